@@ -1,0 +1,1 @@
+"""The equations, each once, in CasADi; :func:`build` makes the model of a card."""

@@ -1,0 +1,330 @@
+"""The one object from which everything is derived: a model with its variables, named and with units.
+
+A :class:`Model` says what its states, inputs and parameters are, and defines named *quantities* (angles, forces,
+accelerations) by CasADi expressions of these and of each other. Simulation, linearisation, sensitivities, the C code
+and the XML of the FMU all read this object; none of them types an equation or a list of variables again.
+
+Quantities are what makes an effect possible: an effect redefines one (``force.Y`` becomes ``force.Y`` plus something)
+and returns a new model. They may be given in any order; the model sorts them by what they use.
+"""
+
+from __future__ import annotations
+
+import graphlib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.units import UNITS
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Variable:
+    """A named scalar of a model.
+
+    Parameters
+    ----------
+    name : str
+        Structured name as in the FMU, ``motion.u``.
+    unit : str
+        Key of :data:`tank2sim.units.UNITS`; angles are in rad.
+    description : str
+        What it is, with its sign convention.
+    nominal : float
+        A typical magnitude, in `unit`, for solvers that scale.
+    minimum, maximum : float, optional
+        Bounds, in `unit`.
+    display_unit : str, optional
+        One of the unit's ``displays``.
+    boolean : bool
+        A truth value; its symbol holds 0 or 1.
+    """
+
+    name: str
+    unit: str
+    description: str
+    nominal: float = 1.0
+    minimum: float | None = None
+    maximum: float | None = None
+    display_unit: str | None = None
+    boolean: bool = False
+
+    @cached_property
+    def symbol(self) -> ca.SX:
+        """The scalar CasADi symbol that stands for this variable in expressions."""
+        return ca.SX.sym(self.name)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Parameter(Variable):
+    """A constant of the model; `tunable` ones may be changed while a simulation runs."""
+
+    start: float
+    tunable: bool = True
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Input(Variable):
+    """What acts on the model from outside."""
+
+    start: float = 0.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class State(Variable):
+    """A continuous state.
+
+    Parameters
+    ----------
+    derivative : str
+        Name of the quantity that is its time derivative.
+    start : casadi.SX or float
+        Value at the beginning, an expression of parameters.
+    steady : bool
+        True if its derivative vanishes in steady motion and trimming solves for it.
+    trim : casadi.SX, optional
+        Value in steady motion as an expression of inputs and parameters (a rudder at its order).
+    """
+
+    derivative: str
+    start: ca.SX | float
+    steady: bool = False
+    trim: ca.SX | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Quantity(Variable):
+    """A value defined by an expression of states, inputs, parameters and other quantities."""
+
+    value: ca.SX
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """States, inputs, parameters and the quantities between them.
+
+    Parameters
+    ----------
+    name, description : str
+        The ship (or body), and one sentence on what the model is.
+    states, inputs, parameters, quantities : tuples
+        The variables.
+    outputs : tuple of str
+        Names of the states and quantities that are outputs.
+    step_s : float
+        Step for fixed-step integration (classical Runge-Kutta) at which it is accurate, s.
+    notices : tuple of str
+        What a user of this model should be told (assumptions taken, keys not used).
+
+    Raises
+    ------
+    ValueError
+        Two variables have one name, a name or unit is unknown, an expression uses a symbol that is no variable of the
+        model, or quantities define each other in a circle.
+    """
+
+    name: str
+    description: str
+    states: tuple[State, ...]
+    inputs: tuple[Input, ...]
+    parameters: tuple[Parameter, ...]
+    quantities: tuple[Quantity, ...]
+    outputs: tuple[str, ...]
+    step_s: float
+    notices: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [variable.name for variable in self.variables]
+        if len(set(names)) != len(names):
+            raise ValueError(f"doubled variable: {sorted({name for name in names if names.count(name) > 1})}")
+        for variable in self.variables:
+            unit = UNITS.get(variable.unit)
+            if unit is None or (variable.display_unit is not None and variable.display_unit not in unit.displays):
+                raise ValueError(f"{variable.name}: unknown unit {variable.unit} or {variable.display_unit}")
+        known = {quantity.name for quantity in self.quantities}
+        for name in (*self.outputs, *(state.derivative for state in self.states)):
+            if name not in known and name not in {state.name for state in self.states}:
+                raise ValueError(f"{name} is no state or quantity")
+        _ = self._sorted_quantities
+
+    # -- looking things up -------------------------------------------------------------------------------------------
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """All variables: states, inputs, parameters, quantities."""
+        return (*self.states, *self.inputs, *self.parameters, *self.quantities)
+
+    def __getitem__(self, name: str) -> Variable:
+        return self._by_name[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._by_name
+
+    def symbol(self, name: str) -> ca.SX:
+        """The symbol of a variable, to write expressions with."""
+        return self._by_name[name].symbol
+
+    @cached_property
+    def _by_name(self) -> dict[str, Variable]:
+        return {variable.name: variable for variable in self.variables}
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the states in the order of the vector x."""
+        return tuple(variable.name for variable in self.states)
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Names of the inputs in the order of the vector u."""
+        return tuple(variable.name for variable in self.inputs)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters in the order of the vector p."""
+        return tuple(variable.name for variable in self.parameters)
+
+    def input_values(self, changed: Mapping[str, float] | None = None) -> Vector:
+        """The input vector u: start values, with those of `changed` (by name) in place of their own."""
+        return _values(self.inputs, changed or {})
+
+    def parameter_values(self, changed: Mapping[str, float] | None = None) -> Vector:
+        """The parameter vector p: start values, with those of `changed` (by name) in place of their own."""
+        return _values(self.parameters, changed or {})
+
+    # -- making another model of it (what effects do) ----------------------------------------------------------------
+
+    def redefine(self, name: str, value: Callable[[ca.SX], ca.SX]) -> Model:
+        """A model in which the quantity `name` has the value ``value(old expression)``."""
+        if name not in {quantity.name for quantity in self.quantities}:
+            raise ValueError(f"{name} is no quantity of {self.name}")
+        changed = tuple(
+            _same_symbol(quantity, replace(quantity, value=ca.SX(value(quantity.value))))
+            if quantity.name == name
+            else quantity
+            for quantity in self.quantities
+        )
+        return replace(self, quantities=changed)
+
+    def extend(self, *variables: Variable, outputs: Iterable[str] = (), notices: Iterable[str] = ()) -> Model:
+        """A model with more variables (each put with its own kind), outputs and notices."""
+
+        def those(kind: type[Variable]) -> tuple[Variable, ...]:
+            return tuple(variable for variable in variables if isinstance(variable, kind))
+
+        return replace(
+            self,
+            states=(*self.states, *those(State)),
+            inputs=(*self.inputs, *those(Input)),
+            parameters=(*self.parameters, *those(Parameter)),
+            quantities=(*self.quantities, *those(Quantity)),
+            outputs=(*self.outputs, *outputs),
+            notices=(*self.notices, *notices),
+        )
+
+    # -- what is derived ---------------------------------------------------------------------------------------------
+
+    @cached_property
+    def x(self) -> ca.SX:
+        """State vector (nx, 1) of symbols."""
+        return ca.vcat([variable.symbol for variable in self.states])
+
+    @cached_property
+    def u(self) -> ca.SX:
+        """Input vector (nu, 1) of symbols."""
+        return ca.vcat([variable.symbol for variable in self.inputs])
+
+    @cached_property
+    def p(self) -> ca.SX:
+        """Parameter vector (np, 1) of symbols."""
+        return ca.vcat([variable.symbol for variable in self.parameters])
+
+    def expand(self, expression: ca.SX) -> ca.SX:
+        """The expression in states, inputs and parameters alone: every quantity is replaced by its definition."""
+        ordered = self._sorted_quantities
+        definitions = [quantity.value for quantity in ordered]
+        expanded: list[ca.SX] = ca.substitute_inplace([q.symbol for q in ordered], definitions, [expression])[1]
+        return expanded[0]
+
+    @cached_property
+    def rates(self) -> ca.SX:
+        """Right-hand side dx/dt (nx, 1) as an expression of x, u, p."""
+        return self.expand(ca.vcat([self.symbol(state.derivative) for state in self.states]))
+
+    @cached_property
+    def output_values(self) -> ca.SX:
+        """Outputs (ny, 1) as an expression of x, u, p."""
+        return self.expand(ca.vcat([self.symbol(name) for name in self.outputs]))
+
+    @cached_property
+    def rhs(self) -> ca.Function:
+        """``rhs(x, u, p) -> xdot``."""
+        return ca.Function("rhs", [self.x, self.u, self.p], [self.rates], ["x", "u", "p"], ["xdot"], {"cse": True})
+
+    @cached_property
+    def output(self) -> ca.Function:
+        """``output(x, u, p) -> y``, in the order of :attr:`outputs`."""
+        arguments = [self.x, self.u, self.p]
+        return ca.Function("output", arguments, [self.output_values], ["x", "u", "p"], ["y"], {"cse": True})
+
+    @cached_property
+    def initial(self) -> ca.Function:
+        """``initial(p) -> x``: the states at the beginning."""
+        start = ca.vcat([ca.SX(state.start) for state in self.states])
+        return ca.Function("initial", [self.p], [start], ["p"], ["x"])
+
+    @cached_property
+    def trim_step(self) -> ca.Function | None:
+        """``trim_step(x, u, p) -> x``: one Newton step towards steady motion; None if the model has no such states.
+
+        States with a ``trim`` expression take its value; those marked ``steady`` move by ``-J^-1 f``, f their
+        derivatives; the others stay.
+        """
+        places = [place for place, state in enumerate(self.states) if state.steady]
+        if not places:
+            return None
+        fixed = [state.symbol if state.trim is None else state.trim for state in self.states]
+        unknown = self.x[places]
+        residual = ca.substitute(self.rates[places], self.x, ca.vcat(fixed))
+        change = ca.solve(ca.jacobian(residual, unknown), residual)
+        for row, place in enumerate(places):
+            fixed[place] = self.states[place].symbol - change[row]
+        return ca.Function(
+            "trim_step", [self.x, self.u, self.p], [ca.vcat(fixed)], ["x", "u", "p"], ["x_next"], {"cse": True}
+        )
+
+    @cached_property
+    def _sorted_quantities(self) -> tuple[Quantity, ...]:
+        by_symbol = {quantity.symbol.element_hash(): quantity for quantity in self.quantities}
+        known = {variable.symbol.element_hash() for variable in (*self.states, *self.inputs, *self.parameters)}
+        uses: dict[str, set[str]] = {}
+        for quantity in self.quantities:
+            symbols = {symbol.element_hash(): symbol for symbol in ca.symvar(quantity.value)}
+            strangers = [symbols[key].name() for key in symbols if key not in known and key not in by_symbol]
+            if strangers:
+                raise ValueError(f"{quantity.name} uses {strangers}, which are no variables of the model")
+            uses[quantity.name] = {by_symbol[key].name for key in symbols if key in by_symbol}
+        try:
+            order = graphlib.TopologicalSorter(uses).static_order()
+            named = {quantity.name: quantity for quantity in self.quantities}
+            return tuple(named[name] for name in order)
+        except graphlib.CycleError as error:
+            raise ValueError(f"quantities define each other in a circle: {error.args[1]}") from None
+
+
+def _values(variables: tuple[Parameter, ...] | tuple[Input, ...], changed: Mapping[str, float]) -> Vector:
+    unknown = set(changed) - {variable.name for variable in variables}
+    if unknown:
+        raise KeyError(f"no such variable: {', '.join(sorted(unknown))}")
+    return np.array([changed.get(variable.name, variable.start) for variable in variables], dtype=float)
+
+
+def _same_symbol(old: Quantity, new: Quantity) -> Quantity:
+    # cached_property stores in __dict__, so this keeps the symbol that other expressions already use.
+    new.__dict__["symbol"] = old.symbol
+    return new

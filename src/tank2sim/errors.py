@@ -1,0 +1,27 @@
+"""The one kind of error a user sees: a fault in what was given, told in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class InputError(Exception):
+    """Something given to the program is wrong, and the user can mend it.
+
+    The command line prints it as one line and ends with exit code 2.
+
+    Parameters
+    ----------
+    source : path or str
+        The file (or option) at fault.
+    place : str
+        Where in it: a key, a line, a column; empty if it is the file as a whole.
+    problem : str
+        What is wrong.
+    remedy : str
+        What to do about it.
+    """
+
+    def __init__(self, source: Path | str, place: str, problem: str, remedy: str):
+        self.source, self.place, self.problem, self.remedy = str(source), place, problem, remedy
+        super().__init__(": ".join(part for part in (self.source, place, problem) if part) + f"; {remedy}")

@@ -1,0 +1,1 @@
+"""The FMU of a model: described, generated, compiled, packed and verified."""

@@ -1,0 +1,1 @@
+"""From measured records to the coefficients of a model, with their uncertainty."""

@@ -1,0 +1,1 @@
+"""Integration of a model, manoeuvres, and the figures read off them."""

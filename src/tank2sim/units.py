@@ -1,0 +1,90 @@
+"""Units: those that stand in the names of keys and columns, and those that an FMU declares.
+
+A number's unit stands at the end of its name (``length_m``, ``psi_deg``). Inside the program everything is SI and
+radians; :func:`to_si` converts a named number once, at the door.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+KNOT_MPS = 1852.0 / 3600.0
+"""One international knot, 1852 m an hour (BIPM SI brochure, 9th ed., table 8)."""
+
+# suffix -> (SI suffix, factor). The order matters: longer suffixes first, so that `_degps` is not read as `_s`.
+_SUFFIXES: dict[str, tuple[str, float]] = {
+    "degps": ("radps", math.pi / 180.0),
+    "degpmin": ("radps", math.pi / 180.0 / 60.0),
+    "radps": ("radps", 1.0),
+    "rpm": ("radps", 2.0 * math.pi / 60.0),
+    "rps": ("radps", 2.0 * math.pi),
+    "deg": ("rad", math.pi / 180.0),
+    "rad": ("rad", 1.0),
+}
+
+
+def to_si(name: str, value: float) -> tuple[str, float]:
+    """Name and value in SI: ``("max_angle_deg", 40.0)`` becomes ``("max_angle_rad", 0.698...)``.
+
+    Names whose unit is SI already, or that bear none, come back unchanged.
+    """
+    stem, _, suffix = name.rpartition("_")
+    if stem and suffix in _SUFFIXES:
+        si_suffix, factor = _SUFFIXES[suffix]
+        return f"{stem}_{si_suffix}", value * factor
+    return name, value
+
+
+def from_si(name: str, value: float) -> float:
+    """The inverse of :func:`to_si` for one value: what stands under `name` in a file, from its SI value."""
+    _, factor = to_si(name, 1.0)
+    return value / factor
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as FMI describes it: exponents of the SI base units, and the units it may be shown in.
+
+    Parameters
+    ----------
+    name : str
+        Name in the model description, such as ``m/s``.
+    base : dict
+        Exponents of the SI base units and of rad (``kg m s A K mol cd rad``).
+    displays : dict
+        Name of a display unit to its factor: *display = factor * value in this unit*.
+    """
+
+    name: str
+    base: dict[str, int]
+    displays: dict[str, float] = field(default_factory=dict)
+
+
+UNITS: dict[str, Unit] = {
+    unit.name: unit
+    for unit in (
+        Unit("1", {}),
+        Unit("m", {"m": 1}),
+        Unit("s", {"s": 1}),
+        Unit("kg", {"kg": 1}),
+        Unit("rad", {"rad": 1}, {"deg": 180.0 / math.pi}),
+        Unit("m/s", {"m": 1, "s": -1}, {"knots": 1.0 / KNOT_MPS}),
+        Unit("m/s2", {"m": 1, "s": -2}),
+        Unit(
+            "rad/s",
+            {"rad": 1, "s": -1},
+            {"deg/s": 180.0 / math.pi, "deg/min": 60.0 * 180.0 / math.pi, "rpm": 60.0 / (2.0 * math.pi)},
+        ),
+        Unit("rad/s2", {"rad": 1, "s": -2}, {"deg/s2": 180.0 / math.pi}),
+        Unit("N", {"kg": 1, "m": 1, "s": -2}),
+        Unit("N.m", {"kg": 1, "m": 2, "s": -2}),
+        Unit("kg/m3", {"kg": 1, "m": -3}),
+        Unit("kg.m", {"kg": 1, "m": 1}),
+        Unit("kg.m2", {"kg": 1, "m": 2}),
+        Unit("kg/m", {"kg": 1, "m": -1}),
+        Unit("kg.s/m2", {"kg": 1, "m": -2, "s": 1}),
+        Unit("kg.s2/m3", {"kg": 1, "m": -3, "s": 2}),
+    )
+}
+"""Every unit a variable of a model may declare."""
