@@ -14,6 +14,7 @@ import graphlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import casadi as ca
 import numpy as np
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from tank2sim.units import UNITS
 
 Vector = NDArray[np.float64]
+Kind = TypeVar("Kind", bound="Variable")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -214,7 +216,7 @@ class Model:
     def extend(self, *variables: Variable, outputs: Iterable[str] = (), notices: Iterable[str] = ()) -> Model:
         """A model with more variables (each put with its own kind), outputs and notices."""
 
-        def those(kind: type[Variable]) -> tuple[Variable, ...]:
+        def those(kind: type[Kind]) -> tuple[Kind, ...]:
             return tuple(variable for variable in variables if isinstance(variable, kind))
 
         return replace(
