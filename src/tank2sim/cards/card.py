@@ -1,0 +1,105 @@
+"""What is known of a ship, in the conventions of the program: prime system, starboard positive, SI, radians."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tank2sim.cards.form import (
+    EffectEntry,
+    Environment,
+    Propulsion,
+    RigidBody,
+    Ship,
+    ShipModel,
+    SteeringGear,
+    Surge,
+    SurgeModel,
+)
+from tank2sim.cards.scaling import Scales
+from tank2sim.errors import InputError
+from tank2sim.files import write_whole
+
+DEFAULT_RELATIVE_ERROR = 0.02
+"""Standard error of a derivative without ``[uncertainty]``, relative to its value (card format)."""
+
+
+@dataclass(frozen=True)
+class Card:
+    """A card: its text, and what the text says.
+
+    The text is kept as it was read, comments and all, so that a card is written back without loss; the other fields are
+    converted from it once.
+
+    Parameters
+    ----------
+    source : str
+        File name, for messages.
+    text : str
+        The TOML text.
+    ship, environment
+        Particulars and surroundings, SI.
+    """
+
+    source: str
+    text: str
+    ship: Ship
+    environment: Environment
+
+    def write(self, path: Path) -> None:
+        """Write the card's text to a file, whole or not at all."""
+        write_whole(path, self.text)
+
+    def fault(self, place: str, problem: str, remedy: str) -> InputError:
+        """An error about this card, to be raised."""
+        return InputError(self.source, place, problem, remedy)
+
+
+@dataclass(frozen=True)
+class ManoeuvringCard(Card):
+    """Card of a ship that manoeuvres in the horizontal plane.
+
+    Parameters
+    ----------
+    model : ShipModel
+        Kind of equations; ``speed_scale`` and ``yaw_rate_terms`` hold for the numbers below, the file's ``scaling`` and
+        ``rudder_sign`` only for the text.
+    rigid_body : RigidBody
+        m', J_z', x_G', all about the origin.
+    derivatives : mapping
+        Canonical name to prime value, rudder positive to starboard; absent means 0.
+    uncertainty : mapping
+        Canonical name to standard error, same scaling; absent means :data:`DEFAULT_RELATIVE_ERROR`.
+    places : mapping
+        Canonical name to the key under which the file has it.
+    effects : tuple
+        Effects on top of the polynomial, in the order of the file.
+    """
+
+    model: ShipModel
+    rigid_body: RigidBody
+    derivatives: Mapping[str, float]
+    uncertainty: Mapping[str, float] = field(default_factory=dict)
+    places: Mapping[str, str] = field(default_factory=dict)
+    steering_gear: SteeringGear | None = None
+    propulsion: Propulsion | None = None
+    effects: tuple[EffectEntry, ...] = ()
+
+    @property
+    def scales(self) -> Scales:
+        """What makes this ship's numbers non-dimensional."""
+        return Scales(self.environment.water_density_kgpm3, self.ship.length_m, self.model.speed_mps)
+
+    def standard_error(self, name: str) -> float:
+        """Standard error of a derivative (prime): as stated, or the default share of its value."""
+        return self.uncertainty.get(name, DEFAULT_RELATIVE_ERROR * abs(self.derivatives.get(name, 0.0)))
+
+
+@dataclass(frozen=True)
+class SurgeBodyCard(Card):
+    """Card of a body that only surges: (1.5) of paper 1, SI."""
+
+    model: SurgeModel
+    surge: Surge
+    uncertainty: Mapping[str, float] = field(default_factory=dict)

@@ -1,0 +1,304 @@
+"""Cards from TOML: found by file or by the name of a bundled ship, checked for form, converted once."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from pydantic import ValidationError
+from tomlkit.exceptions import ParseError, TOMLKitError
+
+from tank2sim.bundled import bundled_cards
+from tank2sim.cards.card import Card, ManoeuvringCard, SurgeBodyCard
+from tank2sim.cards.form import FORMS, EffectEntry, RigidBody, ShipCard, SurgeCard
+from tank2sim.cards.scaling import Scales, file_factor
+from tank2sim.cards.terms import parse_term
+from tank2sim.errors import InputError
+from tank2sim.files import read_text
+from tank2sim.units import from_si, to_si
+
+# Sections whose keys may give an angle in degrees or radians.
+_SECTIONS_WITH_ANGLES = ("steering_gear", "propulsion")
+
+
+def find_card(name: str) -> Path:
+    """Path of a card given on the command line: a file, or a bundled ship's name in any case.
+
+    Raises
+    ------
+    InputError
+        It is neither.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    ships = bundled_cards()
+    if name.lower() in ships:
+        return ships[name.lower()]
+    raise InputError(name, "", "is no file and no bundled ship", f"bundled are: {', '.join(ships)}")
+
+
+def read_card(name: str | Path, changes: Mapping[str, object] | None = None) -> Card:
+    """Read a card.
+
+    Parameters
+    ----------
+    name : str or path
+        A file, or the name of a bundled ship.
+    changes : mapping, optional
+        Values to put in place of the file's, by dotted key, in the file's conventions: ``{"derivatives.Yv": -0.0117}``.
+
+    Raises
+    ------
+    InputError
+        There is no such card, or something in it is wrong; the message names file, key and what was expected.
+    """
+    path = find_card(str(name))
+    text = read_text(path)
+    return parse_card(changed_text(text, str(path), changes) if changes else text, str(path))
+
+
+def parse_card(text: str, source: str) -> Card:
+    """The card that a TOML text describes; `source` names it in messages. Raises as :func:`read_card`."""
+    content = _toml(text, source).unwrap()
+    if not isinstance(content.get("model"), dict):
+        raise InputError(source, "model", "this section is missing", "a card needs [model] with its kind")
+    kind = content["model"].get("kind")
+    if kind not in FORMS:
+        raise InputError(source, "model.kind", f"is {kind!r}", f"one of {', '.join(FORMS)} was expected")
+    spelt: dict[str, str] = {}
+    _angles_to_radians(content, source, spelt)
+    try:
+        form = FORMS[kind].model_validate(content)
+    except ValidationError as error:
+        raise _told(error, source, spelt) from None
+    if isinstance(form, ShipCard):
+        return _manoeuvring_card(form, text, source)
+    return _surge_card(form, text, source)
+
+
+def changed_text(text: str, source: str, changes: Mapping[str, object]) -> str:
+    """A card's text with values at dotted keys replaced or added; everything else stays as it is, comments included.
+
+    Raises
+    ------
+    InputError
+        A key leads through something that is no section.
+    """
+    document = _toml(text, source)
+    for key, value in changes.items():
+        *sections, last = key.split(".")
+        table: Any = document
+        for section in sections:
+            if section not in table:
+                table[section] = tomlkit.table()
+            table = table[section]
+            if not isinstance(table, dict):
+                raise InputError(source, key, f"cannot be set: {section} is no section", "give section.key=value")
+        table[last] = value
+    return tomlkit.dumps(document)
+
+
+def revised(card: ManoeuvringCard, derivatives: Mapping[str, tuple[float, float]]) -> ManoeuvringCard:
+    """A card with other derivatives: canonical name to (value, standard error), prime and starboard-positive.
+
+    They are written in the conventions of the card's own text.
+    """
+    scales = card.scales if card.model.scaling == "dimensional" else None
+    changes: dict[str, object] = {}
+    for name, (value, error) in derivatives.items():
+        term = parse_term(name)
+        if term is None:
+            raise ValueError(f"{name} is no derivative")
+        factor = file_factor(term, scales, rudder_to_port=card.model.rudder_sign == "port")
+        key = card.places.get(name, name)
+        changes[f"derivatives.{key}"] = value * factor
+        changes[f"uncertainty.{key}"] = error * abs(factor)
+    new = parse_card(changed_text(card.text, card.source, changes), card.source)
+    assert isinstance(new, ManoeuvringCard)
+    return new
+
+
+def _toml(text: str, source: str) -> tomlkit.TOMLDocument:
+    try:
+        return tomlkit.parse(text)
+    except ParseError as error:
+        problem = str(error).split(" at line")[0]
+        remedy = "give it once" if "already" in problem or "exists" in problem else "mend the TOML there"
+        raise InputError(source, f"line {error.line} column {error.col}", problem, remedy) from None
+    except TOMLKitError as error:
+        raise InputError(source, "", str(error), "mend the TOML; a key may stand once") from None
+
+
+def _angles_to_radians(content: dict[str, Any], source: str, spelt: dict[str, str]) -> None:
+    """Convert degrees in place; `spelt` learns what a converted key is called in the file."""
+    places = [(name, content[name]) for name in _SECTIONS_WITH_ANGLES if name in content]
+    entries = content.get("effects")
+    for number, entry in enumerate(entries if isinstance(entries, list) else []):
+        if isinstance(entry, dict):
+            places += [
+                (f"effects.{number}.{part}", entry[part]) for part in ("parameters", "uncertainty") if part in entry
+            ]
+    for place, section in places:
+        if not isinstance(section, dict):
+            continue  # the form will refuse it
+        for key in list(section):
+            value = section[key]
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                continue
+            si_key, si_value = to_si(key, value)
+            spelt[f"{place}.{si_key}"] = f"{place}.{key}"
+            if si_key != key:
+                if si_key in section:
+                    raise InputError(source, f"{place}.{key}", f"is given twice, also as {si_key}", "give it once")
+                del section[key]
+                section[si_key] = si_value
+
+
+def _told(error: ValidationError, source: str, spelt: Mapping[str, str]) -> InputError:
+    """The first fault that pydantic found, as one line of ours."""
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"])
+    place = spelt.get(place, place)
+    key = place.rpartition(".")[2]
+    wanted = first.get("ctx", {})
+
+    def shown(value: float) -> str:
+        return f"{from_si(key, value):g}"
+
+    match first["type"]:
+        case "missing":
+            told = "is missing", "add it"
+        case "extra_forbidden":
+            told = "is no key of a card", _suggestion(key, _siblings(first["loc"]))
+        case "finite_number":
+            told = f"is {first['input']}", "a finite number was expected"
+        case "float_type" | "int_type":
+            told = f"is {first['input']!r}", "a number was expected"
+        case "greater_than":
+            told = f"is {shown(first['input'])}", f"a number greater than {shown(wanted['gt'])} was expected"
+        case "greater_than_equal":
+            told = f"is {shown(first['input'])}", f"a number of at least {shown(wanted['ge'])} was expected"
+        case "less_than" | "less_than_equal":
+            told = (
+                f"is {shown(first['input'])}",
+                f"a number below {shown(wanted['lt' if 'lt' in wanted else 'le'])} was expected",
+            )
+        case "literal_error":
+            told = f"is {first['input']!r}", f"{wanted['expected']} was expected"
+        case "value_error":
+            told = "is not as it must be", str(wanted["error"])
+        case _:
+            told = f"is {first['input']!r}"[:80], first["msg"][0].lower() + first["msg"][1:]
+    more = len(error.errors()) - 1
+    return InputError(
+        source, place, told[0], told[1] + (f" ({more} more fault{'s' * (more > 1)} after this)" if more else "")
+    )
+
+
+def _siblings(place: tuple[int | str, ...]) -> list[str]:
+    """Keys that may stand where an unknown one was found."""
+    form: Any = ShipCard if place[0] != "surge" else SurgeCard
+    for part in place[:-1]:
+        annotation = form.model_fields[part].annotation if isinstance(part, str) and part in form.model_fields else None
+        inner = [kind for kind in (annotation, *getattr(annotation, "__args__", ())) if hasattr(kind, "model_fields")]
+        if isinstance(part, int):
+            continue
+        if not inner:
+            return []
+        form = inner[0]
+    return list(form.model_fields)
+
+
+def _suggestion(key: str, known: list[str]) -> str:
+    close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
+    same_stem = [name for name in known if name.partition("_")[0] == key.partition("_")[0]]
+    best = close or same_stem
+    return f"did you mean {best[0]}?" if best else f"known here: {', '.join(known)}" if known else "remove it"
+
+
+def _manoeuvring_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard:
+    dimensional = form.model.scaling == "dimensional"
+    ship_scales = Scales(form.environment.water_density_kgpm3, form.ship.length_m, form.model.speed_mps)
+    scales = ship_scales if dimensional else None
+    to_port = form.model.rudder_sign == "port"
+    body = _prime_rigid_body(form.rigid_body, scales, source)
+    places = _canonical_names(form.derivatives, "derivatives", source)
+    stated = _canonical_names(form.uncertainty, "uncertainty", source)
+
+    def inside(name: str, value: float) -> float:
+        term = parse_term(name)
+        assert term is not None
+        return value / file_factor(term, scales, rudder_to_port=to_port)
+
+    _refuse_doubled_effects(form.effects, source)
+    return ManoeuvringCard(
+        source=source,
+        text=text,
+        ship=form.ship,
+        environment=form.environment,
+        model=form.model,
+        rigid_body=body,
+        derivatives={name: inside(name, form.derivatives[key]) for name, key in places.items()},
+        uncertainty={name: abs(inside(name, form.uncertainty[key])) for name, key in stated.items()},
+        places=places,
+        steering_gear=form.steering_gear,
+        propulsion=form.propulsion,
+        effects=tuple(form.effects),
+    )
+
+
+def _surge_card(form: SurgeCard, text: str, source: str) -> SurgeBodyCard:
+    for key in form.uncertainty:
+        if key not in type(form.surge).model_fields:
+            known = _suggestion(key, list(type(form.surge).model_fields))
+            raise InputError(source, f"uncertainty.{key}", "is no coefficient of [surge]", known)
+    return SurgeBodyCard(
+        source=source,
+        text=text,
+        ship=form.ship,
+        environment=form.environment,
+        model=form.model,
+        surge=form.surge,
+        uncertainty=form.uncertainty,
+    )
+
+
+def _prime_rigid_body(body: RigidBody, scales: Scales | None, source: str) -> RigidBody:
+    if scales is not None:
+        body = RigidBody(
+            mass=body.mass / scales.mass, yaw_inertia=body.yaw_inertia / scales.inertia, x_G=body.x_G / scales.length
+        )
+    # No ship's m' exceeds 2 (m' = 2 C_B B T / L^2, each ratio below 1), and its centre of gravity lies inside the hull.
+    if body.mass > 2.0:
+        remedy = 'a prime mass is about 0.01; is the card in SI (scaling = "dimensional")?'
+        raise InputError(source, "rigid_body.mass", f"is {body.mass:g} in the prime system", remedy)
+    if abs(body.x_G) > 0.5:
+        remedy = "x_G is measured from midships, positive forward, in lengths if scaling is prime"
+        raise InputError(source, "rigid_body.x_G", f"puts the centre of gravity {body.x_G:g} L from midships", remedy)
+    return body
+
+
+def _canonical_names(values: Mapping[str, float], section: str, source: str) -> dict[str, str]:
+    """Canonical name to the key in the file."""
+    places: dict[str, str] = {}
+    for key in values:
+        term = parse_term(key)
+        if term is None:
+            remedy = "a name is X, Y or N and then v, r, d, u as often as they occur (Yvvr), 0 or udot, vdot, rdot"
+            raise InputError(source, f"{section}.{key}", "is no name of a derivative", remedy)
+        if term.name in places:
+            problem = f"is the same term as {places[term.name]}"
+            raise InputError(source, f"{section}.{key}", problem, f"give it once, as {term.name}")
+        places[term.name] = key
+    return places
+
+
+def _refuse_doubled_effects(effects: list[EffectEntry], source: str) -> None:
+    names = [entry.name for entry in effects]
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise InputError(source, f"effects.{number}.name", f"{name} stands twice", "give each effect once")

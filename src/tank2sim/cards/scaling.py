@@ -1,0 +1,68 @@
+"""Prime system and signs: converted here, once, between a card's file and the program.
+
+Inside, every derivative is non-dimensional in the prime system (forces by 1/2 rho L^2 V^2, moments by 1/2 rho L^3 V^2,
+v' = v/V, r' = r L/V, Du' = Du/V; inertias and acceleration derivatives by rho and L alone) and the rudder is positive
+to starboard.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from tank2sim.cards.terms import Term
+
+
+@dataclass(frozen=True)
+class Scales:
+    """What makes a number of one ship non-dimensional: water density (kg/m3), length (m), speed of the scaling (m/s).
+
+    Numbers, or CasADi expressions: the equations of motion use the same scales.
+    """
+
+    density: Any
+    length: Any
+    speed: Any
+
+    def derivative(self, term: Term) -> Any:
+        """SI value of a derivative whose prime value is 1.
+
+        F = 1/2 rho L^2 V^2 a' (v/V)^i (r L/V)^j d^k (Du/V)^l, and L times that for N; for acceleration derivatives V
+        cancels and only rho and L remain.
+        """
+        arm = 1 if term.force == "N" else 0
+        if term.acceleration:
+            turning = 1 if term.acceleration == "r" else 0
+            return 0.5 * self.density * self.length ** (3 + arm + turning)
+        return 0.5 * self.density * self.length ** (2 + arm + term.r) * self.speed ** (2 - term.v - term.r - term.u)
+
+    @property
+    def mass(self) -> Any:
+        """SI value of m' = 1, kg."""
+        return 0.5 * self.density * self.length**3
+
+    @property
+    def inertia(self) -> Any:
+        """SI value of J_z' = 1, kg m2."""
+        return 0.5 * self.density * self.length**5
+
+    @property
+    def force(self) -> Any:
+        """SI value of X' = 1, N."""
+        return 0.5 * self.density * self.length**2 * self.speed**2
+
+
+def file_factor(term: Term, scales: Scales | None, *, rudder_to_port: bool) -> float:
+    """What a derivative inside (prime, starboard) is multiplied by to stand in a file.
+
+    Parameters
+    ----------
+    term : Term
+        The derivative.
+    scales : Scales or None
+        The ship's scales if the file is dimensional (SI), None if it is in the prime system.
+    rudder_to_port : bool
+        The file counts rudder angles positive to port: odd powers of the rudder change sign.
+    """
+    sign = -1.0 if rudder_to_port and term.d % 2 else 1.0
+    return sign * (float(scales.derivative(term)) if scales else 1.0)

@@ -1,0 +1,58 @@
+"""Names of hydrodynamic derivatives: how a name is spelt, and which powers of v, r, rudder and speed it stands for.
+
+Which names a model has is said where its equation stands (:mod:`tank2sim.dynamics.abkowitz`); this is only the grammar:
+``Yvvr`` is the coefficient of v^2 r in Y, ``X0`` a constant, ``Y0u`` the coefficient of Du in Y, ``Nrdot`` an
+acceleration derivative.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+_VELOCITY_TERM = re.compile(r"([XYN])(0?)([vrdu]*)")
+_ACCELERATION_TERM = re.compile(r"([XYN])([uvr])dot")
+
+
+@dataclass(frozen=True)
+class Term:
+    """One derivative: a force and what it is derived by.
+
+    Parameters
+    ----------
+    force : str
+        ``X``, ``Y`` or ``N``.
+    v, r, d, u : int
+        Powers of sway velocity, yaw rate, rudder angle and speed change Du in the term.
+    acceleration : str
+        ``u``, ``v`` or ``r`` for an acceleration derivative (its powers are then zero), else empty.
+    """
+
+    force: str
+    v: int = 0
+    r: int = 0
+    d: int = 0
+    u: int = 0
+    acceleration: str = ""
+
+    @property
+    def name(self) -> str:
+        """Canonical spelling: order v, r, d, u; a term of Y or N in Du alone is ``Y0u``, for it exists by asymmetry."""
+        if self.acceleration:
+            return f"{self.force}{self.acceleration}dot"
+        odd = "v" * self.v + "r" * self.r + "d" * self.d
+        zero = "0" if not odd and (self.force != "X" or not self.u) else ""
+        return self.force + zero + odd + "u" * self.u
+
+
+def parse_term(name: str) -> Term | None:
+    """The term a name stands for, whatever the order of its letters (``Xudd`` is ``Xddu``); None if it is no name."""
+    acceleration = _ACCELERATION_TERM.fullmatch(name)
+    if acceleration:
+        return Term(acceleration[1], acceleration=acceleration[2])
+    velocity = _VELOCITY_TERM.fullmatch(name)
+    if velocity is None or (velocity[2] and set(velocity[3]) - {"u"}) or not (velocity[2] or velocity[3]):
+        return None
+    letters = velocity[3]
+    v, r, d, u = (letters.count(letter) for letter in "vrdu")
+    return Term(velocity[1], v, r, d, u)

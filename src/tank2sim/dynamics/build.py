@@ -1,0 +1,65 @@
+"""The model of a card: the equations its kind asks for, with its effects on top."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import replace
+
+from tank2sim.cards.card import Card, ManoeuvringCard, SurgeBodyCard
+from tank2sim.cards.form import EffectEntry
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.ship import ship_model
+from tank2sim.dynamics.surge import SurgeCoefficients, surge_model
+
+
+def build(card: Card) -> Model:
+    """Build the model that a card describes.
+
+    Raises
+    ------
+    InputError
+        The card names a derivative, an effect or a parameter that the model does not know, or its mass matrix is
+        singular; the message names the key.
+    """
+    if isinstance(card, SurgeBodyCard):
+        surge = card.surge
+        coefficients = SurgeCoefficients(
+            total_mass_kg=surge.total_mass_kg,
+            B1_kgs2pm3=surge.B1_kgs2pm3,
+            B2_kgspm2=surge.B2_kgspm2,
+            B3_kgpm=surge.B3_kgpm,
+        )
+        return surge_model(card.ship.name, coefficients, surge.force_N, valid_speed_mps=card.model.valid_speed_mps)
+    if not isinstance(card, ManoeuvringCard):
+        raise TypeError(f"no model for {type(card).__name__}")
+    model = ship_model(card)
+    for number, entry in enumerate(card.effects):
+        model = _with_effect(model, card, entry, f"effects.{number}")
+    return model
+
+
+def linear(card: ManoeuvringCard) -> ManoeuvringCard:
+    """The same ship with the linear equations (3.5): a card that :func:`build` makes a linear model of."""
+    return replace(card, model=card.model.model_copy(update={"kind": "linear"}))
+
+
+def _with_effect(model: Model, card: Card, entry: EffectEntry, place: str) -> Model:
+    effect = EFFECTS.get(entry.name)
+    if effect is None:
+        close = difflib.get_close_matches(entry.name, EFFECTS, n=1)
+        remedy = f"did you mean {close[0]}?" if close else f"known are: {', '.join(EFFECTS)}"
+        raise card.fault(f"{place}.name", f"{entry.name!r} is no effect", remedy)
+    known = {parameter.name: parameter for parameter in effect.parameters}
+    for name in (*entry.parameters, *entry.uncertainty):
+        if name not in known:
+            remedy = f"{entry.name} has {', '.join(known)} (angles also in deg)"
+            raise card.fault(f"{place}.parameters.{name}", f"is no parameter of {entry.name}", remedy)
+    for name, parameter in known.items():
+        if name not in entry.parameters:
+            raise card.fault(f"{place}.parameters.{name}", "is missing", f"give the {parameter.description}")
+        value = entry.parameters[name]
+        if not parameter.minimum <= value <= parameter.maximum:
+            expected = f"{parameter.minimum:g} to {parameter.maximum:g} was expected"
+            raise card.fault(f"{place}.parameters.{name}", f"is {value:g}", expected)
+    return effect.apply(model, entry.parameters)

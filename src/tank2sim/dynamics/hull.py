@@ -1,0 +1,177 @@
+"""Forces on the hull and the motion that follows: (3.5) or (3.8) with (3.7) of paper 2, as quantities of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+
+from tank2sim.cards.scaling import Scales
+from tank2sim.cards.terms import parse_term
+from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, LINEAR_TERMS, TERMS, polynomial
+from tank2sim.dynamics.model import Quantity
+from tank2sim.dynamics.propulsion import propeller_force
+from tank2sim.dynamics.rigid_body import Inertia, accelerations, inertia, inertial_forces
+
+VALIDITY_MARGIN = 0.2
+"""Outside the card's range of speeds ``validity`` falls from 1 to 0 over this share of the speed of expansion.
+
+A choice of ours: forces grow with the square of speed, so 20 % of speed is 44 % of force."""
+
+
+@dataclass(frozen=True)
+class Hull:
+    """The hull's symbols, and the conventions in which its coefficients are given.
+
+    Parameters
+    ----------
+    linear : bool
+        (3.5) instead of (3.8).
+    nominal_scale : bool
+        The speed V of the scaling is u0, not U. In the linear model it always is: V = U would not be linear.
+    inertial_terms : bool
+        ``yaw_rate_terms = "hydrodynamic"``: the equations add m x_G, m, -m u and -m x_G u.
+    symbols : mapping
+        States, inputs, parameters and the quantities ``rudder.effective`` and ``propeller.speed_actual``, by name.
+    """
+
+    linear: bool
+    nominal_scale: bool
+    inertial_terms: bool
+    symbols: Mapping[str, ca.SX]
+
+    def __getitem__(self, name: str) -> ca.SX:
+        return self.symbols[name]
+
+    def coefficient(self, name: str) -> ca.SX:
+        """Symbol of a derivative (prime)."""
+        return self.symbols[f"derivatives.{name}"]
+
+    @property
+    def speed(self) -> ca.SX:
+        """U, m/s."""
+        return ca.sqrt(self["motion.u"] ** 2 + self["motion.v"] ** 2)
+
+    def scales(self, speed: ca.SX) -> Scales:
+        """Scales at a speed, as expressions."""
+        return Scales(self["ship.water_density"], self["ship.length"], speed)
+
+
+def motion_quantities(hull: Hull) -> tuple[Quantity, ...]:
+    """``force.*``, ``inertia.*``, ``motion.udot``, ``.vdot``, ``.rdot``, ``.speed``, ``.beta`` and ``validity``."""
+    forces = _force_quantities(hull)
+    masses = _inertia_quantities(hull)
+    matrix = Inertia(*(mass.symbol for mass in masses))
+    motion = accelerations(matrix, *(force.symbol for force in forces))
+    return (*forces, *masses, *_acceleration_quantities(motion), *_water_speed_quantities(hull))
+
+
+def _right_hand_sides(hull: Hull) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """f1, f2, f3 of (3.8), or the right-hand sides of (3.5); N and N m."""
+    u, v, r, u0 = hull["motion.u"], hull["motion.v"], hull["motion.r"], hull["ship.speed"]
+    speed = u0 if hull.linear or hull.nominal_scale else hull.speed
+    scales = hull.scales(speed)
+    names = LINEAR_TERMS if hull.linear else TERMS
+    coefficients = {name: hull.coefficient(name) for force in "XYN" for name in names[force]}
+    primes = (v / speed, r * scales.length / speed, hull["rudder.effective"], (u - u0) / speed)
+    X, Y, N = (polynomial(names[force], coefficients, *primes) for force in "XYN")
+    forces = scales.force * X, scales.force * Y, scales.force * scales.length * N
+    if "propeller.speed" in hull.symbols:
+        revolutions = hull["propeller.speed_actual"], hull["propulsion.nominal_speed"], hull["propulsion.Xnn"]
+        forces = forces[0] + hull.scales(u0).force * propeller_force(*revolutions), *forces[1:]
+    if hull.inertial_terms:
+        surge, sway, yaw = inertial_forces(hull["ship.mass"], hull["ship.x_G"], u0 if hull.linear else u, v, r)
+        # (3.5a) has no m v r: a product of two small quantities.
+        forces = forces[0] + (0 if hull.linear else surge), forces[1] + sway, forces[2] + yaw
+    return forces
+
+
+def _force_quantities(hull: Hull) -> tuple[Quantity, Quantity, Quantity]:
+    f1, f2, f3 = _right_hand_sides(hull)
+    return (
+        Quantity(
+            name="force.X",
+            unit="N",
+            description="Surge force but for that of acceleration, f1 of (3.8), positive forward",
+            nominal=1e5,
+            value=f1,
+        ),
+        Quantity(
+            name="force.Y",
+            unit="N",
+            description="Sway force but for that of acceleration, f2 of (3.8), positive to starboard",
+            nominal=1e5,
+            value=f2,
+        ),
+        Quantity(
+            name="force.N",
+            unit="N.m",
+            description="Yaw moment about midships but for that of acceleration, f3 of (3.8), positive to starboard",
+            nominal=1e7,
+            value=f3,
+        ),
+    )
+
+
+def _inertia_quantities(hull: Hull) -> tuple[Quantity, ...]:
+    """Mass matrix in SI, in the order of :class:`Inertia`."""
+    scales = hull.scales(hull["ship.speed"])
+    added = {}
+    for name in ACCELERATION_TERMS:
+        term = parse_term(name)
+        assert term is not None
+        added[name] = scales.derivative(term) * hull.coefficient(name)
+    matrix = inertia(hull["ship.mass"], hull["ship.x_G"], hull["ship.yaw_inertia"], added)
+    described = (
+        ("inertia.surge", "kg", "Mass with added mass in surge, m - Xudot", matrix.surge),
+        ("inertia.sway", "kg", "Mass with added mass in sway, m - Yvdot", matrix.sway),
+        ("inertia.sway_yaw", "kg.m", "Sway force by yaw acceleration, m x_G - Yrdot", matrix.sway_yaw),
+        ("inertia.yaw_sway", "kg.m", "Yaw moment by sway acceleration, m x_G - Nvdot", matrix.yaw_sway),
+        ("inertia.yaw", "kg.m2", "Yaw inertia with added inertia, J_z - Nrdot", matrix.yaw),
+    )
+    return tuple(
+        Quantity(name=name, unit=unit, description=description, value=value)
+        for name, unit, description, value in described
+    )
+
+
+def _acceleration_quantities(motion: tuple[ca.SX, ca.SX, ca.SX]) -> tuple[Quantity, ...]:
+    described = (
+        ("motion.udot", "m/s2", "Rate of change of the surge velocity", None, 1e-2),
+        ("motion.vdot", "m/s2", "Rate of change of the sway velocity", None, 1e-2),
+        ("motion.rdot", "rad/s2", "Yaw acceleration, positive to starboard", "deg/s2", 1e-3),
+    )
+    return tuple(
+        Quantity(name=name, unit=unit, description=description, display_unit=shown, nominal=nominal, value=value)
+        for (name, unit, description, shown, nominal), value in zip(described, motion, strict=True)
+    )
+
+
+def _water_speed_quantities(hull: Hull) -> tuple[Quantity, Quantity, Quantity]:
+    speed = Quantity(
+        name="motion.speed",
+        unit="m/s",
+        description="Speed U through the water",
+        display_unit="knots",
+        nominal=5.0,
+        value=hull.speed,
+    )
+    drift = Quantity(
+        name="motion.beta",
+        unit="rad",
+        description="Drift angle -asin(v/U), positive when the water comes from port",
+        display_unit="deg",
+        nominal=0.1,
+        # asin(v/U) without its division by zero at rest
+        value=-ca.atan2(hull["motion.v"], ca.fabs(hull["motion.u"])),
+    )
+    margin = VALIDITY_MARGIN * hull["ship.speed"]
+    inside = ca.fmin(speed.symbol - hull["ship.slowest"], hull["ship.fastest"] - speed.symbol)
+    validity = Quantity(
+        name="validity",
+        unit="1",
+        description="1 in the range of speeds in which the card holds, falling to 0 outside it",
+        value=ca.fmax(0, ca.fmin(1, 1 + inside / margin)),
+    )
+    return speed, drift, validity

@@ -1,0 +1,52 @@
+"""The effect of propeller revolutions on surge."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from tank2sim.cards.form import Propulsion
+from tank2sim.dynamics.model import Input, Parameter, Quantity, Variable
+
+
+def propulsion(section: Propulsion) -> tuple[Variable, ...]:
+    """Input ``propeller.speed`` (rad/s), quantity ``propeller.speed_actual``, parameters ``propulsion.*``."""
+    order = Input(
+        name="propeller.speed",
+        unit="rad/s",
+        description="Propeller revolutions, positive ahead",
+        display_unit="rpm",
+        nominal=section.nominal_radps,
+        start=section.nominal_radps,
+    )
+    return (
+        order,
+        Quantity(
+            name="propeller.speed_actual",
+            unit="rad/s",
+            description="Revolutions at which the propeller turns, positive ahead",
+            display_unit="rpm",
+            nominal=section.nominal_radps,
+            value=order.symbol,
+        ),
+        Parameter(
+            name="propulsion.nominal_speed",
+            unit="rad/s",
+            description="Revolutions that hold the speed of expansion",
+            display_unit="rpm",
+            nominal=section.nominal_radps,
+            minimum=0.0,
+            start=section.nominal_radps,
+        ),
+        Parameter(
+            name="propulsion.Xnn",
+            unit="1",
+            description="Surge force by revolutions, prime system at the speed of expansion",
+            nominal=1e-3,
+            start=section.Xnn,
+        ),
+    )
+
+
+def propeller_force(n: ca.SX, nominal: ca.SX, Xnn: ca.SX) -> ca.SX:
+    """X' of the propeller at the speed of expansion: Xnn (n|n|/n0^2 - 1); zero at nominal revolutions n0 (rad/s)."""
+    return Xnn * (n * ca.fabs(n) / nominal**2 - 1)

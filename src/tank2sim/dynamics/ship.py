@@ -1,0 +1,200 @@
+"""A ship that manoeuvres in the horizontal plane: hull, rigid body, gear, propulsion and kinematics in one model."""
+
+from __future__ import annotations
+
+import math
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.terms import parse_term
+from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
+from tank2sim.dynamics.hull import Hull, motion_quantities
+from tank2sim.dynamics.kinematics import kinematics
+from tank2sim.dynamics.model import Model, Parameter, State, Variable
+from tank2sim.dynamics.propulsion import propulsion
+from tank2sim.dynamics.rigid_body import inertia
+from tank2sim.dynamics.steering_gear import steering_gear
+
+STEPS_PER_LENGTH = 200
+"""Integration steps while the ship covers its own length (benchmarks/accuracy.py prints what halving them changes)."""
+
+OUTPUTS = (
+    *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "motion.speed", "motion.beta"),
+    *("motion.sog", "motion.cog", "motion.udot", "motion.vdot", "motion.rdot", "rudder.angle"),
+    *("force.X", "force.Y", "force.N", "validity"),
+)
+
+
+def ship_model(card: ManoeuvringCard) -> Model:
+    """The model of a ship without its effects, (3.5) or (3.8) of paper 2 as the card's ``model.kind`` says.
+
+    Raises
+    ------
+    InputError
+        The card has a derivative that the model does not know, or its mass matrix is singular (f4 = 0 in 3.6).
+    """
+    names, notices = _derivative_names(card)
+    _refuse_singular_mass(card)
+    body = _body_states(card)
+    gear, gear_notices = steering_gear(card.steering_gear, card.ship.length_m / card.model.speed_mps)
+    engine = propulsion(card.propulsion) if card.propulsion else ()
+    constants = (*_ship_parameters(card), *_derivative_parameters(card, names))
+    position = kinematics({state.name: state for state in body if isinstance(state, State)})
+    given = (*position, *body, *gear, *engine, *constants)
+    hull = Hull(
+        linear=card.model.kind == "linear",
+        nominal_scale=card.model.speed_scale == "nominal",
+        inertial_terms=card.model.yaw_rate_terms == "hydrodynamic",
+        symbols={variable.name: variable.symbol for variable in given},
+    )
+    empty = Model(
+        name=card.ship.name,
+        description=_description(card),
+        states=(),
+        inputs=(),
+        parameters=(),
+        quantities=(),
+        outputs=(),
+        step_s=_step(card),
+        notices=(*notices, *gear_notices),
+    )
+    outputs = (*OUTPUTS, *(["propeller.speed_actual"] if engine else []))
+    return empty.extend(*given, *motion_quantities(hull), outputs=outputs)
+
+
+def _description(card: ManoeuvringCard) -> str:
+    kind = "third-order (Abkowitz)" if card.model.kind == "abkowitz" else "linear"
+    return f"{card.ship.name}: {kind} manoeuvring model in surge, sway and yaw with steering gear"
+
+
+def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[str]]:
+    """Names of the model's derivatives, and notices on those of the card that it does not use."""
+    for name in (*card.derivatives, *card.uncertainty):
+        if name not in ALL_TERMS:
+            key = card.places.get(name, name)
+            remedy = f"the third-order model has {' '.join(ALL_TERMS)}"
+            raise card.fault(f"derivatives.{key}", "is no term of (3.8)", remedy)
+    if card.model.kind == "abkowitz":
+        return list(ALL_TERMS), []
+    names = [*LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS]
+    unused = [name for name in card.derivatives if name not in names]
+    return names, [f"the linear model leaves out {len(unused)} derivatives of the card"] if unused else []
+
+
+def _refuse_singular_mass(card: ManoeuvringCard) -> None:
+    body = card.rigid_body
+    added = {name: card.derivatives.get(name, 0.0) for name in ACCELERATION_TERMS}
+    matrix = inertia(body.mass, body.x_G, body.yaw_inertia, added)
+    scale = abs(matrix.sway * matrix.yaw) + abs(matrix.sway_yaw * matrix.yaw_sway)
+    rounding = 1e-12  # of the two products whose difference f4 is
+    if abs(matrix.determinant) <= rounding * scale:
+        remedy = "check mass, yaw_inertia, x_G, Yvdot, Nrdot, Yrdot and Nvdot"
+        raise card.fault("rigid_body", "the mass matrix of sway and yaw is singular (f4 = 0)", remedy)
+    if matrix.surge <= 0 or matrix.sway <= 0 or matrix.yaw <= 0 or matrix.determinant < 0:
+        problem = "mass with added mass is not positive (m - Xudot, m - Yvdot, J_z - Nrdot, f4)"
+        raise card.fault("derivatives", problem, "acceleration derivatives are negative: check their signs")
+
+
+def _step(card: ManoeuvringCard) -> float:
+    """Step (s): :data:`STEPS_PER_LENGTH`, and five in a time constant of the gear, rounded down to 1, 2 or 5."""
+    wanted = card.ship.length_m / card.model.speed_mps / STEPS_PER_LENGTH
+    if card.steering_gear and card.steering_gear.time_constant_s:
+        wanted = min(wanted, card.steering_gear.time_constant_s / 5)
+    decade = 10.0 ** math.floor(math.log10(wanted))
+    return float(max(digit * decade for digit in (1, 2, 5) if digit * decade <= wanted * (1 + 1e-9)))
+
+
+def _ship_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
+    scales, (slowest, fastest) = card.scales, card.model.speed_range_mps
+
+    def particular(name: str, unit: str, description: str, start: float, **more: str) -> Parameter:
+        nominal = abs(start) or 1.0
+        minimum = None if name == "ship.x_G" else 0.0
+        return Parameter(
+            name=name,
+            unit=unit,
+            description=description,
+            start=start,
+            tunable=False,
+            nominal=nominal,
+            minimum=minimum,
+            display_unit=more.get("display_unit"),
+        )
+
+    body = card.rigid_body
+    return (
+        particular("ship.length", "m", "Length between perpendiculars", scales.length),
+        particular("ship.speed", "m/s", "Speed u0 about which forces are expanded", scales.speed, display_unit="knots"),
+        particular("ship.mass", "kg", "Mass", body.mass * scales.mass),
+        particular("ship.x_G", "m", "Centre of gravity forward of midships", body.x_G * scales.length),
+        particular("ship.yaw_inertia", "kg.m2", "Yaw inertia J_z about midships", body.yaw_inertia * scales.inertia),
+        particular("ship.water_density", "kg/m3", "Density of the water", scales.density),
+        particular("ship.slowest", "m/s", "Lowest speed at which the card holds", slowest, display_unit="knots"),
+        particular("ship.fastest", "m/s", "Highest speed at which the card holds", fastest, display_unit="knots"),
+    )
+
+
+def _derivative_parameters(card: ManoeuvringCard, names: list[str]) -> tuple[Parameter, ...]:
+    def described(name: str) -> str:
+        term = parse_term(name)
+        assert term is not None
+        if term.acceleration:
+            return f"Acceleration derivative of {term.force} by d{term.acceleration}/dt, prime system"
+        powers = [
+            f"{symbol}^{power}" if power > 1 else symbol
+            for symbol, power in (("v", term.v), ("r", term.r), ("delta", term.d), ("Du", term.u))
+            if power
+        ]
+        return f"Coefficient of {' '.join(powers) or '1'} in {term.force}, prime system, rudder + to starboard"
+
+    return tuple(
+        Parameter(
+            name=f"derivatives.{name}",
+            unit="1",
+            description=described(name),
+            nominal=1e-3,
+            start=card.derivatives.get(name, 0.0),
+        )
+        for name in names
+    )
+
+
+def _body_states(card: ManoeuvringCard) -> tuple[Variable, ...]:
+    def start(name: str, unit: str, description: str, value: float) -> Parameter:
+        shown = {"m/s": "knots", "rad/s": "deg/min"}[unit]
+        return Parameter(name=name, unit=unit, description=description, start=value, tunable=False, display_unit=shown)
+
+    starts = (
+        start("initial.u", "m/s", "Surge velocity through the water at the start", card.model.speed_mps),
+        start("initial.v", "m/s", "Sway velocity through the water at the start, positive to starboard", 0.0),
+        start("initial.r", "rad/s", "Yaw rate at the start, positive to starboard", 0.0),
+        Parameter(
+            name="initial.trim",
+            unit="1",
+            description="True: start in steady motion with the inputs given (initial.u, .v, .r are then a first guess)",
+            boolean=True,
+            start=0.0,
+            tunable=False,
+        ),
+    )
+    described = (
+        ("motion.u", "m/s", "Surge velocity through the water, positive forward", "motion.udot", "knots"),
+        ("motion.v", "m/s", "Sway velocity through the water, positive to starboard", "motion.vdot", "knots"),
+        ("motion.r", "rad/s", "Yaw rate, positive to starboard", "motion.rdot", "deg/min"),
+    )
+    nominals = (card.model.speed_mps, 0.1 * card.model.speed_mps, card.model.speed_mps / card.ship.length_m)
+    states = tuple(
+        State(
+            name=name,
+            unit=unit,
+            description=description,
+            display_unit=shown,
+            nominal=nominal,
+            derivative=derivative,
+            start=parameter.symbol,
+            steady=True,
+        )
+        for (name, unit, description, derivative, shown), parameter, nominal in zip(
+            described, starts, nominals, strict=False
+        )
+    )
+    return (*states, *starts)

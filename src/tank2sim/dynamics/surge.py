@@ -1,0 +1,163 @@
+"""Surge of a towed body: equation (1.5) of paper 1 (Wilinski & Zellman 1984).
+
+    M dv/dt + B1 v^4 + B2 v^3 + B3 v^2 = T,   M = m + lambda11
+
+The paper has v >= 0 only. Written with v |v|^(n-1) for v^n, the drag is the same there and opposes motion astern as
+well, where the even powers of the print would push the body on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
+
+DRAG_POWERS: dict[str, int] = {"B1": 4, "B2": 3, "B3": 2}
+"""Drag terms of (1.5), in its order, and the power of the speed that each multiplies."""
+
+# The step of the paper's own integration. It lies far below the shortest time constant M / (dR/dv) of a towed body, 1 s
+# for a 1 m model at 1 m/s and 50 s for the vehicle of the paper: a Runge-Kutta step of a tenth of it errs by 1e-7.
+_STEP_S = 0.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurgeCoefficients:
+    """Coefficients of (1.5), SI; the drag is positive against the motion.
+
+    Parameters
+    ----------
+    total_mass_kg : float
+        M, the mass of the body with the water in it plus its added mass lambda11.
+    B1_kgs2pm3, B2_kgspm2, B3_kgpm : float
+        Of the fourth, third and second power of the speed.
+    """
+
+    total_mass_kg: float
+    B1_kgs2pm3: float = 0.0
+    B2_kgspm2: float = 0.0
+    B3_kgpm: float = 0.0
+
+
+def drag(speed: Any, b1: Any, b2: Any, b3: Any) -> Any:
+    """Drag of (1.5) in N at a speed in m/s, positive at positive speed; numbers, arrays or CasADi expressions."""
+    magnitude = abs(speed)
+    return speed * magnitude * (b3 + magnitude * (b2 + magnitude * b1))
+
+
+def surge_model(
+    name: str,
+    coefficients: SurgeCoefficients,
+    force_N: float,
+    *,
+    valid_speed_mps: tuple[float, float] | None = None,
+) -> Model:
+    """Surge of a body under a force along its axis, equation (1.5).
+
+    Parameters
+    ----------
+    name : str
+        The body.
+    coefficients : SurgeCoefficients
+        Start values of the tunable parameters ``surge.*``.
+    force_N : float
+        Start value of the input ``tow.force``, positive forward.
+    valid_speed_mps : pair of float, optional
+        Speeds that the coefficients were identified in; with it the model has the output ``validity``.
+    """
+    parameters = _parameters(coefficients)
+    mass, b1, b2, b3, initial_x, initial_u = (parameter.symbol for parameter in parameters)
+    force = Input(
+        name="tow.force", unit="N", start=force_N, nominal=abs(force_N) or 1.0, description="Towing force, + forward"
+    )
+    x, u = _states(initial_x, initial_u, valid_speed_mps[1] if valid_speed_mps else 1.0)
+    resistance = Quantity(
+        name="force.drag",
+        unit="N",
+        description="Drag, + when it acts aft",
+        nominal=force.nominal,
+        value=drag(u.symbol, b1, b2, b3),
+    )
+    acceleration = Quantity(
+        name="motion.udot",
+        unit="m/s2",
+        description="Surge acceleration, + forward",
+        nominal=force.nominal / coefficients.total_mass_kg,
+        value=(force.symbol - resistance.symbol) / mass,
+    )
+    speed = Quantity(name="motion.xdot", unit="m/s", description="Rate of the position", value=u.symbol)
+    model = Model(
+        name=name,
+        description="Straight-line unsteady motion of a towed body, equation (1.5) of Wilinski & Zellman (1984)",
+        states=(x, u),
+        inputs=(force,),
+        parameters=parameters,
+        quantities=(speed, acceleration, resistance),
+        outputs=("motion.x", "motion.u", "motion.udot", "force.drag"),
+        step_s=_STEP_S,
+    )
+    return model if valid_speed_mps is None else _with_validity(model, *valid_speed_mps)
+
+
+def _states(initial_x: ca.SX, initial_u: ca.SX, top_speed: float) -> tuple[State, State]:
+    x = State(
+        name="motion.x",
+        unit="m",
+        description="Position along the track, + forward",
+        derivative="motion.xdot",
+        start=initial_x,
+    )
+    u = State(
+        name="motion.u",
+        unit="m/s",
+        description="Surge speed through the water, + forward",
+        nominal=top_speed,
+        derivative="motion.udot",
+        start=initial_u,
+    )
+    return x, u
+
+
+def _parameters(coefficients: SurgeCoefficients) -> tuple[Parameter, ...]:
+    mass = coefficients.total_mass_kg
+    term = "Drag coefficient of the {} power of the speed"
+    return (
+        Parameter(
+            name="surge.total_mass",
+            unit="kg",
+            start=mass,
+            nominal=mass,
+            minimum=0.0,
+            description="Mass of the body with the water in it, plus its added mass in surge",
+        ),
+        *(
+            Parameter(name=f"surge.{key}", unit=unit, start=start, nominal=abs(start) or 1.0, description=description)
+            for key, unit, start, description in (
+                ("B1", "kg.s2/m3", coefficients.B1_kgs2pm3, term.format("fourth")),
+                ("B2", "kg.s/m2", coefficients.B2_kgspm2, term.format("third")),
+                ("B3", "kg/m", coefficients.B3_kgpm, term.format("second")),
+            )
+        ),
+        Parameter(name="initial.x", unit="m", start=0.0, tunable=False, description="Position at the beginning"),
+        Parameter(name="initial.u", unit="m/s", start=0.0, tunable=False, description="Surge speed at the beginning"),
+    )
+
+
+def _with_validity(model: Model, lowest: float, highest: float) -> Model:
+    outside = ca.fmax(lowest - model.symbol("motion.u"), model.symbol("motion.u") - highest)
+    # A polynomial fitted over a range soon departs from the truth beyond it: nothing is left of its worth half a
+    # range away.
+    worth = 1 - 2 * outside / (highest - lowest)
+    validity = Quantity(
+        name="validity",
+        unit="1",
+        description=(
+            f"1 from {lowest:g} to {highest:g} m/s, where the coefficients were identified, falling to 0 outside"
+        ),
+        minimum=0.0,
+        maximum=1.0,
+        value=ca.fmin(1, ca.fmax(0, worth)),
+    )
+    return model.extend(validity, outputs=["validity"])
