@@ -1,0 +1,254 @@
+"""Tables of numbers from CSV files, with comment lines: the ground of every record.
+
+A table is one header line and rows of numbers, separated by commas; an empty cell is a value not recorded. Lines that
+begin with ``#`` are comments; ``# key: value`` with a single word before the colon can be looked up by its key.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.errors import InputError
+from tank2sim.files import read_text
+from tank2sim.units import to_si
+
+Vector = NDArray[np.float64]
+
+_KEY = re.compile(r"([A-Za-z_][\w.-]*)\s*:(?!//)\s*(.*)", re.DOTALL)  # not the colon of https://
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NOT_OF_NUMBERS = re.compile(r"[^0-9eE+\-., \t\n]")
+_EMPTY_CELL = re.compile(r"(?<![^,\n])(?=[,\n])", re.ASCII)
+_QUOTED_LENGTH = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Columns of numbers as in a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    columns : dict
+        Name to values, (rows,), nan where a cell is empty.
+    lines : array of int, (rows,)
+        Line of the file (from 1) of each row.
+    comments : dict
+        Key to text of the lines ``# key: text``; the texts of a repeated key are joined by line breaks.
+    remarks : tuple of str
+        The other comment lines.
+    headings : dict
+        Name of a column to what it is called in the file, where :meth:`si` has renamed it.
+    """
+
+    path: Path
+    columns: dict[str, Vector]
+    lines: NDArray[np.int64]
+    comments: dict[str, str] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+    headings: dict[str, str] = field(default_factory=dict)
+
+    def heading(self, name: str) -> str:
+        """What a column is called in the file."""
+        return self.headings.get(name, name)
+
+    def place(self, row: int, name: str) -> str:
+        """Where a cell is, for messages: ``line 12, column psi_deg``."""
+        return f"line {self.lines[row]}, column {self.heading(name)}"
+
+    def column(self, name: str) -> Vector:
+        """Values of a column, (rows,).
+
+        Raises
+        ------
+        InputError
+            There is no such column.
+        """
+        if name not in self.columns:
+            present = ", ".join(self.heading(other) for other in self.columns)
+            raise InputError(self.path, "header", f"there is no column {name}", f"add it; the columns are {present}")
+        return self.columns[name]
+
+    def increasing(self, name: str) -> Vector:
+        """Values of a column, (rows,), that must be there in each row and rise from row to row (a time).
+
+        Raises
+        ------
+        InputError
+            There is no such column, a cell of it is empty, or it does not rise; the message names the first such row.
+        """
+        values = self.column(name)
+        empty = np.flatnonzero(np.isnan(values))
+        if empty.size:
+            raise InputError(self.path, self.place(int(empty[0]), name), "is empty", "give each row its value")
+        falls = np.flatnonzero(np.diff(values) <= 0)
+        if falls.size:
+            row = int(falls[0]) + 1
+            problem = f"{values[row]:.10g} does not come after {values[row - 1]:.10g} of the row before"
+            raise InputError(self.path, self.place(row, name), problem, "sort the rows, and give each value once")
+        return values
+
+    def comment_number(self, key: str) -> float | None:
+        """The finite number in the comment line ``# key: number``; None if there is no such line.
+
+        Raises
+        ------
+        InputError
+            Its text is no number, or the line stands twice.
+        """
+        if key not in self.comments:
+            return None
+        text = self.comments[key].strip()
+        number = _number(text)
+        if number is None:
+            problem = f"{_quoted(text)} is no number" if "\n" not in text else "is given more than once"
+            raise InputError(self.path, f"comment {key}", problem, f"write one line such as '# {key}: 11.63'")
+        return number
+
+    def si(self) -> Table:
+        """The table in SI and radians, its columns renamed by :func:`tank2sim.units.to_si` (psi_deg to psi_rad).
+
+        Raises
+        ------
+        InputError
+            Two columns are one quantity in two units.
+        """
+        columns: dict[str, Vector] = {}
+        headings: dict[str, str] = {}
+        for name, values in self.columns.items():
+            si_name, factor = to_si(name, 1.0)
+            if si_name in columns:
+                both = f"columns {headings[si_name]} and {self.heading(name)}"
+                raise InputError(self.path, both, "are one quantity in two units", "delete one of them")
+            columns[si_name] = values if factor == 1.0 else values * factor
+            headings[si_name] = self.heading(name)
+        return replace(self, columns=columns, headings=headings)
+
+
+def read_table(path: Path | str) -> Table:
+    """Read a CSV table of numbers.
+
+    A byte order mark, CRLF, blank lines, and spaces around names and numbers do not matter.
+
+    Raises
+    ------
+    InputError
+        The file is missing or not UTF-8; there is no header, a column has no name or the name of another; there are
+        no rows; a row has too many or too few cells; a cell is no finite number in digits and a decimal point.
+    """
+    path = Path(path)
+    all_lines = read_text(path).split("\n")
+    stripped = [line.strip() for line in all_lines]
+    numbers = [number for number, line in enumerate(stripped, start=1) if line and not line.startswith("#")]
+    if not numbers:
+        raise InputError(path, "", "there is no header", "begin with a line of column names, such as t_s,u_mps")
+    names = _header(path, numbers[0], stripped[numbers[0] - 1])
+    if len(numbers) == 1:
+        raise InputError(path, "", "there are no rows under the header", "add the measured values")
+    lines = np.array(numbers[1:], dtype=np.int64)
+    rows = [stripped[number - 1] for number in numbers[1:]]
+    values = _read_fast(rows, len(names))
+    if values is None:
+        values = _read_with_care(path, names, rows, lines)
+    comments, remarks = _comments([line for line in stripped if line.startswith("#")])
+    columns = {name: np.ascontiguousarray(values[:, place]) for place, name in enumerate(names)}
+    return Table(path, columns, lines, comments, remarks)
+
+
+def _header(path: Path, number: int, line: str) -> list[str]:
+    place = f"line {number}"
+    names = _cells(path, place, line)
+    if any(_number(name) is not None for name in names):
+        problem = "there is no header: the first line has numbers"
+        raise InputError(path, place, problem, "put a line of column names above it, such as t_s,u_mps")
+    if len(names) == 1 and (";" in line or "\t" in line):
+        problem = "the columns are not separated by commas"
+        raise InputError(path, place, problem, "save the file with commas between columns and points in numbers")
+    for position, name in enumerate(names, start=1):
+        if not name:
+            raise InputError(path, place, f"column {position} has no name", "name it or delete it")
+        if name in names[: position - 1]:
+            raise InputError(path, f"{place}, column {name}", "stands twice", "delete or rename one of them")
+    return names
+
+
+def _read_fast(rows: Sequence[str], width: int) -> Vector | None:
+    """Values (rows, width) by numpy's compiled reader; None if anything at all is unusual."""
+    body = "\n".join(rows) + "\n"
+    if _NOT_OF_NUMBERS.search(body):
+        return None
+    if " " in body or "\t" in body:
+        body = re.sub(r"[ \t]*([,\n])[ \t]*", r"\1", body)
+    if ",," in body or ",\n" in body or "\n," in body or body.startswith(","):
+        body = _EMPTY_CELL.sub("nan", body)
+    try:
+        values: Vector = np.loadtxt(body.splitlines(), delimiter=",", ndmin=2, comments=None, dtype=np.float64)
+    except ValueError:
+        return None
+    return values if values.shape == (len(rows), width) and not np.isinf(values).any() else None
+
+
+def _read_with_care(path: Path, names: Sequence[str], rows: Sequence[str], lines: NDArray[np.int64]) -> Vector:
+    """Values (rows, width) cell by cell, or the error that names the first cell at fault."""
+    values = np.empty((len(rows), len(names)))
+    for row, line in enumerate(rows):
+        place = f"line {lines[row]}"
+        cells = _cells(path, place, line)
+        if len(cells) != len(names):
+            problem = f"has {len(cells)} cells, and the header has {len(names)} columns"
+            raise InputError(path, place, problem, "give each row one cell a column, empty if it was not recorded")
+        for column, cell in enumerate(cells):
+            number = _number(cell) if cell else np.nan
+            if number is None:
+                _refuse(path, f"{place}, column {names[column]}", cell)
+            values[row, column] = number
+    return values
+
+
+def _cells(path: Path, place: str, line: str) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], skipinitialspace=True))]
+    except csv.Error as error:
+        raise InputError(path, place, f"cannot be read ({error})", "give a text file of comma-separated values") from None
+
+
+def _refuse(path: Path, place: str, cell: str) -> NoReturn:
+    if cell.lstrip("+-").lower() in ("nan", "inf", "infinity", "na", "null", "none", "-", ""):
+        raise InputError(path, place, f"{_quoted(cell)} is no number", "leave the cell empty if nothing was recorded")
+    if _NUMBER.fullmatch(cell):
+        raise InputError(path, place, f"{_quoted(cell)} is too large", "a finite number was expected")
+    raise InputError(path, place, f"{_quoted(cell)} is no number", "write digits with a decimal point, or nothing")
+
+
+def _comments(lines: Sequence[str]) -> tuple[dict[str, str], tuple[str, ...]]:
+    comments: dict[str, str] = {}
+    remarks = []
+    for line in lines:
+        text = line.lstrip("#").strip()
+        match = _KEY.fullmatch(text)
+        if match is None:
+            remarks.append(text)
+            continue
+        key, value = match.groups()
+        comments[key] = f"{comments[key]}\n{value}" if key in comments else value
+    return comments, tuple(remarks)
+
+
+def _number(text: str) -> float | None:
+    """The finite number that a text is, as written in a table; None if it is none."""
+    if not _NUMBER.fullmatch(text):
+        return None
+    value = float(text)
+    return value if np.isfinite(value) else None
+
+
+def _quoted(text: str) -> str:
+    return repr(text if len(text) <= _QUOTED_LENGTH else text[:_QUOTED_LENGTH] + "...")

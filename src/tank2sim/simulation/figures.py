@@ -1,0 +1,177 @@
+"""Manoeuvring figures read off a trajectory, as in ITTC 7.5-04-02-01 and IMO MSC.137(76).
+
+Distances are in axes fixed at the execute: advance along the initial heading, transfer at right angles to it, positive
+to the side of the turn. Between samples signals are interpolated, so that figures do not depend on where samples fall.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.dynamics.model import Vector
+from tank2sim.simulation.manoeuvres import PullOut, Spiral, Turn, Zigzag
+from tank2sim.simulation.trajectory import Trajectory
+
+Figures = dict[str, object]
+
+LOOP_HEIGHT = 0.05
+"""Two yaw rates at one rudder angle of a spiral are two steady turns if they differ by this share of the largest rate;
+less is what waiting for the steady state leaves."""
+
+
+def figures_of(manoeuvre: object, trajectory: Trajectory, length: float) -> Figures:
+    """Figures of a manoeuvre; None for those that the run was too short to show.
+
+    Parameters
+    ----------
+    manoeuvre
+        One of :mod:`tank2sim.simulation.manoeuvres`.
+    trajectory : Trajectory
+        Of a ship.
+    length : float
+        Length between perpendiculars, m.
+    """
+    match manoeuvre:
+        case Turn(rudder):
+            return _turn(trajectory, math.copysign(1.0, rudder), length)
+        case Zigzag(rudder, heading):
+            return _zigzag(trajectory, math.copysign(1.0, rudder), heading, length)
+        case PullOut(rudder):
+            return _pull_out(trajectory, rudder)
+        case Spiral(rudders):
+            return _spiral(trajectory, rudders)
+        case _:
+            return _ending(trajectory)
+
+
+def _ending(run: Trajectory) -> Figures:
+    return {
+        "duration_s": float(run.t[-1]),
+        "final_speed_mps": float(run["motion.speed"][-1]),
+        "final_heading_deg": math.degrees(run["motion.psi"][-1]),
+        "speed_loss_percent": _speed_loss(run, float(run["motion.speed"][-1])),
+    }
+
+
+def _first(times: Vector) -> float | None:
+    return float(times[0]) if len(times) else None
+
+
+@dataclass(frozen=True)
+class _Execute:
+    """Axes at the execute of a run, mirrored so that the turn goes to starboard."""
+
+    run: Trajectory
+    side: float
+
+    @property
+    def heading(self) -> float:
+        return float(self.run["motion.psi"][0])
+
+    def time_of(self, change: float) -> float | None:
+        """Time of the first crossing of a heading change (rad, to the side of the turn)."""
+        return _first(self.run.crossings("motion.psi", "motion.r", self.heading + self.side * change))
+
+    def place(self, time: float) -> tuple[float, float]:
+        """Distance ahead and to the side of the turn at a time, m."""
+        north = self.run.at("motion.x", time) - float(self.run["motion.x"][0])
+        east = self.run.at("motion.y", time) - float(self.run["motion.y"][0])
+        cos, sin = math.cos(self.heading), math.sin(self.heading)
+        return north * cos + east * sin, self.side * (east * cos - north * sin)
+
+
+def _turn(run: Trajectory, side: float, length: float) -> Figures:
+    execute = _Execute(run, side)
+    quarter, half = execute.time_of(math.pi / 2), execute.time_of(math.pi)
+    advance, transfer = execute.place(quarter) if quarter else (None, None)
+    tactical = execute.place(half)[1] if half else None
+    figures: Figures = {
+        "advance_m": advance,
+        "transfer_m": transfer,
+        "tactical_diameter_m": tactical,
+        "advance_lengths": advance and advance / length,
+        "tactical_diameter_lengths": tactical and tactical / length,
+        "time_90_s": quarter,
+        "time_180_s": half,
+    }
+    steady = half is not None and _is_steady(run, length)
+    rate, speed = float(run["motion.r"][-1]), float(run["motion.speed"][-1])
+    return figures | {
+        "steady_diameter_m": 2 * speed / abs(rate) if steady else None,
+        "steady_drift_deg": math.degrees(run["motion.beta"][-1]) if steady else None,
+        "steady_rate_degps": math.degrees(rate) if steady else None,
+        "steady_speed_mps": speed if steady else None,
+        "speed_loss_percent": _speed_loss(run, speed) if steady else None,
+    }
+
+
+def _is_steady(run: Trajectory, length: float) -> bool:
+    """Yaw rate and speed have not changed by more than 1 % over the last two ship lengths."""
+    before = run.t[-1] - 2 * length / max(float(run["motion.speed"][-1]), 1e-9)
+    if before < run.t[0]:
+        return False
+    then = int(np.searchsorted(run.t, before))
+    same = [abs(run[name][-1] - run[name][then]) < 0.01 * abs(run[name][-1]) for name in ("motion.r", "motion.speed")]
+    return all(same)
+
+
+def _zigzag(run: Trajectory, side: float, heading: float, length: float) -> Figures:
+    execute = _Execute(run, side)
+    executes = run.t[1:][np.diff(run["rudder.command"]) != 0]
+    turns = run.crossings("motion.r", "motion.rdot", 0.0)
+    peaks = [later[0] for time in executes if len(later := turns[turns > time])]
+    overshoots = [
+        math.degrees(side * (-1) ** number * (run.at("motion.psi", time) - execute.heading) - heading)
+        for number, time in enumerate(peaks)
+    ]
+    returns = run.crossings("motion.psi", "motion.r", execute.heading)
+    returns = returns[returns > executes[0]] if len(executes) else returns[:0]
+    distance = math.hypot(*execute.place(float(executes[0]))) if len(executes) else None
+    return {
+        "overshoots_deg": overshoots,
+        "overshoot_times_s": [float(peak - time) for peak, time in zip(peaks, executes, strict=False)],
+        "execute_times_s": [float(time) for time in executes],
+        "initial_turning_time_s": _first(executes),
+        "initial_turning_distance_m": distance,
+        "initial_turning_lengths": distance and distance / length,
+        "reach_s": _first(returns),
+        "period_s": float(returns[2] - returns[0]) if len(returns) > 2 else None,
+        "speed_loss_percent": _speed_loss(run, float(run["motion.speed"].min())),
+    }
+
+
+def _pull_out(run: Trajectory, rudder: float) -> Figures:
+    midships = int(np.flatnonzero(np.diff(run["rudder.command"]) != 0)[-1]) + 1
+    rates = np.degrees(run["motion.r"])
+    side = math.copysign(1.0, rudder)
+    halved = run.t[midships:][side * rates[midships:] < side * rates[midships] / 2]
+    return {
+        "steady_rate_degps": float(rates[midships]),
+        # Not zero on a ship that is asymmetric (Y0, N0) or unstable: then the two sides end at different rates.
+        "residual_rate_degps": float(rates[-1]),
+        "time_to_half_rate_s": float(halved[0] - run.t[midships]) if len(halved) else None,
+    }
+
+
+def _spiral(run: Trajectory, rudders: tuple[float, ...]) -> Figures:
+    changes = np.flatnonzero(np.diff(run["rudder.command"]) != 0)
+    ends = np.append(changes[len(changes) - len(rudders) + 1 :] + 1, len(run.t) - 1)
+    rates = np.degrees(run["motion.r"][ends])
+    angles = np.degrees(rudders)
+    half = len(angles) // 2
+    there, back = rates[: half + 1], rates[half:][::-1]
+    # Where the two ways give different rates at one rudder angle, the ship has two steady turns there.
+    double = angles[: half + 1][np.abs(there - back) > LOOP_HEIGHT * np.max(np.abs(rates))]
+    return {
+        "rudder_deg": [float(angle) for angle in np.round(angles, 9)],
+        "rate_degps": [float(rate) for rate in rates],
+        "loop_width_deg": float(np.ptp(double)) if len(double) else 0.0,
+        "loop_height_degps": float(np.max(np.abs(there - back))) if len(double) else 0.0,
+    }
+
+
+def _speed_loss(run: Trajectory, speed: float) -> float:
+    return 100 * (1 - speed / float(run["motion.speed"][0]))

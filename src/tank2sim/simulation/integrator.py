@@ -1,0 +1,131 @@
+"""Integration at machine speed: many steps in one call, never a Python loop over right-hand sides.
+
+Where there is a C compiler, the step is compiled together with a loop over it; elsewhere CasADi evaluates the same step
+in loops of its own. Both take the same steps of :func:`tank2sim.simulation.scheme.runge_kutta_step`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.dynamics.model import Model, Vector
+from tank2sim.native.compiler import find_compiler
+from tank2sim.native.library import cached_library
+from tank2sim.simulation.scheme import runge_kutta_step
+
+# The loop around the generated step. Work arrays are on the stack: their sizes are known when this text is made.
+_LOOP = """
+#ifdef _WIN32
+__declspec(dllexport)
+#else
+__attribute__((visibility("default")))
+#endif
+void rollout(long n, double h, const double* u, const double* p, double* x) {{
+  const double* arg[{sz_arg}];
+  double* res[{sz_res}];
+  casadi_int iw[{sz_iw}];
+  double w[{sz_w}];
+  long k;
+  for (k = 0; k < n; ++k, x += {nx}) {{
+    arg[0] = x; arg[1] = u; arg[2] = p; arg[3] = &h;
+    res[0] = x + {nx};
+    step(arg, res, iw, w, 0);
+  }}
+}}
+#ifdef _WIN32
+__declspec(dllexport)
+#else
+__attribute__((visibility("default")))
+#endif
+void outputs(long n, const double* u, const double* p, const double* x, double* y) {{
+  const double* arg[{sz_arg}];
+  double* res[{sz_res}];
+  casadi_int iw[{sz_iw}];
+  double w[{sz_w}];
+  long k;
+  for (k = 0; k < n; ++k, x += {nx}, u += {nu}, y += {ny}) {{
+    arg[0] = x; arg[1] = u; arg[2] = p;
+    res[0] = y;
+    output(arg, res, iw, w, 0);
+  }}
+}}
+"""
+
+NO_COMPILER = "no C compiler was found: CasADi evaluates the model itself, about ten times slower"
+
+
+class Integrator:
+    """Takes a model's Runge-Kutta steps.
+
+    Parameters
+    ----------
+    model : Model
+        What to integrate.
+    compiled : bool, optional
+        True or False to ask for machine code or for CasADi's own evaluation; by default machine code where a C compiler
+        is found.
+    """
+
+    def __init__(self, model: Model, compiled: bool | None = None):
+        self.model = model
+        self.compiled = find_compiler() is not None if compiled is None else compiled
+        self._step = runge_kutta_step(model)
+        self._rollout, self._outputs = self._in_machine_code() if self.compiled else self._in_casadi()
+
+    def rollout(self, x: Vector, u: Vector, p: Vector, h: float, n: int) -> Vector:
+        """States (n + 1, nx) at the beginning `x` (nx,) and after each of `n` steps of `h` s, inputs `u` (nu,) held."""
+        states = np.empty((n + 1, len(x)))
+        states[0] = x
+        self._rollout(n, h, u, p, states)
+        return states
+
+    def step(self, x: Vector, u: Vector, p: Vector, h: float) -> Vector:
+        """State (nx,) after one step of `h` s."""
+        following: Vector = self.rollout(x, u, p, h, 1)[1]
+        return following
+
+    def outputs(self, x: Vector, u: Vector, p: Vector) -> Vector:
+        """Outputs (n, ny) at states `x` (n, nx) and inputs `u` (n, nu)."""
+        y = np.empty((len(x), len(self.model.outputs)))
+        self._outputs(len(x), np.ascontiguousarray(u), p, np.ascontiguousarray(x), y)
+        return y
+
+    def _in_machine_code(self) -> tuple[Callable[..., None], Callable[..., None]]:
+        generator = ca.CodeGenerator("model", {"with_header": False})
+        functions = (self._step, self.model.output)
+        for function in functions:
+            generator.add(function)
+        sizes = {
+            name: max(1, *(getattr(f, name)() for f in functions)) for name in ("sz_arg", "sz_res", "sz_iw", "sz_w")
+        }
+        loop = _LOOP.format(
+            **sizes, nx=self._step.size1_in(0), nu=self._step.size1_in(1), ny=self.model.output.size1_out(0)
+        )
+        library = ctypes.CDLL(str(cached_library(generator.dump() + loop)))
+        array = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
+        library.rollout.argtypes = [ctypes.c_long, ctypes.c_double, array, array, array]
+        library.outputs.argtypes = [ctypes.c_long, array, array, array, array]
+        library.rollout.restype = library.outputs.restype = None
+        return library.rollout, library.outputs
+
+    def _in_casadi(self) -> tuple[Callable[..., None], Callable[..., None]]:
+        loops: dict[int, ca.Function] = {}
+
+        def rollout(n: int, h: float, u: Vector, p: Vector, x: Vector) -> None:
+            done = 0
+            while done < n:  # loops of 1, 2, 4, ... steps, so that few different ones are ever made
+                length = 1 << ((n - done).bit_length() - 1)
+                if length not in loops:
+                    loops[length] = self._step.mapaccum(length)
+                part = loops[length](x[done], ca.repmat(u, 1, length), ca.repmat(p, 1, length), ca.repmat(h, 1, length))
+                x[done + 1 : done + 1 + length] = np.array(part).T
+                done += length
+
+        def outputs(n: int, u: Vector, p: Vector, x: Vector, y: Vector) -> None:
+            y[:] = np.array(self.model.output(x.T, u.T, ca.repmat(p, 1, n))).T
+
+        return rollout, outputs

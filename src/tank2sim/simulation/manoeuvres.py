@@ -1,0 +1,216 @@
+"""Standard manoeuvres (ITTC 7.5-04-02-01, IMO MSC.137(76)): how the rudder is ordered, and when.
+
+Each manoeuvre drives a :class:`Running` simulation; the order is executed at t = 0. Angles are in rad, rudder and turns
+positive to starboard. What is read off the result is in :mod:`tank2sim.simulation.figures`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.dynamics.model import Vector
+from tank2sim.errors import InputError
+from tank2sim.records.csv_table import read_table
+from tank2sim.simulation.running import Running
+
+FORMS = "turn:35, turn:-35, zigzag:20/20, zigzag:-10/10, pullout:20, spiral, spiral:20, file:orders.csv"
+
+TURN_HEADING = math.radians(540.0)
+"""A turning circle is held for one and a half turns, so that its last half turn is steady (ITTC 7.5-04-02-01)."""
+
+ZIGZAG_EXECUTES = 5
+"""A zigzag ends after its fifth execute (ITTC 7.5-04-02-01): four overshoots."""
+
+SPIRAL_RUDDERS_DEG = (20, 15, 10, 7, 5, 4, 3, 2, 1, 0, -1, -2, -3, -4, -5, -7, -10, -15, -20)
+"""Rudder angles of a direct spiral on its way to port, deg; it comes back through the same ones."""
+
+STEADY_CHANGE = 1e-3
+"""Steady: over two ship lengths the yaw rate changes by less than this share of itself, or of 0.01 u0/L if less."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Turning circle: the rudder is put over and held."""
+
+    rudder: float
+
+    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
+        """Run for `duration` s, or until the heading has changed by :data:`TURN_HEADING` (at most 150 L/u0)."""
+        running.order(rudder__command=self.rudder)
+        if duration is not None:
+            running.run(duration)
+            return
+        side = math.copysign(1.0, self.rudder)
+        goal = running.state("motion.psi") + side * TURN_HEADING
+        running.run_until("motion.psi", goal, rising=side > 0, at_most=150 * ship_time)
+
+
+@dataclass(frozen=True)
+class Zigzag:
+    """Zigzag: rudder `rudder` until the heading has changed by `heading`, then the other way, and so on.
+
+    A negative rudder begins to port; `heading` is positive.
+    """
+
+    rudder: float
+    heading: float
+
+    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
+        """Run for `duration` s, or to the heading's return after the fifth execute (at most 150 L/u0)."""
+        begin = running.state("motion.psi")
+        end = 150 * ship_time if duration is None else duration
+        side = math.copysign(1.0, self.rudder)
+        executes = 0
+        while running.time < end and (duration is not None or executes < ZIGZAG_EXECUTES):
+            running.order(rudder__command=side * abs(self.rudder))
+            goal = begin + side * self.heading
+            if not running.run_until("motion.psi", goal, rising=side > 0, at_most=end - running.time):
+                return
+            side, executes = -side, executes + 1
+
+
+@dataclass(frozen=True)
+class PullOut:
+    """Pull-out: a steady turn, then the rudder amidships; a stable ship comes back to (nearly) a straight course."""
+
+    rudder: float
+
+    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
+        """Turn until steady (at most 60 L/u0), then `duration` s (by default 40 L/u0) with the rudder amidships."""
+        running.order(rudder__command=self.rudder)
+        _until_steady(running, ship_time, at_most=60 * ship_time)
+        running.order(rudder__command=0.0)
+        running.run(40 * ship_time if duration is None else duration)
+
+
+@dataclass(frozen=True)
+class Spiral:
+    """Direct (Dieudonne) spiral: a series of rudder angles to port and back to starboard, each held until steady."""
+
+    rudders: tuple[float, ...]
+
+    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
+        """Hold each rudder until steady, at most `duration` s (by default 100 L/u0)."""
+        for rudder in self.rudders:
+            running.order(rudder__command=rudder)
+            _until_steady(running, ship_time, at_most=100 * ship_time if duration is None else duration)
+
+
+@dataclass(frozen=True)
+class Orders:
+    """Orders from a file, each held until the next.
+
+    Parameters
+    ----------
+    times : array (n,)
+        s, rising from 0.
+    inputs : dict
+        Input of the model to its orders (n,), SI, rudder positive to starboard.
+    source : str
+        The file, for messages.
+    """
+
+    times: Vector
+    inputs: dict[str, Vector]
+    source: str
+
+    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
+        """Run to the last order's time, or for `duration` s."""
+        for name in self.inputs:
+            if name not in running.model.input_names:
+                remedy = "add [propulsion] to the card, or leave the column out"
+                raise InputError(self.source, name, "is no input of this ship", remedy)
+        end = float(self.times[-1]) if duration is None else duration
+        # A file that repeats an order at every sample is one order: fewer, longer calls into machine code.
+        table = np.column_stack(list(self.inputs.values()))
+        new = np.concatenate([[True], np.any(np.diff(table, axis=0) != 0, axis=1)])
+        for row in np.flatnonzero(new):
+            if self.times[row] >= end:
+                break
+            running.run(self.times[row] - running.time)
+            running.order(**{name: values[row] for name, values in self.inputs.items()})
+        running.run(end - running.time)
+
+
+Manoeuvre = Turn | Zigzag | PullOut | Spiral | Orders
+
+
+def parse_manoeuvre(text: str) -> Manoeuvre:
+    """The manoeuvre that a command line means: one of :data:`FORMS`, angles in deg, positive to starboard.
+
+    Raises
+    ------
+    InputError
+        It is none of them, or an angle is out of bounds.
+    """
+    kind, _, rest = text.partition(":")
+    if kind == "file" and rest:
+        return read_orders(Path(rest))
+    number = r"([+-]?\d+(?:\.\d+)?)"
+    makers: dict[str, tuple[str, Callable[[list[float]], Manoeuvre]]] = {
+        "turn": (number, lambda a: Turn(math.radians(a[0]))),
+        "zigzag": (f"{number}/{number}", lambda a: Zigzag(math.radians(a[0]), math.radians(a[1]))),
+        "pullout": (number, lambda a: PullOut(math.radians(a[0]))),
+        "spiral": (f"(?:{number})?", lambda a: Spiral(_spiral_rudders(a[0] if a else None))),
+    }
+    found = re.fullmatch(makers[kind][0], rest) if kind in makers else None
+    if found is None:
+        raise InputError("--manoeuvre", "", f"{text!r} is no manoeuvre", f"one of: {FORMS}")
+    angles = [float(group) for group in found.groups() if group is not None]
+    if any(not 0 < abs(angle) < 90 for angle in angles) or (kind == "zigzag" and angles[1] < 0):
+        remedy = (
+            "angles lie between 0 and 90 deg; the heading of a zigzag is positive, its rudder begins to its own side"
+        )
+        raise InputError("--manoeuvre", "", f"{text!r} has an angle out of bounds", remedy)
+    return makers[kind][1](angles)
+
+
+def read_orders(path: Path) -> Orders:
+    """Orders from a CSV with ``t_s`` and ``delta_order_deg`` (and ``n_rpm``); ``# rudder_sign: port`` is honoured.
+
+    Raises
+    ------
+    InputError
+        A column is missing or unknown, time does not rise from 0, or a value is missing.
+    """
+    table = read_table(path)
+    columns = table.si().columns
+    names = {"delta_order_rad": "rudder.command", "delta_rad": "rudder.command", "n_radps": "propeller.speed"}
+    for name in columns:
+        if name not in {"t_s", *names}:
+            raise InputError(path, f"column {name}", "is no order", "orders are t_s, delta_order_deg and n_rpm")
+    if "t_s" not in columns or not {"delta_order_rad", "delta_rad"} & set(columns):
+        raise InputError(path, "header", "lacks t_s or delta_order_deg", "orders are t_s, delta_order_deg and n_rpm")
+    times = columns["t_s"]
+    if times[0] != 0 or np.any(np.diff(times) <= 0):
+        raise InputError(path, "column t_s", "does not rise from 0", "begin at 0 and give each time once")
+    for name, values in columns.items():
+        if np.isnan(values).any():
+            raise InputError(path, f"column {name}", "has an empty cell", "give every order")
+    port = table.comments.get("rudder_sign", "starboard").strip() == "port"
+    inputs = {names[name]: values for name, values in columns.items() if name in names}
+    inputs["rudder.command"] = inputs["rudder.command"] * (-1.0 if port else 1.0)
+    return Orders(times, inputs, str(path))
+
+
+def _spiral_rudders(largest: float | None) -> tuple[float, ...]:
+    there = [angle for angle in SPIRAL_RUDDERS_DEG if largest is None or abs(angle) <= abs(largest)]
+    return tuple(math.radians(angle) for angle in (*there, *there[-2::-1]))
+
+
+def _until_steady(running: Running, ship_time: float, at_most: float) -> None:
+    """Run until the yaw rate has not changed over two ship lengths (:data:`STEADY_CHANGE`)."""
+    end = running.time + at_most
+    before = math.inf
+    while running.time < end:
+        running.run(min(2 * ship_time, end - running.time))
+        now = running.state("motion.r")
+        if abs(now - before) < STEADY_CHANGE * max(abs(now), 0.01 / ship_time):
+            return
+        before = now

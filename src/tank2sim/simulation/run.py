@@ -1,0 +1,96 @@
+"""One call from a model and a manoeuvre to trajectory, figures and what the user should be told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.simulation.figures import Figures, figures_of
+from tank2sim.simulation.integrator import NO_COMPILER, Integrator
+from tank2sim.simulation.manoeuvres import Manoeuvre, Orders
+from tank2sim.simulation.running import Running
+from tank2sim.simulation.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Run:
+    """A simulated manoeuvre.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    figures : dict
+        Manoeuvring figures, units in their names; None where the run was too short.
+    notices : tuple of str
+        What the user should be told.
+    """
+
+    trajectory: Trajectory
+    figures: Figures
+    notices: tuple[str, ...]
+
+
+def simulate(
+    model: Model,
+    manoeuvre: Manoeuvre,
+    *,
+    duration_s: float | None = None,
+    parameters: Mapping[str, float] | None = None,
+    integrator: Integrator | None = None,
+) -> Run:
+    """Simulate a manoeuvre, executed at t = 0 from the initial state of the model.
+
+    Parameters
+    ----------
+    model : Model
+        A ship.
+    manoeuvre : Manoeuvre
+        See :mod:`tank2sim.simulation.manoeuvres`.
+    duration_s : float, optional
+        By default as long as the manoeuvre needs.
+    parameters : mapping, optional
+        Values in place of the model's, by name.
+    integrator : Integrator, optional
+        One made earlier for this model, to save its preparation.
+
+    Raises
+    ------
+    InputError
+        The model is no ship, the duration is not positive, or the motion leaves all bounds.
+    """
+    if "rudder.command" not in model:
+        raise InputError(
+            model.name, "", "has no rudder", "manoeuvres need the card of a ship (kind linear or abkowitz)"
+        )
+    if duration_s is not None and not 0 < duration_s < 1e7:
+        raise InputError("--duration", "", f"is {duration_s:g} s", "a positive number of seconds was expected")
+    integrator = integrator or Integrator(model)
+    values = dict(zip(model.parameter_names, model.parameter_values(parameters).tolist(), strict=True))
+    running = Running(integrator, parameters=parameters)
+    manoeuvre.drive(running, values["ship.length"] / values["ship.speed"], duration_s)
+    trajectory = running.trajectory()
+    notices = [*model.notices, *_outside_range(trajectory, values["ship.slowest"], values["ship.fastest"])]
+    if not integrator.compiled:
+        notices.append(NO_COMPILER)
+    figures = figures_of(manoeuvre, trajectory, values["ship.length"])
+    missing = [name for name, value in figures.items() if value is None]
+    if missing and not isinstance(manoeuvre, Orders):
+        notices.append(f"the run of {trajectory.t[-1]:.0f} s does not show: {', '.join(missing)}")
+    return Run(trajectory, figures, tuple(notices))
+
+
+def _outside_range(trajectory: Trajectory, slowest: float, fastest: float) -> list[str]:
+    speed = trajectory["motion.speed"]
+    outside = (speed < slowest) | (speed > fastest)
+    if not outside.any():
+        return []
+    first = int(np.argmax(outside))
+    return [
+        f"outside the card's range of {slowest:.4g} to {fastest:.4g} m/s: the speed is {speed[first]:.4g} m/s at "
+        f"{trajectory.t[first]:.0f} s, and reaches {speed.min():.4g} to {speed.max():.4g} m/s"
+    ]

@@ -1,0 +1,180 @@
+"""A simulation that runs: the only place with state. Manoeuvres drive it, and take the trajectory at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from scipy.optimize import brentq
+
+from tank2sim.dynamics.model import Vector
+from tank2sim.errors import InputError
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.trajectory import Trajectory
+
+_CHUNK = 256  # steps taken between looks for an event: long enough for machine code to pay, short against a manoeuvre
+_TRIM_STEPS = 50
+_TRIM_ACCURACY = 1e-13  # of the change in a Newton step, relative to the nominal size of a state
+
+
+class Running:
+    """A running simulation.
+
+    Samples lie on a grid of whole steps since the start; an event between two of them is one more sample, after which
+    the grid goes on where it was.
+
+    Parameters
+    ----------
+    integrator : Integrator
+        Of the model to run.
+    inputs, parameters : mapping, optional
+        Values by name in place of the model's start values.
+
+    Raises
+    ------
+    InputError
+        ``initial.trim`` is set and there is no steady motion near the start.
+    """
+
+    def __init__(
+        self,
+        integrator: Integrator,
+        inputs: Mapping[str, float] | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ):
+        self._integrator = integrator
+        self.model = integrator.model
+        self._p = self.model.parameter_values(parameters)
+        self._u = self.model.input_values(inputs)
+        self._time = 0.0
+        self._steps_done = 0
+        self._x: Vector = np.array(self.model.initial(self._p)).ravel()
+        if "initial.trim" in self.model and self._p[self.model.parameter_names.index("initial.trim")]:
+            self._trim()
+        self._t_parts: list[Vector] = []
+        self._x_parts: list[Vector] = []
+        self._u_parts: list[Vector] = []
+
+    @property
+    def time(self) -> float:
+        """Time since the start, s."""
+        return self._time
+
+    def state(self, name: str) -> float:
+        """Present value of a state."""
+        return float(self._x[self.model.state_names.index(name)])
+
+    def order(self, **inputs: float) -> None:
+        """Set inputs from now on; names with ``__`` for the dot (``rudder__command=0.35``)."""
+        self._u = self._u.copy()
+        for name, value in inputs.items():
+            self._u[self.model.input_names.index(name.replace("__", "."))] = value
+
+    def run(self, duration: float) -> None:
+        """Advance by `duration` s with the inputs held."""
+        self._advance_to(self._time + duration)
+
+    def run_until(self, state: str, level: float, *, rising: bool, at_most: float) -> bool:
+        """Advance until a state crosses a level in the given direction, to the exact time of the crossing.
+
+        Returns False, after `at_most` s, if it does not. A state that is beyond the level already counts as crossed.
+        """
+        place = self.model.state_names.index(state)
+        sign = 1.0 if rising else -1.0
+
+        def beyond(x: Vector) -> float:
+            return sign * (float(x[place]) - level)
+
+        end = self._time + at_most
+        if beyond(self._x) >= 0:
+            return True
+        while self._time < end:
+            begin_time, begin_x, parts, steps = self._time, self._x, len(self._t_parts), self._steps_done
+            self._advance_to(min(end, self._time + _CHUNK * self.model.step_s))
+            times = np.concatenate([*self._t_parts[parts:], [self._time]])
+            states = np.concatenate([*self._x_parts[parts:], self._x[None, :]])
+            over = np.flatnonzero(sign * (states[:, place] - level) >= 0)
+            if not len(over):
+                continue
+            last = int(over[0]) - 1
+            gap = float(times[last + 1] - times[last])
+            h = brentq(self._after_step_from(states[last], beyond), 0.0, gap, xtol=1e-13)
+            # Take the chunk back, and go to the event instead.
+            del self._t_parts[parts:], self._x_parts[parts:], self._u_parts[parts:]
+            self._time, self._x, self._steps_done = begin_time, begin_x, steps
+            self._advance_to(float(times[last]))
+            self._partial(h)
+            return True
+        return False
+
+    def trajectory(self) -> Trajectory:
+        """Everything so far.
+
+        Raises
+        ------
+        InputError
+            The motion left all bounds.
+        """
+        t = np.append(np.concatenate([*self._t_parts, []]), self._time)
+        x = np.concatenate([*self._x_parts, self._x[None, :]])
+        u = np.concatenate([*self._u_parts, self._u[None, :]])
+        result = Trajectory(self.model, t, x, u, self._integrator.outputs(x, u, self._p))
+        if not result.is_finite():
+            bad = ~(np.isfinite(x).all(axis=1) & np.isfinite(result.y).all(axis=1))
+            when = f"t = {t[int(np.argmax(bad))]:.1f} s"
+            remedy = "check the card's derivatives, or order less rudder: the model does not hold there"
+            raise InputError(self.model.name, when, "the motion leaves all bounds", remedy)
+        return result
+
+    def _after_step_from(self, x: Vector, measure: Callable[[Vector], float]) -> Callable[[float], float]:
+        return lambda h: measure(self._integrator.step(x, self._u, self._p, h))
+
+    def _advance_to(self, end: float) -> None:
+        h = self.model.step_s
+        tolerance = 1e-9 * h
+        to_grid = (self._steps_done + 1) * h - self._time
+        if self._time > self._steps_done * h + tolerance and to_grid <= end - self._time + tolerance:
+            self._partial(to_grid)
+            self._steps_done += 1
+        whole = 0
+        if self._time <= self._steps_done * h + tolerance:
+            whole = int(np.floor((end - self._time) / h + 1e-9))
+        if whole > 0:
+            states = self._integrator.rollout(self._x, self._u, self._p, h, whole)
+            times: Vector = np.asarray((self._steps_done + np.arange(whole)) * h, dtype=float)
+            times[0] = self._time
+            self._keep(times, states[:-1])
+            self._x = states[-1]
+            self._steps_done += whole
+            self._time = self._steps_done * h
+        if end - self._time > tolerance:
+            self._partial(end - self._time)
+
+    def _partial(self, h: float) -> None:
+        """One step of a length of its own."""
+        if h <= 0.0:
+            return
+        self._keep(np.array([self._time]), self._x[None, :])
+        self._x = self._integrator.step(self._x, self._u, self._p, h)
+        self._time += h
+
+    def _keep(self, times: Vector, states: Vector) -> None:
+        self._t_parts.append(times)
+        self._x_parts.append(states)
+        self._u_parts.append(np.repeat(self._u[None, :], len(times), axis=0))
+
+    def _trim(self) -> None:
+        step = self.model.trim_step
+        if step is None:
+            return
+        nominal = np.array([state.nominal for state in self.model.states])
+        for _ in range(_TRIM_STEPS):
+            following = np.array(step(self._x, self._u, self._p)).ravel()
+            change = np.max(np.abs(following - self._x) / nominal)
+            self._x = following
+            if not np.isfinite(change) or change < _TRIM_ACCURACY:
+                break
+        if not change < 1e-9:
+            raise InputError(
+                self.model.name, "initial.trim", "there is no steady motion near the start", "start without it"
+            )
