@@ -1,0 +1,139 @@
+"""Straight-line stability and Nomoto's models of steering, of any ship."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import control
+import numpy as np
+
+from tank2sim.analysis.linearisation import jacobians, state_space, straight_course
+from tank2sim.dynamics.model import Model
+
+
+@dataclass(frozen=True)
+class Nomoto:
+    """Yaw rate by rudder angle, r/delta = K (1 + T3 s) / ((1 + T1 s)(1 + T2 s)), and T = T1 + T2 - T3.
+
+    Nomoto, Taguchi, Honda and Hirano (1957). K in 1/s, positive if the ship follows its rudder; T's in s. Of an
+    unstable ship T1 (and with it T and K) is negative. T1 is the slower mode; a pair that oscillates has complex T1, T2 and only
+    their sum and product are real, so that they are given as None.
+    """
+
+    K_per_s: float
+    T_s: float
+    T1_s: float | None
+    T2_s: float | None
+    T3_s: float
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Straight-line stability of a ship at a speed.
+
+    Parameters
+    ----------
+    name : str
+        The ship.
+    speed_mps, drift_deg, rudder_deg : float
+        The straight course about which it was linearised (beta and rudder, starboard positive).
+    eigenvalues : tuple of complex
+        Of surge, sway and yaw, 1/s, slowest first.
+    criterion : float
+        C' = Y'_v (N'_r - m' x'_G u') - N'_v (Y'_r - m' u'): the ship is stable on a straight course if it is positive.
+        Prime system; the slopes are those of the full forces at the operating point.
+    nomoto, nomoto_prime : Nomoto
+        In SI; and with K L/U, T U/L.
+    """
+
+    name: str
+    speed_mps: float
+    drift_deg: float
+    rudder_deg: float
+    eigenvalues: tuple[complex, ...]
+    criterion: float
+    nomoto: Nomoto
+    nomoto_prime: Nomoto
+
+    @property
+    def stable(self) -> bool:
+        """True if the ship holds a straight course with the rudder fixed (yaw and sway modes both decay)."""
+        return self.criterion > 0
+
+    def as_json(self) -> dict[str, object]:
+        """The result as JSON has it; eigenvalues as [real, imaginary]."""
+        return {
+            "ship": self.name,
+            "operating_point": {
+                "speed_mps": self.speed_mps,
+                "drift_deg": self.drift_deg,
+                "rudder_deg": self.rudder_deg,
+            },
+            "eigenvalues": [[value.real, value.imag] for value in self.eigenvalues],
+            "stability_criterion": {"C_prime": self.criterion, "stable": self.stable},
+            "nomoto": {"dimensional": vars(self.nomoto), "prime": vars(self.nomoto_prime)},
+        }
+
+
+def stability(model: Model, speed_mps: float | None = None) -> Stability:
+    """Straight-line stability of a ship, by default at its speed of expansion.
+
+    Raises
+    ------
+    InputError
+        The model is no ship, or holds no straight course.
+    """
+    point = straight_course(model, speed_mps)
+    values = dict(zip(model.parameter_names, point.p.tolist(), strict=True))
+    at = dict(zip(model.state_names, point.x.tolist(), strict=True))
+    speed = float(np.hypot(at["motion.u"], at["motion.v"]))
+    length, density = values["ship.length"], values["ship.water_density"]
+
+    whole = state_space(model, point, states=["motion.u", "motion.v", "motion.r"])
+    eigenvalues = sorted((complex(value) for value in whole.poles()), key=lambda value: -value.real)
+    slopes, _ = jacobians(model, point, ["force.Y", "force.N"], ["motion.v", "motion.r"], [])
+    # Y_v N_r and N_v Y_r are both in (1/2 rho)^2 L^6 V^2.
+    criterion = float(np.linalg.det(slopes)) / (0.25 * density**2 * length**6 * speed**2)
+    steering = state_space(model, point, states=["motion.v", "motion.r"], inputs=["rudder.angle"], outputs=["motion.r"])
+    own = nomoto(steering)
+    time = length / speed
+    return Stability(
+        name=model.name,
+        speed_mps=speed,
+        drift_deg=float(np.degrees(-np.arcsin(at["motion.v"] / speed))),
+        rudder_deg=float(np.degrees(at["rudder.angle"])),
+        eigenvalues=tuple(eigenvalues),
+        criterion=criterion,
+        nomoto=own,
+        nomoto_prime=Nomoto(
+            own.K_per_s * time,
+            own.T_s / time,
+            own.T1_s and own.T1_s / time,
+            own.T2_s and own.T2_s / time,
+            own.T3_s / time,
+        ),
+    )
+
+
+def nomoto(steering: control.StateSpace) -> Nomoto:
+    """Nomoto's coefficients of a sway-yaw system from rudder angle (rad) to yaw rate (rad/s).
+
+    From A (2, 2), B (2, 1), C (1, 2): 1/(T1 T2) = det A, T1 + T2 = -tr A / det A, and the zero of the transfer function.
+    """
+    A, B, C = steering.A, steering.B, steering.C
+    determinant = float(np.linalg.det(A))
+    adjugate = np.array([[A[1, 1], -A[0, 1]], [-A[1, 0], A[0, 0]]])
+    # C (sI - A)^-1 B = (s C B - C adj(A) B) / det(sI - A), adj the adjugate
+    linear, constant = float((C @ B)[0, 0]), -float((C @ adjugate @ B)[0, 0])
+    T3 = linear / constant
+    total = -float(np.trace(A)) / determinant
+    poles = np.linalg.eigvals(A)
+    slow, fast = sorted(poles, key=abs)
+    real = abs(slow.imag) == 0
+    return Nomoto(
+        K_per_s=constant / determinant,
+        T_s=total - T3,
+        T1_s=float(-1 / slow.real) if real else None,
+        T2_s=float(-1 / fast.real) if real else None,
+        T3_s=T3,
+    )
