@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from tank2sim.errors import InputError
@@ -12,17 +13,37 @@ from tank2sim.errors import InputError
 def write_whole(path: Path, content: str | bytes) -> None:
     """Write a file so that a reader sees the old content or the complete new one, never a part.
 
-    The content goes to a temporary file in the same folder, which then replaces the target in one step.
-
     Raises
     ------
     InputError
         The folder is missing, or cannot be written.
     """
-    data = content.encode("utf-8") if isinstance(content, str) else content
-    path = Path(path)
+    write_together({path: content})
+
+
+def write_together(contents: Mapping[Path, str | bytes]) -> None:
+    """Write several files, all or none: first all as temporary files beside their targets, then all are renamed.
+
+    Raises
+    ------
+    InputError
+        One of the folders is missing or cannot be written; then nothing has been written.
+    """
+    ready: list[tuple[Path, Path]] = []
+    try:
+        for path, content in contents.items():
+            ready.append((_temporary(Path(path), content), Path(path)))
+        for temporary, path in ready:
+            temporary.replace(path)
+    finally:
+        for temporary, _ in ready:
+            temporary.unlink(missing_ok=True)
+
+
+def _temporary(path: Path, content: str | bytes) -> Path:
     if path.is_dir():
         raise InputError(path, "", "is a folder, and a file is to be written there", "give the name of a file")
+    data = content.encode("utf-8") if isinstance(content, str) else content
     temporary = None
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
@@ -30,14 +51,12 @@ def write_whole(path: Path, content: str | bytes) -> None:
         with os.fdopen(handle, "wb") as stream:
             stream.write(data)
         os.chmod(temporary, 0o666 & ~_umask())
-        temporary.replace(path)
     except OSError as error:
-        raise InputError(
-            path, "", f"cannot be written ({error.strerror})", "choose a folder that exists and that you may write to"
-        ) from None
-    finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
+        remedy = "choose a folder that exists and that you may write to"
+        raise InputError(path, "", f"cannot be written ({error.strerror})", remedy) from None
+    return temporary
 
 
 def read_text(path: Path) -> str:

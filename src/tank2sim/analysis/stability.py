@@ -16,8 +16,8 @@ class Nomoto:
     """Yaw rate by rudder angle, r/delta = K (1 + T3 s) / ((1 + T1 s)(1 + T2 s)), and T = T1 + T2 - T3.
 
     Nomoto, Taguchi, Honda and Hirano (1957). K in 1/s, positive if the ship follows its rudder; T's in s. Of an
-    unstable ship T1 (and with it T and K) is negative. T1 is the slower mode; a pair that oscillates has complex T1, T2 and only
-    their sum and product are real, so that they are given as None.
+    unstable ship T1 (and with it T and K) is negative. T1 is the slower mode. Of a pair that oscillates only
+    the sum and product of T1 and T2 are real: both are then None.
     """
 
     K_per_s: float
@@ -118,7 +118,7 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
 def nomoto(steering: control.StateSpace) -> Nomoto:
     """Nomoto's coefficients of a sway-yaw system from rudder angle (rad) to yaw rate (rad/s).
 
-    From A (2, 2), B (2, 1), C (1, 2): 1/(T1 T2) = det A, T1 + T2 = -tr A / det A, and the zero of the transfer function.
+    From A (2, 2), B (2, 1), C (1, 2): 1/(T1 T2) = det A, T1 + T2 = -tr A / det A, T3 from the zero.
     """
     A, B, C = steering.A, steering.B, steering.C
     determinant = float(np.linalg.det(A))

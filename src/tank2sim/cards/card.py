@@ -40,12 +40,15 @@ class Card:
         The TOML text.
     ship, environment
         Particulars and surroundings, SI.
+    model
+        Kind of equations.
     """
 
     source: str
     text: str
     ship: Ship
     environment: Environment
+    model: ShipModel | SurgeModel
 
     def write(self, path: Path) -> None:
         """Write the card's text to a file, whole or not at all."""

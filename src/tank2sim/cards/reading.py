@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import tomlkit
 from pydantic import ValidationError
-from tomlkit.exceptions import ParseError, TOMLKitError
+from tomlkit.exceptions import TOMLKitError
 
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards.card import Card, ManoeuvringCard, SurgeBodyCard
@@ -124,13 +125,12 @@ def revised(card: ManoeuvringCard, derivatives: Mapping[str, tuple[float, float]
 
 def _toml(text: str, source: str) -> tomlkit.TOMLDocument:
     try:
+        tomllib.loads(text)  # unlike tomlkit it tells the place of every fault, a doubled key's too
         return tomlkit.parse(text)
-    except ParseError as error:
-        problem = str(error).split(" at line")[0]
-        remedy = "give it once" if "already" in problem or "exists" in problem else "mend the TOML there"
-        raise InputError(source, f"line {error.line} column {error.col}", problem, remedy) from None
-    except TOMLKitError as error:
-        raise InputError(source, "", str(error), "mend the TOML; a key may stand once") from None
+    except (tomllib.TOMLDecodeError, TOMLKitError) as error:
+        problem, _, place = str(error).partition(" (at ")
+        remedy = "give each key once" if "overwrite" in problem or "twice" in problem else "mend the TOML there"
+        raise InputError(source, place.rstrip(")"), problem, remedy) from None
 
 
 def _angles_to_radians(content: dict[str, Any], source: str, spelt: dict[str, str]) -> None:
@@ -160,7 +160,8 @@ def _angles_to_radians(content: dict[str, Any], source: str, spelt: dict[str, st
 
 def _told(error: ValidationError, source: str, spelt: Mapping[str, str]) -> InputError:
     """The first fault that pydantic found, as one line of ours."""
-    first = error.errors()[0]
+    # A key that is unknown explains one that is missing (length_ft for length_m), not the other way round.
+    first = min(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     place = ".".join(str(part) for part in first["loc"])
     place = spelt.get(place, place)
     key = place.rpartition(".")[2]

@@ -1,1 +1,75 @@
-"""The command line: one thin file a command."""
+"""The command line: one thin file a command, which reads, calls and prints.
+
+Every command ends 0 (done), 1 (`check` only: it failed) or 2 (bad input: one line on the error stream).
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import tempfile
+import traceback
+from pathlib import Path
+
+import click
+
+from tank2sim import __version__
+from tank2sim.errors import InputError
+
+COMMANDS = ("demo", "ships", "simulate", "tow", "export", "check", "stability")
+
+
+class _Commands(click.Group):
+    """Commands are imported when they are asked for, so that ``tank2sim ships`` does not wait for CasADi."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(f"tank2sim.cli.{cmd_name}").command
+        return command
+
+
+@click.command(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(__version__, prog_name="tank2sim")
+def tank2sim() -> None:
+    """From what a towing tank or a sea trial measured to a verified ship model inside a simulator."""
+
+
+def main() -> None:
+    """Entry point of ``tank2sim``: runs a command and ends the process with its exit code."""
+    sys.exit(_run())
+
+
+def _run() -> int:
+    try:
+        result = tank2sim.main(prog_name="tank2sim", standalone_mode=False)
+    except InputError as error:
+        return _refuse(str(error))
+    except click.exceptions.NoArgsIsHelpError as error:
+        print(error.ctx.get_help() if error.ctx else "", file=sys.stderr)
+        return 2
+    except click.UsageError as error:
+        where = error.ctx.command_path if error.ctx else "tank2sim"
+        return _refuse(f"{error.format_message().rstrip('.')}; see {where} --help")
+    except click.ClickException as error:
+        return _refuse(error.format_message())
+    except (click.Abort, KeyboardInterrupt):
+        return _refuse("interrupted; nothing is left half-written", code=130)
+    except BrokenPipeError:
+        return 0
+    except Exception as error:
+        with tempfile.NamedTemporaryFile("w", prefix="tank2sim-", suffix=".log", delete=False) as log:
+            traceback.print_exc(file=log)
+        told = " ".join(str(error).split())[:200]
+        return _refuse(
+            f"a fault of the program, not of yours: {type(error).__name__}: {told}; please report {Path(log.name)}"
+        )
+    return result if isinstance(result, int) else 0
+
+
+def _refuse(message: str, code: int = 2) -> int:
+    print(f"tank2sim: {' '.join(message.split())}", file=sys.stderr)
+    return code

@@ -1,0 +1,61 @@
+"""``tank2sim simulate``: a standard manoeuvre of a ship."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from tank2sim.cards import read_card
+from tank2sim.cli.changes import parse_changes
+from tank2sim.cli.screen import json_option, json_text, show_notices, show_table
+from tank2sim.dynamics import build
+from tank2sim.files import write_together
+from tank2sim.simulation.manoeuvres import FORMS, parse_manoeuvre
+from tank2sim.simulation.run import Run, simulate
+from tank2sim.simulation.trial_file import trial_csv
+
+
+@click.command("simulate")
+@click.argument("card")
+@click.option(
+    "--manoeuvre", required=True, metavar="M", help=f"{FORMS}. Angles in deg, + to starboard; execute at t = 0."
+)
+@click.option(
+    "--duration", type=float, metavar="S", help="Length of the run in s; by default what the manoeuvre needs."
+)
+@click.option(
+    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="A value in place of the card's, by dotted key."
+)
+@click.option("--out", type=click.Path(path_type=Path), metavar="run.csv", help="Write the motion as a trial CSV.")
+@click.option("--plot", type=click.Path(path_type=Path), metavar="run.png", help="Draw track and time histories.")
+@json_option
+def command(card: str, manoeuvre: str, duration: float | None, settings: tuple[str, ...], **files: Path | None) -> None:
+    """Simulate a manoeuvre of CARD (a file, or the name of a bundled ship) and read off its figures."""
+    ship = read_card(card, parse_changes(settings))
+    model = build(ship)
+    run = simulate(model, parse_manoeuvre(manoeuvre), duration_s=duration)
+    contents: dict[Path, str | bytes] = {}
+    if out := files["out"]:
+        contents[out] = trial_csv(run.trajectory, f"tank2sim simulation of {ship.ship.name}: {manoeuvre}")
+    if plot := files["plot"]:
+        contents[plot] = _picture(run, f"{ship.ship.name}, {manoeuvre}")
+    if json_file := files["json_file"]:
+        result = {"ship": ship.ship.name, "manoeuvre": manoeuvre, "figures": run.figures, "notices": run.notices}
+        contents[json_file] = json_text(result)
+    write_together(contents)
+    show_table(
+        f"{ship.ship.name}, {manoeuvre}", ["figure", "value"], [[name, value] for name, value in run.figures.items()]
+    )
+    show_notices(run.notices)
+
+
+def _picture(run: Run, title: str) -> bytes:
+    import altair as alt  # drawing is asked for seldom, and its library is slow to load
+
+    from tank2sim.report.charts import chart_png, history_chart, track_chart
+    from tank2sim.report.runs import SHIP_SIGNALS, history_of, signals_of, track_of
+
+    motion = run.trajectory
+    histories = history_chart([history_of(title, motion, SHIP_SIGNALS)], signals_of(motion.model, SHIP_SIGNALS))
+    return chart_png(alt.vconcat(track_chart([track_of(title, motion)], title=title), histories))

@@ -1,0 +1,27 @@
+"""From a simulated trajectory to what the charts of tracks and time histories take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tank2sim.dynamics.model import Model
+from tank2sim.report.charts import History, Signal, Track
+from tank2sim.simulation.trajectory import Trajectory
+
+SHIP_SIGNALS = ("rudder.angle", "motion.psi", "motion.r", "motion.u", "motion.v")
+"""What the time histories of a ship show, from top to bottom."""
+
+
+def track_of(label: str, run: Trajectory) -> Track:
+    """The track of a run."""
+    return Track(label=label, x_m=run["motion.x"], y_m=run["motion.y"], time_s=run.t)
+
+
+def history_of(label: str, run: Trajectory, names: Sequence[str]) -> History:
+    """Named signals of a run over time."""
+    return History(label=label, time_s=run.t, values={name: run[name] for name in names})
+
+
+def signals_of(model: Model, names: Sequence[str]) -> list[Signal]:
+    """Panels for named variables of a model, with the units it declares."""
+    return [Signal(name=name, title=name.partition(".")[2], unit=model[name].unit) for name in names]

@@ -1,0 +1,192 @@
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tank2sim.bundled import bundled_cards
+from tank2sim.cards import parse_card, read_card, revised
+from tank2sim.dynamics import build
+from tank2sim.errors import InputError
+
+SI_CARD = """
+format = "tank2sim-ship/1"
+[ship]
+name = "Test ship"
+length_m = 100.0
+source = "made up"
+[environment]
+water_density_kgpm3 = 1000.0
+[model]
+kind = "abkowitz"
+speed_mps = 10.0
+scaling = "dimensional"
+speed_scale = "nominal"
+yaw_rate_terms = "hydrodynamic"
+rudder_sign = "port"
+[rigid_body]
+mass = 5e6          # kg
+yaw_inertia = 3.2e9
+x_G = 1.0
+[derivatives]
+Yv = -6e5           # N per m/s
+Yr = 1.5e7          # N per rad/s
+Nr = -1.2e9         # N m per rad/s
+Yd = 1.1e6          # N per rad
+Nvvr = -4e8
+Xdd = -5e5
+Yvdot = -4e6
+Nrdot = -2e9
+"""
+
+
+def refusal(text: str) -> str:
+    with pytest.raises(InputError) as error:
+        build(parse_card(text, "ship.toml"))
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_dimensional_numbers_become_prime_by_hand() -> None:
+    card = parse_card(SI_CARD, "ship.toml")
+    half_rho, length, speed = 500.0, 100.0, 10.0
+    assert card.rigid_body.mass == pytest.approx(5e6 / (half_rho * length**3))
+    assert card.rigid_body.yaw_inertia == pytest.approx(3.2e9 / (half_rho * length**5))
+    assert card.rigid_body.x_G == pytest.approx(0.01)
+    assert card.derivatives["Yv"] == pytest.approx(-6e5 / (half_rho * length**2 * speed))
+    assert card.derivatives["Yr"] == pytest.approx(1.5e7 / (half_rho * length**3 * speed))
+    assert card.derivatives["Nr"] == pytest.approx(-1.2e9 / (half_rho * length**4 * speed))
+    assert card.derivatives["Nvvr"] == pytest.approx(-4e8 * speed / (half_rho * length**4))
+    assert card.derivatives["Yvdot"] == pytest.approx(-4e6 / (half_rho * length**3))
+    assert card.derivatives["Nrdot"] == pytest.approx(-2e9 / (half_rho * length**5))
+
+
+def test_a_rudder_to_port_changes_the_sign_of_odd_powers_alone() -> None:
+    card = parse_card(SI_CARD, "ship.toml")
+    assert card.derivatives["Yd"] == pytest.approx(-1.1e6 / (500.0 * 100.0**2 * 100.0))
+    assert card.derivatives["Xdd"] == pytest.approx(-5e5 / (500.0 * 100.0**2 * 100.0))
+
+
+def test_degrees_and_radians_are_one() -> None:
+    in_degrees = read_card("mariner")
+    in_radians = parse_card(
+        in_degrees.text.replace("max_rate_degps = 5.0", f"max_rate_radps = {math.radians(5.0)}"), "ship.toml"
+    )
+    assert in_radians.steering_gear.max_rate_radps == pytest.approx(in_degrees.steering_gear.max_rate_radps)
+    assert in_degrees.steering_gear.max_angle_rad == pytest.approx(math.radians(40.0))
+
+
+def test_a_card_is_written_back_without_loss(tmp_path: Path) -> None:
+    for path in bundled_cards().values():
+        read_card(path).write(tmp_path / "copy.toml")
+        assert (tmp_path / "copy.toml").read_text(encoding="utf-8") == path.read_text(encoding="utf-8")
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    value=st.floats(-1, 1).filter(lambda v: v == 0 or abs(v) > 1e-9),
+    error=st.floats(0, 0.1),
+    name=st.sampled_from(["Yv", "Nddd", "Xvr", "Yvvr", "Nvdot", "Yduu", "Y0"]),
+    source=st.sampled_from(["mariner", "si"]),
+)
+def test_revised_values_come_back_from_the_written_text(value: float, error: float, name: str, source: str) -> None:
+    card = read_card("mariner") if source == "mariner" else parse_card(SI_CARD, "ship.toml")
+    again = parse_card(revised(card, {name: (value, error)}).text, "again.toml")
+    assert again.derivatives[name] == pytest.approx(value, rel=1e-12, abs=1e-300)
+    assert again.uncertainty[name] == pytest.approx(error, rel=1e-12, abs=1e-300)
+    others = set(card.derivatives) - {name}
+    assert {key: again.derivatives[key] for key in others} == {key: card.derivatives[key] for key in others}
+
+
+def test_comments_survive_a_revision() -> None:
+    new = revised(parse_card(SI_CARD, "ship.toml"), {"Yv": (-0.01, 0.001)}).text
+    assert "# kg" in new and "# N per rad/s" in new
+
+
+def test_uncertainty_left_out_is_two_percent() -> None:
+    card = read_card("mariner")
+    assert card.standard_error("Yv") == pytest.approx(0.02 * 0.0116)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "expected"),
+    [
+        ("length_m = 100.0", "", "ship.length_m", "is missing"),
+        ("length_m = 100.0", "length_m = -100.0", "ship.length_m", "greater than 0"),
+        ("length_m = 100.0", "length_m = nan", "ship.length_m", "finite"),
+        ("length_m = 100.0", "length_m = inf", "ship.length_m", "finite"),
+        ("length_m = 100.0", "length_ft = 328.0", "ship.length_ft", "did you mean length_m?"),
+        ("length_m = 100.0", 'length_m = "100"', "ship.length_m", "a number was expected"),
+        ("length_m = 100.0", "length_m = 100.0\nlength_m = 101.0", "line", "once"),
+        ('kind = "abkowitz"', 'kind = "mmg"', "model.kind", "abkowitz"),
+        ('rudder_sign = "port"', "", "model.rudder_sign", "is missing"),
+        ('yaw_rate_terms = "hydrodynamic"', 'yaw_rate_terms = "both"', "model.yaw_rate_terms", "total"),
+        ("Yv = -6e5", "Yv = -6e5\nYbeta = 1.0", "derivatives.Ybeta", "no name of a derivative"),
+        ("Yv = -6e5", "Yv = -6e5\nYvvvv = 1.0", "derivatives.Yvvvv", "no term of (3.8)"),
+        ("Xdd = -5e5", "Xudd = 1.0\nXddu = 1.0", "derivatives.Xddu", "same term as Xudd"),
+        ("mass = 5e6", "mass = 5e12", "rigid_body.mass", "prime"),
+        ("x_G = 1.0", "x_G = 80.0", "rigid_body.x_G", "midships"),
+        ("[derivatives]", "[wings]\na = 1\n[derivatives]", "wings", "no key of a card"),
+        ("[derivatives]", "[derivatives", "line", "TOML"),
+    ],
+)
+def test_a_faulty_card_is_refused_with_its_place(old: str, new: str, place: str, expected: str) -> None:
+    assert old in SI_CARD
+    told = refusal(SI_CARD.replace(old, new, 1))
+    assert told.startswith("ship.toml: ") and place in told and expected in told
+
+
+def test_a_singular_mass_matrix_is_refused() -> None:
+    card = read_card("mariner")
+    body, added = card.rigid_body, card.derivatives
+    coupling = (body.mass * body.x_G - added["Yrdot"]) * (body.mass * body.x_G - added["Nvdot"])
+    singular = body.yaw_inertia - coupling / (body.mass - added["Yvdot"])
+    told = refusal(card.text.replace("Nrdot = -43.8e-5", f"Nrdot = {singular!r}"))
+    assert "f4 = 0" in told and "rigid_body" in told
+
+
+def test_positive_added_mass_is_refused() -> None:
+    assert "not positive" in refusal(read_card("mariner").text.replace("Yvdot = -748e-5", "Yvdot = 1748e-5"))
+
+
+def test_an_angle_given_in_both_units_is_refused() -> None:
+    text = read_card("mariner").text.replace("max_angle_deg = 40.0", "max_angle_deg = 40.0\nmax_angle_rad = 0.7")
+    assert "given twice" in refusal(text)
+
+
+def test_an_angle_out_of_bounds_is_told_in_the_units_of_the_file() -> None:
+    told = refusal(read_card("mariner").text.replace("max_angle_deg = 40.0", "max_angle_deg = 120.0"))
+    assert "is 120" in told and "below 90" in told
+
+
+@pytest.mark.parametrize(
+    ("effect", "expected"),
+    [
+        ('name = "curent"', "did you mean current?"),
+        ('name = "current"', "speed_mps: is missing"),
+        ('name = "current"\nparameters = {speed_mps = 0.5, direction_deg = 30.0, depth_m = 1.0}', "no parameter"),
+        ('name = "current"\nparameters = {speed_mps = -0.5, direction_deg = 30.0}', "was expected"),
+    ],
+)
+def test_a_faulty_effect_is_refused(effect: str, expected: str) -> None:
+    assert expected in refusal(f"{SI_CARD}\n[[effects]]\n{effect}\n")
+
+
+def test_an_effect_given_twice_is_refused() -> None:
+    effect = '[[effects]]\nname = "current"\nparameters = {speed_mps = 0.5, direction_deg = 30.0}\n'
+    assert "stands twice" in refusal(f"{SI_CARD}\n{effect}{effect}")
+
+
+def test_a_bundled_name_is_found_in_any_case_and_an_unknown_one_lists_them() -> None:
+    assert read_card("MaRiNeR").ship.name == "Mariner class"
+    with pytest.raises(InputError, match="mariner"):
+        read_card("titanic")
+
+
+def test_changes_are_made_in_the_conventions_of_the_file() -> None:
+    plain, changed = read_card("mariner"), read_card("mariner", {"derivatives.Yd": 300e-5})
+    assert plain.derivatives["Yd"] == pytest.approx(-278e-5)
+    assert changed.derivatives["Yd"] == pytest.approx(-300e-5)

@@ -1,0 +1,40 @@
+"""What several test modules need: the measured data beside the project, and the bundled ships."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.dynamics import Model, build
+
+ROOT = Path(__file__).resolve().parents[1]
+DATA = Path(os.environ.get("TANK2SIM_DATA", ROOT.parent / "shared"))
+
+
+@pytest.fixture(scope="session")
+def data() -> Path:
+    """The folder of measured and reference data, or a skip that says it is missing."""
+    if not DATA.is_dir():
+        pytest.skip(f"measured data are missing: no folder {DATA} (set TANK2SIM_DATA)")
+    return DATA
+
+
+@pytest.fixture(scope="session")
+def mariner_card() -> ManoeuvringCard:
+    card = read_card("mariner")
+    assert isinstance(card, ManoeuvringCard)
+    return card
+
+
+@pytest.fixture(scope="session")
+def mariner(mariner_card: ManoeuvringCard) -> Model:
+    return build(mariner_card)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def private_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Compiled models of tests go to a folder of their own, so that no test passes on what was compiled earlier."""
+    os.environ["XDG_CACHE_HOME"] = str(tmp_path_factory.mktemp("cache"))

@@ -1,0 +1,201 @@
+"""The ship's equations against (3.5), (3.8) written out anew, term by term as printed, in plain numpy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.dynamics import build, linear
+from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, TERMS
+
+from ..cards.test_reading import SI_CARD
+
+L, U0, RHO = 160.93, 7.7175, 1025.0
+
+
+def with_random_derivatives(card: ManoeuvringCard, seed: int, **model: str) -> ManoeuvringCard:
+    random = np.random.default_rng(seed)
+    derivatives = dict(card.derivatives)
+    for name in (*TERMS["X"], *TERMS["Y"], *TERMS["N"]):
+        derivatives[name] = random.normal(scale=1e-3)
+    return replace(card, derivatives=derivatives, model=card.model.model_copy(update=model))
+
+
+def printed(c: dict[str, float], card: ManoeuvringCard, state: tuple[float, ...]) -> np.ndarray:
+    """du/dt, dv/dt, dr/dt by (3.8) and a matrix solve; v, r, d, u given in SI, all in the prime system within."""
+    u, v, r, d = state
+    V = np.hypot(u, v) if card.model.speed_scale == "instantaneous" else U0
+    Du, v, r, u = (u - U0) / V, v / V, r * L / V, u / V
+    m, xG, Jz = card.rigid_body.mass, card.rigid_body.x_G, card.rigid_body.yaw_inertia
+    add = 1.0 if card.model.yaw_rate_terms == "hydrodynamic" else 0.0
+    X = (
+        c["X0"] + c["Xu"] * Du + c["Xuu"] * Du**2 + c["Xuuu"] * Du**3
+        + c["Xvv"] * v**2 + (c["Xrr"] + add * m * xG) * r**2
+        + c["Xdd"] * d**2 + c["Xvvu"] * v**2 * Du + c["Xrru"] * r**2 * Du + c["Xddu"] * d**2 * Du
+        + (c["Xvr"] + add * m) * v * r + c["Xvd"] * v * d + c["Xrd"] * r * d
+        + c["Xvru"] * v * r * Du + c["Xvdu"] * v * d * Du + c["Xrdu"] * r * d * Du
+    )  # fmt: skip
+
+    def odd(F: str, inertial: float) -> float:
+        return (
+            c[F + "0"] + c[F + "0u"] * Du + c[F + "0uu"] * Du**2
+            + c[F + "v"] * v + c[F + "vvv"] * v**3 + c[F + "vrr"] * v * r**2 + c[F + "vdd"] * v * d**2
+            + c[F + "vu"] * v * Du + c[F + "vuu"] * v * Du**2
+            + (c[F + "r"] - add * inertial * u) * r + c[F + "rrr"] * r**3 + c[F + "vvr"] * r * v**2
+            + c[F + "rdd"] * r * d**2 + c[F + "ru"] * r * Du + c[F + "ruu"] * r * Du**2
+            + c[F + "d"] * d + c[F + "ddd"] * d**3 + c[F + "vvd"] * d * v**2 + c[F + "rrd"] * d * r**2
+            + c[F + "du"] * d * Du + c[F + "duu"] * d * Du**2 + c[F + "vrd"] * v * r * d
+        )  # fmt: skip
+
+    M = np.array(
+        [
+            [m - c["Xudot"], 0, 0],
+            [0, m - c["Yvdot"], m * xG - c["Yrdot"]],
+            [0, m * xG - c["Nvdot"], Jz - c["Nrdot"]],
+        ]
+    )
+    udot, vdot, rdot = np.linalg.solve(M, [X, odd("Y", m), odd("N", m * xG)])
+    return np.array([udot * V**2 / L, vdot * V**2 / L, rdot * V**2 / L**2])
+
+
+def accelerations(card: ManoeuvringCard, state: tuple[float, ...], **more: float) -> np.ndarray:
+    model = build(card)
+    values = {"motion.u": state[0], "motion.v": state[1], "motion.r": state[2], "rudder.angle": state[3], **more}
+    x = np.array([values.get(name, 0.0) for name in model.state_names])
+    y = np.array(model.output(x, model.input_values(), model.parameter_values())).ravel()
+    return y[[model.outputs.index(name) for name in ("motion.udot", "motion.vdot", "motion.rdot")]]
+
+
+STATES = [(7.7175, 0.3, 0.004, 0.1), (6.0, -0.9, 0.011, -0.5), (9.1, 0.7, -0.008, 0.3)]
+
+
+def test_the_term_lists_are_those_of_the_paper() -> None:
+    assert [len(TERMS[force]) for force in "XYN"] == [16, 22, 22]
+    assert len(ACCELERATION_TERMS) == 5 and len(set(ALL_TERMS)) == 65
+
+
+@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize("speed_scale", ["instantaneous", "nominal"])
+@pytest.mark.parametrize("yaw_rate_terms", ["total", "hydrodynamic"])
+def test_all_65_terms_are_those_of_3_8(mariner_card, state, speed_scale, yaw_rate_terms) -> None:
+    card = with_random_derivatives(mariner_card, 7, speed_scale=speed_scale, yaw_rate_terms=yaw_rate_terms)
+    np.testing.assert_allclose(accelerations(card, state), printed(card.derivatives, card, state), rtol=1e-11)
+
+
+@pytest.mark.parametrize("yaw_rate_terms", ["total", "hydrodynamic"])
+def test_the_linear_model_is_3_5(mariner_card, yaw_rate_terms) -> None:
+    card = with_random_derivatives(mariner_card, 3, yaw_rate_terms=yaw_rate_terms)
+    only = {"Xu", "Yv", "Yr", "Yd", "Nv", "Nr", "Nd", *ACCELERATION_TERMS}
+    # (3.8) without its other terms, near u0 and for small v, r, is (3.5)
+    c = {name: value if name in only else 0.0 for name, value in card.derivatives.items()}
+    near = replace(card, model=card.model.model_copy(update={"speed_scale": "nominal"}))
+    state = (U0, 1e-4, 1e-6, 1e-4)
+    np.testing.assert_allclose(accelerations(linear(card), state)[1:], printed(c, near, state)[1:], rtol=1e-9)
+    fast, slow = accelerations(linear(card), (8.0, 0, 0, 0)), accelerations(linear(card), (7.0, 0, 0, 0))
+    m = card.rigid_body.mass - c["Xudot"]
+    np.testing.assert_allclose((fast - slow)[0], c["Xu"] * U0 / L / m, rtol=1e-9)
+
+
+def test_total_and_hydrodynamic_differ_by_m_times_speed_difference(mariner_card) -> None:
+    """formats: the two differ by m (V - u) r once the inertia terms are taken over."""
+    m, xG = mariner_card.rigid_body.mass, mariner_card.rigid_body.x_G
+    c = mariner_card.derivatives
+    moved = {"Yr": c["Yr"] + m, "Nr": c["Nr"] + m * xG, "Xvr": c["Xvr"] - m, "Xrr": c["Xrr"] - m * xG}
+    bare = replace(
+        mariner_card,
+        derivatives={**c, **moved},
+        model=mariner_card.model.model_copy(update={"yaw_rate_terms": "hydrodynamic"}),
+    )
+    u, v, r = 6.5, -0.8, 0.01
+    V = np.hypot(u, v)
+    half = RHO / 2 * L**3
+    matrix = half * np.array([[m - c["Yvdot"], L * (m * xG - c["Yrdot"])], [L * (m * xG - c["Nvdot"]), 0]])
+    matrix[1, 1] = half * L**2 * (mariner_card.rigid_body.yaw_inertia - c["Nrdot"])
+    difference = half * m * np.array([1.0, xG * L]) * (V - u) * r
+    found = accelerations(bare, (u, v, r, 0.1)) - accelerations(mariner_card, (u, v, r, 0.1))
+    np.testing.assert_allclose(found[1:], np.linalg.solve(matrix, difference), rtol=1e-8)
+
+
+def test_a_symmetric_ship_turns_alike_to_both_sides(mariner_card) -> None:
+    names = ("X0 Xu Xuu Xuuu Xvv Xrr Xdd Xvvu Xrru Xddu Xvr Xvd Xrd Xvru Xvdu Xrdu").split()
+    assert set(names) == set(TERMS["X"])
+    even = [f + end for f in "YN" for end in ("0", "0u", "0uu")]
+    random = with_random_derivatives(mariner_card, 11)
+    card = replace(random, derivatives={**random.derivatives, **dict.fromkeys(even, 0.0)})
+    starboard, port = accelerations(card, (7.0, 0.5, 0.01, 0.2)), accelerations(card, (7.0, -0.5, -0.01, -0.2))
+    np.testing.assert_allclose(port, starboard * [1, -1, -1], rtol=1e-12)
+
+
+def test_ships_of_any_size_with_equal_primes_accelerate_alike(mariner_card) -> None:
+    """Dimensional similarity: accelerations scale with U^2/L and U^2/L^2, whatever the density."""
+    scale, speed, density = 1 / 40.0, 0.2, 0.97
+    model = replace(
+        mariner_card,
+        ship=mariner_card.ship.model_copy(update={"length_m": L * scale}),
+        model=mariner_card.model.model_copy(update={"speed_mps": U0 * speed, "valid_speed_mps": None}),
+        environment=mariner_card.environment.model_copy(update={"water_density_kgpm3": RHO * density}),
+    )
+    state = np.array([6.5, -0.8, 0.01, 0.3])
+    scaled = accelerations(model, tuple(state * [speed, speed, speed / scale, 1]))
+    expected = accelerations(mariner_card, tuple(state)) * [speed**2 / scale, speed**2 / scale, speed**2 / scale**2]
+    np.testing.assert_allclose(scaled, expected, rtol=1e-11)
+
+
+def test_positive_rudder_turns_to_starboard(mariner_card) -> None:
+    assert accelerations(mariner_card, (U0, 0, 0, 0.2))[2] > 0
+
+
+def test_the_steering_gear_keeps_its_limits_and_stays_when_it_fails(mariner) -> None:
+    rate = mariner.state_names.index("rudder.angle")
+    at = np.zeros(7)
+    at[mariner.state_names.index("motion.u")] = U0
+    p = mariner.parameter_values()
+    far = mariner.input_values({"rudder.command": np.radians(35)})
+    near = mariner.input_values({"rudder.command": np.radians(2)})
+    failed = mariner.input_values({"rudder.command": np.radians(35), "steering.failed": 1.0})
+    assert float(mariner.rhs(at, far, p)[rate]) == pytest.approx(np.radians(5.0))
+    assert float(mariner.rhs(at, near, p)[rate]) == pytest.approx(np.radians(2.0) / 1.0)
+    assert float(mariner.rhs(at, failed, p)[rate]) == 0.0
+    at[rate] = np.radians(40)
+    beyond = mariner.input_values({"rudder.command": np.radians(60)})
+    assert float(mariner.rhs(at, beyond, p)[rate]) == pytest.approx(0.0, abs=1e-15)
+
+
+def test_a_card_without_gear_says_which_lag_is_taken() -> None:
+    model = build(parse_card(SI_CARD, "ship.toml"))
+    assert any("time constant" in notice for notice in model.notices)
+
+
+def test_current_carries_the_ship_and_changes_no_force(mariner_card) -> None:
+    text = (
+        mariner_card.text + '\n[[effects]]\nname = "current"\nparameters = {speed_mps = 0.5, direction_deg = 120.0}\n'
+    )
+    model = build(parse_card(text, "ship.toml"))
+    plain = build(mariner_card)
+    x = np.array([0, 0, 0.3, 7.0, -0.4, 0.008, 0.2])
+    assert model.state_names == plain.state_names
+    with_current = np.array(model.rhs(x, model.input_values(), model.parameter_values())).ravel()
+    without = np.array(plain.rhs(x, plain.input_values(), plain.parameter_values())).ravel()
+    expected = np.zeros(7)
+    expected[:2] = 0.5 * np.cos(np.radians(120)), 0.5 * np.sin(np.radians(120))
+    np.testing.assert_allclose(with_current - without, expected, atol=1e-14)
+    assert {"current.speed", "current.direction"} <= set(model.input_names)
+
+
+def test_propulsion_balances_at_nominal_revolutions_and_pulls_above(data) -> None:
+    card = parse_card((data / "data/gap_cases/case_1/ship.toml").read_text(), "ship.toml")
+    model = build(card)
+    x = np.array([0, 0, 0, U0, 0, 0, 0.0])
+    nominal = 84.0 * 2 * np.pi / 60
+    surge = model.state_names.index("motion.u")
+
+    def udot(n: float) -> float:
+        return float(model.rhs(x, model.input_values({"propeller.speed": n}), model.parameter_values())[surge])
+
+    assert udot(nominal) == pytest.approx(0.0, abs=1e-12)
+    m = card.rigid_body.mass - card.derivatives["Xudot"]
+    assert udot(1.1 * nominal) == pytest.approx(0.00077 * 0.21 * U0**2 / L / m, rel=1e-9)
+    assert udot(-nominal) == pytest.approx(-2 * 0.00077 * U0**2 / L / m, rel=1e-9)
