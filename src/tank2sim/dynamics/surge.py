@@ -18,8 +18,8 @@ from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
 DRAG_POWERS: dict[str, int] = {"B1": 4, "B2": 3, "B3": 2}
 """Drag terms of (1.5), in its order, and the power of the speed that each multiplies."""
 
-# The step of the paper's own integration. It lies far below the shortest time constant M / (dR/dv) of a towed body, 1 s
-# for a 1 m model at 1 m/s and 50 s for the vehicle of the paper: a Runge-Kutta step of a tenth of it errs by 1e-7.
+# The step of the paper's own integration. The time constant M / (dR/dv) of a towed body is 1 s for a 1 m model at 1 m/s
+# and 10 s or more for the vehicle of the paper; a Runge-Kutta step of a tenth of it errs by less than 1e-7 of the speed.
 _STEP_S = 0.1
 
 
@@ -48,11 +48,7 @@ def drag(speed: Any, b1: Any, b2: Any, b3: Any) -> Any:
 
 
 def surge_model(
-    name: str,
-    coefficients: SurgeCoefficients,
-    force_N: float,
-    *,
-    valid_speed_mps: tuple[float, float] | None = None,
+    name: str, coefficients: SurgeCoefficients, force_N: float, *, valid_speed_mps: tuple[float, float] | None = None
 ) -> Model:
     """Surge of a body under a force along its axis, equation (1.5).
 
@@ -69,36 +65,35 @@ def surge_model(
     """
     parameters = _parameters(coefficients)
     mass, b1, b2, b3, initial_x, initial_u = (parameter.symbol for parameter in parameters)
-    force = Input(
-        name="tow.force", unit="N", start=force_N, nominal=abs(force_N) or 1.0, description="Towing force, + forward"
-    )
+    scale = abs(force_N) or 1.0
+    force = Input(name="tow.force", unit="N", start=force_N, nominal=scale, description="Towing force, + forward")
     x, u = _states(initial_x, initial_u, valid_speed_mps[1] if valid_speed_mps else 1.0)
+    speed = Quantity(name="motion.xdot", unit="m/s", description="Rate of the position", value=u.symbol)
     resistance = Quantity(
         name="force.drag",
         unit="N",
         description="Drag, + when it acts aft",
-        nominal=force.nominal,
+        nominal=scale,
         value=drag(u.symbol, b1, b2, b3),
     )
     acceleration = Quantity(
         name="motion.udot",
         unit="m/s2",
         description="Surge acceleration, + forward",
-        nominal=force.nominal / coefficients.total_mass_kg,
+        nominal=scale / coefficients.total_mass_kg,
         value=(force.symbol - resistance.symbol) / mass,
     )
-    speed = Quantity(name="motion.xdot", unit="m/s", description="Rate of the position", value=u.symbol)
     model = Model(
         name=name,
-        description="Straight-line unsteady motion of a towed body, equation (1.5) of Wilinski & Zellman (1984)",
+        description="Straight-line motion of a towed body, equation (1.5) of Wilinski & Zellman (1984)",
         states=(x, u),
         inputs=(force,),
         parameters=parameters,
         quantities=(speed, acceleration, resistance),
-        outputs=("motion.x", "motion.u", "motion.udot", "force.drag"),
+        outputs=(x.name, u.name, acceleration.name, resistance.name),
         step_s=_STEP_S,
     )
-    return model if valid_speed_mps is None else _with_validity(model, *valid_speed_mps)
+    return model if valid_speed_mps is None else _with_validity(model, valid_speed_mps)
 
 
 def _states(initial_x: ca.SX, initial_u: ca.SX, top_speed: float) -> tuple[State, State]:
@@ -145,7 +140,8 @@ def _parameters(coefficients: SurgeCoefficients) -> tuple[Parameter, ...]:
     )
 
 
-def _with_validity(model: Model, lowest: float, highest: float) -> Model:
+def _with_validity(model: Model, speeds_mps: tuple[float, float]) -> Model:
+    lowest, highest = speeds_mps
     outside = ca.fmax(lowest - model.symbol("motion.u"), model.symbol("motion.u") - highest)
     # A polynomial fitted over a range soon departs from the truth beyond it: nothing is left of its worth half a
     # range away.

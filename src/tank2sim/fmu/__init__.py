@@ -1,1 +1,5 @@
-"""The FMU of a model: described, generated, compiled, packed and verified."""
+"""A model as a Functional Mock-up Unit: interface, C generation, packaging, verification."""
+
+from tank2sim.fmu.export import CARD_IN_FMU, Documents, ExportedFmu, write_fmu
+
+__all__ = ["CARD_IN_FMU", "Documents", "ExportedFmu", "write_fmu"]

@@ -203,7 +203,7 @@ def _read_with_care(path: Path, names: Sequence[str], rows: Sequence[str], lines
         place = f"line {lines[row]}"
         cells = _cells(path, place, line)
         if len(cells) != len(names):
-            problem = f"has {len(cells)} cells, and the header has {len(names)} columns"
+            problem = f"the number of cells is {len(cells)}, and that of columns {len(names)}"
             raise InputError(path, place, problem, "give each row one cell a column, empty if it was not recorded")
         for column, cell in enumerate(cells):
             number = _number(cell) if cell else np.nan
@@ -217,7 +217,9 @@ def _cells(path: Path, place: str, line: str) -> list[str]:
     try:
         return [cell.strip() for cell in next(csv.reader([line], skipinitialspace=True))]
     except csv.Error as error:
-        raise InputError(path, place, f"cannot be read ({error})", "give a text file of comma-separated values") from None
+        raise InputError(
+            path, place, f"cannot be read ({error})", "give a text file of comma-separated values"
+        ) from None
 
 
 def _refuse(path: Path, place: str, cell: str) -> NoReturn:

@@ -163,13 +163,16 @@ def _spiral(run: Trajectory, rudders: tuple[float, ...]) -> Figures:
     angles = np.degrees(rudders)
     half = len(angles) // 2
     there, back = rates[: half + 1], rates[half:][::-1]
-    # Where the two ways give different rates at one rudder angle, the ship has two steady turns there.
-    double = angles[: half + 1][np.abs(there - back) > LOOP_HEIGHT * np.max(np.abs(rates))]
+    # Where the two ways give different rates at one rudder angle, the ship has two steady turns there: a loop, as wide
+    # as the rudder has to go beyond one crossing of zero rate to reach the other.
+    height = float(np.max(np.abs(there - back)))
+    loop = height > LOOP_HEIGHT * np.max(np.abs(rates))
+    crossings = [np.interp(0.0, way[::-1], angles[: half + 1][::-1]) for way in (there, back)]
     return {
         "rudder_deg": [float(angle) for angle in np.round(angles, 9)],
         "rate_degps": [float(rate) for rate in rates],
-        "loop_width_deg": float(np.ptp(double)) if len(double) else 0.0,
-        "loop_height_degps": float(np.max(np.abs(there - back))) if len(double) else 0.0,
+        "loop_width_deg": float(abs(crossings[0] - crossings[1])) if loop else 0.0,
+        "loop_height_degps": height if loop else 0.0,
     }
 
 

@@ -90,7 +90,7 @@ class Running:
             return True
         while self._time < end:
             begin_time, begin_x, parts, steps = self._time, self._x, len(self._t_parts), self._steps_done
-            self._advance_to(min(end, self._time + _CHUNK * self.model.step_s))
+            self._advance_to(min(end, (steps + _CHUNK) * self.model.step_s))
             times = np.concatenate([*self._t_parts[parts:], [self._time]])
             states = np.concatenate([*self._x_parts[parts:], self._x[None, :]])
             over = np.flatnonzero(sign * (states[:, place] - level) >= 0)

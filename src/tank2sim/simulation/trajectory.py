@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline, barycentric_interpolate
+from scipy.interpolate import CubicHermiteSpline, krogh_interpolate
 from scipy.optimize import brentq
 
 from tank2sim.dynamics.model import Model, Vector
@@ -50,7 +50,7 @@ class Trajectory:
     def at(self, name: str, time: float) -> float:
         """A signal at a time between samples: a cubic through the four around it."""
         near = np.unique(np.clip(np.searchsorted(self.t, time) + np.arange(-2, 2), 0, len(self.t) - 1))
-        return float(barycentric_interpolate(self.t[near], self[name][near], time))
+        return float(krogh_interpolate(self.t[near], self[name][near], time))
 
     def crossings(self, name: str, rate: str, level: float) -> Vector:
         """Times at which a signal crosses a level, from its values and those of its time derivative `rate`.

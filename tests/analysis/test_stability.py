@@ -1,0 +1,126 @@
+from __future__ import annotations
+
+import control
+import numpy as np
+import pytest
+
+from tank2sim.analysis.imo import imo_criteria
+from tank2sim.analysis.linearisation import jacobians, state_space, straight_course
+from tank2sim.analysis.stability import nomoto, stability
+from tank2sim.cards import parse_card, read_card
+from tank2sim.dynamics import build, linear
+from tank2sim.errors import InputError
+
+SYMMETRIC = dict.fromkeys(("derivatives.Y0", "derivatives.Y0u", "derivatives.Y0uu"), 0.0) | dict.fromkeys(
+    ("derivatives.N0", "derivatives.N0u", "derivatives.N0uu"), 0.0
+)
+
+
+def test_the_mariner_is_stable_with_the_criterion_computed_by_hand() -> None:
+    """C' = Y_v N_r - N_v Y_r of the printed numbers, which contain the inertia terms."""
+    found = stability(build(read_card("mariner", SYMMETRIC)))
+    assert found.criterion == pytest.approx(1160e-5 * 166e-5 - 264e-5 * 499e-5, rel=1e-9)
+    assert found.stable and all(value.real < 0 for value in found.eigenvalues)
+
+
+def test_reading_the_printed_yaw_terms_as_bare_derivatives_makes_the_stable_mariner_unstable() -> None:
+    """The trap: Y_r, N_r, X_vr, X_rr as printed already contain the inertia terms."""
+    trapped = stability(build(read_card("mariner", {"model.yaw_rate_terms": "hydrodynamic"})))
+    assert not trapped.stable and trapped.eigenvalues[0].real > 0
+    assert stability(build(read_card("mariner"))).stable
+
+
+def test_nomoto_of_the_mariner_is_that_of_the_literature() -> None:
+    """K' = 3.86, T1' = 5.66, T2' = 0.38, T3' = 0.89 (Chislett and Strom-Tejsen, as in Fossen 1994, table 5.1)."""
+    found = stability(build(read_card("mariner", SYMMETRIC))).nomoto_prime
+    assert found.K_per_s == pytest.approx(3.86, abs=0.01)
+    assert found.T1_s == pytest.approx(5.66, abs=0.01)
+    assert found.T2_s == pytest.approx(0.38, abs=0.01)
+    assert found.T3_s == pytest.approx(0.89, abs=0.01)
+
+
+def test_nomoto_agrees_with_poles_zeros_and_gain_of_python_control(mariner) -> None:
+    steering = state_space(
+        mariner,
+        straight_course(mariner),
+        states=["motion.v", "motion.r"],
+        inputs=["rudder.angle"],
+        outputs=["motion.r"],
+    )
+    found = nomoto(steering)
+    assert found.K_per_s == pytest.approx(float(control.dcgain(steering)))
+    np.testing.assert_allclose(sorted(-1 / control.poles(steering).real), sorted([found.T1_s, found.T2_s]))
+    np.testing.assert_allclose(-1 / control.zeros(steering).real, [found.T3_s])
+    assert found.T_s == pytest.approx(found.T1_s + found.T2_s - found.T3_s)
+
+
+def test_a_small_rudder_step_settles_at_nomotos_gain(mariner) -> None:
+    from tank2sim.simulation.integrator import Integrator
+    from tank2sim.simulation.running import Running
+
+    point = straight_course(mariner)
+    at = dict(zip(mariner.state_names, point.x, strict=True))
+    small = np.radians(0.001)
+    start = {"initial.v": at["motion.v"], "initial.rudder_angle": at["rudder.angle"]}
+    running = Running(Integrator(mariner), {"rudder.command": at["rudder.angle"] + small}, start)
+    running.run(100.0)
+    found = stability(mariner).nomoto
+    rise = 1 - (found.T1_s - found.T3_s) / (found.T1_s - found.T2_s) * np.exp(-100.0 / found.T1_s)
+    # the steering gear delays by its time constant of 1 s
+    assert running.state("motion.r") / small == pytest.approx(found.K_per_s * rise, rel=0.02)
+
+
+def test_matrices_are_the_slopes_of_the_right_hand_side(mariner) -> None:
+    point = straight_course(mariner)
+    system = state_space(mariner, point)
+    names = mariner.state_names
+    for k in range(len(names)):
+        step = np.zeros(len(names))
+        step[k] = 1e-6
+        ahead, back = (np.array(mariner.rhs(point.x + s, point.u, point.p)).ravel() for s in (step, -step))
+        np.testing.assert_allclose(system.A[:, k], (ahead - back) / 2e-6, rtol=1e-6, atol=1e-8)
+    assert system.state_labels[names.index("motion.r")] == "motion_r"
+    assert system.input_labels == ["rudder_command"]
+
+
+def test_a_straight_course_is_straight_also_for_an_asymmetric_ship(mariner) -> None:
+    point = straight_course(mariner)
+    rates = dict(zip(mariner.state_names, np.array(mariner.rhs(point.x, point.u, point.p)).ravel(), strict=True))
+    assert abs(rates["motion.v"]) < 1e-12 and abs(rates["motion.r"]) < 1e-14 and rates["motion.psi"] == 0.0
+    assert point.u[mariner.input_names.index("rudder.command")] != 0.0
+
+
+def test_linear_and_third_order_models_agree_at_the_speed_of_expansion() -> None:
+    card = read_card("mariner", SYMMETRIC)
+    third, first = stability(build(card)), stability(build(linear(card)))
+    assert first.criterion == pytest.approx(third.criterion)
+    np.testing.assert_allclose(first.eigenvalues, third.eigenvalues, rtol=1e-9)
+
+
+def test_no_straight_course_is_told(mariner_card) -> None:
+    text = mariner_card.text.replace("Nd = -139e-5", "Nd = 0.0").replace("Nddd = 45e-5", "Nddd = 0.0")
+    text = text.replace("N0 = 3e-5", "N0 = 900e-5").replace("Nvvd = -489e-5", "Nvvd = 0.0")
+    with pytest.raises(InputError, match="straight course"):
+        stability(build(parse_card(text, "ship.toml")))
+
+
+def test_slopes_of_forces_are_the_derivatives_of_the_card() -> None:
+    model = build(read_card("mariner", SYMMETRIC))
+    slopes, _ = jacobians(model, straight_course(model), ["force.Y", "force.N"], ["motion.v", "motion.r"], [])
+    half, L, U = 0.5 * 1025.0, 160.93, 7.7175
+    expected = half * L**2 * U * np.array([[-1160e-5, -499e-5 * L], [-264e-5 * L, -166e-5 * L**2]])
+    np.testing.assert_allclose(slopes, expected, rtol=1e-9)
+
+
+def test_imo_limits_follow_the_resolution(mariner) -> None:
+    """L/V = 20.85 s: first overshoot of a 10/10 within 5 + L/2V, second within 17.5 + 0.75 L/V."""
+    limits = {one.name: one.allowed for one in imo_criteria(mariner)}
+    assert limits["10/10 zigzag, first overshoot"] == pytest.approx(5 + 0.5 * 160.93 / 7.7175)
+    assert limits["10/10 zigzag, second overshoot"] == pytest.approx(17.5 + 0.75 * 160.93 / 7.7175)
+    assert limits["advance"] == 4.5 and limits["tactical diameter"] == 5.0
+
+
+def test_imo_verdicts_of_the_mariner(mariner) -> None:
+    verdicts = {one.name: one.passed for one in imo_criteria(mariner)}
+    assert verdicts.pop("tactical diameter") is False  # 6.4 L to starboard: she turns wide
+    assert all(verdicts.values())

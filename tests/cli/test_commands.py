@@ -1,0 +1,86 @@
+"""Commands as a user gives them: exit codes, one line of error, files whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+def tank2sim(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "from tank2sim.cli import main; main()", *arguments]
+    return subprocess.run(
+        command, cwd=cwd, capture_output=True, text=True, check=False, timeout=120, env={**os.environ, **environment}
+    )
+
+
+def refused(result: subprocess.CompletedProcess[str], *words: str) -> None:
+    assert result.returncode == 2, result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1 and "Traceback" not in result.stderr
+    for word in words:
+        assert word in result.stderr, result.stderr
+
+
+def test_ships_lists_the_bundled_cards(tmp_path) -> None:
+    result = tank2sim("ships", "--json", "ships.json", cwd=tmp_path)
+    assert result.returncode == 0 and "Mariner class" in result.stdout
+    names = {ship["name"] for ship in json.loads((tmp_path / "ships.json").read_text())["ships"]}
+    assert {"mariner", "wilinski-zellman"} <= names
+
+
+def test_simulate_writes_what_is_asked(tmp_path) -> None:
+    result = tank2sim(
+        *("simulate", "Mariner", "--manoeuvre", "zigzag:20/20", "--out", "run.csv", "--plot", "run.png"),
+        *("--json", "run.json"),
+        cwd=tmp_path,
+    )
+    assert result.returncode == 0, result.stderr
+    figures = json.loads((tmp_path / "run.json").read_text())["figures"]
+    assert len(figures["overshoots_deg"]) == 4
+    assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
+    again = tank2sim("simulate", "mariner", "--manoeuvre", "file:run.csv", cwd=tmp_path)
+    refused(again, "run.csv", "no order")  # a trial has more than orders, and says which column
+
+
+def test_stability_gives_json(tmp_path) -> None:
+    result = tank2sim("stability", "mariner", "--json", "s.json", cwd=tmp_path)
+    assert result.returncode == 0 and "stable" in result.stdout
+    found = json.loads((tmp_path / "s.json").read_text())
+    assert found["stability_criterion"]["stable"] is True
+    assert {"eigenvalues", "nomoto", "imo"} <= set(found)
+
+
+def test_set_changes_a_value_in_the_cards_conventions(tmp_path) -> None:
+    setting = "model.yaw_rate_terms=hydrodynamic"
+    result = tank2sim("stability", "mariner", "--set", setting, "--json", "s.json", cwd=tmp_path)
+    assert json.loads((tmp_path / "s.json").read_text())["stability_criterion"]["stable"] is False, result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["simulate", "mariner"], ["--manoeuvre"]),
+        (["simulate", "titanic", "--manoeuvre", "turn:35"], ["titanic", "mariner"]),
+        (["simulate", "mariner", "--manoeuvre", "turn:200"], ["turn:200"]),
+        (["simulate", "mariner", "--manoeuvre", "turn:35", "--set", "Yv"], ["--set", "KEY=VALUE"]),
+        (["simulate", "mariner", "--manoeuvre", "turn:35", "--set", "ship.length_m=-1"], ["ship.length_m"]),
+        (["simulate", "mariner", "--manoeuvre", "turn:35", "--duration", "nan"], ["--duration"]),
+        (["simulate", "wilinski-zellman", "--manoeuvre", "turn:35"], ["rudder"]),
+        (["stability", "wilinski-zellman"], ["rudder"]),
+        (["simulate", "mariner", "--manoeuvre", "file:none.csv"], ["none.csv"]),
+        (["fly"], ["fly"]),
+    ],
+)
+def test_bad_input_ends_in_one_line_and_exit_2(tmp_path, arguments, words) -> None:
+    refused(tank2sim(*arguments, cwd=tmp_path), *words)
+    assert not list(tmp_path.iterdir())
+
+
+def test_if_one_file_cannot_be_written_none_is(tmp_path) -> None:
+    arguments = ["simulate", "mariner", "--manoeuvre", "turn:35", "--out", "run.csv", "--json", "missing/run.json"]
+    refused(tank2sim(*arguments, cwd=tmp_path), "missing/run.json", "cannot be written")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,195 @@
+"""Figures against motions whose figures are known without any simulation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tank2sim.cards import parse_card
+from tank2sim.dynamics import build
+from tank2sim.errors import InputError
+from tank2sim.simulation.figures import figures_of
+from tank2sim.simulation.manoeuvres import Spiral, Turn, Zigzag, parse_manoeuvre, read_orders
+from tank2sim.simulation.run import simulate
+from tank2sim.simulation.trajectory import Trajectory
+from tank2sim.simulation.trial_file import trial_csv
+
+
+def made_up(model, t, **signals) -> Trajectory:
+    """A trajectory with given signals (underscore for the dot), the rest zero."""
+    y = np.zeros((len(t), len(model.outputs)))
+    x = np.zeros((len(t), len(model.states)))
+    u = np.zeros((len(t), len(model.inputs)))
+    for name, values in signals.items():
+        dotted = name.replace("_", ".", 1)
+        for names, table in ((model.outputs, y), (model.state_names, x), (model.input_names, u)):
+            if dotted in names:
+                table[:, names.index(dotted)] = values
+    return Trajectory(model, t, x, u, y)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("start", [0.0, 2.5])
+def test_a_circle_has_the_figures_of_a_circle(mariner, side: int, start: float) -> None:
+    """On a circle of radius R: advance = transfer = R at 90 deg, tactical diameter = steady diameter = 2 R."""
+    radius, speed = 300.0, 5.0
+    t = np.arange(0, 500, 0.7)
+    change = side * speed / radius * t
+    ahead, aside = radius * np.sin(abs(change)), side * radius * (1 - np.cos(change))
+    run = made_up(
+        mariner,
+        t,
+        motion_psi=start + change,
+        motion_r=side * speed / radius,
+        motion_speed=speed,
+        motion_x=10 + ahead * math.cos(start) - aside * math.sin(start),
+        motion_y=20 + ahead * math.sin(start) + aside * math.cos(start),
+    )
+    figures = figures_of(Turn(side * 0.6), run, 100.0)
+    assert figures["advance_m"] == pytest.approx(radius, rel=1e-6)
+    assert figures["transfer_m"] == pytest.approx(radius, rel=1e-6)
+    assert figures["tactical_diameter_m"] == pytest.approx(2 * radius, rel=1e-6)
+    assert figures["steady_diameter_m"] == pytest.approx(2 * radius, rel=1e-9)
+    assert figures["advance_lengths"] == pytest.approx(3.0, rel=1e-6)
+    assert figures["time_90_s"] == pytest.approx(math.pi / 2 * radius / speed, rel=1e-9)
+    assert figures["speed_loss_percent"] == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_sine_of_heading_has_the_overshoots_of_a_sine(mariner, side: int) -> None:
+    amplitude, heading, omega = math.radians(17.0), math.radians(10.0), 0.05
+    t = np.arange(0, 300, 0.5)
+    psi = side * amplitude * np.sin(omega * t)
+    order, sign, now = np.zeros_like(t), side, 0.2 * side
+    for k, angle in enumerate(psi):
+        if sign * angle >= heading and now == 0.2 * sign:
+            sign = -sign
+            now = 0.2 * sign
+        order[k] = now
+    run = made_up(
+        mariner,
+        t,
+        motion_psi=psi,
+        motion_r=side * amplitude * omega * np.cos(omega * t),
+        motion_rdot=-side * amplitude * omega**2 * np.sin(omega * t),
+        motion_speed=5.0,
+        rudder_command=order,
+    )
+    figures = figures_of(Zigzag(0.2 * side, heading), run, 100.0)
+    np.testing.assert_allclose(figures["overshoots_deg"], 7.0, atol=1e-5)
+    assert len(figures["overshoots_deg"]) == 5
+    assert figures["period_s"] == pytest.approx(2 * math.pi / omega, rel=1e-6)
+
+
+def test_a_port_turn_has_positive_transfer(mariner) -> None:
+    figures = simulate(mariner, parse_manoeuvre("turn:-35")).figures
+    assert figures["transfer_m"] > 0 and figures["tactical_diameter_m"] > figures["transfer_m"]
+    assert figures["steady_rate_degps"] < 0 and figures["steady_drift_deg"] < 0
+
+
+def test_figures_do_not_depend_on_where_the_ship_starts(mariner) -> None:
+    moved = {"initial.x": 500.0, "initial.y": -900.0, "initial.psi": 2.2}
+    at_home, abroad = (simulate(mariner, parse_manoeuvre("turn:20"), parameters=start).figures for start in ({}, moved))
+    for name, value in at_home.items():
+        assert abroad[name] == pytest.approx(value, rel=1e-7), name
+
+
+def test_a_run_too_short_leaves_figures_open_and_says_so(mariner) -> None:
+    run = simulate(mariner, parse_manoeuvre("turn:35"), duration_s=60.0)
+    assert run.figures["advance_m"] is None and any("does not show" in notice for notice in run.notices)
+
+
+def test_a_run_outside_the_range_of_speeds_says_so(mariner_card) -> None:
+    narrow = mariner_card.text.replace("valid_speed_mps = [3.9, 9.3]", "valid_speed_mps = [7.0, 9.3]")
+    model = build(parse_card(narrow, "ship.toml"))
+    assert any("outside the card's range" in n for n in simulate(model, parse_manoeuvre("turn:35")).notices)
+    assert not simulate(model, parse_manoeuvre("turn:35"), duration_s=5.0).notices[:0]
+    inside = build(mariner_card)
+    assert not any("outside" in n for n in simulate(inside, parse_manoeuvre("turn:35")).notices)
+
+
+def test_the_spiral_of_a_stable_ship_has_no_loop_and_that_of_an_unstable_one_has(mariner_card) -> None:
+    stable = simulate(build(mariner_card), parse_manoeuvre("spiral:5")).figures
+    assert stable["loop_width_deg"] == 0.0
+    assert stable["rate_degps"][0] > 0 > min(stable["rate_degps"])
+    # Less yaw damping: C' turns negative, and near midships the ship has two steady turns.
+    text = mariner_card.text.replace("Nr = -166e-5", "Nr = -90e-5")
+    unstable = simulate(build(parse_card(text, "ship.toml")), parse_manoeuvre("spiral:5")).figures
+    assert 0.5 < unstable["loop_width_deg"] < 2.0 and unstable["loop_height_degps"] > 0.1
+
+
+def test_the_pull_out_of_a_symmetric_stable_ship_ends_straight(mariner_card) -> None:
+    text = mariner_card.text.replace("N0 = 3e-5", "N0 = 0.0").replace("Y0 = -4e-5", "Y0 = 0.0")
+    for name in ("Y0u = -8e-5", "Y0uu = -4e-5", "N0u = 6e-5", "N0uu = 3e-5"):
+        text = text.replace(name, name.split("=")[0] + "= 0.0")
+    figures = simulate(build(parse_card(text, "ship.toml")), parse_manoeuvre("pullout:20")).figures
+    assert abs(figures["residual_rate_degps"]) < 0.002 < figures["steady_rate_degps"]
+    assert figures["time_to_half_rate_s"] > 0
+
+
+def test_orders_from_a_file_are_held_and_repeat_a_turn(mariner, tmp_path) -> None:
+    lines = [f"{t},{35.0 if t < 100 else 0.0}" for t in np.arange(0, 200.5, 0.5)]
+    (tmp_path / "orders.csv").write_text("t_s,delta_order_deg\n" + "\n".join(lines) + "\n")
+    run = simulate(mariner, parse_manoeuvre(f"file:{tmp_path}/orders.csv")).trajectory
+    turn = simulate(mariner, parse_manoeuvre("turn:35"), duration_s=100.0).trajectory
+    n = len(turn.t)
+    np.testing.assert_allclose(run.x[:n], turn.x, rtol=1e-12, atol=1e-12)
+    assert run.t[-1] == pytest.approx(200.0)
+    assert set(run["rudder.command"]) == {math.radians(35.0), 0.0}
+
+
+def test_a_port_positive_orders_file_is_converted(tmp_path) -> None:
+    (tmp_path / "o.csv").write_text("# rudder_sign: port\nt_s,delta_order_deg\n0,10\n50,-10\n")
+    orders = read_orders(tmp_path / "o.csv")
+    np.testing.assert_allclose(orders.inputs["rudder.command"], np.radians([-10, 10]))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("t_s\n0\n", "lacks"),
+        ("t_s,delta_order_deg\n5,1\n6,2\n", "rise from 0"),
+        ("t_s,delta_order_deg\n0,1\n0,2\n", "rise from 0"),
+        ("t_s,delta_order_deg,sail_deg\n0,1,2\n", "no order"),
+        ("t_s,delta_order_deg\n0,\n1,2\n", "empty"),
+        ("t_s,delta_order_deg\n0,hard over\n", "hard over"),
+    ],
+)
+def test_faulty_orders_are_refused(tmp_path, text: str, expected: str) -> None:
+    (tmp_path / "o.csv").write_text(text)
+    with pytest.raises(InputError, match=expected):
+        read_orders(tmp_path / "o.csv")
+
+
+def test_revolutions_for_a_ship_without_propulsion_are_refused(mariner, tmp_path) -> None:
+    (tmp_path / "o.csv").write_text("t_s,delta_order_deg,n_rpm\n0,10,84\n50,0,84\n")
+    with pytest.raises(InputError, match="propulsion"):
+        simulate(mariner, parse_manoeuvre(f"file:{tmp_path}/o.csv"))
+
+
+@pytest.mark.parametrize(
+    "text", ["turn", "turn:", "turn:x", "turn:0", "turn:95", "zigzag:20", "zigzag:20/-20", "loop:3", ""]
+)
+def test_what_is_no_manoeuvre_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="--manoeuvre"):
+        parse_manoeuvre(text)
+
+
+def test_manoeuvres_are_read_in_degrees() -> None:
+    assert parse_manoeuvre("zigzag:-10/20") == Zigzag(math.radians(-10), math.radians(20))
+    spiral = parse_manoeuvre("spiral:2")
+    assert isinstance(spiral, Spiral)
+    np.testing.assert_allclose(np.degrees(spiral.rudders), [2, 1, 0, -1, -2, -1, 0, 1, 2])
+
+
+def test_a_run_is_written_as_a_trial_in_the_units_of_its_header(mariner) -> None:
+    run = simulate(mariner, parse_manoeuvre("turn:20"), duration_s=30.0).trajectory
+    lines = trial_csv(run, "two\nlines").splitlines()
+    assert lines[0] == "# two lines"
+    header, last = lines[1].split(","), dict(zip(lines[1].split(","), map(float, lines[-1].split(",")), strict=True))
+    assert header[:3] == ["t_s", "delta_order_deg", "delta_deg"]
+    assert last["delta_order_deg"] == pytest.approx(20.0)
+    assert last["r_degps"] == pytest.approx(math.degrees(run["motion.r"][-1]))
+    assert last["x_m"] == pytest.approx(run["motion.x"][-1])

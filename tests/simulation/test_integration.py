@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tank2sim.cards import parse_card
+from tank2sim.dynamics import build
+from tank2sim.errors import InputError
+from tank2sim.simulation.integrator import NO_COMPILER, Integrator
+from tank2sim.simulation.manoeuvres import parse_manoeuvre
+from tank2sim.simulation.run import simulate
+from tank2sim.simulation.running import Running
+
+
+@pytest.fixture(scope="module")
+def integrator(mariner) -> Integrator:
+    return Integrator(mariner)
+
+
+def test_machine_code_and_casadi_take_the_same_steps(mariner, integrator) -> None:
+    assert integrator.compiled
+    p, u = mariner.parameter_values(), mariner.input_values({"rudder.command": 0.4})
+    x = np.array(mariner.initial(p)).ravel()
+    interpreted = Integrator(mariner, compiled=False)
+    fast, slow = (one.rollout(x, u, p, 0.1, 777) for one in (integrator, interpreted))
+    np.testing.assert_allclose(fast, slow, rtol=1e-13, atol=1e-13)
+    inputs = np.repeat(u[None, :], 50, axis=0)
+    np.testing.assert_allclose(
+        integrator.outputs(fast[:50], inputs, p), interpreted.outputs(fast[:50], inputs, p), rtol=1e-13, atol=1e-13
+    )
+
+
+def test_no_compiler_means_casadi_and_one_line_that_says_so(mariner, monkeypatch) -> None:
+    with_compiler = simulate(mariner, parse_manoeuvre("turn:20"), duration_s=60.0)
+    monkeypatch.setenv("CC", "no-such-compiler")
+    without = simulate(mariner, parse_manoeuvre("turn:20"), duration_s=60.0)
+    assert NO_COMPILER in without.notices and NO_COMPILER not in with_compiler.notices
+    np.testing.assert_allclose(without.trajectory.x, with_compiler.trajectory.x, rtol=1e-12, atol=1e-12)
+
+
+def test_the_motion_is_that_of_an_adaptive_solver(mariner, integrator) -> None:
+    p, u = mariner.parameter_values(), mariner.input_values({"rudder.command": np.radians(-20)})
+    running = Running(integrator, inputs={"rudder.command": np.radians(-20)})
+    running.run(200.0)
+    rhs = lambda _, x: np.array(mariner.rhs(x, u, p)).ravel()  # noqa: E731
+    exact = solve_ivp(rhs, (0, 200), np.array(mariner.initial(p)).ravel(), rtol=1e-10, atol=1e-12, max_step=0.2)
+    np.testing.assert_allclose(running.trajectory().x[-1], exact.y[:, -1], rtol=1e-6, atol=1e-6)
+
+
+def test_the_scheme_is_of_fourth_order(mariner, integrator) -> None:
+    """Without steering gear limits in play (they are kinks): halving the step divides the error by 16."""
+    p, u = mariner.parameter_values(), mariner.input_values()
+    x = np.array([0, 0, 0, 7.7, 0.5, 0.01, 0.0])
+    ends = [integrator.rollout(x, u, p, 40.0 / n, n)[-1] for n in (10, 20, 40, 1280)]
+    errors = [np.abs(end - ends[-1])[3:6].max() for end in ends[:3]]
+    assert 11 < errors[0] / errors[1] < 22 and 12 < errors[1] / errors[2] < 20
+
+
+def test_a_zigzag_switches_at_the_heading_and_not_at_a_step(mariner) -> None:
+    run = simulate(mariner, parse_manoeuvre("zigzag:20/20")).trajectory
+    switches = 1 + np.flatnonzero(np.diff(run["rudder.command"]))
+    assert len(switches) == 4
+    np.testing.assert_allclose(np.abs(np.degrees(run["motion.psi"][switches])), 20.0, atol=1e-9)
+    assert np.all(np.diff(run.t) > 0)
+    off_grid = np.abs(run.t / mariner.step_s - np.round(run.t / mariner.step_s)) > 1e-6
+    assert set(np.flatnonzero(off_grid)) <= {
+        *switches,
+        len(run.t) - 1,
+    }  # the last sample is the heading's fifth crossing
+
+
+def test_halving_the_step_hardly_moves_the_figures(mariner) -> None:
+    from dataclasses import replace
+
+    finer = replace(mariner, step_s=mariner.step_s / 2)
+    for text in ("zigzag:20/20", "turn:35"):
+        coarse, fine = (simulate(model, parse_manoeuvre(text)).figures for model in (mariner, finer))
+        for name, value in coarse.items():
+            np.testing.assert_allclose(value, fine[name], rtol=1e-5, err_msg=name)
+
+
+def test_a_crossing_that_never_comes_ends_at_the_limit(integrator) -> None:
+    running = Running(integrator)
+    assert not running.run_until("motion.psi", 3.0, rising=True, at_most=33.33)
+    assert running.time == pytest.approx(33.33)
+    assert running.trajectory().t[-1] == pytest.approx(33.33)
+
+
+def test_splitting_a_run_does_not_change_it(integrator) -> None:
+    whole, parts = Running(integrator), Running(integrator)
+    for running in (whole, parts):
+        running.order(rudder__command=0.3)
+    whole.run(100.0)
+    for piece in (13.0, 0.4, 50.1, 36.5):
+        parts.run(piece)
+    np.testing.assert_allclose(parts.trajectory().x[-1], whole.trajectory().x[-1], rtol=1e-12)
+
+
+def test_a_motion_that_leaves_all_bounds_is_told(mariner_card) -> None:
+    model = build(parse_card(mariner_card.text.replace("Yv = -1160e-5", "Yv = 0.5"), "ship.toml"))
+    with pytest.raises(InputError, match="leaves all bounds"):
+        simulate(model, parse_manoeuvre("turn:35"))
+
+
+def test_trim_starts_in_steady_motion(integrator) -> None:
+    running = Running(integrator, {"rudder.command": np.radians(15)}, {"initial.trim": 1.0})
+    start = [running.state(name) for name in ("motion.u", "motion.v", "motion.r")]
+    running.run(300.0)
+    np.testing.assert_allclose([running.state(name) for name in ("motion.u", "motion.v", "motion.r")], start, rtol=1e-9)
+    assert start[2] > 0.005
