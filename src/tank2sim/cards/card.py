@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tank2sim.cards.form import (
+    Body,
     EffectEntry,
     Environment,
     Propulsion,
@@ -46,7 +47,7 @@ class Card:
 
     source: str
     text: str
-    ship: Ship
+    ship: Body
     environment: Environment
     model: ShipModel | SurgeModel
 
@@ -80,6 +81,7 @@ class ManoeuvringCard(Card):
         Effects on top of the polynomial, in the order of the file.
     """
 
+    ship: Ship
     model: ShipModel
     rigid_body: RigidBody
     derivatives: Mapping[str, float]

@@ -19,12 +19,12 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
 
-class Ship(Section):
-    """``[ship]``: principal particulars, SI."""
+class Body(Section):
+    """``[ship]`` of a body that only surges: principal particulars, SI."""
 
     name: Text
-    length_m: Positive
     source: Text
+    length_m: Positive | None = None
     beam_m: Positive | None = None
     draught_m: Positive | None = None
     displacement_kg: Positive | None = None
@@ -37,6 +37,12 @@ class Ship(Section):
     metacentric_height_m: float | None = None
     water_depth_m: Positive | None = None
     notes: str | None = None
+
+
+class Ship(Body):
+    """``[ship]`` of a manoeuvring ship, whose length between perpendiculars is the L of the prime system."""
+
+    length_m: Positive
 
 
 class Environment(Section):
@@ -143,7 +149,7 @@ class SurgeCard(Section):
     """The card of a body that only surges, as in its file."""
 
     format: Literal["tank2sim-ship/1"]
-    ship: Ship
+    ship: Body
     environment: Environment = Environment()
     model: SurgeModel
     surge: Surge

@@ -39,7 +39,8 @@ def _show(result: Stability, criteria: tuple[Criterion, ...]) -> None:
     verdict = "stable" if result.stable else "unstable"
     screen.print(
         f"{result.name} at {result.speed_mps:.4g} m/s (drift {result.drift_deg:.3g} deg, "
-        f"rudder {result.rudder_deg:.3g} deg) is [bold]{verdict}[/bold] on a straight course: C' = {result.criterion:.4g}",
+        f"rudder {result.rudder_deg:.3g} deg) is [bold]{verdict}[/bold] on a straight course: "
+        f"C' = {result.criterion:.4g}",
         soft_wrap=True,
     )
     show_table(

@@ -1,0 +1,110 @@
+"""Tows: speeds of a body that a constant force accelerates from rest, several runs read at the same times."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.errors import InputError
+from tank2sim.records.csv_table import Table, Vector, read_table
+
+_SPEED = re.compile(r"speed_([1-9]\d*)_mps")
+FEWEST_TIMES = 5
+"""Times at which a speed must be known: the release, three for a quadratic, and one to show whether that fits."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tows:
+    """Speeds of one body in tows by the same force.
+
+    Parameters
+    ----------
+    path : Path
+        The file they come from.
+    names : tuple of str
+        Column of each tow.
+    time_s : array, (times,)
+        Rising; 0 is the moment of release.
+    speed_mps : array, (times, tows)
+        nan where nothing was recorded; each row and each tow has at least one reading.
+    force_N, mass_kg : float or None
+        Towing force and mass of the body with the water in it, where the file tells them.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    time_s: Vector
+    speed_mps: NDArray[np.float64]
+    force_N: float | None = None
+    mass_kg: float | None = None
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Number of tows read at each time, (times,)."""
+        counts: NDArray[np.int64] = np.sum(~np.isnan(self.speed_mps), axis=1)
+        return counts
+
+    @property
+    def mean_speed_mps(self) -> Vector:
+        """Mean over the tows that were read at each time, (times,)."""
+        mean: Vector = np.nanmean(self.speed_mps, axis=1)
+        return mean
+
+    @property
+    def top_speed_mps(self) -> float:
+        """The highest reading."""
+        return float(np.nanmax(self.speed_mps))
+
+
+def read_tows(path: Path | str) -> Tows:
+    """Read tows: ``t_s,speed_1_mps,speed_2_mps,...``, with comments ``# force_N: 11.63`` and ``# mass_kg: 2243``.
+
+    Rows without any reading are left out.
+
+    Raises
+    ------
+    InputError
+        The table is at fault (:func:`tank2sim.records.csv_table.read_table`), a column is no speed in m/s, a tow has
+        no reading, there are fewer than five times with one, or the time does not rise from 0 or later.
+    """
+    table = read_table(path)
+    time = table.increasing("t_s")
+    if time[0] < 0:
+        raise InputError(
+            table.path, table.place(0, "t_s"), "is before the release", "count the time from the release, t_s = 0"
+        )
+    names = tuple(name for name in table.columns if name != "t_s")
+    for name in names:
+        _check_name(table, name)
+    if not names:
+        raise InputError(table.path, "header", "there is no speed", "add a column speed_1_mps")
+    speed = np.column_stack([table.columns[name] for name in names])
+    for name, readings in zip(names, speed.T, strict=True):
+        if np.isnan(readings).all():
+            raise InputError(table.path, f"column {name}", "has no reading", "delete the column")
+    read = ~np.isnan(speed).all(axis=1)
+    if np.count_nonzero(read) < FEWEST_TIMES:
+        problem = f"has readings at {np.count_nonzero(read)} times only"
+        raise InputError(table.path, "", problem, f"give readings at {FEWEST_TIMES} times or more")
+    return Tows(table.path, names, time[read], speed[read], _positive(table, "force_N"), _positive(table, "mass_kg"))
+
+
+def _check_name(table: Table, name: str) -> None:
+    if _SPEED.fullmatch(name):
+        return
+    if name.startswith("speed") and not name.endswith("_mps"):
+        problem, remedy = "is no speed in m/s", "convert it to m/s and call it speed_1_mps, speed_2_mps, ..."
+    else:
+        problem, remedy = "is no speed of a tow", "delete it, or call it speed_1_mps, speed_2_mps, ..."
+    raise InputError(table.path, f"column {name}", problem, remedy)
+
+
+def _positive(table: Table, key: str) -> float | None:
+    value = table.comment_number(key)
+    if value is not None and value <= 0:
+        raise InputError(table.path, f"comment {key}", f"is {value:g}", "a positive number was expected")
+    return value
