@@ -7,8 +7,8 @@ import pytest
 from tank2sim.analysis.imo import imo_criteria
 from tank2sim.analysis.linearisation import jacobians, state_space, straight_course
 from tank2sim.analysis.stability import nomoto, stability
-from tank2sim.cards import parse_card, read_card
-from tank2sim.dynamics import build, linear
+from tank2sim.cards import linear, parse_card, read_card
+from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 
 SYMMETRIC = dict.fromkeys(("derivatives.Y0", "derivatives.Y0u", "derivatives.Y0uu"), 0.0) | dict.fromkeys(

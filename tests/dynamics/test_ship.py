@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
-from tank2sim.dynamics import build, linear
+from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, TERMS
 
 from ..cards.test_reading import SI_CARD
@@ -67,6 +67,10 @@ def accelerations(card: ManoeuvringCard, state: tuple[float, ...], **more: float
     x = np.array([values.get(name, 0.0) for name in model.state_names])
     y = np.array(model.output(x, model.input_values(), model.parameter_values())).ravel()
     return y[[model.outputs.index(name) for name in ("motion.udot", "motion.vdot", "motion.rdot")]]
+
+
+def linear(card: ManoeuvringCard) -> ManoeuvringCard:
+    return replace(card, model=card.model.model_copy(update={"kind": "linear"}))
 
 
 STATES = [(7.7175, 0.3, 0.004, 0.1), (6.0, -0.9, 0.011, -0.5), (9.1, 0.7, -0.008, 0.3)]

@@ -123,6 +123,13 @@ def revised(card: ManoeuvringCard, derivatives: Mapping[str, tuple[float, float]
     return new
 
 
+def linear(card: Card) -> ManoeuvringCard:
+    """The same ship with the linear equations (3.5); derivatives that these have not stay in the text."""
+    new = parse_card(changed_text(card.text, card.source, {"model.kind": "linear"}), card.source)
+    assert isinstance(new, ManoeuvringCard)
+    return new
+
+
 def _toml(text: str, source: str) -> tomlkit.TOMLDocument:
     try:
         tomllib.loads(text)  # unlike tomlkit it tells the place of every fault, a doubled key's too

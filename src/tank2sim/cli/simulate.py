@@ -51,11 +51,8 @@ def command(card: str, manoeuvre: str, duration: float | None, settings: tuple[s
 
 
 def _picture(run: Run, title: str) -> bytes:
-    import altair as alt  # drawing is asked for seldom, and its library is slow to load
+    # Drawing is asked for seldom, and its library is slow to load.
+    from tank2sim.report.charts import chart_png
+    from tank2sim.report.runs import run_chart
 
-    from tank2sim.report.charts import chart_png, history_chart, track_chart
-    from tank2sim.report.runs import SHIP_SIGNALS, history_of, signals_of, track_of
-
-    motion = run.trajectory
-    histories = history_chart([history_of(title, motion, SHIP_SIGNALS)], signals_of(motion.model, SHIP_SIGNALS))
-    return chart_png(alt.vconcat(track_chart([track_of(title, motion)], title=title), histories))
+    return chart_png(run_chart(title, run.trajectory))

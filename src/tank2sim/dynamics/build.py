@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-from dataclasses import replace
 
 from tank2sim.cards.card import Card, ManoeuvringCard, SurgeBodyCard
 from tank2sim.cards.form import EffectEntry
@@ -37,11 +36,6 @@ def build(card: Card) -> Model:
     for number, entry in enumerate(card.effects):
         model = _with_effect(model, card, entry, f"effects.{number}")
     return model
-
-
-def linear(card: ManoeuvringCard) -> ManoeuvringCard:
-    """The same ship with the linear equations (3.5): a card that :func:`build` makes a linear model of."""
-    return replace(card, model=card.model.model_copy(update={"kind": "linear"}))
 
 
 def _with_effect(model: Model, card: Card, entry: EffectEntry, place: str) -> Model:

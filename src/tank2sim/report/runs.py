@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import altair as alt
+
 from tank2sim.dynamics.model import Model
-from tank2sim.report.charts import History, Signal, Track
+from tank2sim.report.charts import History, Signal, Track, history_chart, track_chart
 from tank2sim.simulation.trajectory import Trajectory
 
 SHIP_SIGNALS = ("rudder.angle", "motion.psi", "motion.r", "motion.u", "motion.v")
@@ -20,6 +22,15 @@ def track_of(label: str, run: Trajectory) -> Track:
 def history_of(label: str, run: Trajectory, names: Sequence[str]) -> History:
     """Named signals of a run over time."""
     return History(label=label, time_s=run.t, values={name: run[name] for name in names})
+
+
+def run_chart(label: str, run: Trajectory) -> alt.VConcatChart:
+    """Track and time histories of one run, one under the other."""
+    track = track_chart([track_of(label, run)], title=label)
+    track.usermeta = alt.Undefined  # only a chart by itself may carry it
+    return alt.vconcat(
+        track, history_chart([history_of(label, run, SHIP_SIGNALS)], signals_of(run.model, SHIP_SIGNALS))
+    )
 
 
 def signals_of(model: Model, names: Sequence[str]) -> list[Signal]:

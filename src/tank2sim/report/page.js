@@ -1,0 +1,109 @@
+"use strict";
+// Draws the charts of the page, in the colours of the screen, and in light ones for paper and for saved files.
+(() => {
+  const { light, dark, locale, charts } = JSON.parse(document.getElementById("drawings").textContent);
+  const figures = [...document.querySelectorAll("figure")];
+  const darkScreen = matchMedia("(prefers-color-scheme: dark)");
+  const views = new Map();
+  let turn = 0;
+
+  const tip = document.createElement("div");
+  tip.className = "tip";
+  tip.hidden = true;
+  tip.setAttribute("aria-hidden", "true");
+  document.body.append(tip);
+
+  function showTip(_handler, event, _item, value) {
+    tip.hidden = value === null || value === undefined || value === "";
+    if (tip.hidden) return;
+    const lines = typeof value === "object" ? Object.entries(value) : [["", value]];
+    tip.replaceChildren(...lines.flatMap(([key, text]) => {
+      const [name, content] = [document.createElement("span"), document.createElement("b")];
+      name.textContent = key;
+      content.textContent = String(text);
+      return [name, content];
+    }));
+    const box = tip.getBoundingClientRect();
+    const left = event.clientX + 14 + box.width > innerWidth ? event.clientX - box.width - 14 : event.clientX + 14;
+    const top = Math.min(event.clientY + 14, innerHeight - box.height - 8);
+    tip.style.left = `${Math.max(4, left)}px`;
+    tip.style.top = `${Math.max(4, top)}px`;
+  }
+
+  // A narrower chart keeps the size of its letters; where both axes have one scale its height shrinks alike.
+  function shrunk(node, factor, height) {
+    const copy = { ...node };
+    if (typeof copy.width === "number") copy.width *= factor;
+    if (height && typeof copy.height === "number") copy.height *= factor;
+    for (const key of ["layer", "vconcat", "hconcat", "concat"]) {
+      if (copy[key]) copy[key] = copy[key].map((part) => shrunk(part, factor, height));
+    }
+    if (copy.spec) copy.spec = shrunk(copy.spec, factor, height);
+    return copy;
+  }
+
+  function embedded(holder, chart, config) {
+    const looks = { config, formatLocale: locale, renderer: "svg", tooltip: showTip };
+    return vegaEmbed(holder, chart, { mode: "vega-lite", actions: false, defaultStyle: false, ...looks });
+  }
+
+  async function draw(place, config) {
+    const holder = figures[place].querySelector(".drawing");
+    const equal = Boolean(charts[place].usermeta?.equal_scales);
+    const room = holder.clientWidth;
+    let factor = 1;
+    for (let attempt = 0; attempt < 4; attempt += 1) {
+      views.get(place)?.finalize();
+      views.set(place, await embedded(holder, shrunk(charts[place], factor, equal), config));
+      const width = holder.querySelector("svg").width.baseVal.value;
+      if (width <= room || room === 0) break;
+      factor *= (room / width) * 0.99;
+    }
+    figures[place].querySelector(".tools").hidden = false;
+  }
+
+  async function drawAll(config) {
+    turn += 1;
+    const mine = turn;
+    let failed = 0;
+    for (let place = 0; place < charts.length && mine === turn; place += 1) {
+      try {
+        await draw(place, config);
+      } catch (error) {
+        failed += 1;
+        figures[place].querySelector(".drawing").textContent = `This chart cannot be drawn: ${error.message}`;
+        console.error(error);
+      }
+    }
+    if (mine === turn) document.documentElement.dataset.charts = failed ? "failed" : "drawn";
+  }
+
+  async function save(place, kind) {
+    const { view, finalize } = await embedded(document.createElement("div"), charts[place], light);
+    const link = document.createElement("a");
+    link.href = await view.toImageURL(kind, kind === "png" ? 2 : 1);
+    link.download = `figure-${place + 1}.${kind}`;
+    link.click();
+    finalize();
+  }
+
+  const onScreen = () => drawAll(darkScreen.matches ? dark : light);
+  darkScreen.addEventListener("change", onScreen);
+  addEventListener("beforeprint", () => { if (darkScreen.matches) drawAll(light); });
+  addEventListener("afterprint", () => { if (darkScreen.matches) onScreen(); });
+
+  let width = innerWidth;
+  let waiting = 0;
+  addEventListener("resize", () => {
+    if (innerWidth === width) return;
+    width = innerWidth;
+    clearTimeout(waiting);
+    waiting = setTimeout(onScreen, 200);
+  });
+  figures.forEach((figure, place) => {
+    for (const button of figure.querySelectorAll("button")) {
+      button.addEventListener("click", () => save(place, button.dataset.save));
+    }
+  });
+  onScreen();
+})();

@@ -1,0 +1,62 @@
+"""Fewer samples for the same picture: a chart a few hundred pixels wide shows no more."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+def thin_line(columns: Sequence[Vector], limit: int) -> Indices:
+    """Samples to keep of a line that is drawn through all of them.
+
+    The samples are cut into equal buckets, and of each bucket the lowest and the highest of every column stay, so no
+    peak is lost. The first and last sample stay, and of every bucket with gaps (NaN) one gap.
+
+    Parameters
+    ----------
+    columns : sequence of (n,) arrays
+        What is drawn: ``[y]`` against an even time, ``[x, y]`` for a track. The unit does not matter.
+    limit : int
+        Samples to keep at most, but for gaps and the two ends; a shorter line keeps all.
+
+    Returns
+    -------
+    (m,) array of int
+        Indices, ascending.
+    """
+    count = len(columns[0])
+    if count <= limit:
+        return np.arange(count)
+    buckets = max(1, limit // (2 * len(columns)))
+    edges = np.linspace(0, count, buckets + 1).astype(int)
+    kept = {0, count - 1}
+    for column in columns:
+        gap = np.isnan(column)
+        low, high = np.where(gap, np.inf, column), np.where(gap, -np.inf, column)
+        for begin, end in itertools.pairwise(edges.tolist()):
+            kept.add(int(begin + np.argmin(low[begin:end])))
+            kept.add(int(begin + np.argmax(high[begin:end])))
+            if gap[begin:end].any():
+                kept.add(int(begin + np.argmax(gap[begin:end])))
+    return np.array(sorted(kept))
+
+
+def thin_points(columns: Sequence[Vector], limit: int) -> Indices:
+    """Samples to keep of points that are drawn singly: evenly spread ones, and the extremes of every column.
+
+    Parameters and result are those of :func:`thin_line`; up to two extremes a column come on top of `limit`.
+    """
+    count = len(columns[0])
+    if count <= limit:
+        return np.arange(count)
+    kept = set(np.linspace(0, count - 1, limit).round().astype(int).tolist())
+    for column in columns:
+        if not np.isnan(column).all():
+            kept |= {int(np.nanargmin(column)), int(np.nanargmax(column))}
+    return np.array(sorted(kept))

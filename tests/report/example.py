@@ -1,0 +1,74 @@
+"""A page with one of everything, of data made up but shaped like a ship's."""
+
+import numpy as np
+
+from tank2sim.report.charts import (
+    FrequencyResponse,
+    History,
+    OutputError,
+    PolesZeros,
+    Signal,
+    Spiral,
+    Tow,
+    Track,
+    bode_chart,
+    error_chart,
+    history_chart,
+    pole_zero_chart,
+    spiral_chart,
+    tow_chart,
+    track_chart,
+)
+from tank2sim.report.page import Column, Figure, Illustration, Page, Section, Table, Verdict
+
+TIME = np.arange(0.0, 600.0, 0.1)
+HEADING = 0.01 * TIME
+
+
+def circle(label: str, radius_m: float = 300.0, measured: bool = False) -> Track:
+    x, y = radius_m * np.sin(HEADING), radius_m * (1 - np.cos(HEADING))
+    return Track(label=label, x_m=x, y_m=y, time_s=TIME, measured=measured)
+
+
+def every_chart():
+    heading = Signal(name="motion.psi", title="heading", unit="rad")
+    run = History(label="simulated", time_s=TIME, values={"motion.psi": HEADING})
+    tow = Tow(label="tow 1", time_s=[0, 5], speed_mps=[0, 0.5], model_time_s=TIME, model_speed_mps=np.tanh(TIME / 10))
+    omega = np.logspace(-3, 1, 50)
+    return {
+        "track": track_chart([circle("simulated"), circle("trial", 310.0, measured=True)], title="Turning circle"),
+        "history": history_chart([run], [heading], title="Heading"),
+        "tow": tow_chart([tow], title="Tows"),
+        "bode": bode_chart(
+            [FrequencyResponse(label="yaw", omega_radps=omega, response=1 / (1j * omega))], title="Bode"
+        ),
+        "pole_zero": pole_zero_chart([PolesZeros(label="yaw", poles=[-0.1, -0.01], zeros=[-0.05])], title="Poles"),
+        "error": error_chart(
+            [OutputError(kind="FMI 2 CS", output="motion.x", error=1e-12, limit=1e-9)], title="Errors"
+        ),
+        "spiral": spiral_chart([Spiral(label="direct", rudder_rad=[0.1, -0.1], yaw_rate_radps=[0.01, -0.01])]),
+    }
+
+
+def example_page(title: str = "Mariner class") -> Page:
+    columns = [Column(title="Run"), Column(title="Advance", unit="m"), Column(title="Verdict")]
+    rows = [["port", -1234.567, Verdict.PASSED], ["starboard", 87.2, Verdict.FAILED], ["unknown", None, None]]
+    return Page(
+        title=title,
+        subtitle="Turning and steering",
+        figures=[Figure(label="Tactical diameter", value=561.24, unit="m", verdict=Verdict.PASSED, note="3.5 lengths")],
+        sections=[
+            Section(
+                heading="Turning circle",
+                text="First paragraph.\n\nSecond paragraph.",
+                notes=["Outside the valid speeds."],
+                tables=[Table(caption="Figures of the circle.", columns=columns, rows=rows)],
+            ),
+            Section(
+                heading="Charts",
+                charts=[
+                    Illustration(chart=chart, caption=f"Caption of {name}.") for name, chart in every_chart().items()
+                ],
+            ),
+        ],
+    )

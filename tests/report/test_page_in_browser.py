@@ -1,0 +1,113 @@
+"""The page as a browser shows it; skipped where no Chromium is installed."""
+
+import json
+import re
+import shutil
+import subprocess
+from html import unescape
+
+import pytest
+
+from tank2sim.report.charts import Track, track_chart
+from tank2sim.report.page import Illustration, Page, Section, render_page
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+CHROMIUM = next((path for name in NAMES if (path := shutil.which(name))), None)
+FLAGS = (
+    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+    "--disable-component-update --disable-sync --enable-logging=stderr --v=0 --window-size=1200,2000 "
+    "--virtual-time-budget=10000 --dump-dom"
+).split()
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in")
+
+# Keeps the views the page makes, and turns the wheel over the first chart, without and with Ctrl.
+KEEP_VIEWS = """<script>{
+  const embed = vegaEmbed;
+  window.views = [];
+  window.vegaEmbed = async (...all) => { const made = await embed(...all); views.push(made.view); return made; };
+}</script>"""
+TURN_WHEEL = """<script>
+const shown = () => {
+  const view = views.findLast((one) => one.container().isConnected);
+  const span = (axis) => {
+    try { const [low, high] = view.scale(axis).domain(); return high - low; } catch { return null; }
+  };
+  return { x: span("x"), y: span("y"), width: view.width(), height: view.height() };
+};
+setTimeout(() => {
+  const chart = document.querySelector("figure svg");
+  const target = chart.querySelector(".role-scope .background") ?? chart.querySelector(".role-frame .background");
+  const box = target.getBoundingClientRect();
+  const turn = (ctrlKey) => target.dispatchEvent(new WheelEvent("wheel", {
+    bubbles: true, cancelable: true, deltaY: -300, ctrlKey, clientX: box.left + 150, clientY: box.top + 80 }));
+  const seen = [shown()];
+  turn(false);
+  setTimeout(() => { seen.push(shown()); turn(true); }, 200);
+  setTimeout(() => { seen.push(shown()); document.body.dataset.seen = JSON.stringify(seen); }, 400);
+}, 1500);
+</script>"""
+
+
+def opened(html, folder, *flags):
+    """The page after its scripts have run, and what stood in the console."""
+    file = folder / "page.html"
+    file.write_text(html, encoding="utf-8")
+    command = [CHROMIUM, *FLAGS, f"--user-data-dir={folder / 'profile'}", *flags, file.as_uri()]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    return run.stdout, [line for line in run.stderr.splitlines() if "CONSOLE" in line]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_page_draws_every_chart_without_a_word_in_the_console(page, tmp_path, scheme):
+    flags = ["--blink-settings=preferredColorScheme=0"] if scheme == "dark" else []
+    seen, console = opened(render_page(page), tmp_path, *flags)
+    assert console == []
+    assert 'data-charts="drawn"' in seen
+    charts = seen.split('class="drawing')[1:]
+    assert len(charts) == 7
+    paper = {"light": "rgb(255, 255, 255)", "dark": "rgb(21, 28, 35)"}[scheme]
+    assert all("<svg" in chart and f"background-color: {paper}" in chart for chart in charts)
+    assert all(chart.count("<path") > 3 for chart in charts)
+
+
+def wheel_over(chart, folder, *flags):
+    """What a chart shows at first, after the wheel alone, and after the wheel with Ctrl."""
+    html = render_page(Page(title="Wheel", sections=[Section(heading="Chart", charts=[Illustration(chart=chart)])]))
+    place = html.rindex('<script>\n"use strict"')
+    html = html[:place] + KEEP_VIEWS + html[place:].replace("</body>", TURN_WHEEL + "</body>")
+    seen, console = opened(html, folder, *flags)
+    assert console == []
+    return json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))
+
+
+@pytest.mark.parametrize("width", [1200, 420])
+def test_a_track_keeps_equal_scales_when_it_is_zoomed_and_when_the_window_is_narrow(tmp_path, width):
+    track = Track(label="run", x_m=[0, 300, 500], y_m=[0, 50, 900])
+    before, wheel, zoomed = wheel_over(track_chart([track]), tmp_path, f"--window-size={width},900")
+    assert before["width"] < width
+    assert before["x"] / before["width"] == pytest.approx(before["y"] / before["height"], rel=1e-9)
+    assert wheel == before
+    assert zoomed["x"] / zoomed["width"] == pytest.approx(zoomed["y"] / zoomed["height"], rel=1e-9)
+    assert zoomed["x"] < 0.9 * before["x"]
+
+
+@pytest.mark.parametrize("name", ["history", "bode"])
+def test_stacked_charts_are_zoomed_along_their_common_axis(charts, tmp_path, name):
+    before, wheel, zoomed = wheel_over(charts[name], tmp_path)
+    assert wheel == before
+    assert zoomed["x"] < 0.9 * before["x"]
+
+
+def test_a_name_that_is_a_script_is_not_run(tmp_path):
+    name = "</script><script>document.body.dataset.run = 1</script><img src=x onerror='document.body.dataset.run = 2'>"
+    chart = track_chart(
+        [Track(label=name, x_m=[0, 1], y_m=[0, 1]), Track(label="b", x_m=[0, 1], y_m=[0, 1])], title=name
+    )
+    page = Page(
+        title=name, sections=[Section(heading=name, text=name, charts=[Illustration(chart=chart, caption=name)])]
+    )
+    seen, console = opened(render_page(page), tmp_path)
+    assert console == []
+    assert 'data-charts="drawn"' in seen
+    assert "data-run" not in seen
