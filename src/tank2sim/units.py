@@ -42,6 +42,16 @@ def from_si(name: str, value: float) -> float:
     return value / factor
 
 
+_WORDS = {"m": "m", "s": "s", "deg": "deg", "degps": "deg/s", "mps": "m/s", "percent": "%", "lengths": "L"}
+
+
+def in_words(name: str) -> tuple[str, str]:
+    """Words and unit of a figure's name for a reader: ``("steady_rate_degps")`` is ``("steady rate", "deg/s")``."""
+    stem, _, suffix = name.rpartition("_")
+    words, unit = (stem, _WORDS[suffix]) if stem and suffix in _WORDS else (name, "")
+    return words.replace("_", " "), unit
+
+
 @dataclass(frozen=True)
 class Unit:
     """A unit as FMI describes it: exponents of the SI base units, and the units it may be shown in.

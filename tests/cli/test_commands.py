@@ -84,3 +84,63 @@ def test_if_one_file_cannot_be_written_none_is(tmp_path) -> None:
     arguments = ["simulate", "mariner", "--manoeuvre", "turn:35", "--out", "run.csv", "--json", "missing/run.json"]
     refused(tank2sim(*arguments, cwd=tmp_path), "missing/run.json", "cannot be written")
     assert not list(tmp_path.iterdir())
+
+
+def test_export_and_check_agree_and_a_wrong_card_fails(tmp_path) -> None:
+    assert tank2sim("export", "mariner", "-o", "m.fmu", "--fmi", "3", cwd=tmp_path).returncode == 0
+    right = tank2sim("check", "m.fmu", "--json", "c.json", cwd=tmp_path)
+    assert right.returncode == 0 and "passed" in right.stdout
+    assert max(json.loads((tmp_path / "c.json").read_text())["max_error"].values()) < 1e-6
+    text = (Path(__file__).parents[2] / "models/mariner/ship.toml").read_text()
+    (tmp_path / "other.toml").write_text(text.replace("Nd = -139e-5", "Nd = 139e-5"))
+    wrong = tank2sim("check", "m.fmu", "--card", "other.toml", cwd=tmp_path)
+    assert wrong.returncode == 1 and "FAILED" in wrong.stdout and not wrong.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["export", "mariner"], ["-o"]),
+        (["export", "mariner", "-o", "x.fmu", "--fmi", "1"], ["--fmi"]),
+        (["export", "mariner", "-o", "x.fmu", "--platforms", "amiga"], ["--platforms", "amiga"]),
+        (["export", "mariner", "-o", "missing/x.fmu"], ["missing/x.fmu", "cannot be written"]),
+        (["export", "mariner", "-o", "x.fmu", "--json", "missing/x.json"], ["missing/x.json", "cannot be written"]),
+        (["check", "none.fmu"], ["none.fmu"]),
+        (["tow", "none.csv"], ["none.csv"]),
+        (["demo", "-o", "/proc/demo"], ["/proc/demo"]),
+    ],
+)
+def test_bad_input_to_fmu_commands_ends_in_one_line(tmp_path, arguments, words) -> None:
+    refused(tank2sim(*arguments, cwd=tmp_path), *words)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("arguments", [["export", "mariner", "-o", "x.fmu"], ["demo", "-o", "demo"]])
+def test_without_a_compiler_nothing_is_written(tmp_path, arguments) -> None:
+    refused(tank2sim(*arguments, cwd=tmp_path, CC="no-such-compiler"), "compiler")
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_tow_writes_a_card_that_exports(tmp_path) -> None:
+    tows = str(Path(__file__).parents[2] / "models/wilinski-zellman/tows.csv")
+    result = tank2sim("tow", tows, "--force-N", "11.63", "--mass-kg", "2243", "--json", "t.json", cwd=tmp_path)
+    assert result.returncode == 0 and "condition" in result.stdout and "--terms B3" in result.stdout
+    methods = json.loads((tmp_path / "t.json").read_text())["methods"]
+    assert {"paper", "qr"} <= set(methods) and "condition" in methods["paper"]
+    assert tank2sim("tow", tows, "--terms", "B3", "-o", "v.toml", cwd=tmp_path).returncode == 0
+    assert tank2sim("export", "v.toml", "-o", "v.fmu", cwd=tmp_path).returncode == 0
+    assert tank2sim("check", "v.fmu", cwd=tmp_path).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("t_s,speed_1_mps\n0,0\n5,fast\n", ["line 3", "fast"]),
+        ("t_s,speed_1_kn\n0,0\n5,1\n", ["speed_1_kn"]),
+        ("", ["tow.csv"]),
+    ],
+)
+def test_a_faulty_tow_is_refused_with_its_place(tmp_path, text, words) -> None:
+    (tmp_path / "tow.csv").write_text(text)
+    refused(tank2sim("tow", "tow.csv", "--force-N", "1", "--mass-kg", "2", "-o", "v.toml", cwd=tmp_path), *words)
+    assert not (tmp_path / "v.toml").exists()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -12,9 +11,9 @@ from tank2sim.cli.changes import parse_changes
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.files import write_whole
+from tank2sim.files import write_together
 from tank2sim.fmu.documents import documents_of
-from tank2sim.fmu.export import write_fmu
+from tank2sim.fmu.export import make_fmu
 
 
 @click.command("export")
@@ -35,12 +34,15 @@ def command(
         raise InputError("--platforms", platforms, "only the platform of this machine can be built", remedy)
     ship = read_card(card, parse_changes(settings))
     model = build(ship)
-    exported = write_fmu(model, output, fmi=int(fmi), documents=documents_of(ship))
+    made = make_fmu(model, fmi=int(fmi), documents=documents_of(ship))
+    contents: dict[Path, str | bytes] = {output: made.content}
     if json_file:
-        write_whole(json_file, json_text({**asdict(exported), "ship": ship.ship.name, "notices": model.notices}))
+        result = {"ship": ship.ship.name, "fmu": output, **made.as_json(), "notices": model.notices}
+        contents[json_file] = json_text(result)
+    write_together(contents)
     screen.print(
-        f"{output}: {ship.ship.name}, FMI {fmi}, Model Exchange and Co-Simulation, {', '.join(exported.platforms)}, "
-        f"{exported.size_bytes / 1000:.0f} kB",
+        f"{output}: {ship.ship.name}, FMI {fmi}, Model Exchange and Co-Simulation, {', '.join(made.platforms)}, "
+        f"{len(made.content) / 1000:.0f} kB",
         soft_wrap=True,
         markup=False,
     )

@@ -14,6 +14,7 @@ from tank2sim.files import write_together
 from tank2sim.simulation.manoeuvres import FORMS, parse_manoeuvre
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trial_file import trial_csv
+from tank2sim.units import in_words
 
 
 @click.command("simulate")
@@ -44,9 +45,8 @@ def command(card: str, manoeuvre: str, duration: float | None, settings: tuple[s
         result = {"ship": ship.ship.name, "manoeuvre": manoeuvre, "figures": run.figures, "notices": run.notices}
         contents[json_file] = json_text(result)
     write_together(contents)
-    show_table(
-        f"{ship.ship.name}, {manoeuvre}", ["figure", "value"], [[name, value] for name, value in run.figures.items()]
-    )
+    rows = [[*in_words(name), value] for name, value in run.figures.items()]
+    show_table(f"{ship.ship.name}, {manoeuvre}", ["figure", "unit", "value"], rows)
     show_notices(run.notices)
 
 

@@ -19,7 +19,8 @@ DRAG_POWERS: dict[str, int] = {"B1": 4, "B2": 3, "B3": 2}
 """Drag terms of (1.5), in its order, and the power of the speed that each multiplies."""
 
 # The step of the paper's own integration. The time constant M / (dR/dv) of a towed body is 1 s for a 1 m model at
-# 1 m/s and 10 s or more for the vehicle of the paper; a Runge-Kutta step of a tenth of it errs by less than 1e-7 of the speed.
+# 1 m/s and 10 s or more for the vehicle of the paper; a Runge-Kutta step of a tenth of it errs by less than 1e-7 of
+# the speed.
 _STEP_S = 0.1
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 
 import altair as alt
 
@@ -10,8 +10,14 @@ from tank2sim.dynamics.model import Model
 from tank2sim.report.charts import History, Signal, Track, history_chart, track_chart
 from tank2sim.simulation.trajectory import Trajectory
 
-SHIP_SIGNALS = ("rudder.angle", "motion.psi", "motion.r", "motion.u", "motion.v")
-"""What the time histories of a ship show, from top to bottom."""
+SHIP_SIGNALS = {
+    "rudder.angle": "rudder, + to starboard",
+    "motion.psi": "heading",
+    "motion.r": "yaw rate",
+    "motion.u": "surge velocity",
+    "motion.v": "sway velocity, + to starboard",
+}
+"""What the time histories of a ship show, from top to bottom, and the words on each axis."""
 
 
 def track_of(label: str, run: Trajectory) -> Track:
@@ -19,7 +25,7 @@ def track_of(label: str, run: Trajectory) -> Track:
     return Track(label=label, x_m=run["motion.x"], y_m=run["motion.y"], time_s=run.t)
 
 
-def history_of(label: str, run: Trajectory, names: Sequence[str]) -> History:
+def history_of(label: str, run: Trajectory, names: Iterable[str]) -> History:
     """Named signals of a run over time."""
     return History(label=label, time_s=run.t, values={name: run[name] for name in names})
 
@@ -33,6 +39,6 @@ def run_chart(label: str, run: Trajectory) -> alt.VConcatChart:
     )
 
 
-def signals_of(model: Model, names: Sequence[str]) -> list[Signal]:
-    """Panels for named variables of a model, with the units it declares."""
-    return [Signal(name=name, title=name.partition(".")[2], unit=model[name].unit) for name in names]
+def signals_of(model: Model, titles: Mapping[str, str]) -> list[Signal]:
+    """Panels for named variables of a model, with their titles and the units that it declares."""
+    return [Signal(name=name, title=title, unit=model[name].unit) for name, title in titles.items()]

@@ -14,6 +14,7 @@ import numpy as np
 
 from tank2sim.dynamics.model import Model, Vector
 from tank2sim.native.compiler import find_compiler
+from tank2sim.native.generate import generate_c
 from tank2sim.native.library import cached_library
 from tank2sim.simulation.scheme import runge_kutta_step
 
@@ -55,7 +56,7 @@ void outputs(long n, const double* u, const double* p, const double* x, double* 
 }}
 """
 
-NO_COMPILER = "no C compiler was found: CasADi evaluates the model itself, about ten times slower"
+NO_COMPILER = "no C compiler was found: CasADi evaluates the model itself, many times slower"
 
 
 class Integrator:
@@ -95,17 +96,13 @@ class Integrator:
         return y
 
     def _in_machine_code(self) -> tuple[Callable[..., None], Callable[..., None]]:
-        generator = ca.CodeGenerator("model", {"with_header": False})
         functions = (self._step, self.model.output)
-        for function in functions:
-            generator.add(function)
         sizes = {
             name: max(1, *(getattr(f, name)() for f in functions)) for name in ("sz_arg", "sz_res", "sz_iw", "sz_w")
         }
-        loop = _LOOP.format(
-            **sizes, nx=self._step.size1_in(0), nu=self._step.size1_in(1), ny=self.model.output.size1_out(0)
-        )
-        library = ctypes.CDLL(str(cached_library(generator.dump() + loop)))
+        lengths = {"nx": self._step.size1_in(0), "nu": self._step.size1_in(1), "ny": self.model.output.size1_out(0)}
+        source = generate_c(functions, "model") + _LOOP.format(**sizes, **lengths)
+        library = ctypes.CDLL(str(cached_library(source)))
         array = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
         library.rollout.argtypes = [ctypes.c_long, ctypes.c_double, array, array, array]
         library.outputs.argtypes = [ctypes.c_long, array, array, array, array]

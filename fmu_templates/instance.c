@@ -1,0 +1,135 @@
+/* Life of an instance, its log, and what may be called when. */
+#include "instance.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const struct {
+    const char *name;
+    unsigned bits;
+} CATEGORIES[] = {
+    {"logStatusError", LOG_ERROR},
+    {"logStatusDiscard", LOG_DISCARD},
+    {"logStatusWarning", LOG_WARNING},
+    {"logEvents", LOG_EVENTS},
+    {"logAll", LOG_ALL},
+};
+enum { CATEGORY_COUNT = sizeof CATEGORIES / sizeof CATEGORIES[0] };
+
+static void send(const Instance *self, Status status, unsigned category, const char *format, va_list arguments) {
+    char message[512];
+    if (!(self->logged & category) || !self->host.logger) return;
+    vsnprintf(message, sizeof message, format, arguments);
+    for (size_t i = 0; i < CATEGORY_COUNT; ++i) {
+        if (CATEGORIES[i].bits == category) self->host.send(self, status, CATEGORIES[i].name, message);
+    }
+}
+
+/* Tell the simulator why a call did not end with OK; returns `status`. */
+Status report(const Instance *self, Status status, const char *format, ...) {
+    static const unsigned category[] = {LOG_EVENTS, LOG_WARNING, LOG_DISCARD, LOG_ERROR};
+    va_list arguments;
+    va_start(arguments, format);
+    send(self, status, category[status], format, arguments);
+    va_end(arguments);
+    return status;
+}
+
+void report_event(const Instance *self, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    send(self, OK, LOG_EVENTS, format, arguments);
+    va_end(arguments);
+}
+
+/* NULL if there is no memory, the name is missing, or the token is that of another FMU. */
+Instance *create_instance(const Host *host, const char *name, const char *token, int kind, bool logging) {
+    const char *called = name ? name : "";
+    Instance *self = host->allocate(1, sizeof *self);
+    if (!self) return NULL;
+    self->host = *host;
+    self->kind = kind;
+    self->logged = logging ? LOG_ALL : LOG_ALL & ~(unsigned)LOG_EVENTS;
+    self->name = host->allocate(strlen(called) + 1, 1);
+    if (self->name) strcpy(self->name, called);
+    reset_instance(self);
+    if (self->name && *called && token && strcmp(token, MODEL_TOKEN) == 0) return self;
+    if (!*called) {
+        report(self, ERROR, "the instance name is missing");
+    } else {
+        report(self, ERROR, "the token is %s and must be %s, as in modelDescription.xml",
+               token ? token : "missing", MODEL_TOKEN);
+    }
+    free_instance(self);
+    return NULL;
+}
+
+void free_instance(Instance *self) {
+    void (*release)(void *);
+    if (!self) return;
+    release = self->host.release;
+    if (self->name) release(self->name);
+    release(self);
+}
+
+void reset_instance(Instance *self) {
+    for (size_t i = 0; i < VARIABLE_COUNT; ++i) self->value[i] = VARIABLES[i].start;
+    self->mode = INSTANTIATED;
+    self->stale = STALE_ALL;
+    self->stop_defined = false;
+    self->last_step = OK;
+}
+
+static const char *mode_name(int mode) {
+    switch (mode) {
+        case INSTANTIATED: return "instantiated";
+        case INITIALISING: return "initialization mode";
+        case EVENT: return "event mode";
+        case CONTINUOUS_TIME: return "continuous-time mode";
+        case STEPPING: return "step mode";
+        default: return "terminated";
+    }
+}
+
+/* True, with a line in the log, if the function cannot be called on this instance, or not now. */
+bool refused(const Instance *self, const char *function, int modes, int kinds) {
+    if (!self) return true;
+    if (!(self->kind & kinds)) {
+        report(self, ERROR, "%s: is not for %s", function,
+               self->kind == CO_SIMULATION ? "Co-Simulation" : "Model Exchange");
+        return true;
+    }
+    if (!(self->mode & modes)) {
+        report(self, ERROR, "%s: cannot be called in state '%s'", function, mode_name(self->mode));
+        return true;
+    }
+    return false;
+}
+
+/* True, with a line in the log, if an argument that has `count` elements is NULL. */
+bool missing(const Instance *self, const char *function, const void *pointer, size_t count) {
+    if (pointer || count == 0) return false;
+    report(self, ERROR, "%s: an argument is a null pointer", function);
+    return true;
+}
+
+Status unsupported(const Instance *self, const char *function, const char *why) {
+    return self ? report(self, ERROR, "%s: %s", function, why) : ERROR;
+}
+
+/* Switch the named categories, or all if none is named. */
+Status select_logging(Instance *self, bool on, size_t count, const char *const categories[]) {
+    unsigned bits = count == 0 ? LOG_ALL : 0;
+    for (size_t i = 0; i < count; ++i) {
+        size_t known = 0;
+        while (known < CATEGORY_COUNT && (!categories[i] || strcmp(categories[i], CATEGORIES[known].name) != 0)) ++known;
+        if (known == CATEGORY_COUNT) {
+            return report(self, ERROR, "there is no log category %s", categories[i] ? categories[i] : "NULL");
+        }
+        bits |= CATEGORIES[known].bits;
+    }
+    self->logged = on ? self->logged | bits : self->logged & ~bits;
+    return OK;
+}

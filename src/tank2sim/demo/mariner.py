@@ -1,0 +1,245 @@
+"""Second half of the demo: the Mariner, linear and third order, as four FMUs that manoeuvre like the CasADi model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import control
+import numpy as np
+
+from tank2sim.analysis.imo import Criterion, imo_criteria
+from tank2sim.analysis.linearisation import state_space, straight_course
+from tank2sim.analysis.stability import Stability, stability
+from tank2sim.cards import linear, read_card
+from tank2sim.demo.workshop import Outcome, Workshop, error_words, largest_error, output_errors
+from tank2sim.dynamics import Model, build
+from tank2sim.dynamics.model import Vector
+from tank2sim.fmu.check import CheckReport
+from tank2sim.fmu.manoeuvre import Manoeuvre
+from tank2sim.fmu.replay import replay
+from tank2sim.report.charts import (
+    FrequencyResponse,
+    History,
+    Track,
+    bode_chart,
+    chart_png,
+    error_chart,
+    history_chart,
+    track_chart,
+)
+from tank2sim.report.page import Cell, Column, Figure, Illustration, Section, Table, Verdict
+from tank2sim.report.runs import SHIP_SIGNALS, history_of, signals_of, track_of
+from tank2sim.simulation.manoeuvres import parse_manoeuvre
+from tank2sim.simulation.run import Run, simulate
+from tank2sim.simulation.trial_file import trial_csv
+from tank2sim.units import in_words
+
+MANOEUVRES = {"turn-35": "turn:35", "zigzag-20-20": "zigzag:20/20"}
+THIRD, FIRST, IN_FMU = "third order", "linear", "third order, FMU through fmpy"
+
+
+def mariner(workshop: Workshop) -> Outcome:
+    """Export and check four FMUs, simulate two manoeuvres on the desk and in the FMU, judge stability."""
+    card = read_card("mariner")
+    cards = {THIRD: card, FIRST: linear(card)}
+    models = {name: build(one) for name, one in cards.items()}
+    names = {THIRD: "mariner", FIRST: "mariner-linear"}
+    checked = [workshop.checked_fmu(cards[kind], models[kind], names[kind], fmi) for kind in names for fmi in (2, 3)]
+    path, reports = checked[0][0], [report for _, report in checked]
+    runs, sections = {}, []
+    for name, text in MANOEUVRES.items():
+        workshop.tell(f"Mariner: {text}, on the desk and in the FMU")
+        run = {kind: simulate(model, parse_manoeuvre(text)) for kind, model in models.items()}
+        runs[name] = run
+        fmu = _in_fmu(models[THIRD], path, run[THIRD])
+        workshop.write(
+            f"mariner-{name}.csv", trial_csv(run[THIRD].trajectory, f"tank2sim simulation of the Mariner: {text}")
+        )
+        sections.append(_manoeuvre_section(workshop, name, text, run, fmu))
+    workshop.tell("Mariner: stability")
+    judged = {kind: stability(model) for kind, model in models.items()}
+    criteria = imo_criteria(models[THIRD])
+    sections = [_fmu_section(reports), *sections, _stability_section(models, judged, criteria)]
+    figures = _figures(reports, runs["turn-35"][THIRD], runs["zigzag-20-20"][THIRD], judged[THIRD])
+    result: dict[str, object] = {
+        "figures": {name: {kind: one.figures for kind, one in run.items()} for name, run in runs.items()},
+        "stability": {kind: one.as_json() for kind, one in judged.items()},
+        "imo": [criterion.as_json() for criterion in criteria],
+        "checks": [report.as_json() for report in reports],
+    }
+    return Outcome(figures, sections, result)
+
+
+def _in_fmu(model: Model, path: Path, run: Run) -> dict[str, Vector]:
+    """The same orders through the FMU; communication points are the samples of the run, its switches among them."""
+    motion = run.trajectory
+    return replay(path, Manoeuvre(motion.t, motion.u[:-1]), model)
+
+
+def _manoeuvre_section(
+    workshop: Workshop, name: str, text: str, run: dict[str, Run], fmu: dict[str, Vector]
+) -> Section:
+    third, first = run[THIRD].trajectory, run[FIRST].trajectory
+    tracks = track_chart(
+        [
+            track_of(f"{THIRD}, CasADi", third),
+            Track(label=IN_FMU, x_m=fmu["motion.x"], y_m=fmu["motion.y"], time_s=third.t),
+            track_of(f"{FIRST}, CasADi", first),
+        ],
+        title=f"{text}: tracks",
+    )
+    in_fmu = History(label=IN_FMU, time_s=third.t, values=dict(fmu))
+    histories = history_chart(
+        [
+            history_of(f"{THIRD}, CasADi", third, SHIP_SIGNALS),
+            in_fmu,
+            history_of(f"{FIRST}, CasADi", first, SHIP_SIGNALS),
+        ],
+        signals_of(third.model, SHIP_SIGNALS),
+        title=f"{text}: time histories",
+    )
+    workshop.write(f"mariner-{name}-track.png", chart_png(tracks))
+    workshop.write(f"mariner-{name}-history.png", chart_png(histories))
+    apart = np.hypot(fmu["motion.x"] - third["motion.x"], fmu["motion.y"] - third["motion.y"])
+    return Section(
+        heading=f"Mariner: {text}",
+        text=f"The FMU, given the same orders through fmpy, stays within {apart.max():.1e} m of the CasADi model.",
+        tables=[_figure_table(run)],
+        charts=[
+            Illustration(
+                chart=tracks, caption="North is up. The FMU's track lies on that of the model it was made from."
+            ),
+            Illustration(chart=histories, caption="Rudder and yaw rate are positive to starboard."),
+        ],
+        notes=[f"{kind}: {notice}." for kind, one in run.items() for notice in one.notices],
+    )
+
+
+def _figure_table(run: dict[str, Run]) -> Table:
+    rows: list[list[Cell]] = []
+    for name, value in run[THIRD].figures.items():
+        words, unit = in_words(name)
+        both = [one.figures[name] for one in run.values()]
+        if isinstance(value, list):
+            lists = [each if isinstance(each, list) else [] for each in both]
+            for k in range(max(len(each) for each in lists)):
+                rows.append([f"{words}, {k + 1}", *(each[k] if k < len(each) else None for each in lists), unit])
+        else:
+            rows.append([words, *(_cell(each) for each in both), unit])
+    columns = [Column(title="figure"), *(Column(title=kind) for kind in run), Column(title="unit")]
+    return Table(caption="Manoeuvring figures", columns=columns, rows=rows)
+
+
+def _fmu_section(reports: list[CheckReport]) -> Section:
+    rows: list[list[Cell]] = [
+        [
+            report.path.rpartition("/")[2],
+            f"FMI {report.fmi}",
+            kind,
+            max(errors.values()),
+            report.limits[kind],
+            Verdict.PASSED if report.passed else Verdict.FAILED,
+        ]
+        for report in reports
+        for kind, errors in report.errors.items()
+    ]
+    heads = ("file", "standard", "kind", "largest error", "limit", "verdict")
+    table = Table(
+        caption="Largest error of any output, relative to its range in the run",
+        columns=[Column(title=head, digits=2) for head in heads],
+        rows=rows,
+    )
+    return Section(
+        heading="Four FMUs of the Mariner, checked",
+        text=(
+            "Each file was validated by FMPy and driven through steps of rudder and a failure of the steering gear. "
+            "Co-Simulation is held against the same Runge-Kutta steps in CasADi, "
+            "Model Exchange against the exact solution."
+        ),
+        tables=[table],
+        charts=[
+            Illustration(
+                chart=error_chart(output_errors(reports[:2]), title="Errors of the third-order FMUs by output")
+            )
+        ],
+    )
+
+
+def _stability_section(
+    models: dict[str, Model], judged: dict[str, Stability], criteria: tuple[Criterion, ...]
+) -> Section:
+    point = straight_course(models[THIRD])
+    channel = {"inputs": ["rudder.command"], "outputs": ["motion.r"]}
+    system = state_space(models[THIRD], point, states=["motion.v", "motion.r", "rudder.angle"], **channel)
+    omega = np.logspace(-4, 0.5, 400)
+    response = control.frequency_response(system, omega)
+    nomoto = judged[THIRD].nomoto
+    first_order = nomoto.K_per_s / (1 + 1j * omega * nomoto.T_s)
+    chart = bode_chart(
+        [
+            FrequencyResponse(label="linearised, with gear", omega_radps=omega, response=response.frdata[0, 0]),
+            FrequencyResponse(label="Nomoto, first order", omega_radps=omega, response=first_order),
+        ],
+        title="Yaw rate by rudder order",
+    )
+    verdicts = {True: Verdict.PASSED, False: Verdict.FAILED, None: Verdict.NONE}
+    rows = [[one.name, one.found, one.allowed, one.unit, verdicts[one.passed]] for one in criteria]
+    imo = Table(
+        caption="IMO MSC.137(76), the worse of the two sides",
+        columns=[Column(title=head) for head in ("criterion", "found", "allowed", "unit", "verdict")],
+        rows=rows,
+    )
+    return Section(
+        heading="Mariner: stability",
+        text=f"C′ = {judged[THIRD].criterion:.3g}: {_verdict(judged[THIRD])} on a straight course.",
+        tables=[_nomoto_table(judged), imo],
+        charts=[Illustration(chart=chart)],
+    )
+
+
+def _verdict(judged: Stability) -> str:
+    return "stable" if judged.stable else "unstable"
+
+
+def _nomoto_table(judged: dict[str, Stability]) -> Table:
+    times = [Column(title=name, unit="s") for name in ("T", "T1", "T2", "T3")]
+    columns = [Column(title="model"), Column(title="K", unit="1/s"), *times]
+    rows = [[kind, *vars(one.nomoto).values()] for kind, one in judged.items()]
+    return Table(caption="Nomoto's coefficients at the speed of expansion", columns=columns, rows=rows)
+
+
+def _figures(reports: list[CheckReport], turn: Run, zigzag: Run, judged: Stability) -> list[Figure]:
+    overshoots = zigzag.figures["overshoots_deg"]
+    assert isinstance(overshoots, list)
+    same, exact = (largest_error(reports, kind) for kind in ("CoSimulation", "ModelExchange"))
+    return [
+        Figure(
+            label="Mariner's FMUs, Co-Simulation",
+            value=error_words(same),
+            verdict=Verdict.PASSED,
+            note="same scheme, relative",
+        ),
+        Figure(
+            label="Mariner's FMUs, Model Exchange",
+            value=error_words(exact),
+            verdict=Verdict.PASSED,
+            note="exact solution, relative",
+        ),
+        Figure(label="Tactical diameter at 35°", value=_number(turn.figures["tactical_diameter_m"]), unit="m"),
+        Figure(label="First overshoot of 20/20", value=overshoots[0], unit="deg"),
+        Figure(
+            label="Straight-line stability",
+            value=_verdict(judged),
+            verdict=Verdict.PASSED if judged.stable else Verdict.CAUTION,
+            note=f"C′ = {judged.criterion:.2e}",
+        ),
+    ]
+
+
+def _cell(figure: object) -> Cell:
+    return figure if isinstance(figure, float | str) else None
+
+
+def _number(figure: object) -> float:
+    assert isinstance(figure, float)
+    return figure

@@ -1,0 +1,41 @@
+"""The demo from end to end: files one after the other, each whole, and a page at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from tank2sim.demo.mariner import mariner
+from tank2sim.demo.towed import towed_vehicle
+from tank2sim.demo.workshop import Workshop
+from tank2sim.native.compiler import require_compiler
+from tank2sim.report.page import Page, render_page
+
+PAGE = "report.html"
+
+STEPS = 18
+"""How often the demo says what it is doing."""
+
+
+def run_demo(folder: Path, tell: Callable[[str], None]) -> dict[str, object]:
+    """Run the demo into an existing folder; `tell` is called at each of :data:`STEPS`. Returns the steps' figures.
+
+    A demo that is stopped half-way leaves whole files of what it had finished, and a second one replaces them.
+
+    Raises
+    ------
+    InputError
+        There is no C compiler, or the folder cannot be written.
+    """
+    require_compiler("the demo")
+    workshop = Workshop(folder, tell)
+    towed, ship = towed_vehicle(workshop), mariner(workshop)
+    tell("writing the page")
+    page = Page(
+        title="From tank to simulator",
+        subtitle="Five tows of a vehicle and the Mariner: measured, identified, simulated, exported, checked",
+        figures=[*towed.figures, *ship.figures],
+        sections=[*towed.sections, *ship.sections],
+    )
+    workshop.write(PAGE, render_page(page))
+    return {"towed_vehicle": towed.result, "mariner": ship.result, "files": workshop.files}

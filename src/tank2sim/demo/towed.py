@@ -1,0 +1,151 @@
+"""First half of the demo: the five tows of paper 1 become an FMU, which is towed again beside them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tank2sim.bundled import bundled
+from tank2sim.cards import parse_card
+from tank2sim.cards.writing import SurgeResult, surge_card_text
+from tank2sim.demo.workshop import Outcome, Workshop, error_words, largest_error
+from tank2sim.dynamics import build
+from tank2sim.dynamics.model import Vector
+from tank2sim.fmu.manoeuvre import Manoeuvre
+from tank2sim.fmu.replay import replay
+from tank2sim.identification.tow import TowResult, identify_tow
+from tank2sim.records.tows import Tows, read_tows
+from tank2sim.report.charts import Tow, chart_png, tow_chart
+from tank2sim.report.page import Column, Figure, Illustration, Section, Table, Verdict
+
+WELL_POSED = ("B3",)
+"""Drag terms that these tows can tell (with M); the paper's B1 and B2 beside them cannot be identified."""
+
+
+def towed_vehicle(workshop: Workshop) -> Outcome:
+    """Identify, write the card, export and check the FMU, and tow it through fmpy beside the measured tows."""
+    workshop.tell("five tows of an underwater vehicle: identifying mass and drag")
+    tows = read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
+    paper, chosen = identify_tow(tows), identify_tow(tows, terms=WELL_POSED)
+    text = _card(chosen)
+    card = parse_card(text, workshop.write("towed-vehicle.toml", text).name)
+    model = build(card)
+    checked = [workshop.checked_fmu(card, model, "towed-vehicle", fmi) for fmi in (2, 3)]
+    workshop.tell("towed vehicle: co-simulating the five tows")
+    # A tenth of the readings' interval, so that every reading falls on a communication point.
+    times = np.linspace(tows.time_s[0], tows.time_s[-1], 10 * (len(tows.time_s) - 1) + 1)
+    held = np.full((len(times) - 1, 1), chosen.force_N)
+    speed = replay(checked[0][0], Manoeuvre(times, held), model)["motion.u"]
+    misses = _misses(tows, times, speed)
+    rows = "\n".join(f"{t:.10g},{v:.10g}" for t, v in zip(times, speed, strict=True))
+    workshop.write("towed-vehicle.csv", f"t_s,speed_mps\n{rows}\n")
+    chart = tow_chart(
+        [
+            Tow(label=f"tow {k + 1}", time_s=tows.time_s, speed_mps=column, model_time_s=times, model_speed_mps=speed)
+            for k, column in enumerate(tows.speed_mps.T)
+        ],
+        title="Speed of the vehicle: five tows, and the FMU under the same force",
+    )
+    workshop.write("towed-vehicle.png", chart_png(chart))
+    worst = max(miss["largest_mps"] for miss in misses)
+    error = largest_error([report for _, report in checked], "CoSimulation")
+    section = Section(
+        heading="A towed vehicle: from five tows to an FMU",
+        text=(
+            "An underwater vehicle was towed from rest by a known force (Wilinski and Zellman 1984, Table 1). Its mass "
+            "with added mass M and its drag follow from M dv/dt + B1 v⁴ + B2 v³ + B3 v² = T.\n\n"
+            "The published method asks for four unknowns. The condition numbers say that these tows cannot tell them "
+            "apart; M and B3 alone they can. The card, and the FMU made from it, have those two, by output error."
+        ),
+        tables=[
+            _estimates(paper, "Four unknowns, as published"),
+            _estimates(chosen, "Two unknowns, as in the card"),
+            _miss_table(misses),
+        ],
+        charts=[
+            Illustration(
+                chart=chart, caption="Points were measured; the line is the exported FMU, co-simulated through fmpy."
+            )
+        ],
+        notes=[*paper.warnings[:1], *chosen.warnings],
+    )
+    fit = chosen.fits["output_error"]
+    figures = [
+        Figure(
+            label="Vehicle's mass with added mass",
+            value=f"{fit.estimates['total_mass_kg']:.0f} ± {fit.standard_errors['total_mass_kg']:.0f}",
+            unit="kg",
+            note="from five tows, one standard error",
+        ),
+        Figure(label="FMU against the tows", value=worst, unit="m/s", note="largest difference of any reading"),
+        Figure(
+            label="Vehicle's FMU against CasADi",
+            value=error_words(error),
+            verdict=Verdict.PASSED,
+            note="same scheme, relative",
+        ),
+    ]
+    result: dict[str, object] = {
+        "four_unknowns": paper.as_json(),
+        "two_unknowns": chosen.as_json(),
+        "tows": misses,
+        "checks": [report.as_json() for _, report in checked],
+    }
+    return Outcome(figures, [section], result)
+
+
+def _card(chosen: TowResult) -> str:
+    fit = chosen.fits["output_error"]
+    values = {key: value for key, value in fit.estimates.items() if key != "added_mass_kg"}
+    return surge_card_text(
+        SurgeResult(
+            name="Wilinski-Zellman underwater vehicle",
+            source="Table 1 of Wilinski and Zellman (1984), M and B3 by output error (tank2sim demo)",
+            values={**values, "force_N": chosen.force_N, "dry_mass_kg": chosen.mass_kg},
+            standard_errors={key: fit.standard_errors[key] for key in values},
+            top_speed_mps=chosen.tows.top_speed_mps,
+            length_m=3.8,  # of the vehicle, paper 1
+            notes=" ".join(chosen.warnings),
+        )
+    )
+
+
+def _misses(tows: Tows, times: Vector, speed: Vector) -> list[dict[str, float]]:
+    """Root mean square and largest difference of the FMU from each tow, m/s."""
+    at_readings = np.interp(tows.time_s, times, speed)
+    differences = tows.speed_mps - at_readings[:, None]
+    return [
+        {
+            "tow": k + 1,
+            "rms_mps": float(np.sqrt(np.nanmean(column**2))),
+            "largest_mps": float(np.nanmax(np.abs(column))),
+            "at_s": float(tows.time_s[np.nanargmax(np.abs(column))]),
+        }
+        for k, column in enumerate(differences.T)
+    ]
+
+
+def _miss_table(misses: list[dict[str, float]]) -> Table:
+    return Table(
+        caption="The FMU beside each tow",
+        columns=[
+            Column(title="tow", digits=1),
+            Column(title="rms difference", unit="m/s", digits=2),
+            Column(title="largest difference", unit="m/s", digits=2),
+            Column(title="at", unit="s", digits=2),
+        ],
+        rows=[[int(miss["tow"]), miss["rms_mps"], miss["largest_mps"], miss["at_s"]] for miss in misses],
+    )
+
+
+def _estimates(result: TowResult, caption: str) -> Table:
+    units = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m"}
+    unknowns = next(iter(result.fits.values())).unknowns
+    rows = []
+    for method, fit in result.fits.items():
+        errors = [None] * len(unknowns) if fit.covariance is None else np.sqrt(np.diag(fit.covariance)).tolist()
+        pairs = [cell for pair in zip(fit.values.tolist(), errors, strict=True) for cell in pair]
+        rows.append([method.replace("_", " "), *pairs, fit.condition_scaled])
+    columns = [Column(title="method")]
+    for name in unknowns:
+        columns += [Column(title=name, unit=units[name]), Column(title="±", unit=units[name], digits=2)]
+    return Table(caption=caption, columns=[*columns, Column(title="condition", digits=2)], rows=rows)

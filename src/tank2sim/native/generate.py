@@ -1,0 +1,36 @@
+"""C code of CasADi functions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+
+@dataclass(frozen=True)
+class WorkSizes:
+    """Lengths of the work vectors that the largest of some generated functions needs."""
+
+    reals: int
+    integers: int
+
+
+def generate_c(functions: Sequence[ca.Function], stem: str) -> str:
+    """One C file with all `functions`, under their own names, none of them exported from a library.
+
+    Each is ``int name(const double **arg, double **res, long long int *iw, double *w, int mem)``, keeps nothing
+    between calls and allocates nothing. `stem` distinguishes the file's other symbols from those of other files.
+    """
+    generator = ca.CodeGenerator(f"{stem}.c", {"with_export": False, "with_header": False})
+    for function in functions:
+        generator.add(function)
+    code: str = generator.dump()
+    return code
+
+
+def work_sizes(functions: Sequence[ca.Function]) -> WorkSizes:
+    """What :func:`generate_c` code of these functions needs as `w` and `iw`."""
+    return WorkSizes(
+        reals=max(function.sz_w() for function in functions), integers=max(function.sz_iw() for function in functions)
+    )

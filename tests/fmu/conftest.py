@@ -1,0 +1,211 @@
+"""Small models with everything an FMU must cope with, and one FMU of each exported once for all tests."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.model_description import read_model_description
+
+from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
+from tank2sim.fmu.export import write_fmu
+from tank2sim.fmu.running import RunningFmu, running
+from tank2sim.fmu.unpacking import UnpackedFmu
+
+
+def tunable(name: str, start: float, unit: str = "1") -> Parameter:
+    return Parameter(name=name, unit=unit, description=f"Coefficient {name}", start=start, nominal=abs(start) or 1)
+
+
+def fixed(name: str, start: float, unit: str = "1", boolean: bool = False) -> Parameter:
+    return Parameter(name=name, unit=unit, description=f"Fixed {name}", start=start, tunable=False, boolean=boolean)
+
+
+def state(name: str, unit: str, derivative: str, start: ca.SX | float, **more: Any) -> State:
+    return State(name=name, unit=unit, description=f"State {name}", derivative=derivative, start=start, **more)
+
+
+def quantity(name: str, unit: str, value: ca.SX | float) -> Quantity:
+    return Quantity(name=name, unit=unit, description=f"Quantity {name}", value=ca.SX(value))
+
+
+def steered_hull(name: str = "Test hull") -> Model:
+    """A hull with linear sway and yaw, quadratic surge, a rate-limited rudder that can fail, and a steady motion."""
+    inputs = (
+        Input(
+            name="rudder.command",
+            unit="rad",
+            description="Rudder order, + to starboard",
+            minimum=-0.6,
+            maximum=0.6,
+            display_unit="deg",
+            nominal=0.3,
+        ),
+        Input(name="propeller.speed", unit="rad/s", description="Revolutions", start=1.0, display_unit="rpm"),
+        Input(name="steering.failed", unit="1", description="True: the rudder stays where it is", boolean=True),
+    )
+    order, revolutions, failed = (variable.symbol for variable in inputs)
+    parameters = (
+        tunable("derivatives.drag", 0.002),
+        tunable("derivatives.thrust", 0.1),
+        tunable("derivatives.Yv", -0.12),
+        tunable("derivatives.Yr", -0.9),
+        tunable("derivatives.Nv", -0.002),
+        tunable("derivatives.Nr", -0.11),
+        tunable("derivatives.Nd", 0.012),
+        tunable("derivatives.Nvvv", -0.003),
+        fixed("steering.max_rate", math.radians(5.0), "rad/s"),
+        fixed("initial.psi", 0.1, "rad"),
+        fixed("initial.u", 7.0, "m/s"),
+        fixed("initial.trim", 0.0, boolean=True),
+    )
+    p = {parameter.name: parameter.symbol for parameter in parameters}
+    d = {name.removeprefix("derivatives."): symbol for name, symbol in p.items()}
+    states = (
+        state("motion.x", "m", "motion.xdot", 0.0, nominal=100.0),
+        state("motion.y", "m", "motion.ydot", 0.0, nominal=100.0),
+        state("motion.psi", "rad", "motion.psidot", p["initial.psi"], display_unit="deg"),
+        state("motion.u", "m/s", "motion.udot", p["initial.u"], steady=True, display_unit="knots", nominal=7.0),
+        state("motion.v", "m/s", "motion.vdot", 0.0, steady=True),
+        state("motion.r", "rad/s", "motion.rdot", 0.0, steady=True, display_unit="deg/min", nominal=0.01),
+        state("rudder.angle", "rad", "rudder.rate", 0.0, trim=order, display_unit="deg", nominal=0.3),
+    )
+    _, _, psi, u, v, r, delta = (variable.symbol for variable in states)
+    limit = p["steering.max_rate"]
+    yaw = d["Nv"] * v + d["Nr"] * r + d["Nd"] * delta * u / 7 + d["Nvvv"] * v**3
+    quantities = (
+        quantity("motion.xdot", "m/s", u * ca.cos(psi) - v * ca.sin(psi)),
+        quantity("motion.ydot", "m/s", u * ca.sin(psi) + v * ca.cos(psi)),
+        quantity("motion.psidot", "rad/s", r),
+        quantity("motion.udot", "m/s2", d["thrust"] * revolutions - d["drag"] * u * ca.fabs(u) + 0.3 * v * r),
+        quantity("motion.vdot", "m/s2", d["Yv"] * v + d["Yr"] * r * u / 7 + 0.05 * delta),
+        quantity("motion.rdot", "rad/s2", yaw),
+        quantity("rudder.rate", "rad/s", ca.fmax(-limit, ca.fmin(limit, order - delta)) * (1 - failed)),
+        quantity("motion.speed", "m/s", ca.sqrt(u**2 + v**2)),
+        quantity("motion.beta", "rad", -ca.asin(v / ca.sqrt(u**2 + v**2))),
+        quantity("force.N", "N.m", 1e6 * d["Nd"] * delta),
+        quantity("rudder.demand", "rad", order - delta),
+    )
+    return Model(
+        name=name,
+        description="A steered hull for tests",
+        states=states,
+        inputs=inputs,
+        parameters=parameters,
+        quantities=quantities,
+        outputs=(
+            *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "motion.speed", "motion.beta"),
+            *("motion.udot", "motion.rdot", "rudder.angle", "force.N", "rudder.demand"),
+        ),
+        step_s=0.1,
+    )
+
+
+def coasting_body() -> Model:
+    """Surge without inputs and without trim; the derivative of its position is its other state."""
+    drag, start = tunable("drag", 0.05), fixed("initial.u", 2.0, "m/s")
+    position = state("motion.x", "m", "motion.u", 0.0)
+    speed = state("motion.u", "m/s", "motion.udot", start.symbol)
+    return Model(
+        name="Body",
+        description="A body that slows down",
+        states=(position, speed),
+        inputs=(),
+        parameters=(drag, start),
+        quantities=(quantity("motion.udot", "m/s2", -drag.symbol * speed.symbol**2),),
+        outputs=("motion.x", "motion.u"),
+        step_s=0.2,
+    )
+
+
+def gain() -> Model:
+    """No states at all, and no parameters: an output that follows its input."""
+    order = Input(name="command", unit="rad", description="Order")
+    return Model(
+        name="Gain",
+        description="Twice the input",
+        states=(),
+        inputs=(order,),
+        parameters=(),
+        quantities=(quantity("answer", "rad", 2 * order.symbol),),
+        outputs=("answer",),
+        step_s=0.5,
+    )
+
+
+MODELS: dict[str, Callable[[], Model]] = {"hull": steered_hull, "body": coasting_body, "gain": gain}
+
+
+@pytest.fixture(scope="session")
+def models() -> dict[str, Model]:
+    """The small models: a hull with everything, a body without inputs, a gain without states or parameters."""
+    return {name: make() for name, make in MODELS.items()}
+
+
+@pytest.fixture(scope="session")
+def hull(models: dict[str, Model]) -> Model:
+    return models["hull"]
+
+
+@pytest.fixture(scope="session")
+def fmu_file(models: dict[str, Model], tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path]:
+    """The FMU of a small model in a version of FMI, exported once."""
+    folder, made = tmp_path_factory.mktemp("fmus"), {}
+
+    def file(name: str, fmi: int) -> Path:
+        if (name, fmi) not in made:
+            made[name, fmi] = folder / f"{name}{fmi}.fmu"
+            write_fmu(models[name], made[name, fmi], fmi=fmi)
+        return made[name, fmi]
+
+    return file
+
+
+@pytest.fixture(scope="session")
+def unpacked(
+    fmu_file: Callable[[str, int], Path], tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[str, int], UnpackedFmu]:
+    """The same, unpacked once."""
+    made: dict[tuple[str, int], UnpackedFmu] = {}
+
+    def folder(name: str, fmi: int) -> UnpackedFmu:
+        if (name, fmi) not in made:
+            target = tmp_path_factory.mktemp(f"{name}{fmi}")
+            with zipfile.ZipFile(fmu_file(name, fmi)) as archive:
+                archive.extractall(target)
+            made[name, fmi] = UnpackedFmu(target, read_model_description(str(target), validate=False))
+        return made[name, fmi]
+
+    return folder
+
+
+@pytest.fixture
+def instantiate(unpacked: Callable[[str, int], UnpackedFmu]) -> Iterator[Callable[..., RunningFmu]]:
+    """Make an instance (name of the model, FMI version, kind), which is freed after the test."""
+    with contextlib.ExitStack() as stack:
+
+        def make(name: str, fmi: int, kind: str, **more: Any) -> RunningFmu:
+            return stack.enter_context(running(unpacked(name, fmi), kind, **more))  # type: ignore[arg-type]
+
+        yield make
+
+
+@pytest.fixture
+def status() -> Callable[..., int]:
+    """The status with which a call through FMPy ends: 0 OK or Warning, 2 Discard, 3 Error."""
+
+    def call(function: Callable[..., Any], *arguments: Any) -> int:
+        try:
+            function(*arguments)
+        except FMICallException as error:
+            return int(error.status)
+        return 0
+
+    return call

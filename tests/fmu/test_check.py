@@ -1,0 +1,226 @@
+"""The check itself: it passes what is right, and nothing else."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tank2sim.cards import read_card
+from tank2sim.dynamics import build
+from tank2sim.dynamics.model import Model, Parameter
+from tank2sim.errors import InputError
+from tank2sim.fmu.check import LIMITS, check_fmu
+from tank2sim.fmu.export import write_fmu
+from tank2sim.fmu.manoeuvre import manoeuvre
+from tank2sim.fmu.reference import by_scheme, exactly
+from tank2sim.fmu.unpacking import embedded_card
+
+FMI = pytest.mark.parametrize("fmi", [2, 3])
+KINDS = ("ModelExchange", "CoSimulation")
+
+
+@FMI
+@pytest.mark.parametrize("name", ["hull", "body", "gain"])
+def test_an_fmu_agrees_with_its_model(
+    name: str, fmi: int, fmu_file: Callable[[str, int], Path], models: dict[str, Model]
+) -> None:
+    report = check_fmu(fmu_file(name, fmi), model=models[name])
+    assert report.passed
+    assert (report.kinds, report.validation, report.differences) == (KINDS, (), ())
+    assert set(report.max_error) == set(models[name].outputs)
+    assert max(report.errors["CoSimulation"].values()) < 1e-9
+    assert max(report.errors["ModelExchange"].values()) < 1e-6
+
+
+@FMI
+@pytest.mark.parametrize("ship", ["mariner", "wilinski-zellman"])
+def test_a_bundled_ship_agrees_with_its_model(ship: str, fmi: int, tmp_path: Path) -> None:
+    model = build(read_card(ship))
+    write_fmu(model, tmp_path / "x.fmu", fmi=fmi)
+    report = check_fmu(tmp_path / "x.fmu", model=model)
+    assert (report.validation, report.differences) == ((), ())
+    assert report.passed
+
+
+def with_start(model: Model, name: str, start: float) -> Model:
+    """The model with another start value of one parameter."""
+
+    def changed(parameter: Parameter) -> Parameter:
+        copy = replace(parameter, start=start) if parameter.name == name else parameter
+        copy.__dict__["symbol"] = parameter.symbol
+        return copy
+
+    return replace(model, parameters=tuple(changed(parameter) for parameter in model.parameters))
+
+
+def test_another_coefficient_is_found_and_named(hull: Model, tmp_path: Path) -> None:
+    write_fmu(with_start(hull, "derivatives.Yv", -0.1200001), tmp_path / "x.fmu")
+    report = check_fmu(tmp_path / "x.fmu", model=hull)
+    assert not report.passed
+    assert any("derivatives.Yv is -0.1200001 in the FMU and -0.12" in line for line in report.differences)
+    assert report.errors["CoSimulation"]["motion.v"] > LIMITS["CoSimulation"]
+
+
+@pytest.mark.parametrize(
+    ("quantity", "wrong"),
+    [
+        ("force.N", lambda value: -value),
+        ("motion.beta", lambda value: -value),
+        ("motion.udot", lambda value: value * (1 + 1e-5)),
+        ("rudder.rate", lambda value: value * 0.999),
+        ("motion.psidot", lambda value: -value),
+    ],
+)
+def test_a_wrong_equation_fails(
+    quantity: str, wrong: Callable[[ca.SX], ca.SX], hull: Model, fmu_file: Callable[[str, int], Path]
+) -> None:
+    report = check_fmu(fmu_file("hull", 2), model=hull.redefine(quantity, wrong))
+    assert not report.passed
+    for kind in KINDS:
+        assert max(report.errors[kind].values()) > LIMITS[kind]  # type: ignore[index]
+
+
+def test_a_sign_changed_in_the_generated_code_fails(
+    hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tank2sim.fmu import sources
+
+    def tampered(functions: list[ca.Function], stem: str) -> str:
+        code = generate(functions, stem)
+        assert "=sin(" in code
+        return code.replace("=sin(", "=-sin(")
+
+    generate = sources.generate_c
+    monkeypatch.setattr(sources, "generate_c", tampered)
+    write_fmu(hull, tmp_path / "x.fmu")
+    report = check_fmu(tmp_path / "x.fmu", model=hull)
+    assert not report.passed
+    assert report.max_error["motion.y"] > 0.1
+
+
+def test_an_fmu_of_another_ship_is_told_by_its_variables(
+    models: dict[str, Model], fmu_file: Callable[[str, int], Path]
+) -> None:
+    report = check_fmu(fmu_file("body", 2), model=models["hull"])
+    assert not report.passed
+    assert "input rudder.command of the model is not in the FMU" in report.differences
+    assert "parameter drag of the FMU is not in the model" in report.differences
+
+
+def test_a_library_that_fails_is_a_failed_check(hull: Model, tmp_path: Path) -> None:
+    weak = with_start(hull, "derivatives.thrust", 1e308)
+    write_fmu(with_start(weak, "derivatives.drag", -1e308), tmp_path / "x.fmu")
+    report = check_fmu(tmp_path / "x.fmu", model=hull)
+    assert not report.passed
+    assert any("not finite" in line for line in report.differences)
+
+
+def test_a_description_with_a_fault_fails(fmu_file: Callable[[str, int], Path], hull: Model, tmp_path: Path) -> None:
+    with zipfile.ZipFile(fmu_file("hull", 2)) as source, zipfile.ZipFile(tmp_path / "x.fmu", "w") as target:
+        for entry in source.infolist():
+            data = source.read(entry)
+            if entry.filename == "modelDescription.xml":
+                data = data.replace(b'unit="N.m"', b'unit="lbf.ft"')
+            target.writestr(entry, data)
+    report = check_fmu(tmp_path / "x.fmu", model=hull)
+    assert not report.passed
+    assert any("lbf.ft" in problem for problem in report.validation)
+    assert any("lbf.ft" in line for line in report.differences)
+
+
+def test_without_a_model_the_file_alone_is_validated(fmu_file: Callable[[str, int], Path]) -> None:
+    report = check_fmu(fmu_file("hull", 3))
+    assert (report.passed, report.compared, report.max_error) == (True, False, {})
+
+
+def test_the_report_is_plain_data_and_nothing_is_printed(
+    fmu_file: Callable[[str, int], Path], hull: Model, capfd: pytest.CaptureFixture[str]
+) -> None:
+    report = check_fmu(fmu_file("hull", 2), model=hull).as_json()
+    assert json.loads(json.dumps(report))["max_error"]["motion.x"] < 1e-6
+    assert capfd.readouterr() == ("", "")
+
+
+# ---- files that are no FMU ----
+
+
+def test_files_that_are_no_fmu_are_told_in_one_line(
+    fmu_file: Callable[[str, int], Path], tmp_path: Path, hull: Model
+) -> None:
+    whole = fmu_file("hull", 2).read_bytes()
+    damaged = bytearray(whole)
+    damaged[len(whole) // 3] ^= 0xFF
+    cases = {"text.fmu": b"no zip", "empty.fmu": b"", "short.fmu": whole[:-100], "damaged.fmu": bytes(damaged)}
+    for name, content in cases.items():
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(InputError, match=rf"{name}.*no FMU"):
+            check_fmu(tmp_path / name, model=hull)
+    with zipfile.ZipFile(tmp_path / "bare.fmu", "w") as archive:
+        archive.writestr("readme.txt", "nothing here")
+    with pytest.raises(InputError, match=r"no modelDescription\.xml"):
+        check_fmu(tmp_path / "bare.fmu", model=hull)
+    for path, problem in ((tmp_path / "none.fmu", "no such file"), (tmp_path, "cannot be read")):
+        with pytest.raises(InputError, match=problem):
+            check_fmu(path, model=hull)
+        with pytest.raises(InputError, match=problem):
+            embedded_card(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        (b"<ModelVariables>", b"<ModelVariables", "modelDescription.xml: cannot be read"),
+        (b'fmiVersion="2.0"', b'fmiVersion="1.0"', "FMI|cannot be read"),
+        (b'modelIdentifier="Test_hull"', b'modelIdentifier="Other"', "no library for this machine"),
+    ],
+)
+def test_a_description_that_cannot_be_used_is_told(
+    old: bytes, new: bytes, problem: str, fmu_file: Callable[[str, int], Path], tmp_path: Path
+) -> None:
+    with zipfile.ZipFile(fmu_file("hull", 2)) as source, zipfile.ZipFile(tmp_path / "x.fmu", "w") as target:
+        for entry in source.infolist():
+            target.writestr(entry, source.read(entry).replace(old, new))
+    with pytest.raises(InputError, match=problem) as caught:
+        check_fmu(tmp_path / "x.fmu")
+    assert "\n" not in str(caught.value)
+
+
+# ---- the references ----
+
+
+def test_the_manoeuvre_goes_both_ways_within_the_bounds(hull: Model) -> None:
+    run = manoeuvre(hull)
+    rudder, revolutions, failed = run.inputs.T
+    assert (rudder.max(), rudder.min(), rudder[0]) == (0.3, -0.3, 0.0)
+    assert (revolutions.max(), revolutions.min(), revolutions[0]) == (1.5, 0.5, 1.0)
+    assert (failed[0], failed[-1], failed.max()) == (0.0, 0.0, 1.0)
+    assert run.times[-1] == pytest.approx(300.0)
+    for first, behind in run.pieces():
+        assert (run.inputs[first:behind] == run.inputs[first]).all()
+
+
+def test_the_scheme_approaches_the_exact_solution_as_its_step_shrinks(hull: Model) -> None:
+    run = manoeuvre(hull)
+    exact = exactly(hull, run)
+    errors = [np.abs(by_scheme(replace(hull, step_s=step), run) - exact)[:, :2].max() for step in (0.4, 0.1, 0.025)]
+    assert errors[2] < errors[1] / 4 < errors[0] / 16
+    assert errors[2] < 1e-3
+
+
+def test_the_exact_solution_is_that_of_another_integrator(models: dict[str, Model]) -> None:
+    body = models["body"]
+    run = manoeuvre(body)
+    # dv/dt = -k v^2 has the solution v0 / (1 + k v0 t), whose integral is log(1 + k v0 t) / k.
+    slowed = 1 + 0.05 * 2.0 * run.times
+    expected = np.column_stack([np.log(slowed) / 0.05, 2.0 / slowed])
+    np.testing.assert_allclose(exactly(body, run), expected, rtol=1e-8)
+    numeric = solve_ivp(lambda _, x: [x[1], -0.05 * x[1] ** 2], (0, run.times[-1]), [0, 2.0], "DOP853", rtol=1e-12)
+    np.testing.assert_allclose(by_scheme(body, run)[-1], numeric.y[:, -1], rtol=1e-7)

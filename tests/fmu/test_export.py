@@ -1,0 +1,240 @@
+"""Writing an FMU: the same bytes each time, whole or not at all, whatever the ship is called."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy.validation import validate_fmu
+from lxml import etree
+
+from tank2sim.bundled import bundled
+from tank2sim.dynamics.model import Model, Parameter
+from tank2sim.errors import InputError
+from tank2sim.fmu.check import check_fmu
+from tank2sim.fmu.export import Documents, write_fmu
+from tank2sim.fmu.templates import c_identifier
+from tank2sim.fmu.unpacking import UnpackedFmu, embedded_card
+from tank2sim.native.compiler import require_compiler
+
+FMI = pytest.mark.parametrize("fmi", [2, 3])
+OURS = ["derivatives.c", "instance.c", "simulation.c", "snapshot.c", "values.c", "variables.c"]
+
+
+# ---- the same each time ----
+
+_EXPORT = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from conftest import steered_hull
+from tank2sim.fmu.export import Documents, write_fmu
+write_fmu(steered_hull(), Path(sys.argv[2]), fmi=int(sys.argv[3]), documents=Documents(card_text="x = 1"))
+"""
+
+
+@FMI
+def test_another_process_in_another_place_writes_the_same_bytes(fmi: int, tmp_path: Path) -> None:
+    contents = []
+    for name, seed in (("one", "1"), ("another", "2")):
+        folder = tmp_path / name
+        folder.mkdir()
+        command = [sys.executable, "-c", _EXPORT, str(Path(__file__).parent), str(folder / f"{name}.fmu"), str(fmi)]
+        environment = os.environ | {"TMPDIR": str(folder), "PYTHONHASHSEED": seed}
+        subprocess.run(command, check=True, cwd=folder, env=environment)
+        contents.append((folder / f"{name}.fmu").read_bytes())
+    assert contents[0] == contents[1]
+
+
+@FMI
+def test_no_path_of_this_machine_is_in_the_library(fmi: int, unpacked: Callable[[str, int], UnpackedFmu]) -> None:
+    folder = unpacked("hull", fmi).folder
+    (library,) = (path for path in folder.glob("binaries/*/*"))
+    content = library.read_bytes()
+    assert b"/tmp" not in content
+    assert b"/home" not in content
+    assert str(Path.cwd()).encode() not in content
+
+
+def test_the_token_tells_contents_apart(hull: Model, tmp_path: Path) -> None:
+    heavier = replace(hull, parameters=replace_start(hull, "derivatives.Yv", -0.13))
+    tokens = {
+        write_fmu(model, tmp_path / "x.fmu", documents=documents).token
+        for model, documents in ((hull, None), (heavier, None), (hull, Documents(card_text="name = 1")))
+    }
+    assert len(tokens) == 3
+
+
+def replace_start(model: Model, name: str, start: float) -> tuple[Parameter, ...]:
+    changed = []
+    for parameter in model.parameters:
+        copy = replace(parameter, start=start) if parameter.name == name else parameter
+        copy.__dict__["symbol"] = parameter.symbol
+        changed.append(copy)
+    return tuple(changed)
+
+
+def test_times_are_those_of_source_date_epoch(hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
+    write_fmu(hull, tmp_path / "plain.fmu")
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    write_fmu(hull, tmp_path / "dated.fmu")
+    for name, date, moment in (("plain", None, 1980), ("dated", "2023-11-14T22:13:20Z", 2023)):
+        with zipfile.ZipFile(tmp_path / f"{name}.fmu") as archive:
+            root = etree.fromstring(archive.read("modelDescription.xml"))
+            assert root.get("generationDateAndTime") == date
+            assert {entry.date_time[0] for entry in archive.infolist()} == {moment}
+    assert validate_fmu(str(tmp_path / "dated.fmu")) == []
+
+
+# ---- what is in it ----
+
+
+@FMI
+def test_sources_compile_alone(fmi: int, unpacked: Callable[[str, int], UnpackedFmu], tmp_path: Path) -> None:
+    sources = sorted(str(path) for path in (unpacked("hull", fmi).folder / "sources").glob("*.c"))
+    library = tmp_path / "library.so"
+    command = [*require_compiler("the test"), "-shared", "-fPIC", *sources, "-lm", "-o", str(library)]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stderr == ""
+    assert library.stat().st_size > 10_000
+
+
+@FMI
+@pytest.mark.parametrize("name", ["hull", "body", "gain"])
+def test_sources_are_c99_without_a_warning(
+    name: str, fmi: int, unpacked: Callable[[str, int], UnpackedFmu], tmp_path: Path
+) -> None:
+    folder = unpacked(name, fmi).folder / "sources"
+    files = [*OURS, *(["fmi2.c"] if fmi == 2 else ["fmi3.c", "fmi3_unsupported.c"])]
+    flags = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O2", "-fPIC"]
+    for file in files:
+        command = [*require_compiler("the test"), *flags, "-c", str(folder / file), "-o", str(tmp_path / "x.o")]
+        assert subprocess.run(command, capture_output=True, text=True, check=False).stderr == ""
+
+
+@FMI
+def test_sources_are_listed(fmi: int, unpacked: Callable[[str, int], UnpackedFmu]) -> None:
+    folder = unpacked("hull", fmi).folder
+    there = sorted(path.name for path in (folder / "sources").glob("*.c"))
+    if fmi == 2:
+        root = etree.parse(str(folder / "modelDescription.xml")).getroot()
+        for kind in ("ModelExchange", "CoSimulation"):
+            assert [file.get("name") for file in root.find(kind).iter("File")] == there
+    else:
+        build = etree.parse(str(folder / "sources" / "buildDescription.xml"))
+        schema = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3BuildDescription.xsd"))
+        schema.assertValid(build)
+        assert [file.get("name") for file in build.getroot().iter("SourceFile")] == there
+
+
+@FMI
+def test_documentation_names_source_units_and_licences(fmi: int, hull: Model, tmp_path: Path) -> None:
+    documents = Documents(card_text='name = "x"', source="Towing tank A & B", validity="3 to 9 m/s")
+    exported = write_fmu(hull, tmp_path / "x.fmu", fmi=fmi, documents=documents)
+    with zipfile.ZipFile(io.BytesIO(exported.content)) as archive:
+        page = archive.read("documentation/index.html").decode()
+        assert archive.read("documentation/licenses/license.txt") == bundled("LICENSE").read_bytes()
+        notice = archive.read("documentation/licenses/FMI-headers.txt").decode()
+    for words in ("Towing tank A &amp; B", "3 to 9 m/s", "rudder.command", "rad (deg)", "+ to starboard", "Test hull"):
+        assert words in page
+    assert "Modelica Association" in notice
+    assert "Redistributions in binary form" in notice
+    assert embedded_card(tmp_path / "x.fmu") == 'name = "x"'
+    assert exported.as_json()["size_bytes"] == (tmp_path / "x.fmu").stat().st_size
+
+
+# ---- whatever the ship is called ----
+
+NASTY = [
+    "Quote \" and ' and <tag> & amp; */ /* %s %n #r1#",
+    "../../etc/passwd",
+    "C:\\con\\..\\x",
+    "Zeile eins\nZeile zwei\r\n\tdrei",
+    "Bełchatów 船 🚢 Ünïcödé",
+    "船",
+    "",
+    "2nd ship",
+    "int",
+    "CON",
+    "bell \x07 null \x00 escape \x1b \ufffe \ud800",
+    "x" * 500,
+    "]]> <!-- -->",
+    "{{ 7 * 7 }} {% raw %}",
+]
+
+
+@pytest.mark.parametrize("name", NASTY)
+def test_any_name_gives_a_c_identifier(name: str) -> None:
+    identifier = c_identifier(name)
+    assert re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,63}", identifier)
+    assert identifier.lower() not in ("int", "con")
+
+
+@FMI
+def test_names_that_resemble_markup_or_paths_do_no_harm(fmi: int, hull: Model, tmp_path: Path) -> None:
+    # All of them at once: an export of each would only take longer.
+    everything = " | ".join(NASTY)
+    model = replace(hull, name=everything, description=everything, notices=(everything,))
+    exported = write_fmu(
+        model,
+        tmp_path / "x.fmu",
+        fmi=fmi,
+        documents=Documents(card_text="name = 'ł'", source=everything, validity=everything),
+    )
+    report = check_fmu(tmp_path / "x.fmu", model=model)
+    assert report.validation == ()
+    assert report.passed
+    with zipfile.ZipFile(io.BytesIO(exported.content)) as archive:
+        root = etree.fromstring(archive.read("modelDescription.xml"))
+        assert "船 🚢 Ünïcödé" in root.get("modelName")
+        assert "<tag> & amp; */ /* %s" in root.get("modelName")
+        page = archive.read("documentation/index.html").decode()
+        assert "<tag>" not in page
+        assert "{{ 7 * 7 }}" in page
+        assert all(".." not in entry for entry in archive.namelist())
+
+
+# ---- what goes wrong ----
+
+
+def test_without_a_compiler_nothing_is_written(hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(InputError, match="no C compiler"):
+        write_fmu(hull, tmp_path / "x.fmu")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_missing_is_told(hull: Model, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be written"):
+        write_fmu(hull, tmp_path / "missing" / "x.fmu")
+
+
+def test_there_is_no_fmi_1(hull: Model, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="choose 2 or 3"):
+        write_fmu(hull, tmp_path / "x.fmu", fmi=1)
+
+
+@pytest.mark.parametrize("epoch", ["yesterday", "1e9", "99999999999999999999"])
+def test_a_source_date_epoch_that_is_no_time_is_told(
+    epoch: str, hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
+    with pytest.raises(InputError, match="SOURCE_DATE_EPOCH"):
+        write_fmu(hull, tmp_path / "x.fmu")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_was_written_is_plain_data(hull: Model, tmp_path: Path) -> None:
+    exported = write_fmu(hull, tmp_path / "x.fmu", fmi=3).as_json()
+    assert json.loads(json.dumps(exported))["model_identifier"] == "Test_hull"
+    assert len(exported["platforms"]) == 1

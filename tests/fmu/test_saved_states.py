@@ -1,0 +1,84 @@
+"""States of an FMU that are saved, carried as bytes, and taken up by another instance."""
+
+from __future__ import annotations
+
+import pytest
+
+from tank2sim.fmu.running import RunningFmu
+from tests.fmu.driving import ERROR, STATES, Instantiate, Status, begun, steps
+
+FMI = pytest.mark.parametrize("fmi", [2, 3])
+
+
+def saved(fmu: RunningFmu) -> bytes:
+    instance = fmu.instance
+    state = instance.getFMUstate() if fmu.unpacked.fmi == 2 else instance.getFMUState()
+    data = instance.serializeFMUstate(state) if fmu.unpacked.fmi == 2 else instance.serializeFMUState(state)
+    (instance.freeFMUstate if fmu.unpacked.fmi == 2 else instance.freeFMUState)(state)
+    return bytes(data)
+
+
+def restore(fmu: RunningFmu, data: bytes) -> None:
+    instance = fmu.instance
+    if fmu.unpacked.fmi == 2:
+        state = instance.deSerializeFMUstate(data)
+        instance.setFMUstate(state)
+        instance.freeFMUstate(state)
+    else:
+        state = instance.deserializeFMUState(data)
+        instance.setFMUState(state)
+        instance.freeFMUState(state)
+
+
+@FMI
+def test_a_saved_state_goes_on_in_another_instance(fmi: int, instantiate: Instantiate) -> None:
+    first = instantiate("hull", fmi, "CoSimulation")
+    first.write({"derivatives.Yv": -0.15, "initial.u": 6.0})
+    steps(begun(first, rudder__command=0.3), 20)
+    data = saved(first)
+    gone_on = steps(first, 20, begin=2.0)
+    second = instantiate("hull", fmi, "CoSimulation")
+    restore(second, data)
+    assert steps(second, 20, begin=2.0) == gone_on
+    restore(first, data)
+    assert steps(first, 20, begin=2.0) == gone_on
+    assert first.read(["derivatives.Yv"]) == second.read(["derivatives.Yv"]) == [-0.15]
+
+
+@FMI
+def test_the_stop_time_is_part_of_the_state(fmi: int, instantiate: Instantiate, status: Status) -> None:
+    first, second = (instantiate("hull", fmi, "CoSimulation") for _ in range(2))
+    if fmi == 2:
+        first.instance.setupExperiment(startTime=0.0, stopTime=2.0)
+        first.instance.enterInitializationMode()
+    else:
+        first.instance.enterInitializationMode(startTime=0.0, stopTime=2.0)
+    first.instance.exitInitializationMode()
+    restore(second, saved(first))
+    assert status(second.instance.doStep, 0.0, 2.1) == ERROR
+    assert status(second.instance.doStep, 0.0, 2.0) == 0
+
+
+@FMI
+def test_a_state_saved_before_initialisation_is_one_before_initialisation(fmi: int, instantiate: Instantiate) -> None:
+    first = instantiate("hull", fmi, "ModelExchange")
+    first.write({"initial.u": 5.0})
+    data = saved(first)
+    begun(first)
+    restore(first, data)
+    assert first.read(["motion.u"]) == [5.0]
+    first.write({"initial.psi": 1.0})
+    assert begun(first).read(["motion.u", "motion.psi"]) == [5.0, 1.0]
+
+
+@FMI
+def test_bytes_that_are_no_state_of_this_fmu_are_refused(fmi: int, instantiate: Instantiate, status: Status) -> None:
+    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.3)
+    before, data = steps(fmu, 5), saved(fmu)
+    other_kind = saved(instantiate("hull", fmi, "ModelExchange"))
+    other_model = saved(instantiate("body", fmi, "CoSimulation"))
+    not_a_number = data[:-8] + b"\xff" * 8
+    bad = [data[:-1], data + b"\0", b"", b"x" * len(data), b"\0" + data[1:], other_kind, other_model, not_a_number]
+    assert [status(restore, fmu, case) for case in bad] == [ERROR] * len(bad)
+    assert len(fmu.log) == len(bad)
+    assert fmu.read(STATES) == before
