@@ -90,7 +90,7 @@ def test_a_crossing_that_never_comes_ends_at_the_limit(integrator) -> None:
 def test_splitting_a_run_does_not_change_it(integrator) -> None:
     whole, parts = Running(integrator), Running(integrator)
     for running in (whole, parts):
-        running.order(rudder__command=0.3)
+        running.order({"rudder.command": 0.3})
     whole.run(100.0)
     for piece in (13.0, 0.4, 50.1, 36.5):
         parts.run(piece)

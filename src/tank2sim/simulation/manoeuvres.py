@@ -42,7 +42,7 @@ class Turn:
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Run for `duration` s, or until the heading has changed by :data:`TURN_HEADING` (at most 150 L/u0)."""
-        running.order(rudder__command=self.rudder)
+        running.order({"rudder.command": self.rudder})
         if duration is not None:
             running.run(duration)
             return
@@ -68,7 +68,7 @@ class Zigzag:
         side = math.copysign(1.0, self.rudder)
         executes = 0
         while running.time < end and (duration is not None or executes < ZIGZAG_EXECUTES):
-            running.order(rudder__command=side * abs(self.rudder))
+            running.order({"rudder.command": side * abs(self.rudder)})
             goal = begin + side * self.heading
             if not running.run_until("motion.psi", goal, rising=side > 0, at_most=end - running.time):
                 return
@@ -83,9 +83,9 @@ class PullOut:
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Turn until steady (at most 60 L/u0), then `duration` s (by default 40 L/u0) with the rudder amidships."""
-        running.order(rudder__command=self.rudder)
+        running.order({"rudder.command": self.rudder})
         _until_steady(running, ship_time, at_most=60 * ship_time)
-        running.order(rudder__command=0.0)
+        running.order({"rudder.command": 0.0})
         running.run(40 * ship_time if duration is None else duration)
 
 
@@ -98,7 +98,7 @@ class Spiral:
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Hold each rudder until steady, at most `duration` s (by default 100 L/u0)."""
         for rudder in self.rudders:
-            running.order(rudder__command=rudder)
+            running.order({"rudder.command": rudder})
             _until_steady(running, ship_time, at_most=100 * ship_time if duration is None else duration)
 
 
@@ -134,7 +134,7 @@ class Orders:
             if self.times[row] >= end:
                 break
             running.run(self.times[row] - running.time)
-            running.order(**{name: values[row] for name, values in self.inputs.items()})
+            running.order({name: values[row] for name, values in self.inputs.items()})
         running.run(end - running.time)
 
 

@@ -64,11 +64,11 @@ class Running:
         """Present value of a state."""
         return float(self._x[self.model.state_names.index(name)])
 
-    def order(self, **inputs: float) -> None:
-        """Set inputs from now on; names with ``__`` for the dot (``rudder__command=0.35``)."""
+    def order(self, inputs: Mapping[str, float]) -> None:
+        """Set inputs, by name, from now on."""
         self._u = self._u.copy()
         for name, value in inputs.items():
-            self._u[self.model.input_names.index(name.replace("__", "."))] = value
+            self._u[self.model.input_names.index(name)] = value
 
     def run(self, duration: float) -> None:
         """Advance by `duration` s with the inputs held."""
