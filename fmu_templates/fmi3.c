@@ -380,7 +380,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     }
     status = do_step(instance, currentCommunicationPoint, communicationStepSize);
     *eventHandlingNeeded = fmi3False;
-    *terminateSimulation = fmi3False;
+    *terminateSimulation = status == DISCARD; /* the same step would fail again */
     *earlyReturn = fmi3False;
     *lastSuccessfulTime = ((Instance *)instance)->value[TIME];
     return (fmi3Status)status;

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+import io
 import math
 import re
 import subprocess
@@ -14,8 +16,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import fmpy
+import fmpy.fmi2
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from scipy.optimize import fsolve
 
 from tank2sim.dynamics.model import Model
@@ -178,6 +182,17 @@ def test_an_input_that_is_not_finite_is_discarded(
 
 
 @FMI
+def test_a_simulator_that_only_asks_whether_to_go_on_ends(fmi: int, fmu_file: Callable[[str, int], Path]) -> None:
+    """FMPy repeats a discarded step until the FMU says that it has ended."""
+    start = {"derivatives.thrust": 1e308, "propeller.speed": 1e3}
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(FMICallException):
+        result = fmpy.simulate_fmu(
+            str(fmu_file("hull", fmi)), stop_time=5.0, start_values=start, fmi_type="CoSimulation"
+        )
+        assert result["time"][-1] < 5.0
+
+
+@FMI
 def test_a_step_to_states_that_are_not_finite_is_discarded(fmi: int, instantiate: Instantiate, status: Status) -> None:
     fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
     before = steps(fmu, 10)
@@ -186,6 +201,8 @@ def test_a_step_to_states_that_are_not_finite_is_discarded(fmi: int, instantiate
     assert fmu.read(STATES) == before
     assert fmu.read(["time"]) == [1.0]
     assert any("motion." in line and "not finite" in line for line in fmu.log)
+    if fmi == 2:  # FMPy does not hand on what fmi3DoStep says of it
+        assert fmu.instance.getBooleanStatus(fmpy.fmi2.fmi2Terminated)
     fmu.write({"derivatives.thrust": 0.1, "propeller.speed": 1.0})
     undisturbed = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
     assert steps(fmu, 5, begin=1.0) == steps(undisturbed, 15)
