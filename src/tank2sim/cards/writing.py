@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import tomlkit
+from tomlkit.items import Table
 
 
 @dataclass(frozen=True)
@@ -57,3 +59,78 @@ def surge_card_text(result: SurgeResult) -> str:
     document["ship"], document["model"], document["surge"] = ship, model, surge
     document["uncertainty"] = uncertainty
     return tomlkit.dumps(document)
+
+
+class DerivativeEntry(NamedTuple):
+    """A derivative (prime, rudder positive to starboard), its standard error, and how it was found."""
+
+    value: float
+    standard_error: float
+    how: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ManoeuvringResult:
+    """What a card of a manoeuvring ship is made of: prime, instantaneous, "hydrodynamic", starboard-positive.
+
+    Parameters
+    ----------
+    particulars : mapping
+        Keys of ``[ship]`` but source and notes; SI.
+    source, notes : str
+        Where the numbers come from, and what a reader should know.
+    environment : mapping
+        Keys of ``[environment]``, SI.
+    speed_mps : float
+        u0, about which the forces are expanded.
+    rigid_body : mapping
+        ``mass``, ``yaw_inertia``, ``x_G``.
+    inertia_source : str
+        Where the yaw inertia is from.
+    derivatives : mapping
+        Canonical name to entry, in the order of the card.
+    """
+
+    particulars: Mapping[str, float | str]
+    source: str
+    notes: str
+    environment: Mapping[str, float]
+    speed_mps: float
+    rigid_body: Mapping[str, float]
+    inertia_source: str
+    derivatives: Mapping[str, DerivativeEntry]
+
+
+def manoeuvring_card_text(result: ManoeuvringResult) -> str:
+    """TOML text of a ship card: each derivative with how it was found."""
+    document = tomlkit.document()
+    document["format"] = "tank2sim-ship/1"
+    document["ship"] = _table({**result.particulars, "source": result.source, "notes": result.notes})
+    document["environment"] = _table(result.environment)
+    document["model"] = _table(
+        {
+            "kind": "abkowitz",
+            "speed_mps": result.speed_mps,
+            "scaling": "prime",
+            "speed_scale": "instantaneous",
+            "yaw_rate_terms": "hydrodynamic",
+            "rudder_sign": "starboard",
+        }
+    )
+    body = _table({key: float(f"{value:.6g}") for key, value in result.rigid_body.items()})
+    body["yaw_inertia"].comment(f"about midships; {result.inertia_source}")
+    document["rigid_body"] = body
+    derivatives, uncertainty = tomlkit.table(), tomlkit.table()
+    for name, entry in result.derivatives.items():
+        derivatives[name] = entry.value
+        derivatives[name].comment(entry.how)
+        uncertainty[name] = entry.standard_error
+    document["derivatives"], document["uncertainty"] = derivatives, uncertainty
+    return tomlkit.dumps(document)
+
+
+def _table(values: Mapping[str, float | str]) -> Table:
+    table = tomlkit.table()
+    for key, value in values.items():
+        table[key] = value
+    return table

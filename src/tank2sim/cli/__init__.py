@@ -16,7 +16,7 @@ import click
 from tank2sim import __version__
 from tank2sim.errors import InputError
 
-COMMANDS = ("demo", "ships", "simulate", "tow", "export", "check", "stability")
+COMMANDS = ("demo", "ships", "simulate", "reduce", "tow", "export", "check", "stability")
 
 
 class _Commands(click.Group):

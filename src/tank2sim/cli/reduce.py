@@ -1,0 +1,160 @@
+"""``tank2sim reduce``: captive tests to derivatives with uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from tank2sim.cards import parse_card
+from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.errors import InputError
+from tank2sim.files import writable_folder, write_together
+from tank2sim.identification.captive.as_json import prediction_errors, reduction_as_json
+from tank2sim.identification.captive.findings import findings
+from tank2sim.identification.captive.reduction import Options, Reduction, reduce_campaign
+from tank2sim.identification.captive.result_card import FILLS, Contents, card_text, contents, reynolds_ratio
+from tank2sim.records.campaigns import Campaign, read_campaign
+
+
+@click.command("reduce")
+@click.argument("campaign", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the ship card.")
+@click.option(
+    "--fill",
+    type=click.Choice(tuple(FILLS)),
+    help="Take what the campaign cannot give from this published estimate, marked and with a wide uncertainty.",
+)
+@click.option(
+    "--scale", metavar="LAMBDA", help="Write the card of a ship so many times as long; 'ship': [model] scale."
+)
+@click.option("--keep-going", is_flag=True, help="Leave out runs at fault and reduce the rest.")
+@click.option("--keep-fast", is_flag=True, help="Use runs with omega U/g of 0.1 and more, too.")
+@click.option("--off-speed", is_flag=True, help="Use runs away from the test speed, too, for terms in the speed.")
+@click.option("--all-terms", is_flag=True, help="Keep terms that do not differ from zero.")
+@click.option("--test-symmetry", is_flag=True, help="Test terms that port-starboard symmetry leaves out.")
+@click.option("--plot", "plots", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Write plots.")
+@json_option
+def command(
+    campaign: Path, *, fill: str | None, scale: str | None, plots: Path | None, output: Path | None, **more: object
+) -> None:
+    """Reduce the captive tests in CAMPAIGN (campaign.toml) to derivatives with standard errors."""
+    json_file = more.pop("json_file")
+    read = read_campaign(campaign, keep_going=bool(more["keep_going"]))
+    ratio = scale_of(read, scale)
+    if ratio is not None:
+        read = at_scale(read, ratio)
+    reduction = reduce_campaign(read, Options(**{key: bool(value) for key, value in more.items()}))
+    card = contents(reduction, fill)
+    warnings = (*findings(reduction), *_fill_notices(card, fill, ratio, read))
+    files: dict[Path, str | bytes] = {}
+    if output:
+        text = card_text(reduction, card, ratio or 1.0)
+        parse_card(text, str(output))  # refuses what is no ship here, before anything is written
+        files[output] = text
+    if isinstance(json_file, Path):
+        files[json_file] = json_text(reduction_as_json(reduction, card, warnings))
+    if plots:
+        files |= _pictures(reduction, plots)
+    write_together(files)
+    _show(reduction, card)
+    show_notices(warnings)
+    if output:
+        screen.print(f"{output}: {len(card.entries)} derivatives", soft_wrap=True, markup=False)
+
+
+def scale_of(campaign: Campaign, given: str | None) -> float | None:
+    """The ratio of lengths asked for: a number, or ``ship`` for that of the campaign; None if none was.
+
+    Raises
+    ------
+    InputError
+        It is no number of at least 1, or the campaign gives none.
+    """
+    if given is None:
+        return None
+    if given == "ship":
+        if campaign.model.scale is None:
+            raise InputError(campaign.path, "model.scale", "is missing", "add it, or give --scale a number")
+        return campaign.model.scale
+    try:
+        ratio = float(given)
+    except ValueError:
+        ratio = 0.0
+    if not 1.0 <= ratio < 1e4:
+        raise InputError("--scale", "", f"{given} is no ratio of lengths", "give a number such as 46.4, or 'ship'")
+    return ratio
+
+
+def at_scale(campaign: Campaign, ratio: float) -> Campaign:
+    """The campaign with this ratio of lengths in place of its own."""
+    return replace(campaign, model=campaign.model.model_copy(update={"scale": ratio}))
+
+
+def _fill_notices(card: Contents, fill: str | None, ratio: float | None, campaign: Campaign) -> list[str]:
+    told = []
+    if card.estimated:
+        told.append(
+            f"Estimated, not measured, with wide standard errors ({FILLS[fill or '']}): {', '.join(card.estimated)}."
+        )
+    if card.missing:
+        remedy = "" if fill else f" --fill {next(iter(FILLS))} takes what it can from a published estimate."
+        told.append(
+            f"The card has no {', '.join(card.missing)}: they are zero there, and a manoeuvre simulated with it is as "
+            f"wrong as that.{remedy}"
+        )
+    if {"Yr", "Nr"} & set(card.estimated) and not {"Nvvr", "Nrrr"} & set(card.entries):
+        told.append("No term of third order in the yaw rate was measured or estimated: hard turns come out too tight.")
+    if ratio:
+        told.append(
+            f"The card is of a ship {ratio:g} times as long as the model, at the same Froude number; its Reynolds "
+            f"number is {reynolds_ratio(campaign, ratio):.4g} times the model's, for which nothing was corrected."
+        )
+    return told
+
+
+def _pictures(reduction: Reduction, folder: Path) -> dict[Path, str | bytes]:
+    from tank2sim.report.captive_results import reduction_pictures
+
+    writable_folder(folder)
+    return {folder / name: picture for name, picture in reduction_pictures(reduction).items()}
+
+
+def _show(reduction: Reduction, card: Contents) -> None:
+    rows: list[list[object]] = []
+    for name, entry in card.entries.items():
+        steps = reduction.forces[name[0]].stepwise
+        other = "-"
+        if name in steps.names and name not in card.estimated:
+            place = steps.names.index(name)
+            other = f"{steps.values[place]:.5g} ± {steps.standard_errors[place]:.2g} ({steps.found_in[place]})"
+        origin = "estimated" if name in card.estimated else "measured"
+        rows.append([name, f"{entry.value:.5g} ± {entry.standard_error:.2g}", other, origin])
+    title = f"{reduction.campaign.model.name}: derivatives from {len(reduction.runs)} runs (prime, rudder to starboard)"
+    show_table(title, ["", "whole campaign", "paper's order", ""], rows)
+    dropped = [
+        [choice.name, choice.reason, choice.told]
+        for result in reduction.forces.values()
+        for choice in result.selection.choices
+        if choice.reason in ("collinear", "not significant")
+    ]
+    if dropped:
+        show_table("Terms that the runs excite and that were left out", ["", "", "why"], dropped)
+    unexcited = [
+        choice.name
+        for result in reduction.forces.values()
+        for choice in result.selection.choices
+        if choice.reason == "not excited"
+    ]
+    screen.print(f"Not excited by any run: {', '.join(unexcited)}", soft_wrap=True, markup=False)
+    errors = prediction_errors(reduction)
+    show_table(
+        "Leave-one-out: root mean square error of each run predicted from the others, % of the range",
+        ["runs of type", "X", "Y", "N"],
+        [
+            [kind, *(f"{100 * forces[force]['relative']:.2g}" if force in forces else "-" for force in "XYN")]
+            for kind, forces in errors.items()
+            if any(forces[force]["runs"] > 2 for force in forces)
+        ],
+    )

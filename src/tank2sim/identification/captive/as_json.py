@@ -1,0 +1,158 @@
+"""The whole of a reduction as plain data, for JSON."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from tank2sim.cards.scaling import Scales
+from tank2sim.identification.captive.harmonics import ReducedRun
+from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
+from tank2sim.identification.captive.repeats import repeats
+from tank2sim.identification.captive.result_card import Contents
+from tank2sim.records.campaigns import Campaign
+
+
+def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str, ...]) -> dict[str, Any]:
+    """Everything of a reduction; ``derivatives`` and ``rigid_body`` are those of the card."""
+    campaign = reduction.campaign
+    found: dict[str, Any] = {
+        "campaign": str(campaign.path),
+        "model": campaign.model.model_dump(exclude_none=True),
+        "test": campaign.test.model_dump(exclude_none=True),
+        "conventions": {
+            "scaling": "prime",
+            "speed_scale": "instantaneous",
+            "yaw_rate_terms": "hydrodynamic",
+            "rudder_sign": "starboard",
+            "speed_mps": campaign.test.speed_mps,
+        },
+        "rigid_body": {"mass": card.mass, "yaw_inertia": card.yaw_inertia, "x_G": card.x_G},
+        "derivatives": {name: _derivative(reduction, card, name) for name in card.entries},
+        "missing": card.missing,
+        "warnings": warnings,
+        "methods": {force: _methods(result) for force, result in reduction.forces.items()},
+        "selection": {
+            force: [asdict(choice) for choice in result.selection.choices] for force, result in reduction.forces.items()
+        },
+        "spread": {force: _spread(result) for force, result in reduction.forces.items()},
+        "trends": [asdict(trend) for result in reduction.forces.values() for trend in result.trends],
+        "symmetry": {force: asdict(result.asymmetry) for force, result in reduction.forces.items() if result.asymmetry},
+        "leave_one_out": {
+            force: [{**asdict(row), "error": row.error} for row in result.left_out]
+            for force, result in reduction.forces.items()
+        },
+        "prediction_errors": prediction_errors(reduction),
+        "oscillations": [asdict(row) for row in reduction.oscillations],
+        "third_order": [asdict(cubic) for cubic in reduction.cubics],
+        "runs": [_run(campaign, run) for run in reduction.runs],
+        "not_used": reduction.not_used,
+        "faults": [str(fault) for fault in reduction.faults],
+    }
+    again = repeats(campaign, reduction.runs)
+    found["repeats"] = asdict(again) if again else None
+    if is_resistance(campaign) and "X0" in reduction.derivatives:
+        resistance = reduction.derivatives["X0"]
+        found["resistance"] = {"X0": {"value": resistance.value, "standard_error": resistance.standard_error}}
+    return found
+
+
+def prediction_errors(reduction: Reduction) -> dict[str, dict[str, dict[str, float]]]:
+    """Leave-one-condition-out errors: type of run to force to root mean square, largest, and the range (prime).
+
+    ``relative`` is the root mean square over the range of what was measured in runs of that type.
+    """
+    found: dict[str, dict[str, dict[str, float]]] = {}
+    for force, result in reduction.forces.items():
+        for kind in dict.fromkeys(row.type for row in result.left_out):
+            rows = [row for row in result.left_out if row.type == kind]
+            errors = np.array([row.error for row in rows])
+            span = float(np.ptp([row.measured for row in rows]))
+            rms = float(np.sqrt(np.mean(errors**2)))
+            found.setdefault(kind, {})[force] = {
+                "rms": rms,
+                "largest": float(np.max(np.abs(errors))),
+                "range": span,
+                "relative": rms / span if span > 0 else np.nan,
+                "runs": len(rows),
+            }
+    return found
+
+
+def _derivative(reduction: Reduction, card: Contents, name: str) -> dict[str, Any]:
+    entry = card.entries[name]
+    found: dict[str, Any] = {"value": entry.value, "standard_error": entry.standard_error}
+    if name in card.estimated:
+        return found | {"origin": "estimated", "source": entry.how}
+    derivative = reduction.derivatives[name]
+    steps = reduction.forces[name[0]].stepwise
+    found |= {"origin": "measured", "type_a": derivative.type_a, "type_b": derivative.type_b}
+    if name in steps.names:
+        place = steps.names.index(name)
+        found["paper_order"] = {
+            "value": steps.values[place],
+            "standard_error": steps.standard_errors[place],
+            "found_in": steps.found_in[place],
+        }
+    return found
+
+
+def _methods(result: ForceResult) -> dict[str, Any]:
+    solution, steps = result.solution, result.stepwise
+    return {
+        "regression": {
+            "names": solution.names,
+            "values": solution.values,
+            "standard_errors": solution.standard_errors,
+            "covariance": solution.covariance,
+            "condition": solution.condition,
+            "variance_inflation": solution.inflation,
+            "held_within": result.selection.equations.prior,
+        },
+        "paper_order": {
+            "names": steps.names,
+            "values": steps.values,
+            "standard_errors": steps.standard_errors,
+            "found_in": steps.found_in,
+        },
+        "disagreements": [asdict(difference) for difference in result.disagreements],
+    }
+
+
+def _spread(result: ForceResult) -> dict[str, Any]:
+    spread, unit = result.selection.spread, result.selection.equations.unit
+    zero = float(np.sqrt(spread.zero_variance))
+    return {
+        "noise_factor": spread.noise,
+        "zero_error_prime": zero,
+        "zero_error_si": zero * unit,
+        "by_type": {kind: float(np.sqrt(variance)) for kind, variance in spread.by_type.items()},
+    }
+
+
+def _run(campaign: Campaign, run: ReducedRun) -> dict[str, Any]:
+    """A run with its harmonics, prime with its own speed."""
+    motion = run.motion
+    scales = Scales(campaign.test.water_density_kgpm3, campaign.model.length_m, motion.mean_speed_mps)
+    harmonics: dict[str, Any] = {}
+    for force, fit in run.fits.items():
+        unit = scales.force * (scales.length if force == "N" else 1.0)
+        errors = np.sqrt(np.diag(fit.covariance))
+        harmonics[force] = {
+            label: {"value": value / unit, "standard_error": error / unit}
+            for label, value, error in zip(run.labels, fit.coefficients, errors, strict=True)
+        }
+    return {
+        "name": run.run.name,
+        "type": run.run.type,
+        "speed_mps": motion.mean_speed_mps,
+        "frequency_radps": motion.frequency_radps,
+        "periods": motion.periods,
+        "v_amplitude_mps": motion.amplitude(motion.v_mps),
+        "r_amplitude_radps": motion.amplitude(motion.r_radps),
+        "v_mean_mps": float(np.mean(motion.v_mps)),
+        "rudder_rad": float(np.mean(motion.delta_rad)),
+        "harmonics": harmonics,
+    }

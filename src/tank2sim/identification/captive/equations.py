@@ -1,0 +1,243 @@
+"""The linear equations of a campaign: what each term of (3.8) gives to each harmonic of each run.
+
+A run's reduction to harmonics is linear, so that the same reduction of the regressors v, v^3, v r^2, dv/dt, ... gives
+the equations exactly, whatever the motion; no small-amplitude expansion is made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.cards.scaling import Scales
+from tank2sim.cards.terms import Term, parse_term
+from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, TERMS
+from tank2sim.dynamics.rigid_body import inertia, inertial_forces
+from tank2sim.errors import InputError
+from tank2sim.identification.captive.harmonics import ReducedRun
+from tank2sim.identification.captive.motion import Motion
+from tank2sim.identification.conditioning import Matrix, Vector
+from tank2sim.records.campaigns import Campaign
+
+SPEED_RANGE = 0.03
+"""Relative change of the speed between runs from which terms in Du are candidates, and within which a run counts as
+one at the test speed. A choice of ours: 3 % of speed is 6 % of force, and carriages hold 0.1 %."""
+_ACTIVE = 1e-3
+"""A term is excited if its product of motions reaches this share of the product of the campaign's largest motions."""
+
+
+def candidate_terms(force: str) -> tuple[Term, ...]:
+    """Terms of (3.8) and acceleration terms of one force, in their order."""
+    names = (*TERMS[force], *(name for name in ACCELERATION_TERMS if name[0] == force))
+    return tuple(term for term in map(parse_term, names) if term is not None)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Equations:
+    """Weighted equations of one force over a campaign: rows are coefficients of runs, columns are terms.
+
+    Parameters
+    ----------
+    force : str
+        ``X``, ``Y`` or ``N``.
+    names : tuple of str
+        Of the columns.
+    design : array, (rows, columns)
+        Each run's block is multiplied by the inverse root of its within-run covariance.
+    values : array, (rows,)
+        The water's force so weighted.
+    zero : array, (rows,)
+        What a zero error of 1 common to a run adds, so weighted.
+    run_of_row : array of int, (rows,)
+        Place of each row's run in `runs`.
+    runs : tuple of ReducedRun
+        The runs.
+    unit : float
+        Force or moment by which rows are made non-dimensional before weighting, N or N m.
+    roots : tuple of array
+        Cholesky root of each run's within-run covariance, in `unit`.
+    prior : mapping
+        Term to the standard deviation (prime) about zero within which it is held; others are free.
+    """
+
+    force: str
+    names: tuple[str, ...]
+    design: Matrix
+    values: Vector
+    zero: Vector
+    run_of_row: NDArray[np.int64]
+    runs: tuple[ReducedRun, ...]
+    unit: float
+    roots: tuple[Matrix, ...]
+    prior: Mapping[str, float] = field(default_factory=dict)
+
+    def held(self, prior: Mapping[str, float]) -> Equations:
+        """The same equations with some terms held loosely about zero."""
+        return replace(self, prior=prior)
+
+    @property
+    def prior_rows(self) -> Matrix:
+        """The prior as weighted equations with zero on their right, (terms held, columns)."""
+        places = [place for place, name in enumerate(self.names) if name in self.prior]
+        rows = np.zeros((len(places), len(self.names)))
+        rows[np.arange(len(places)), places] = [1.0 / self.prior[self.names[place]] for place in places]
+        return rows
+
+    def of_terms(self, names: Sequence[str]) -> Equations:
+        """The same equations with some columns only."""
+        places = [self.names.index(name) for name in names]
+        return replace(self, names=tuple(names), design=self.design[:, places])
+
+    def of_runs(self, places: Sequence[int]) -> Equations:
+        """The equations of some runs only."""
+        rows = np.flatnonzero(np.isin(self.run_of_row, places))
+        renumbered = {place: number for number, place in enumerate(places)}
+        return replace(
+            self,
+            design=self.design[rows],
+            values=self.values[rows],
+            zero=self.zero[rows],
+            run_of_row=np.array([renumbered[place] for place in self.run_of_row[rows]], dtype=np.int64),
+            runs=tuple(self.runs[place] for place in places),
+            roots=tuple(self.roots[place] for place in places),
+        )
+
+    @cached_property
+    def first_rows(self) -> NDArray[np.int64]:
+        """Row at which each run begins."""
+        starts: NDArray[np.int64] = np.searchsorted(self.run_of_row, np.arange(len(self.runs)))
+        return starts
+
+    @cached_property
+    def zero_sizes(self) -> Vector:
+        """Squared norm of each run's rows of `zero`, (runs,)."""
+        sizes: Vector = self.run_sums(self.zero**2)
+        return sizes
+
+    def run_sums(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sum over the rows of each run, (runs, ...)."""
+        return np.add.reduceat(rows, self.first_rows, axis=0)
+
+
+def equations(campaign: Campaign, runs: Sequence[ReducedRun], force: str, names: Sequence[str]) -> Equations:
+    """The equations of a force for the named terms (or trend terms, ``Yv w2``).
+
+    Raises
+    ------
+    InputError
+        A yaw run's inertia is to be taken out and the campaign does not give it.
+    """
+    scales = campaign.scales
+    unit = scales.force * (scales.length if force == "N" else 1.0)
+    blocks, values, zeros, roots, places = [], [], [], [], []
+    for place, run in enumerate(runs):
+        histories = np.column_stack([*(_history(campaign, run.motion, name) for name in names)]) / unit
+        own = rigid_body_force(campaign, run.motion)[force] / unit
+        projected = run.projected(np.column_stack([histories, own]))
+        fit, count = run.fits[force], run.regressed
+        covariance = fit.covariance[:count, :count] / unit**2
+        root = np.linalg.cholesky(covariance)
+        measured = fit.coefficients[:count] / unit + projected[:, -1]
+        weighted = np.linalg.solve(root, np.column_stack([projected[:, :-1], measured, np.eye(count)[:, 0]]))
+        blocks.append(weighted[:, :-2])
+        values.append(weighted[:, -2])
+        zeros.append(weighted[:, -1])
+        roots.append(root)
+        places += [place] * count
+    return Equations(
+        force=force,
+        names=tuple(names),
+        design=np.vstack(blocks),
+        values=np.concatenate(values),
+        zero=np.concatenate(zeros),
+        run_of_row=np.array(places, dtype=np.int64),
+        runs=tuple(runs),
+        unit=unit,
+        roots=tuple(roots),
+    )
+
+
+def axial_speed(motion: Motion) -> Vector:
+    """u = U cos(beta), (rows,), m/s."""
+    axial: Vector = np.sqrt(motion.speed_mps**2 - motion.v_mps**2)
+    return axial
+
+
+def rigid_body_force(campaign: Campaign, motion: Motion) -> Mapping[str, Vector]:
+    """What is added to a measured force (hydrodynamic sense) to leave the water's, N and N m: (3.1) of paper 2.
+
+    Zero if the campaign's forces have the inertia removed already.
+    """
+    if campaign.inertia_removed:
+        return {force: np.zeros(len(motion.time_s)) for force in "XYN"}
+    model = campaign.model
+    turning = bool(np.any(motion.rdot_radps2))
+    if turning and model.yaw_inertia_kgm2 is None:
+        remedy = "add the yaw inertia about midships of the body that the gauges carry"
+        raise InputError(campaign.path, "model.yaw_inertia_kgm2", "is missing, and there are yaw tests", remedy)
+    body = inertia(model.mass_kg, model.x_G_m, model.yaw_inertia_kgm2 or 0.0, dict.fromkeys(ACCELERATION_TERMS, 0.0))
+    # Paper 2 has u = U in its tests (2.2, 2.3).
+    u = motion.speed_mps if campaign.test.inertia_speed == "test" else axial_speed(motion)
+    surge, sway, yaw = inertial_forces(model.mass_kg, model.x_G_m, u, motion.v_mps, motion.r_radps)
+    return {
+        "X": -surge,
+        "Y": body.sway * motion.vdot_mps2 + body.sway_yaw * motion.rdot_radps2 - sway,
+        "N": body.yaw_sway * motion.vdot_mps2 + body.yaw * motion.rdot_radps2 - yaw,
+    }
+
+
+def _history(campaign: Campaign, motion: Motion, name: str) -> Vector:
+    """Force of a term whose prime value is 1, (rows,), N or N m."""
+    spelt, _, trend = name.partition(" ")
+    term = parse_term(spelt)
+    assert term is not None
+    model, u0 = campaign.model, campaign.test.speed_mps
+    scale = Scales(campaign.test.water_density_kgpm3, model.length_m, motion.speed_mps).derivative(term)
+    if term.acceleration:
+        history = scale * (motion.vdot_mps2 if term.acceleration == "v" else motion.rdot_radps2)
+    else:
+        change = axial_speed(motion) - u0 if term.u else 0.0
+        history = (
+            scale * motion.v_mps**term.v * motion.r_radps**term.r * motion.delta_rad**term.d * change**term.u
+        ) * np.ones(len(motion.time_s))
+    if trend:
+        history = history * (motion.frequency_radps * model.length_m / u0) ** 2
+    result: Vector = history
+    return result
+
+
+def excited(campaign: Campaign, runs: Sequence[ReducedRun], term: Term) -> bool:
+    """Whether some run moves in a way that the term acts on."""
+    u0, length = campaign.test.speed_mps, campaign.model.length_m
+    if term.acceleration == "u":
+        return False
+    if term.acceleration:
+        return any(
+            np.any(run.motion.vdot_mps2 if term.acceleration == "v" else run.motion.rdot_radps2)
+            and run.run.type == ("pure_sway" if term.acceleration == "v" else run.run.type)
+            for run in runs
+        )
+    if term.u and not speeds_differ(campaign, runs):
+        return False
+    powers = np.array([term.v, term.r, term.d, term.u])
+    motions = np.array([_largest_motions(run.motion, u0, length) for run in runs])
+    # The largest motions of one run count as simultaneous: a coarse bound is enough to see that nothing moves.
+    products, bound = np.prod(motions**powers, axis=1), np.prod(motions.max(axis=0) ** powers)
+    return bool(np.any(products > _ACTIVE * bound))
+
+
+def _largest_motions(motion: Motion, u0: float, length: float) -> list[float]:
+    """Of v', r', rudder, and of the change of speed U (that of u by the drift angle alone tells nothing of Du)."""
+    change = abs(motion.mean_speed_mps / u0 - 1)
+    histories = (motion.v_mps / u0, motion.r_radps * length / u0, motion.delta_rad)
+    return [*(float(np.max(np.abs(values))) for values in histories), change if change > SPEED_RANGE else 0.0]
+
+
+def speeds_differ(campaign: Campaign, runs: Sequence[ReducedRun]) -> bool:
+    """Whether the runs' speeds differ by more than :data:`SPEED_RANGE` of the test speed."""
+    speeds = [run.motion.mean_speed_mps for run in runs]
+    return max(speeds) - min(speeds) > SPEED_RANGE * campaign.test.speed_mps

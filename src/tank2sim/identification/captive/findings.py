@@ -1,0 +1,176 @@
+"""What a user should know of a reduction before using it: each finding is one sentence or two."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+
+import numpy as np
+
+from tank2sim.identification.captive.cautions import Oscillation, cautions_of_result, cautions_of_test
+from tank2sim.identification.captive.oscillation import cubic_findings
+from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
+from tank2sim.identification.captive.repeats import repeats
+
+_SHEET = 0.05
+_UNEXPLAINED = 2.0
+_ASYMMETRIC = 0.01
+_REPEATED_ENOUGH = 3
+
+
+def findings(reduction: Reduction) -> tuple[str, ...]:
+    """Everything to be told of a reduction, the gravest first."""
+    found = [
+        *(f"left out, for it is at fault: {fault}" for fault in reduction.faults),
+        *_left_out(reduction),
+        *reduction.campaign.remarks,
+        *_missing(reduction),
+        *_physics(reduction),
+        *_conventions(reduction),
+    ]
+    for force, result in reduction.forces.items():
+        found += _of_force(reduction, force, result)
+    found += cubic_findings(reduction.cubics)
+    found += _sheet(reduction)
+    found += _repeated(reduction)
+    return tuple(found)
+
+
+def _left_out(reduction: Reduction) -> Iterator[str]:
+    reasons: dict[str, list[str]] = defaultdict(list)
+    for name, reason in reduction.not_used.items():
+        reasons[reason.partition(" is ")[0]].append(name)
+    for what, names in reasons.items():
+        first = reduction.not_used[names[0]]
+        yield f"{len(names)} run{'s' * (len(names) > 1)} left out ({_listed(names)}): {first}."
+        if what == "its speed" and _constant_revolutions(reduction, names):
+            yield (
+                "The runs away from the test speed keep its revolutions, so that speed and propeller load change "
+                "together: no term in Du of hull or rudder alone can be had from them. --off-speed uses them, and its "
+                "terms in Du then hold at constant revolutions."
+            )
+    if reduction.options.off_speed:
+        revolutions = {run.run.propeller_radps for run in reduction.runs}
+        if len(revolutions) == 1 and None not in revolutions:
+            yield (
+                "Runs at other speeds keep the revolutions of the test speed: speed and propeller load change "
+                "together, and the terms in Du hold at constant revolutions."
+            )
+
+
+def _constant_revolutions(reduction: Reduction, names: list[str]) -> bool:
+    revolutions = {run.propeller_radps for run in reduction.campaign.runs if run.name in names}
+    return len(revolutions) == 1 and None not in revolutions and 0.0 not in revolutions
+
+
+def _missing(reduction: Reduction) -> Iterator[str]:
+    if reduction.missing:
+        yield f"The campaign does not give {', '.join(reduction.missing)}."
+    if reduction.campaign.model.yaw_inertia_kgm2 is None:
+        yield "[model] yaw_inertia_kgm2 is missing: the card has that of a radius of gyration of 0.25 L, an estimate."
+
+
+def _physics(reduction: Reduction) -> Iterator[str]:
+    campaign = reduction.campaign
+    runs = tuple(
+        Oscillation(row.run, "sway" if row.letter == "v" else "yaw", row.frequency_radps)
+        for row in reduction.oscillations
+    )
+    values = {name: derivative.value for name, derivative in reduction.derivatives.items()}
+    errors = {name: derivative.standard_error for name, derivative in reduction.derivatives.items()}
+    for caution in (*cautions_of_test(campaign, runs), *cautions_of_result(values, errors, campaign)):
+        yield f"{caution.message}{f' Runs: {_listed(caution.runs)}.' if caution.runs else ''}"
+
+
+def _conventions(reduction: Reduction) -> Iterator[str]:
+    campaign = reduction.campaign
+    if "X0" in reduction.derivatives and is_resistance(campaign):
+        found = reduction.derivatives["X0"]
+        yield (
+            f"X0 = {found.value:.4g} ± {found.standard_error:.2g} is the resistance at the test speed, of a model "
+            "towed without a propeller (no [test] propeller_rps). It is left out of the card, where the thrust at the "
+            "nominal revolutions balances it."
+        )
+    turning = any(run.run.type == "yaw_with_drift" for run in reduction.runs)
+    if turning and not campaign.inertia_removed and campaign.test.inertia_speed == "test":
+        prime = campaign.model.mass_kg / float(campaign.scales.mass)
+        yield (
+            "The carried body's m u r was taken with u = U, as in the paper (2.3). With u = U cos(beta) in the runs "
+            f"that yaw with drift Yvvr would come out lower by m'/2 = {prime / 2:.3g} and Nvvr by "
+            f'{prime * campaign.model.x_G_m / campaign.model.length_m / 2:.2g}: [test] inertia_speed = "axial".'
+        )
+
+
+def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator[str]:
+    for difference in result.disagreements:
+        yield (
+            f"{difference.name} is {difference.together:.4g} by the regression over the whole campaign and "
+            f"{difference.stepwise:.4g} in the paper's order, {abs(difference.ratio):.1f} standard errors apart: the "
+            "tests do not agree with each other within (3.8)."
+        )
+    for trend in result.trends:
+        if trend.used:
+            yield (
+                f"{trend.name} changes with the frequency, by {trend.slope:.3g} ± {trend.standard_error:.2g} times "
+                "(omega L/U)^2; its value is that extrapolated to zero frequency."
+            )
+    collinear = [choice.name for choice in result.selection.choices if choice.reason == "collinear"]
+    if collinear:
+        yield f"The campaign cannot tell {', '.join(collinear)} from other terms: they are left out."
+    odd = [row for row in result.left_out if row.unlikely]
+    for row in odd:
+        yield (
+            f"{row.run}: {force} does not fit the other runs (chance {row.chance:.1g}); without it {row.moved} would "
+            f"move by {row.influence:.1f} standard errors."
+        )
+    noise = result.selection.spread.noise
+    if noise > _UNEXPLAINED**2:
+        yield (
+            f"The harmonics of {force} scatter from run to run {np.sqrt(noise):.1f} times as much as the noise within "
+            "the runs explains, and the standard errors are as much wider: (3.8) does not follow them fully, or the "
+            "motion is not what was recorded."
+        )
+    test = result.asymmetry
+    if test is not None and test.names:
+        told = "does not hold" if test.chance < _ASYMMETRIC else "holds"
+        yield (
+            f"Symmetry of {force} to port and starboard {told} (chance {test.chance:.2g}; tested: "
+            f"{', '.join(test.names)})."
+        )
+
+
+def _sheet(reduction: Reduction) -> Iterator[str]:
+    """Frequencies and amplitudes of the sheet that are not those measured."""
+    for run in reduction.runs:
+        sheet, motion = run.run.sheet, run.motion
+        measured = (
+            ("frequency", "rad/s", sheet.frequency_radps, motion.frequency_radps),
+            (
+                "amplitude",
+                "m",
+                sheet.amplitude_m if run.run.type == "pure_sway" else None,
+                motion.amplitude(motion.v_mps) / (motion.frequency_radps or 1.0),
+            ),
+            ("yaw rate amplitude", "rad/s", sheet.yaw_rate_amplitude_radps, motion.amplitude(motion.r_radps)),
+        )
+        for what, unit, said, found in measured:
+            if said is not None and run.run.oscillates and abs(found / said - 1) > _SHEET:
+                yield f"{run.run.name}: its {what} is {found:.4g} {unit}, and {said:.4g} by the sheet; measured counts."
+
+
+def _repeated(reduction: Reduction) -> Iterator[str]:
+    found = repeats(reduction.campaign, reduction.runs)
+    if found is None or found.freedom < _REPEATED_ENOUGH:
+        return
+    for force, deviation in found.deviation.items():
+        zero = float(np.sqrt(reduction.forces[force].selection.spread.zero_variance))
+        if zero and not 1 / 3 < deviation / zero < 3:
+            yield (
+                f"Repeated runs differ in {force}' by {deviation:.2g}, and runs altogether from the fit by {zero:.2g}: "
+                "the standard errors rest on the latter."
+            )
+
+
+def _listed(names: list[str] | tuple[str, ...]) -> str:
+    few = 4
+    return ", ".join(names[:few]) + (f" and {len(names) - few} more" if len(names) > few else "")

@@ -1,0 +1,207 @@
+"""Every run reduced to a handful of numbers: mean, trend and harmonics of X, Y, N, with an honest covariance.
+
+Least squares over whole periods, with zero offset, linear drift of the zero and higher harmonics fitted, so that none
+of them leans on the first harmonic. A record sampled at 20 Hz is not 20 independent readings a second: the covariance
+takes the spectral density of the residuals near each harmonic's own frequency (for a harmonic regressor the
+autocorrelation enters by that density alone; Grenander & Rosenblatt 1957). The zero error that is common to a
+whole run cannot be seen inside it; :mod:`tank2sim.identification.captive.regression` finds it from run to run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import digamma, polygamma
+
+from tank2sim.identification.captive.motion import Motion, harmonic_basis, run_motion
+from tank2sim.identification.conditioning import Matrix, Vector
+from tank2sim.records.campaigns import FORCES, Run
+
+FORCE_HARMONICS = 5
+"""Harmonics of the forces that are fitted."""
+REGRESSED_HARMONICS = 3
+"""Harmonics that go into the derivatives: products of third order reach the third."""
+_WINDOW = 10
+"""Lines of the periodogram on each side of a frequency over which its density is averaged."""
+_FLOOR = 1e-6
+"""Least standard deviation of a record relative to its largest value: a computed record has no noise at all."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Fit:
+    """Harmonics of one force in one run.
+
+    Parameters
+    ----------
+    coefficients : array, (columns,)
+        In the order of :attr:`ReducedRun.labels`, N or N m, hydrodynamic sense, as measured.
+    covariance : array, (columns, columns)
+        Of noise within the run; the zero error of the run is not in it.
+    residual : array, (rows,)
+        Record less fit.
+    density : array, (columns,)
+        Variance of white noise that would disturb each coefficient as much.
+    freedom : array, (columns,)
+        Degrees of freedom of each density.
+    """
+
+    coefficients: Vector
+    covariance: Matrix
+    residual: Vector
+    density: Vector
+    freedom: Vector
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReducedRun:
+    """A run as a few numbers.
+
+    Parameters
+    ----------
+    run : Run
+        The record.
+    motion : Motion
+        Its smooth motion.
+    labels : tuple of str
+        ``mean``, ``cos 1``, ``sin 1``, ..., and last ``trend`` (by the time over half the record's length).
+    basis : array, (rows, columns)
+        What the force was fitted by.
+    fits : mapping
+        ``X``, ``Y``, ``N`` to its fit.
+    """
+
+    run: Run
+    motion: Motion
+    labels: tuple[str, ...]
+    basis: Matrix
+    fits: Mapping[str, Fit]
+
+    @property
+    def regressed(self) -> int:
+        """How many coefficients, from the first, go into the derivatives."""
+        return 1 + 2 * REGRESSED_HARMONICS if self.run.oscillates else 1
+
+    def projected(self, histories: Matrix) -> Matrix:
+        """The coefficients that given histories (rows, n) would have: (regressed, n); exactly linear."""
+        gram = self.basis.T @ self.basis
+        coefficients = np.linalg.solve(gram, self.basis.T @ histories)[: self.regressed]
+        return np.asarray(coefficients, dtype=np.float64)
+
+
+def reduced_run(run: Run) -> ReducedRun:
+    """A run as mean, harmonics and trend of its forces.
+
+    Raises
+    ------
+    InputError
+        As :func:`tank2sim.identification.captive.motion.run_motion`.
+    """
+    motion = run_motion(run)
+    rows = len(motion.time_s)
+    harmonics = FORCE_HARMONICS if run.oscillates else 0
+    columns = [harmonic_basis(motion.time_s, motion.frequency_radps, harmonics)]
+    labels = ["mean", *(f"{wave} {order}" for order in range(1, harmonics + 1) for wave in ("cos", "sin"))]
+    # Over a single period a trend is nearly a sine.
+    if rows > 2 and motion.periods != 1:
+        columns.append(np.linspace(-1.0, 1.0, rows)[:, None])
+        labels.append("trend")
+    basis = np.hstack(columns)
+    inverse = np.asarray(np.linalg.inv(basis.T @ basis), dtype=np.float64)
+    fits = {name: _fit(run.force(name)[motion.kept], basis, inverse, motion) for name in FORCES}
+    return ReducedRun(run=run, motion=motion, labels=tuple(labels), basis=basis, fits=fits)
+
+
+def _fit(values: Vector, basis: Matrix, inverse: Matrix, motion: Motion) -> Fit:
+    coefficients = inverse @ (basis.T @ values)
+    residual = values - basis @ coefficients
+    floor = (_FLOOR * float(np.max(np.abs(values))) + 1e-30) ** 2
+    density, freedom = _densities(residual, basis.shape[1], motion.periods)
+    density = np.maximum(density, floor)
+    root = np.sqrt(density)
+    return Fit(
+        coefficients=coefficients,
+        covariance=inverse * np.outer(root, root),
+        residual=residual,
+        density=density,
+        freedom=freedom,
+    )
+
+
+def moderated(runs: Sequence[ReducedRun]) -> tuple[ReducedRun, ...]:
+    """The runs with densities moderated by those of all runs.
+
+    A density averaged over a few lines is itself uncertain by a quarter. Each is drawn towards the campaign's usual one
+    as far as the runs differ by no more than chance (Smyth 2004, Statistical Applications in Genetics and Molecular
+    Biology 3); where they truly differ, they stay as they are.
+    """
+    result = list(runs)
+    records = [place for place, run in enumerate(runs) if not run.run.is_average]
+    if len(records) < 3:
+        return tuple(runs)
+    for force in FORCES:
+        fits = [runs[place].fits[force] for place in records]
+        usual, weight = _usual_density(
+            np.concatenate([f.density for f in fits]), np.concatenate([f.freedom for f in fits])
+        )
+        for place, fit in zip(records, fits, strict=True):
+            density = fit.density
+            if math.isinf(weight):
+                density = np.full(len(density), usual)
+            elif weight > 0:
+                density = (weight * usual + fit.freedom * fit.density) / (weight + fit.freedom)
+            ratio = np.sqrt(density / fit.density)
+            changed = replace(fit, density=density, covariance=fit.covariance * np.outer(ratio, ratio))
+            result[place] = replace(result[place], fits={**result[place].fits, force: changed})
+    return tuple(result)
+
+
+def _usual_density(density: Vector, freedom: Vector) -> tuple[float, float]:
+    """The campaign's usual density and its weight in degrees of freedom, from the scatter of the logarithms."""
+    half = freedom / 2
+    logs = np.log(density) - digamma(half) + np.log(half)
+    usual = float(np.mean(logs))
+    excess = float(np.var(logs, ddof=1) - np.mean(polygamma(1, half)))
+    if excess <= 0:
+        return math.exp(usual), math.inf
+    weight = _inverse_trigamma(excess)
+    return math.exp(usual + float(digamma(weight) - math.log(weight))), 2 * weight
+
+
+def _inverse_trigamma(value: float) -> float:
+    """x with trigamma(x) = value, by Newton's method on 1/trigamma, which is nearly straight (Smyth 2004)."""
+    x = 0.5 + 1.0 / value
+    for _ in range(20):
+        step = float(polygamma(1, x) * (1 - polygamma(1, x) / value) / polygamma(2, x))
+        x += step
+        if abs(step) < 1e-8 * x:
+            break
+    return x
+
+
+def _densities(residual: Vector, columns: int, periods: int) -> tuple[Vector, Vector]:
+    """Spectral density of the residual at the frequency of each column, (columns,), as a variance; and its degrees of
+    freedom."""
+    count = len(residual)
+    if count <= columns + 2:
+        freedom = max(1, count - columns)
+        return np.full(columns, float(residual @ residual) / freedom), np.full(columns, float(freedom))
+    power = np.abs(np.fft.rfft(residual)) ** 2 / count
+    # The fit has emptied the lines of its own harmonics, which over whole periods are lines of the periodogram.
+    fitted = np.zeros(len(power), dtype=bool)
+    fitted[0] = True
+    if periods:
+        fitted[periods : FORCE_HARMONICS * periods + 1 : periods] = True
+    lines = np.zeros(columns, dtype=int)
+    if periods:
+        harmonics = np.repeat(np.arange(1, FORCE_HARMONICS + 1), 2) * periods
+        lines[1 : 1 + len(harmonics)] = np.minimum(harmonics, len(power) - 1)
+    densities, freedoms = np.empty(columns), np.empty(columns)
+    for line in np.unique(lines):
+        window = slice(max(0, line - _WINDOW), max(line, _WINDOW) + _WINDOW + 1)
+        near = power[window][~fitted[window]]
+        near = near if near.size else power[~fitted]
+        densities[lines == line], freedoms[lines == line] = near.mean(), 2 * near.size
+    return densities, freedoms

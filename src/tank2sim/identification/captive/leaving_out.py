@@ -1,0 +1,101 @@
+"""Each run predicted from all the others: what a model is worth where it was not fitted, and which runs pull it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtrc
+
+from tank2sim.identification.captive.equations import Equations
+from tank2sim.identification.captive.regression import Spread, weighted_system
+from tank2sim.identification.conditioning import Matrix, Vector, column_norms
+
+_UNLIKELY = 1e-4
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeftOut:
+    """One run left out.
+
+    Parameters
+    ----------
+    run, type : str
+        Its name and type.
+    measured, predicted : float
+        The water's force, by 1/2 rho L^2 u0^2 (N: L^3): its mean in a steady run, its part in phase with the velocity
+        in an oscillating one; predicted from the derivatives of all other runs.
+    standard_error : float
+        Of the difference of the two.
+    chance : float
+        Probability of a misfit of all its coefficients as large as this or larger.
+    influence : float
+        The most that leaving it out moves a derivative, in standard errors.
+    moved : str
+        Which derivative that is.
+    """
+
+    run: str
+    type: str
+    measured: float
+    predicted: float
+    standard_error: float
+    chance: float
+    influence: float
+    moved: str
+
+    @property
+    def error(self) -> float:
+        """Predicted less measured."""
+        return self.predicted - self.measured
+
+    @property
+    def unlikely(self) -> bool:
+        """It does not belong with the others, but by a chance of one in ten thousand."""
+        return self.chance < _UNLIKELY
+
+
+def leave_one_out(equations: Equations, spread: Spread) -> tuple[LeftOut, ...]:
+    """Every run left out in turn, with the spread of the whole campaign.
+
+    One solve serves all: leaving a run out takes its share from the normal equations. A run without which a term
+    cannot be found is not told.
+    """
+    design, values = weighted_system(equations, spread)
+    norms = column_norms(design)
+    design = design / norms
+    normal, right = design.T @ design, design.T @ values
+    whole = np.linalg.pinv(normal)
+    estimate, errors = whole @ right, np.sqrt(np.diag(whole))
+    found = []
+    ends = [*equations.first_rows[1:], len(equations.values)]
+    for place, (start, end) in enumerate(zip(equations.first_rows, ends, strict=True)):
+        own, target = design[start:end], values[start:end]
+        rest = normal - own.T @ own
+        if np.linalg.cond(rest) > 1e10:
+            continue
+        inverse = np.linalg.inv(rest)
+        without = inverse @ (right - own.T @ target)
+        shift = np.abs(without - estimate) / np.maximum(errors, 1e-300)
+        most = int(np.argmax(shift))
+        misfit_covariance = np.eye(end - start) + own @ inverse @ own.T
+        root = spread.run_root(equations, place)
+        which = 1 if equations.runs[place].run.oscillates else 0
+        measured, predicted = (float((root @ part)[which]) for part in (target, own @ without))
+        found.append(
+            LeftOut(
+                run=equations.runs[place].run.name,
+                type=equations.runs[place].run.type,
+                measured=measured,
+                predicted=predicted,
+                standard_error=float(np.sqrt((root @ misfit_covariance @ root.T)[which, which])),
+                chance=_chance(target - own @ without, misfit_covariance),
+                influence=float(shift[most]),
+                moved=equations.names[most],
+            )
+        )
+    return tuple(found)
+
+
+def _chance(misfit: Vector, covariance: Matrix) -> float:
+    return float(chdtrc(len(misfit), misfit @ np.linalg.solve(covariance, misfit)))

@@ -1,0 +1,222 @@
+"""The motion of a captive run, from what was measured: its frequency, its whole periods, and smooth histories.
+
+Frequencies and amplitudes come from the record, never from the test sheet. Histories are mean and harmonics by least
+squares, so that accelerations are exact derivatives of what the mechanism did and noise of the motion sensors does not
+enter the products of (3.8).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.errors import InputError
+from tank2sim.identification.conditioning import Matrix, Vector
+from tank2sim.records.campaigns import Run
+
+MOTION_HARMONICS = 3
+"""Harmonics of the mechanism's motion that are kept."""
+_WHOLE = 0.02
+"""Share of a period by which a record may fall short of a whole number of them: rounding of its ends."""
+_FEWEST_PER_PERIOD = 16
+_ITERATIONS = 8
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Motion:
+    """Smooth motion of a run over whole periods; SI, radians, rudder to starboard.
+
+    Parameters
+    ----------
+    kept : slice
+        Rows of the record used.
+    time_s : array, (rows,)
+        Of those rows; in an oscillating run counted from a moment at which the leading velocity (v in pure sway, else
+        r) is greatest, so that it is cos(omega t) and its acceleration is -sin(omega t).
+    frequency_radps : float
+        omega; 0 in a steady run.
+    periods : int
+        Whole periods kept; 0 in a steady run.
+    v_mps, r_radps, speed_mps, delta_rad, vdot_mps2, rdot_radps2 : array, (rows,)
+        ``speed_mps`` is U through the water.
+    """
+
+    kept: slice
+    time_s: Vector
+    frequency_radps: float
+    periods: int
+    v_mps: Vector
+    r_radps: Vector
+    speed_mps: Vector
+    delta_rad: Vector
+    vdot_mps2: Vector
+    rdot_radps2: Vector
+
+    @property
+    def mean_speed_mps(self) -> float:
+        """Mean of U."""
+        return float(np.mean(self.speed_mps))
+
+    def amplitude(self, values: Vector) -> float:
+        """Half the range of a history."""
+        return 0.5 * float(np.ptp(values))
+
+
+def leading(run: Run) -> Vector:
+    """The velocity that a type of run is about: v in pure sway, r in yaw."""
+    return run.v_mps if run.type == "pure_sway" else run.r_radps
+
+
+def run_motion(run: Run) -> Motion:
+    """The motion of a run.
+
+    Raises
+    ------
+    InputError
+        It oscillates and has no oscillation, less than one whole period, or too few readings a period.
+    """
+    return _oscillating(run) if run.oscillates else _steady(run)
+
+
+def _steady(run: Run) -> Motion:
+    count = len(run.time_s)
+
+    def level(values: Vector) -> Vector:
+        return np.full(count, float(np.mean(values)))
+
+    return Motion(
+        kept=slice(0, count),
+        time_s=run.time_s,
+        frequency_radps=0.0,
+        periods=0,
+        v_mps=level(run.v_mps),
+        r_radps=level(run.r_radps),
+        speed_mps=level(run.speed_mps),
+        delta_rad=level(run.delta_rad),
+        vdot_mps2=np.zeros(count),
+        rdot_radps2=np.zeros(count),
+    )
+
+
+def _oscillating(run: Run) -> Motion:
+    if len(run.time_s) < _FEWEST_PER_PERIOD:
+        raise InputError(run.name, "", f"has {len(run.time_s)} readings only", "a whole period of them is needed")
+    if np.ptp(leading(run)) == 0.0:
+        name = "v_mps" if run.type == "pure_sway" else "r_radps"
+        raise InputError(run.name, f"column {name}", f"does not change, in a run of {run.type}", "mend its type")
+    frequency = measured_frequency(run)
+    kept, periods = _whole_periods(run, frequency)
+    time = run.time_s[kept]
+    if len(time) < _FEWEST_PER_PERIOD * periods:
+        problem = f"has {len(time) / periods:.3g} readings a period"
+        raise InputError(run.name, "", problem, f"sample it at least {_FEWEST_PER_PERIOD} times a period")
+    first = _fitted(leading(run)[kept], harmonic_basis(time, frequency, 1))
+    time = time - math.atan2(first[2], first[1]) / frequency
+    basis = harmonic_basis(time, frequency, MOTION_HARMONICS)
+    slope = _derivative_basis(basis, frequency)
+    v, r, speed, rudder = (
+        _fitted(values[kept], basis) for values in (run.v_mps, run.r_radps, run.speed_mps, run.delta_rad)
+    )
+    return Motion(
+        kept=kept,
+        time_s=time,
+        frequency_radps=frequency,
+        periods=periods,
+        v_mps=basis @ v,
+        r_radps=basis @ r,
+        speed_mps=basis @ speed,
+        delta_rad=basis @ rudder,
+        vdot_mps2=slope @ v,
+        rdot_radps2=slope @ r,
+    )
+
+
+def harmonic_basis(time: Vector, frequency: float, harmonics: int) -> Matrix:
+    """Columns 1, cos(wt), sin(wt), cos(2wt), ..., (rows, 1 + 2 harmonics)."""
+    angles = frequency * np.outer(time, np.arange(1, harmonics + 1))
+    basis = np.ones((len(time), 1 + 2 * harmonics))
+    basis[:, 1::2], basis[:, 2::2] = np.cos(angles), np.sin(angles)
+    return basis
+
+
+def _derivative_basis(basis: Matrix, frequency: float) -> Matrix:
+    """Time derivative of :func:`harmonic_basis`, column by column."""
+    slope = np.zeros_like(basis)
+    orders = frequency * np.arange(1, basis.shape[1] // 2 + 1)
+    slope[:, 1::2], slope[:, 2::2] = -orders * basis[:, 2::2], orders * basis[:, 1::2]
+    return slope
+
+
+def _fitted(values: Vector, basis: Matrix) -> Vector:
+    # Over whole periods the columns are nearly orthogonal: the normal equations lose nothing, and are fast.
+    solution: Vector = np.asarray(np.linalg.solve(basis.T @ basis, basis.T @ values), dtype=np.float64)
+    return solution
+
+
+def measured_frequency(run: Run) -> float:
+    """omega, rad/s, of an oscillating run: least squares of all its motion signals on harmonics of one frequency.
+
+    The highest line of the spectrum starts a Gauss-Newton iteration in which each signal counts by its
+    signal-to-noise ratio.
+    """
+    signals = _oscillating_signals(run)
+    frequency = _spectral_line(run.time_s, leading(run))
+    bin_width = 2 * math.pi / run.duration_s
+    for _ in range(_ITERATIONS):
+        centred = run.time_s - 0.5 * (run.time_s[0] + run.time_s[-1])
+        step = _frequency_step(centred, signals, frequency)
+        step = float(np.clip(step, -0.5 * bin_width, 0.5 * bin_width))
+        frequency = max(frequency + step, 0.1 * bin_width)
+        if abs(step) < 1e-12 * frequency:
+            break
+    return float(frequency)
+
+
+def _oscillating_signals(run: Run) -> list[Vector]:
+    signals = [leading(run)]
+    other = run.y_m if run.type == "pure_sway" else run.psi_rad
+    if other is not None and np.ptp(other) > 0:
+        signals.append(other)
+    return signals
+
+
+def _spectral_line(time: Vector, values: Vector) -> float:
+    """Frequency of the highest line of a signal's spectrum, padded so that lines lie close, rad/s."""
+    count = len(values)
+    padded = 4 * count
+    spectrum = np.abs(np.fft.rfft((values - float(np.mean(values))) * np.hanning(count), padded))
+    # below half a cycle in the record there is no oscillation to find
+    spectrum[: max(2, padded // (2 * count))] = 0.0
+    step = (time[-1] - time[0]) / (count - 1)
+    return float(2 * math.pi * int(np.argmax(spectrum)) / (padded * step))
+
+
+def _frequency_step(time: Vector, signals: Sequence[Vector], frequency: float) -> float:
+    """Gauss-Newton step of the frequency."""
+    basis = harmonic_basis(time, frequency, MOTION_HARMONICS)
+    normal = np.asarray(np.linalg.pinv(basis.T @ basis), dtype=np.float64)
+    total = weight = 0.0
+    for values in signals:
+        coefficients = normal @ (basis.T @ values)
+        residual = values - basis @ coefficients
+        slope = time * (_derivative_basis(basis, 1.0) @ coefficients)
+        slope = slope - basis @ (normal @ (basis.T @ slope))
+        noise = float(residual @ residual) / len(values) + 1e-24 * float(values @ values) + 1e-300
+        total += float(slope @ residual) / noise
+        weight += float(slope @ slope) / noise
+    return total / weight if weight > 0 else 0.0
+
+
+def _whole_periods(run: Run, frequency: float) -> tuple[slice, int]:
+    """The last rows of the record that span a whole number of periods, and how many periods."""
+    period = 2 * math.pi / frequency
+    periods = math.floor(run.duration_s / period + _WHOLE)
+    if periods < 1:
+        problem = f"has {run.duration_s / period:.2f} of a period ({period:.4g} s)"
+        raise InputError(run.name, "", problem, "one whole period at least is needed")
+    count = len(run.time_s)
+    rows = min(count, round(periods * period * count / run.duration_s))
+    return slice(count - rows, count), periods

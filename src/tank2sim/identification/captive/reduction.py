@@ -1,0 +1,278 @@
+"""A captive campaign to hydrodynamic derivatives with uncertainty: the whole way.
+
+Every run is reduced to mean and harmonics; two ways lead on to the derivatives of (3.8): one weighted regression over
+the whole campaign, whose numbers are the result, and beside it the paper's order, from the simplest tests to the more
+complex. The numbers are prime, instantaneous, "hydrodynamic", starboard-positive, expanded at the test speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tank2sim.errors import InputError
+from tank2sim.identification.captive.equations import SPEED_RANGE
+from tank2sim.identification.captive.faults import record_faults, reduced_faults
+from tank2sim.identification.captive.harmonics import ReducedRun, moderated, reduced_run
+from tank2sim.identification.captive.leaving_out import LeftOut, leave_one_out
+from tank2sim.identification.captive.order import (
+    Disagreement,
+    Stepwise,
+    disagreements,
+    scatter_within_tests,
+    stepwise,
+)
+from tank2sim.identification.captive.oscillation import (
+    Cubic,
+    Oscillation,
+    cubics,
+    frequency_parameter,
+    oscillations,
+)
+from tank2sim.identification.captive.regression import Solution, solve
+from tank2sim.identification.captive.selection import Selection, select
+from tank2sim.identification.captive.symmetry import Asymmetry, asymmetry
+from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER
+from tank2sim.identification.captive.trends import Trend, trends
+from tank2sim.identification.captive.type_b import type_b_errors
+from tank2sim.records.campaigns import FORCES, Campaign, together
+
+DISAGREEMENT_LIMIT = 3.5
+"""Standard errors by which the two ways may differ before it is told."""
+ESSENTIAL = ("Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot", "Yv", "Nv", "Yr", "Nr", "Yd", "Nd")
+"""Derivatives without which no manoeuvre can be simulated rightly."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What the user asks for.
+
+    Parameters
+    ----------
+    keep_going : bool
+        Leave out runs at fault instead of refusing the campaign.
+    keep_fast : bool
+        Use runs with omega U/g of 0.1 and more, too.
+    off_speed : bool
+        Use runs away from the test speed, too, and find terms in Du.
+    all_terms : bool
+        Keep terms that are not significant.
+    test_symmetry : bool
+        Test terms of the other parity, which (3.8) leaves out.
+    """
+
+    keep_going: bool = False
+    keep_fast: bool = False
+    off_speed: bool = False
+    all_terms: bool = False
+    test_symmetry: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Derivative:
+    """One derivative found (prime).
+
+    Parameters
+    ----------
+    value, standard_error : float
+        ``standard_error`` joins both types.
+    type_a : float
+        Standard error from the scatter of the campaign.
+    type_b : mapping
+        Source to standard error from what was stated of the campaign.
+    found_in : tuple of str
+        Types of run on which it rests most, told by the paper's order; empty if that does not give it.
+    """
+
+    value: float
+    standard_error: float
+    type_a: float
+    type_b: Mapping[str, float] = field(default_factory=dict)
+    found_in: str = ""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ForceResult:
+    """What a campaign tells of one force.
+
+    Parameters
+    ----------
+    selection : Selection
+        Chosen terms and equations; its ``choices`` tell every candidate's fate.
+    solution : Solution
+        The weighted regression over the whole campaign (Type A errors).
+    stepwise : Stepwise
+        The paper's order.
+    disagreements : tuple
+        Where the two differ.
+    trends : tuple
+        Trends with frequency, and values extrapolated to zero frequency.
+    left_out : tuple
+        Each run predicted from all the others.
+    asymmetry : Asymmetry or None
+        The test of the other parity, if asked for.
+    """
+
+    selection: Selection
+    solution: Solution
+    stepwise: Stepwise
+    disagreements: tuple[Disagreement, ...]
+    trends: tuple[Trend, ...]
+    left_out: tuple[LeftOut, ...]
+    asymmetry: Asymmetry | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Reduction:
+    """A campaign reduced.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        As read.
+    options : Options
+        As asked.
+    runs : tuple of ReducedRun
+        Those that were used.
+    not_used : mapping
+        Name of a run to why it was left out.
+    faults : tuple of InputError
+        Runs at fault, left out because that was asked for.
+    forces : mapping
+        ``X``, ``Y``, ``N`` to its result.
+    derivatives : mapping
+        Name to number; the card's.
+    oscillations, cubics
+        Oscillation tests by themselves.
+    missing : tuple of str
+        Those of :data:`ESSENTIAL` that the campaign does not give.
+    """
+
+    campaign: Campaign
+    options: Options
+    runs: tuple[ReducedRun, ...]
+    not_used: Mapping[str, str]
+    faults: tuple[InputError, ...]
+    forces: Mapping[str, ForceResult]
+    derivatives: Mapping[str, Derivative]
+    oscillations: tuple[Oscillation, ...]
+    cubics: tuple[Cubic, ...]
+    missing: tuple[str, ...]
+
+
+def reduce_campaign(campaign: Campaign, options: Options | None = None) -> Reduction:
+    """Derivatives from a campaign.
+
+    Raises
+    ------
+    InputError
+        Runs are at fault and `keep_going` is not asked for (all are told); no run is left; or a key that the runs need
+        is missing.
+    """
+    options = options or Options()
+    runs, faults = _sound_runs(campaign)
+    if faults and not options.keep_going:
+        raise together(faults)
+    used, not_used = _used_runs(campaign, moderated(runs), options)
+    if not used:
+        problem = "no run can be used"
+        told = faults[0] if faults else next(iter(not_used.items()), "")
+        raise InputError(campaign.path, "runs", problem, f"the first was left out: {told}")
+    forces = {force: _force_result(campaign, used, force, options) for force in FORCES}
+    derivatives = {name: found for force in FORCES for name, found in _derivatives(campaign, forces[force]).items()}
+    alone = oscillations(campaign, runs)
+    return Reduction(
+        campaign=campaign,
+        options=options,
+        runs=tuple(used),
+        not_used=not_used,
+        faults=(*campaign.faults, *faults),
+        forces=forces,
+        derivatives=derivatives,
+        oscillations=alone,
+        cubics=cubics([row for row in alone if row.run not in not_used]),
+        missing=tuple(name for name in ESSENTIAL if name not in derivatives),
+    )
+
+
+def _sound_runs(campaign: Campaign) -> tuple[list[ReducedRun], list[InputError]]:
+    runs: list[ReducedRun] = []
+    faults: list[InputError] = []
+    for run in campaign.runs:
+        found = list(record_faults(campaign, run))
+        if not found:
+            try:
+                reduced = reduced_run(run)
+                found = list(reduced_faults(reduced))
+            except InputError as fault:
+                found = [fault]
+        if found:
+            faults.append(found[0])
+        else:
+            runs.append(reduced)
+    return runs, faults
+
+
+def _used_runs(
+    campaign: Campaign, runs: Sequence[ReducedRun], options: Options
+) -> tuple[list[ReducedRun], dict[str, str]]:
+    used: list[ReducedRun] = []
+    not_used: dict[str, str] = {}
+    for run in runs:
+        speed, fast = run.motion.mean_speed_mps, frequency_parameter(campaign, run)
+        if fast >= LARGEST_FREQUENCY_PARAMETER and not options.keep_fast:
+            not_used[run.run.name] = (
+                f"omega U/g is {fast:.3g}, and coefficients fall steeply from {LARGEST_FREQUENCY_PARAMETER:g} on"
+            )
+        elif abs(speed / campaign.test.speed_mps - 1) > SPEED_RANGE and not options.off_speed:
+            not_used[run.run.name] = f"its speed is {speed:.4g} m/s, and the test speed {campaign.test.speed_mps:.4g}"
+        else:
+            used.append(run)
+    return used, not_used
+
+
+def _force_result(campaign: Campaign, runs: Sequence[ReducedRun], force: str, options: Options) -> ForceResult:
+    selection = select(campaign, runs, force, all_terms=options.all_terms)
+    selection, found = trends(campaign, selection)
+    solution = selection.solution
+    within = scatter_within_tests(selection.equations)
+    steps = stepwise(selection.equations, within, campaign.test.speed_mps)
+    together = solve(selection.equations, within)
+    return ForceResult(
+        selection=selection,
+        solution=solution,
+        stepwise=steps,
+        # With terms in Du the steps at the test speed, which lack them, are no second way to the same numbers: Du acts
+        # by u = U cos(beta) in their drift tests, too.
+        disagreements=()
+        if options.off_speed
+        else disagreements(steps, together, selection.reported, DISAGREEMENT_LIMIT),
+        trends=found,
+        left_out=leave_one_out(selection.equations, selection.spread),
+        asymmetry=asymmetry(campaign, selection) if options.test_symmetry else None,
+    )
+
+
+def _derivatives(campaign: Campaign, result: ForceResult) -> dict[str, Derivative]:
+    solution, steps = result.solution, result.stepwise
+    sources = type_b_errors(campaign, result.selection.equations, solution)
+    found = {}
+    for name, value, error in zip(solution.names, solution.values, solution.standard_errors, strict=True):
+        if name not in result.selection.reported or " " in name:
+            continue  # not shown, or a trend with frequency, which is no derivative
+        type_b = {source: errors[name] for source, errors in sources.items()}
+        found[name] = Derivative(
+            value=float(value),
+            standard_error=float(np.sqrt(error**2 + sum(size**2 for size in type_b.values()))),
+            type_a=float(error),
+            type_b=type_b,
+            found_in=steps.found_in[steps.names.index(name)] if name in steps.names else "",
+        )
+    return found
+
+
+def is_resistance(campaign: Campaign) -> bool:
+    """Whether X0 is the resistance of a model without a working propeller, which no card of a ship has."""
+    return not any(run.propeller_radps for run in campaign.runs)

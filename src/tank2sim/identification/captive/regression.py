@@ -1,0 +1,210 @@
+"""Generalised least squares over a campaign, with the zero error that every run has of its own.
+
+The covariance of a run's coefficients is ``noise`` times its within-run covariance plus ``zero_variance`` for its
+mean. Both factors are found by restricted maximum likelihood over the campaign (REML; Patterson & Thompson 1971), so
+that the scatter from run to run, not only that within a run, tells how well a derivative is known.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import chdtrc
+
+from tank2sim.identification.captive.equations import Equations
+from tank2sim.identification.conditioning import Matrix, Vector, column_norms, scaled_condition
+
+_LEAST, _MOST = 1e-3, 1e4
+"""Range of the factor on the within-run covariance."""
+_FEWEST_RUNS = 8
+_CLEARLY = 0.05
+"""Chance of so much higher a likelihood if all types of run scatter alike, below which each gets its own variance."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How the runs of a campaign scatter.
+
+    Parameters
+    ----------
+    noise : float
+        Factor on the within-run covariances; 1 if they are all there is.
+    zero_variance : float
+        Variance of the zero error from run to run, in ``Equations.unit`` squared.
+    by_type : mapping
+        Type of run to its own such variance, where the types differ; what (3.8) does not follow is in it.
+    """
+
+    noise: float
+    zero_variance: float
+    by_type: Mapping[str, float] = field(default_factory=dict)
+
+    def zeros(self, equations: Equations) -> Vector:
+        """Variance of the zero error of each run, (runs,)."""
+        return np.array([self.by_type.get(run.run.type, self.zero_variance) for run in equations.runs])
+
+    def weighted(self, equations: Equations, columns: Matrix) -> Matrix:
+        """Columns (rows, n) multiplied by an inverse root of the covariance of the equations."""
+        zero, size = equations.zero, equations.zero_sizes
+        share = 1.0 - np.sqrt(self.noise / (self.noise + self.zeros(equations) * size))
+        along = equations.run_sums(zero[:, None] * columns) * (share / size)[:, None]
+        result: Matrix = (columns - zero[:, None] * along[equations.run_of_row]) / math.sqrt(self.noise)
+        return result
+
+    def run_root(self, equations: Equations, place: int) -> Matrix:
+        """A root of the covariance of one run's coefficients, in ``Equations.unit``."""
+        start, size = int(equations.first_rows[place]), len(equations.roots[place])
+        zero, length = equations.zero[start : start + size], float(equations.zero_sizes[place])
+        along = math.sqrt(1.0 + float(self.zeros(equations)[place]) * length / self.noise) - 1.0
+        symmetric = math.sqrt(self.noise) * (np.eye(size) + np.outer(zero, zero) * along / length)
+        root: Matrix = equations.roots[place] @ symmetric
+        return root
+
+    def log_determinant(self, equations: Equations) -> float:
+        """Of the covariance of the weighted equations."""
+        rows, runs = len(equations.values), len(equations.runs)
+        each = np.log(self.noise + self.zeros(equations) * equations.zero_sizes)
+        return (rows - runs) * math.log(self.noise) + float(np.sum(each))
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Derivatives of one force from a set of equations.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the terms.
+    values : array, (terms,)
+        Prime.
+    covariance : array, (terms, terms)
+        Of the values.
+    spread : Spread
+        With which they were weighted.
+    condition : float
+        Scaled condition number of the weighted design.
+    inflation : array, (terms,)
+        Variance inflation factors: by how much the variance of a term is greater than if no other were there.
+    """
+
+    names: tuple[str, ...]
+    values: Vector
+    covariance: Matrix
+    spread: Spread
+    condition: float
+    inflation: Vector
+
+    @property
+    def standard_errors(self) -> Vector:
+        """(terms,)."""
+        errors: Vector = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        return errors
+
+    @property
+    def ratios(self) -> Vector:
+        """Value over standard error, (terms,)."""
+        ratios: Vector = self.values / np.maximum(self.standard_errors, 1e-300)
+        return ratios
+
+    def value(self, name: str) -> float:
+        """Of one term; 0 if it is not among them."""
+        return float(self.values[self.names.index(name)]) if name in self.names else 0.0
+
+    def error(self, name: str) -> float:
+        """Standard error of one term."""
+        return float(self.standard_errors[self.names.index(name)])
+
+
+def solve(equations: Equations, spread: Spread) -> Solution:
+    """Weighted least squares by QR with a known spread."""
+    design, values = weighted_system(equations, spread)
+    if not equations.names:
+        return Solution((), np.zeros(0), np.zeros((0, 0)), spread, 1.0, np.zeros(0))
+    norms = column_norms(design)
+    q, r = np.linalg.qr(design / norms)
+    inverse = np.linalg.pinv(r)
+    estimate = inverse @ (q.T @ values) / norms
+    spreading = inverse @ inverse.T
+    return Solution(
+        names=equations.names,
+        values=estimate,
+        covariance=spreading / np.outer(norms, norms),
+        spread=spread,
+        condition=scaled_condition(design),
+        inflation=np.diag(spreading).copy(),
+    )
+
+
+def weighted_system(equations: Equations, spread: Spread) -> tuple[Matrix, Vector]:
+    """Design and right-hand side of unit variance, the rows of the prior last."""
+    weighted = spread.weighted(equations, np.column_stack([equations.design, equations.values]))
+    prior = equations.prior_rows
+    return np.vstack([weighted[:, :-1], prior]), np.concatenate([weighted[:, -1], np.zeros(len(prior))])
+
+
+def fitted_spread(equations: Equations, *, by_type: bool = True) -> Spread:
+    """The spread that restricted maximum likelihood finds for these terms.
+
+    One zero variance serves all types of run, unless the likelihood speaks clearly for one each: the tests at large
+    angles, say, do not follow (3.8). Where every run is a single reading (averages, steady runs alone) the two factors
+    cannot be told apart, and the noise within a run is taken as it is.
+    """
+    single = len(equations.values) == len(equations.runs)
+    common, least = _best(equations, {"": _starting_zero(equations)}, single)
+    if not by_type:
+        return common
+    counts = Counter[str](run.run.type for run in equations.runs)
+    types = [kind for kind, count in counts.items() if count >= _FEWEST_RUNS]
+    if len(types) < 2:
+        return common
+    # Each type by itself is the start: a common one is a likely spread, too, from which no way leads downhill.
+    alone = {
+        kind: _starting_zero(equations.of_runs([n for n, run in enumerate(equations.runs) if run.run.type == kind]))
+        for kind in types
+    }
+    own, lower = _best(equations, alone, single)
+    return own if chdtrc(len(types) - 1, max(least - lower, 0.0)) < _CLEARLY else common
+
+
+def _best(equations: Equations, start: Mapping[str, float], single: bool) -> tuple[Spread, float]:
+    """The likeliest spread with a zero variance for each type of run in `start` (one type, "": all), and -2 log of
+    its likelihood."""
+
+    def spread(logs: Vector) -> Spread:
+        variances = {kind: value * math.exp(log) for (kind, value), log in zip(start.items(), logs[1:], strict=True)}
+        usual = math.exp(sum(math.log(value) for value in variances.values()) / len(variances))
+        return Spread(1.0 if single else math.exp(logs[0]), usual, {} if "" in variances else variances)
+
+    bounds = [(math.log(_LEAST), math.log(_MOST))] + [(-25.0, 25.0)] * len(start)
+    found = minimize(
+        lambda logs: _criterion(equations, spread(logs)),
+        np.zeros(len(bounds)),
+        method="L-BFGS-B",
+        bounds=bounds,
+        options={"eps": 1e-4},
+    )
+    return spread(found.x), float(found.fun)
+
+
+def _criterion(equations: Equations, spread: Spread) -> float:
+    """-2 log of the restricted likelihood."""
+    design, values = weighted_system(equations, spread)
+    norms = column_norms(design)
+    q, r = np.linalg.qr(design / norms)
+    residual = values - q @ (q.T @ values)
+    information = 2 * float(np.sum(np.log(np.abs(np.diag(r)) * norms + 1e-300)))
+    return spread.log_determinant(equations) + information + float(residual @ residual)
+
+
+def _starting_zero(equations: Equations) -> float:
+    """Mean square misfit of the runs' means in an ordinary fit."""
+    means = equations.first_rows
+    roots = np.array([root[0, 0] for root in equations.roots])
+    design, values = equations.design[means] * roots[:, None], equations.values[means] * roots
+    residual = values - design @ np.linalg.lstsq(design, values, rcond=None)[0]
+    return float(max(float(residual @ residual) / max(1, len(residual) - design.shape[1] // 2), 1e-24))

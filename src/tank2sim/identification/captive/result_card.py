@@ -1,0 +1,207 @@
+"""The ship card of a reduction: what was measured, what was filled in from published estimates, at which scale."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from tank2sim.cards.writing import DerivativeEntry, ManoeuvringResult, manoeuvring_card_text
+from tank2sim.dynamics.abkowitz import ALL_TERMS
+from tank2sim.errors import InputError
+from tank2sim.identification.captive.reduction import ESSENTIAL, Reduction, is_resistance
+from tank2sim.identification.captive.tank_conditions import FroudeScaling
+from tank2sim.identification.estimates import CLARKE, ESTIMATED, GYRATION, RELATIVE_ERROR, Particulars, estimate
+from tank2sim.records.campaign_form import FullScaleSection
+from tank2sim.records.campaigns import Campaign
+
+FILLS: Mapping[str, str] = {"clarke1983": CLARKE}
+"""Name of a published estimate to its source."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contents:
+    """What the card says.
+
+    Parameters
+    ----------
+    entries : mapping
+        Name to value, standard error (prime) and how it was found, in the canonical order.
+    estimated : tuple of str
+        Those that are estimates.
+    missing : tuple of str
+        Essential ones that are neither measured nor estimated.
+    mass, yaw_inertia, x_G : float
+        Prime.
+    inertia_source : str
+        Where the yaw inertia is from.
+    """
+
+    entries: Mapping[str, DerivativeEntry]
+    estimated: tuple[str, ...]
+    missing: tuple[str, ...]
+    mass: float
+    yaw_inertia: float
+    x_G: float
+    inertia_source: str
+
+
+def contents(reduction: Reduction, fill: str | None = None) -> Contents:
+    """What a card of a reduction has.
+
+    Parameters
+    ----------
+    fill : str, optional
+        Key of :data:`FILLS`: the source of what the campaign cannot give.
+
+    Raises
+    ------
+    InputError
+        The estimate needs beam and draught and the campaign does not give them.
+    """
+    campaign = reduction.campaign
+    model, scales = campaign.model, campaign.scales
+    found = {
+        name: DerivativeEntry(derivative.value, derivative.standard_error, _how(reduction, name))
+        for name, derivative in reduction.derivatives.items()
+        if not (name == "X0" and is_resistance(campaign))
+    }
+    estimates = {}
+    if fill is not None:
+        lacking = [name for name in ESSENTIAL if name not in found and name in ESTIMATED]
+        estimates = {
+            name: DerivativeEntry(number.value, number.standard_error, f"ESTIMATED: {number.source}")
+            for name, number in estimate(_particulars(campaign), lacking).items()
+        }
+        estimates |= _constant_thrust(reduction, found)
+    entries = found | estimates
+    inertia, source = _yaw_inertia(campaign)
+    return Contents(
+        entries={name: _in_card_figures(entries[name]) for name in ALL_TERMS if name in entries},
+        estimated=tuple(estimates),
+        missing=tuple(name for name in ESSENTIAL if name not in entries),
+        mass=model.mass_kg / float(scales.mass),
+        yaw_inertia=inertia / float(scales.inertia),
+        x_G=model.x_G_m / model.length_m,
+        inertia_source=source,
+    )
+
+
+def _in_card_figures(entry: DerivativeEntry) -> DerivativeEntry:
+    """Figures as the card has them, so that card and JSON agree to the last."""
+    return DerivativeEntry(float(f"{entry.value:.7g}"), float(f"{entry.standard_error:.3g}"), entry.how)
+
+
+def _how(reduction: Reduction, name: str) -> str:
+    """In a few words: from what a derivative was found, and what the paper's order gives."""
+    result = reduction.forces[name[0]]
+    steps = result.stepwise
+    if any(trend.name == name and trend.used for trend in result.trends):
+        return "measured, extrapolated to zero frequency"
+    if name not in steps.names:
+        return "measured, all runs together"
+    place = steps.names.index(name)
+    return f"measured; in the paper's order {steps.values[place]:.4g}, from {steps.found_in[place]}"
+
+
+def _constant_thrust(reduction: Reduction, found: Mapping[str, DerivativeEntry]) -> dict[str, DerivativeEntry]:
+    """Xu and Xuu of a ship whose thrust stays what balances the measured resistance, while that goes as U^2.
+
+    X = R0 (U/u0)^2 - R0 over 1/2 rho L^2 U^2 is X0' (1 - (u0/U)^2), X0' the measured resistance (negative), and with
+    u0/U = 1 - Du' it is X0' (2 Du' - Du'^2). Thrust grows as a ship slows, so that this is a cautious estimate.
+    """
+    if not is_resistance(reduction.campaign) or "X0" not in reduction.derivatives or "Xu" in found:
+        return {}
+    resistance = reduction.derivatives["X0"].value
+    how = "ESTIMATED: constant thrust against the measured resistance, which goes as U^2"
+    return {
+        "Xu": DerivativeEntry(2 * resistance, RELATIVE_ERROR * abs(2 * resistance), how),
+        "Xuu": DerivativeEntry(-resistance, RELATIVE_ERROR * abs(resistance), how),
+    }
+
+
+def _particulars(campaign: Campaign) -> Particulars:
+    model = campaign.model
+    if model.beam_m is None or model.draught_m is None:
+        key = "beam_m" if model.beam_m is None else "draught_m"
+        raise InputError(campaign.path, f"model.{key}", "is missing, and estimates need it", "add it")
+    return Particulars(
+        length_m=model.length_m,
+        beam_m=model.beam_m,
+        draught_m=model.draught_m,
+        density_kgpm3=campaign.test.water_density_kgpm3,
+        mass_kg=model.mass_kg,
+        block_coefficient=model.block_coefficient,
+        x_G_m=model.x_G_m,
+    )
+
+
+def _yaw_inertia(campaign: Campaign) -> tuple[float, str]:
+    model = campaign.model
+    if model.yaw_inertia_kgm2 is not None:
+        return model.yaw_inertia_kgm2, "campaign"
+    return model.mass_kg * ((0.25 * model.length_m) ** 2 + model.x_G_m**2), f"ESTIMATED: {GYRATION}"
+
+
+def card_text(reduction: Reduction, card: Contents, scale: float = 1.0) -> str:
+    """The card's text at model scale, or Froude-scaled to a ship `scale` times as long.
+
+    Prime numbers hold at every scale; length and speed follow lambda and lambda^0.5 (paper 2, section 5).
+    """
+    campaign = reduction.campaign
+    model, test = campaign.model, campaign.test
+    water = campaign.full_scale or FullScaleSection()
+    density = water.water_density_kgpm3 if scale != 1.0 else test.water_density_kgpm3
+    ratio = FroudeScaling(scale, density / test.water_density_kgpm3)
+    particulars: dict[str, float | str] = {"name": model.name, "length_m": model.length_m * scale}
+    for key in ("beam_m", "draught_m", "propeller_diameter_m"):
+        if (size := getattr(model, key)) is not None:
+            particulars[key] = size * scale
+    particulars["displacement_kg"] = model.mass_kg * ratio.force
+    if model.block_coefficient is not None:
+        particulars["block_coefficient"] = model.block_coefficient
+    if model.rudder_area_m2 is not None:
+        particulars["rudder_area_m2"] = model.rudder_area_m2 * scale**2
+    environment = {
+        "water_density_kgpm3": density,
+        "gravity_mps2": water.gravity_mps2 if scale != 1.0 else test.gravity_mps2,
+    }
+    viscosity = water.kinematic_viscosity_m2ps if scale != 1.0 else test.kinematic_viscosity_m2ps
+    if viscosity is not None:
+        environment["kinematic_viscosity_m2ps"] = viscosity
+    speed = test.speed_mps * math.sqrt(scale * environment["gravity_mps2"] / test.gravity_mps2)
+    return manoeuvring_card_text(
+        ManoeuvringResult(
+            particulars=_in_figures(particulars),
+            source=f"tank2sim reduce {campaign.path.parent.name}/{campaign.path.name}",
+            notes=_notes(reduction, card, scale),
+            environment=environment,
+            speed_mps=float(f"{speed:.6g}"),
+            rigid_body={"mass": card.mass, "yaw_inertia": card.yaw_inertia, "x_G": card.x_G},
+            inertia_source=card.inertia_source,
+            derivatives=card.entries,
+        )
+    )
+
+
+def _in_figures(particulars: Mapping[str, float | str]) -> dict[str, float | str]:
+    return {key: value if isinstance(value, str) else float(f"{value:.6g}") for key, value in particulars.items()}
+
+
+def _notes(reduction: Reduction, card: Contents, scale: float) -> str:
+    told = [f"From {len(reduction.runs)} captive runs."]
+    if card.estimated:
+        told.append(f"Estimated, not measured: {', '.join(card.estimated)}.")
+    if card.missing:
+        told.append(f"Neither measured nor estimated, and zero here: {', '.join(card.missing)}.")
+    if scale != 1.0:
+        told.append(f"Froude-scaled from the model by {scale:g}; no correction for the Reynolds number was made.")
+    return " ".join(told)
+
+
+def reynolds_ratio(campaign: Campaign, scale: float) -> float:
+    """Reynolds number of the ship over that of the model: lambda^1.5 over the ratio of viscosities, where given."""
+    model_water = campaign.test.kinematic_viscosity_m2ps
+    if model_water is None or campaign.full_scale is None:
+        return FroudeScaling(scale).reynolds
+    return FroudeScaling(scale, viscosity=campaign.full_scale.kinematic_viscosity_m2ps / model_water).reynolds

@@ -1,0 +1,175 @@
+"""Which terms of (3.8) a campaign can give: every term left out is told, with the reason.
+
+Every term that the campaign excites and can tell from the others is in the regression, third-order terms held loosely
+about zero (:mod:`tank2sim.identification.captive.prior`). Reported are always the linear terms, the acceleration
+derivatives and X0, and of the others those that the campaign shows: |value| of at least 2.6 standard errors. A term
+that is not reported keeps its part in the standard errors of the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import stdtrit
+
+from tank2sim.cards.terms import Term, parse_term
+from tank2sim.identification.captive.equations import Equations, candidate_terms, equations, excited
+from tank2sim.identification.captive.harmonics import ReducedRun
+from tank2sim.identification.captive.prior import with_prior
+from tank2sim.identification.captive.regression import Solution, Spread, fitted_spread, solve
+from tank2sim.identification.conditioning import COLLINEAR, scaled_condition
+from tank2sim.records.campaigns import Campaign
+
+SIGNIFICANT = 2.6
+"""Least ratio of a value to its standard error for a term beyond the linear ones (1 % level)."""
+
+_NORMAL = 1.959964
+"""Standard errors of a two-sided 95 % interval of the normal distribution."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What became of one candidate term.
+
+    Parameters
+    ----------
+    name : str
+        The term.
+    kept : bool
+        It is reported.
+    reason : str
+        ``linear``, ``significant``, ``asked for``, ``not excited``, ``collinear``, ``not significant``, ``symmetry``.
+    told : str
+        The reason in a sentence, with its figures.
+    inflation, ratio : float or None
+        Variance inflation factor, and value over standard error, when it was decided.
+    """
+
+    name: str
+    kept: bool
+    reason: str
+    told: str
+    inflation: float | None = None
+    ratio: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The regression over the whole campaign: equations of all terms that it can tell apart, and each candidate's fate.
+
+    Of the terms in the regression those that are not significant have ``kept`` false: they are not reported.
+    """
+
+    equations: Equations
+    spread: Spread
+    choices: tuple[Choice, ...]
+
+    @property
+    def reported(self) -> tuple[str, ...]:
+        """Terms of the result."""
+        return tuple(choice.name for choice in self.choices if choice.kept)
+
+    @property
+    def solution(self) -> Solution:
+        """All terms of the regression, its errors widened by Student's t over the normal quantile.
+
+        So 1.96 standard errors are a 95 % interval, although the scatter was itself estimated, from as many degrees of
+        freedom as there are runs more than free terms.
+        """
+        solution = solve(self.equations, self.spread)
+        free = len(self.equations.names) - len(self.equations.prior)
+        widened = float(stdtrit(max(1, len(self.equations.runs) - free), 0.975)) / _NORMAL
+        return replace(solution, covariance=solution.covariance * widened**2)
+
+
+def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_terms: bool = False) -> Selection:
+    """Choose the terms of one force.
+
+    Parameters
+    ----------
+    all_terms : bool
+        Report terms that are not significant, too.
+
+    Raises
+    ------
+    InputError
+        As :func:`tank2sim.identification.captive.equations.equations`.
+    """
+    choices: dict[str, Choice] = {}
+    active = []
+    for term in candidate_terms(force):
+        if excited(campaign, runs, term):
+            active.append(term.name)
+        else:
+            choices[term.name] = Choice(term.name, False, "not excited", f"no run moves so that {term.name} acts")
+    full = equations(campaign, runs, force, active)
+    used = full.of_terms(_told_apart(full, choices))
+    spread = fitted_spread(used)
+    used = with_prior(used, spread)
+    selection = Selection(used, spread, ())
+    solution = selection.solution
+    for place, name in enumerate(used.names):
+        choices[name] = _judged(solution, place, all_terms)
+    order = [term.name for term in candidate_terms(force)]
+    return replace(selection, choices=tuple(sorted(choices.values(), key=lambda choice: order.index(choice.name))))
+
+
+def _judged(solution: Solution, place: int, all_terms: bool) -> Choice:
+    """Whether a term of the regression is reported."""
+    name, ratio = solution.names[place], float(solution.ratios[place])
+    value, error = solution.values[place], solution.standard_errors[place]
+    if _always(name):
+        reason, told = "linear", f"value / standard error {ratio:.3g}"
+    elif abs(ratio) >= SIGNIFICANT:
+        reason, told = "significant", f"value / standard error {ratio:.3g}, and {SIGNIFICANT:g} was asked"
+    else:
+        reason = "asked for" if all_terms else "not significant"
+        told = f"{value:.3g} ± {error:.2g} does not differ from zero; its doubt is in the errors of the others"
+    return Choice(name, reason != "not significant", reason, told, float(solution.inflation[place]), ratio)
+
+
+def _always(name: str) -> bool:
+    term = parse_term(name)
+    assert term is not None
+    return bool(term.acceleration) or name == "X0" or _order(term) == 1
+
+
+def _order(term: Term) -> int:
+    return term.v + term.r + term.d + term.u
+
+
+def _told_apart(full: Equations, choices: dict[str, Choice]) -> list[str]:
+    """Terms that the campaign can tell apart, taken from the simplest to the most mixed: each that joins must leave
+    the condition number bearable."""
+    kept: list[str] = []
+    for name in sorted(full.names, key=_simplicity):
+        part = full.of_terms([*kept, name])
+        weighted = Spread(1.0, _usual_zero(full)).weighted(part, part.design)
+        condition = scaled_condition(weighted)
+        if condition <= COLLINEAR or _always(name):
+            kept.append(name)
+            continue
+        column, others = weighted[:, -1], weighted[:, :-1]
+        alone = column - others @ np.linalg.lstsq(others, column, rcond=None)[0]
+        inflation = float(column @ column / max(float(alone @ alone), 1e-300))
+        told = (
+            f"the runs cannot tell it from simpler terms: variance inflation {inflation:.3g}, scaled condition number "
+            f"{condition:.3g} with it, and {COLLINEAR:g} can be borne"
+        )
+        choices[name] = Choice(name, False, "collinear", told, inflation)
+    return [name for name in full.names if name in kept]
+
+
+def _simplicity(name: str) -> tuple[int, ...]:
+    """Linear terms come first, then by order, and at one order those in one motion before mixed ones."""
+    term = parse_term(name)
+    assert term is not None
+    mixed = sum(power > 0 for power in (term.v, term.r, term.d, term.u))
+    return (not _always(name), _order(term), term.u, mixed, term.d, term.r)
+
+
+def _usual_zero(full: Equations) -> float:
+    """A zero error that makes every mean as good as the others: what can be told apart hangs on the tests alone."""
+    return float(np.median([root[0, 0] for root in full.roots])) ** 2

@@ -1,0 +1,310 @@
+"""Physics warnings on how captive tests were made: what a correct reduction may still get wrong about the ship.
+
+Each function looks at one thing and yields a :class:`Caution` if need be, one sentence; nothing is left out or changed
+here. A warning that cannot be given yields a caution that names the key it lacks. "Paper 2" is Krezelewski and Misiag,
+section 5; "ITTC" is the recommended procedure 7.5-02-06-02, Captive Model Tests.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from tank2sim.identification.captive.caution import Caution, lacking
+
+SHORTEST_MODEL_M = 4.0
+"""Paper 2: between models of 4 m and 2 m most coefficients differ by about 10 %."""
+
+LARGEST_FREQUENCY_PARAMETER = 0.1
+"""omega U/g. Paper 2: coefficients fall steeply above."""
+
+LARGEST_REDUCED_FREQUENCY = {"sway": 2.0, "yaw": 3.0}
+"""omega L/U above which the flow remembers. ITTC quotes limits of 1 to 2 in sway and 2 to 3 in yaw; the upper ones."""
+
+NEAR_RESONANCE = 0.1
+"""A harmonic of the motion this near (relatively) to a standing wave of the tank excites it: a choice of ours."""
+
+LARGEST_BLOCKAGE = 0.01
+"""Midship section over tank section: a choice of ours; blockage corrections of resistance begin to matter there."""
+
+LEAST_DEPTH_RATIO = 4.0
+"""Depth over draught of deep water: IMO MSC.137(76), standards for ship manoeuvrability."""
+
+LARGEST_DEPTH_FROUDE = 0.6
+"""U/sqrt(g h) at which the bottom changes the model's waves by 1 %: they have k h = 1/Fn_h^2, and tanh(k h) = 0.99."""
+
+BLOCK_TOLERANCE = 0.05
+"""Relative difference between a stated block coefficient and that of the mass: a choice of ours."""
+
+RADII_OF_GYRATION = (0.18, 0.32)
+"""In yaw, in lengths, about midships: 0.25 is usual; a choice of ours on either side."""
+
+SIMILARITY = {"m'": (0.02, "relative"), "J_z'": (0.05, "relative"), "x_G'": (0.005, ""), "z_G'": (0.005, "")}
+"""How far model and ship may be apart, relative or in lengths: a choice of ours, paper 2 asks for equality."""
+
+
+@dataclass(frozen=True)
+class Oscillation:
+    """Motion of one run: ``sway`` or ``yaw``, and its angular frequency (rad/s) as measured."""
+
+    run: str
+    motion: str
+    frequency_radps: float
+
+
+@dataclass(frozen=True)
+class Tank:
+    """Breadth and depth of the basin, m; None if not known."""
+
+    breadth_m: float | None = None
+    depth_m: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """The body that the gauges carry, in the water density of the test; SI."""
+
+    length_m: float
+    mass_kg: float
+    density_kgpm3: float
+    yaw_inertia_kgm2: float | None = None
+    beam_m: float | None = None
+    draught_m: float | None = None
+
+
+@dataclass(frozen=True)
+class FroudeScaling:
+    """Ship over model at equal Froude number (paper 2, section 5), from the ratio of lengths and that of densities."""
+
+    length: float
+    density: float = 1.0
+    viscosity: float = 1.0
+
+    @property
+    def speed(self) -> float:
+        """And time: the root of the ratio of lengths."""
+        return math.sqrt(self.length)
+
+    @property
+    def frequency(self) -> float:
+        """The inverse of the ratio of times."""
+        return 1 / math.sqrt(self.length)
+
+    @property
+    def force(self) -> float:
+        """Also that of masses."""
+        return self.density * self.length**3
+
+    @property
+    def moment(self) -> float:
+        """Force times length."""
+        return self.density * self.length**4
+
+    @property
+    def reynolds(self) -> float:
+        """Reynolds number of the ship over that of the model: lambda^1.5 over the ratio of kinematic viscosities."""
+        return math.pow(self.length, 1.5) / self.viscosity
+
+
+def frequency_parameter(frequency_radps: float, speed_mps: float, gravity_mps2: float) -> float:
+    """zeta = omega U/g, which is also omega' Fn^2 (paper 2, section 5)."""
+    return frequency_radps * speed_mps / gravity_mps2
+
+
+def reduced_frequency(frequency_radps: float, speed_mps: float, length_m: float) -> float:
+    """omega' = omega L/U."""
+    return frequency_radps * length_m / speed_mps
+
+
+def shortest_period_s(speed_mps: float, gravity_mps2: float) -> float:
+    """Period at which omega U/g is 0.1: 2 pi U/(0.1 g), s."""
+    return 2 * math.pi * speed_mps / (LARGEST_FREQUENCY_PARAMETER * gravity_mps2)
+
+
+def standing_wave_frequency(mode: int, tank_breadth_m: float, depth_m: float, gravity_mps2: float) -> float:
+    """Angular frequency (rad/s) of the tank's transverse standing wave with `mode` half waves across.
+
+    omega^2 = g k tanh(k h), k = mode pi/B: linear waves between vertical walls (Lamb, Hydrodynamics, art. 228).
+    """
+    number = mode * math.pi / tank_breadth_m
+    return math.sqrt(gravity_mps2 * number * math.tanh(number * depth_m))
+
+
+def model_length(length_m: float) -> Iterator[Caution]:
+    """A model shorter than 4 m."""
+    if length_m < SHORTEST_MODEL_M:
+        yield Caution(
+            "model length",
+            f"The model is {length_m:.3g} m long: below {SHORTEST_MODEL_M:g} m the scale effect grows, and most "
+            "coefficients of 2 m models differ by about 10 % from those of 4 m (paper 2).",
+        )
+
+
+def frequency_parameters(runs: tuple[Oscillation, ...], speed_mps: float, gravity_mps2: float) -> Iterator[Caution]:
+    """Runs with omega U/g of 0.1 or more; those are to be left out."""
+    values = {run.run: frequency_parameter(run.frequency_radps, speed_mps, gravity_mps2) for run in runs}
+    high = tuple(name for name, value in values.items() if value >= LARGEST_FREQUENCY_PARAMETER)
+    if high:
+        yield Caution(
+            "frequency parameter",
+            f"omega U/g reaches {max(values[name] for name in high):.3g}; from {LARGEST_FREQUENCY_PARAMETER:g} on "
+            "coefficients fall steeply (paper 2): oscillate with periods above "
+            f"{shortest_period_s(speed_mps, gravity_mps2):.3g} s at this speed.",
+            high,
+        )
+
+
+def flow_memory(runs: tuple[Oscillation, ...], speed_mps: float, length_m: float) -> Iterator[Caution]:
+    """Runs so fast that the force depends on the motion before, one caution a kind of motion."""
+    for motion, limit in LARGEST_REDUCED_FREQUENCY.items():
+        values = {
+            run.run: reduced_frequency(run.frequency_radps, speed_mps, length_m) for run in runs if run.motion == motion
+        }
+        high = tuple(name for name, value in values.items() if value > limit)
+        if high:
+            yield Caution(
+                "flow memory",
+                f"omega L/U of {motion} reaches {max(values.values()):.3g}, above the {limit:g} that ITTC quotes: the "
+                "flow remembers earlier motion, and derivatives may depend on frequency; the runs are kept, see the "
+                "trend with frequency.",
+                high,
+            )
+
+
+def trim(trim_m: float | None, length_m: float) -> Iterator[Caution]:
+    """A model that is not on even keel."""
+    if trim_m is None:
+        yield lacking("trim", "the trim, which acts strongly on Y_r and N_r (paper 2)", "[model] trim_m")
+    elif trim_m != 0:
+        yield Caution(
+            "trim",
+            f"The model is trimmed by {abs(trim_m):.3g} m ({100 * abs(trim_m) / length_m:.2g} % of the length): trim "
+            "acts strongly on Y_r and N_r, a change by 1 % changed one of them by 7.5 % (paper 2).",
+        )
+
+
+def similarity(model: Mapping[str, float | None], ship: Mapping[str, float | None]) -> Iterator[Caution]:
+    """Differences of m', J_z', x_G', z_G' between model and ship; a number one of them lacks is named.
+
+    Parameters
+    ----------
+    model, ship : mapping
+        The numbers under the names of :data:`SIMILARITY`, prime system, x_G' and z_G' in lengths.
+    """
+    keys = {"m'": "mass_kg", "J_z'": "yaw_inertia_kgm2", "x_G'": "x_G_m", "z_G'": "z_G_m"}
+    for name, (limit, kind) in SIMILARITY.items():
+        one, other = model.get(name), ship.get(name)
+        if one is None or other is None:
+            where = f"[model] {keys[name]}" if one is None else f"{name} of the ship card"
+            yield lacking("similarity", f"whether model and ship have the same {name}", where)
+            continue
+        apart = abs(one - other) / (abs(other) if kind else 1.0)
+        if apart > limit:
+            amount = f"{100 * apart:.2g} %" + ("" if kind else " of the length")
+            yield Caution(
+                "similarity",
+                f"{name} is {one:.4g} of the model and {other:.4g} of the ship card, {amount} apart; derivatives hold "
+                "for the ship only if both are equal (paper 2).",
+            )
+
+
+def tank_resonance(runs: tuple[Oscillation, ...], tank: Tank, gravity_mps2: float) -> Iterator[Caution]:
+    """Runs of which the motion or its third harmonic is near a transverse standing wave of the tank.
+
+    A model on the centreline that sways or yaws excites the waves that are odd across the tank, modes 1, 3, 5.
+    """
+    if not runs:
+        return
+    if tank.breadth_m is None:
+        yield lacking("tank resonance", "whether the motion excites standing waves of the tank", "[tank] breadth_m")
+        return
+    depth = math.inf if tank.depth_m is None else tank.depth_m
+    for mode in (1, 3, 5):
+        own = standing_wave_frequency(mode, tank.breadth_m, depth, gravity_mps2)
+        for harmonic in (1, 3):
+            near = tuple(run.run for run in runs if abs(harmonic * run.frequency_radps - own) <= NEAR_RESONANCE * own)
+            if near:
+                what = "the motion" if harmonic == 1 else "the third harmonic of the motion"
+                yield Caution(
+                    "tank resonance",
+                    f"The frequency of {what} is within {100 * NEAR_RESONANCE:.0f} % of standing wave {mode} across "
+                    f"the tank ({own:.3g} rad/s, {tank.breadth_m:g} m wide): its waves add to the forces.",
+                    near,
+                )
+
+
+def blockage(beam_m: float | None, draught_m: float | None, tank: Tank) -> Iterator[Caution]:
+    """A tank too small in section or depth for the model to behave as in open water."""
+    known = {"[model] beam_m": beam_m, "[model] draught_m": draught_m}
+    known |= {"[tank] breadth_m": tank.breadth_m, "[tank] depth_m": tank.depth_m}
+    missing = [key for key, value in known.items() if value is None]
+    if missing:
+        yield lacking("blockage", "the share of the tank's section that the model blocks", ", ".join(missing))
+    if beam_m is not None and draught_m is not None and tank.breadth_m is not None and tank.depth_m is not None:
+        share = beam_m * draught_m / (tank.breadth_m * tank.depth_m)
+        if share > LARGEST_BLOCKAGE:
+            yield Caution(
+                "blockage",
+                f"The model fills {100 * share:.2g} % of the tank's section, more than "
+                f"{100 * LARGEST_BLOCKAGE:g} %: forces are larger than in open water.",
+            )
+    if draught_m is not None and tank.depth_m is not None and tank.depth_m < LEAST_DEPTH_RATIO * draught_m:
+        yield Caution(
+            "blockage",
+            f"The water is {tank.depth_m / draught_m:.2g} draughts deep; deep water is more than "
+            f"{LEAST_DEPTH_RATIO:g} (IMO MSC.137(76)): the derivatives are those of shallow water.",
+        )
+
+
+def depth_froude(speed_mps: float, depth_m: float | None, gravity_mps2: float) -> Iterator[Caution]:
+    """A depth Froude number U/sqrt(g h) that changes the waves."""
+    if depth_m is None:
+        yield lacking("depth Froude number", "whether the bottom changes the waves", "[tank] depth_m")
+        return
+    number = speed_mps / math.sqrt(gravity_mps2 * depth_m)
+    if number > LARGEST_DEPTH_FROUDE:
+        message = f"The depth Froude number is {number:.2g}, above {LARGEST_DEPTH_FROUDE:g}: the bottom changes the "
+        yield Caution("depth Froude number", message + "waves of the model.")
+
+
+def carried_mass(body: Body, block_coefficient: float | None = None) -> Iterator[Caution]:
+    """A mass that does not fit the hull, a yaw inertia that does not fit the mass: most often a wrong unit.
+
+    The gauges may carry less than the whole model; only what cannot be, or contradicts the block coefficient, is told.
+    """
+    if body.beam_m is not None and body.draught_m is not None:
+        block = body.mass_kg / (body.density_kgpm3 * body.length_m * body.beam_m * body.draught_m)
+        if block > 1:
+            yield Caution(
+                "mass", f"The mass is {block:.3g} times that of the water in L x B x T; no floating body's is."
+            )
+        elif block_coefficient is not None and abs(block / block_coefficient - 1) > BLOCK_TOLERANCE:
+            yield Caution(
+                "mass",
+                f"The mass corresponds to a block coefficient of {block:.3g}, and {block_coefficient:.3g} is given: do "
+                "the gauges carry a part of the model alone?",
+            )
+    if body.yaw_inertia_kgm2 is not None:
+        radius = math.sqrt(body.yaw_inertia_kgm2 / body.mass_kg) / body.length_m
+        low, high = RADII_OF_GYRATION
+        if not low <= radius <= high:
+            yield Caution(
+                "mass",
+                f"The radius of gyration in yaw is {radius:.3g} L; ships and their models have {low:g} to {high:g}.",
+            )
+
+
+def scale_effect(scale: float | None, length_m: float, speed_mps: float, viscosity_m2ps: float | None) -> Caution:
+    """What Froude scaling to the ship does not keep: the Reynolds number (paper 2, section 5)."""
+    if scale is None:
+        return lacking("scale effect", "the Reynolds number of the ship", "[model] scale")
+    at = ""
+    if viscosity_m2ps is not None:
+        at = f" ({speed_mps * length_m / viscosity_m2ps:.2g} of the model)"
+    ratio = FroudeScaling(scale).reynolds
+    return Caution(
+        "scale effect",
+        f"At equal Froude number the ship's Reynolds number is {ratio:.4g} times the model's{at}: its boundary "
+        "layer is thinner, its resistance coefficient and the wake at the rudder smaller.",
+    )

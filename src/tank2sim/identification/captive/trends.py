@@ -1,0 +1,105 @@
+"""Trends with frequency: do damping and added mass depend on it, and what are they at zero frequency?
+
+For slow motions both are even functions of the frequency: value at zero plus a slope times (omega L/U)^2. A term with a
+trend that is shown keeps it in the regression, so that its own value is that at zero frequency; static tests, which are
+at zero frequency, take part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from tank2sim.identification.captive.equations import Equations, equations
+from tank2sim.identification.captive.oscillation import distinct
+from tank2sim.identification.captive.regression import fitted_spread, solve
+from tank2sim.identification.captive.selection import Choice, Selection
+from tank2sim.identification.conditioning import COLLINEAR
+from tank2sim.records.campaigns import Campaign
+
+SHOWN = 3.5
+"""Standard errors from which a slope counts as shown: with eight slopes in a campaign chance reaches it once in 250."""
+_FEWEST_FREQUENCIES = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trend:
+    """Trend of one term with frequency.
+
+    Parameters
+    ----------
+    name : str
+        The term.
+    slope, standard_error : float
+        Change of its prime value by (omega L/U)^2.
+    at_zero, error_at_zero : float
+        Its value extrapolated to zero frequency, with this slope in the regression.
+    used : bool
+        The slope is shown, and the result's value is that at zero frequency.
+    """
+
+    name: str
+    slope: float
+    standard_error: float
+    at_zero: float
+    error_at_zero: float
+    used: bool
+
+
+def trends(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[Trend, ...]]:
+    """The selection, with the trends that are shown among its terms, and every trend that can be looked for."""
+    used = selection.equations
+    candidates = [
+        name
+        for motion, kind in (("v", "pure_sway"), ("r", "pure_yaw"))
+        if distinct([run.motion.frequency_radps for run in used.runs if run.run.type == kind]) >= _FEWEST_FREQUENCIES
+        for name in (f"{used.force}{motion}", f"{used.force}{motion}dot")
+        if name in used.names
+    ]
+    if not candidates:
+        return selection, ()
+    full = equations(campaign, used.runs, used.force, [*used.names, *map(_slope, candidates)]).held(used.prior)
+    names = list(used.names)
+    shown: list[str] = []
+    while True:
+        found = [_trend(full, names, name, selection) for name in candidates if name not in shown]
+        told = [trend for trend in found if trend is not None]
+        best = max(told, key=_ratio, default=None)
+        if best is None or _ratio(best) < SHOWN:
+            break
+        shown.append(best.name)
+        names.append(_slope(best.name))
+    if not shown:
+        return selection, tuple(told)
+    chosen = [
+        Choice(_slope(name), True, "trend", f"{name} changes with the frequency; its value is that at zero frequency")
+        for name in shown
+    ]
+    widened = full.of_terms(names)
+    result = replace(selection, equations=widened, spread=fitted_spread(widened), choices=(*selection.choices, *chosen))
+    kept = [_trend(full, [other for other in names if other != _slope(name)], name, result) for name in shown]
+    return result, (*(replace(trend, used=True) for trend in kept if trend is not None), *told)
+
+
+def _slope(name: str) -> str:
+    return f"{name} w2"
+
+
+def _trend(full: Equations, names: Sequence[str], name: str, selection: Selection) -> Trend | None:
+    """The trend of one term beside the named terms; None if the runs cannot tell it from them."""
+    part = full.of_terms([*names, _slope(name)])
+    solution = solve(part, selection.spread)
+    if solution.condition > COLLINEAR:
+        return None
+    return Trend(
+        name=name,
+        slope=float(solution.values[-1]),
+        standard_error=float(solution.standard_errors[-1]),
+        at_zero=solution.value(name),
+        error_at_zero=solution.error(name),
+        used=False,
+    )
+
+
+def _ratio(trend: Trend) -> float:
+    return abs(trend.slope) / max(trend.standard_error, 1e-300)

@@ -1,0 +1,65 @@
+"""Type B uncertainty: errors common to the whole campaign, which no scatter of its runs shows (ITTC 7.5-02-06-04).
+
+Each is carried through by making the error and solving again: what the derivatives then change by is their uncertainty
+from it. Different errors are independent and add in squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tank2sim.identification.captive.equations import Equations, equations
+from tank2sim.identification.captive.harmonics import ReducedRun
+from tank2sim.identification.captive.motion import Motion
+from tank2sim.identification.captive.regression import Solution, solve
+from tank2sim.records.campaigns import Campaign
+
+
+def type_b_errors(campaign: Campaign, used: Equations, solution: Solution) -> dict[str, dict[str, float]]:
+    """Standard error (prime) of each term of a force from each stated error: source to term to error.
+
+    `solution` is that of the equations `used`.
+    """
+    stated = campaign.uncertainty.model_dump()
+    found = {}
+    for source, size in stated.items():
+        if not size:
+            continue
+        changed, altered = _with_error(campaign, used.runs, source, size)
+        erring = equations(changed, altered, used.force, used.names).held(used.prior)
+        moved = solve(erring, solution.spread).values - solution.values
+        found[source] = {name: float(abs(shift)) for name, shift in zip(used.names, moved, strict=True)}
+    return found
+
+
+def _with_error(
+    campaign: Campaign, runs: Sequence[ReducedRun], source: str, size: float
+) -> tuple[Campaign, list[ReducedRun]]:
+    """The campaign as it would be if the error were of one standard deviation."""
+    if source == "mass_relative":
+        return _model(campaign, "mass_kg", 1 + size), list(runs)
+    if source == "yaw_inertia_relative":
+        return _model(campaign, "yaw_inertia_kgm2", 1 + size), list(runs)
+    if source == "calibration_relative":
+        return campaign, [_scaled(run, 1 + size) for run in runs]
+    changes: dict[str, Callable[[Motion], Motion]] = {
+        "alignment_rad": lambda motion: replace(motion, v_mps=motion.v_mps - motion.speed_mps * np.sin(size)),
+        "rudder_rad": lambda motion: replace(motion, delta_rad=motion.delta_rad + size),
+        "speed_relative": lambda motion: replace(motion, speed_mps=motion.speed_mps * (1 + size)),
+    }
+    return campaign, [replace(run, motion=changes[source](run.motion)) for run in runs]
+
+
+def _model(campaign: Campaign, key: str, factor: float) -> Campaign:
+    value = getattr(campaign.model, key)
+    if value is None:
+        return campaign
+    return replace(campaign, model=campaign.model.model_copy(update={key: value * factor}))
+
+
+def _scaled(run: ReducedRun, factor: float) -> ReducedRun:
+    fits = {force: replace(fit, coefficients=fit.coefficients * factor) for force, fit in run.fits.items()}
+    return replace(run, fits=fits)

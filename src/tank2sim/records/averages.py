@@ -1,0 +1,131 @@
+"""Tables of averages: static captive conditions, one a row, as a basin publishes them."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.cards.scaling import Scales
+from tank2sim.errors import InputError
+from tank2sim.files import read_text
+from tank2sim.records.campaign_form import CampaignFile
+
+
+@dataclass(frozen=True, kw_only=True)
+class Condition:
+    """One row of averages: SI, radians, rudder positive to starboard, forces in the sense of the file.
+
+    ``name`` tells file and line.
+    """
+
+    name: str
+    drift_rad: float
+    rudder_rad: float
+    speed_mps: float
+    X_N: float
+    Y_N: float
+    N_Nm: float
+    propeller_radps: float | None
+
+
+def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) -> tuple[list[Condition], list[str]]:
+    """Every distinct row of the table that ``[averages]`` names, and what should be told of reading it.
+
+    Only the columns that ``[averages.columns]`` names are read; others may hold text.
+
+    Parameters
+    ----------
+    form : CampaignFile
+        The campaign's file.
+    factors : mapping
+        Quantity to the factor that brings its column to SI.
+    path : Path
+        Of the campaign's file, for messages and as the folder of the table.
+
+    Raises
+    ------
+    InputError
+        The table is missing, a column is, or a number in it cannot be.
+    """
+    averages = form.averages
+    assert averages is not None
+    file = path.parent / averages.file
+    lines, rows = _cells(file)
+    heads = rows.pop(0)
+    values: dict[str, list[float]] = {}
+    for key, heading in averages.columns.model_dump(exclude_none=True).items():
+        if heading not in heads:
+            problem = f"the table has no column {heading!r}"
+            raise InputError(path, f"averages.columns.{key}", problem, f"its columns are {', '.join(heads)}")
+        place = heads.index(heading)
+        cells = [
+            _number(file, (line, heading), row[place] if place < len(row) else "")
+            for line, row in zip(lines[1:], rows, strict=True)
+        ]
+        values[key] = [cell * factors.get(key, 1.0) for cell in cells]
+    if (averages.rudder_sign or form.test.rudder_sign) == "port" and "rudder_rad" in values:
+        values["rudder_rad"] = [-angle for angle in values["rudder_rad"]]
+    table = np.column_stack(list(values.values())) + 0.0  # + 0.0 turns -0.0 into 0.0
+    _, first = np.unique(table, axis=0, return_index=True)
+    distinct = sorted(int(row) for row in first)
+    conditions = [
+        _condition(dict(zip(values, table[row].tolist(), strict=True)), (file, lines[row + 1]), form)
+        for row in distinct
+    ]
+    repeated = len(rows) - len(distinct)
+    told = f"{file.name}: {repeated} of {len(rows)} rows repeat another to the last digit; each is counted once."
+    return conditions, [told] if repeated else []
+
+
+def _cells(file: Path) -> tuple[list[int], list[list[str]]]:
+    """Line numbers and cells of the lines that are neither empty nor comments; the first is the header."""
+    lines: list[int] = []
+    rows: list[list[str]] = []
+    for number, line in enumerate(read_text(file).split("\n"), start=1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            lines.append(number)
+            rows.append([cell.strip() for cell in next(csv.reader([line], skipinitialspace=True))])
+    if len(rows) < 2:
+        raise InputError(file, "", "has no rows under a header", "give a header and a row for each condition")
+    return lines, rows
+
+
+def _number(file: Path, place: tuple[int, str], text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        problem = f"{text!r} is no number"
+        raise InputError(file, f"line {place[0]}, column {place[1]}", problem, "give each condition its value")
+    return value
+
+
+def _condition(at: Mapping[str, float], place: tuple[Path, int], form: CampaignFile) -> Condition:
+    assert form.averages is not None
+    file, line = place
+    for key in ("drift_rad", "rudder_rad"):
+        if abs(at.get(key, 0.0)) >= math.pi / 2:
+            raise InputError(file, f"line {line}", f"{key} is {at[key]:g}", "name its column as _deg if it is degrees")
+    speed = at.get("speed_mps", form.test.speed_mps)
+    if speed <= 0:
+        raise InputError(file, f"line {line}", f"the speed is {speed:g} m/s", "a positive one was expected")
+    scales = Scales(form.test.water_density_kgpm3, form.model.length_m, speed)
+    units: Sequence[float] = (1.0, 1.0, 1.0)
+    if form.averages.scaling == "prime":
+        units = (scales.force, scales.force, scales.force * scales.length)
+    return Condition(
+        name=f"{file.name} line {line}",
+        drift_rad=at.get("drift_rad", 0.0),
+        rudder_rad=at.get("rudder_rad", 0.0),
+        speed_mps=speed,
+        X_N=at["X"] * units[0],
+        Y_N=at["Y"] * units[1],
+        N_Nm=at["N"] * units[2],
+        propeller_radps=at.get("propeller_radps", form.test.propeller_radps),
+    )

@@ -1,0 +1,270 @@
+"""The form of a captive campaign's file: its sections, their keys, and what each may hold.
+
+Values here are in SI and radians: a file may give any angle in degrees and revolutions in rpm or rps, and the key is
+then renamed (``drift_deg`` to ``drift_rad``, ``propeller_rps`` to ``propeller_radps``). Signs are still the file's own.
+"""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field, ValidationError
+
+from tank2sim.cards.form import Positive, Section, Text
+from tank2sim.errors import InputError
+from tank2sim.units import from_si, to_si
+
+RunType = Literal["static_drift", "static_rudder", "drift_and_rudder", "pure_sway", "pure_yaw", "yaw_with_drift"]
+RUN_TYPES: tuple[RunType, ...] = (
+    "static_drift",
+    "static_rudder",
+    "drift_and_rudder",
+    "pure_sway",
+    "pure_yaw",
+    "yaw_with_drift",
+)
+OSCILLATING: tuple[RunType, ...] = ("pure_sway", "pure_yaw", "yaw_with_drift")
+"""Types of run in which the model oscillates; in the others it is towed steadily."""
+
+NotNegative = Annotated[float, Field(ge=0)]
+Angle = Annotated[float, Field(gt=-1.5707963267948966, lt=1.5707963267948966)]
+
+
+class ModelSection(Section):
+    """``[model]``: the ship model as tested, SI.
+
+    Parameters
+    ----------
+    mass_kg, yaw_inertia_kgm2, x_G_m
+        Of the body that the gauges carry, about midships; x_G positive forward. The inertia is needed by yaw tests.
+    trim_m
+        Positive by the stern.
+    scale
+        Length of the ship over that of the model, lambda.
+    z_G_m
+        Height of the centre of gravity above the keel.
+    """
+
+    name: Text
+    length_m: Positive
+    beam_m: Positive | None = None
+    draught_m: Positive | None = None
+    mass_kg: Positive
+    yaw_inertia_kgm2: Positive | None = None
+    x_G_m: float = 0.0
+    z_G_m: float | None = None
+    trim_m: float | None = None
+    block_coefficient: Annotated[float, Field(gt=0, le=1)] | None = None
+    scale: Annotated[float, Field(ge=1)] | None = None
+    rudder_area_m2: Positive | None = None
+    propeller_diameter_m: Positive | None = None
+
+
+class TankTest(Section):
+    """``[test]``: how it was tested.
+
+    Parameters
+    ----------
+    speed_mps
+        The test speed u0, about which the forces are expanded.
+    force_convention
+        ``on_model``: the force of the mechanism on the model; ``on_gauge``: the reaction; ``hydrodynamic``: that of
+        the water on the model, the inertia of the model already removed.
+    rudder_sign
+        To which side a positive rudder angle turns the ship, in the run files and ``[[runs]]``.
+    inertia_speed
+        The u with which the rigid body's m u r and m x_G u r are computed: ``test``, u = U as the paper has it
+        (papers 2.2, 2.3), or ``axial``, u = U cos(beta). They differ in runs that yaw with drift alone.
+    free_motions
+        Motions left free, such as ``["heave", "pitch"]``.
+    """
+
+    water_density_kgpm3: Positive = 1000.0
+    gravity_mps2: Positive = 9.80665
+    speed_mps: Positive
+    force_convention: Literal["on_model", "on_gauge", "hydrodynamic"]
+    rudder_sign: Literal["starboard", "port"] = "starboard"
+    inertia_speed: Literal["test", "axial"] = "test"
+    propeller_radps: NotNegative | None = None
+    free_motions: list[str] | str | bool | None = None
+    kinematic_viscosity_m2ps: Positive | None = None
+
+
+class TankSection(Section):
+    """``[tank]``: the basin."""
+
+    length_m: Positive | None = None
+    breadth_m: Positive | None = None
+    depth_m: Positive | None = None
+
+
+class UncertaintySection(Section):
+    """``[uncertainty]``: Type B standard uncertainties (one standard deviation) that no scatter of the runs shows.
+
+    ITTC 7.5-02-06-04. Each is one error common to the whole campaign; absent means not stated, and none is added.
+
+    Parameters
+    ----------
+    calibration_relative
+        Of the gauges: relative error of every force and moment, each of X, Y and N by itself.
+    alignment_rad
+        Angle between the model's axis at zero drift and the tank's.
+    rudder_rad
+        Zero of the rudder angle.
+    speed_relative
+        Of the carriage speed.
+    mass_relative, yaw_inertia_relative
+        Of the carried mass and its yaw inertia.
+    """
+
+    calibration_relative: NotNegative = 0.0
+    alignment_rad: NotNegative = 0.0
+    rudder_rad: NotNegative = 0.0
+    speed_relative: NotNegative = 0.0
+    mass_relative: NotNegative = 0.0
+    yaw_inertia_relative: NotNegative = 0.0
+
+
+class FullScaleSection(Section):
+    """``[full_scale]``: the water the ship sails in, for a card at ship scale."""
+
+    water_density_kgpm3: Positive = 1025.0
+    gravity_mps2: Positive = 9.80665
+    kinematic_viscosity_m2ps: Positive = 1.19e-6
+
+
+class RunSheet(Section):
+    """One of ``[[runs]]``: what the test sheet says of a run; what was measured stands in its file."""
+
+    file: Text
+    type: RunType
+    drift_rad: Angle | None = None
+    rudder_rad: Angle | None = None
+    frequency_radps: Positive | None = None
+    amplitude_m: Positive | None = None
+    yaw_rate_amplitude_radps: Positive | None = None
+    propeller_radps: NotNegative | None = None
+    notes: str | None = None
+
+
+class Columns(Section):
+    """``[averages.columns]``: quantity to the heading of its column."""
+
+    drift_rad: str | None = None
+    rudder_rad: str | None = None
+    speed_mps: str | None = None
+    propeller_radps: str | None = None
+    X: str
+    Y: str
+    N: str
+
+
+class AveragesSection(Section):
+    """``[averages]``: a table of static conditions, one a row, in place of ``[[runs]]``."""
+
+    file: Text
+    scaling: Literal["prime", "dimensional"]
+    rudder_sign: Literal["starboard", "port"] | None = None
+    columns: Columns
+
+
+class CampaignFile(Section):
+    """The whole of ``campaign.toml``."""
+
+    format: Literal["tank2sim-campaign/1"] = "tank2sim-campaign/1"
+    model: ModelSection
+    test: TankTest
+    tank: TankSection = TankSection()
+    uncertainty: UncertaintySection = UncertaintySection()
+    full_scale: FullScaleSection | None = None
+    averages: AveragesSection | None = None
+    runs: tuple[RunSheet, ...] = ()
+
+
+def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, dict[str, float]]:
+    """The checked form of a campaign's parsed TOML, and the factors to SI of the columns of ``[averages]``.
+
+    Raises
+    ------
+    InputError
+        A key is missing, unknown, given twice in two units, or holds what it cannot.
+    """
+    content = dict(content)
+    spelt: dict[str, str] = {}
+    for section in ("model", "test", "tank", "uncertainty", "full_scale"):
+        if isinstance(content.get(section), dict):
+            content[section] = _in_si(content[section], section, source, spelt)
+    if isinstance(content.get("runs"), list):
+        content["runs"] = tuple(
+            _in_si(run, f"runs.{number}", source, spelt) if isinstance(run, dict) else run
+            for number, run in enumerate(content["runs"])
+        )
+    factors: dict[str, float] = {}
+    averages = content.get("averages")
+    if isinstance(averages, dict) and isinstance(averages.get("columns"), dict):
+        columns = {}
+        for key, heading in averages["columns"].items():
+            si_key, factors[to_si(key, 1.0)[0]] = to_si(key, 1.0)
+            columns[si_key] = heading
+        content["averages"] = {**averages, "columns": columns}
+    try:
+        return CampaignFile.model_validate(content), factors
+    except ValidationError as error:
+        raise _told(error, source, spelt) from None
+
+
+def _in_si(section: dict[str, Any], place: str, source: Path, spelt: dict[str, str]) -> dict[str, Any]:
+    converted: dict[str, Any] = {}
+    for key, value in section.items():
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        si_key, si_value = to_si(key, value) if number else (key, value)
+        if si_key in converted:
+            raise InputError(source, f"{place}.{key}", f"is given twice, also as {si_key}", "give it once")
+        spelt[f"{place}.{si_key}"] = f"{place}.{key}"
+        converted[si_key] = si_value
+    return converted
+
+
+def _told(error: ValidationError, source: Path, spelt: dict[str, str]) -> InputError:
+    """The first fault that pydantic found, as one line of ours; an unknown key before a missing one it explains."""
+    first = min(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+    inner = ".".join(str(part) for part in first["loc"])
+    place = spelt.get(inner, inner)
+    key = place.rpartition(".")[2]
+    wanted = first.get("ctx", {})
+    given = first["input"]
+    bound = next((wanted[name] for name in ("gt", "ge", "lt", "le") if name in wanted), None)
+    match first["type"]:
+        case "missing":
+            told = "is missing", "add it"
+        case "extra_forbidden":
+            told = "is no key of a campaign", _suggestion(key, first["loc"])
+        case "finite_number":
+            told = f"is {given}", "a finite number was expected"
+        case "float_type" | "int_type":
+            told = f"is {given!r}", "a number was expected"
+        case "string_type":
+            told = f"is {given!r}", "a text was expected"
+        case "literal_error":
+            told = f"is {given!r}", f"{wanted['expected']} was expected"
+        case kind if bound is not None and kind.startswith(("greater", "less")):
+            relation = {"greater_than": "greater than", "less_than": "less than"}.get(kind) or (
+                "at least" if kind.startswith("greater") else "at most"
+            )
+            told = f"is {from_si(key, given):g}", f"a number {relation} {from_si(key, bound):g} was expected"
+        case _:
+            told = f"is {given!r}"[:80], first["msg"][0].lower() + first["msg"][1:]
+    return InputError(source, place, *told)
+
+
+def _suggestion(key: str, place: tuple[int | str, ...]) -> str:
+    form: type[BaseModel] = CampaignFile
+    for part in place[:-1]:
+        annotation = form.model_fields[part].annotation if isinstance(part, str) else form
+        inner = [kind for kind in (annotation, *getattr(annotation, "__args__", ())) if hasattr(kind, "model_fields")]
+        form = inner[0] if inner else form
+    known = list(form.model_fields)
+    close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
+    return f"did you mean {close[0]}?" if close else f"known here: {', '.join(known)}"

@@ -1,0 +1,318 @@
+"""Captive campaigns: what a towing tank measured on a model that a carriage drives, read and brought to one convention.
+
+Inside the program a :class:`Run` has, whatever its file says:
+
+- SI units and radians; the rudder positive to starboard; ``drift_rad`` is beta = -asin(v/U);
+- ``X_N``, ``Y_N``, ``N_Nm`` in the *hydrodynamic* sense: positive as the water pushes the model (forward, to
+  starboard, bow to starboard). Unless :attr:`Campaign.inertia_removed`, they still hold the reaction of the carried
+  body's inertia: Y_N = Y_hydrodynamic - m (v' + u r + x_G r'). So a file ``on_model`` has its signs changed, one
+  ``on_gauge`` keeps them;
+- ``speed_mps`` is the speed U through the water.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tank2sim.cards.scaling import Scales
+from tank2sim.errors import InputError
+from tank2sim.files import read_text
+from tank2sim.records.averages import Condition, read_averages
+from tank2sim.records.campaign_form import (
+    OSCILLATING,
+    CampaignFile,
+    FullScaleSection,
+    ModelSection,
+    RunSheet,
+    RunType,
+    TankSection,
+    TankTest,
+    UncertaintySection,
+    campaign_file,
+)
+from tank2sim.records.csv_table import Table, Vector, read_table
+
+FORCES = ("X", "Y", "N")
+_FORCE_COLUMNS = {"X": "X_N", "Y": "Y_N", "N": "N_Nm"}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Run:
+    """One captive run.
+
+    Parameters
+    ----------
+    name : str
+        Its file's name, or ``captive.csv line 12`` for a row of averages.
+    type : str
+        One of :data:`tank2sim.records.campaign_form.RUN_TYPES`.
+    sheet : RunSheet
+        What the test sheet says (SI, rudder to starboard); None where it is silent.
+    time_s : array, (rows,)
+        Rising; a single 0 for a row of averages.
+    v_mps, r_radps, speed_mps, delta_rad : array, (rows,)
+        Sway velocity, yaw rate, speed U through the water, rudder angle.
+    y_m, psi_rad : array, (rows,), or None
+        Sideways position in the tank and heading against its axis.
+    X_N, Y_N, N_Nm : array, (rows,)
+        Forces and moment in the hydrodynamic sense (see the module), about midships.
+    propeller_radps : float or None
+        Revolutions.
+    """
+
+    name: str
+    type: RunType
+    sheet: RunSheet
+    time_s: Vector
+    v_mps: Vector
+    r_radps: Vector
+    speed_mps: Vector
+    delta_rad: Vector
+    X_N: Vector
+    Y_N: Vector
+    N_Nm: Vector
+    y_m: Vector | None = None
+    psi_rad: Vector | None = None
+    propeller_radps: float | None = None
+
+    @property
+    def is_average(self) -> bool:
+        """A row of averages: one reading without a history."""
+        return len(self.time_s) == 1
+
+    @property
+    def oscillates(self) -> bool:
+        """The model oscillates in it."""
+        return self.type in OSCILLATING
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the record, the last sample's own interval included."""
+        count = len(self.time_s)
+        return float(self.time_s[-1] - self.time_s[0]) * count / (count - 1) if count > 1 else 0.0
+
+    def force(self, name: str) -> Vector:
+        """``X``, ``Y`` (N) or ``N`` (N m), (rows,)."""
+        values: Vector = getattr(self, _FORCE_COLUMNS[name])
+        return values
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Campaign:
+    """A captive campaign with one model.
+
+    Parameters
+    ----------
+    path : Path
+        Its ``campaign.toml``.
+    model, test, tank, uncertainty, full_scale
+        Sections of the file, SI and radians (:mod:`tank2sim.records.campaign_form`). ``full_scale`` may be None.
+    runs : tuple of Run
+        In the order of the file.
+    faults : tuple of InputError
+        Runs that could not be read and were left out, because that was asked for.
+    remarks : tuple of str
+        What was done on reading and should be told.
+    """
+
+    path: Path
+    model: ModelSection
+    test: TankTest
+    tank: TankSection
+    uncertainty: UncertaintySection
+    full_scale: FullScaleSection | None
+    runs: tuple[Run, ...]
+    faults: tuple[InputError, ...] = ()
+    remarks: tuple[str, ...] = field(default=())
+
+    @property
+    def inertia_removed(self) -> bool:
+        """The forces are the water's alone, the reaction of the body's inertia already taken out."""
+        return self.test.force_convention == "hydrodynamic"
+
+    @property
+    def scales(self) -> Scales:
+        """Scales of the prime system at the test speed."""
+        return Scales(self.test.water_density_kgpm3, self.model.length_m, self.test.speed_mps)
+
+    def runs_of(self, *types: RunType) -> tuple[Run, ...]:
+        """The runs of the given types."""
+        return tuple(run for run in self.runs if run.type in types)
+
+    def without(self, names: set[str]) -> Campaign:
+        """The campaign less some runs."""
+        return replace(self, runs=tuple(run for run in self.runs if run.name not in names))
+
+
+def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
+    """Read a campaign and all its runs.
+
+    Parameters
+    ----------
+    path : path
+        ``campaign.toml``; the names of files in it are relative to its folder.
+    keep_going : bool
+        Leave out runs that cannot be read (a missing file, text in a number column) and tell them in ``faults``.
+
+    Raises
+    ------
+    InputError
+        The campaign's file is at fault; or a run is, and `keep_going` is not asked for: then all such runs are told.
+    """
+    path = Path(path)
+    form, factors = campaign_file(_parsed(path), path)
+    runs: list[Run] = []
+    faults: list[InputError] = []
+    remarks: list[str] = []
+    if (form.averages is None) == (not form.runs):
+        problem = "has both [averages] and [[runs]]" if form.runs else "has no run"
+        raise InputError(path, "", problem, "give [[runs]] with a file each, or one table in [averages]")
+    if form.averages is not None:
+        conditions, remarks = read_averages(form, factors, path)
+        runs = [_averaged_run(condition, form) for condition in conditions]
+    _refuse_doubled_names(form, path)
+    for sheet in form.runs:
+        try:
+            runs.append(_read_run(sheet, form, path.parent))
+        except InputError as fault:
+            faults.append(fault)
+    if faults and not keep_going:
+        raise together(faults)
+    if not runs:
+        raise InputError(path, "runs", "no run can be used", f"mend them first: {faults[0]}")
+    return Campaign(
+        path=path,
+        model=form.model,
+        test=form.test,
+        tank=form.tank,
+        uncertainty=form.uncertainty,
+        full_scale=form.full_scale,
+        runs=tuple(runs),
+        faults=tuple(faults),
+        remarks=tuple(remarks),
+    )
+
+
+def together(faults: list[InputError]) -> InputError:
+    """Several faults as one error: each is told, the remedy is the first one's and to go on without those runs."""
+    first, *others = faults
+    also = "".join(f"; {': '.join((Path(o.source).name, *filter(None, [o.place]), o.problem))}" for o in others)
+    return InputError(
+        first.source, first.place, first.problem + also, f"{first.remedy}, or leave such runs out with --keep-going"
+    )
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(read_text(path))
+    except tomllib.TOMLDecodeError as error:
+        problem, _, place = str(error).partition(" (at ")
+        raise InputError(path, place.rstrip(")"), problem, "mend the TOML there") from None
+
+
+def _refuse_doubled_names(form: CampaignFile, path: Path) -> None:
+    names = [sheet.file for sheet in form.runs]
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise InputError(path, f"runs.{number}.file", f"{name} stands twice", "give each run once")
+
+
+def _read_run(sheet: RunSheet, form: CampaignFile, folder: Path) -> Run:
+    table = read_table(folder / sheet.file).si()
+    time = table.increasing("t_s") - float(table.column("t_s")[0])
+    to_port = form.test.rudder_sign == "port"
+    if to_port and sheet.rudder_rad is not None:
+        sheet = sheet.model_copy(update={"rudder_rad": -sheet.rudder_rad})
+    sense = -1.0 if form.test.force_convention == "on_model" else 1.0
+    rudder = _optional(table, "delta_rad")
+    if rudder is None:
+        rudder = np.full(len(time), 0.0 if sheet.rudder_rad is None else sheet.rudder_rad)
+    elif to_port:
+        rudder = -rudder
+    speed = _optional(table, "speed_mps")
+    if speed is None:
+        speed = np.full(len(time), form.test.speed_mps)
+    y, psi = _optional(table, "y_m"), _optional(table, "psi_rad")
+    rate = _optional(table, "r_radps")
+    if rate is None:
+        rate = np.zeros(len(time)) if sheet.type not in ("pure_yaw", "yaw_with_drift") else _rate_of(table, psi, time)
+    return Run(
+        name=sheet.file,
+        type=sheet.type,
+        sheet=sheet,
+        time_s=time,
+        v_mps=_sway_velocity(table, sheet, (time, y, speed)),
+        r_radps=rate,
+        speed_mps=speed,
+        delta_rad=rudder,
+        **{column: sense * _filled(table, column) for column in _FORCE_COLUMNS.values()},
+        y_m=y,
+        psi_rad=psi,
+        propeller_radps=sheet.propeller_radps if sheet.propeller_radps is not None else form.test.propeller_radps,
+    )
+
+
+def _filled(table: Table, name: str) -> Vector:
+    values = table.column(name)
+    empty = np.flatnonzero(np.isnan(values))
+    if empty.size:
+        raise InputError(table.path, table.place(int(empty[0]), name), "is empty", "give each row its value")
+    return values
+
+
+def _optional(table: Table, name: str) -> Vector | None:
+    return _filled(table, name) if name in table.columns else None
+
+
+def _sway_velocity(table: Table, sheet: RunSheet, motion: tuple[Vector, Vector | None, Vector]) -> Vector:
+    """v as measured; else from the position (pure sway), or from the drift angle of the sheet."""
+    time, y, speed = motion
+    measured = _optional(table, "v_mps")
+    if measured is not None:
+        return measured
+    if sheet.type == "pure_sway":
+        if y is None:
+            raise InputError(table.path, "header", "there is neither v_mps nor y_m", "add one of them")
+        velocity: Vector = np.gradient(y, time)
+        return velocity
+    if sheet.drift_rad is None and sheet.type in ("static_drift", "drift_and_rudder", "yaw_with_drift"):
+        raise InputError(table.path, "header", "there is no v_mps, and the campaign gives no drift", "give one of them")
+    steady: Vector = -speed * np.sin(sheet.drift_rad or 0.0)
+    return steady
+
+
+def _rate_of(table: Table, psi: Vector | None, time: Vector) -> Vector:
+    if psi is None:
+        raise InputError(table.path, "header", "there is neither r_radps nor psi_rad", "add one of them")
+    rate: Vector = np.gradient(np.unwrap(psi), time)
+    return rate
+
+
+def _averaged_run(condition: Condition, form: CampaignFile) -> Run:
+    assert form.averages is not None
+    kind: RunType = "drift_and_rudder"
+    if condition.rudder_rad == 0.0:
+        kind = "static_drift"
+    elif condition.drift_rad == 0.0:
+        kind = "static_rudder"
+    sense = -1.0 if form.test.force_convention == "on_model" else 1.0
+    sheet = RunSheet(file=form.averages.file, type=kind, drift_rad=condition.drift_rad, rudder_rad=condition.rudder_rad)
+    return Run(
+        name=condition.name,
+        type=kind,
+        sheet=sheet,
+        time_s=np.zeros(1),
+        v_mps=np.array([-condition.speed_mps * np.sin(condition.drift_rad)]),
+        r_radps=np.zeros(1),
+        speed_mps=np.array([condition.speed_mps]),
+        delta_rad=np.array([condition.rudder_rad]),
+        X_N=sense * np.array([condition.X_N]),
+        Y_N=sense * np.array([condition.Y_N]),
+        N_Nm=sense * np.array([condition.N_Nm]),
+        propeller_radps=condition.propeller_radps,
+    )

@@ -1,0 +1,77 @@
+"""``tank2sim reduce``: files written together or not at all, results on screen and as JSON."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from tank2sim.cards import read_card
+from tank2sim.cli.reduce import command
+from tank2sim.errors import InputError
+from tests.identification.captive.generator import Campaign, write
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    return write(Campaign(seed=6, size="linear", rate_hz=5.0), tmp_path_factory.mktemp("campaign")).path
+
+
+def run(*arguments):
+    result = CliRunner().invoke(command, [str(argument) for argument in arguments])
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+def test_card_json_and_plots_are_written_and_agree(path, tmp_path):
+    card, result, plots = tmp_path / "card.toml", tmp_path / "result.json", tmp_path / "plots"
+    shown = run(path, "-o", card, "--json", result, "--plot", plots)
+    assert shown.exit_code == 0
+    assert "whole campaign" in shown.output
+    assert "Leave-one-out" in shown.output
+    found = json.loads(result.read_text())
+    assert {name: entry["value"] for name, entry in found["derivatives"].items()} == dict(read_card(card).derivatives)
+    assert found["derivatives"]["Yv"]["standard_error"] > 0
+    assert found["warnings"]
+    pictures = {picture.name for picture in plots.iterdir()}
+    assert {
+        "static_drift_Y.png",
+        "pure_sway_N.png",
+        "loops_pure_yaw.png",
+        "harmonics_Y.png",
+        "residuals.png",
+    } <= pictures
+    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in plots.iterdir())
+
+
+def test_a_missing_run_is_refused_and_nothing_is_written(tmp_path):
+    faulty = write(Campaign(seed=6, size="linear", rate_hz=5.0, faults={"drift_+04": "missing"}), tmp_path / "c").path
+    card = tmp_path / "card.toml"
+    with pytest.raises(InputError, match=r"drift_\+04\.csv.*no such file"):
+        run(faulty, "-o", card)
+    assert not card.exists()
+    assert run(faulty, "-o", card, "--keep-going").exit_code == 0
+    assert "left out, for it is at fault" in run(faulty, "--keep-going").output
+
+
+def test_what_is_estimated_and_what_is_missing_is_said(path, tmp_path):
+    assert "has no Xudot" in run(path).output
+    filled = run(path, "--fill", "clarke1983", "-o", tmp_path / "card.toml").output
+    assert "Estimated, not measured" in filled
+    assert "ESTIMATED" in (tmp_path / "card.toml").read_text()
+
+
+def test_a_card_at_ship_scale_tells_the_reynolds_ratio(path, tmp_path):
+    shown = run(path, "--scale", "25", "-o", tmp_path / "card.toml").output
+    assert "125 times the model's" in shown.replace("\n", " ")
+    assert read_card(tmp_path / "card.toml").ship.length_m == pytest.approx(
+        25 * read_card(_model_card(path, tmp_path)).ship.length_m, rel=1e-4
+    )
+    for wrong in ("ship", "0.5", "big"):
+        with pytest.raises(InputError):
+            run(path, "--scale", wrong)
+
+
+def _model_card(path, folder):
+    run(path, "-o", folder / "model.toml")
+    return folder / "model.toml"

@@ -1,0 +1,90 @@
+"""Every fault of a run is told by name, and the rest is reduced when asked to go on."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tank2sim.errors import InputError
+from tank2sim.identification.captive.faults import record_faults, reduced_faults
+from tank2sim.identification.captive.harmonics import reduced_run
+from tank2sim.identification.captive.reduction import Options, reduce_campaign
+from tank2sim.records.campaigns import read_campaign
+from tests.identification.captive.generator import Campaign, write
+
+CASES = {
+    "saturated": ("sway_02", "gauge Y: stands still at its .* saturated"),
+    "step": ("drift_+04", "gauge Y: its zero steps by"),
+    "degrees": ("yaw_02", "column r_radps: reaches .* cannot be"),
+    "short": ("sway_11", "has 0.7. of a period"),
+    "wrong type": ("yaw_12", "is said to be pure_sway"),
+    "missing": ("rudder_+10", "there is no such file"),
+}
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    written = write(Campaign(seed=2, rate_hz=10.0), tmp_path_factory.mktemp("sound"))
+    return read_campaign(written.path)
+
+
+def run_of(campaign, name):
+    return next(run for run in campaign.runs if run.name == f"{name}.csv")
+
+
+def told(campaign, run):
+    """Everything told of one run."""
+    found = list(record_faults(campaign, run))
+    return " | ".join(str(fault) for fault in found or reduced_faults(reduced_run(run)))
+
+
+def test_sound_runs_have_no_fault(sound):
+    assert not [told(sound, run) for run in sound.runs if told(sound, run)]
+
+
+@pytest.mark.parametrize(("fault", "name", "message"), [(fault, *case) for fault, case in CASES.items()])
+def test_a_fault_is_told_with_the_name_of_its_run(tmp_path, fault, name, message):
+    path = write(Campaign(seed=2, rate_hz=10.0, faults={name: fault}), tmp_path).path
+    with pytest.raises(InputError, match=message) as error:
+        reduce_campaign(read_campaign(path))
+    assert f"{name}.csv" in str(error.value)
+    assert "--keep-going" in str(error.value)
+
+
+def test_the_rest_is_reduced_when_asked_to_go_on(tmp_path):
+    faults = {name: fault for fault, (name, _) in CASES.items()}
+    written = write(Campaign(seed=2, rate_hz=10.0, faults=faults), tmp_path)
+    reduction = reduce_campaign(read_campaign(written.path, keep_going=True), Options(keep_going=True))
+    assert len(reduction.faults) == len(CASES)
+    assert len(reduction.runs) == len(written.runs) - len(CASES)
+    for name in ("Yv", "Nr", "Yvdot"):
+        found = reduction.derivatives[name]
+        assert abs(found.value - written.derivatives[name]) < 4 * found.standard_error
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "message"),
+    [
+        ("sway_02", lambda run: {"v_mps": 1.3 * run.v_mps}, "v_mps: is 1.3 times the rate of change of y_m"),
+        ("sway_02", lambda run: {"v_mps": -run.v_mps}, "v_mps: has the opposite sign of the rate of change of y_m"),
+        ("yaw_02", lambda run: {"psi_rad": np.roll(run.psi_rad, 40)}, "r_radps: is .* deg out of phase"),
+        ("drift_+08", lambda run: {"v_mps": -run.v_mps}, "has a drift angle of -8 deg by its v, and 8 deg"),
+        ("drift_+08", lambda run: {"Y_N": 1000 * run.Y_N}, "column Y_N: reaches .* no hull has; give it in N"),
+        ("drift_+08", lambda run: {"speed_mps": 100 * run.speed_mps}, "speed_mps: has a mean of"),
+        ("drift_+08", lambda run: {"delta_rad": run.delta_rad + 2.0}, "column delta_rad: reaches 2, which cannot be"),
+        ("rudder_+10", lambda run: {"delta_rad": -run.delta_rad}, "delta_rad: is -10 deg, and 10 deg by the sheet"),
+        ("rudder_+10", lambda run: {"r_radps": run.r_radps + 0.05}, "is said to be static_rudder, and the model moves"),
+        ("drift_+08", lambda run: {"time_s": run.time_s + 3 * (run.time_s > 5)}, "column t_s: has a gap of 3.1 s"),
+    ],
+)
+def test_records_that_cannot_be(sound, name, changes, message):
+    run = run_of(sound, name)
+    assert not told(sound, run)
+    assert re.search(message, told(sound, replace(run, **changes(run))))
+
+
+def test_a_plateau_of_a_coarse_digital_gauge_is_not_saturation(sound):
+    run = run_of(sound, "sway_02")
+    step = np.ptp(run.Y_N) / 12
+    assert "saturated" not in told(sound, replace(run, Y_N=np.round(run.Y_N / step) * step))
