@@ -34,7 +34,7 @@ from tank2sim.records.campaigns import Campaign, read_campaign
 @click.option("--off-speed", is_flag=True, help="Use runs away from the test speed, too, for terms in the speed.")
 @click.option("--all-terms", is_flag=True, help="Keep terms that do not differ from zero.")
 @click.option("--test-symmetry", is_flag=True, help="Test terms that port-starboard symmetry leaves out.")
-@click.option("--plot", "plots", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Write plots.")
+@click.option("--plot", "plots", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Plots, page.")
 @json_option
 def command(
     campaign: Path, *, fill: str | None, scale: str | None, plots: Path | None, output: Path | None, **more: object
@@ -56,7 +56,7 @@ def command(
     if isinstance(json_file, Path):
         files[json_file] = json_text(reduction_as_json(reduction, card, warnings))
     if plots:
-        files |= _pictures(reduction, plots)
+        files |= _pictures(reduction, card, warnings, plots)
     write_together(files)
     _show(reduction, card)
     show_notices(warnings)
@@ -114,11 +114,17 @@ def _fill_notices(card: Contents, fill: str | None, ratio: float | None, campaig
     return told
 
 
-def _pictures(reduction: Reduction, folder: Path) -> dict[Path, str | bytes]:
-    from tank2sim.report.captive_results import reduction_pictures
+def _pictures(reduction: Reduction, card: Contents, warnings: tuple[str, ...], folder: Path) -> dict[Path, str | bytes]:
+    """A picture of each chart, and the page that has them all."""
+    from tank2sim.report.captive_page import reduction_page
+    from tank2sim.report.captive_results import reduction_charts
+    from tank2sim.report.charts import chart_png
+    from tank2sim.report.page import render_page
 
     writable_folder(folder)
-    return {folder / name: picture for name, picture in reduction_pictures(reduction).items()}
+    charts = reduction_charts(reduction)
+    pictures: dict[Path, str | bytes] = {folder / f"{stem}.png": chart_png(chart) for stem, chart in charts.items()}
+    return {**pictures, folder / "report.html": render_page(reduction_page(reduction, card, warnings, charts))}
 
 
 def _show(reduction: Reduction, card: Contents) -> None:

@@ -26,7 +26,6 @@ from tank2sim.report.captive_charts import (
     loop_chart,
     residual_chart,
 )
-from tank2sim.report.charts import chart_png
 
 _NORMAL = 1.959964
 _SAMPLES = 81
@@ -57,11 +56,6 @@ def reduction_charts(reduction: Reduction) -> dict[str, alt.TopLevelMixin]:
         title="Each run against its prediction from all the others",
     )
     return charts
-
-
-def reduction_pictures(reduction: Reduction) -> dict[str, bytes]:
-    """File name to PNG picture of each chart."""
-    return {f"{stem}.png": chart_png(chart) for stem, chart in reduction_charts(reduction).items()}
 
 
 def _angle_chart(reduction: Reduction, force: str, kind: str, words: str) -> alt.LayerChart | None:

@@ -1,0 +1,96 @@
+"""The page of a captive campaign: derivatives, how they were found, and every chart of the reduction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import altair as alt
+
+from tank2sim.identification.captive.as_json import prediction_errors
+from tank2sim.identification.captive.reduction import Reduction
+from tank2sim.identification.captive.result_card import Contents
+from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
+
+_FORCES = {"X": "surge force", "Y": "sway force", "N": "yaw moment"}
+
+
+def reduction_page(
+    reduction: Reduction, card: Contents, warnings: Sequence[str], charts: Mapping[str, alt.TopLevelMixin]
+) -> Page:
+    """The page; `charts` as :func:`tank2sim.report.captive_results.reduction_charts` gives them."""
+    model = reduction.campaign.model
+    measured = len(card.entries) - len(card.estimated)
+    figures = [
+        Figure(label="Runs reduced", value=len(reduction.runs), note=f"{len(reduction.not_used)} left out"),
+        Figure(label="Derivatives measured", value=measured, note="prime system, rudder to starboard"),
+        Figure(
+            label="Derivatives estimated",
+            value=len(card.estimated),
+            verdict=Verdict.CAUTION if card.estimated else Verdict.NONE,
+            note=", ".join(card.estimated) or "none",
+        ),
+    ]
+    sections = [
+        Section(
+            heading="Derivatives",
+            text="One weighted regression over the whole campaign, and beside it the paper's order of tests.",
+            tables=[_derivatives(reduction, card)],
+            notes=warnings,
+        ),
+        Section(
+            heading="Which terms, and why",
+            text="Terms that the runs excite and that are not in the card.",
+            tables=[_left_out(reduction)],
+        ),
+        Section(
+            heading="Leave one run out",
+            text="How well each run is predicted from the others: root mean square error, % of the force's range.",
+            tables=[_predictions(reduction)],
+        ),
+        *_chart_sections(charts),
+    ]
+    return Page(title=model.name, subtitle="Captive model tests, reduced", figures=figures, sections=sections)
+
+
+def _derivatives(reduction: Reduction, card: Contents) -> Table:
+    rows: list[list[Cell]] = []
+    for name, entry in card.entries.items():
+        steps = reduction.forces[name[0]].stepwise
+        other: list[Cell] = [None, None, ""]
+        if name in steps.names and name not in card.estimated:
+            place = steps.names.index(name)
+            tests = str(steps.found_in[place]).replace("_", " ")
+            other = [1e5 * float(steps.values[place]), 1e5 * float(steps.standard_errors[place]), tests]
+        origin = "estimated" if name in card.estimated else "measured"
+        rows.append([name, 1e5 * float(entry.value), 1e5 * float(entry.standard_error), *other, origin])
+    heads = ("", "regression", "±", "paper's order", "±", "from tests", "origin")
+    return Table(caption="Prime system, times 10⁵", columns=[Column(title=head) for head in heads], rows=rows)
+
+
+def _left_out(reduction: Reduction) -> Table:
+    rows: list[list[Cell]] = [
+        [choice.name, choice.reason, choice.told]
+        for result in reduction.forces.values()
+        for choice in result.selection.choices
+        if choice.reason in ("collinear", "not significant")
+    ]
+    return Table(caption="Left out", columns=[Column(title=head) for head in ("term", "reason", "why")], rows=rows)
+
+
+def _predictions(reduction: Reduction) -> Table:
+    rows: list[list[Cell]] = [
+        [kind.replace("_", " "), *(100 * forces[force]["relative"] if force in forces else None for force in _FORCES)]
+        for kind, forces in prediction_errors(reduction).items()
+    ]
+    columns = [Column(title="runs of type"), *(Column(title=force, unit="%", digits=2) for force in _FORCES)]
+    return Table(caption="Prediction errors", columns=columns, rows=rows)
+
+
+def _chart_sections(charts: Mapping[str, alt.TopLevelMixin]) -> list[Section]:
+    """A section for each force and its angles and amplitudes, one for what concerns all."""
+    groups: dict[str, list[Illustration]] = {}
+    for stem, chart in charts.items():
+        words = _FORCES.get(stem.rpartition("_")[2])
+        heading = f"{words.capitalize()} against motion" if words else "Loops and residuals"
+        groups.setdefault(heading, []).append(Illustration(chart=chart))
+    return [Section(heading=heading, charts=illustrations) for heading, illustrations in groups.items()]
