@@ -3,72 +3,167 @@
 from __future__ import annotations
 
 import os
+import stat
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from tank2sim.errors import InputError
 
+BYTE_ORDER_MARK = "\ufeff"
+"""What some editors put before UTF-8 text."""
 
-def write_whole(path: Path, content: str | bytes) -> None:
+
+def write_whole(path: Path, content: str | bytes, *, inputs: Iterable[Path] = ()) -> None:
     """Write a file so that a reader sees the old content or the complete new one, never a part.
 
     Raises
     ------
     InputError
-        The folder is missing, or cannot be written.
+        As :func:`write_together`.
     """
-    write_together({path: content})
+    write_together({path: content}, inputs=inputs)
 
 
-def write_together(contents: Mapping[Path, str | bytes]) -> None:
+def write_together(
+    contents: Mapping[Path, str | bytes], *, inputs: Iterable[Path] = (), outputs: Iterable[Path | None] = ()
+) -> None:
     """Write several files, all or none: first all as temporary files beside their targets, then all are renamed.
+
+    A link keeps pointing where it does, and its target is replaced; what is no regular file (a device, a pipe) cannot
+    be replaced and is written to.
+
+    Parameters
+    ----------
+    contents : mapping
+        Path to what is to stand there.
+    inputs : paths, optional
+        Files that were read, which must not be overwritten; those that do not exist are passed over.
+    outputs : paths, optional
+        The outputs as the user gave them, None for those left out: a mapping cannot show that one was given twice.
 
     Raises
     ------
     InputError
-        One of the folders is missing or cannot be written; then nothing has been written.
+        One of the targets is an input, is given twice or is a folder, or its folder is missing or cannot be written;
+        then nothing has been written.
     """
-    ready: list[tuple[Path, Path]] = []
+    targets = [_target(Path(path)) for path in contents]
+    _refuse_doubled(targets)
+    _refuse_doubled([_target(Path(path)) for path in outputs if path is not None])
+    _refuse_inputs(targets, [Path(path) for path in inputs])
+    ready: list[tuple[Path, _Target]] = []
+    direct: list[tuple[bytes, _Target]] = []
     try:
-        for path, content in contents.items():
-            ready.append((_temporary(Path(path), content), Path(path)))
-        for temporary, path in ready:
-            temporary.replace(path)
+        for target, content in zip(targets, contents.values(), strict=True):
+            data = content.encode("utf-8") if isinstance(content, str) else content
+            if target.replaceable:
+                ready.append((_temporary(target, data), target))
+            else:
+                direct.append((data, target))
+        for data, target in direct:
+            with _told(target.given), target.path.open("wb") as stream:
+                stream.write(data)
+        for temporary, target in ready:
+            with _told(target.given):
+                temporary.replace(target.path)
     finally:
         for temporary, _ in ready:
             temporary.unlink(missing_ok=True)
 
 
-def _temporary(path: Path, content: str | bytes) -> Path:
-    if path.is_dir():
-        raise InputError(path, "", "is a folder, and a file is to be written there", "give the name of a file")
-    data = content.encode("utf-8") if isinstance(content, str) else content
-    temporary = None
+@dataclass(frozen=True)
+class _Target:
+    """Where a file is written: the name given, the path behind its links, and whether a file can be renamed to it."""
+
+    given: Path
+    path: Path
+    replaceable: bool
+
+
+def _target(given: Path) -> _Target:
+    with _told(given):
+        try:
+            mode = given.stat().st_mode
+        except FileNotFoundError:
+            return _Target(given, _without_links(given), True)
+        if stat.S_ISDIR(mode):
+            raise InputError(given, "", "is a folder, and a file is to be written there", "give the name of a file")
+        # The links of /dev/stdout lead to no path when it is a pipe: what is no regular file keeps its name.
+        regular = stat.S_ISREG(mode)
+        return _Target(given, _without_links(given) if regular else given, regular)
+
+
+def _without_links(path: Path) -> Path:
+    return Path(os.path.realpath(path))
+
+
+def _refuse_doubled(targets: Sequence[_Target]) -> None:
+    seen: set[Path] = set()
+    for target in targets:
+        if target.replaceable and target.path in seen:
+            raise InputError(target.given, "", "is given for two outputs", "give each a file of its own")
+        seen.add(target.path)
+
+
+def _refuse_inputs(targets: Sequence[_Target], inputs: Sequence[Path]) -> None:
+    for target in targets:
+        for path in inputs:
+            if target.replaceable and _same(target.path, path):
+                remedy = "give the output another name"
+                raise InputError(target.given, "", f"is an input ({path}), which would be overwritten", remedy)
+
+
+def _same(one: Path, other: Path) -> bool:
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        temporary = Path(name)
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
-        os.chmod(temporary, 0o666 & ~_umask())
+        return os.path.samefile(one, other)
+    except OSError:
+        return False  # one of them does not exist
+
+
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    try:
+        yield
     except OSError as error:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
         remedy = "choose a folder that exists and that you may write to"
         raise InputError(path, "", f"cannot be written ({error.strerror})", remedy) from None
+
+
+def _temporary(target: _Target, data: bytes) -> Path:
+    temporary = None
+    with _told(target.given):
+        try:
+            # Not named after the target: its name may already be as long as the file system allows.
+            handle, name = tempfile.mkstemp(prefix=".tank2sim-", dir=target.path.parent)
+            temporary = Path(name)
+            with os.fdopen(handle, "wb") as stream:
+                stream.write(data)
+            os.chmod(temporary, 0o666 & ~_umask())
+        except OSError:
+            if temporary is not None:
+                temporary.unlink(missing_ok=True)
+            raise
     return temporary
 
 
 def read_text(path: Path) -> str:
-    """Text of a UTF-8 file (a byte order mark is dropped).
+    """Text of a UTF-8 file; a byte order mark is dropped, and every line ends in a line feed.
 
     Raises
     ------
     InputError
         The file is missing, unreadable, or not UTF-8.
     """
+    return read_exact_text(path).removeprefix(BYTE_ORDER_MARK).replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_exact_text(path: Path) -> str:
+    """Text of a UTF-8 file as it stands, which encodes to the same bytes again. Raises as :func:`read_text`."""
     try:
-        return Path(path).read_text(encoding="utf-8-sig")
+        return Path(path).read_bytes().decode("utf-8")
     except FileNotFoundError:
         raise InputError(path, "", "there is no such file", "check the name") from None
     except UnicodeDecodeError as error:

@@ -62,39 +62,43 @@ class Unit:
         Name in the model description, such as ``m/s``.
     base : dict
         Exponents of the SI base units and of rad (``kg m s A K mol cd rad``).
+    extent : float
+        Magnitude that no variable of a ship or model in this unit exceeds: the bound of those that state none.
     displays : dict
         Name of a display unit to its factor: *display = factor * value in this unit*.
     """
 
     name: str
     base: dict[str, int]
+    extent: float
     displays: dict[str, float] = field(default_factory=dict)
 
 
 UNITS: dict[str, Unit] = {
     unit.name: unit
     for unit in (
-        Unit("1", {}),
-        Unit("m", {"m": 1}),
-        Unit("s", {"s": 1}),
-        Unit("kg", {"kg": 1}),
-        Unit("rad", {"rad": 1}, {"deg": 180.0 / math.pi}),
-        Unit("m/s", {"m": 1, "s": -1}, {"knots": 1.0 / KNOT_MPS}),
-        Unit("m/s2", {"m": 1, "s": -2}),
+        Unit("1", {}, 1e3),
+        Unit("m", {"m": 1}, 1e8),
+        Unit("s", {"s": 1}, 1e7),
+        Unit("kg", {"kg": 1}, 1e10),
+        Unit("rad", {"rad": 1}, 1e5, {"deg": 180.0 / math.pi}),
+        Unit("m/s", {"m": 1, "s": -1}, 1e3, {"knots": 1.0 / KNOT_MPS}),
+        Unit("m/s2", {"m": 1, "s": -2}, 1e3),
         Unit(
             "rad/s",
             {"rad": 1, "s": -1},
+            1e3,
             {"deg/s": 180.0 / math.pi, "deg/min": 60.0 * 180.0 / math.pi, "rpm": 60.0 / (2.0 * math.pi)},
         ),
-        Unit("rad/s2", {"rad": 1, "s": -2}, {"deg/s2": 180.0 / math.pi}),
-        Unit("N", {"kg": 1, "m": 1, "s": -2}),
-        Unit("N.m", {"kg": 1, "m": 2, "s": -2}),
-        Unit("kg/m3", {"kg": 1, "m": -3}),
-        Unit("kg.m", {"kg": 1, "m": 1}),
-        Unit("kg.m2", {"kg": 1, "m": 2}),
-        Unit("kg/m", {"kg": 1, "m": -1}),
-        Unit("kg.s/m2", {"kg": 1, "m": -2, "s": 1}),
-        Unit("kg.s2/m3", {"kg": 1, "m": -3, "s": 2}),
+        Unit("rad/s2", {"rad": 1, "s": -2}, 1e3, {"deg/s2": 180.0 / math.pi}),
+        Unit("N", {"kg": 1, "m": 1, "s": -2}, 1e12),
+        Unit("N.m", {"kg": 1, "m": 2, "s": -2}, 1e15),
+        Unit("kg/m3", {"kg": 1, "m": -3}, 1e5),
+        Unit("kg.m", {"kg": 1, "m": 1}, 1e13),
+        Unit("kg.m2", {"kg": 1, "m": 2}, 1e16),
+        Unit("kg/m", {"kg": 1, "m": -1}, 1e10),
+        Unit("kg.s/m2", {"kg": 1, "m": -2, "s": 1}, 1e10),
+        Unit("kg.s2/m3", {"kg": 1, "m": -3, "s": 2}, 1e10),
     )
 }
 """Every unit a variable of a model may declare."""

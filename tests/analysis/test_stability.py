@@ -124,3 +124,16 @@ def test_imo_verdicts_of_the_mariner(mariner) -> None:
     verdicts = {one.name: one.passed for one in imo_criteria(mariner)}
     assert verdicts.pop("tactical diameter") is False  # 6.4 L to starboard: she turns wide
     assert all(verdicts.values())
+
+
+def test_a_ship_whose_modes_both_grow_is_not_called_stable() -> None:
+    """C' > 0 is necessary, not sufficient: with positive Y_v and N_r both modes of sway and yaw grow."""
+    changed = {"model.kind": "linear", "derivatives.Nv": 0.0, "derivatives.Yv": 0.0005, "derivatives.Nr": 0.0001}
+    found = stability(build(read_card("mariner", changed)))
+    assert found.criterion > 0 and any(mode.real > 0 for mode in found.steering_modes)
+    assert not found.stable
+
+
+def test_the_imo_criteria_are_those_of_calm_water(mariner) -> None:
+    effect = [{"name": "current", "parameters": {"speed_mps": 0.8, "direction_deg": 40.0}}]
+    assert imo_criteria(build(read_card("mariner", {"effects": effect}))) == imo_criteria(mariner)

@@ -115,7 +115,7 @@ def test_uncertainty_left_out_is_two_percent() -> None:
     ("old", "new", "place", "expected"),
     [
         ("length_m = 100.0", "", "ship.length_m", "is missing"),
-        ("length_m = 100.0", "length_m = -100.0", "ship.length_m", "greater than 0"),
+        ("length_m = 100.0", "length_m = -100.0", "ship.length_m", "at least 0.01"),
         ("length_m = 100.0", "length_m = nan", "ship.length_m", "finite"),
         ("length_m = 100.0", "length_m = inf", "ship.length_m", "finite"),
         ("length_m = 100.0", "length_ft = 328.0", "ship.length_ft", "did you mean length_m?"),
@@ -169,6 +169,7 @@ def test_an_angle_out_of_bounds_is_told_in_the_units_of_the_file() -> None:
         ('name = "current"', "speed_mps: is missing"),
         ('name = "current"\nparameters = {speed_mps = 0.5, direction_deg = 30.0, depth_m = 1.0}', "no parameter"),
         ('name = "current"\nparameters = {speed_mps = -0.5, direction_deg = 30.0}', "was expected"),
+        ('name = "current"\nparameters = {speed_mps = 0.5, direction_deg = 400}', "direction_deg: is 400; -360 to 360"),
     ],
 )
 def test_a_faulty_effect_is_refused(effect: str, expected: str) -> None:
@@ -190,3 +191,63 @@ def test_changes_are_made_in_the_conventions_of_the_file() -> None:
     plain, changed = read_card("mariner"), read_card("mariner", {"derivatives.Yd": 300e-5})
     assert plain.derivatives["Yd"] == pytest.approx(-278e-5)
     assert changed.derivatives["Yd"] == pytest.approx(-300e-5)
+
+
+def test_the_propeller_term_of_a_dimensional_card_is_a_force() -> None:
+    text = SI_CARD + "[propulsion]\nnominal_rpm = 60.0\nXnn = 1e5\n"
+    assert parse_card(text, "ship.toml").propulsion.Xnn == pytest.approx(1e5 / (500.0 * 100.0**2 * 10.0**2))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "expected"),
+    [
+        ('kind = "abkowitz"', 'kind = ["abkowitz"]', "model.kind", "one of linear"),
+        ('kind = "abkowitz"', "kind = {a = 1}", "model.kind", "one of linear"),
+        ("length_m = 100.0", f"length_m = {'1' * 5000}", "", "thousands of digits"),
+        ("length_m = 100.0", f"length_m = {'1' * 400}", "ship.length_m", "was expected"),
+        ("length_m = 100.0", f"length_m = -{'1' * 400}", "ship.length_m", "was expected"),
+        ("length_m = 100.0", "length_m = 1e100", "ship.length_m", "at most 1000 "),
+        ("length_m = 100.0", "length_m = 1e-300", "ship.length_m", "at least 0.01 "),
+        ("speed_mps = 10.0", "speed_mps = 1e-300", "model.speed_mps", "at least 0.001 "),
+        ("kgpm3 = 1000.0", "kgpm3 = 1e30", "environment.water_density_kgpm3", "at most 20000 "),
+        ("[derivatives]", "[steering_gear]\ntime_constant_s = 1e-9\n[derivatives]", "time_constant_s", "0.001 "),
+        (
+            "[derivatives]",
+            f"[steering_gear]\nmax_rate_degps = {'1' * 400}\n[derivatives]",
+            "steering_gear.max_rate_degps",
+            "no number is so large",
+        ),
+        ("[derivatives]", f"deep = {'[' * 5000}{']' * 5000}\n[derivatives]", "", "nested too deeply"),
+        ("[rigid_body]", "valid_speed_mps = [9.0, 3.0]\n[rigid_body]", "model.valid_speed_mps", "the lower first"),
+        ("[rigid_body]", f"valid_speed_mps = [1, {'9' * 400}]\n[rigid_body]", "model.valid_speed_mps", "100 m/s"),
+        ("Yv = -6e5", f"Yv = {'9' * 400}", "derivatives.Yv", "number"),
+    ],
+)
+def test_what_no_ship_can_have_is_refused_in_one_short_line(old: str, new: str, place: str, expected: str) -> None:
+    assert old in SI_CARD
+    told = refusal(SI_CARD.replace(old, new, 1))
+    assert told.startswith("ship.toml: ") and place in told and expected in told
+    assert len(told) < 300
+
+
+def test_a_name_no_file_can_have_is_refused() -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        read_card("n" * 300)
+
+
+def test_line_ends_and_byte_order_mark_are_written_back(tmp_path: Path) -> None:
+    data = b"\xef\xbb\xbf" + SI_CARD.encode().replace(b"\n", b"\r\n")
+    (tmp_path / "ship.toml").write_bytes(data)
+    card = read_card(tmp_path / "ship.toml")
+    card.write(tmp_path / "copy.toml")
+    assert (tmp_path / "copy.toml").read_bytes() == data
+    new = revised(card, {"Yv": (card.derivatives["Yv"], 0.0)}).text
+    assert new.startswith("\ufeff\r\nformat") and "# kg\r\n" in new
+
+
+def test_an_angle_can_be_told_as_the_file_has_it() -> None:
+    effect = '[[effects]]\nname = "current"\nparameters = {speed_mps = 0.5, direction_deg = 30.0}\n'
+    card = parse_card(f"{SI_CARD}\n{effect}", "ship.toml")
+    place, value = card.in_file("effects.0.parameters.direction_rad", math.pi)
+    assert place == "effects.0.parameters.direction_deg" and value == pytest.approx(180.0)
+    assert card.in_file("ship.length_m", 3.0) == ("ship.length_m", 3.0)

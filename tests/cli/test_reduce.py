@@ -41,7 +41,7 @@ def test_card_json_and_plots_are_written_and_agree(path, tmp_path):
         "harmonics_Y.png",
         "residuals.png",
     } <= pictures
-    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in plots.iterdir())
+    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in plots.glob("*.png"))
 
 
 def test_a_missing_run_is_refused_and_nothing_is_written(tmp_path):
@@ -75,3 +75,13 @@ def test_a_card_at_ship_scale_tells_the_reynolds_ratio(path, tmp_path):
 def _model_card(path, folder):
     run(path, "-o", folder / "model.toml")
     return folder / "model.toml"
+
+
+@pytest.mark.parametrize("convention", ["on_gauge", "hydrodynamic"])
+def test_a_wrong_force_convention_is_warned_of_before_the_numbers(path, convention):
+    wrong = path.with_name(f"{convention}.toml")
+    wrong.write_text(path.read_text().replace('"on_model"', f'"{convention}"'))
+    shown = run(wrong).output
+    assert shown.startswith("warning: ")
+    assert shown.index("the added mass is negative") < shown.index("whole campaign")
+    assert "warning: " not in run(path).output

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,6 +19,7 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model, Parameter
 from tank2sim.errors import InputError
 from tank2sim.fmu.check import LIMITS, check_fmu
+from tank2sim.fmu.comparison import description_differences
 from tank2sim.fmu.export import write_fmu
 from tank2sim.fmu.manoeuvre import manoeuvre
 from tank2sim.fmu.reference import by_scheme, exactly
@@ -134,6 +136,113 @@ def test_a_description_with_a_fault_fails(fmu_file: Callable[[str, int], Path], 
     assert not report.passed
     assert any("lbf.ft" in problem for problem in report.validation)
     assert any("lbf.ft" in line for line in report.differences)
+
+
+def rewritten(source: Path, target: Path, change: Callable[[str, bytes], bytes]) -> Path:
+    """An FMU with other contents of its files."""
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
+        for entry in old.infolist():
+            new.writestr(entry, change(entry.filename, old.read(entry)))
+    return target
+
+
+@FMI
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('start="-0.12"', 'start="-0.22"', r"derivatives\.Yv.*start is -0\.22 in the FMU and -0\.12 in the model"),
+        ('factor="1.9438444924406046"', 'factor="1.0"', "Unit m/s: DisplayUnit knots: factor is 1.0 in"),
+        ('<BaseUnit kg="1" m="2" s="-2"/>', '<BaseUnit kg="1" m="3" s="-2"/>', "N.m: BaseUnit: m is 3 in"),
+        ('displayUnit="knots" ', "", "motion.u.*displayUnit is missing in the FMU and knots in"),
+        ('unit="m/s2"', 'unit="m/s"', "motion.udot.*unit is m/s in the FMU and m/s2 in"),
+        ('min="-0.6"', 'min="-0.7"', "rudder.command.*min is -0.7 in"),
+        ('max="0.6" ', "", "rudder.command.*max is missing in"),
+        ('nominal="100.0"', 'nominal="10.0"', "motion.x.*nominal is 10.0 in"),
+        ('variability="tunable"', 'variability="fixed"', "derivatives.drag.*variability is fixed in"),
+        ('causality="local"', 'causality="output"', "causality is output in the FMU and local in"),
+        ("+ to starboard", "+ to port", "rudder.command.*description is Rudder order, . to port in"),
+    ],
+)
+def test_whatever_is_falsified_in_a_description_is_told(
+    fmi: int, old: str, new: str, told: str, fmu_file: Callable[[str, int], Path], hull: Model, tmp_path: Path
+) -> None:
+    with zipfile.ZipFile(fmu_file("hull", fmi)) as archive:
+        text = archive.read("modelDescription.xml")
+    assert description_differences(tmp_path, text, hull, fmi) == []
+    assert old.encode() in text
+    differences = description_differences(tmp_path, text.replace(old.encode(), new.encode()), hull, fmi)
+    assert any(re.search(told, line) for line in differences), differences
+
+
+@pytest.mark.parametrize(
+    ("old", "told"), [(b'start="-0.12"', "start is 0.7"), (b'factor="1.9438444924406046"', "knots")]
+)
+def test_an_fmu_with_a_falsified_description_fails(
+    old: bytes, told: str, fmu_file: Callable[[str, int], Path], hull: Model, tmp_path: Path
+) -> None:
+    def falsify(name: str, data: bytes) -> bytes:
+        return data.replace(old, old.split(b"=")[0] + b'="0.7"') if name == "modelDescription.xml" else data
+
+    report = check_fmu(rewritten(fmu_file("hull", 2), tmp_path / "x.fmu", falsify), model=hull)
+    assert not report.passed
+    assert len(report.differences) == 1 and told in report.differences[0]
+    assert max(report.errors["CoSimulation"].values()) < 1e-9
+
+
+def test_another_spelling_of_a_number_is_no_difference(
+    fmu_file: Callable[[str, int], Path], models: dict[str, Model], tmp_path: Path
+) -> None:
+    def respell(name: str, data: bytes) -> bytes:
+        return data.replace(b'start="0.05"', b'start="5e-2"') if name == "modelDescription.xml" else data
+
+    path = rewritten(fmu_file("body", 2), tmp_path / "x.fmu", respell)
+    assert path.read_bytes() != fmu_file("body", 2).read_bytes()
+    assert check_fmu(path, model=models["body"]).passed
+
+
+def cut(name: str, data: bytes) -> bytes:
+    return data[: len(data) // 3] if name.startswith("binaries/") else data
+
+
+def empty(name: str, data: bytes) -> bytes:
+    return b"" if name.startswith("binaries/") else data
+
+
+def another_token(name: str, data: bytes) -> bytes:
+    return re.sub(rb'(guid|instantiationToken)="\{........', rb'\1="{00000000', data) if name.endswith(".xml") else data
+
+
+@FMI
+@pytest.mark.parametrize("damage", [cut, empty, another_token])
+def test_a_library_that_cannot_be_used_is_a_failed_check(
+    damage: Callable[[str, bytes], bytes],
+    fmi: int,
+    fmu_file: Callable[[str, int], Path],
+    hull: Model,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    report = check_fmu(rewritten(fmu_file("hull", fmi), tmp_path / "x.fmu", damage), model=hull)
+    assert not report.passed
+    assert [line.split(":")[0] for line in report.differences] == list(KINDS)
+    assert not any("\n" in line or "Traceback" in line for line in report.differences)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(("end", "told"), [("abort()", "SIGABRT"), ("exit(0)", "exit code 0")])
+def test_a_library_that_ends_its_process_is_a_failed_check(
+    end: str, told: str, hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tank2sim.fmu import sources
+
+    generate = sources.generate_c
+    deadly = f"\n#include <stdlib.h>\n__attribute__((constructor)) static void end(void) {{ {end}; }}\n"
+    monkeypatch.setattr(sources, "generate_c", lambda functions, stem: generate(functions, stem) + deadly)
+    write_fmu(hull, tmp_path / "x.fmu")
+    report = check_fmu(tmp_path / "x.fmu", model=hull)
+    assert not report.passed
+    assert all("ended the process" in line and told in line for line in report.differences)
+    assert len(report.differences) == len(KINDS)
 
 
 def test_without_a_model_the_file_alone_is_validated(fmu_file: Callable[[str, int], Path]) -> None:

@@ -140,8 +140,9 @@ def test_orders_from_a_file_are_held_and_repeat_a_turn(mariner, tmp_path) -> Non
     assert set(run["rudder.command"]) == {math.radians(35.0), 0.0}
 
 
-def test_a_port_positive_orders_file_is_converted(tmp_path) -> None:
-    (tmp_path / "o.csv").write_text("# rudder_sign: port\nt_s,delta_order_deg\n0,10\n50,-10\n")
+@pytest.mark.parametrize("comment", ["# rudder_sign: port", "# rudder_sign: Port", "# RUDDER_SIGN: port"])
+def test_a_port_positive_orders_file_is_converted(tmp_path, comment: str) -> None:
+    (tmp_path / "o.csv").write_text(f"{comment}\nt_s,delta_order_deg\n0,10\n50,-10\n")
     orders = read_orders(tmp_path / "o.csv")
     np.testing.assert_allclose(orders.inputs["rudder.command"], np.radians([-10, 10]))
 
@@ -155,6 +156,9 @@ def test_a_port_positive_orders_file_is_converted(tmp_path) -> None:
         ("t_s,delta_order_deg,sail_deg\n0,1,2\n", "no order"),
         ("t_s,delta_order_deg\n0,\n1,2\n", "empty"),
         ("t_s,delta_order_deg\n0,hard over\n", "hard over"),
+        ("# rudder_sign: prot\nt_s,delta_order_deg\n0,1\n5,2\n", "rudder_sign"),
+        ("t_s,delta_order_deg,delta_deg\n0,1,2\n5,1,2\n", "two rudder columns"),
+        ("t_s,delta_order_deg\n0,1\n1e8,2\n", "1e\\+08"),
     ],
 )
 def test_faulty_orders_are_refused(tmp_path, text: str, expected: str) -> None:
@@ -193,3 +197,21 @@ def test_a_run_is_written_as_a_trial_in_the_units_of_its_header(mariner) -> None
     assert last["delta_order_deg"] == pytest.approx(20.0)
     assert last["r_degps"] == pytest.approx(math.degrees(run["motion.r"][-1]))
     assert last["x_m"] == pytest.approx(run["motion.x"][-1])
+
+
+def test_a_single_order_needs_to_be_told_how_long(mariner, tmp_path) -> None:
+    (tmp_path / "o.csv").write_text("t_s,delta_order_deg\n0,10\n")
+    with pytest.raises(InputError, match="--duration"):
+        simulate(mariner, parse_manoeuvre(f"file:{tmp_path}/o.csv"))
+    run = simulate(mariner, parse_manoeuvre(f"file:{tmp_path}/o.csv"), duration_s=20.0).trajectory
+    assert run.t[-1] == pytest.approx(20.0) and run["motion.psi"][-1] > 0
+
+
+def test_an_order_beyond_the_gear_is_told(mariner) -> None:
+    run = simulate(mariner, parse_manoeuvre("turn:60"), duration_s=60.0)
+    assert any("its gear stops at 40 deg" in notice for notice in run.notices)
+
+
+def test_a_duration_beside_the_grid_by_rounding_ends(mariner) -> None:
+    run = simulate(mariner, parse_manoeuvre("zigzag:10/10"), duration_s=100.00000000001).trajectory
+    assert run.t[-1] == pytest.approx(100.0)

@@ -109,3 +109,10 @@ def test_trim_starts_in_steady_motion(integrator) -> None:
     running.run(300.0)
     np.testing.assert_allclose([running.state(name) for name in ("motion.u", "motion.v", "motion.r")], start, rtol=1e-9)
     assert start[2] > 0.005
+
+
+def test_trim_leaves_a_failed_rudder_where_it_is(integrator) -> None:
+    start = {"initial.trim": 1.0, "initial.rudder_angle": np.radians(5.0)}
+    running = Running(integrator, {"rudder.command": np.radians(20.0), "steering.failed": 1.0}, start)
+    assert running.state("rudder.angle") == pytest.approx(np.radians(5.0))
+    assert running.state("motion.r") > 0

@@ -41,10 +41,12 @@ def imo_criteria(model: Model) -> tuple[Criterion, ...]:
     integrator = Integrator(model)
     parameters = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     time = parameters["ship.length"] / parameters["ship.speed"]
+    # MSC.137(76) asks for calm water: a current on the card is part of one place, not of the ship.
+    calm = {name: 0.0 for name in model.input_names if name in ("current.speed", "wind.speed")}
     rudder = min(TRIAL_RUDDER, parameters.get("steering.max_angle", TRIAL_RUDDER))
 
     def worst(manoeuvres: list[Turn] | list[Zigzag], *places: tuple[str, int | None]) -> list[float | None]:
-        runs = [simulate(model, manoeuvre, integrator=integrator).figures for manoeuvre in manoeuvres]
+        runs = [simulate(model, one, inputs=calm, integrator=integrator).figures for one in manoeuvres]
         found: list[float | None] = []
         for name, number in places:
             values = [_number(run[name], number) for run in runs]

@@ -40,8 +40,10 @@ class Stability:
     eigenvalues : tuple of complex
         Of surge, sway and yaw, 1/s, slowest first.
     criterion : float
-        C' = Y'_v (N'_r - m' x'_G u') - N'_v (Y'_r - m' u'): the ship is stable on a straight course if it is positive.
+        C' = Y'_v (N'_r - m' x'_G u') - N'_v (Y'_r - m' u'): a ship that is stable on a straight course has it positive.
         Prime system; the slopes are those of the full forces at the operating point.
+    steering_modes : tuple of complex
+        Eigenvalues of sway and yaw alone, 1/s.
     nomoto, nomoto_prime : Nomoto
         In SI; and with K L/U, T U/L.
     """
@@ -52,13 +54,17 @@ class Stability:
     rudder_deg: float
     eigenvalues: tuple[complex, ...]
     criterion: float
+    steering_modes: tuple[complex, ...]
     nomoto: Nomoto
     nomoto_prime: Nomoto
 
     @property
     def stable(self) -> bool:
-        """True if the ship holds a straight course with the rudder fixed (yaw and sway modes both decay)."""
-        return self.criterion > 0
+        """True if the ship holds a straight course with the rudder fixed: both modes of sway and yaw decay.
+
+        C' > 0 alone is not enough: two modes that both grow have it, too.
+        """
+        return all(mode.real < 0 for mode in self.steering_modes)
 
     def as_json(self) -> dict[str, object]:
         """The result as JSON has it; eigenvalues as [real, imaginary]."""
@@ -104,6 +110,7 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
         rudder_deg=float(np.degrees(at["rudder.angle"])),
         eigenvalues=tuple(eigenvalues),
         criterion=criterion,
+        steering_modes=tuple(complex(value) for value in steering.poles()),
         nomoto=own,
         nomoto_prime=Nomoto(
             own.K_per_s * time,

@@ -21,6 +21,7 @@ from tank2sim.cards.form import (
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.files import write_whole
+from tank2sim.units import from_si
 
 DEFAULT_RELATIVE_ERROR = 0.02
 """Standard error of a derivative without ``[uncertainty]``, relative to its value (card format)."""
@@ -30,8 +31,8 @@ DEFAULT_RELATIVE_ERROR = 0.02
 class Card:
     """A card: its text, and what the text says.
 
-    The text is kept as it was read, comments and all, so that a card is written back without loss; the other fields are
-    converted from it once.
+    The text is kept as it was read (comments, line ends and byte order mark), so that a card is written back without
+    loss; the other fields are converted from it once.
 
     Parameters
     ----------
@@ -77,6 +78,9 @@ class ManoeuvringCard(Card):
         Canonical name to standard error, same scaling; absent means :data:`DEFAULT_RELATIVE_ERROR`.
     places : mapping
         Canonical name to the key under which the file has it.
+    spelt : mapping
+        Place of an angle or a rate in SI (``effects.0.parameters.direction_rad``) to its place in the file
+        (``effects.0.parameters.direction_deg``).
     effects : tuple
         Effects on top of the polynomial, in the order of the file.
     """
@@ -87,6 +91,7 @@ class ManoeuvringCard(Card):
     derivatives: Mapping[str, float]
     uncertainty: Mapping[str, float] = field(default_factory=dict)
     places: Mapping[str, str] = field(default_factory=dict)
+    spelt: Mapping[str, str] = field(default_factory=dict)
     steering_gear: SteeringGear | None = None
     propulsion: Propulsion | None = None
     effects: tuple[EffectEntry, ...] = ()
@@ -95,6 +100,11 @@ class ManoeuvringCard(Card):
     def scales(self) -> Scales:
         """What makes this ship's numbers non-dimensional."""
         return Scales(self.environment.water_density_kgpm3, self.ship.length_m, self.model.speed_mps)
+
+    def in_file(self, place: str, value: float) -> tuple[str, float]:
+        """Place and value as the file has them, from those in SI: for messages about an angle."""
+        own = self.spelt.get(place, place)
+        return own, from_si(own, value)
 
     def standard_error(self, name: str) -> float:
         """Standard error of a derivative (prime): as stated, or the default share of its value."""

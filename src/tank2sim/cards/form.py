@@ -7,10 +7,40 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 Positive = Annotated[float, Field(gt=0)]
+# Bounds of plausibility, far outside anything that was ever built, towed or steered: a number beyond them is a slip of
+# the pen or of the unit, and the powers of it in the prime system (up to L^5) leave the range of a float.
+Length = Annotated[float, Field(ge=0.01, le=1000.0)]
+Speed = Annotated[float, Field(ge=0.001, le=100.0)]
+WaterDensity = Annotated[float, Field(ge=1.0, le=20000.0)]
+AirDensity = Annotated[float, Field(ge=1e-3, le=100.0)]
+Gravity = Annotated[float, Field(ge=0.01, le=1000.0)]
+Viscosity = Annotated[float, Field(ge=1e-9, le=1.0)]
+TimeConstant = Annotated[float, Field(ge=1e-3, le=1000.0)]
+AngularRate = Annotated[float, Field(ge=1e-6, le=1e5)]
+Mass = Annotated[float, Field(ge=1e-6, le=1e12)]
 Text = Annotated[str, Field(min_length=1)]
+
+
+def _rising_pair(value: object) -> object:
+    """TOML has lists, the form has pairs.
+
+    Raises
+    ------
+    ValueError
+        It is no list of two plausible speeds, the lower first.
+    """
+    if not isinstance(value, list):
+        return value
+    numbers = all(isinstance(speed, int | float) and not isinstance(speed, bool) for speed in value)
+    if len(value) != 2 or not numbers or not 0 <= value[0] < value[1] <= 100:
+        raise ValueError("two speeds, the lower first, from 0 to 100 m/s were expected")
+    return tuple(value)
+
+
+SpeedRange = Annotated[tuple[float, float], BeforeValidator(_rising_pair)]
 
 
 class Section(BaseModel):
@@ -24,12 +54,12 @@ class Body(Section):
 
     name: Text
     source: Text
-    length_m: Positive | None = None
+    length_m: Length | None = None
     beam_m: Positive | None = None
     draught_m: Positive | None = None
     displacement_kg: Positive | None = None
     block_coefficient: Annotated[float, Field(gt=0, le=1)] | None = None
-    speed_trials_mps: Positive | None = None
+    speed_trials_mps: Speed | None = None
     projected_area_front_m2: Positive | None = None
     projected_area_side_m2: Positive | None = None
     rudder_area_m2: Positive | None = None
@@ -42,33 +72,28 @@ class Body(Section):
 class Ship(Body):
     """``[ship]`` of a manoeuvring ship, whose length between perpendiculars is the L of the prime system."""
 
-    length_m: Positive
+    length_m: Length
 
 
 class Environment(Section):
     """``[environment]``: water, air and gravity; the defaults are those of the card format."""
 
-    water_density_kgpm3: Positive = 1025.0
-    air_density_kgpm3: Positive = 1.225
-    gravity_mps2: Positive = 9.80665
-    kinematic_viscosity_m2ps: Positive = 1.19e-6
+    water_density_kgpm3: WaterDensity = 1025.0
+    air_density_kgpm3: AirDensity = 1.225
+    gravity_mps2: Gravity = 9.80665
+    kinematic_viscosity_m2ps: Viscosity = 1.19e-6
 
 
 class ShipModel(Section):
     """``[model]`` of a manoeuvring ship: what kind of equations, and in which conventions the numbers are given."""
 
     kind: Literal["linear", "abkowitz"]
-    speed_mps: Positive
+    speed_mps: Speed
     scaling: Literal["prime", "dimensional"]
     speed_scale: Literal["instantaneous", "nominal"]
     yaw_rate_terms: Literal["total", "hydrodynamic"]
     rudder_sign: Literal["port", "starboard"]
-    valid_speed_mps: tuple[float, float] | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _range_from_list(cls, values: object) -> object:
-        return with_tuple(values, "valid_speed_mps")
+    valid_speed_mps: SpeedRange | None = None
 
     @property
     def speed_range_mps(self) -> tuple[float, float]:
@@ -80,12 +105,7 @@ class SurgeModel(Section):
     """``[model]`` of a body that only surges (eq. 1.5)."""
 
     kind: Literal["surge"]
-    valid_speed_mps: tuple[float, float] | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _range_from_list(cls, values: object) -> object:
-        return with_tuple(values, "valid_speed_mps")
+    valid_speed_mps: SpeedRange | None = None
 
 
 class RigidBody(Section):
@@ -99,27 +119,27 @@ class RigidBody(Section):
 class SteeringGear(Section):
     """``[steering_gear]``: first-order lag, rate and angle limits; absent means none."""
 
-    time_constant_s: Positive | None = None
-    max_rate_radps: Positive | None = None
+    time_constant_s: TimeConstant | None = None
+    max_rate_radps: AngularRate | None = None
     max_angle_rad: Annotated[float, Field(gt=0, lt=1.5707963267948966)] | None = None
 
 
 class Propulsion(Section):
     """``[propulsion]``: the effect of revolutions on surge, ``Xnn`` in the prime system at the speed of expansion."""
 
-    nominal_radps: Positive
+    nominal_radps: AngularRate
     Xnn: float
 
 
 class Surge(Section):
     """``[surge]``: coefficients of (1.5), M dv/dt + B1 v^4 + B2 v^3 + B3 v^2 = T."""
 
-    total_mass_kg: Positive
+    total_mass_kg: Mass
     B1_kgs2pm3: float = 0.0
     B2_kgspm2: float = 0.0
     B3_kgpm: float
     force_N: float = 0.0
-    dry_mass_kg: Positive | None = None
+    dry_mass_kg: Mass | None = None
 
 
 class EffectEntry(Section):
@@ -158,20 +178,3 @@ class SurgeCard(Section):
 
 FORMS: dict[str, type[ShipCard] | type[SurgeCard]] = {"linear": ShipCard, "abkowitz": ShipCard, "surge": SurgeCard}
 """Kind of model to the form of its card."""
-
-
-def with_tuple(values: object, key: str) -> object:
-    """TOML has lists, the form has pairs: a list of two rising numbers becomes a tuple.
-
-    Raises
-    ------
-    ValueError
-        The pair does not rise.
-    """
-    if isinstance(values, dict) and isinstance(values.get(key), list):
-        pair = tuple(values[key])
-        numbers = all(isinstance(value, int | float) for value in pair)
-        if len(pair) != 2 or not numbers or not 0 <= pair[0] < pair[1]:
-            raise ValueError(f"{key} must be two speeds, the lower first")
-        return {**values, key: pair}
-    return values

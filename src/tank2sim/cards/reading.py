@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +16,11 @@ from tomlkit.exceptions import TOMLKitError
 
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards.card import Card, ManoeuvringCard, SurgeBodyCard
-from tank2sim.cards.form import FORMS, EffectEntry, RigidBody, ShipCard, SurgeCard
+from tank2sim.cards.form import FORMS, EffectEntry, Propulsion, RigidBody, ShipCard, SurgeCard
 from tank2sim.cards.scaling import Scales, file_factor
 from tank2sim.cards.terms import parse_term
 from tank2sim.errors import InputError
-from tank2sim.files import read_text
+from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
 from tank2sim.units import from_si, to_si
 
 # Sections whose keys may give an angle in degrees or radians.
@@ -34,8 +36,11 @@ def find_card(name: str) -> Path:
         It is neither.
     """
     path = Path(name)
-    if path.is_file():
-        return path
+    try:
+        if path.is_file():
+            return path
+    except OSError as error:
+        raise InputError(name, "", f"cannot be read ({error.strerror})", "check the name") from None
     ships = bundled_cards()
     if name.lower() in ships:
         return ships[name.lower()]
@@ -58,18 +63,18 @@ def read_card(name: str | Path, changes: Mapping[str, object] | None = None) -> 
         There is no such card, or something in it is wrong; the message names file, key and what was expected.
     """
     path = find_card(str(name))
-    text = read_text(path)
+    text = read_exact_text(path)
     return parse_card(changed_text(text, str(path), changes) if changes else text, str(path))
 
 
 def parse_card(text: str, source: str) -> Card:
     """The card that a TOML text describes; `source` names it in messages. Raises as :func:`read_card`."""
-    content = _toml(text, source).unwrap()
+    content = _content(text, source)
     if not isinstance(content.get("model"), dict):
         raise InputError(source, "model", "this section is missing", "a card needs [model] with its kind")
     kind = content["model"].get("kind")
-    if kind not in FORMS:
-        raise InputError(source, "model.kind", f"is {kind!r}", f"one of {', '.join(FORMS)} was expected")
+    if not isinstance(kind, str) or kind not in FORMS:
+        raise InputError(source, "model.kind", f"is {_short(kind)}", f"one of {', '.join(FORMS)} was expected")
     spelt: dict[str, str] = {}
     _angles_to_radians(content, source, spelt)
     try:
@@ -77,7 +82,7 @@ def parse_card(text: str, source: str) -> Card:
     except ValidationError as error:
         raise _told(error, source, spelt) from None
     if isinstance(form, ShipCard):
-        return _manoeuvring_card(form, text, source)
+        return replace(_manoeuvring_card(form, text, source), spelt=spelt)
     return _surge_card(form, text, source)
 
 
@@ -89,7 +94,7 @@ def changed_text(text: str, source: str, changes: Mapping[str, object]) -> str:
     InputError
         A key leads through something that is no section.
     """
-    document = _toml(text, source)
+    document = _document(text, source)
     for key, value in changes.items():
         *sections, last = key.split(".")
         table: Any = document
@@ -100,7 +105,8 @@ def changed_text(text: str, source: str, changes: Mapping[str, object]) -> str:
             if not isinstance(table, dict):
                 raise InputError(source, key, f"cannot be set: {section} is no section", "give section.key=value")
         table[last] = value
-    return tomlkit.dumps(document)
+    mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
+    return mark + tomlkit.dumps(document)
 
 
 def revised(card: ManoeuvringCard, derivatives: Mapping[str, tuple[float, float]]) -> ManoeuvringCard:
@@ -130,13 +136,30 @@ def linear(card: Card) -> ManoeuvringCard:
     return new
 
 
-def _toml(text: str, source: str) -> tomlkit.TOMLDocument:
+def _content(text: str, source: str) -> dict[str, Any]:
+    with _faults_of_toml(source):
+        content = tomllib.loads(text.removeprefix(BYTE_ORDER_MARK))
+    return content
+
+
+def _document(text: str, source: str) -> tomlkit.TOMLDocument:
+    _content(text, source)  # unlike tomlkit, tomllib tells the place of every fault, a doubled key's too
+    with _faults_of_toml(source):
+        document = tomlkit.parse(text.removeprefix(BYTE_ORDER_MARK))
+    return document
+
+
+@contextmanager
+def _faults_of_toml(source: str) -> Iterator[None]:
     try:
-        tomllib.loads(text)  # unlike tomlkit it tells the place of every fault, a doubled key's too
-        return tomlkit.parse(text)
-    except (tomllib.TOMLDecodeError, TOMLKitError) as error:
+        yield
+    except RecursionError:
+        raise InputError(source, "", "is nested too deeply", "a card has sections and their keys") from None
+    except (ValueError, TOMLKitError) as error:  # a ValueError also when an integer has thousands of digits
         problem, _, place = str(error).partition(" (at ")
         remedy = "give each key once" if "overwrite" in problem or "twice" in problem else "mend the TOML there"
+        if "integer string conversion" in problem:
+            problem, remedy = "an integer has thousands of digits", "give a number of a plausible size"
         raise InputError(source, place.rstrip(")"), problem, remedy) from None
 
 
@@ -156,7 +179,10 @@ def _angles_to_radians(content: dict[str, Any], source: str, spelt: dict[str, st
             value = section[key]
             if isinstance(value, bool) or not isinstance(value, int | float):
                 continue
-            si_key, si_value = to_si(key, value)
+            try:
+                si_key, si_value = to_si(key, float(value))
+            except OverflowError:
+                raise InputError(source, f"{place}.{key}", f"is {_short(value)}", "no number is so large") from None
             spelt[f"{place}.{si_key}"] = f"{place}.{key}"
             if si_key != key:
                 if si_key in section:
@@ -175,7 +201,10 @@ def _told(error: ValidationError, source: str, spelt: Mapping[str, str]) -> Inpu
     wanted = first.get("ctx", {})
 
     def shown(value: float) -> str:
-        return f"{from_si(key, value):g}"
+        try:
+            return f"{from_si(key, value):g}"
+        except OverflowError:
+            return _short(value)
 
     match first["type"]:
         case "missing":
@@ -183,28 +212,32 @@ def _told(error: ValidationError, source: str, spelt: Mapping[str, str]) -> Inpu
         case "extra_forbidden":
             told = "is no key of a card", _suggestion(key, _siblings(first["loc"]))
         case "finite_number":
-            told = f"is {first['input']}", "a finite number was expected"
+            told = f"is {_short(first['input'])}", "a finite number was expected"
         case "float_type" | "int_type":
-            told = f"is {first['input']!r}", "a number was expected"
+            told = f"is {_short(first['input'])}", "a number was expected"
         case "greater_than":
             told = f"is {shown(first['input'])}", f"a number greater than {shown(wanted['gt'])} was expected"
         case "greater_than_equal":
             told = f"is {shown(first['input'])}", f"a number of at least {shown(wanted['ge'])} was expected"
-        case "less_than" | "less_than_equal":
-            told = (
-                f"is {shown(first['input'])}",
-                f"a number below {shown(wanted['lt' if 'lt' in wanted else 'le'])} was expected",
-            )
+        case "less_than":
+            told = f"is {shown(first['input'])}", f"a number below {shown(wanted['lt'])} was expected"
+        case "less_than_equal":
+            told = f"is {shown(first['input'])}", f"a number of at most {shown(wanted['le'])} was expected"
         case "literal_error":
-            told = f"is {first['input']!r}", f"{wanted['expected']} was expected"
+            told = f"is {_short(first['input'])}", f"{wanted['expected']} was expected"
         case "value_error":
-            told = "is not as it must be", str(wanted["error"])
+            told = f"is {_short(first['input'])}", str(wanted["error"])
         case _:
-            told = f"is {first['input']!r}"[:80], first["msg"][0].lower() + first["msg"][1:]
+            told = f"is {_short(first['input'])}", first["msg"][0].lower() + first["msg"][1:]
     more = len(error.errors()) - 1
     return InputError(
         source, place, told[0], told[1] + (f" ({more} more fault{'s' * (more > 1)} after this)" if more else "")
     )
+
+
+def _short(value: object) -> str:
+    told = repr(value)
+    return told if len(told) <= 80 else f"{told[:77]}..."
 
 
 def _siblings(place: tuple[int | str, ...]) -> list[str]:
@@ -254,7 +287,7 @@ def _manoeuvring_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard
         uncertainty={name: abs(inside(name, form.uncertainty[key])) for name, key in stated.items()},
         places=places,
         steering_gear=form.steering_gear,
-        propulsion=form.propulsion,
+        propulsion=_prime_propulsion(form.propulsion, scales),
         effects=tuple(form.effects),
     )
 
@@ -288,6 +321,12 @@ def _prime_rigid_body(body: RigidBody, scales: Scales | None, source: str) -> Ri
         remedy = "x_G is measured from midships, positive forward, in lengths if scaling is prime"
         raise InputError(source, "rigid_body.x_G", f"puts the centre of gravity {body.x_G:g} L from midships", remedy)
     return body
+
+
+def _prime_propulsion(propulsion: Propulsion | None, scales: Scales | None) -> Propulsion | None:
+    if propulsion is None or scales is None:
+        return propulsion
+    return propulsion.model_copy(update={"Xnn": propulsion.Xnn / scales.force})
 
 
 def _canonical_names(values: Mapping[str, float], section: str, source: str) -> dict[str, str]:

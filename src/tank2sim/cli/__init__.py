@@ -5,7 +5,10 @@ Every command ends 0 (done), 1 (`check` only: it failed) or 2 (bad input: one li
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import importlib
+import os
 import sys
 import tempfile
 import traceback
@@ -32,15 +35,30 @@ class _Commands(click.Group):
         return command
 
 
-@click.command(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.group(
+    cls=_Commands,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+)
 @click.version_option(__version__, prog_name="tank2sim")
-def tank2sim() -> None:
+@click.pass_context
+def tank2sim(ctx: click.Context) -> None:
     """From what a towing tank or a sea trial measured to a verified ship model inside a simulator."""
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())
 
 
 def main() -> None:
     """Entry point of ``tank2sim``: runs a command and ends the process with its exit code."""
-    sys.exit(_run())
+    code = _run()
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _silence()
+    except OSError as error:
+        code = code or _unwritable(error)
+        _silence()
+    sys.exit(code)
 
 
 def _run() -> int:
@@ -48,9 +66,6 @@ def _run() -> int:
         result = tank2sim.main(prog_name="tank2sim", standalone_mode=False)
     except InputError as error:
         return _refuse(str(error))
-    except click.exceptions.NoArgsIsHelpError as error:
-        print(error.ctx.get_help() if error.ctx else "", file=sys.stderr)
-        return 2
     except click.UsageError as error:
         where = error.ctx.command_path if error.ctx else "tank2sim"
         return _refuse(f"{error.format_message().rstrip('.')}; see {where} --help")
@@ -60,7 +75,14 @@ def _run() -> int:
         return _refuse("interrupted; nothing is left half-written", code=130)
     except BrokenPipeError:
         return 0
+    except SystemExit as error:
+        # No command exits by itself: click and rich do, with 1, when the reader of the output has gone away.
+        if error.code == 1:
+            return 0
+        raise
     except Exception as error:
+        if isinstance(error, OSError) and error.errno == errno.ENOSPC:
+            return _unwritable(error)
         with tempfile.NamedTemporaryFile("w", prefix="tank2sim-", suffix=".log", delete=False) as log:
             traceback.print_exc(file=log)
         told = " ".join(str(error).split())[:200]
@@ -68,6 +90,19 @@ def _run() -> int:
             f"a fault of the program, not of yours: {type(error).__name__}: {told}; please report {Path(log.name)}"
         )
     return result if isinstance(result, int) else 0
+
+
+def _silence() -> None:
+    """Let what standard output still holds go nowhere: the interpreter would fail at it on its way out."""
+    with contextlib.suppress(OSError, ValueError):
+        output = sys.stdout.fileno()
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, output)
+        os.close(nowhere)
+
+
+def _unwritable(error: OSError) -> int:
+    return _refuse(f"the output cannot be written ({error.strerror}); make room, or send it elsewhere")
 
 
 def _refuse(message: str, code: int = 2) -> int:

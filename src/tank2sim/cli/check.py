@@ -31,7 +31,7 @@ def command(fmu: Path, card: str | None, json_file: Path | None) -> int:
     model = _model(fmu, card)
     report = check_fmu(fmu, model=model)
     if json_file:
-        write_whole(json_file, json_text(report.as_json()))
+        write_whole(json_file, json_text(report.as_json()), inputs=[fmu, *([Path(card)] if card else [])])
     _show(report)
     return 0 if report.passed else 1
 
@@ -56,5 +56,5 @@ def _show(report: CheckReport) -> None:
         screen.print(f"... and {len(problems) - MOST_PROBLEMS} more (--json has all)")
     if not report.compared:
         show_notices(["the FMU carries no card: only its description was validated; give --card to compare"])
-    verdict = "passed" if report.passed else "FAILED"
+    verdict = ("passed" if report.compared else "valid") if report.passed else "FAILED"
     screen.print(f"{report.path}: FMI {report.fmi}, {', '.join(report.kinds)}: {verdict}", soft_wrap=True, markup=False)

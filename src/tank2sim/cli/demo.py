@@ -10,7 +10,9 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeEl
 
 from tank2sim.cli.screen import json_option, json_text, screen
 from tank2sim.demo.run import PAGE, STEPS, run_demo
+from tank2sim.errors import InputError
 from tank2sim.files import writable_folder, write_whole
+from tank2sim.native.compiler import require_compiler
 
 
 @click.command("demo")
@@ -26,6 +28,9 @@ from tank2sim.files import writable_folder, write_whole
 @json_option
 def command(output: Path, json_file: Path | None) -> None:
     """Go the whole way on bundled data: tows to an FMU, the Mariner to checked FMUs, and a page that shows both."""
+    require_compiler("the demo")
+    if json_file and not json_file.absolute().parent.is_dir():
+        raise InputError(json_file, "", "is in a folder that does not exist", "choose one that does")
     folder = writable_folder(output)
     begin = time.monotonic()
     columns = SpinnerColumn(), BarColumn(bar_width=24), TimeElapsedColumn(), TextColumn("{task.description}")

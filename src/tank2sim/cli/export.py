@@ -39,7 +39,7 @@ def command(
     if json_file:
         result = {"ship": ship.ship.name, "fmu": output, **made.as_json(), "notices": model.notices}
         contents[json_file] = json_text(result)
-    write_together(contents)
+    write_together(contents, inputs=[Path(ship.source)], outputs=[output, json_file])
     screen.print(
         f"{output}: {ship.ship.name}, FMI {fmi}, Model Exchange and Co-Simulation, {', '.join(made.platforms)}, "
         f"{len(made.content) / 1000:.0f} kB",

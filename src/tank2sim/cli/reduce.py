@@ -6,13 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import click
+from rich.markup import escape
 
 from tank2sim.cards import parse_card
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
 from tank2sim.errors import InputError
 from tank2sim.files import writable_folder, write_together
 from tank2sim.identification.captive.as_json import prediction_errors, reduction_as_json
-from tank2sim.identification.captive.findings import findings
+from tank2sim.identification.captive.findings import findings, implausible
 from tank2sim.identification.captive.reduction import Options, Reduction, reduce_campaign
 from tank2sim.identification.captive.result_card import FILLS, Contents, card_text, contents, reynolds_ratio
 from tank2sim.records.campaigns import Campaign, read_campaign
@@ -57,9 +58,14 @@ def command(
         files[json_file] = json_text(reduction_as_json(reduction, card, warnings))
     if plots:
         files |= _pictures(reduction, card, warnings, plots)
-    write_together(files)
+    measured = [campaign.parent / run.name.partition(" line ")[0] for run in read.runs]
+    asked = [output, json_file if isinstance(json_file, Path) else None]
+    write_together(files, inputs=[campaign, *measured], outputs=asked)
+    grave = implausible(reduction)
+    for warning in grave:
+        screen.print(f"[bold red]warning:[/bold red] {escape(warning)}", soft_wrap=True)
     _show(reduction, card)
-    show_notices(warnings)
+    show_notices(warning for warning in warnings if warning not in grave)
     if output:
         screen.print(f"{output}: {len(card.entries)} derivatives", soft_wrap=True, markup=False)
 

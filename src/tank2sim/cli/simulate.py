@@ -44,7 +44,8 @@ def command(card: str, manoeuvre: str, duration: float | None, settings: tuple[s
     if json_file := files["json_file"]:
         result = {"ship": ship.ship.name, "manoeuvre": manoeuvre, "figures": run.figures, "notices": run.notices}
         contents[json_file] = json_text(result)
-    write_together(contents)
+    orders = Path(manoeuvre.removeprefix("file:"))
+    write_together(contents, inputs=[Path(ship.source), orders], outputs=files.values())
     rows = [[*in_words(name), value] for name, value in run.figures.items()]
     show_table(f"{ship.ship.name}, {manoeuvre}", ["figure", "unit", "value"], rows)
     show_notices(run.notices)

@@ -43,7 +43,7 @@ def command(
         contents[output] = card_text(result, method, str(output))
     if json_file := files["json_file"]:
         contents[json_file] = json_text(result.as_json())
-    write_together(contents)
+    write_together(contents, inputs=[tow], outputs=files.values())
     _show(result)
     if output:
         screen.print(f"{output}: the card has the numbers of {method}", soft_wrap=True, markup=False)

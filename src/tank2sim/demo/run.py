@@ -8,7 +8,6 @@ from pathlib import Path
 from tank2sim.demo.mariner import mariner
 from tank2sim.demo.towed import towed_vehicle
 from tank2sim.demo.workshop import Workshop
-from tank2sim.native.compiler import require_compiler
 from tank2sim.report.page import Page, render_page
 
 PAGE = "report.html"
@@ -25,9 +24,8 @@ def run_demo(folder: Path, tell: Callable[[str], None]) -> dict[str, object]:
     Raises
     ------
     InputError
-        There is no C compiler, or the folder cannot be written.
+        There is no C compiler, or a file cannot be written.
     """
-    require_compiler("the demo")
     workshop = Workshop(folder, tell)
     towed, ship = towed_vehicle(workshop), mariner(workshop)
     tell("writing the page")

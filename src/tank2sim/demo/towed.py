@@ -40,8 +40,11 @@ def towed_vehicle(workshop: Workshop) -> Outcome:
     workshop.write("towed-vehicle.csv", f"t_s,speed_mps\n{rows}\n")
     chart = tow_chart(
         [
-            Tow(label=f"tow {k + 1}", time_s=tows.time_s, speed_mps=column, model_time_s=times, model_speed_mps=speed)
-            for k, column in enumerate(tows.speed_mps.T)
+            *(
+                Tow(label=f"tow {k + 1}", time_s=tows.time_s, speed_mps=column, model_time_s=[], model_speed_mps=[])
+                for k, column in enumerate(tows.speed_mps.T)
+            ),
+            Tow(label="FMU", time_s=[], speed_mps=[], model_time_s=times, model_speed_mps=speed),
         ],
         title="Speed of the vehicle: five tows, and the FMU under the same force",
     )

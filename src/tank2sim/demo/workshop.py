@@ -84,7 +84,7 @@ def output_errors(reports: Sequence[CheckReport]) -> list[OutputError]:
 
 def error_words(error: float) -> str:
     """A relative error for a reader."""
-    return f"{error:.1e}" if error else "none, to the last bit"
+    return f"{error:.1e}" if error else "no difference"
 
 
 def largest_error(reports: Sequence[CheckReport], kind: str) -> float:

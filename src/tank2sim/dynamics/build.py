@@ -10,6 +10,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import ship_model
 from tank2sim.dynamics.surge import SurgeCoefficients, surge_model
+from tank2sim.units import from_si
 
 
 def build(card: Card) -> Model:
@@ -38,22 +39,24 @@ def build(card: Card) -> Model:
     return model
 
 
-def _with_effect(model: Model, card: Card, entry: EffectEntry, place: str) -> Model:
+def _with_effect(model: Model, card: ManoeuvringCard, entry: EffectEntry, place: str) -> Model:
     effect = EFFECTS.get(entry.name)
     if effect is None:
         close = difflib.get_close_matches(entry.name, EFFECTS, n=1)
         remedy = f"did you mean {close[0]}?" if close else f"known are: {', '.join(EFFECTS)}"
         raise card.fault(f"{place}.name", f"{entry.name!r} is no effect", remedy)
     known = {parameter.name: parameter for parameter in effect.parameters}
-    for name in (*entry.parameters, *entry.uncertainty):
-        if name not in known:
-            remedy = f"{entry.name} has {', '.join(known)} (angles also in deg)"
-            raise card.fault(f"{place}.parameters.{name}", f"is no parameter of {entry.name}", remedy)
+    for section, given in (("parameters", entry.parameters), ("uncertainty", entry.uncertainty)):
+        for name in given:
+            if name not in known:
+                remedy = f"{entry.name} has {', '.join(known)} (angles also in deg)"
+                raise card.fault(f"{place}.{section}.{name}", f"is no parameter of {entry.name}", remedy)
     for name, parameter in known.items():
         if name not in entry.parameters:
             raise card.fault(f"{place}.parameters.{name}", "is missing", f"give the {parameter.description}")
         value = entry.parameters[name]
         if not parameter.minimum <= value <= parameter.maximum:
-            expected = f"{parameter.minimum:g} to {parameter.maximum:g} was expected"
-            raise card.fault(f"{place}.parameters.{name}", f"is {value:g}", expected)
+            key, shown = card.in_file(f"{place}.parameters.{name}", value)
+            lowest, highest = (from_si(key, bound) for bound in (parameter.minimum, parameter.maximum))
+            raise card.fault(key, f"is {shown:g}", f"{lowest:g} to {highest:g} was expected")
     return effect.apply(model, entry.parameters)

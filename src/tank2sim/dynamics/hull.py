@@ -89,25 +89,26 @@ def _right_hand_sides(hull: Hull) -> tuple[ca.SX, ca.SX, ca.SX]:
 
 def _force_quantities(hull: Hull) -> tuple[Quantity, Quantity, Quantity]:
     f1, f2, f3 = _right_hand_sides(hull)
+    equations = "right-hand side of (3.5)" if hull.linear else "right-hand side of (3.8)"
     return (
         Quantity(
             name="force.X",
             unit="N",
-            description="Surge force but for that of acceleration, f1 of (3.8), positive forward",
+            description=f"Surge force but for that of acceleration, {equations}, positive forward",
             nominal=1e5,
             value=f1,
         ),
         Quantity(
             name="force.Y",
             unit="N",
-            description="Sway force but for that of acceleration, f2 of (3.8), positive to starboard",
+            description=f"Sway force but for that of acceleration, {equations}, positive to starboard",
             nominal=1e5,
             value=f2,
         ),
         Quantity(
             name="force.N",
             unit="N.m",
-            description="Yaw moment about midships but for that of acceleration, f3 of (3.8), positive to starboard",
+            description=f"Yaw moment about midships but for that of acceleration, {equations}, positive to starboard",
             nominal=1e7,
             value=f3,
         ),
@@ -172,6 +173,8 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, Quantity, Quantity]:
         name="validity",
         unit="1",
         description="1 in the range of speeds in which the card holds, falling to 0 outside it",
+        minimum=0.0,
+        maximum=1.0,
         value=ca.fmax(0, ca.fmin(1, 1 + inside / margin)),
     )
     return speed, drift, validity

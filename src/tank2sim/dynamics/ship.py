@@ -68,11 +68,12 @@ def _description(card: ManoeuvringCard) -> str:
 
 def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[str]]:
     """Names of the model's derivatives, and notices on those of the card that it does not use."""
-    for name in (*card.derivatives, *card.uncertainty):
-        if name not in ALL_TERMS:
-            key = card.places.get(name, name)
-            remedy = f"the third-order model has {' '.join(ALL_TERMS)}"
-            raise card.fault(f"derivatives.{key}", "is no term of (3.8)", remedy)
+    for section, given in (("derivatives", card.derivatives), ("uncertainty", card.uncertainty)):
+        for name in given:
+            if name not in ALL_TERMS:
+                key = card.places.get(name, name)
+                remedy = f"the third-order model has {' '.join(ALL_TERMS)}"
+                raise card.fault(f"{section}.{key}", "is no term of (3.8)", remedy)
     if card.model.kind == "abkowitz":
         return list(ALL_TERMS), []
     names = [*LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS]
@@ -108,7 +109,8 @@ def _ship_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
 
     def particular(name: str, unit: str, description: str, start: float, **more: str) -> Parameter:
         nominal = abs(start) or 1.0
-        minimum = None if name == "ship.x_G" else 0.0
+        # Above zero: a ship without length, speed, mass or water has no equations.
+        minimum = None if name == "ship.x_G" else 1e-6
         return Parameter(
             name=name,
             unit=unit,

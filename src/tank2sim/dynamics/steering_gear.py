@@ -41,7 +41,7 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
         name="steering.time_constant",
         unit="s",
         description="Time constant of the steering gear",
-        minimum=0.0,
+        minimum=1e-6,
         start=gear.time_constant_s or UNSTATED_LAG * ship_time_s,
     )
     command = Input(
@@ -85,7 +85,7 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
         nominal=0.35,
         derivative="rudder.rate",
         start=start.symbol,
-        trim=order,
+        trim=ca.if_else(failed.symbol, start.symbol, order),
     )
     rate = (order - rudder.symbol) / lag.symbol
     if limited_rate is not None:

@@ -6,19 +6,20 @@ import contextlib
 import io
 import tempfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 from tank2sim.dynamics.model import Model, Vector
+from tank2sim.fmu.comparison import description_differences
 from tank2sim.fmu.interface import MAX_STEP, interface
 from tank2sim.fmu.manoeuvre import Manoeuvre, manoeuvre
+from tank2sim.fmu.process import Drive, drive_apart
 from tank2sim.fmu.reference import by_scheme, exactly
-from tank2sim.fmu.running import RunningFmu, co_simulate, exchange, running
 from tank2sim.fmu.unpacking import Kind, UnpackedFmu, unpack
 
 LIMITS: dict[Kind, float] = {"ModelExchange": 1e-6, "CoSimulation": 1e-9}
@@ -34,7 +35,7 @@ class CheckReport:
     validation : tuple of str
         What FMPy objects to in the description; empty if nothing.
     differences : tuple of str
-        Where variables of the FMU differ from those of the model, and calls that failed.
+        Where the FMU's description or parameters differ from the model's, and what its library failed to do.
     errors : dict
         Kind (``ModelExchange``, ``CoSimulation``) to output to its largest error in the run, relative to the larger
         of the output's range in the run and its nominal value.
@@ -63,6 +64,8 @@ class CheckReport:
 
 def check_fmu(path: Path, *, model: Model | None = None) -> CheckReport:
     """Validate an FMU, and drive it in every kind it offers through steps of all inputs, beside the model.
+
+    The library runs in processes of its own: one that cannot be loaded, or ends its process, is a failed check.
 
     Parameters
     ----------
@@ -100,31 +103,35 @@ def check_fmu(path: Path, *, model: Model | None = None) -> CheckReport:
 
 
 def _compare(unpacked: UnpackedFmu, model: Model, run: Manoeuvre) -> tuple[list[str], dict[Kind, dict[str, float]]]:
-    differences = _interface_differences(unpacked, model)
+    differences = _name_differences(unpacked, model)
     if differences:
         return differences, {}
     references: dict[Kind, Callable[[Model, Manoeuvre], Vector]] = {
         "ModelExchange": exactly,
         "CoSimulation": by_scheme,
     }
-    drive = {"ModelExchange": exchange, "CoSimulation": co_simulate}
+    parameters = {parameter.name: float(parameter.start) for parameter in model.parameters} | {MAX_STEP: model.step_s}
+    names = {"inputs": model.input_names, "outputs": model.outputs, "parameters": tuple(parameters)}
     errors: dict[Kind, dict[str, float]] = {}
-    for kind in unpacked.kinds:
-        expected = references[kind](model, run)
-        log: list[str] = []
-        try:
-            with running(unpacked, kind) as fmu:
-                log = fmu.log
-                differences += [f"{kind}: {difference}" for difference in _parameter_differences(fmu, model)]
-                found = drive[kind](fmu, run, model.input_names, model.outputs)
-        except (FMICallException, RuntimeError, AttributeError) as error:
-            differences.append(f"{kind}: {error} {' '.join(log)}".strip())
-            continue
-        errors[kind] = _errors(model, found, expected)
+    with ThreadPoolExecutor() as pool:  # the FMU runs in its processes while this one calculates what to expect
+        answers = {
+            kind: pool.submit(drive_apart, unpacked, Drive(kind=kind, run=run, **names)) for kind in unpacked.kinds
+        }
+        text = (unpacked.folder / "modelDescription.xml").read_bytes()
+        differences = description_differences(unpacked.folder, text, model, unpacked.fmi)
+        for kind, promised in answers.items():
+            expected = references[kind](model, run)
+            answer = promised.result()
+            if answer.parameters is not None:
+                differences += [f"{kind}: {line}" for line in _parameter_differences(answer.parameters, parameters)]
+            if answer.problem:
+                differences.append(f"{kind}: {answer.problem}")
+            if answer.outputs is not None:
+                errors[kind] = _errors(model, answer.outputs, expected)
     return differences, errors
 
 
-def _interface_differences(unpacked: UnpackedFmu, model: Model) -> list[str]:
+def _name_differences(unpacked: UnpackedFmu, model: Model) -> list[str]:
     described = interface(model)
     there = {variable.name: variable for variable in unpacked.description.modelVariables}
     differences = []
@@ -133,18 +140,14 @@ def _interface_differences(unpacked: UnpackedFmu, model: Model) -> list[str]:
         found = [name for name, variable in there.items() if variable.causality == causality]
         differences += [f"{causality} {name} of the model is not in the FMU" for name in wanted if name not in found]
         differences += [f"{causality} {name} of the FMU is not in the model" for name in found if name not in wanted]
-    for name in model.outputs:
-        if name in there and there[name].unit != model[name].unit:
-            differences.append(f"output {name} is in {there[name].unit}, in the model in {model[name].unit}")
     return differences
 
 
-def _parameter_differences(fmu: RunningFmu, model: Model) -> list[str]:
-    expected = {parameter.name: float(parameter.start) for parameter in model.parameters} | {MAX_STEP: model.step_s}
+def _parameter_differences(found: Vector, expected: dict[str, float]) -> list[str]:
     return [
-        f"parameter {name} is {found!r} in the FMU and {expected[name]!r} in the model"
-        for name, found in zip(expected, fmu.read(list(expected)), strict=True)
-        if found != expected[name]
+        f"parameter {name} is {value!r} in the FMU and {expected[name]!r} in the model"
+        for name, value in zip(expected, found.tolist(), strict=True)
+        if value != expected[name]
     ]
 
 

@@ -125,10 +125,31 @@ def make_fmu(model: Model, *, fmi: int = 2, documents: Documents | None = None) 
     )
 
 
+def description_text(model: Model, *, fmi: int) -> str:
+    """The ``modelDescription.xml`` that :func:`make_fmu` would write, but for its token, documents and source files."""
+    return render(f"modelDescription-fmi{fmi}.xml", _values(model, interface(model), fmi, Documents()))
+
+
 def _texts(model: Model, described: Interface, fmi: int, documents: Documents) -> dict[str, str]:
     """All files of the FMU but the library, by name, with a token of zeros."""
     sources = c_sources(model, described, fmi, _NO_TOKEN)
-    values: dict[str, Any] = {
+    values = _values(model, described, fmi, documents)
+    values["sources"] = sorted(name for name in sources if name.endswith(".c"))
+    files = {f"sources/{name}": text for name, text in sources.items()}
+    files["modelDescription.xml"] = render(f"modelDescription-fmi{fmi}.xml", values)
+    files["documentation/index.html"] = render("index.html", values)
+    files["documentation/licenses/license.txt"] = bundled("LICENSE").read_text(encoding="utf-8")
+    files["documentation/licenses/FMI-headers.txt"] = headers_notice(fmi)
+    if fmi == 3:
+        files["sources/buildDescription.xml"] = render("buildDescription.xml", values)
+    if documents.card_text is not None:
+        files[CARD_IN_FMU] = documents.card_text
+    return files
+
+
+def _values(model: Model, described: Interface, fmi: int, documents: Documents) -> dict[str, Any]:
+    """What the templates of the description and the documentation tell, without the names of source files."""
+    return {
         "about": {
             "name": model.name,
             "description": model.description,
@@ -144,23 +165,13 @@ def _texts(model: Model, described: Interface, fmi: int, documents: Documents) -
         "interface": described,
         "structure": structure(model, described),
         "units": [UNITS[name] for name in sorted({variable.unit for variable in described.variables})],
-        "sources": sorted(name for name in sources if name.endswith(".c")),
+        "sources": [],
         "experiment": {
             "step": model.step_s,
             "stop_time": model.step_s * _EXPERIMENT_STEPS,
             "tolerance": _EXPERIMENT_TOLERANCE,
         },
     }
-    files = {f"sources/{name}": text for name, text in sources.items()}
-    files["modelDescription.xml"] = render(f"modelDescription-fmi{fmi}.xml", values)
-    files["documentation/index.html"] = render("index.html", values)
-    files["documentation/licenses/license.txt"] = bundled("LICENSE").read_text(encoding="utf-8")
-    files["documentation/licenses/FMI-headers.txt"] = headers_notice(fmi)
-    if fmi == 3:
-        files["sources/buildDescription.xml"] = render("buildDescription.xml", values)
-    if documents.card_text is not None:
-        files[CARD_IN_FMU] = documents.card_text
-    return files
 
 
 def _token(files: dict[str, str]) -> str:

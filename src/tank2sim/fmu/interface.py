@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from tank2sim.dynamics.model import Input, Model, Parameter, Variable
+from tank2sim.units import UNITS
 
 TRIM_SWITCH = "initial.trim"
 """Boolean parameter that asks for a start in steady motion."""
@@ -170,8 +171,8 @@ def _shown(variable: Variable, reference: int, **as_fmi: Any) -> FmuVariable:
         unit=variable.unit,
         display_unit=variable.display_unit,
         nominal=abs(variable.nominal) or 1.0,
-        minimum=variable.minimum,
-        maximum=variable.maximum,
+        minimum=-UNITS[variable.unit].extent if variable.minimum is None else variable.minimum,
+        maximum=UNITS[variable.unit].extent if variable.maximum is None else variable.maximum,
         **as_fmi,
     )
 

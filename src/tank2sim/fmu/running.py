@@ -69,8 +69,10 @@ class RunningFmu:
 
 
 @contextmanager
-def running(unpacked: UnpackedFmu, kind: Kind, *, logging: bool = False) -> Iterator[RunningFmu]:
-    """An instance of an FMU, freed at the end whatever happens."""
+def running(
+    unpacked: UnpackedFmu, kind: Kind, *, logging: bool = False, log: list[str] | None = None
+) -> Iterator[RunningFmu]:
+    """An instance of an FMU, freed at the end whatever happens; what it logs is added to `log`, if given."""
     interface = unpacked.description.modelExchange if kind == "ModelExchange" else unpacked.description.coSimulation
     classes: dict[tuple[int, Kind], Any] = {
         (2, "ModelExchange"): fmpy.fmi2.FMU2Model,
@@ -84,19 +86,19 @@ def running(unpacked: UnpackedFmu, kind: Kind, *, logging: bool = False) -> Iter
         modelIdentifier=interface.modelIdentifier,
         instanceName="check",
     )
-    run = RunningFmu(unpacked, instance)
+    run = RunningFmu(unpacked, instance, [] if log is None else log)
 
-    def log(*arguments: Any) -> None:
+    def record(*arguments: Any) -> None:
         run.log.append(arguments[-1].decode("utf-8", "replace"))
 
     if unpacked.fmi == 2:
         callbacks = fmpy.fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmpy.fmi2.fmi2CallbackLoggerTYPE(log)
+        callbacks.logger = fmpy.fmi2.fmi2CallbackLoggerTYPE(record)
         callbacks.allocateMemory = fmpy.fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
         callbacks.freeMemory = fmpy.fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
         instance.instantiate(callbacks=callbacks, loggingOn=logging)
     else:
-        instance.instantiate(logMessage=log, loggingOn=logging)
+        instance.instantiate(logMessage=record, loggingOn=logging)
     try:
         yield run
     finally:

@@ -7,7 +7,9 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 from tank2sim.errors import InputError
@@ -19,16 +21,14 @@ FLAGS = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", "-fvisibility=hidden")
 SHARED_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 
+# Fails where headers, libraries or the linker do not fit, and with nothing else.
+_TRIAL = '#include <math.h>\n#include <string.h>\ndouble trial(double x) { return sin(x) + (double) strlen(""); }\n'
+
+
 def find_compiler() -> list[str] | None:
-    """Command of the C compiler: ``CC`` if it is set, else the first of cc, gcc, clang; None if there is none."""
-    chosen = os.environ.get("CC")
-    if chosen:
-        words = shlex.split(chosen)
-        return words if words and shutil.which(words[0]) else None
-    for name in ("cc", "gcc", "clang"):
-        if shutil.which(name):
-            return [name]
-    return None
+    """Command of the C compiler: ``CC`` if it is set, else the first of cc, gcc, clang; None if none of them works."""
+    command = _named_compiler()
+    return list(command) if command and _trouble(command) is None else None
 
 
 def require_compiler(purpose: str) -> list[str]:
@@ -37,17 +37,18 @@ def require_compiler(purpose: str) -> list[str]:
     Raises
     ------
     InputError
-        There is none; `purpose` says what it is needed for.
+        There is none that works; `purpose` says what it is needed for.
     """
-    command = find_compiler()
+    command, chosen = _named_compiler(), os.environ.get("CC")
+    source = f"CC={chosen}" if chosen else " ".join(command or ("C compiler",))
     if command is None:
-        raise InputError(
-            os.environ.get("CC", "C compiler"),
-            "",
-            f"no C compiler was found, and {purpose} needs one",
-            "install gcc or clang, or name one in the environment variable CC",
-        )
-    return command
+        problem = f"no C compiler was found, and {purpose} needs one"
+        raise InputError(source, "", problem, "install gcc or clang, or name one in the environment variable CC")
+    trouble = _trouble(command)
+    if trouble is not None:
+        problem = f"this C compiler does not work, and {purpose} needs one ({_first_error(trouble)})"
+        raise InputError(source, "", problem, "mend it, or name another in the environment variable CC")
+    return list(command)
 
 
 def compile_shared(
@@ -61,24 +62,59 @@ def compile_shared(
     Raises
     ------
     InputError
-        There is no compiler.
+        There is no compiler that works.
     RuntimeError
         The compiler refused the sources: a fault of the program, with the compiler's words.
     """
-    sources = [Path(source) for source in sources]
+    compiler = require_compiler("compiling a model")
+    refusal = _refusal(compiler, list(sources), Path(library), [*flags, *(f"-I{path}" for path in include)])
+    if refusal is not None:
+        raise RuntimeError(f"{shlex.join(compiler)} refused generated C\n{refusal}")
+
+
+def _named_compiler() -> tuple[str, ...] | None:
+    chosen = os.environ.get("CC")
+    if not chosen:
+        return next(((name,) for name in ("cc", "gcc", "clang") if shutil.which(name)), None)
+    try:
+        words = shlex.split(chosen)
+    except ValueError:  # quotes that do not close
+        return None
+    return tuple(words) if words and shutil.which(words[0]) else None
+
+
+@cache
+def _trouble(command: tuple[str, ...]) -> str | None:
+    """What a compiler says when it cannot even make a library of a few words; None if it can."""
+    with tempfile.TemporaryDirectory(prefix="tank2sim-") as folder:
+        trial = Path(folder, "trial.c")
+        trial.write_text(_TRIAL, encoding="utf-8")
+        return _refusal(list(command), [trial], Path(folder, "trial"), [])
+
+
+def _refusal(compiler: list[str], sources: list[Path], library: Path, flags: Iterable[str]) -> str | None:
+    """What the compiler said when it made no library; None if it made one."""
     folder = sources[0].parent
     command = [
-        *require_compiler("compiling a model"),
+        *compiler,
         *FLAGS,
         *flags,
         "-shared",
         *(["-Wl,--build-id=none"] if sys.platform.startswith("linux") else []),
-        *(f"-I{path}" for path in include),
         "-o",
-        str(Path(library).resolve()),
+        str(library.resolve()),
         *(os.path.relpath(source, folder) for source in sources),
         *([] if sys.platform == "win32" else ["-lm"]),
     ]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise RuntimeError(f"{' '.join(command)}\n{done.stderr}")
+    try:
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
+    except OSError as error:
+        return f"it cannot be run ({error.strerror})"
+    if done.returncode == 0 and library.exists():
+        return None
+    return done.stderr.strip() or f"it ended with code {done.returncode}, without a library or a word"
+
+
+def _first_error(words: str) -> str:
+    lines = words.splitlines()
+    return next((line for line in lines if "error" in line or "cannot" in line), lines[0]).strip()

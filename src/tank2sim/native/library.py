@@ -29,7 +29,7 @@ def cached_library(source: str) -> Path:
     Raises
     ------
     InputError
-        It has to be compiled and there is no compiler.
+        There is no compiler, or it has to be compiled and the compiler does not work.
     """
     compiler = require_compiler("compiling a model")
     key = hashlib.sha256("\0".join([source, *compiler, *FLAGS]).encode()).hexdigest()[:32]

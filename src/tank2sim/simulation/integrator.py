@@ -13,6 +13,7 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.dynamics.model import Model, Vector
+from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
 from tank2sim.native.generate import generate_c
 from tank2sim.native.library import cached_library
@@ -56,7 +57,7 @@ void outputs(long n, const double* u, const double* p, const double* x, double* 
 }}
 """
 
-NO_COMPILER = "no C compiler was found: CasADi evaluates the model itself, many times slower"
+NO_COMPILER = "no C compiler that works was found: CasADi evaluates the model itself, many times slower"
 
 
 class Integrator:
@@ -68,14 +69,22 @@ class Integrator:
         What to integrate.
     compiled : bool, optional
         True or False to ask for machine code or for CasADi's own evaluation; by default machine code where a C compiler
-        is found.
+        is found and works.
     """
 
     def __init__(self, model: Model, compiled: bool | None = None):
         self.model = model
         self.compiled = find_compiler() is not None if compiled is None else compiled
         self._step = runge_kutta_step(model)
-        self._rollout, self._outputs = self._in_machine_code() if self.compiled else self._in_casadi()
+        if self.compiled:
+            try:
+                self._rollout, self._outputs = self._in_machine_code()
+                return
+            except (InputError, OSError):  # a compiler that does not work, or compiles for another machine
+                if compiled:
+                    raise
+                self.compiled = False
+        self._rollout, self._outputs = self._in_casadi()
 
     def rollout(self, x: Vector, u: Vector, p: Vector, h: float, n: int) -> Vector:
         """States (n + 1, nx) at the beginning `x` (nx,) and after each of `n` steps of `h` s, inputs `u` (nu,) held."""

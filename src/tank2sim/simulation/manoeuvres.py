@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +29,9 @@ ZIGZAG_EXECUTES = 5
 
 SPIRAL_RUDDERS_DEG = (20, 15, 10, 7, 5, 4, 3, 2, 1, 0, -1, -2, -3, -4, -5, -7, -10, -15, -20)
 """Rudder angles of a direct spiral on its way to port, deg; it comes back through the same ones."""
+
+LONGEST_RUN_S = 1e7
+"""Longest run, s: beyond a hundred days a manoeuvre is a mistake in units."""
 
 STEADY_CHANGE = 1e-3
 """Steady: over two ship lengths the yaw rate changes by less than this share of itself, or of 0.01 u0/L if less."""
@@ -121,12 +124,14 @@ class Orders:
     source: str
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
-        """Run to the last order's time, or for `duration` s."""
+        """Run to the last order's time, or for `duration` s (needed if there is only one order)."""
         for name in self.inputs:
             if name not in running.model.input_names:
                 remedy = "add [propulsion] to the card, or leave the column out"
                 raise InputError(self.source, name, "is no input of this ship", remedy)
         end = float(self.times[-1]) if duration is None else duration
+        if end <= 0:
+            raise InputError(self.source, "column t_s", "ends at 0 s", "add the time to which to run, or --duration")
         # A file that repeats an order at every sample is one order: fewer, longer calls into machine code.
         table = np.column_stack(list(self.inputs.values()))
         new = np.concatenate([[True], np.any(np.diff(table, axis=0) != 0, axis=1)])
@@ -157,7 +162,7 @@ def parse_manoeuvre(text: str) -> Manoeuvre:
         "turn": (number, lambda a: Turn(math.radians(a[0]))),
         "zigzag": (f"{number}/{number}", lambda a: Zigzag(math.radians(a[0]), math.radians(a[1]))),
         "pullout": (number, lambda a: PullOut(math.radians(a[0]))),
-        "spiral": (f"(?:{number})?", lambda a: Spiral(_spiral_rudders(a[0] if a else None))),
+        "spiral": (f"(?:{number})?", lambda a: Spiral(_spiral_rudders(a[0] if a else SPIRAL_RUDDERS_DEG[0]))),
     }
     found = re.fullmatch(makers[kind][0], rest) if kind in makers else None
     if found is None:
@@ -185,22 +190,40 @@ def read_orders(path: Path) -> Orders:
     for name in columns:
         if name not in {"t_s", *names}:
             raise InputError(path, f"column {name}", "is no order", "orders are t_s, delta_order_deg and n_rpm")
-    if "t_s" not in columns or not {"delta_order_rad", "delta_rad"} & set(columns):
+    rudders = {"delta_order_rad", "delta_rad"} & set(columns)
+    if "t_s" not in columns or not rudders:
         raise InputError(path, "header", "lacks t_s or delta_order_deg", "orders are t_s, delta_order_deg and n_rpm")
+    if len(rudders) > 1:
+        raise InputError(path, "header", "has two rudder columns", "give delta_order_deg alone")
     times = columns["t_s"]
     if times[0] != 0 or np.any(np.diff(times) <= 0):
         raise InputError(path, "column t_s", "does not rise from 0", "begin at 0 and give each time once")
+    if times[-1] > LONGEST_RUN_S:
+        raise InputError(
+            path, "column t_s", f"ends at {times[-1]:g} s", f"at most {LONGEST_RUN_S:g} s can be simulated"
+        )
     for name, values in columns.items():
         if np.isnan(values).any():
             raise InputError(path, f"column {name}", "has an empty cell", "give every order")
-    port = table.comments.get("rudder_sign", "starboard").strip() == "port"
+    port = _rudder_sign(path, table.comments) == "port"
     inputs = {names[name]: values for name, values in columns.items() if name in names}
     inputs["rudder.command"] = inputs["rudder.command"] * (-1.0 if port else 1.0)
     return Orders(times, inputs, str(path))
 
 
-def _spiral_rudders(largest: float | None) -> tuple[float, ...]:
-    there = [angle for angle in SPIRAL_RUDDERS_DEG if largest is None or abs(angle) <= abs(largest)]
+def _rudder_sign(path: Path, comments: Mapping[str, str]) -> str:
+    """``port`` or ``starboard``, as the file's comment says; starboard if it says nothing."""
+    signs = [text.strip().lower() for key, text in comments.items() if key.strip().lower() == "rudder_sign"]
+    sign = signs[0] if signs else "starboard"
+    if sign not in ("port", "starboard"):
+        raise InputError(path, "comment rudder_sign", f"is {sign!r}", "port or starboard was expected")
+    return sign
+
+
+def _spiral_rudders(largest: float) -> tuple[float, ...]:
+    """There and back again, from `largest` (deg) by the steps of :data:`SPIRAL_RUDDERS_DEG`."""
+    inner = [angle for angle in SPIRAL_RUDDERS_DEG if abs(angle) < abs(largest)]
+    there = [largest, *(math.copysign(1.0, largest) * angle for angle in inner), -largest]
     return tuple(math.radians(angle) for angle in (*there, *there[-2::-1]))
 
 

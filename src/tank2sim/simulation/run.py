@@ -11,9 +11,10 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
-from tank2sim.simulation.manoeuvres import Manoeuvre, Orders
+from tank2sim.simulation.manoeuvres import LONGEST_RUN_S, Manoeuvre, Orders
 from tank2sim.simulation.running import Running
 from tank2sim.simulation.trajectory import Trajectory
+from tank2sim.units import in_words
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ def simulate(
     manoeuvre: Manoeuvre,
     *,
     duration_s: float | None = None,
+    inputs: Mapping[str, float] | None = None,
     parameters: Mapping[str, float] | None = None,
     integrator: Integrator | None = None,
 ) -> Run:
@@ -53,7 +55,7 @@ def simulate(
         See :mod:`tank2sim.simulation.manoeuvres`.
     duration_s : float, optional
         By default as long as the manoeuvre needs.
-    parameters : mapping, optional
+    inputs, parameters : mapping, optional
         Values in place of the model's, by name.
     integrator : Integrator, optional
         One made earlier for this model, to save its preparation.
@@ -67,21 +69,33 @@ def simulate(
         raise InputError(
             model.name, "", "has no rudder", "manoeuvres need the card of a ship (kind linear or abkowitz)"
         )
-    if duration_s is not None and not 0 < duration_s < 1e7:
+    if duration_s is not None and not 0 < duration_s < LONGEST_RUN_S:
         raise InputError("--duration", "", f"is {duration_s:g} s", "a positive number of seconds was expected")
     integrator = integrator or Integrator(model)
     values = dict(zip(model.parameter_names, model.parameter_values(parameters).tolist(), strict=True))
-    running = Running(integrator, parameters=parameters)
+    running = Running(integrator, inputs, parameters)
     manoeuvre.drive(running, values["ship.length"] / values["ship.speed"], duration_s)
     trajectory = running.trajectory()
     notices = [*model.notices, *_outside_range(trajectory, values["ship.slowest"], values["ship.fastest"])]
+    notices += _beyond_the_gear(trajectory, values.get("steering.max_angle"))
     if not integrator.compiled:
         notices.append(NO_COMPILER)
     figures = figures_of(manoeuvre, trajectory, values["ship.length"])
     missing = [name for name, value in figures.items() if value is None]
     if missing and not isinstance(manoeuvre, Orders):
-        notices.append(f"the run of {trajectory.t[-1]:.0f} s does not show: {', '.join(missing)}")
+        notices.append(
+            f"the run of {trajectory.t[-1]:.0f} s does not show: {', '.join(in_words(name)[0] for name in missing)}"
+        )
     return Run(trajectory, figures, tuple(notices))
+
+
+def _beyond_the_gear(trajectory: Trajectory, largest: float | None) -> list[str]:
+    ordered = float(np.max(np.abs(trajectory["rudder.command"])))
+    if largest is None or ordered <= largest * (1 + 1e-9):
+        return []
+    return [
+        f"the rudder was ordered to {np.degrees(ordered):.4g} deg, and its gear stops at {np.degrees(largest):.4g} deg"
+    ]
 
 
 def _outside_range(trajectory: Trajectory, slowest: float, fastest: float) -> list[str]:

@@ -56,6 +56,11 @@ class Running:
         self._u_parts: list[Vector] = []
 
     @property
+    def _tolerance(self) -> float:
+        """Times that differ by less are one: rounding, far below a step."""
+        return 1e-9 * self.model.step_s
+
+    @property
     def time(self) -> float:
         """Time since the start, s."""
         return self._time
@@ -88,7 +93,7 @@ class Running:
         end = self._time + at_most
         if beyond(self._x) >= 0:
             return True
-        while self._time < end:
+        while end - self._time > self._tolerance:
             begin_time, begin_x, parts, steps = self._time, self._x, len(self._t_parts), self._steps_done
             self._advance_to(min(end, (steps + _CHUNK) * self.model.step_s))
             times = np.concatenate([*self._t_parts[parts:], [self._time]])
@@ -131,7 +136,7 @@ class Running:
 
     def _advance_to(self, end: float) -> None:
         h = self.model.step_s
-        tolerance = 1e-9 * h
+        tolerance = self._tolerance
         to_grid = (self._steps_done + 1) * h - self._time
         if self._time > self._steps_done * h + tolerance and to_grid <= end - self._time + tolerance:
             self._partial(to_grid)

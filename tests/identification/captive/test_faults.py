@@ -11,7 +11,7 @@ from tank2sim.identification.captive.faults import record_faults, reduced_faults
 from tank2sim.identification.captive.harmonics import reduced_run
 from tank2sim.identification.captive.reduction import Options, reduce_campaign
 from tank2sim.records.campaigns import read_campaign
-from tests.identification.captive.generator import Campaign, write
+from tests.identification.captive.generator import NOISE_SHARE, Campaign, write
 
 CASES = {
     "saturated": ("sway_02", "gauge Y: stands still at its .* saturated"),
@@ -88,3 +88,74 @@ def test_a_plateau_of_a_coarse_digital_gauge_is_not_saturation(sound):
     run = run_of(sound, "sway_02")
     step = np.ptp(run.Y_N) / 12
     assert "saturated" not in told(sound, replace(run, Y_N=np.round(run.Y_N / step) * step))
+
+
+def changed(campaign, name, **columns):
+    """The campaign with one run's columns changed by functions of the run."""
+    runs = [
+        replace(run, **{key: change(run) for key, change in columns.items()}) if run.name == f"{name}.csv" else run
+        for run in campaign.runs
+    ]
+    return replace(campaign, runs=tuple(runs))
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "change", "message"),
+    [
+        ("sway_01", "Y_N", lambda run: 0 * run.Y_N, "gauge Y: reads 0 while the model oscillates .* dead"),
+        ("yaw_01", "N_Nm", lambda run: 0 * run.N_Nm + 3.0, "gauge N: reads 3 while the model oscillates .* dead"),
+        ("drift_+08", "Y_N", lambda run: 0 * run.Y_N + 3.0, "gauge Y: reads 3 from end to end .* dead"),
+        ("drift_+08", "X_N", lambda run: 0 * run.X_N, "gauge X: reads 0 from end to end .* dead"),
+        ("sway_00", "Y_N", lambda run: run.Y_N / 1000, "gauge Y: contradicts the other runs: its harmonics"),
+        ("yaw_01", "N_Nm", lambda run: -run.N_Nm, "gauge N: contradicts the other runs: its harmonics"),
+        ("rudder_+20", "Y_N", lambda run: -run.Y_N, "gauge Y: contradicts the other runs: its mean"),
+        ("drift_-04", "N_Nm", lambda run: run.N_Nm / 1000, "gauge N: contradicts the other runs: its mean"),
+    ],
+)
+def test_one_bad_run_among_sound_ones_is_told_and_left_out(sound, name, column, change, message):
+    faulty = changed(sound, name, **{column: change})
+    with pytest.raises(InputError, match=message) as error:
+        reduce_campaign(faulty)
+    assert error.value.source == f"{name}.csv"
+    rest = reduce_campaign(faulty, Options(keep_going=True))
+    assert [fault.source for fault in rest.faults] == [f"{name}.csv"]
+    alone = reduce_campaign(sound.without({f"{name}.csv"}))
+    assert {n: d.value for n, d in rest.derivatives.items()} == {n: d.value for n, d in alone.derivatives.items()}
+
+
+@pytest.mark.parametrize("seed", range(30, 60))
+def test_no_run_of_a_sound_campaign_is_at_fault(tmp_path, seed):
+    kinds = [
+        {},
+        {"correlation_time_s": 2.0, "zero_drift": 2.0},
+        {"speed_fluctuation": 0.02, "sheet_error": 0.04, "part_periods": True, "asymmetry": True},
+        {"size": "linear"},
+        {"noise": 0.0, "zero_error": 0.0},
+        {"noise": 1e-3, "zero_error": 1e-3},
+    ]
+    path = write(Campaign(seed=seed, rate_hz=5.0, **kinds[seed % len(kinds)]), tmp_path).path
+    assert not reduce_campaign(read_campaign(path)).faults
+
+
+@pytest.mark.parametrize("times_noise", [1.0, 2.0, 4.0])
+def test_coarse_gauges_are_not_saturated_or_dead(tmp_path, times_noise):
+    written = write(Campaign(seed=5), tmp_path)
+    step = times_noise * NOISE_SHARE * written.ship.force_N
+    coarse = read_campaign(written.path)
+    for run in coarse.runs:
+        columns = {"X_N": step, "Y_N": step, "N_Nm": 0.3 * step * written.ship.length_m}
+        readings = {key: np.round(getattr(run, key) / size) * size for key, size in columns.items()}
+        assert not told(coarse, replace(run, **readings))
+
+
+def test_a_steady_gauge_at_the_end_of_its_range_is_saturated(sound):
+    run = run_of(sound, "drift_+08")
+    assert "saturated" in told(sound, replace(run, Y_N=np.minimum(run.Y_N, np.quantile(run.Y_N, 0.3))))
+
+
+def test_one_steady_run_shows_no_derivative_but_the_resistance(sound):
+    for name in ("drift_+00", "drift_+08", "rudder_+20"):
+        reduction = reduce_campaign(sound.without({run.name for run in sound.runs} - {f"{name}.csv"}))
+        assert set(reduction.derivatives) == {"X0"}
+        choices = {choice.name: choice.reason for choice in reduction.forces["N"].selection.choices}
+        assert choices["N0"] == choices["Nv"] == "not excited"

@@ -62,3 +62,10 @@ def test_less_than_a_period_is_refused_with_the_name_of_the_run():
 def test_a_run_that_does_not_oscillate_is_refused():
     with pytest.raises(InputError, match=r"column v_mps: does not change"):
         run_motion(sway(amplitude=0.0))
+
+
+@pytest.mark.parametrize("periods", [1.0, 1.02, 1.3])
+def test_one_whole_period_is_enough(periods):
+    motion = run_motion(sway(0.7, duration=periods * 2 * np.pi / 0.7, noise=1e-4))
+    assert motion.periods == 1
+    assert motion.frequency_radps == pytest.approx(0.7, rel=5e-3)

@@ -29,6 +29,11 @@ comes to 5 among the hundreds of records of a campaign, does not do both."""
 _LARGEST_PRIME = {"X": 0.5, "Y": 0.5, "N": 0.25}
 """No hull's coefficients come near: a flat plate broadside has Y' of about T/L."""
 _GAP = 5.0
+_NO_SMALL_ANGLE = 0.05
+_FEWEST_LEVELS = 8
+_PLATEAU = 5.0
+"""Length of a saturated gauge's plateau, in those of its next level. A sinusoid read coarsely and without noise stays
+at its outermost level up to 1/(sqrt(2) - 1) = 2.4 times as long in all as at the next, and 4.8 times at a stretch."""
 
 
 def record_faults(campaign: Campaign, run: Run) -> Iterator[InputError]:
@@ -40,6 +45,7 @@ def record_faults(campaign: Campaign, run: Run) -> Iterator[InputError]:
         return
     yield from _other_motion(campaign, run)
     for force in FORCES:
+        yield from _dead(campaign, run, force)
         yield from _clipped(run, force)
 
 
@@ -161,11 +167,37 @@ def _rates(reduced: ReducedRun) -> Iterator[InputError]:
     yield InputError(run.name, f"column {column}", problem, "one of them is in another unit, sign or clock")
 
 
-def _clipped(run: Run, force: str) -> Iterator[InputError]:
-    """A plateau at the top or bottom of a record: many equal readings in a row, and nothing beyond."""
+def _dead(campaign: Campaign, run: Run, force: str) -> Iterator[InputError]:
+    """A gauge that shows one value from end to end, where the model's motion or the gauge's usual noise forbids it."""
     values = run.force(force)
-    if np.ptp(values) == 0.0:
+    if np.ptp(values) > 0.0:
         return
+    angles = (float(np.mean(run.v_mps / run.speed_mps)), float(np.mean(run.delta_rad)))
+    # Drift and rudder together may cancel, and a coarse gauge reads nothing at a small angle.
+    nothing = float(values[0]) == 0.0 and max(map(abs, angles)) > _NO_SMALL_ANGLE and 0.0 in angles
+    if ((run.oscillates or nothing) and force != "X") or _usually_noisy(campaign, force):
+        when = "while the model oscillates" if run.oscillates else "from end to end"
+        problem = f"reads {values[0] + 0.0:.4g} {when} and never varies: the gauge is dead"
+        yield InputError(run.name, f"gauge {force}", problem, "repeat the run, or give it its readings")
+
+
+def _usually_noisy(campaign: Campaign, force: str) -> bool:
+    """Whether steady runs usually show many levels: no computed campaign, and no coarse gauge."""
+    records = [run for run in campaign.runs if not run.is_average]
+    steady = [run for run in records if not run.oscillates] or records
+    return float(np.median([len(np.unique(run.force(force))) for run in steady])) >= _FEWEST_LEVELS
+
+
+def _clipped(run: Run, force: str) -> Iterator[InputError]:
+    """A plateau at the top or bottom of a record: many equal readings in a row, and nothing beyond.
+
+    A gauge that shows a few levels only is coarse beside what it measures, and its outermost may well be the usual one.
+    """
+    values = run.force(force)
+    stands, counts = np.unique(values, return_counts=True)
+    if len(stands) < _FEWEST_LEVELS:
+        return
+    inner = int(counts[1:-1].max())
     equal = np.flatnonzero(np.diff(values) != 0.0)
     lengths = np.diff(np.concatenate([[-1], equal, [len(values) - 1]]))
     usual = float(np.median(lengths))
@@ -176,7 +208,8 @@ def _clipped(run: Run, force: str) -> Iterator[InputError]:
         # A coarse gauge stands still at every level, a saturated one at its last.
         natural = max(usual, float(lengths[levels == next_level].max()))
         longest, count = int(lengths[levels == extreme].max()), int(np.count_nonzero(values == extreme))
-        if longest >= 4 * natural and count >= max(6, 0.01 * len(values)):
+        plateau = longest >= _PLATEAU * natural and count >= _PLATEAU * inner
+        if plateau and count >= max(6, 0.01 * len(values)):
             problem = f"stands still at its {end}, {extreme:.4g}, for {longest} readings: the gauge is saturated"
             yield InputError(run.name, f"gauge {force}", problem, "repeat the run with a larger range")
             return

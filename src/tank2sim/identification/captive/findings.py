@@ -21,6 +21,7 @@ _REPEATED_ENOUGH = 3
 def findings(reduction: Reduction) -> tuple[str, ...]:
     """Everything to be told of a reduction, the gravest first."""
     found = [
+        *implausible(reduction),
         *(f"left out, for it is at fault: {fault}" for fault in reduction.faults),
         *_left_out(reduction),
         *reduction.campaign.remarks,
@@ -34,6 +35,13 @@ def findings(reduction: Reduction) -> tuple[str, ...]:
     found += _sheet(reduction)
     found += _repeated(reduction)
     return tuple(found)
+
+
+def implausible(reduction: Reduction) -> tuple[str, ...]:
+    """What no ship has among the derivatives: a wrong unit, sign or convention of the whole campaign shows there."""
+    values = {name: derivative.value for name, derivative in reduction.derivatives.items()}
+    errors = {name: derivative.standard_error for name, derivative in reduction.derivatives.items()}
+    return tuple(caution.message for caution in cautions_of_result(values, errors, reduction.campaign))
 
 
 def _left_out(reduction: Reduction) -> Iterator[str]:
@@ -76,9 +84,7 @@ def _physics(reduction: Reduction) -> Iterator[str]:
         Oscillation(row.run, "sway" if row.letter == "v" else "yaw", row.frequency_radps)
         for row in reduction.oscillations
     )
-    values = {name: derivative.value for name, derivative in reduction.derivatives.items()}
-    errors = {name: derivative.standard_error for name, derivative in reduction.derivatives.items()}
-    for caution in (*cautions_of_test(campaign, runs), *cautions_of_result(values, errors, campaign)):
+    for caution in cautions_of_test(campaign, runs):
         yield f"{caution.message}{f' Runs: {_listed(caution.runs)}.' if caution.runs else ''}"
 
 

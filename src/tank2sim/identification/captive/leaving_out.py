@@ -29,6 +29,10 @@ class LeftOut:
         Of the difference of the two.
     chance : float
         Probability of a misfit of all its coefficients as large as this or larger.
+    misfit : float
+        Root mean square misfit of all its coefficients, in standard errors.
+    gap, size : float
+        Norm of that misfit, and the larger norm of the coefficients measured and predicted; units as `measured`.
     influence : float
         The most that leaving it out moves a derivative, in standard errors.
     moved : str
@@ -41,6 +45,9 @@ class LeftOut:
     predicted: float
     standard_error: float
     chance: float
+    misfit: float
+    gap: float
+    size: float
     influence: float
     moved: str
 
@@ -61,6 +68,8 @@ def leave_one_out(equations: Equations, spread: Spread) -> tuple[LeftOut, ...]:
     One solve serves all: leaving a run out takes its share from the normal equations. A run without which a term
     cannot be found is not told.
     """
+    if not equations.names:
+        return ()
     design, values = weighted_system(equations, spread)
     norms = column_norms(design)
     design = design / norms
@@ -81,15 +90,19 @@ def leave_one_out(equations: Equations, spread: Spread) -> tuple[LeftOut, ...]:
         misfit_covariance = np.eye(end - start) + own @ inverse @ own.T
         root = spread.run_root(equations, place)
         which = 1 if equations.runs[place].run.oscillates else 0
-        measured, predicted = (float((root @ part)[which]) for part in (target, own @ without))
+        shown, expected = root @ target, root @ (own @ without)
+        squares = _squares(target - own @ without, misfit_covariance)
         found.append(
             LeftOut(
                 run=equations.runs[place].run.name,
                 type=equations.runs[place].run.type,
-                measured=measured,
-                predicted=predicted,
+                measured=float(shown[which]),
+                predicted=float(expected[which]),
                 standard_error=float(np.sqrt((root @ misfit_covariance @ root.T)[which, which])),
-                chance=_chance(target - own @ without, misfit_covariance),
+                chance=float(chdtrc(end - start, squares)),
+                misfit=float(np.sqrt(squares / (end - start))),
+                gap=float(np.linalg.norm(shown - expected)),
+                size=float(max(np.linalg.norm(shown), np.linalg.norm(expected))),
                 influence=float(shift[most]),
                 moved=equations.names[most],
             )
@@ -97,5 +110,5 @@ def leave_one_out(equations: Equations, spread: Spread) -> tuple[LeftOut, ...]:
     return tuple(found)
 
 
-def _chance(misfit: Vector, covariance: Matrix) -> float:
-    return float(chdtrc(len(misfit), misfit @ np.linalg.solve(covariance, misfit)))
+def _squares(misfit: Vector, covariance: Matrix) -> float:
+    return float(misfit @ np.linalg.solve(covariance, misfit))

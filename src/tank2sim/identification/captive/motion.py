@@ -23,6 +23,7 @@ _WHOLE = 0.02
 """Share of a period by which a record may fall short of a whole number of them: rounding of its ends."""
 _FEWEST_PER_PERIOD = 16
 _ITERATIONS = 8
+_FEW_PERIODS = 2.5
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -191,7 +192,19 @@ def _spectral_line(time: Vector, values: Vector) -> float:
     # below half a cycle in the record there is no oscillation to find
     spectrum[: max(2, padded // (2 * count))] = 0.0
     step = (time[-1] - time[0]) / (count - 1)
-    return float(2 * math.pi * int(np.argmax(spectrum)) / (padded * step))
+    line = 2 * math.pi * int(np.argmax(spectrum)) / (padded * step)
+    bin_width = 2 * math.pi / (count * step)
+    if line > _FEW_PERIODS * bin_width:
+        return float(line)
+    # Of a period or two the lines of positive and negative frequency run together, and half the frequency may have the
+    # highest: the sinusoid that fits best does not mistake it.
+    trials = bin_width * np.arange(0.5, _FEW_PERIODS + 1.0, 0.1)
+    return float(min(trials, key=lambda trial: _misfit(values, harmonic_basis(time, trial, 1))))
+
+
+def _misfit(values: Vector, basis: Matrix) -> float:
+    residual = values - basis @ _fitted(values, basis)
+    return float(residual @ residual)
 
 
 def _frequency_step(time: Vector, signals: Sequence[Vector], frequency: float) -> float:

@@ -108,6 +108,8 @@ def scatter_within_tests(equations: Equations) -> Spread:
         if name in equations.names and np.any(kinds == kind) and not np.all(kinds == kind):
             columns.append(np.where(kinds == kind, equations.design[:, equations.names.index(name)], 0.0)[:, None])
             names.append(f"{name} {kind}")
+    if len(names) > len(equations.values):
+        return fitted_spread(equations, by_type=False)
     return fitted_spread(replace(equations, names=tuple(names), design=np.hstack(columns)), by_type=False)
 
 

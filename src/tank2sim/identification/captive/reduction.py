@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.contradictions import contradicted
 from tank2sim.identification.captive.equations import SPEED_RANGE
 from tank2sim.identification.captive.faults import record_faults, reduced_faults
 from tank2sim.identification.captive.harmonics import ReducedRun, moderated, reduced_run
@@ -175,11 +176,16 @@ def reduce_campaign(campaign: Campaign, options: Options | None = None) -> Reduc
     runs, faults = _sound_runs(campaign)
     if faults and not options.keep_going:
         raise together(faults)
+    odd = contradicted(campaign, _used_runs(campaign, runs, options)[0])
+    faults += odd.values()
+    if odd and not options.keep_going:
+        raise together(faults)
+    runs = [run for run in runs if run.run.name not in odd]
     used, not_used = _used_runs(campaign, moderated(runs), options)
     if not used:
-        problem = "no run can be used"
-        told = faults[0] if faults else next(iter(not_used.items()), "")
-        raise InputError(campaign.path, "runs", problem, f"the first was left out: {told}")
+        told = [*map(str, faults), *(f"{name}, for {reason}" for name, reason in not_used.items())]
+        remedy = f"the first was left out: {told[0]}" if told else "give it runs"
+        raise InputError(campaign.path, "runs", "no run can be used", remedy)
     forces = {force: _force_result(campaign, used, force, options) for force in FORCES}
     derivatives = {name: found for force in FORCES for name, found in _derivatives(campaign, forces[force]).items()}
     alone = oscillations(campaign, runs)

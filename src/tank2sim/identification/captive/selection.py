@@ -98,14 +98,7 @@ def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_te
         As :func:`tank2sim.identification.captive.equations.equations`.
     """
     choices: dict[str, Choice] = {}
-    active = []
-    for term in candidate_terms(force):
-        if excited(campaign, runs, term):
-            active.append(term.name)
-        else:
-            choices[term.name] = Choice(term.name, False, "not excited", f"no run moves so that {term.name} acts")
-    full = equations(campaign, runs, force, active)
-    used = full.of_terms(_told_apart(full, choices))
+    used = told_apart(campaign, runs, force, choices)
     spread = fitted_spread(used)
     used = with_prior(used, spread)
     selection = Selection(used, spread, ())
@@ -114,6 +107,18 @@ def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_te
         choices[name] = _judged(solution, place, all_terms)
     order = [term.name for term in candidate_terms(force)]
     return replace(selection, choices=tuple(sorted(choices.values(), key=lambda choice: order.index(choice.name))))
+
+
+def told_apart(campaign: Campaign, runs: Sequence[ReducedRun], force: str, choices: dict[str, Choice]) -> Equations:
+    """The equations of all terms that the runs excite and can tell apart; the fate of the others goes to `choices`."""
+    active = []
+    for term in candidate_terms(force):
+        if excited(campaign, runs, term):
+            active.append(term.name)
+        else:
+            choices[term.name] = Choice(term.name, False, "not excited", f"no run moves so that {term.name} acts")
+    full = equations(campaign, runs, force, active)
+    return full.of_terms(_told_apart(full, choices))
 
 
 def _judged(solution: Solution, place: int, all_terms: bool) -> Choice:
@@ -144,9 +149,16 @@ def _told_apart(full: Equations, choices: dict[str, Choice]) -> list[str]:
     """Terms that the campaign can tell apart, taken from the simplest to the most mixed: each that joins must leave
     the condition number bearable."""
     kept: list[str] = []
+    conditions = _conditions(full)
     for name in sorted(full.names, key=_simplicity):
+        # The zero of Y and N is an unknown, whether or not its term is in the result.
+        spare = 0 if full.force == "X" or {"Y0", "N0"} & {name, *kept} else 1
+        if len(kept) + spare >= conditions or (conditions < 2 and name != "X0"):
+            told = f"{conditions} distinct condition{'s' * (conditions > 1)} cannot show it beside the zero"
+            choices[name] = Choice(name, False, "not excited", f"{' and '.join([told, *kept])}")
+            continue
         part = full.of_terms([*kept, name])
-        weighted = Spread(1.0, _usual_zero(full)).weighted(part, part.design)
+        weighted = Spread(1.0, usual_zero(full)).weighted(part, part.design)
         condition = scaled_condition(weighted)
         if condition <= COLLINEAR or _always(name):
             kept.append(name)
@@ -162,6 +174,15 @@ def _told_apart(full: Equations, choices: dict[str, Choice]) -> list[str]:
     return [name for name in full.names if name in kept]
 
 
+def _conditions(full: Equations) -> int:
+    """How many distinct conditions there are: an oscillating run counts once for each of its coefficients."""
+    steady = {
+        tuple(np.round([m.v_mps[0] / m.speed_mps[0], m.delta_rad[0], m.speed_mps[0]], 2).tolist())
+        for m in (run.motion for run in full.runs if not run.run.oscillates)
+    }
+    return len(steady) + sum(run.regressed for run in full.runs if run.run.oscillates)
+
+
 def _simplicity(name: str) -> tuple[int, ...]:
     """Linear terms come first, then by order, and at one order those in one motion before mixed ones."""
     term = parse_term(name)
@@ -170,6 +191,6 @@ def _simplicity(name: str) -> tuple[int, ...]:
     return (not _always(name), _order(term), term.u, mixed, term.d, term.r)
 
 
-def _usual_zero(full: Equations) -> float:
+def usual_zero(full: Equations) -> float:
     """A zero error that makes every mean as good as the others: what can be told apart hangs on the tests alone."""
     return float(np.median([root[0, 0] for root in full.roots])) ** 2

@@ -1,0 +1,108 @@
+"""An FMU driven in a process of its own, because a library can end the process that loads it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy.model_description import read_model_description
+
+from tank2sim.dynamics.model import Vector
+from tank2sim.fmu.manoeuvre import Manoeuvre
+from tank2sim.fmu.running import co_simulate, exchange, running
+from tank2sim.fmu.unpacking import Kind, UnpackedFmu
+
+_LONGEST_S = 900.0
+_ENTRY = "import sys; from tank2sim.fmu.process import drive_here; drive_here(*sys.argv[1:])"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """What to drive an FMU through, and the names of the inputs, outputs (ny) and parameters (np) to write and read."""
+
+    kind: Kind
+    run: Manoeuvre
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    parameters: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """What came of it.
+
+    Parameters
+    ----------
+    parameters : (np,) array, optional
+        Their values after instantiation, None if it did not come so far.
+    outputs : (K + 1, ny) array, optional
+        At the communication points, None if it did not come so far.
+    problem : str
+        What went wrong, in one line; empty if nothing.
+    """
+
+    parameters: Vector | None = None
+    outputs: Vector | None = None
+    problem: str = ""
+
+
+def drive_apart(unpacked: UnpackedFmu, drive: Drive) -> Answer:
+    """Drive an FMU in a process of its own. Whatever the library does there is part of the answer, never raised."""
+    with tempfile.TemporaryDirectory(prefix="tank2sim-") as name:
+        task, answer = Path(name, "task.npz"), Path(name, "answer.npz")
+        names: dict[str, Any] = {
+            key: np.array(getattr(drive, key), dtype=str) for key in ("inputs", "outputs", "parameters")
+        }
+        np.savez(task, times=drive.run.times, held=drive.run.inputs, **names)
+        command = [sys.executable, "-P", "-c", _ENTRY, str(unpacked.folder), drive.kind, str(task), str(answer)]
+        try:
+            ended = subprocess.run(
+                command,
+                env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                timeout=_LONGEST_S,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            return Answer(problem=f"the library did not come to an end in {_LONGEST_S:g} s")
+        if ended.returncode != 0 or not answer.exists():
+            return Answer(problem=f"the library ended the process that ran it ({_end(ended.returncode)})")
+        with np.load(answer) as found:
+            return Answer(
+                parameters=found.get("parameters"), outputs=found.get("outputs"), problem=str(found["problem"])
+            )
+
+
+def drive_here(folder: str, kind: Kind, task: str, answer: str) -> None:
+    """Drive the FMU in `folder` as the file `task` says and write what came of it to the file `answer`."""
+    drive = {"ModelExchange": exchange, "CoSimulation": co_simulate}[kind]
+    found: dict[str, Any] = {}
+    log: list[str] = []
+    problem = ""
+    with np.load(task) as given:
+        run = Manoeuvre(given["times"], given["held"])
+        inputs, outputs, parameters = (given[key].tolist() for key in ("inputs", "outputs", "parameters"))
+    try:
+        unpacked = UnpackedFmu(Path(folder), read_model_description(folder, validate=False))
+        with running(unpacked, kind, log=log) as fmu:
+            found["parameters"] = np.array(fmu.read(parameters))
+            found["outputs"] = drive(fmu, run, inputs, outputs)
+    except Exception as error:  # fmpy and ctypes raise many kinds, Exception itself among them
+        words = f"{error} {' '.join(log)}".replace(f"{folder}{os.sep}", "")
+        problem = " ".join(words.split()) or type(error).__name__
+    np.savez(answer, problem=np.array(problem), **found)
+
+
+def _end(code: int) -> str:
+    try:
+        return signal.Signals(-code).name
+    except ValueError:
+        return f"exit code {code}"

@@ -1,0 +1,68 @@
+"""The entry point: what a command ends with when its output cannot go where it should, or it is asked for nothing."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.cli.test_commands import refused, tank2sim
+
+MODELS = Path(__file__).parents[2] / "models"
+
+
+def into(output: int, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "from tank2sim.cli import main; main()", *arguments]
+    return subprocess.run(command, stdout=output, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
+
+
+@pytest.mark.parametrize("arguments", [["ships"], ["--help"], []])
+def test_a_reader_that_goes_away_is_no_fault(arguments) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    result = into(writing, *arguments)
+    os.close(writing)
+    assert (result.returncode, result.stderr) == (0, "")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("arguments", [["ships"], ["--help"]])
+def test_a_full_output_is_told_in_one_line(arguments) -> None:
+    with open("/dev/full", "w") as full:
+        refused(into(full.fileno(), *arguments), "output cannot be written")
+
+
+def test_asked_for_nothing_it_helps(tmp_path) -> None:
+    result = tank2sim(cwd=tmp_path)
+    assert result.returncode == 0 and "simulate" in result.stdout and not result.stderr
+    assert result.stdout == tank2sim("--help", cwd=tmp_path).stdout
+
+
+@pytest.mark.parametrize(
+    ("given", "bundled", "arguments"),
+    [
+        ("tows.csv", "wilinski-zellman/tows.csv", ["tow", "tows.csv", "--terms", "B3", "-o", "tows.csv"]),
+        ("ship.toml", "mariner/ship.toml", ["stability", "ship.toml", "--json", "ship.toml"]),
+        ("ship.toml", "mariner/ship.toml", ["export", "ship.toml", "-o", "ship.toml"]),
+        ("ship.toml", "mariner/ship.toml", ["simulate", "ship.toml", "--manoeuvre", "turn:35", "--out", "ship.toml"]),
+    ],
+)
+def test_an_input_is_not_written_over(tmp_path, given, bundled, arguments) -> None:
+    data = (MODELS / bundled).read_bytes()
+    (tmp_path / given).write_bytes(data)
+    refused(tank2sim(*arguments, cwd=tmp_path), given, "is an input")
+    assert (tmp_path / given).read_bytes() == data and len(list(tmp_path.iterdir())) == 1
+
+
+def test_one_file_for_two_outputs_is_refused(tmp_path) -> None:
+    tows = str(MODELS / "wilinski-zellman/tows.csv")
+    refused(tank2sim("tow", tows, "--terms", "B3", "-o", "x", "--json", "x", cwd=tmp_path), "two outputs")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_ship_may_be_named_like_markup(tmp_path) -> None:
+    result = tank2sim("stability", "mariner", "--set", 'ship.name="[/] [bold]x"', cwd=tmp_path)
+    assert result.returncode == 0 and "[/] [bold]x at" in result.stdout, result.stderr
