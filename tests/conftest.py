@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+# Matrices here are small and the workers of the tests share the cores: threads would only wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, read_card
@@ -34,7 +37,16 @@ def mariner(mariner_card: ManoeuvringCard) -> Model:
     return build(mariner_card)
 
 
+@pytest.fixture(scope="session")
+def session_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of this session of tests, which its worker processes share; write into it whole files only."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "session"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
 @pytest.fixture(autouse=True, scope="session")
-def private_cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+def private_cache(session_folder: Path) -> None:
     """Compiled models of tests go to a folder of their own, so that no test passes on what was compiled earlier."""
-    os.environ["XDG_CACHE_HOME"] = str(tmp_path_factory.mktemp("cache"))
+    os.environ["XDG_CACHE_HOME"] = str(session_folder / "cache")

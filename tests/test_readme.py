@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.cli.command_line import tank2sim
 
 from .conftest import DATA, ROOT
 
@@ -49,16 +48,7 @@ def test_every_example_command_runs(folder: Path) -> None:
     if not (folder / "campaign").is_dir():
         pytest.skip(f"no campaign to reduce: measured data are missing in {DATA} (set TANK2SIM_DATA)")
     for line in COMMANDS:
-        arguments = line.split()[1:]
-        done = subprocess.run(
-            [sys.executable, "-c", "from tank2sim.cli import main; main()", *arguments],
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=120,
-            env=dict(os.environ),
-        )
+        done = tank2sim(*line.split()[1:], cwd=folder)
         assert done.returncode == 0, f"{line}\n{done.stderr}"
 
 

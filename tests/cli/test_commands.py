@@ -3,26 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
+from tests.cli.command_line import refused, tank2sim
 
-def tank2sim(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", "from tank2sim.cli import main; main()", *arguments]
-    return subprocess.run(
-        command, cwd=cwd, capture_output=True, text=True, check=False, timeout=120, env={**os.environ, **environment}
-    )
-
-
-def refused(result: subprocess.CompletedProcess[str], *words: str) -> None:
-    assert result.returncode == 2, result.stderr
-    assert len(result.stderr.strip().splitlines()) == 1 and "Traceback" not in result.stderr
-    for word in words:
-        assert word in result.stderr, result.stderr
+VEHICLE = "wilinski-zellman"
 
 
 def test_ships_lists_the_bundled_cards(tmp_path) -> None:
@@ -103,8 +90,11 @@ def test_export_and_check_agree_and_a_wrong_card_fails(tmp_path) -> None:
         (["export", "mariner"], ["-o"]),
         (["export", "mariner", "-o", "x.fmu", "--fmi", "1"], ["--fmi"]),
         (["export", "mariner", "-o", "x.fmu", "--platforms", "amiga"], ["--platforms", "amiga"]),
-        (["export", "mariner", "-o", "missing/x.fmu"], ["missing/x.fmu", "cannot be written"]),
-        (["export", "mariner", "-o", "x.fmu", "--json", "missing/x.json"], ["missing/x.json", "cannot be written"]),
+        (["export", VEHICLE, "-o", "missing/x.fmu"], ["missing/x.fmu", "cannot be written"]),
+        (
+            ["export", VEHICLE, "-o", "x.fmu", "--json", "missing/x.json"],
+            ["missing/x.json", "cannot be written"],
+        ),
         (["check", "none.fmu"], ["none.fmu"]),
         (["tow", "none.csv"], ["none.csv"]),
         (["demo", "-o", "/proc/demo"], ["/proc/demo"]),

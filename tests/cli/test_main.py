@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.test_commands import refused, tank2sim
+from tests.cli.command_line import refused, tank2sim
 
 MODELS = Path(__file__).parents[2] / "models"
 
@@ -17,6 +17,14 @@ MODELS = Path(__file__).parents[2] / "models"
 def into(output: int, *arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-c", "from tank2sim.cli import main; main()", *arguments]
     return subprocess.run(command, stdout=output, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
+
+
+def test_a_process_ends_as_its_command_does(tmp_path) -> None:
+    assert into(subprocess.PIPE, "ships").stdout == tank2sim("ships", cwd=tmp_path).stdout
+    for arguments in (["stability", "titanic"], ["fly"]):
+        asked = into(subprocess.PIPE, *arguments)
+        refused(asked, arguments[-1])
+        assert (asked.stdout, asked.stderr) == ("", tank2sim(*arguments, cwd=tmp_path).stderr)
 
 
 @pytest.mark.parametrize("arguments", [["ships"], ["--help"], []])
@@ -46,7 +54,7 @@ def test_asked_for_nothing_it_helps(tmp_path) -> None:
     [
         ("tows.csv", "wilinski-zellman/tows.csv", ["tow", "tows.csv", "--terms", "B3", "-o", "tows.csv"]),
         ("ship.toml", "mariner/ship.toml", ["stability", "ship.toml", "--json", "ship.toml"]),
-        ("ship.toml", "mariner/ship.toml", ["export", "ship.toml", "-o", "ship.toml"]),
+        ("ship.toml", "wilinski-zellman/ship.toml", ["export", "ship.toml", "-o", "ship.toml"]),
         ("ship.toml", "mariner/ship.toml", ["simulate", "ship.toml", "--manoeuvre", "turn:35", "--out", "ship.toml"]),
     ],
 )

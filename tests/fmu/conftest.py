@@ -155,15 +155,14 @@ def hull(models: dict[str, Model]) -> Model:
 
 
 @pytest.fixture(scope="session")
-def fmu_file(models: dict[str, Model], tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, int], Path]:
-    """The FMU of a small model in a version of FMI, exported once."""
-    folder, made = tmp_path_factory.mktemp("fmus"), {}
+def fmu_file(models: dict[str, Model], session_folder: Path) -> Callable[[str, int], Path]:
+    """The FMU of a small model in a version of FMI, exported once; whoever needs it first writes it, whole."""
 
     def file(name: str, fmi: int) -> Path:
-        if (name, fmi) not in made:
-            made[name, fmi] = folder / f"{name}{fmi}.fmu"
-            write_fmu(models[name], made[name, fmi], fmi=fmi)
-        return made[name, fmi]
+        path = session_folder / f"{name}{fmi}.fmu"
+        if not path.exists():
+            write_fmu(models[name], path, fmi=fmi)
+        return path
 
     return file
 

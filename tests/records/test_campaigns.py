@@ -116,7 +116,7 @@ def test_averages_become_dimensional_with_their_own_speed_and_repeated_rows_coun
         (("speed_mps = 1.2", 'speed_mps = "fast"'), "test.speed_mps", "a number was expected"),
         (('type = "static_drift"', 'type = "drift"'), "runs.0.type", "static_drift"),
         (("drift_deg = 4.78", "drift_deg = 4.78\ndrift_rad = 0.1"), "runs.0.drift_rad", "given twice"),
-        (("drift_deg = 4.78", "drift_deg = 478"), "runs.0.drift_deg", "less than 90"),
+        (("drift_deg = 4.78", "drift_deg = 478"), "runs.0.drift_deg", "below 90"),
         (("x_G_m = 0.1", "x_G_m = nan"), "model.x_G_m", "finite"),
         (("[test]", "[test"), "line 7", ""),
     ],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -17,11 +16,12 @@ from tomlkit.exceptions import TOMLKitError
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards.card import Card, ManoeuvringCard, SurgeBodyCard
 from tank2sim.cards.form import FORMS, EffectEntry, Propulsion, RigidBody, ShipCard, SurgeCard
+from tank2sim.cards.form_faults import form_fault, short, suggestion
 from tank2sim.cards.scaling import Scales, file_factor
 from tank2sim.cards.terms import parse_term
 from tank2sim.errors import InputError
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
-from tank2sim.units import from_si, to_si
+from tank2sim.units import to_si
 
 # Sections whose keys may give an angle in degrees or radians.
 _SECTIONS_WITH_ANGLES = ("steering_gear", "propulsion")
@@ -74,13 +74,13 @@ def parse_card(text: str, source: str) -> Card:
         raise InputError(source, "model", "this section is missing", "a card needs [model] with its kind")
     kind = content["model"].get("kind")
     if not isinstance(kind, str) or kind not in FORMS:
-        raise InputError(source, "model.kind", f"is {_short(kind)}", f"one of {', '.join(FORMS)} was expected")
+        raise InputError(source, "model.kind", f"is {short(kind)}", f"one of {', '.join(FORMS)} was expected")
     spelt: dict[str, str] = {}
     _angles_to_radians(content, source, spelt)
     try:
         form = FORMS[kind].model_validate(content)
     except ValidationError as error:
-        raise _told(error, source, spelt) from None
+        raise form_fault(error, source, spelt, form=FORMS[kind], what="a card") from None
     if isinstance(form, ShipCard):
         return replace(_manoeuvring_card(form, text, source), spelt=spelt)
     return _surge_card(form, text, source)
@@ -182,83 +182,13 @@ def _angles_to_radians(content: dict[str, Any], source: str, spelt: dict[str, st
             try:
                 si_key, si_value = to_si(key, float(value))
             except OverflowError:
-                raise InputError(source, f"{place}.{key}", f"is {_short(value)}", "no number is so large") from None
+                raise InputError(source, f"{place}.{key}", f"is {short(value)}", "no number is so large") from None
             spelt[f"{place}.{si_key}"] = f"{place}.{key}"
             if si_key != key:
                 if si_key in section:
                     raise InputError(source, f"{place}.{key}", f"is given twice, also as {si_key}", "give it once")
                 del section[key]
                 section[si_key] = si_value
-
-
-def _told(error: ValidationError, source: str, spelt: Mapping[str, str]) -> InputError:
-    """The first fault that pydantic found, as one line of ours."""
-    # A key that is unknown explains one that is missing (length_ft for length_m), not the other way round.
-    first = min(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
-    place = ".".join(str(part) for part in first["loc"])
-    place = spelt.get(place, place)
-    key = place.rpartition(".")[2]
-    wanted = first.get("ctx", {})
-
-    def shown(value: float) -> str:
-        try:
-            return f"{from_si(key, value):g}"
-        except OverflowError:
-            return _short(value)
-
-    match first["type"]:
-        case "missing":
-            told = "is missing", "add it"
-        case "extra_forbidden":
-            told = "is no key of a card", _suggestion(key, _siblings(first["loc"]))
-        case "finite_number":
-            told = f"is {_short(first['input'])}", "a finite number was expected"
-        case "float_type" | "int_type":
-            told = f"is {_short(first['input'])}", "a number was expected"
-        case "greater_than":
-            told = f"is {shown(first['input'])}", f"a number greater than {shown(wanted['gt'])} was expected"
-        case "greater_than_equal":
-            told = f"is {shown(first['input'])}", f"a number of at least {shown(wanted['ge'])} was expected"
-        case "less_than":
-            told = f"is {shown(first['input'])}", f"a number below {shown(wanted['lt'])} was expected"
-        case "less_than_equal":
-            told = f"is {shown(first['input'])}", f"a number of at most {shown(wanted['le'])} was expected"
-        case "literal_error":
-            told = f"is {_short(first['input'])}", f"{wanted['expected']} was expected"
-        case "value_error":
-            told = f"is {_short(first['input'])}", str(wanted["error"])
-        case _:
-            told = f"is {_short(first['input'])}", first["msg"][0].lower() + first["msg"][1:]
-    more = len(error.errors()) - 1
-    return InputError(
-        source, place, told[0], told[1] + (f" ({more} more fault{'s' * (more > 1)} after this)" if more else "")
-    )
-
-
-def _short(value: object) -> str:
-    told = repr(value)
-    return told if len(told) <= 80 else f"{told[:77]}..."
-
-
-def _siblings(place: tuple[int | str, ...]) -> list[str]:
-    """Keys that may stand where an unknown one was found."""
-    form: Any = ShipCard if place[0] != "surge" else SurgeCard
-    for part in place[:-1]:
-        annotation = form.model_fields[part].annotation if isinstance(part, str) and part in form.model_fields else None
-        inner = [kind for kind in (annotation, *getattr(annotation, "__args__", ())) if hasattr(kind, "model_fields")]
-        if isinstance(part, int):
-            continue
-        if not inner:
-            return []
-        form = inner[0]
-    return list(form.model_fields)
-
-
-def _suggestion(key: str, known: list[str]) -> str:
-    close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
-    same_stem = [name for name in known if name.partition("_")[0] == key.partition("_")[0]]
-    best = close or same_stem
-    return f"did you mean {best[0]}?" if best else f"known here: {', '.join(known)}" if known else "remove it"
 
 
 def _manoeuvring_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard:
@@ -295,7 +225,7 @@ def _manoeuvring_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard
 def _surge_card(form: SurgeCard, text: str, source: str) -> SurgeBodyCard:
     for key in form.uncertainty:
         if key not in type(form.surge).model_fields:
-            known = _suggestion(key, list(type(form.surge).model_fields))
+            known = suggestion(key, list(type(form.surge).model_fields))
             raise InputError(source, f"uncertainty.{key}", "is no coefficient of [surge]", known)
     return SurgeBodyCard(
         source=source,

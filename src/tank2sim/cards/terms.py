@@ -56,3 +56,11 @@ def parse_term(name: str) -> Term | None:
     letters = velocity[3]
     v, r, d, u = (letters.count(letter) for letter in "vrdu")
     return Term(velocity[1], v, r, d, u)
+
+
+def known_term(name: str) -> Term:
+    """The term of a name that a list of the program has; raises ValueError if it is none."""
+    term = parse_term(name)
+    if term is None:
+        raise ValueError(f"{name} is no derivative")
+    return term

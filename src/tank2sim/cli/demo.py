@@ -9,7 +9,6 @@ import click
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from tank2sim.cli.screen import json_option, json_text, screen
-from tank2sim.demo.run import PAGE, STEPS, run_demo
 from tank2sim.errors import InputError
 from tank2sim.files import writable_folder, write_whole
 from tank2sim.native.compiler import require_compiler
@@ -28,6 +27,8 @@ from tank2sim.native.compiler import require_compiler
 @json_option
 def command(output: Path, json_file: Path | None) -> None:
     """Go the whole way on bundled data: tows to an FMU, the Mariner to checked FMUs, and a page that shows both."""
+    from tank2sim.demo.run import PAGE, STEPS, run_demo  # drawing and control: seconds, for which --help does not wait
+
     require_compiler("the demo")
     if json_file and not json_file.absolute().parent.is_dir():
         raise InputError(json_file, "", "is in a folder that does not exist", "choose one that does")

@@ -12,11 +12,17 @@ from tank2sim.cards import parse_card
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
 from tank2sim.errors import InputError
 from tank2sim.files import writable_folder, write_together
-from tank2sim.identification.captive.as_json import prediction_errors, reduction_as_json
+from tank2sim.identification.captive.as_json import reduction_as_json
 from tank2sim.identification.captive.findings import findings, implausible
 from tank2sim.identification.captive.reduction import Options, Reduction, reduce_campaign
 from tank2sim.identification.captive.result_card import FILLS, Contents, card_text, contents, reynolds_ratio
-from tank2sim.records.campaigns import Campaign, read_campaign
+from tank2sim.identification.captive.rows import (
+    derivative_rows,
+    prediction_rows,
+    terms_left_out,
+    terms_not_excited,
+)
+from tank2sim.records.campaigns import FORCES, Campaign, read_campaign
 
 
 @click.command("reduce")
@@ -135,38 +141,20 @@ def _pictures(reduction: Reduction, card: Contents, warnings: tuple[str, ...], f
 
 def _show(reduction: Reduction, card: Contents) -> None:
     rows: list[list[object]] = []
-    for name, entry in card.entries.items():
-        steps = reduction.forces[name[0]].stepwise
-        other = "-"
-        if name in steps.names and name not in card.estimated:
-            place = steps.names.index(name)
-            other = f"{steps.values[place]:.5g} ± {steps.standard_errors[place]:.2g} ({steps.found_in[place]})"
-        origin = "estimated" if name in card.estimated else "measured"
-        rows.append([name, f"{entry.value:.5g} ± {entry.standard_error:.2g}", other, origin])
+    for row in derivative_rows(reduction, card):
+        own, steps = f"{row.value:.5g} ± {row.standard_error:.2g}", row.stepped
+        other = f"{steps.value:.5g} ± {steps.standard_error:.2g} ({steps.found_in})" if steps else "-"
+        rows.append([row.name, own, other, row.origin])
     title = f"{reduction.campaign.model.name}: derivatives from {len(reduction.runs)} runs (prime, rudder to starboard)"
     show_table(title, ["", "whole campaign", "paper's order", ""], rows)
-    dropped = [
-        [choice.name, choice.reason, choice.told]
-        for result in reduction.forces.values()
-        for choice in result.selection.choices
-        if choice.reason in ("collinear", "not significant")
-    ]
-    if dropped:
+    if dropped := [[choice.name, choice.reason, choice.told] for choice in terms_left_out(reduction)]:
         show_table("Terms that the runs excite and that were left out", ["", "", "why"], dropped)
-    unexcited = [
-        choice.name
-        for result in reduction.forces.values()
-        for choice in result.selection.choices
-        if choice.reason == "not excited"
-    ]
-    screen.print(f"Not excited by any run: {', '.join(unexcited)}", soft_wrap=True, markup=False)
-    errors = prediction_errors(reduction)
+    screen.print(f"Not excited by any run: {', '.join(terms_not_excited(reduction))}", soft_wrap=True, markup=False)
     show_table(
         "Leave-one-out: root mean square error of each run predicted from the others, % of the range",
-        ["runs of type", "X", "Y", "N"],
+        ["runs of type", *FORCES],
         [
-            [kind, *(f"{100 * forces[force]['relative']:.2g}" if force in forces else "-" for force in "XYN")]
-            for kind, forces in errors.items()
-            if any(forces[force]["runs"] > 2 for force in forces)
+            [kind, *(f"{errors[force]:.2g}" if force in errors else "-" for force in FORCES)]
+            for kind, errors in prediction_rows(reduction).items()
         ],
     )

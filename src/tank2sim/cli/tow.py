@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 
 from tank2sim.cards import parse_card
-from tank2sim.cards.writing import SurgeResult, surge_card_text
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table, shown
 from tank2sim.files import write_together
 from tank2sim.identification.tow import METHODS, TowResult, identify_tow, parse_terms
+from tank2sim.identification.tow_card import tow_card_text
 from tank2sim.identification.tow_fit import TowFit
 from tank2sim.records.tows import read_tows
 
@@ -58,18 +58,8 @@ def card_text(result: TowResult, method: str, name: str) -> str:
         They are no body's: the total mass is not positive.
     """
     fit = result.fits.get(method) or result.fits["qr"]
-    values = {key: value for key, value in fit.estimates.items() if key != "added_mass_kg"}
-    errors = {key: value for key, value in fit.standard_errors.items() if key in values}
-    text = surge_card_text(
-        SurgeResult(
-            name=Path(name).stem,
-            source=f"tank2sim tow {result.tows.path.name}, method {fit.method}",
-            values={**values, "force_N": result.force_N, "dry_mass_kg": result.mass_kg},
-            standard_errors=errors,
-            top_speed_mps=result.tows.top_speed_mps,
-            notes=" ".join(result.warnings),
-        )
-    )
+    source = f"tank2sim tow {result.tows.path.name}, method {fit.method}"
+    text = tow_card_text(result, fit, name=Path(name).stem, source=source)
     parse_card(text, name)  # refuses a negative mass here, before anything is written
     return text
 

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import altair as alt
 import numpy as np
 
 from tank2sim.bundled import bundled
 from tank2sim.cards import parse_card
-from tank2sim.cards.writing import SurgeResult, surge_card_text
 from tank2sim.demo.workshop import Outcome, Workshop, error_words, largest_error
 from tank2sim.dynamics import build
-from tank2sim.dynamics.model import Vector
+from tank2sim.dynamics.model import Model, Vector
+from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.manoeuvre import Manoeuvre
 from tank2sim.fmu.replay import replay
 from tank2sim.identification.tow import TowResult, identify_tow
+from tank2sim.identification.tow_card import tow_card_text
 from tank2sim.records.tows import Tows, read_tows
 from tank2sim.report.charts import Tow, chart_png, tow_chart
 from tank2sim.report.page import Column, Figure, Illustration, Section, Table, Verdict
@@ -21,24 +25,48 @@ WELL_POSED = ("B3",)
 """Drag terms that these tows can tell (with M); the paper's B1 and B2 beside them cannot be identified."""
 
 
+NAME = "Wilinski-Zellman underwater vehicle"
+SOURCE = "Table 1 of Wilinski and Zellman (1984), M and B3 by output error (tank2sim demo)"
+LENGTH_M = 3.8
+"""Of the vehicle, paper 1."""
+
+
 def towed_vehicle(workshop: Workshop) -> Outcome:
     """Identify, write the card, export and check the FMU, and tow it through fmpy beside the measured tows."""
     workshop.tell("five tows of an underwater vehicle: identifying mass and drag")
     tows = read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
     paper, chosen = identify_tow(tows), identify_tow(tows, terms=WELL_POSED)
-    text = _card(chosen)
+    text = tow_card_text(chosen, chosen.fits["output_error"], name=NAME, source=SOURCE, length_m=LENGTH_M)
     card = parse_card(text, workshop.write("towed-vehicle.toml", text).name)
     model = build(card)
     checked = [workshop.checked_fmu(card, model, "towed-vehicle", fmi) for fmi in (2, 3)]
     workshop.tell("towed vehicle: co-simulating the five tows")
-    # A tenth of the readings' interval, so that every reading falls on a communication point.
-    times = np.linspace(tows.time_s[0], tows.time_s[-1], 10 * (len(tows.time_s) - 1) + 1)
-    held = np.full((len(times) - 1, 1), chosen.force_N)
-    speed = replay(checked[0][0], Manoeuvre(times, held), model)["motion.u"]
-    misses = _misses(tows, times, speed)
+    times, speed = _towed_again(model, checked[0][0], tows, chosen.force_N)
     rows = "\n".join(f"{t:.10g},{v:.10g}" for t, v in zip(times, speed, strict=True))
     workshop.write("towed-vehicle.csv", f"t_s,speed_mps\n{rows}\n")
-    chart = tow_chart(
+    chart = _chart(tows, times, speed)
+    workshop.write("towed-vehicle.png", chart_png(chart))
+    misses = _misses(tows, times, speed)
+    reports = [report for _, report in checked]
+    result: dict[str, object] = {
+        "four_unknowns": paper.as_json(),
+        "two_unknowns": chosen.as_json(),
+        "tows": misses,
+        "checks": [report.as_json() for report in reports],
+    }
+    return Outcome(_figures(chosen, misses, reports), [_section(paper, chosen, misses, chart)], result)
+
+
+def _towed_again(model: Model, fmu: Path, tows: Tows, force_N: float) -> tuple[Vector, Vector]:
+    """Times (s) and speeds (m/s) of the FMU under the force of the tows."""
+    # A tenth of the readings' interval, so that every reading falls on a communication point.
+    times = np.linspace(tows.time_s[0], tows.time_s[-1], 10 * (len(tows.time_s) - 1) + 1)
+    held = np.full((len(times) - 1, 1), force_N)
+    return times, replay(fmu, Manoeuvre(times, held), model)["motion.u"]
+
+
+def _chart(tows: Tows, times: Vector, speed: Vector) -> alt.LayerChart:
+    return tow_chart(
         [
             *(
                 Tow(label=f"tow {k + 1}", time_s=tows.time_s, speed_mps=column, model_time_s=[], model_speed_mps=[])
@@ -48,10 +76,10 @@ def towed_vehicle(workshop: Workshop) -> Outcome:
         ],
         title="Speed of the vehicle: five tows, and the FMU under the same force",
     )
-    workshop.write("towed-vehicle.png", chart_png(chart))
-    worst = max(miss["largest_mps"] for miss in misses)
-    error = largest_error([report for _, report in checked], "CoSimulation")
-    section = Section(
+
+
+def _section(paper: TowResult, chosen: TowResult, misses: list[dict[str, float]], chart: alt.LayerChart) -> Section:
+    return Section(
         heading="A towed vehicle: from five tows to an FMU",
         text=(
             "An underwater vehicle was towed from rest by a known force (Wilinski and Zellman 1984, Table 1). Its mass "
@@ -71,45 +99,30 @@ def towed_vehicle(workshop: Workshop) -> Outcome:
         ],
         notes=[*paper.warnings[:1], *chosen.warnings],
     )
+
+
+def _figures(chosen: TowResult, misses: list[dict[str, float]], reports: list[CheckReport]) -> list[Figure]:
     fit = chosen.fits["output_error"]
-    figures = [
+    return [
         Figure(
             label="Vehicle's mass with added mass",
             value=f"{fit.estimates['total_mass_kg']:.0f} ± {fit.standard_errors['total_mass_kg']:.0f}",
             unit="kg",
             note="from five tows, one standard error",
         ),
-        Figure(label="FMU against the tows", value=worst, unit="m/s", note="largest difference of any reading"),
+        Figure(
+            label="FMU against the tows",
+            value=max(miss["largest_mps"] for miss in misses),
+            unit="m/s",
+            note="largest difference of any reading",
+        ),
         Figure(
             label="Vehicle's FMU against CasADi",
-            value=error_words(error),
+            value=error_words(largest_error(reports, "CoSimulation")),
             verdict=Verdict.PASSED,
             note="same scheme, relative",
         ),
     ]
-    result: dict[str, object] = {
-        "four_unknowns": paper.as_json(),
-        "two_unknowns": chosen.as_json(),
-        "tows": misses,
-        "checks": [report.as_json() for _, report in checked],
-    }
-    return Outcome(figures, [section], result)
-
-
-def _card(chosen: TowResult) -> str:
-    fit = chosen.fits["output_error"]
-    values = {key: value for key, value in fit.estimates.items() if key != "added_mass_kg"}
-    return surge_card_text(
-        SurgeResult(
-            name="Wilinski-Zellman underwater vehicle",
-            source="Table 1 of Wilinski and Zellman (1984), M and B3 by output error (tank2sim demo)",
-            values={**values, "force_N": chosen.force_N, "dry_mass_kg": chosen.mass_kg},
-            standard_errors={key: fit.standard_errors[key] for key in values},
-            top_speed_mps=chosen.tows.top_speed_mps,
-            length_m=3.8,  # of the vehicle, paper 1
-            notes=" ".join(chosen.warnings),
-        )
-    )
 
 
 def _misses(tows: Tows, times: Vector, speed: Vector) -> list[dict[str, float]]:

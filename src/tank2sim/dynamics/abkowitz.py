@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from tank2sim.cards.terms import parse_term
+from tank2sim.cards.terms import known_term
 
 _EVEN_AND_ODD = (
     "0 0u 0uu v vvv vrr vdd vu vuu r rrr vvr rdd ru ruu d ddd vvd rrd du duu vrd".split()  # order of (3.8b)
@@ -43,7 +43,6 @@ def polynomial(names: Iterable[str], coefficients: Mapping[str, Any], v: Any, r:
     """
     total: Any = 0
     for name in names:
-        term = parse_term(name)
-        assert term is not None
+        term = known_term(name)
         total += coefficients[name] * v**term.v * r**term.r * d**term.d * du**term.u
     return total

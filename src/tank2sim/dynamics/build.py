@@ -53,10 +53,12 @@ def _with_effect(model: Model, card: ManoeuvringCard, entry: EffectEntry, place:
                 raise card.fault(f"{place}.{section}.{name}", f"is no parameter of {entry.name}", remedy)
     for name, parameter in known.items():
         if name not in entry.parameters:
+            if parameter.default is not None:
+                continue
             raise card.fault(f"{place}.parameters.{name}", "is missing", f"give the {parameter.description}")
         value = entry.parameters[name]
         if not parameter.minimum <= value <= parameter.maximum:
             key, shown = card.in_file(f"{place}.parameters.{name}", value)
             lowest, highest = (from_si(key, bound) for bound in (parameter.minimum, parameter.maximum))
             raise card.fault(key, f"is {shown:g}", f"{lowest:g} to {highest:g} was expected")
-    return effect.apply(model, entry.parameters)
+    return effect.apply(model, entry.parameters, card)

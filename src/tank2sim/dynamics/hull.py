@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from tank2sim.cards.scaling import Scales
-from tank2sim.cards.terms import parse_term
+from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, LINEAR_TERMS, TERMS, polynomial
 from tank2sim.dynamics.model import Quantity
 from tank2sim.dynamics.propulsion import propeller_force
@@ -59,38 +59,64 @@ class Hull:
 
 
 def motion_quantities(hull: Hull) -> tuple[Quantity, ...]:
-    """``force.*``, ``inertia.*``, ``motion.udot``, ``.vdot``, ``.rdot``, ``.speed``, ``.beta`` and ``validity``."""
+    """``rudder.X``, ``.Y``, ``.N``, ``force.*``, ``inertia.*``, ``motion.udot``, ``.vdot``, ``.rdot``, ``.speed``, ``.beta`` and ``validity``."""
     forces = _force_quantities(hull)
+    X, Y, N = forces[-3:]
     masses = _inertia_quantities(hull)
     matrix = Inertia(*(mass.symbol for mass in masses))
-    motion = accelerations(matrix, *(force.symbol for force in forces))
+    motion = accelerations(matrix, X.symbol, Y.symbol, N.symbol)
     return (*forces, *masses, *_acceleration_quantities(motion), *_water_speed_quantities(hull))
 
 
-def _right_hand_sides(hull: Hull) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _scales_of_forces(hull: Hull) -> tuple[ca.SX, Scales]:
+    """V of the scaling, and the scales with it."""
+    speed = hull["ship.speed"] if hull.linear or hull.nominal_scale else hull.speed
+    return speed, hull.scales(speed)
+
+
+def _polynomials(hull: Hull, with_rudder: bool) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """X, Y, N of the terms of (3.5) or (3.8) that hold the rudder's angle, or of those that do not; N, N and N m."""
+    speed, scales = _scales_of_forces(hull)
+    u, v, r = hull["motion.u"], hull["motion.v"], hull["motion.r"]
+    primes = (v / speed, r * scales.length / speed, hull["rudder.effective"], (u - hull["ship.speed"]) / speed)
+    sums = []
+    for force in "XYN":
+        every = (LINEAR_TERMS if hull.linear else TERMS)[force]
+        names = [name for name in every if (known_term(name).d > 0) == with_rudder]
+        sums.append(polynomial(names, {name: hull.coefficient(name) for name in names}, *primes))
+    return scales.force * sums[0], scales.force * sums[1], scales.force * scales.length * sums[2]
+
+
+def _rudder_quantities(hull: Hull) -> tuple[Quantity, Quantity, Quantity]:
+    X, Y, N = _polynomials(hull, with_rudder=True)
+    return (
+        Quantity(name="rudder.X", unit="N", description="Surge force by the rudder, positive forward", value=X),
+        Quantity(name="rudder.Y", unit="N", description="Sway force by the rudder, positive to starboard", value=Y),
+        Quantity(name="rudder.N", unit="N.m", description="Yaw moment by the rudder, positive to starboard", value=N),
+    )
+
+
+def _right_hand_sides(hull: Hull, rudder: tuple[Quantity, Quantity, Quantity]) -> tuple[ca.SX, ca.SX, ca.SX]:
     """f1, f2, f3 of (3.8), or the right-hand sides of (3.5); N and N m."""
     u, v, r, u0 = hull["motion.u"], hull["motion.v"], hull["motion.r"], hull["ship.speed"]
-    speed = u0 if hull.linear or hull.nominal_scale else hull.speed
-    scales = hull.scales(speed)
-    names = LINEAR_TERMS if hull.linear else TERMS
-    coefficients = {name: hull.coefficient(name) for force in "XYN" for name in names[force]}
-    primes = (v / speed, r * scales.length / speed, hull["rudder.effective"], (u - u0) / speed)
-    X, Y, N = (polynomial(names[force], coefficients, *primes) for force in "XYN")
-    forces = scales.force * X, scales.force * Y, scales.force * scales.length * N
+    bare = _polynomials(hull, with_rudder=False)
+    X, Y, N = (force + by_rudder.symbol for force, by_rudder in zip(bare, rudder, strict=True))
     if "propeller.speed" in hull.symbols:
         revolutions = hull["propeller.speed_actual"], hull["propulsion.nominal_speed"], hull["propulsion.Xnn"]
-        forces = forces[0] + hull.scales(u0).force * propeller_force(*revolutions), *forces[1:]
+        X = X + hull.scales(u0).force * propeller_force(*revolutions)
     if hull.inertial_terms:
         surge, sway, yaw = inertial_forces(hull["ship.mass"], hull["ship.x_G"], u0 if hull.linear else u, v, r)
         # (3.5a) has no m v r: a product of two small quantities.
-        forces = forces[0] + (0 if hull.linear else surge), forces[1] + sway, forces[2] + yaw
-    return forces
+        X, Y, N = X + (0 if hull.linear else surge), Y + sway, N + yaw
+    return X, Y, N
 
 
-def _force_quantities(hull: Hull) -> tuple[Quantity, Quantity, Quantity]:
-    f1, f2, f3 = _right_hand_sides(hull)
+def _force_quantities(hull: Hull) -> tuple[Quantity, ...]:
+    by_rudder = _rudder_quantities(hull)
+    f1, f2, f3 = _right_hand_sides(hull, by_rudder)
     equations = "right-hand side of (3.5)" if hull.linear else "right-hand side of (3.8)"
     return (
+        *by_rudder,
         Quantity(
             name="force.X",
             unit="N",
@@ -120,9 +146,7 @@ def _inertia_quantities(hull: Hull) -> tuple[Quantity, ...]:
     scales = hull.scales(hull["ship.speed"])
     added = {}
     for name in ACCELERATION_TERMS:
-        term = parse_term(name)
-        assert term is not None
-        added[name] = scales.derivative(term) * hull.coefficient(name)
+        added[name] = scales.derivative(known_term(name)) * hull.coefficient(name)
     matrix = inertia(hull["ship.mass"], hull["ship.x_G"], hull["ship.yaw_inertia"], added)
     described = (
         ("inertia.surge", "kg", "Mass with added mass in surge, m - Xudot", matrix.surge),

@@ -28,56 +28,56 @@ def kinematics(body: Mapping[str, State]) -> tuple[Variable, ...]:
         States ``motion.x``, ``motion.y``, ``motion.psi``; quantities ``motion.xdot``, ``motion.ydot``,
         ``motion.psidot``, ``motion.sog``, ``motion.cog``; parameters ``initial.x``, ``.y``, ``.psi``.
     """
-    starts = (
-        Parameter(name="initial.x", unit="m", description="Position to north at the start", start=0.0, tunable=False),
-        Parameter(name="initial.y", unit="m", description="Position to east at the start", start=0.0, tunable=False),
-        Parameter(
-            name="initial.psi",
-            unit="rad",
-            description="Heading at the start, clockwise from north",
-            display_unit="deg",
-            start=0.0,
-            tunable=False,
-        ),
-    )
-    x, y, psi = (
-        State(
-            name="motion.x",
-            unit="m",
-            description="Position of the origin (midway between perpendiculars) to north",
-            nominal=100.0,
-            derivative="motion.xdot",
-            start=starts[0].symbol,
-        ),
-        State(
-            name="motion.y",
-            unit="m",
-            description="Position of the origin (midway between perpendiculars) to east",
-            nominal=100.0,
-            derivative="motion.ydot",
-            start=starts[1].symbol,
-        ),
-        State(
-            name="motion.psi",
-            unit="rad",
-            description="Heading, clockwise from north, continuous",
-            display_unit="deg",
-            derivative="motion.psidot",
-            start=starts[2].symbol,
-        ),
-    )
+    x0, y0, psi0 = starts = _starts()
+    _, _, psi = states = _states(x0.symbol, y0.symbol, psi0.symbol)
     north, east = earth_velocity(body["motion.u"].symbol, body["motion.v"].symbol, psi.symbol)
-    xdot = Quantity(name="motion.xdot", unit="m/s", description="Speed to north over the ground", value=north)
-    ydot = Quantity(name="motion.ydot", unit="m/s", description="Speed to east over the ground", value=east)
-    psidot = Quantity(
-        name="motion.psidot",
-        unit="rad/s",
-        description="Rate of change of heading, positive to starboard",
-        display_unit="deg/s",
-        nominal=0.01,
-        value=body["motion.r"].symbol,
+    xdot, ydot, _ = rates = _rates(north, east, body["motion.r"].symbol)
+    return (*states, *rates, *_over_ground(xdot.symbol, ydot.symbol, psi.symbol), *starts)
+
+
+def _starts() -> tuple[Parameter, ...]:
+    described = (
+        ("initial.x", "m", "Position to north at the start", None),
+        ("initial.y", "m", "Position to east at the start", None),
+        ("initial.psi", "rad", "Heading at the start, clockwise from north", "deg"),
     )
-    return (x, y, psi, xdot, ydot, psidot, *_over_ground(xdot.symbol, ydot.symbol, psi.symbol), *starts)
+    return tuple(
+        Parameter(name=name, unit=unit, description=description, display_unit=shown, start=0.0, tunable=False)
+        for name, unit, description, shown in described
+    )
+
+
+def _states(*starts: ca.SX) -> tuple[State, ...]:
+    origin = "Position of the origin (midway between perpendiculars)"
+    described = (
+        ("motion.x", "m", f"{origin} to north", None, 100.0),
+        ("motion.y", "m", f"{origin} to east", None, 100.0),
+        ("motion.psi", "rad", "Heading, clockwise from north, continuous", "deg", 1.0),
+    )
+    return tuple(
+        State(
+            name=name,
+            unit=unit,
+            description=description,
+            display_unit=shown,
+            nominal=nominal,
+            derivative=f"{name}dot",
+            start=start,
+        )
+        for (name, unit, description, shown, nominal), start in zip(described, starts, strict=True)
+    )
+
+
+def _rates(*values: ca.SX) -> tuple[Quantity, ...]:
+    described = (
+        ("motion.xdot", "m/s", "Speed to north over the ground", None, 1.0),
+        ("motion.ydot", "m/s", "Speed to east over the ground", None, 1.0),
+        ("motion.psidot", "rad/s", "Rate of change of heading, positive to starboard", "deg/s", 0.01),
+    )
+    return tuple(
+        Quantity(name=name, unit=unit, description=description, display_unit=shown, nominal=nominal, value=value)
+        for (name, unit, description, shown, nominal), value in zip(described, values, strict=True)
+    )
 
 
 def _over_ground(xdot: ca.SX, ydot: ca.SX, psi: ca.SX) -> tuple[Quantity, Quantity]:

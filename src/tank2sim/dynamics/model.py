@@ -213,6 +213,26 @@ class Model:
         )
         return replace(self, quantities=changed)
 
+    def substitute(self, name: str, value: ca.SX) -> Model:
+        """A model in which `value` stands wherever the variable `name` stood: in quantities, starts and trims.
+
+        `value` may hold the old symbol. A parameter that it does not hold acts on nothing any more, and is dropped.
+        """
+        old = self.symbol(name)
+
+        def changed(expression: ca.SX | float) -> ca.SX:
+            return ca.substitute(ca.SX(expression), old, value)
+
+        quantities = tuple(_same_symbol(one, replace(one, value=changed(one.value))) for one in self.quantities)
+        states = tuple(
+            _same_symbol(
+                one, replace(one, start=changed(one.start), trim=None if one.trim is None else changed(one.trim))
+            )
+            for one in self.states
+        )
+        kept = tuple(one for one in self.parameters if one.name != name or ca.depends_on(value, old))
+        return replace(self, quantities=quantities, states=states, parameters=kept)
+
     def extend(self, *variables: Variable, outputs: Iterable[str] = (), notices: Iterable[str] = ()) -> Model:
         """A model with more variables (each put with its own kind), outputs and notices."""
 
@@ -326,7 +346,7 @@ def _values(variables: tuple[Parameter, ...] | tuple[Input, ...], changed: Mappi
     return np.array([changed.get(variable.name, variable.start) for variable in variables], dtype=float)
 
 
-def _same_symbol(old: Quantity, new: Quantity) -> Quantity:
+def _same_symbol(old: Kind, new: Kind) -> Kind:
     # cached_property stores in __dict__, so this keeps the symbol that other expressions already use.
     new.__dict__["symbol"] = old.symbol
     return new

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.cards.terms import parse_term
+from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.hull import Hull, motion_quantities
 from tank2sim.dynamics.kinematics import kinematics
@@ -137,8 +137,7 @@ def _ship_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
 
 def _derivative_parameters(card: ManoeuvringCard, names: list[str]) -> tuple[Parameter, ...]:
     def described(name: str) -> str:
-        term = parse_term(name)
-        assert term is not None
+        term = known_term(name)
         if term.acceleration:
             return f"Acceleration derivative of {term.force} by d{term.acceleration}/dt, prime system"
         powers = [

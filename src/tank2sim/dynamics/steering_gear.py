@@ -27,23 +27,50 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
     -------
     variables : tuple
         Inputs ``rudder.command`` (rad, + starboard) and ``steering.failed``, state ``rudder.angle``, quantities
-        ``rudder.rate`` and ``rudder.effective`` (the angle that the hull forces see), parameters ``steering.*``.
+        ``rudder.rate``, ``rudder.error`` (order less angle, which drives the rate) and ``rudder.effective`` (the angle
+        that the hull forces see), parameters ``steering.*``.
     notices : list of str
     """
     gear = gear or SteeringGear()
-    notices = []
-    if gear.time_constant_s is None:
-        notices.append(
-            "the card states no time constant of the steering gear: "
-            f"{UNSTATED_LAG * ship_time_s:.3g} s is taken ({UNSTATED_LAG} L/u0)"
-        )
-    lag = Parameter(
-        name="steering.time_constant",
-        unit="s",
-        description="Time constant of the steering gear",
-        minimum=1e-6,
-        start=gear.time_constant_s or UNSTATED_LAG * ship_time_s,
+    notices = [] if gear.time_constant_s else [assumed_lag_notice(ship_time_s)]
+    command, failed = _inputs(gear)
+    lag, *limits = _parameters(gear, ship_time_s)
+    by_name = {limit.name: limit.symbol for limit in limits}
+    start = Parameter(
+        name="initial.rudder_angle",
+        unit="rad",
+        description="Rudder angle at the start, positive to starboard",
+        display_unit="deg",
+        nominal=0.35,
+        start=0.0,
+        tunable=False,
     )
+    order = _within(command.symbol, by_name.get("steering.max_angle"))
+    rudder = State(
+        name="rudder.angle",
+        unit="rad",
+        description="Rudder angle, positive to starboard (turns the ship to starboard)",
+        display_unit="deg",
+        nominal=0.35,
+        derivative="rudder.rate",
+        start=start.symbol,
+        trim=ca.if_else(failed.symbol, start.symbol, order),
+    )
+    error = _angle("rudder.error", "Order less rudder angle, on which the gear acts", order - rudder.symbol)
+    rate = _rate(_within(error.symbol / lag.symbol, by_name.get("steering.max_rate")) * (1 - failed.symbol))
+    seen = _angle("rudder.effective", "Rudder angle that the hull forces see, positive to starboard", rudder.symbol)
+    return (command, failed, rudder, error, rate, seen, lag, *limits, start), notices
+
+
+def assumed_lag_notice(ship_time_s: float) -> str:
+    """What a user is told where a card states no time constant; L/u0 in s."""
+    return (
+        "the card states no time constant of the steering gear: "
+        f"{UNSTATED_LAG * ship_time_s:.3g} s is taken ({UNSTATED_LAG} L/u0)"
+    )
+
+
+def _inputs(gear: SteeringGear) -> tuple[Input, Input]:
     command = Input(
         name="rudder.command",
         unit="rad",
@@ -59,65 +86,51 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
         description="True: the steering gear has failed and the rudder stays where it is",
         boolean=True,
     )
-    parameters = [lag]
-    order, limited_rate = command.symbol, None
-    if gear.max_angle_rad is not None:
-        angle = _limit("steering.max_angle", "rad", "Largest rudder angle either way", gear.max_angle_rad, "deg")
-        parameters.append(angle)
-        order = ca.fmax(-angle.symbol, ca.fmin(angle.symbol, order))
-    if gear.max_rate_radps is not None:
-        limited_rate = _limit("steering.max_rate", "rad/s", "Largest rate of the rudder", gear.max_rate_radps, "deg/s")
-        parameters.append(limited_rate)
-    start = Parameter(
-        name="initial.rudder_angle",
-        unit="rad",
-        description="Rudder angle at the start, positive to starboard",
-        display_unit="deg",
-        nominal=0.35,
-        start=0.0,
-        tunable=False,
-    )
-    rudder = State(
-        name="rudder.angle",
-        unit="rad",
-        description="Rudder angle, positive to starboard (turns the ship to starboard)",
-        display_unit="deg",
-        nominal=0.35,
-        derivative="rudder.rate",
-        start=start.symbol,
-        trim=ca.if_else(failed.symbol, start.symbol, order),
-    )
-    rate = (order - rudder.symbol) / lag.symbol
-    if limited_rate is not None:
-        rate = ca.fmax(-limited_rate.symbol, ca.fmin(limited_rate.symbol, rate))
-    quantities = (
-        Quantity(
-            name="rudder.rate",
-            unit="rad/s",
-            description="Rate of the rudder, positive to starboard",
-            display_unit="deg/s",
-            nominal=0.05,
-            value=rate * (1 - failed.symbol),
-        ),
-        Quantity(
-            name="rudder.effective",
-            unit="rad",
-            description="Rudder angle that the hull forces see, positive to starboard",
-            display_unit="deg",
-            nominal=0.35,
-            value=rudder.symbol,
-        ),
-    )
-    return (command, failed, rudder, *quantities, *parameters, start), notices
+    return command, failed
 
 
-def _limit(name: str, unit: str, description: str, value: float, display_unit: str) -> Parameter:
-    return Parameter(
-        name=name,
-        unit=unit,
-        description=description,
-        minimum=0.0,
-        start=value,
-        nominal=value,
-        display_unit=display_unit,
+def _parameters(gear: SteeringGear, ship_time_s: float) -> list[Parameter]:
+    lag = Parameter(
+        name="steering.time_constant",
+        unit="s",
+        description="Time constant of the steering gear",
+        minimum=1e-6,
+        start=gear.time_constant_s or UNSTATED_LAG * ship_time_s,
     )
+    described = (
+        ("steering.max_angle", "rad", "Largest rudder angle either way", gear.max_angle_rad, "deg"),
+        ("steering.max_rate", "rad/s", "Largest rate of the rudder", gear.max_rate_radps, "deg/s"),
+    )
+    limits = (
+        Parameter(
+            name=name,
+            unit=unit,
+            description=description,
+            minimum=0.0,
+            start=value,
+            nominal=value,
+            display_unit=display_unit,
+        )
+        for name, unit, description, value, display_unit in described
+        if value is not None
+    )
+    return [lag, *limits]
+
+
+def _angle(name: str, description: str, value: ca.SX) -> Quantity:
+    return Quantity(name=name, unit="rad", description=description, display_unit="deg", nominal=0.35, value=value)
+
+
+def _rate(value: ca.SX) -> Quantity:
+    return Quantity(
+        name="rudder.rate",
+        unit="rad/s",
+        description="Rate of the rudder, positive to starboard",
+        display_unit="deg/s",
+        nominal=0.05,
+        value=value,
+    )
+
+
+def _within(value: ca.SX, limit: ca.SX | None) -> ca.SX:
+    return value if limit is None else ca.fmax(-limit, ca.fmin(limit, value))

@@ -24,11 +24,9 @@ from tank2sim.fmu.interface import Interface, interface
 from tank2sim.fmu.platforms import host_platform
 from tank2sim.fmu.sources import c_sources, headers_notice
 from tank2sim.fmu.templates import c_identifier, render
+from tank2sim.fmu.unpacking import CARD_IN_FMU
 from tank2sim.native.compiler import compile_shared, require_compiler
 from tank2sim.units import UNITS
-
-CARD_IN_FMU = "resources/ship.toml"
-"""Where an FMU keeps the card of its ship, so that a check can build the model again."""
 
 _EXPERIMENT_STEPS = 6000
 _EXPERIMENT_TOLERANCE = 1e-6

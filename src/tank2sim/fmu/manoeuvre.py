@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tank2sim.dynamics.model import Input, Model, Vector
+if TYPE_CHECKING:  # the processes that drive an FMU import this module, and would wait for CasADi
+    from tank2sim.dynamics.model import Input, Model, Vector
 
 _STEP_PATTERN = (4.0, 2.5, 1.0)
 """Communication steps in internal steps, again and again: several, a number that is not whole, and one."""

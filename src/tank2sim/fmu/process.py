@@ -9,15 +9,17 @@ import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from fmpy.model_description import read_model_description
 
-from tank2sim.dynamics.model import Vector
 from tank2sim.fmu.manoeuvre import Manoeuvre
 from tank2sim.fmu.running import co_simulate, exchange, running
 from tank2sim.fmu.unpacking import Kind, UnpackedFmu
+
+if TYPE_CHECKING:
+    from tank2sim.dynamics.model import Vector
 
 _LONGEST_S = 900.0
 _ENTRY = "import sys; from tank2sim.fmu.process import drive_here; drive_here(*sys.argv[1:])"

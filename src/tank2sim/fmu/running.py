@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import fmpy.fmi2
 import fmpy.fmi3
 import numpy as np
 from fmpy.sundials import CVodeSolver
 
-from tank2sim.dynamics.model import Vector
 from tank2sim.fmu.manoeuvre import Manoeuvre
 from tank2sim.fmu.unpacking import Kind, UnpackedFmu
+
+if TYPE_CHECKING:
+    from tank2sim.dynamics.model import Vector
 
 _TOLERANCE = 1e-10
 _MOST_SOLVER_STEPS = 1_000_000

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,9 +13,11 @@ import fmpy
 from fmpy.model_description import read_model_description
 
 from tank2sim.errors import InputError
-from tank2sim.fmu.export import CARD_IN_FMU
 
 Kind = Literal["ModelExchange", "CoSimulation"]
+
+CARD_IN_FMU = "resources/ship.toml"
+"""Where an FMU keeps the card of its ship, so that a check can build the model again."""
 
 
 @dataclass(frozen=True)
@@ -48,12 +51,19 @@ class UnpackedFmu:
 
     def references(self, names: Sequence[str]) -> list[int]:
         """Value references of variables."""
-        by_name = {variable.name: variable.valueReference for variable in self.description.modelVariables}
-        return [by_name[name] for name in names]
+        return [self._references[name] for name in names]
 
     def boolean(self, name: str) -> bool:
         """Whether a variable is Boolean."""
-        return any(v.name == name and v.type == "Boolean" for v in self.description.modelVariables)
+        return name in self._booleans
+
+    @cached_property
+    def _references(self) -> dict[str, int]:
+        return {variable.name: variable.valueReference for variable in self.description.modelVariables}
+
+    @cached_property
+    def _booleans(self) -> frozenset[str]:
+        return frozenset(variable.name for variable in self.description.modelVariables if variable.type == "Boolean")
 
 
 def unpack(path: Path, folder: Path) -> UnpackedFmu:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
+from functools import cache
 from pathlib import Path
 
 import platformdirs
@@ -13,14 +14,20 @@ from tank2sim.native.compiler import FLAGS, SHARED_SUFFIX, compile_shared, requi
 
 
 def cache_folder() -> Path:
-    """Folder of compiled libraries: the user's cache, or a temporary folder where that cannot be written."""
+    """Folder of compiled libraries: the user's cache; where that cannot be written, one that ends with the process."""
     folder = platformdirs.user_cache_path("tank2sim") / "native"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError:
-        return Path(tempfile.mkdtemp(prefix="tank2sim-"))
+        return Path(_passing_folder().name)
+
+
+@cache
+def _passing_folder() -> tempfile.TemporaryDirectory[str]:
+    # A library that is still loaded cannot be removed everywhere.
+    return tempfile.TemporaryDirectory(prefix="tank2sim-", ignore_cleanup_errors=True)
 
 
 def cached_library(source: str) -> Path:

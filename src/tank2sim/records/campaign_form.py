@@ -6,15 +6,15 @@ then renamed (``drift_deg`` to ``drift_rad``, ``propeller_rps`` to ``propeller_r
 
 from __future__ import annotations
 
-import difflib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from tank2sim.cards.form import Positive, Section, Text
+from tank2sim.cards.form_faults import form_fault
 from tank2sim.errors import InputError
-from tank2sim.units import from_si, to_si
+from tank2sim.units import to_si
 
 RunType = Literal["static_drift", "static_rudder", "drift_and_rudder", "pure_sway", "pure_yaw", "yaw_with_drift"]
 RUN_TYPES: tuple[RunType, ...] = (
@@ -212,7 +212,7 @@ def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, 
     try:
         return CampaignFile.model_validate(content), factors
     except ValidationError as error:
-        raise _told(error, source, spelt) from None
+        raise form_fault(error, source, spelt, form=CampaignFile, what="a campaign") from None
 
 
 def _in_si(section: dict[str, Any], place: str, source: Path, spelt: dict[str, str]) -> dict[str, Any]:
@@ -225,46 +225,3 @@ def _in_si(section: dict[str, Any], place: str, source: Path, spelt: dict[str, s
         spelt[f"{place}.{si_key}"] = f"{place}.{key}"
         converted[si_key] = si_value
     return converted
-
-
-def _told(error: ValidationError, source: Path, spelt: dict[str, str]) -> InputError:
-    """The first fault that pydantic found, as one line of ours; an unknown key before a missing one it explains."""
-    first = min(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
-    inner = ".".join(str(part) for part in first["loc"])
-    place = spelt.get(inner, inner)
-    key = place.rpartition(".")[2]
-    wanted = first.get("ctx", {})
-    given = first["input"]
-    bound = next((wanted[name] for name in ("gt", "ge", "lt", "le") if name in wanted), None)
-    match first["type"]:
-        case "missing":
-            told = "is missing", "add it"
-        case "extra_forbidden":
-            told = "is no key of a campaign", _suggestion(key, first["loc"])
-        case "finite_number":
-            told = f"is {given}", "a finite number was expected"
-        case "float_type" | "int_type":
-            told = f"is {given!r}", "a number was expected"
-        case "string_type":
-            told = f"is {given!r}", "a text was expected"
-        case "literal_error":
-            told = f"is {given!r}", f"{wanted['expected']} was expected"
-        case kind if bound is not None and kind.startswith(("greater", "less")):
-            relation = {"greater_than": "greater than", "less_than": "less than"}.get(kind) or (
-                "at least" if kind.startswith("greater") else "at most"
-            )
-            told = f"is {from_si(key, given):g}", f"a number {relation} {from_si(key, bound):g} was expected"
-        case _:
-            told = f"is {given!r}"[:80], first["msg"][0].lower() + first["msg"][1:]
-    return InputError(source, place, *told)
-
-
-def _suggestion(key: str, place: tuple[int | str, ...]) -> str:
-    form: type[BaseModel] = CampaignFile
-    for part in place[:-1]:
-        annotation = form.model_fields[part].annotation if isinstance(part, str) else form
-        inner = [kind for kind in (annotation, *getattr(annotation, "__args__", ())) if hasattr(kind, "model_fields")]
-        form = inner[0] if inner else form
-    known = list(form.model_fields)
-    close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
-    return f"did you mean {close[0]}?" if close else f"known here: {', '.join(known)}"

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import altair as alt
 
-from tank2sim.identification.captive.as_json import prediction_errors
 from tank2sim.identification.captive.reduction import Reduction
 from tank2sim.identification.captive.result_card import Contents
+from tank2sim.identification.captive.rows import derivative_rows, prediction_rows, terms_left_out
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
 
 _FORCES = {"X": "surge force", "Y": "sway force", "N": "yaw moment"}
@@ -54,33 +54,24 @@ def reduction_page(
 
 def _derivatives(reduction: Reduction, card: Contents) -> Table:
     rows: list[list[Cell]] = []
-    for name, entry in card.entries.items():
-        steps = reduction.forces[name[0]].stepwise
+    for row in derivative_rows(reduction, card):
         other: list[Cell] = [None, None, ""]
-        if name in steps.names and name not in card.estimated:
-            place = steps.names.index(name)
-            tests = str(steps.found_in[place]).replace("_", " ")
-            other = [1e5 * float(steps.values[place]), 1e5 * float(steps.standard_errors[place]), tests]
-        origin = "estimated" if name in card.estimated else "measured"
-        rows.append([name, 1e5 * float(entry.value), 1e5 * float(entry.standard_error), *other, origin])
+        if steps := row.stepped:
+            other = [1e5 * steps.value, 1e5 * steps.standard_error, steps.found_in.replace("_", " ")]
+        rows.append([row.name, 1e5 * row.value, 1e5 * row.standard_error, *other, row.origin])
     heads = ("", "regression", "±", "paper's order", "±", "from tests", "origin")
     return Table(caption="Prime system, times 10⁵", columns=[Column(title=head) for head in heads], rows=rows)
 
 
 def _left_out(reduction: Reduction) -> Table:
-    rows: list[list[Cell]] = [
-        [choice.name, choice.reason, choice.told]
-        for result in reduction.forces.values()
-        for choice in result.selection.choices
-        if choice.reason in ("collinear", "not significant")
-    ]
+    rows: list[list[Cell]] = [[choice.name, choice.reason, choice.told] for choice in terms_left_out(reduction)]
     return Table(caption="Left out", columns=[Column(title=head) for head in ("term", "reason", "why")], rows=rows)
 
 
 def _predictions(reduction: Reduction) -> Table:
     rows: list[list[Cell]] = [
-        [kind.replace("_", " "), *(100 * forces[force]["relative"] if force in forces else None for force in _FORCES)]
-        for kind, forces in prediction_errors(reduction).items()
+        [kind.replace("_", " "), *(errors.get(force) for force in _FORCES)]
+        for kind, errors in prediction_rows(reduction).items()
     ]
     columns = [Column(title="runs of type"), *(Column(title=force, unit="%", digits=2) for force in _FORCES)]
     return Table(caption="Prediction errors", columns=columns, rows=rows)

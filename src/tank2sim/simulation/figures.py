@@ -37,7 +37,7 @@ def figures_of(manoeuvre: object, trajectory: Trajectory, length: float) -> Figu
     match manoeuvre:
         case Turn(rudder):
             return _turn(trajectory, math.copysign(1.0, rudder), length)
-        case Zigzag(rudder, heading):
+        case Zigzag(rudder=rudder, heading=heading):
             return _zigzag(trajectory, math.copysign(1.0, rudder), heading, length)
         case PullOut(rudder):
             return _pull_out(trajectory, rudder)

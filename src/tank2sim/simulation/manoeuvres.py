@@ -58,11 +58,13 @@ class Turn:
 class Zigzag:
     """Zigzag: rudder `rudder` until the heading has changed by `heading`, then the other way, and so on.
 
-    A negative rudder begins to port; `heading` is positive.
+    A negative rudder begins to port; `heading` is positive. The order comes `lag_s` after the heading is reached: the
+    delay of a helmsman or of a model basin's controller (0.1 to 0.6 s at model scale).
     """
 
     rudder: float
     heading: float
+    lag_s: float = 0.0
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Run for `duration` s, or to the heading's return after the fifth execute (at most 150 L/u0)."""
@@ -75,6 +77,7 @@ class Zigzag:
             goal = begin + side * self.heading
             if not running.run_until("motion.psi", goal, rising=side > 0, at_most=end - running.time):
                 return
+            running.run(max(0.0, min(self.lag_s, end - running.time)))
             side, executes = -side, executes + 1
 
 

@@ -76,17 +76,17 @@ def simulate(
     running = Running(integrator, inputs, parameters)
     manoeuvre.drive(running, values["ship.length"] / values["ship.speed"], duration_s)
     trajectory = running.trajectory()
+    figures = figures_of(manoeuvre, trajectory, values["ship.length"])
     notices = [*model.notices, *_outside_range(trajectory, values["ship.slowest"], values["ship.fastest"])]
     notices += _beyond_the_gear(trajectory, values.get("steering.max_angle"))
-    if not integrator.compiled:
-        notices.append(NO_COMPILER)
-    figures = figures_of(manoeuvre, trajectory, values["ship.length"])
-    missing = [name for name, value in figures.items() if value is None]
-    if missing and not isinstance(manoeuvre, Orders):
-        notices.append(
-            f"the run of {trajectory.t[-1]:.0f} s does not show: {', '.join(in_words(name)[0] for name in missing)}"
-        )
+    notices += [] if integrator.compiled else [NO_COMPILER]
+    notices += [] if isinstance(manoeuvre, Orders) else _not_shown(trajectory, figures)
     return Run(trajectory, figures, tuple(notices))
+
+
+def _not_shown(trajectory: Trajectory, figures: Figures) -> list[str]:
+    missing = [in_words(name)[0] for name, value in figures.items() if value is None]
+    return [f"the run of {trajectory.t[-1]:.0f} s does not show: {', '.join(missing)}"] if missing else []
 
 
 def _beyond_the_gear(trajectory: Trajectory, largest: float | None) -> list[str]:

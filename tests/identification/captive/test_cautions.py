@@ -205,3 +205,6 @@ def test_a_whole_campaign_is_judged(tmp_path):
     assert not cautions_of_result(written.derivatives, {}, campaign)
     turned = dict(written.derivatives) | {"Nd": -written.derivatives["Nd"]}
     assert {caution.kind for caution in cautions_of_result(turned, {}, campaign)} == {"sign", "lever"}
+    reversed_forces = dict(written.derivatives) | {"Yvdot": 0.02}
+    (once,) = cautions_of_result(reversed_forces, {}, campaign)
+    assert once.kind == "force convention" and once.message.startswith("Yvdot is 0.02")

@@ -10,11 +10,12 @@ import pytest
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.identification.captive.as_json import prediction_errors, reduction_as_json
+from tank2sim.identification.captive.as_json import reduction_as_json
 from tank2sim.identification.captive.findings import findings
 from tank2sim.identification.captive.reduction import Options, reduce_campaign
 from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.result_card import card_text, contents, reynolds_ratio
+from tank2sim.identification.captive.rows import prediction_errors
 from tank2sim.identification.captive.type_b import type_b_errors
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import Campaign, write

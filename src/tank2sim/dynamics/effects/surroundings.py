@@ -1,40 +1,29 @@
-"""Effects of the ship's surroundings: current."""
+"""Effects of the ship's surroundings: current, wind, waves, a bank."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import casadi as ca
 
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter
-from tank2sim.dynamics.model import Input, Model
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols, particular
+from tank2sim.dynamics.effects.forces import scales, with_forces
+from tank2sim.dynamics.kinematics import earth_velocity
+from tank2sim.dynamics.model import Model
+
+STILL_MPS = 1e-6
+"""Added to the square of a relative speed, so that its root has a slope at rest; far below any speed of air."""
 
 
-def _with_current(model: Model, values: Mapping[str, float]) -> Model:
+def _with_current(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
     """Water that moves uniformly over the ground: dx/dt and dy/dt gain its velocity.
 
     u and v are through the water; a uniform steady current is only another inertial frame, so that no force changes.
     """
-    speed = Input(
-        name="current.speed",
-        unit="m/s",
-        description="Speed of the current over the ground",
-        display_unit="knots",
-        minimum=0.0,
-        start=values["speed_mps"],
-    )
-    direction = Input(
-        name="current.direction",
-        unit="rad",
-        description="Direction towards which the current sets, clockwise from north",
-        display_unit="deg",
-        start=values["direction_rad"],
-    )
-    return (
-        model.extend(speed, direction)
-        .redefine("motion.xdot", lambda north: north + speed.symbol * ca.cos(direction.symbol))
-        .redefine("motion.ydot", lambda east: east + speed.symbol * ca.sin(direction.symbol))
+    speed, direction = given["speed"], given["direction"]
+    return model.redefine("motion.xdot", lambda north: north + speed * ca.cos(direction)).redefine(
+        "motion.ydot", lambda east: east + speed * ca.sin(direction)
     )
 
 
@@ -44,8 +33,145 @@ CURRENT = Effect(
     description="The water moves over the ground and carries the ship with it.",
     source="kinematics of a moving frame; formats of the ship card",
     parameters=(
-        EffectParameter("speed_mps", "speed of the current over the ground", 0.0, 5.0),
-        EffectParameter("direction_rad", "direction towards which it sets", -2 * math.pi, 2 * math.pi),
+        EffectParameter("speed_mps", "speed of the current over the ground", 0.0, 5.0, input_name="current.speed"),
+        EffectParameter(
+            "direction_rad",
+            "direction towards which the current sets, clockwise from north",
+            -2 * math.pi,
+            2 * math.pi,
+            input_name="current.direction",
+        ),
     ),
-    apply=_with_current,
+    equations=_with_current,
+)
+
+
+def air_over_ship(model: Model, speed: ca.SX, direction: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Velocity of the air relative to the ship, forward and to starboard in body axes (m/s).
+
+    Parameters
+    ----------
+    model : Model
+        Of the ship; its velocity over the ground holds a current if the model has one.
+    speed, direction : casadi.SX
+        True wind (m/s) and the direction from which it comes (rad, clockwise from north).
+    """
+    north = -speed * ca.cos(direction) - model.symbol("motion.xdot")
+    east = -speed * ca.sin(direction) - model.symbol("motion.ydot")
+    return earth_velocity(north, east, -model.symbol("motion.psi"))
+
+
+def _with_wind(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Wind force on hull and superstructure, with V_R and gamma_R (from, clockwise from the bow) of the relative wind:
+
+        X = -1/2 rho_air V_R^2 c_X A_F cos(gamma_R)
+        Y = -1/2 rho_air V_R^2 c_Y A_L sin(gamma_R)
+        N = -1/2 rho_air V_R^2 c_N A_L L sin(2 gamma_R) + x_A Y
+
+    Fossen (2011), Handbook of Marine Craft Hydrodynamics and Motion Control, 8.1: c_X 0.5 to 0.9, c_Y 0.7 to 0.95,
+    c_N 0.05 to 0.2 for ships with symmetric superstructures; the defaults are in the middle of the first two, and for
+    c_N that of Blendermann (1994), J. Wind Eng. Ind. Aerodyn. 51, whose arm 0.18 (pi/2 - gamma) L gives
+    0.10 at 45 deg. x_A is the centroid of the side area; L between perpendiculars stands for the length over all.
+    The whole relative wind acts: a card whose X already holds the resistance of still air counts it twice.
+    """
+    density = card.environment.air_density_kgpm3
+    front = particular(card, "projected_area_front_m2", "wind needs the area above the water seen from ahead")
+    side = particular(card, "projected_area_side_m2", "wind needs the area above the water seen from the side")
+    forward, starboard = air_over_ship(model, given["speed"], given["direction"])
+    speed = ca.sqrt(forward**2 + starboard**2 + STILL_MPS**2)
+    X = 0.5 * density * front * given["surge_coefficient"] * speed * forward
+    Y = 0.5 * density * side * given["sway_coefficient"] * speed * starboard
+    # sin(2 gamma) = 2 sin cos, forward = -V cos, starboard = -V sin
+    turning = -density * side * model.symbol("ship.length") * given["yaw_coefficient"] * forward * starboard
+    return with_forces(model, X=X, Y=Y, N=turning + given["centroid_forward"] * Y)
+
+
+WIND = Effect(
+    name="wind",
+    acts_on="force",
+    description="Wind pushes and turns the part of the ship above the water.",
+    source="Fossen (2011), Handbook of Marine Craft Hydrodynamics and Motion Control, 8.1; Blendermann (1994)",
+    parameters=(
+        EffectParameter("speed_mps", "true speed of the wind", 0.0, 60.0, input_name="wind.speed"),
+        EffectParameter(
+            "direction_rad",
+            "direction from which the wind comes, clockwise from north",
+            -2 * math.pi,
+            2 * math.pi,
+            input_name="wind.direction",
+        ),
+        EffectParameter("surge_coefficient", "wind force coefficient in surge, on the frontal area", 0.0, 2.0, 0.7),
+        EffectParameter("sway_coefficient", "wind force coefficient in sway, on the side area", 0.0, 2.0, 0.8),
+        EffectParameter("yaw_coefficient", "wind moment coefficient, on the side area and length", -0.5, 0.5, 0.1),
+        EffectParameter("centroid_forward_m", "centroid of the side area forward of midships", -200.0, 200.0, 0.0),
+    ),
+    equations=_with_wind,
+)
+
+
+def _with_wave_drift(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Mean second-order force of short irregular waves that the side and a round bow reflect:
+
+        X = -rho g Hs^2/16 B c_X |cos(chi)| cos(chi)
+        Y = -rho g Hs^2/16 L c_Y |sin(chi)| sin(chi)
+        N = -rho g Hs^2/16 L^2 c_N sin(2 chi)
+
+    chi is the direction from which the waves come, clockwise from the bow; rho g Hs^2/16 is the mean of
+    1/2 rho g zeta^2 over the spectrum. Faltinsen (1990), Sea Loads on Ships and Offshore Structures, chapter 5:
+    c_Y = 1 for a vertical side, c_X = 2/3 for a semicircular bow; c_N = 0 for a hull alike fore and aft.
+    """
+    beam = particular(card, "beam_m", "wave_drift needs the beam, m")
+    chi = given["direction"] - model.symbol("motion.psi")
+    length = model.symbol("ship.length")
+    pressure = model.symbol("ship.water_density") * card.environment.gravity_mps2 * given["height"] ** 2 / 16
+    along, across = ca.cos(chi), ca.sin(chi)
+    return with_forces(
+        model,
+        X=-pressure * beam * given["surge_coefficient"] * ca.fabs(along) * along,
+        Y=-pressure * length * given["sway_coefficient"] * ca.fabs(across) * across,
+        N=-pressure * length**2 * given["yaw_coefficient"] * ca.sin(2 * chi),
+    )
+
+
+WAVE_DRIFT = Effect(
+    name="wave_drift",
+    acts_on="force",
+    description="Waves that the hull throws back push it slowly along with them.",
+    source="Faltinsen (1990), Sea Loads on Ships and Offshore Structures, chapter 5 (short waves)",
+    parameters=(
+        EffectParameter("height_m", "significant wave height", 0.0, 20.0),
+        EffectParameter(
+            "direction_rad",
+            "direction from which the waves come, clockwise from north",
+            -2 * math.pi,
+            2 * math.pi,
+        ),
+        EffectParameter("surge_coefficient", "wave drift coefficient in surge, on the beam", 0.0, 3.0, 2 / 3),
+        EffectParameter("sway_coefficient", "wave drift coefficient in sway, on the length", 0.0, 3.0, 1.0),
+        EffectParameter("yaw_coefficient", "wave drift moment coefficient, on the length squared", -1.0, 1.0, 0.0),
+    ),
+    equations=_with_wave_drift,
+)
+
+
+def _with_bank_suction(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Y, N = 1/2 rho L^2 u^2 Y', 1/2 rho L^3 u^2 N': a ship that runs along a bank or wall at one distance.
+
+    Norrbin (1974), Bank effects on a ship moving through a short dredged channel: force and moment are proportional to
+    the square of the speed. A bank to starboard draws the ship (Y' > 0) and turns its bow away (N' < 0).
+    """
+    here = scales(model, model.symbol("motion.u"))
+    return with_forces(model, Y=here.force * given["Y"], N=here.force * here.length * given["N"])
+
+
+BANK_SUCTION = Effect(
+    name="bank_suction",
+    acts_on="force",
+    description="A bank or wall alongside draws the ship to it and turns its bow away.",
+    source="Norrbin (1974), 10th Symposium on Naval Hydrodynamics, 71-88",
+    parameters=(
+        EffectParameter("Y_prime", "sway force by a bank, prime, positive to starboard", -0.01, 0.01),
+        EffectParameter("N_prime", "yaw moment by a bank, prime, positive to starboard", -0.01, 0.01),
+    ),
+    equations=_with_bank_suction,
 )

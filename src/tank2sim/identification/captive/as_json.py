@@ -12,6 +12,7 @@ from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
 from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.result_card import Contents
+from tank2sim.identification.captive.rows import by_the_papers_order, prediction_errors
 from tank2sim.records.campaigns import Campaign
 
 
@@ -59,43 +60,15 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
     return found
 
 
-def prediction_errors(reduction: Reduction) -> dict[str, dict[str, dict[str, float]]]:
-    """Leave-one-condition-out errors: type of run to force to root mean square, largest, and the range (prime).
-
-    ``relative`` is the root mean square over the range of what was measured in runs of that type.
-    """
-    found: dict[str, dict[str, dict[str, float]]] = {}
-    for force, result in reduction.forces.items():
-        for kind in dict.fromkeys(row.type for row in result.left_out):
-            rows = [row for row in result.left_out if row.type == kind]
-            errors = np.array([row.error for row in rows])
-            span = float(np.ptp([row.measured for row in rows]))
-            rms = float(np.sqrt(np.mean(errors**2)))
-            found.setdefault(kind, {})[force] = {
-                "rms": rms,
-                "largest": float(np.max(np.abs(errors))),
-                "range": span,
-                "relative": rms / span if span > 0 else np.nan,
-                "runs": len(rows),
-            }
-    return found
-
-
 def _derivative(reduction: Reduction, card: Contents, name: str) -> dict[str, Any]:
     entry = card.entries[name]
     found: dict[str, Any] = {"value": entry.value, "standard_error": entry.standard_error}
     if name in card.estimated:
         return found | {"origin": "estimated", "source": entry.how}
     derivative = reduction.derivatives[name]
-    steps = reduction.forces[name[0]].stepwise
     found |= {"origin": "measured", "type_a": derivative.type_a, "type_b": derivative.type_b}
-    if name in steps.names:
-        place = steps.names.index(name)
-        found["paper_order"] = {
-            "value": steps.values[place],
-            "standard_error": steps.standard_errors[place],
-            "found_in": steps.found_in[place],
-        }
+    if stepped := by_the_papers_order(reduction, name):
+        found["paper_order"] = asdict(stepped)
     return found
 
 

@@ -6,7 +6,13 @@ from collections.abc import Mapping
 
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.identification.captive.caution import Caution
-from tank2sim.identification.captive.plausibility import force_convention, levers, unusual_signs, yaw_force
+from tank2sim.identification.captive.plausibility import (
+    ADDED_MASSES,
+    force_convention,
+    levers,
+    unusual_signs,
+    yaw_force,
+)
 from tank2sim.identification.captive.tank_conditions import (
     Body,
     Oscillation,
@@ -75,9 +81,11 @@ def cautions_of_result(
     numbers = _numbers(campaign)
     mass, inertia = numbers["m'"], numbers["J_z'"]
     assert mass is not None
+    # A positive added mass is told once, with its likely cause.
+    others = {name: value for name, value in derivatives.items() if name not in ADDED_MASSES}
     return (
         *force_convention(derivatives, mass, inertia or 0.0, campaign.test.force_convention),
-        *unusual_signs(derivatives, standard_errors),
+        *unusual_signs(others, standard_errors),
         *yaw_force(derivatives, mass),
         *levers(derivatives, standard_errors),
     )

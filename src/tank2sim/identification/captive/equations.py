@@ -175,8 +175,7 @@ def rigid_body_force(campaign: Campaign, motion: Motion) -> Mapping[str, Vector]
     if campaign.inertia_removed:
         return {force: np.zeros(len(motion.time_s)) for force in "XYN"}
     model = campaign.model
-    turning = bool(np.any(motion.rdot_radps2))
-    if turning and model.yaw_inertia_kgm2 is None:
+    if motion.accelerates[1] and model.yaw_inertia_kgm2 is None:
         remedy = "add the yaw inertia about midships of the body that the gauges carry"
         raise InputError(campaign.path, "model.yaw_inertia_kgm2", "is missing, and there are yaw tests", remedy)
     body = inertia(model.mass_kg, model.x_G_m, model.yaw_inertia_kgm2 or 0.0, dict.fromkeys(ACCELERATION_TERMS, 0.0))
@@ -217,7 +216,7 @@ def excited(campaign: Campaign, runs: Sequence[ReducedRun], term: Term) -> bool:
         return False
     if term.acceleration:
         return any(
-            np.any(run.motion.vdot_mps2 if term.acceleration == "v" else run.motion.rdot_radps2)
+            run.motion.accelerates["vr".index(term.acceleration)]
             and run.run.type == ("pure_sway" if term.acceleration == "v" else run.run.type)
             for run in runs
         )
@@ -233,8 +232,8 @@ def excited(campaign: Campaign, runs: Sequence[ReducedRun], term: Term) -> bool:
 def _largest_motions(motion: Motion, u0: float, length: float) -> list[float]:
     """Of v', r', rudder, and of the change of speed U (that of u by the drift angle alone tells nothing of Du)."""
     change = abs(motion.mean_speed_mps / u0 - 1)
-    histories = (motion.v_mps / u0, motion.r_radps * length / u0, motion.delta_rad)
-    return [*(float(np.max(np.abs(values))) for values in histories), change if change > SPEED_RANGE else 0.0]
+    v, r, delta = motion.largest
+    return [v / u0, r * length / u0, delta, change if change > SPEED_RANGE else 0.0]
 
 
 def speeds_differ(campaign: Campaign, runs: Sequence[ReducedRun]) -> bool:

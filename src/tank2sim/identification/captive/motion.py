@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -56,10 +57,21 @@ class Motion:
     vdot_mps2: Vector
     rdot_radps2: Vector
 
-    @property
+    @cached_property
     def mean_speed_mps(self) -> float:
         """Mean of U."""
         return float(np.mean(self.speed_mps))
+
+    @cached_property
+    def largest(self) -> tuple[float, float, float]:
+        """Largest magnitudes of v (m/s), r (rad/s) and the rudder's angle (rad)."""
+        v, r, delta = (float(np.max(np.abs(values))) for values in (self.v_mps, self.r_radps, self.delta_rad))
+        return v, r, delta
+
+    @cached_property
+    def accelerates(self) -> tuple[bool, bool]:
+        """Whether the sway velocity, and the yaw rate, change at all."""
+        return bool(np.any(self.vdot_mps2)), bool(np.any(self.rdot_radps2))
 
     def amplitude(self, values: Vector) -> float:
         """Half the range of a history."""

@@ -14,6 +14,9 @@ from tank2sim.identification.captive.expected_signs import EXPECTED_SIGNS, Expec
 ADDED_SHARE = (0.1, 3.0)
 """Added mass and added yaw inertia of ships over their own lie between; about 0.9 and 0.7 are usual."""
 
+ADDED_MASSES = ("Yvdot", "Nrdot")
+"""Derivatives that tell a wrong convention of the forces; their sign is judged with it."""
+
 LEVERS = (
     ("Nv", "Yv", (-0.1, 0.6), "the force of a small drift angle"),
     ("Nd", "Yd", (-0.55, -0.35), "the force of the rudder"),
@@ -39,7 +42,8 @@ def force_convention(
     convention : str
         ``force_convention`` as the campaign has it.
     """
-    for name, inertia, what in (("Yvdot", mass_prime, "mass"), ("Nrdot", inertia_prime, "yaw inertia")):
+    inertias = ((mass_prime, "mass"), (inertia_prime, "yaw inertia"))
+    for name, (inertia, what) in zip(ADDED_MASSES, inertias, strict=True):
         value = derivatives.get(name)
         if value is not None and value > 0:
             message = f"{name} is {value:.3g}: the added {what} is negative"

@@ -1,0 +1,107 @@
+"""What pydantic objects to in a file that should follow one of our forms, as one line of ours."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from tank2sim.errors import InputError
+from tank2sim.units import from_si
+
+_RELATIONS = {
+    "greater_than": ("gt", "greater than"),
+    "greater_than_equal": ("ge", "of at least"),
+    "less_than": ("lt", "below"),
+    "less_than_equal": ("le", "of at most"),
+}
+"""Kind of fault to the name of the bound in pydantic's words and in ours."""
+
+
+def form_fault(
+    error: ValidationError, source: str | Path, spelt: Mapping[str, str], *, form: type[BaseModel], what: str
+) -> InputError:
+    """The first fault that pydantic found, as one line of ours.
+
+    Parameters
+    ----------
+    source : str or path
+        The file.
+    spelt : mapping
+        Dotted key in SI to the key as it is spelt in the file, where the two differ.
+    form : type
+        The form that the file should follow.
+    what : str
+        What the file is, for the message: ``a card``.
+    """
+    # A key that is unknown explains one that is missing (length_ft for length_m), not the other way round.
+    first: Any = min(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+    place = ".".join(str(part) for part in first["loc"])
+    place = spelt.get(place, place)
+    problem, remedy = _told(first, place.rpartition(".")[2], form, what)
+    more = len(error.errors()) - 1
+    after = f" ({more} more fault{'s' * (more > 1)} after this)" if more else ""
+    return InputError(source, place, problem, remedy + after)
+
+
+def short(value: object) -> str:
+    """A value as it would stand in Python, cut to 80 characters."""
+    told = repr(value)
+    return told if len(told) <= 80 else f"{told[:77]}..."
+
+
+def suggestion(key: str, known: list[str]) -> str:
+    """What to do about an unknown key where the `known` ones may stand."""
+    close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
+    same_stem = [name for name in known if name.partition("_")[0] == key.partition("_")[0]]
+    best = close or same_stem
+    return f"did you mean {best[0]}?" if best else f"known here: {', '.join(known)}" if known else "remove it"
+
+
+def _told(fault: Any, key: str, form: type[BaseModel], what: str) -> tuple[str, str]:
+    """Problem and remedy."""
+    given, wanted = fault["input"], fault.get("ctx", {})
+    match fault["type"]:
+        case "missing":
+            return "is missing", "add it"
+        case "extra_forbidden":
+            return f"is no key of {what}", suggestion(key, _siblings(fault["loc"], form))
+        case "finite_number":
+            return f"is {short(given)}", "a finite number was expected"
+        case "float_type" | "int_type":
+            return f"is {short(given)}", "a number was expected"
+        case "string_type":
+            return f"is {short(given)}", "a text was expected"
+        case kind if kind in _RELATIONS:
+            bound, relation = _RELATIONS[kind]
+            return f"is {_shown(key, given)}", f"a number {relation} {_shown(key, wanted[bound])} was expected"
+        case "literal_error":
+            return f"is {short(given)}", f"{wanted['expected']} was expected"
+        case "value_error":
+            return f"is {short(given)}", str(wanted["error"])
+        case _:
+            return f"is {short(given)}", fault["msg"][0].lower() + fault["msg"][1:]
+
+
+def _shown(key: str, value: float) -> str:
+    """A value in the unit that its key is spelt with."""
+    try:
+        return f"{from_si(key, value):g}"
+    except OverflowError:
+        return short(value)
+
+
+def _siblings(place: tuple[int | str, ...], form: Any) -> list[str]:
+    """Keys that may stand where an unknown one was found."""
+    for part in place[:-1]:
+        if isinstance(part, int):
+            continue
+        annotation = form.model_fields[part].annotation if part in form.model_fields else None
+        inner = [kind for kind in (annotation, *getattr(annotation, "__args__", ())) if hasattr(kind, "model_fields")]
+        if not inner:
+            return []
+        form = inner[0]
+    return list(form.model_fields)

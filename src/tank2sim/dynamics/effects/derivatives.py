@@ -1,0 +1,227 @@
+"""Effects that change the ship's own derivatives: dampings, couplings, added masses, water depth, trim."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import casadi as ca
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.terms import known_term
+from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Equations, Symbols, particular
+from tank2sim.dynamics.effects.forces import scales
+from tank2sim.dynamics.model import Model
+
+
+def with_changes(model: Model, changes: Mapping[str, ca.SX], card: ManoeuvringCard) -> Model:
+    """The model with derivatives changed by so much: name to an expression in the prime system.
+
+    Raises
+    ------
+    InputError
+        The card's model has no such derivative (the linear one has few).
+    """
+    for name in changes:
+        if f"derivatives.{name}" not in model:
+            raise card.fault("model.kind", f"a {card.model.kind} model has no {name}", 'set kind = "abkowitz"')
+    for name, change in changes.items():
+        symbol = model.symbol(f"derivatives.{name}")
+        model = model.substitute(f"derivatives.{name}", symbol + change)
+    return model
+
+
+def hydrodynamic(model: Model, name: str, card: ManoeuvringCard) -> ca.SX:
+    """The hydrodynamic part of a derivative (prime): without the inertia of the ship that "total" cards put into it.
+
+    With ``yaw_rate_terms = "total"``, X_vr, X_rr, Y_r, N_r contain m, m x_G, -m, -m x_G of (3.1).
+    """
+    symbol = model.symbol(f"derivatives.{name}")
+    if card.model.yaw_rate_terms == "hydrodynamic":
+        return symbol
+    mass = model.symbol("ship.mass") / scales(model, model.symbol("ship.speed")).mass
+    x_G = model.symbol("ship.x_G") / model.symbol("ship.length")
+    inertial = {"Xvr": mass, "Xrr": mass * x_G, "Yr": -mass, "Nr": -mass * x_G}
+    return symbol - inertial[name] if name in inertial else symbol
+
+
+def _magnified(names: Iterable[str]) -> Equations:
+    """Equations that magnify derivatives by 1 + ``factor``."""
+    wanted = tuple(names)
+
+    def equations(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+        factor = given["factor"]
+        return with_changes(model, {name: factor * hydrodynamic(model, name, card) for name in wanted}, card)
+
+    return equations
+
+
+def _added(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Derivatives change by the parameters that bear their names."""
+    return with_changes(model, given, card)
+
+
+CUBIC_YAW_DAMPING = Effect(
+    name="cubic_yaw_damping",
+    acts_on="force",
+    description="The hull resists fast turning more than in proportion to the rate of turn.",
+    source="(3.8) of paper 2, Krezelewski and Misiag; Abkowitz (1964)",
+    parameters=(
+        EffectParameter("Yrrr", "change of Yrrr, prime", -0.1, 0.1),
+        EffectParameter("Nrrr", "change of Nrrr, prime, negative damps", -0.1, 0.1),
+    ),
+    equations=_added,
+)
+
+SWAY_YAW_COUPLING = Effect(
+    name="sway_yaw_coupling",
+    acts_on="force",
+    description="Drifting and turning together give a force and a moment that neither gives alone.",
+    source="(3.8) of paper 2, Krezelewski and Misiag; Abkowitz (1964)",
+    parameters=(
+        EffectParameter("Yvrr", "change of Yvrr, prime", -0.5, 0.5),
+        EffectParameter("Nvrr", "change of Nvrr, prime", -0.5, 0.5),
+    ),
+    equations=_added,
+)
+
+TURNING_DRAG = Effect(
+    name="turning_drag",
+    acts_on="force",
+    description="The ship loses more (or less) speed in a turn.",
+    source="(3.8) of paper 2, Krezelewski and Misiag: the term X_vr v r",
+    parameters=(
+        EffectParameter("Xvr", "change of Xvr, prime, positive slows a turning ship more (v r < 0)", -0.05, 0.05),
+    ),
+    equations=_added,
+)
+
+ADDED_YAW_INERTIA = Effect(
+    name="added_yaw_inertia",
+    acts_on="mass",
+    description="More (or less) water turns with the ship when its rate of turn changes.",
+    source="(3.7) of paper 2, Krezelewski and Misiag: J_z - Nrdot; Alyshev (2019)",
+    parameters=(EffectParameter("factor", "relative change of Nrdot", -1.0, 5.0),),
+    equations=_magnified(["Nrdot"]),
+)
+
+ADDED_SWAY_MASS = Effect(
+    name="added_sway_mass",
+    acts_on="mass",
+    description="More (or less) water moves with the ship when its drift changes.",
+    source="(3.7) of paper 2, Krezelewski and Misiag: m - Yvdot",
+    parameters=(EffectParameter("factor", "relative change of Yvdot", -0.9, 5.0),),
+    equations=_magnified(["Yvdot"]),
+)
+
+LINEAR_YAW_DAMPING = Effect(
+    name="linear_yaw_damping",
+    acts_on="force",
+    description="The hull resists turning more (or less), at small rates of turn too.",
+    source="(3.5) of paper 2, Krezelewski and Misiag: hydrodynamic parts of Yr and Nr",
+    parameters=(EffectParameter("factor", "relative change of the hydrodynamic Yr and Nr", -1.0, 5.0),),
+    equations=_magnified(["Yr", "Nr"]),
+)
+
+LINEAR_SWAY_DAMPING = Effect(
+    name="linear_sway_damping",
+    acts_on="force",
+    description="The hull resists drifting sideways more (or less), at small drift too.",
+    source="(3.5) of paper 2, Krezelewski and Misiag: Yv and Nv",
+    parameters=(EffectParameter("factor", "relative change of Yv and Nv", -1.0, 5.0),),
+    equations=_magnified(["Yv", "Nv"]),
+)
+
+
+def _odd_in_motion(name: str) -> bool:
+    term = known_term(name)
+    return term.force in "YN" and not term.acceleration and term.d == 0 and (term.v + term.r) % 2 == 1
+
+
+MAGNIFIED_BY_SHALLOW_WATER = (*ACCELERATION_TERMS, *(name for name in ALL_TERMS if _odd_in_motion(name)))
+"""Added masses, and the terms of Y and N that are odd in v and r and have no rudder."""
+
+
+def _in_shallow_water(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Added masses and the odd sway and yaw terms of the hull, times 1 + magnification.
+
+    Under a small keel clearance the flow goes round the ends instead of below, and all these rise together, to
+    several times at H/T = 1.2: Brix (ed.) (1993), Manoeuvring Technical Manual; Vantorre (2003). One factor for all
+    is a choice of ours, for the data rarely show more; :data:`WATER_DEPTH` has the published factors.
+    """
+    names = [name for name in MAGNIFIED_BY_SHALLOW_WATER if f"derivatives.{name}" in model]
+    return with_changes(model, {name: given["magnification"] * hydrodynamic(model, name, card) for name in names}, card)
+
+
+SHALLOW_WATER = Effect(
+    name="shallow_water",
+    acts_on="force and mass",
+    description="Near the bottom more water moves with the ship, and it resists drift and turning more.",
+    source="Brix (ed.) (1993), Manoeuvring Technical Manual; Vantorre (2003), MARSIM",
+    parameters=(
+        EffectParameter(
+            "magnification",
+            "relative increase of added masses and of sway and yaw damping (0 in deep water)",
+            -0.5,
+            5.0,
+        ),
+    ),
+    equations=_in_shallow_water,
+)
+
+
+def _at_depth(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Y_v, N_v, N_r times f = 1/(1 - h)^n - h with h = T/H, as input ``water.depth`` says.
+
+    n = 0.40 Cb B/T for Y_v, 0.425 Cb B/T for N_v, 1.5 - 14.28 T/L for N_r: Kijima, Katsuno, Nakiri and Furukawa (1990),
+    J. Soc. Naval Arch. Japan 168. f is 1 in deep water. h is held below 0.95: at 1 the ship is aground. Added masses,
+    Y_r and the terms of higher order stay as they are; the card must be of deep water.
+    """
+    beam, draught, block = (
+        particular(card, key, "water_depth needs beam_m, draught_m and block_coefficient")
+        for key in ("beam_m", "draught_m", "block_coefficient")
+    )
+    h = ca.fmin(draught / ca.fmax(given["depth"], draught), 0.95)
+    fullness = block * beam / draught
+    powers = {"Yv": 0.40 * fullness, "Nv": 0.425 * fullness, "Nr": 1.5 - 14.28 * draught / card.ship.length_m}
+    changes = {name: ((1 - h) ** -power - h - 1) * hydrodynamic(model, name, card) for name, power in powers.items()}
+    return with_changes(model, changes, card)
+
+
+WATER_DEPTH = Effect(
+    name="water_depth",
+    acts_on="force",
+    description="The hull resists drift and turning more as the water under it becomes shallow.",
+    source="Kijima, Katsuno, Nakiri and Furukawa (1990), J. Soc. Naval Architects of Japan 168",
+    parameters=(EffectParameter("depth_m", "depth of the water", 0.01, 1e4, input_name="water.depth"),),
+    equations=_at_depth,
+)
+
+
+def _trimmed(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Linear derivatives of a hull trimmed by tau at an unchanged mean draught T:
+
+        Y_v (1 + 2/3 tau/T), Y_r (1 + 0.80 tau/T), N_v - 0.27 Y_v tau/T, N_r (1 + 0.30 tau/T)
+
+    Inoue, Hirano and Kijima (1981), Hydrodynamic derivatives on ship manoeuvring, Int. Shipbuilding Progress 28 (321).
+    """
+    draught = particular(card, "draught_m", "trim needs the mean draught, m")
+    share = given["by_stern"] / draught
+    changes = {
+        "Yv": 2 / 3 * share * hydrodynamic(model, "Yv", card),
+        "Yr": 0.80 * share * hydrodynamic(model, "Yr", card),
+        "Nr": 0.30 * share * hydrodynamic(model, "Nr", card),
+        "Nv": -0.27 * share * hydrodynamic(model, "Yv", card),
+    }
+    # Nv last: its change is by the Yv of the even keel, which the change of Yv must not reach.
+    return with_changes(model, changes, card)
+
+
+TRIM = Effect(
+    name="trim",
+    acts_on="force",
+    description="A hull deeper aft than forward keeps its course better, and one deeper forward worse.",
+    source="Inoue, Hirano and Kijima (1981), International Shipbuilding Progress 28 (321)",
+    parameters=(EffectParameter("by_stern_m", "trim, draught aft less draught forward", -10.0, 10.0),),
+    equations=_trimmed,
+)

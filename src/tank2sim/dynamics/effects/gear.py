@@ -1,0 +1,141 @@
+"""Effects of the steering gear: what it makes of a rudder order."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import casadi as ca
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols, with_steps_for
+from tank2sim.dynamics.model import Model, Quantity, State
+from tank2sim.dynamics.steering_gear import assumed_lag_notice
+
+
+def _limited(value: ca.SX, limit: ca.SX) -> ca.SX:
+    return ca.fmax(-limit, ca.fmin(limit, value))
+
+
+def _with_rate_limit(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """abs(d delta/dt) <= k, in place of the card's own limit."""
+    limit = given["max_rate"]
+    if "steering.max_rate" in model:
+        return model.substitute("steering.max_rate", limit)
+    return model.redefine("rudder.rate", lambda rate: _limited(rate, limit))
+
+
+RUDDER_RATE_LIMIT = Effect(
+    name="rudder_rate_limit",
+    acts_on="actuator",
+    description="The steering gear turns the rudder no faster than this.",
+    source="van Amerongen (1982), Adaptive steering of ships, thesis, Delft: pump capacity of the gear",
+    parameters=(EffectParameter("max_rate_radps", "largest rate of the rudder", 1e-4, 2.0),),
+    equations=_with_rate_limit,
+)
+
+
+def _with_lag(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """d delta/dt = (order - delta)/T, with T in place of the card's time constant."""
+    assumed = assumed_lag_notice(card.ship.length_m / card.model.speed_mps)
+    lagging = model.substitute("steering.time_constant", given["time_constant"])
+    lagging = replace(lagging, notices=tuple(notice for notice in lagging.notices if notice != assumed))
+    return with_steps_for(lagging, "rudder_lag.time_constant")
+
+
+RUDDER_LAG = Effect(
+    name="rudder_lag",
+    acts_on="actuator",
+    description="The rudder follows its order with this delay.",
+    source="van Amerongen (1982), Adaptive steering of ships, thesis, Delft",
+    parameters=(EffectParameter("time_constant_s", "time constant of the steering gear", 0.01, 100.0),),
+    equations=_with_lag,
+)
+
+
+def _beyond(value: ca.SX, limit: ca.SX) -> ca.SX:
+    """What `value` exceeds +-`limit` by, 0 between them; continuous."""
+    return value - _limited(value, limit)
+
+
+def _with_backlash(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """The gear acts on that part of order - delta which exceeds half the play b; within it the rudder stays.
+
+    The rudder's own angle is the state of the hysteresis: for slow orders it is the play operator, which lags by b/2
+    behind an order that rises and by b/2 behind one that falls (Brokate and Sprekels 1996, Hysteresis and Phase
+    Transitions). The rate is continuous in all states and inputs. Play behind the sensor of the angle is another thing.
+    """
+    return model.redefine("rudder.error", lambda error: _beyond(error, given["width"] / 2))
+
+
+RUDDER_BACKLASH = Effect(
+    name="rudder_backlash",
+    acts_on="actuator",
+    description="The steering gear has play: small changes of the order do not reach the rudder.",
+    source="Brokate and Sprekels (1996), Hysteresis and Phase Transitions: play operator",
+    parameters=(EffectParameter("width_rad", "whole play of the gear", 0.0, math.radians(20.0)),),
+    equations=_with_backlash,
+)
+
+
+def _with_dead_band(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Orders within +-b of midships move nothing, larger ones move the rudder by what they exceed b.
+
+    The static dead zone (no memory, unlike :data:`RUDDER_BACKLASH`) of a valve with overlap about its middle.
+    """
+    return model.substitute("rudder.command", _beyond(model.symbol("rudder.command"), given["half_width"]))
+
+
+RUDDER_DEAD_BAND = Effect(
+    name="rudder_dead_band",
+    acts_on="actuator",
+    description="Small orders about midships move nothing.",
+    source="van Amerongen (1982), Adaptive steering of ships, thesis, Delft; static dead zone",
+    parameters=(
+        EffectParameter("half_width_rad", "largest order either way that moves nothing", 0.0, math.radians(10.0)),
+    ),
+    equations=_with_dead_band,
+)
+
+
+def _with_telemotor_lag(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """dq/dt = (order - q)/T, and the gear follows q: the first of the two stages of a steering gear.
+
+    van Amerongen (1982): telemotor before rudder servo. In model tests it is the lag of the controller.
+    """
+    command = model.symbol("rudder.command")
+    order = State(
+        name="telemotor_lag.order",
+        unit="rad",
+        description="Rudder order as it reaches the gear, positive to starboard",
+        display_unit="deg",
+        nominal=0.35,
+        derivative="telemotor_lag.rate",
+        start=model.symbol("initial.rudder_angle"),
+        steady=True,
+    )
+    rate = Quantity(
+        name="telemotor_lag.rate",
+        unit="rad/s",
+        description="Rate of the rudder order that reaches the gear, positive to starboard",
+        display_unit="deg/s",
+        nominal=0.05,
+        value=ca.SX(0),
+    )
+    # Its rate last: it alone still holds the command, which gives way to q everywhere else.
+    lagging = (
+        model.extend(order, rate)
+        .substitute("rudder.command", order.symbol)
+        .redefine(rate.name, lambda _: (command - order.symbol) / given["time_constant"])
+    )
+    return with_steps_for(lagging, "telemotor_lag.time_constant")
+
+
+TELEMOTOR_LAG = Effect(
+    name="telemotor_lag",
+    acts_on="actuator",
+    description="Orders reach the steering gear late.",
+    source="van Amerongen (1982), Adaptive steering of ships, thesis, Delft",
+    parameters=(EffectParameter("time_constant_s", "time constant before the steering gear", 0.01, 100.0),),
+    equations=_with_telemotor_lag,
+)

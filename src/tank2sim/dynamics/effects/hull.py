@@ -1,0 +1,113 @@
+"""Effects of the hull's drag and shape."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols, particular
+from tank2sim.dynamics.effects.forces import scales, with_forces
+from tank2sim.dynamics.model import Model
+
+STRIPS = 12
+"""Stations of the Gauss-Legendre sum along the hull: wherever the pivot lies, both integrals are then within 0.03 % of
+the largest the same end speed can give (tests compare with the integral in closed form)."""
+
+
+def _with_cross_flow_drag(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Y, N = -1/2 rho T C_D integral of (1, x) abs(v + x r) (v + x r) dx from -L/2 to L/2.
+
+    Norrbin (1971), Theory and observations on the use of a mathematical model for ship manoeuvring, SSPA 68; Faltinsen
+    (1990), Sea Loads, 6.4; one C_D for all stations. It comes on top of the card's own cubic terms.
+    """
+    draught = particular(card, "draught_m", "cross_flow_drag needs the draught, m")
+    half = model.symbol("ship.length") / 2
+    Y = N = ca.SX(0)
+    for station, weight in zip(*np.polynomial.legendre.leggauss(STRIPS), strict=True):
+        x = half * float(station)
+        across = model.symbol("motion.v") + x * model.symbol("motion.r")
+        drag = half * float(weight) * ca.fabs(across) * across
+        Y, N = Y + drag, N + x * drag
+    pressure = -0.5 * model.symbol("ship.water_density") * draught * given["drag_coefficient"]
+    return with_forces(model, Y=pressure * Y, N=pressure * N)
+
+
+CROSS_FLOW_DRAG = Effect(
+    name="cross_flow_drag",
+    acts_on="force",
+    description="Water that crosses under and round the hull drags on every slice of it.",
+    source="Norrbin (1971), SSPA publication 68; Faltinsen (1990), Sea Loads on Ships and Offshore Structures, 6.4",
+    parameters=(EffectParameter("drag_coefficient", "cross-flow drag coefficient", -1.0, 3.0),),
+    equations=_with_cross_flow_drag,
+)
+
+
+def _with_fouling(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """X = 1/2 rho L^2 X' u abs(u), X' negative: growth and roughness, as the allowance of ITTC 7.5-02-03-01.4."""
+    u = model.symbol("motion.u")
+    return with_forces(model, X=scales(model, ca.SX(1)).force * given["X"] * u * ca.fabs(u))
+
+
+HULL_FOULING = Effect(
+    name="hull_fouling",
+    acts_on="force",
+    description="Growth on the hull makes it rough and slows the ship.",
+    source="ITTC 7.5-02-03-01.4, 1978 performance prediction method: roughness allowance",
+    parameters=(EffectParameter("X_prime", "surge force, prime, negative: more resistance", -0.005, 0.005),),
+    equations=_with_fouling,
+)
+
+
+def _with_hump(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """X = 1/2 rho L^2 u^2 X' exp(-1/2 ((u - u_h)/w)^2), X' negative: a hump of the resistance by waves at u_h.
+
+    The waves of bow and stern add up at some speeds and cancel at others: Havelock (1909); Faltinsen (2005),
+    Hydrodynamics of High-Speed Marine Vehicles, 4.2. The Gaussian is a choice of ours for one hump.
+    """
+    u = model.symbol("motion.u")
+    place = (u - given["speed"]) / given["width"]
+    return with_forces(model, X=scales(model, u).force * given["X"] * ca.exp(-0.5 * place**2))
+
+
+HUMP_RESISTANCE = Effect(
+    name="hump_resistance",
+    acts_on="force",
+    description="About one speed the ship's own waves add up and resist more than at speeds below and above.",
+    source="Faltinsen (2005), Hydrodynamics of High-Speed Marine Vehicles, 4.2; Gaussian hump of ours",
+    parameters=(
+        EffectParameter("X_prime", "surge force at the hump, prime, negative: more resistance", -0.005, 0.005),
+        EffectParameter("speed_mps", "speed of the hump through the water", 0.0, 50.0),
+        EffectParameter(
+            "width_mps",
+            "width of the hump (standard deviation), by default a twentieth of u0",
+            0.01,
+            10.0,
+            lambda card: 0.05 * card.model.speed_mps,
+        ),
+    ),
+    equations=_with_hump,
+)
+
+
+def _turning_unlike(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Y, N = 1/2 rho L^2 V^2 (Y_rr, L N_rr) r'^2 = 1/2 rho L^4 (Y_rr, L N_rr) r^2: alike to both sides, so unlike.
+
+    Even terms in Y and N are those that a symmetric ship has not: Abkowitz (1964); SIMMAN 2008 tactical diameters.
+    """
+    r = model.symbol("motion.r")
+    here = scales(model, model.symbol("ship.length") * r)
+    return with_forces(model, Y=here.force * given["Yrr"], N=here.force * here.length * given["Nrr"])
+
+
+ASYMMETRIC_TURNING = Effect(
+    name="asymmetric_turning",
+    acts_on="force",
+    description="The ship turns more tightly to one side than to the other.",
+    source="Abkowitz (1964), HyA report Hy-5: even terms of an asymmetric ship",
+    parameters=(
+        EffectParameter("Yrr", "coefficient of r^2 in Y, prime, positive to starboard", -0.05, 0.05),
+        EffectParameter("Nrr", "coefficient of r^2 in N, prime, positive to starboard", -0.05, 0.05),
+    ),
+    equations=_turning_unlike,
+)

@@ -1,0 +1,117 @@
+"""Effects of propeller and engine."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols
+from tank2sim.dynamics.effects.forces import scales, with_forces
+from tank2sim.dynamics.model import Model
+
+_SIDE_FORCE = (
+    EffectParameter("Y_prime", "sway force at nominal revolutions, prime at u0, positive to starboard", -0.01, 0.01),
+    EffectParameter("N_prime", "yaw moment at nominal revolutions, prime at u0, positive to starboard", -0.01, 0.01),
+)
+
+
+def _relative_revolutions(model: Model) -> ca.SX:
+    """n/n0, positive ahead; 1 on a card without propulsion, whose revolutions are the nominal ones."""
+    if "propeller.speed_actual" not in model:
+        return ca.SX(1)
+    return model.symbol("propeller.speed_actual") / model.symbol("propulsion.nominal_speed")
+
+
+def _with_side_force(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Y, N = 1/2 rho L^2 u0^2 (Y', L N') n abs(n)/n0^2.
+
+    The blades meet the upper and the lower half of the wake unlike: Saunders (1957), Hydrodynamics in Ship Design;
+    Brix (ed.) (1993), Manoeuvring Technical Manual. It does not fall with the ship's speed as all else does.
+    """
+    n = _relative_revolutions(model)
+    force = scales(model, model.symbol("ship.speed")).force * n * ca.fabs(n)
+    return with_forces(model, Y=force * given["Y"], N=force * model.symbol("ship.length") * given["N"])
+
+
+PROPELLER_SIDE_FORCE = Effect(
+    name="propeller_side_force",
+    acts_on="force",
+    description="A single propeller pushes the stern to one side as it turns.",
+    source="Saunders (1957), Hydrodynamics in Ship Design; Brix (ed.) (1993), Manoeuvring Technical Manual",
+    parameters=_SIDE_FORCE,
+    equations=_with_side_force,
+)
+
+
+def _refuse_without_propulsion(card: ManoeuvringCard, effect: str) -> None:
+    if card.propulsion is None:
+        raise card.fault("propulsion", "is missing", f"{effect} needs nominal_rpm and Xnn")
+
+
+def _with_walk(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Y, N = 1/2 rho L^2 u0^2 (Y', L N') min(n, 0)^2/n0^2: only while the propeller turns astern.
+
+    Then its jet meets one side of the stern: Brix (ed.) (1993), Manoeuvring Technical Manual; a right-handed propeller
+    throws the stern to port and the bow to starboard (Y' < 0, N' > 0).
+    """
+    _refuse_without_propulsion(card, "propeller_walk")
+    astern = ca.fmin(_relative_revolutions(model), 0)
+    force = scales(model, model.symbol("ship.speed")).force * astern**2
+    return with_forces(model, Y=force * given["Y"], N=force * model.symbol("ship.length") * given["N"])
+
+
+PROPELLER_WALK = Effect(
+    name="propeller_walk",
+    acts_on="force",
+    description="A propeller that turns astern throws the stern to one side.",
+    source="Brix (ed.) (1993), Manoeuvring Technical Manual",
+    parameters=_SIDE_FORCE,
+    equations=_with_walk,
+)
+
+
+def _with_loading_side_force(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Y, N = 1/2 rho L^2 U^2 (Y', L N') eta, with the propeller loading eta = (n/n0) u0/U - 1.
+
+    An asymmetry that vanishes where the propeller holds the speed and grows as the ship slows: the form is ours, after
+    the KVLCC2 (SIMMAN 2008) whose tactical diameters differ by 8 % between the sides, but not by one constant.
+    """
+    speed = model.symbol("motion.speed")
+    # U^2 eta, without its division by U at rest
+    loading = speed * (_relative_revolutions(model) * model.symbol("ship.speed") - speed)
+    force = scales(model, ca.SX(1)).force * loading
+    return with_forces(model, Y=force * given["Y"], N=force * model.symbol("ship.length") * given["N"])
+
+
+LOADING_SIDE_FORCE = Effect(
+    name="loading_side_force",
+    acts_on="force",
+    description="The harder the propeller works for the ship's speed, the more it pushes the stern to one side.",
+    source="form of ours, after the asymmetry of the KVLCC2 in SIMMAN 2008",
+    parameters=(
+        EffectParameter("Y_prime", "sway force by propeller loading, prime, positive to starboard", -0.01, 0.01),
+        EffectParameter("N_prime", "yaw moment by propeller loading, prime, positive to starboard", -0.01, 0.01),
+    ),
+    equations=_with_loading_side_force,
+)
+
+
+def _with_droop(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """n = order (1 - droop (1 - u/u0)): the engine is not held at its revolutions when the ship slows.
+
+    First order in the loss of speed of an engine at constant torque or power, whose propeller load rises in a turn: the
+    propulsion strategies that ITTC 7.5-02-06-01, free running model tests, tells apart.
+    """
+    _refuse_without_propulsion(card, "engine_droop")
+    loss = 1 - model.symbol("motion.u") / model.symbol("ship.speed")
+    return model.redefine("propeller.speed_actual", lambda order: order * (1 - given["droop"] * loss))
+
+
+ENGINE_DROOP = Effect(
+    name="engine_droop",
+    acts_on="propulsion",
+    description="The engine slows down when the ship loses speed.",
+    source="ITTC 7.5-02-06-01, propulsion strategy of free running tests; first order in the loss of speed",
+    parameters=(EffectParameter("droop", "relative loss of revolutions by relative loss of speed", -1.0, 1.0),),
+    equations=_with_droop,
+)

@@ -1,0 +1,96 @@
+"""Effects on the force of the rudder, and on the angle at which it stands."""
+
+from __future__ import annotations
+
+import math
+
+import casadi as ca
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols
+from tank2sim.dynamics.model import Model
+
+STALL_WIDTH = math.radians(5.0)
+"""Range of angle over which a stalling rudder loses its share of force, rad: a choice of ours. The lift of all-movable
+rudders falls off over some degrees past its maximum (Molland and Turnock 2007, Marine Rudders and Control Surfaces)."""
+
+
+def with_rudder_force(model: Model, multiplier: ca.SX) -> Model:
+    """The model with ``rudder.X``, ``rudder.Y`` and ``rudder.N`` times `multiplier`."""
+    for name in ("rudder.X", "rudder.Y", "rudder.N"):
+        model = model.redefine(name, lambda force: multiplier * force)
+    return model
+
+
+def _biased(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """The hull sees delta + d0: the rudder stands off its dial."""
+    return model.redefine("rudder.effective", lambda angle: angle + given["angle"])
+
+
+RUDDER_BIAS = Effect(
+    name="rudder_bias",
+    acts_on="actuator",
+    description="The rudder stands a little to one side of what its indicator shows.",
+    source="formats of the ship card; kinematics",
+    parameters=(
+        EffectParameter(
+            "angle_rad", "rudder angle when the indicator shows midships, positive to starboard", -0.35, 0.35
+        ),
+    ),
+    equations=_biased,
+)
+
+
+def _more_effective(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """(1 + factor) F_delta, F_delta all terms of X, Y, N that hold the rudder."""
+    return with_rudder_force(model, 1 + given["factor"])
+
+
+RUDDER_EFFECTIVENESS = Effect(
+    name="rudder_effectiveness",
+    acts_on="force",
+    description="The rudder gives more (or less) force than the card says.",
+    source="(3.8) of paper 2, Krezelewski and Misiag: its terms in delta",
+    parameters=(EffectParameter("factor", "relative change of the force of the rudder", -1.0, 3.0),),
+    equations=_more_effective,
+)
+
+
+def _in_slipstream(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """F_delta (1 + gain (1 - u/u0)): the propeller keeps up the flow over the rudder while the ship loses speed.
+
+    First order in the loss of speed of the slipstream of momentum theory: Brix (ed.) (1993), Manoeuvring Technical
+    Manual; Ogawa and Kasai (1978), Int. Shipbuilding Progress 25 (292).
+    """
+    loss = 1 - model.symbol("motion.u") / model.symbol("ship.speed")
+    return with_rudder_force(model, 1 + given["gain"] * loss)
+
+
+RUDDER_SLIPSTREAM = Effect(
+    name="rudder_slipstream",
+    acts_on="force",
+    description="The propeller's jet keeps up the force of the rudder when the ship has lost speed.",
+    source="Brix (ed.) (1993), Manoeuvring Technical Manual; Ogawa and Kasai (1978)",
+    parameters=(EffectParameter("gain", "relative gain of rudder force by relative loss of speed", -3.0, 5.0),),
+    equations=_in_slipstream,
+)
+
+
+def _stalled(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """F_delta (1 - loss s), s = 3 a^2 - 2 a^3 rising from 0 to 1 over :data:`STALL_WIDTH` above the angle of stall."""
+    beyond = (ca.fabs(model.symbol("rudder.effective")) - given["angle"]) / STALL_WIDTH
+    a = ca.fmax(0, ca.fmin(1, beyond))
+    return with_rudder_force(model, 1 - given["loss"] * a**2 * (3 - 2 * a))
+
+
+RUDDER_STALL = Effect(
+    name="rudder_stall",
+    acts_on="force",
+    description="Beyond some angle the flow leaves the rudder, which then loses a share of its force.",
+    source="Molland and Turnock (2007), Marine Rudders and Control Surfaces, chapter 5",
+    parameters=(
+        EffectParameter("angle_rad", "rudder angle at which stall begins, either way", 0.0, math.pi / 2),
+        EffectParameter("loss", "share of the rudder force that is lost beyond it", 0.0, 1.0),
+    ),
+    equations=_stalled,
+)

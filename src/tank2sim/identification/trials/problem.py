@@ -1,0 +1,108 @@
+"""What is asked of an estimator of free-running trials, and what it answers: the same for every method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.dynamics.model import Model, Vector
+from tank2sim.identification.trials.runs import Run
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Free parameters of a model, what is known of them beforehand, and the runs that tell more.
+
+    Parameters
+    ----------
+    model : Model
+        Driven as the runs were (:mod:`.driving`).
+    free : tuple of str
+        Names of the k parameters to estimate.
+    prior_mean, prior_error : array (k,)
+        Value and standard error before the trials, in the parameter's own unit; the error is positive.
+    runs : tuple of Run
+        Each with the same `seen`.
+    """
+
+    model: Model
+    free: tuple[str, ...]
+    prior_mean: Vector
+    prior_error: Vector
+    runs: tuple[Run, ...]
+
+    @property
+    def seen(self) -> tuple[str, ...]:
+        """Variables that are compared with measurements, in the order of the columns of each run."""
+        return self.runs[0].seen
+
+    @property
+    def ship_time(self) -> float:
+        """L/u0, s."""
+        p = self.model.parameter_values()
+        names = self.model.parameter_names
+        return float(p[names.index("ship.length")] / p[names.index("ship.speed")])
+
+    def parameters(self, values: Vector) -> Vector:
+        """The model's parameter vector with the free ones at `values` (k,)."""
+        return self.model.parameter_values(dict(zip(self.free, map(float, values), strict=True)))
+
+    def with_runs(self, runs: tuple[Run, ...]) -> Problem:
+        """The same question, asked of other runs."""
+        return replace(self, runs=runs)
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """What a method found.
+
+    Parameters
+    ----------
+    method : str
+        Its name.
+    free : tuple of str
+        The k parameters.
+    values : array (k,)
+        Estimates.
+    covariance : array (k, k)
+        Of the estimates, for the residuals as they are (coloured, with model error), not as white noise.
+    information : array (k, k)
+        What the trials alone tell: the inverse covariance without the prior.
+    noise : mapping
+        Standard deviation of the residual by variable.
+    cost : tuple of float
+        What was minimised, after each iteration.
+    prior_scale : float
+        Factor on the prior's standard errors that was chosen or given.
+    notices : tuple of str
+        What a user should be told.
+    """
+
+    method: str
+    free: tuple[str, ...]
+    values: Vector
+    covariance: Array
+    information: Array
+    noise: Mapping[str, float] = field(default_factory=dict)
+    cost: tuple[float, ...] = ()
+    prior_scale: float = 1.0
+    notices: tuple[str, ...] = ()
+
+    @property
+    def standard_errors(self) -> Vector:
+        """Of the estimates (k,)."""
+        errors: Vector = np.sqrt(np.diag(self.covariance))
+        return errors
+
+
+Progress = Callable[[str, Vector, float], None]
+"""Called as ``progress(stage, values, cost)`` whenever a better estimate is found; it may raise to stop."""
+
+
+def silent(stage: str, values: Vector, cost: float) -> None:
+    """Progress that nobody watches."""

@@ -1,0 +1,162 @@
+"""Trials as an estimator takes them: equal steps, inputs held over each, and what was measured at each instant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.dynamics.model import Model, Vector
+from tank2sim.errors import InputError
+from tank2sim.records.trials import Trial
+
+Array = NDArray[np.float64]
+
+SEEN = {
+    "u_mps": "motion.u",
+    "v_mps": "motion.v",
+    "r_radps": "motion.r",
+    "psi_rad": "motion.psi",
+    "x_m": "motion.x",
+    "y_m": "motion.y",
+    "u_ground_mps": "motion.u_ground",
+    "v_ground_mps": "motion.v_ground",
+    "sog_mps": "motion.sog",
+    "phi_rad": "motion.phi",
+}
+"""Signal of a trial to the variable of a model that it measures."""
+
+FED = {
+    "n_radps": "propeller.speed",
+    "wind_speed_mps": "wind.speed",
+    "wind_direction_rad": "wind.direction",
+}
+"""Signal of a trial to the input of a model that it gives, beside the rudder."""
+
+LONGEST_GAP = 3
+"""Gaps of up to this many samples are bridged; in longer ones nothing counts as measured (a choice of ours)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One trial on equal steps.
+
+    Parameters
+    ----------
+    name : str
+        Of the trial.
+    begin_s, step_s : float
+        Time of the first instant in the trial's own time, and the step, s.
+    inputs : array (n, nu)
+        Mean of each of the model's inputs from an instant to the next; the last row repeats the one before.
+    measured : array (n, ny)
+        In the order of `seen`; nan where nothing was measured.
+    seen : tuple of str
+        Names of the model's variables that are measured.
+    """
+
+    name: str
+    begin_s: float
+    step_s: float
+    inputs: Array
+    measured: Array
+    seen: tuple[str, ...]
+
+    @property
+    def times(self) -> Vector:
+        """Instants in the trial's own time (n,), s."""
+        return self.begin_s + self.step_s * np.arange(len(self.measured))
+
+    def column(self, name: str) -> Vector:
+        """What was measured of a variable (n,), nan where nothing was."""
+        if name not in self.seen:
+            return np.full(len(self.measured), np.nan)
+        column: Vector = self.measured[:, self.seen.index(name)]
+        return column
+
+    def part(self, begin: int, end: int) -> Run:
+        """The instants `begin` to `end` - 1."""
+        where = slice(begin, end)
+        begin_s = self.begin_s + begin * self.step_s
+        return Run(self.name, begin_s, self.step_s, self.inputs[where], self.measured[where], self.seen)
+
+
+def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | None = None) -> Run:
+    """A trial on equal steps, for a model that is driven as the trial was (:mod:`.driving`).
+
+    The step is a whole number of sampling steps near `step_s` (by default 1.5 times the model's own). Signals are
+    averaged over a step, so that no measurement is thrown away. A rudder order holds until the next and enters with its
+    mean over the step; a measured angle is taken as straight between samples.
+
+    Raises
+    ------
+    InputError
+        The trial has fewer than ten steps, or none of the signals in `seen`.
+    """
+    sampling = float(np.median(np.diff(trial.time_s)))
+    stride = max(1, int((step_s or 1.5 * model.step_s) / sampling))
+    step = stride * sampling
+    count = int((trial.time_s[-1] - trial.time_s[0]) / step + 1e-6)
+    begin = float(trial.time_s[0]) + 0.5 * (stride - 1) * sampling
+    grid = begin + step * np.arange(count)
+    if count < 10:
+        raise InputError(trial.path, "", f"is only {trial.time_s[-1] - trial.time_s[0]:g} s long", "leave it out")
+    inputs = np.tile(model.input_values(), (count, 1))
+    for name, values in _input_signals(model, trial).items():
+        held = name == "rudder.command" and "delta_rad" not in trial.signals
+        inputs[:, model.input_names.index(name)] = _means(trial.time_s, values, grid, step, held=held)
+    signals = {variable: signal for signal, variable in SEEN.items()}
+    measured = np.full((count, len(seen)), np.nan)
+    for place, name in enumerate(seen):
+        values = trial.signals.get(signals[name])
+        if values is not None:
+            measured[:, place] = _averaged(trial.time_s, values, grid, stride)
+    if np.isnan(measured).all():
+        raise InputError(
+            trial.path, "header", "none of the signals to be compared is there", "give u_mps, r_degps, ..."
+        )
+    return Run(trial.name, begin, step, inputs, measured, tuple(seen))
+
+
+def seen_in(model: Model, trials: Sequence[Trial]) -> tuple[str, ...]:
+    """Variables of the model that at least one of the trials measured."""
+    there = {signal for trial in trials for signal in trial.signals}
+    return tuple(variable for signal, variable in SEEN.items() if signal in there and variable in model)
+
+
+def _input_signals(model: Model, trial: Trial) -> dict[str, Vector]:
+    given = {variable: trial.signals[name] for name, variable in FED.items() if name in trial.signals}
+    angle = trial.signals.get("delta_rad")
+    given["rudder.command"] = trial.signals["delta_order_rad"] if angle is None else angle
+    return {name: values for name, values in given.items() if name in model.input_names}
+
+
+def _means(time: Vector, values: Vector, grid: Vector, step: float, *, held: bool) -> Vector:
+    """Mean of a signal from each instant of the grid to the next, (n,)."""
+    known = ~np.isnan(values)
+    time, values = time[known], values[known]
+    lengths = np.diff(time)
+    areas = lengths * (values[:-1] if held else 0.5 * (values[:-1] + values[1:]))
+    whole = np.concatenate([[0.0], np.cumsum(areas)])
+    at = np.interp(np.append(grid, grid[-1] + step), time, whole)
+    means: Vector = np.diff(at) / step
+    means[-1] = means[-2]
+    return means
+
+
+def _averaged(time: Vector, values: Vector, grid: Vector, stride: int) -> Vector:
+    """Signal at the instants of the grid: mean of the `stride` samples around each, nan in long gaps."""
+    known = np.flatnonzero(~np.isnan(values))
+    if len(known) < 2:
+        return np.full(len(grid), np.nan)
+    sampling = float(np.median(np.diff(time)))
+    places = (np.arange(stride) - 0.5 * (stride - 1)) * sampling
+    fine = (grid[:, None] + places).ravel()
+    there = np.interp(fine, time[known], values[known], left=np.nan, right=np.nan)
+    after = np.clip(np.searchsorted(time[known], fine), 1, len(known) - 1)
+    gap = time[known[after]] - time[known[after - 1]]
+    there[gap > LONGEST_GAP * sampling] = np.nan
+    mean: Vector = there.reshape(len(grid), stride).mean(axis=1)
+    return mean

@@ -1,0 +1,65 @@
+"""What the audit finds: a column that does not say what its name says, and what it says instead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from tank2sim.records.trials import Trial
+
+Mend = Callable[[Trial], Trial]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One finding about a trial.
+
+    Parameters
+    ----------
+    source : Path
+        The file.
+    columns : tuple of str
+        The columns it is about, as the file calls them.
+    what : str
+        What does not agree with what.
+    likely_truth : str
+        What the columns hold instead.
+    kind : str
+        "fault" if a column is not what its name says or a sensor failed; "note" for what a right record may show too
+        (a current, a small bias, a gap).
+    evidence : mapping
+        Figures, the unit in the name.
+    mend : callable or None
+        Trial to mended trial.
+    safe : bool
+        Whether the mend only restates what was measured (a frame, a sign, a unit, a time base, a failed sensor left
+        out), so that :func:`tank2sim.records.audit.mended` applies it. The others (a bias, a scale, a clock) change
+        measured values by an estimate and are for the user, or for the gap workflow, to decide.
+    """
+
+    source: Path
+    columns: tuple[str, ...]
+    what: str
+    likely_truth: str
+    kind: Literal["fault", "note"] = "fault"
+    evidence: Mapping[str, float] = field(default_factory=dict)
+    mend: Mend | None = None
+    safe: bool = False
+
+    @property
+    def column(self) -> str:
+        """The columns in one text."""
+        return ", ".join(self.columns)
+
+    def as_json(self) -> list[dict[str, Any]]:
+        """One entry a column: file, column, what, likely_truth, kind, mended (by the safe mends) and evidence."""
+        rest = {
+            "what": self.what,
+            "likely_truth": self.likely_truth,
+            "kind": self.kind,
+            "mended": self.safe and self.mend is not None,
+            "evidence": dict(self.evidence),
+        }
+        return [{"file": str(self.source), "column": column, **rest} for column in self.columns]

@@ -1,0 +1,54 @@
+"""Noise of each signal from the record itself."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.signal import savgol_coeffs, savgol_filter
+
+from tank2sim.records.csv_table import Vector
+from tank2sim.records.trials import MEASURED, Trial
+
+WINDOW, DEGREE = 7, 3
+"""Samples and degree of the Savitzky-Golay filter: a cubic through seven samples follows a ship at any usual rate, and
+leaves enough of the noise (0.67 of its variance) to measure it. A choice of ours."""
+_MAD = 1.4826  # of the median absolute deviation to the standard deviation of normal noise
+
+
+def estimated_noise(trial: Trial) -> dict[str, float]:
+    """Standard deviation of the white part of the noise of each measured signal, SI; what the file states is used.
+
+    A signal is compared with its Savitzky-Golay smoothing (a cubic through seven samples, Savitzky & Golay 1964). Of
+    white noise with standard deviation s the residual has s sqrt(1 - c0), c0 the middle coefficient of the filter, for
+    the filter is a projection. The residual's deviation is 1.4826 times its median absolute value, so that spikes and
+    steps do not count, but no less than a rounding to the smallest step between values would make it (that step over
+    sqrt 12, if values repeat). Noise slower than a few samples (waves, a filter in the sensor) is not seen: the
+    figure is a lower bound for coloured noise.
+    """
+    return {
+        name: trial.noise.get(name, white_noise(values)) for name, values in trial.signals.items() if name in MEASURED
+    }
+
+
+def white_noise(values: Vector) -> float:
+    """Standard deviation of the white part of the noise of a signal (n,), see :func:`estimated_noise`."""
+    known = values[np.isfinite(values)]
+    if known.size < WINDOW:
+        return 0.0
+    residual = known - savgol_filter(known, WINDOW, DEGREE)
+    left = 1.0 - float(savgol_coeffs(WINDOW, DEGREE)[WINDOW // 2])
+    apart = _MAD * float(np.median(np.abs(residual)))
+    return max(apart / math.sqrt(left), resolution(known) / math.sqrt(12.0))
+
+
+def resolution(values: Vector) -> float:
+    """Step to which a signal (n,) is rounded: the median of its steps other than zero, if neighbours often repeat.
+
+    One in ten neighbours alike is taken for rounding (or a held value); of values as fine as their noise fewer are.
+    """
+    steps = np.abs(np.diff(values[np.isfinite(values)]))
+    changes = steps[steps > 0]
+    if changes.size == 0 or changes.size > 0.9 * steps.size:
+        return 0.0
+    return float(np.median(changes))

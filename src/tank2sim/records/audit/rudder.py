@@ -1,0 +1,149 @@
+"""Rudder against the turn, and rudder angle against rudder order."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tank2sim.records.audit.finding import Finding
+from tank2sim.records.audit.noise import estimated_noise
+from tank2sim.records.audit.weak import FEWEST, fit, on_uniform_time, windows_for, windows_of
+from tank2sim.records.csv_table import Vector
+from tank2sim.records.trials import RUDDERS, Trial, with_signals
+
+SIDEWAYS = np.pi / 2
+"""No rudder turns as far; beyond it an angle is not in its unit."""
+
+FAR_OVER = np.deg2rad(8.0)
+"""Rudder that leaves the spiral loop of any usual course-unstable ship: she then turns with her rudder."""
+STEADY = 0.9
+"""Cosine between rudder and rate of turn from which a turn is steady. A choice of ours, as the one above."""
+
+
+def rudder_findings(trial: Trial) -> list[Finding]:
+    """Unit and sign of the rudder angle and of the order, and where one does not follow the other."""
+    findings = []
+    for name in RUDDERS:
+        if name not in trial.signals:
+            continue
+        largest = float(np.nanmax(np.abs(trial.signals[name])))
+        if largest > SIDEWAYS:
+            findings.append(_too_large(trial, name, largest))
+            continue
+        response = rudder_response(trial, name)
+        if response and _too_small(trial, name, largest):
+            findings.append(_in_radians(trial, name, largest))
+        if response < 0:
+            findings.append(_wrong_sign(trial, name, response))
+    return findings or _saturation(trial)
+
+
+def rudder_response(trial: Trial, name: str | None = None) -> float:
+    """Positive if a rudder to starboard turns the ship to starboard, negative if to port, 0 if that cannot be told.
+
+    First by b of dr/dt = a r + b delta + c, and then in its standard errors.
+
+    The linear equation of Nomoto (1957) in the weak form, with a and c free, so that a course-unstable ship or one
+    that carries rudder is judged alike: a rudder to starboard (b > 0) accelerates the turn to starboard. What happens
+    with the propeller stopped or astern, or with the ship going astern, is left out: the rudder's force may reverse.
+    Else by a steady turn: +-1 if the rudder is far over and the ship turns, one proportional to the other.
+    """
+    step, signals = on_uniform_time(trial)
+    present = [rudder for rudder in ((name,) if name else RUDDERS) if rudder in signals]
+    if not present or not {"r_radps", "psi_rad"} & set(signals):
+        return 0.0
+    ahead = np.ones(len(signals[present[0]]), dtype=bool)
+    for sign in ("n_radps", "u_mps"):
+        if sign in signals:
+            ahead &= ~(signals[sign] <= 0)
+    rudder = np.where(ahead, signals[present[0]], np.nan)
+    yaw = signals.get("r_radps", signals.get("psi_rad"))
+    assert yaw is not None
+    noise = estimated_noise(trial)
+    if "r_radps" in signals:
+        windows = windows_for(noise["r_radps"], _rms(yaw) / 10, step, len(yaw))
+        r, change = windows.mean(yaw), windows.rate(yaw)
+    else:
+        windows = windows_of(yaw, noise["psi_rad"], step)
+        r, change = windows.rate(yaw), windows.acceleration(yaw)
+    found = fit(change, [r, windows.mean(rudder), np.ones(len(r))])
+    if found is not None and found.differs(1):
+        return float(found.values[1] / found.errors[1])
+    return _steady_turn(r, windows.mean(rudder))
+
+
+def _steady_turn(rate: Vector, rudder: Vector) -> float:
+    whole = np.isfinite(rate) & np.isfinite(rudder)
+    rate, rudder = rate[whole], rudder[whole]
+    if rate.size < FEWEST or _rms(rudder) < FAR_OVER:
+        return 0.0
+    likeness = float(np.sum(rate * rudder) / max(_rms(rate) * _rms(rudder) * rate.size, 1e-300))
+    return float(np.sign(likeness)) if abs(likeness) > STEADY else 0.0
+
+
+def _rms(values: Vector) -> float:
+    return float(np.sqrt(np.nanmean(np.square(values))))
+
+
+def _too_large(trial: Trial, name: str, largest: float) -> Finding:
+    what = f"the rudder angle reaches {np.rad2deg(largest):.4g} deg"
+    truth = "it is in degrees under the name of radians" if largest < np.rad2deg(SIDEWAYS) else "it is no rudder angle"
+
+    def in_degrees(other: Trial) -> Trial:
+        return with_signals(other, {name: np.deg2rad(other.signals[name])}, f"{name}: {truth}")
+
+    mend = in_degrees if "deg" not in trial.heading(name) and largest < np.rad2deg(SIDEWAYS) else None
+    evidence = {"largest_deg": float(np.rad2deg(largest))}
+    return Finding(trial.path, (trial.heading(name),), what, truth, "fault", evidence, mend, safe=mend is not None)
+
+
+def _too_small(trial: Trial, name: str, largest: float) -> bool:
+    """Whether the rudder, given in degrees, stays below 45 deg in radians while the heading changes 57 times as far.
+
+    Rightly read a zigzag changes the heading as far as the rudder, and a turn some tens of times as far.
+    """
+    if "deg" not in trial.heading(name) or "psi_rad" not in trial.signals or largest > np.deg2rad(np.pi / 4):
+        return False
+    heading = trial.signals["psi_rad"]
+    return bool(np.nanmax(heading) - np.nanmin(heading) > largest * 180 / np.pi)
+
+
+def _in_radians(trial: Trial, name: str, largest: float) -> Finding:
+    degrees = float(np.rad2deg(largest))
+    what = f"a rudder of {degrees:.3g} deg at most turns the ship far"
+    truth = "it is in radians under the name of degrees"
+
+    def in_radians(other: Trial) -> Trial:
+        return with_signals(other, {name: np.rad2deg(other.signals[name])}, f"{name}: {truth}")
+
+    columns = (trial.heading(name),)
+    return Finding(trial.path, columns, what, truth, "fault", {"largest_deg": degrees}, in_radians, safe=True)
+
+
+def _wrong_sign(trial: Trial, name: str, response: float) -> Finding:
+    what = "a positive rudder turns the ship to port"
+    truth = "the rudder is positive to port (rudder_sign: port); or heading, rate of turn, v and y all are"
+
+    def turned(other: Trial) -> Trial:
+        told = f"{name}: positive to port in the file, by the turn that it causes"
+        return with_signals(other, {name: 0.0 - other.signals[name]}, told)
+
+    evidence = {"standard_errors_from_zero": response}
+    return Finding(trial.path, (trial.heading(name),), what, truth, "fault", evidence, turned, safe=True)
+
+
+def _saturation(trial: Trial) -> list[Finding]:
+    """A rudder that stands still at its largest angle while more is ordered."""
+    if not set(RUDDERS) <= set(trial.signals):
+        return []
+    angle, order = (trial.signals[name] for name in RUDDERS)
+    stop = float(np.nanmax(np.abs(angle)))
+    at_stop = np.abs(angle) > 0.995 * stop
+    beyond = at_stop & (np.abs(order) > 1.05 * stop)
+    # half of the time at the stop: more than passing by on the way to the order
+    if not at_stop.any() or np.count_nonzero(beyond) < 0.5 * np.count_nonzero(at_stop) or beyond.sum() < 10:
+        return []
+    share = float(np.mean(beyond))
+    what = f"the rudder stands at {np.rad2deg(stop):.3g} deg while more is ordered, {100 * share:.2g} % of the time"
+    truth = "the steering gear or the sensor saturates there"
+    evidence = {"stop_deg": float(np.rad2deg(stop)), "share": share}
+    return [Finding(trial.path, (trial.heading("delta_rad"),), what, truth, "note", evidence)]

@@ -1,0 +1,176 @@
+"""Each signal by itself: missing values, a sensor that stands still, spikes, values held between slower readings."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import find_objects, label, median_filter
+from scipy.signal import savgol_coeffs
+from scipy.stats import norm
+
+from tank2sim.records.audit.finding import Finding, Mend
+from tank2sim.records.audit.noise import DEGREE, WINDOW, estimated_noise, white_noise
+from tank2sim.records.audit.weak import FALSE_ALARM
+from tank2sim.records.csv_table import Vector
+from tank2sim.records.trials import MEASURED, Trial, sampling_step, with_signals
+
+MOTIONS = tuple(name for name in MEASURED if not name.startswith("wind"))
+"""Signals that inertia makes smooth; wind may jump."""
+SPIKE_SAMPLES = 3
+"""A spike is this many samples long at most; what lasts longer is a step."""
+SPIKE = 10.0
+"""Standard deviations of a spike from its neighbours, for the noise of real sensors has longer tails than normal."""
+
+ROUNDING = 1e-9
+"""Share of a signal below which its noise is that of the arithmetic: the signal was calculated, not measured."""
+SHORT = 0.05
+"""Share of a record up to which failed readings of one sensor are noted rather than called its fault: they are left
+out, and nothing is lost. A choice of ours."""
+
+
+def sensor_findings(trial: Trial) -> list[Finding]:
+    """Faults of single sensors; failed values are mended by leaving them out (nan)."""
+    findings = []
+    noise = estimated_noise(trial)
+    for name, values in trial.signals.items():
+        findings += _missing(trial, name, values)
+        if name in MOTIONS and np.nanmax(values) == np.nanmin(values):
+            findings += _stands_still(trial, name, noise)
+        elif name in MOTIONS:
+            findings += _stuck(trial, name, values)
+            findings += _spikes(trial, name, values, noise[name])
+    return findings
+
+
+def _missing(trial: Trial, name: str, values: Vector) -> list[Finding]:
+    missing = np.isnan(values)
+    if not missing.any():
+        return []
+    runs = _runs(missing)
+    longest = max(runs, key=lambda run: run.stop - run.start)
+    seconds = (longest.stop - longest.start) * sampling_step(trial)
+    what = (
+        f"{missing.sum()} values are missing, the longest time {seconds:.3g} s from {trial.time_s[longest.start]:.6g} s"
+    )
+    evidence = {"values": float(missing.sum()), "runs": float(len(runs)), "longest_s": seconds}
+    return [Finding(trial.path, (trial.heading(name),), what, "not recorded there", "note", evidence)]
+
+
+def _runs(true: NDArray[np.bool_]) -> list[slice]:
+    """Slices of the runs of True."""
+    return [found[0] for found in find_objects(label(true)[0]) if found is not None]
+
+
+def _stuck(trial: Trial, name: str, values: Vector) -> list[Finding]:
+    """Runs of one value that chance does not explain.
+
+    With p the share of neighbours alike outside the longest run, a run of k repeats begins somewhere among n values
+    by chance with probability n p^k at most. That holds for a signal whose steps are noise; a smooth one, or one of a
+    coarse sensor, may rest, and counts only if it is three of its larger steps away when the run ends.
+    """
+    alike = np.append(np.diff(values) == 0, False)
+    runs = _runs(alike)
+    if not runs:
+        return []
+    steps = np.abs(np.diff(values))
+    moving = steps[steps > 0]
+    if moving.size == 0:
+        return []
+    longest = max(run.stop - run.start for run in runs)
+    others = alike.sum() - longest
+    chance = max(float(others / max(len(values) - longest, 1)), 1 / len(values))
+    if chance > 0.5:  # rests more often than not: no sensor of a motion, or one far too coarse to tell
+        return []
+    least = np.log(len(values) / FALSE_ALARM) / -np.log(chance)
+    bends = np.abs(np.diff(values, n=2))
+    # of white noise the bends are 1.7 times the steps, of a curve less; rounding alone is no noise
+    noisy = np.median(bends[bends > 0]) > np.median(moving) and white_noise(values) > ROUNDING * np.nanmax(abs(values))
+    usual = float(np.quantile(moving, 0.9))
+    long_enough = [run for run in runs if run.stop - run.start > max(least, 9)]
+    stuck = [run for run in long_enough if noisy or _jumps(values, run, usual)]
+    if not stuck:
+        return []
+    seconds = sum(run.stop - run.start for run in stuck) * sampling_step(trial)
+    first = stuck[0]
+    what = f"stands still for {seconds:.3g} s in all, first at {trial.time_s[first.start]:.6g} s"
+    evidence = {"runs": float(len(stuck)), "seconds": seconds, "longest_samples": float(longest + 1)}
+    rows = np.concatenate([np.arange(run.start + 1, run.stop + 1) for run in stuck])
+    mend = _left_out(name, rows, "where the sensor stood still")
+    kind = _kind(len(rows), values)
+    return [Finding(trial.path, (trial.heading(name),), what, "the sensor was stuck", kind, evidence, mend, safe=True)]
+
+
+def _jumps(values: Vector, run: slice, usual: float) -> bool:
+    """Whether the signal is elsewhere when a run of repeats ends."""
+    after = values[run.stop + 1 : run.stop + 12]
+    if after.size < 2:
+        return False
+    # what rests and then sets out goes on in steps like its first
+    return bool(abs(after[0] - values[run.stop]) > 3 * max(usual, float(np.median(np.abs(np.diff(after))))))
+
+
+def _stands_still(trial: Trial, name: str, noise: dict[str, float]) -> list[Finding]:
+    """A signal of one value: in a measured record, where the others have noise, the sensor was not read."""
+    others = [other for other in MOTIONS if other in trial.signals and other != name]
+    measured = [noise[other] > ROUNDING * float(np.nanmax(np.abs(trial.signals[other]))) for other in others]
+    if not any(measured):
+        return []
+    what = "has one value from beginning to end"
+    truth = "the sensor was not read"
+
+    def without(other: Trial) -> Trial:
+        return with_signals(other, {name: None}, f"{name} left out: {truth}")
+
+    return [Finding(trial.path, (trial.heading(name),), what, truth, mend=without, safe=True)]
+
+
+def _spikes(trial: Trial, name: str, values: Vector, noise: float) -> list[Finding]:
+    """Values far from the median of their neighbours (Hampel 1974), on both sides."""
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size < 4 * WINDOW:
+        return []
+    away = values[known] - median_filter(values[known], size=2 * SPIKE_SAMPLES + 1, mode="nearest")
+    left = 1.0 - float(savgol_coeffs(WINDOW, DEGREE)[WINDOW // 2])
+    usual = max(1.4826 * float(np.median(np.abs(away))), noise * float(np.sqrt(left)))
+    limit = max(SPIKE, float(norm.isf(FALSE_ALARM / known.size / 2))) * usual
+    # a signal that often moves as far between neighbours has no spikes
+    limit = max(limit, 3 * float(np.quantile(np.abs(np.diff(values[known])), 0.99)))
+    far = np.abs(away) > limit
+    runs = [run for run in _runs(far) if run.stop - run.start <= SPIKE_SAMPLES and _stands_out(values[known], run)]
+    if not runs or limit == 0:
+        return []
+    rows = np.concatenate([known[run] for run in runs])
+    what = f"{len(runs)} spikes, the first at {trial.time_s[rows[0]]:.6g} s"
+    evidence = {"spikes": float(len(runs)), "largest_in_noise": float(np.max(np.abs(away)) / usual) if usual else 0.0}
+    mend = _left_out(name, rows, "spikes")
+    truth = "disturbed readings"
+    return [
+        Finding(trial.path, (trial.heading(name),), what, truth, _kind(len(rows), values), evidence, mend, safe=True)
+    ]
+
+
+def _stands_out(values: Vector, run: slice) -> bool:
+    """Whether the steps into and out of a run are twice any step near it: the top of a smooth curve is no spike."""
+    near = slice(max(0, run.start - 2 * SPIKE_SAMPLES), run.stop + 2 * SPIKE_SAMPLES)
+    steps = np.abs(np.diff(values[near]))
+    own = np.zeros(len(steps), dtype=bool)
+    own[max(0, run.start - near.start - 1) : run.stop - near.start] = True
+    if own.all():
+        return False
+    edges = steps[own][[0, -1]]
+    return bool(edges.min() > 2 * steps[~own].max())
+
+
+def _kind(rows: int, values: Vector) -> Literal["fault", "note"]:
+    return "fault" if rows > SHORT * len(values) else "note"
+
+
+def _left_out(name: str, rows: NDArray[np.int64], why: str) -> Mend:
+    def left_out(trial: Trial) -> Trial:
+        values = trial.signals[name].copy()
+        values[rows] = np.nan
+        return with_signals(trial, {name: values}, f"{name}: {len(rows)} values left out, {why}")
+
+    return left_out

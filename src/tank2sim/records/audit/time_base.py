@@ -1,0 +1,98 @@
+"""The time column: rising, gaps, repeated rows, few digits, uneven steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.records.audit.finding import Finding
+from tank2sim.records.trials import Trial, sampling_step, select_rows
+
+GAP = 1.5
+"""Steps between rows from which samples are missing: half-way to the first lost one."""
+UNEVEN = 0.1
+"""Scatter of the step, as a share of it, worth a word: beyond any rounding of a uniform time to two digits."""
+
+
+def time_findings(trial: Trial) -> list[Finding]:
+    """Faults of the time base, each with what mends it."""
+    steps = np.diff(trial.time_s)
+    if np.any(steps <= 0):
+        return [_not_rising(trial, steps)]
+    findings = []
+    step = sampling_step(trial)
+    scatter = 1.4826 * float(np.median(np.abs(steps - step))) / step  # of normal scatter, gaps left aside
+    limit = max(GAP, 1 + 6 * scatter) * step
+    wide = np.flatnonzero(steps > limit)
+    column = (trial.heading("t_s"),)
+    if wide.size:
+        longest = int(wide[np.argmax(steps[wide])])
+        lost = int(np.sum(np.round(steps[wide] / step) - 1))
+        what = f"{wide.size} gaps, the longest {steps[longest]:.3g} s at {trial.time_s[longest]:.6g} s"
+        evidence = {"gaps": float(wide.size), "longest_s": float(steps[longest]), "samples": float(lost)}
+        truth = f"about {lost} rows were not recorded"
+        findings.append(Finding(trial.path, column, what, truth, "note", evidence))
+    if scatter > UNEVEN:
+        what = f"the step between rows scatters by {100 * scatter:.0f} % about {step:.4g} s"
+        truth = "the rows were recorded at uneven times, or stamped late"
+        findings.append(Finding(trial.path, column, what, truth, "note", {"scatter": scatter, "step_s": step}))
+    return findings
+
+
+def _not_rising(trial: Trial, steps: NDArray[np.float64]) -> Finding:
+    """Which of the usual reasons explains a time that does not rise."""
+    row = int(np.flatnonzero(steps <= 0)[0]) + 1
+    at_fault = np.count_nonzero(steps <= 0)
+    what = f"does not rise in {at_fault} rows, first in row {row + 1} ({trial.time_s[row]:.6g} s)"
+    evidence = {"rows": float(at_fault), "first_row": float(row + 1)}
+    repeated = np.flatnonzero(_repeats(trial)) + 1
+    kept = np.delete(np.arange(len(trial.time_s)), repeated)
+    sorted_rows = np.argsort(trial.time_s, kind="stable")
+    rising = np.flatnonzero(trial.time_s > np.concatenate([[-np.inf], np.maximum.accumulate(trial.time_s)[:-1]]))
+    if np.all(np.diff(trial.time_s[kept]) > 0):
+        truth, rows = "rows are repeated to the last digit: each counts once", kept
+    elif _rounded(trial, steps):
+        return _uniform(trial, what, evidence)
+    elif np.all(np.diff(trial.time_s[sorted_rows]) > 0):
+        truth, rows = "the rows are not in the order of time: sorted", sorted_rows
+    else:
+        truth, rows = (
+            "times are repeated or fall back: rows that do not come after all before them are left out",
+            rising,
+        )
+
+    def mend(other: Trial) -> Trial:
+        return replace(select_rows(other, rows), notices=(*other.notices, f"time: {truth}"))
+
+    return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", evidence, mend, safe=True)
+
+
+def _repeats(trial: Trial) -> NDArray[np.bool_]:
+    """Whether each row but the first is the one before it to the last digit, (n - 1,)."""
+    alike: NDArray[np.bool_] = np.diff(trial.time_s) == 0
+    for values in trial.signals.values():
+        alike = alike & ((values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1])))
+    return alike
+
+
+def _rounded(trial: Trial, steps: NDArray[np.float64]) -> bool:
+    """Whether a uniform time, rounded, gives these: it never falls, and each time is met to its rounding."""
+    if np.any(steps < 0) or not np.any(steps > 0):
+        return False
+    even = np.linspace(trial.time_s[0], trial.time_s[-1], len(trial.time_s))
+    # beyond half the rounding the end points, themselves rounded, may be out by as much again
+    return bool(np.max(np.abs(even - trial.time_s)) <= np.max(steps[steps > 0]))
+
+
+def _uniform(trial: Trial, what: str, evidence: dict[str, float]) -> Finding:
+    count = np.arange(len(trial.time_s))
+    step = float(np.polyfit(count, trial.time_s, 1)[0])
+    truth = f"times are rounded: the step is uniform, {step:.5g} s"
+
+    def mend(other: Trial) -> Trial:
+        return replace(other, time_s=other.time_s[0] + step * count, notices=(*other.notices, f"time: {truth}"))
+
+    figures = {**evidence, "step_s": step}
+    return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", figures, mend, safe=True)

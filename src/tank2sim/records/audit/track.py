@@ -1,0 +1,350 @@
+"""Velocities against positions: unit, frame, sign and axes, then current, scale, heading offset, antenna and clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tank2sim.records.audit.finding import Finding, Mend
+from tank2sim.records.audit.noise import estimated_noise
+from tank2sim.records.audit.weak import Complex, Fit, Windows, fit, on_uniform_time, windows_of
+from tank2sim.records.csv_table import Vector
+from tank2sim.records.trials import Trial, with_signals
+from tank2sim.units import KNOT_MPS
+
+UNITS = {1.0: "m/s", KNOT_MPS: "knots", 1 / KNOT_MPS: "", 1 / 3.6: "km/h", 3.6: "", 0.3048: "ft/s"}
+"""Factor between speed over ground and speed as given, to the unit it tells of."""
+CLEARER = 1.5
+"""How many times the misfit as labelled must be that of another reading: more than an error of the fit's own scale."""
+EVIDENCE = 20.0
+"""Gain in twice the log likelihood from which another reading is taken: 10 is "very strong" (Kass & Raftery 1995), and
+some readings are compared."""
+SCALE, OFFSET, CURRENT = 0.01, np.deg2rad(0.3), 0.01
+"""What is worth a word: a log or a current to 1 % of the speed, a compass to 0.3 deg. Choices of ours."""
+
+_PAIRS = (("u_mps", "v_mps"), ("u_ground_mps", "v_ground_mps"))
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """One way to read the columns.
+
+    Velocity over ground follows from w = u + iv and e = exp(i psi), for x + iy is north + i east; ``mirrored`` if y is
+    positive to west. A rotation by a quarter of a turn, found with it, makes it ``quarter_truth`` about
+    ``quarter_wrong``.
+    """
+
+    truth: str
+    wrong: tuple[str, ...]
+    velocity: Callable[[Complex, Complex], Complex]
+    mirrored: bool = False
+    earth: bool = False
+    quarter_truth: str = ""
+    quarter_wrong: tuple[str, ...] = ()
+
+
+_AS_LABELLED = _Reading("", (), lambda w, e: w * e)
+_READINGS = (
+    _Reading(
+        "v is positive to port",
+        ("v",),
+        lambda w, e: w.conj() * e,
+        quarter_truth="u and v are interchanged",
+        quarter_wrong=("u", "v"),
+    ),
+    _Reading("they are earth-fixed velocities, along x and y", ("u", "v"), lambda w, e: w, earth=True),
+    _Reading(
+        "they are earth-fixed velocities, along x and against y",
+        ("u", "v"),
+        lambda w, e: w.conj(),
+        earth=True,
+        quarter_truth="they are earth-fixed velocities, along y and x",
+        quarter_wrong=("u", "v"),
+    ),
+    _Reading(
+        "y is positive to west",
+        ("x", "y"),
+        lambda w, e: w * e,
+        mirrored=True,
+        quarter_truth="x and y are interchanged: x is east and y north",
+        quarter_wrong=("x", "y"),
+    ),
+    _Reading(
+        "psi is counted anticlockwise",
+        ("psi", "r"),
+        lambda w, e: w * e.conj(),
+        quarter_truth="psi is counted anticlockwise from east",
+        quarter_wrong=("psi", "r"),
+    ),
+)
+
+
+_EARTH = {truth for reading in _READINGS if reading.earth for truth in (reading.truth, reading.quarter_truth)}
+
+
+def track_findings(trial: Trial) -> list[Finding]:
+    """What velocities and positions tell of each other; nothing if there are no positions or no heading."""
+    if not {"x_m", "y_m", "psi_rad"} <= set(trial.signals):
+        return []
+    findings: list[Finding] = []
+    for pair in _PAIRS:
+        if set(pair) <= set(trial.signals):
+            findings += _of_pair(trial, pair)
+    if not set(_PAIRS[0]) <= set(trial.signals) and "u_mps" in trial.signals:
+        findings += _of_surge(trial)
+    if "sog_mps" in trial.signals:
+        findings += _of_speed(trial)
+    return findings
+
+
+@dataclass(frozen=True, eq=False)
+class _Track:
+    """Signals on a uniform time base, and the velocity over ground in windows, (windows,) complex, north + i east."""
+
+    signals: dict[str, Vector]
+    windows: Windows
+    ground: Complex
+
+    @property
+    def speed(self) -> float:
+        return float(np.sqrt(np.nanmean(np.abs(self.ground) ** 2)))
+
+
+def _track(trial: Trial) -> _Track:
+    step, signals = on_uniform_time(trial)
+    place = signals["x_m"] + 1j * signals["y_m"]
+    noise = estimated_noise(trial)
+    windows = windows_of(place, max(noise["x_m"], noise["y_m"]), step)
+    return _Track(signals, windows, windows.rate(place))
+
+
+def _of_pair(trial: Trial, pair: tuple[str, str]) -> list[Finding]:
+    track = _track(trial)
+    given = track.signals[pair[0]] + 1j * track.signals[pair[1]]
+    if np.count_nonzero(np.isfinite(track.windows.mean(given) + track.ground)) < 10:
+        return []
+    found = _units(trial, track, pair, given)
+    findings = [found] if found else []
+    if found and found.mend:
+        trial = found.mend(trial)
+        track = _track(trial)
+        given = track.signals[pair[0]] + 1j * track.signals[pair[1]]
+    frame = _frame(trial, track, pair, given)
+    earth = frame is not None and frame.likely_truth in _EARTH
+    if frame is not None:
+        findings.append(frame)
+        assert frame.mend is not None
+        trial = frame.mend(trial)
+        track = _track(trial)
+        given = track.signals[pair[0]] + 1j * track.signals[pair[1]]
+    lesser = _lesser(trial, track, pair, given)
+    # velocities along the axes of the track have been turned with psi and back: they do not tell of it
+    return findings + [one for one in lesser if not (earth and one.columns == (trial.heading("psi_rad"),))]
+
+
+def _units(trial: Trial, track: _Track, pair: tuple[str, str], given: Complex) -> Finding | None:
+    """Unit of the speed, whatever its frame: speed over ground over speed as given."""
+    mean = track.windows.mean(np.abs(given))
+    moving = mean > 0
+    if not moving.any():
+        return None
+    ratio = float(np.nanmedian(np.abs(track.ground[moving]) / mean[moving]))
+    nearest = min(UNITS, key=lambda factor: abs(np.log(ratio / factor)))
+    # a quarter: less than half the way from one unit to the next, more than any usual current or log error
+    if not ratio > 0 or nearest == 1.0 or not UNITS[nearest] or abs(np.log(ratio / nearest)) > np.log(1.15):
+        return None
+    truth = f"they are in {UNITS[nearest]}"
+
+    wrong = pair[:1] if _sway_is_right(track, given, nearest) else pair
+
+    def in_si(other: Trial) -> Trial:
+        changes = {name: other.signals[name] * nearest for name in wrong}
+        return with_signals(other, changes, f"{', '.join(wrong)}: {truth}")
+
+    columns = tuple(trial.heading(name) for name in wrong)
+    what = f"speed over ground is {ratio:.3g} times the speed given"
+    return Finding(trial.path, columns, what, truth, "fault", {"factor": ratio}, in_si, safe=True)
+
+
+def _sway_is_right(track: _Track, given: Complex, factor: float) -> bool:
+    """Whether v alone is in m/s, by the velocity across the heading."""
+    turn = track.windows.mean(np.exp(1j * track.signals["psi_rad"]))
+    sway = track.windows.mean(given.imag)
+    found = fit((track.ground * turn.conj()).imag, [sway, np.ones(len(sway))])
+    return found is not None and found.differs(0, factor) and abs(found.values[0] - 1) < abs(found.values[0] - factor)
+
+
+def _frame(trial: Trial, track: _Track, pair: tuple[str, str], given: Complex) -> Finding | None:
+    """Another reading than the labelled one, where it explains the track clearly better."""
+    turn = np.exp(1j * track.signals["psi_rad"])
+    labelled, _ = _misfit(track, _AS_LABELLED, given, turn)
+    misfits = {reading: _misfit(track, reading, given, turn) for reading in _READINGS}
+    best = min(_READINGS, key=lambda reading: misfits[reading][0])
+    misfit, rotation = misfits[best]
+    independent = np.count_nonzero(np.isfinite(track.ground)) / 2
+    least = 1e-9 * track.speed  # no misfit is less than the rounding of the numbers
+    gain = 4 * independent * float(np.log(max(labelled, least, 1e-300) / max(misfit, least, 1e-300)))
+    if gain < EVIDENCE or labelled < CLEARER * misfit:
+        return None
+    quarters = round(rotation / (np.pi / 2))
+    turned = quarters % 2 == 1 and best.quarter_truth
+    truth, wrong = (best.quarter_truth, best.quarter_wrong) if turned else (best.truth, best.wrong)
+    # a rate of turn agrees with the heading by now, or there is none
+    names = [name for name in (_signal(pair, one) for one in wrong) if name in trial.signals]
+    columns = tuple(trial.heading(name) for name in names)
+    what = (
+        f"({', '.join(trial.heading(name) for name in pair)}) as body velocities, turned by psi, miss d(x, y)/dt "
+        f"by {labelled:.2g} m/s rms, and by {misfit:.2g} m/s if read otherwise"
+    )
+    evidence = {"misfit_as_labelled_mps": labelled, "misfit_mps": misfit, "speed_mps": track.speed}
+    mend = _mend(best, pair, f"{', '.join(names)}: {truth}", 1j**quarters)
+    return Finding(trial.path, columns, what, truth, "fault", evidence, mend, safe=True)
+
+
+def _misfit(track: _Track, reading: _Reading, given: Complex, turn: Complex) -> tuple[float, float]:
+    """Root mean square misfit of a reading, m/s, with a constant current and a constant rotation left free; this."""
+    ground = track.ground.conj() if reading.mirrored else track.ground
+    velocity = track.windows.mean(reading.velocity(given, turn))
+    whole = np.isfinite(ground) & np.isfinite(velocity)
+    ground, velocity = ground[whole], velocity[whole]
+    # with the mean, or a straight course would leave the rotation to the noise
+    factor = np.vdot(velocity, ground)
+    rotation = factor / abs(factor) if abs(factor) > 0 else 1.0
+    rest = ground - rotation * velocity
+    return float(np.sqrt(np.mean(np.abs(rest - rest.mean()) ** 2))), float(np.angle(rotation))
+
+
+def _signal(pair: tuple[str, str], name: str) -> str:
+    return {"u": pair[0], "v": pair[1], "x": "x_m", "y": "y_m", "psi": "psi_rad", "r": "r_radps"}[name]
+
+
+def _mend(reading: _Reading, pair: tuple[str, str], notice: str, quarter: complex) -> Mend:
+    if reading.earth:
+        notice += "; turned to body axes by psi (those through the water are the same if there is no current)"
+
+    def read(trial: Trial) -> Trial:
+        signals = trial.signals
+        if reading.mirrored:
+            place = np.conj(signals["x_m"] + 1j * signals["y_m"]) / quarter
+            return with_signals(trial, {"x_m": place.real, "y_m": place.imag}, notice)
+        if "psi" in reading.wrong:
+            turned: dict[str, Vector | None] = {"psi_rad": np.angle(quarter) - signals["psi_rad"]}
+            if "r_radps" in signals:
+                turned["r_radps"] = 0.0 - signals["r_radps"]
+            return with_signals(trial, turned, notice)
+        turn = np.exp(1j * signals["psi_rad"])
+        body = quarter * reading.velocity(signals[pair[0]] + 1j * signals[pair[1]], turn) * turn.conj()
+        return with_signals(trial, {pair[0]: body.real, pair[1]: body.imag}, notice)
+
+    return read
+
+
+def _lesser(trial: Trial, track: _Track, pair: tuple[str, str], given: Complex) -> list[Finding]:
+    """Current c, scale and turn a, antenna l or clock tau: d(x + iy)/dt = a w e + c + d(l e)/dt, or + tau d(w e)/dt."""
+    turn = np.exp(1j * track.signals["psi_rad"])
+    velocity = given * turn
+    windows, ground = track.windows, track.ground
+    mean = windows.mean(velocity)
+    base = [mean, np.ones(len(mean))]
+    plain = fit(ground, base)
+    lever = fit(ground, [*base, windows.rate(turn)])
+    clock = fit(ground, [*base, windows.rate(velocity)])
+    findings = []
+    best = plain
+    # what half a step of the clock would do cannot be told from the stamping of the times
+    least = track.speed * windows.step_s / 2
+    if lever is not None and (lever.differs(4) or lever.differs(5)) and np.hypot(*lever.values[4:6]) > least:
+        best = lever
+        findings.append(_antenna(trial, lever, clock))
+    if best is None:
+        return findings
+    columns = tuple(trial.heading(name) for name in pair)
+    if best.differs(0, 1.0) and abs(best.values[0] - 1) > SCALE:
+        findings.append(_scale(trial, pair, best))
+    if best.differs(1) and abs(best.values[1]) > OFFSET:
+        findings.append(_offset(trial, best))
+    c = complex(best.values[2], best.values[3])
+    if (best.differs(2) or best.differs(3)) and abs(c) > CURRENT * track.speed:
+        towards = float(np.rad2deg(np.angle(c)) % 360)
+        truth = f"a current of {abs(c):.3g} m/s towards {towards:.0f} deg, if the velocities are through the water"
+        if pair == _PAIRS[1]:
+            truth = f"they are through the water, in a current of {abs(c):.3g} m/s towards {towards:.0f} deg"
+        evidence = {"speed_mps": abs(c), "direction_deg": towards, "standard_error_mps": float(best.errors[2])}
+        what = "velocity over ground and the velocities differ by a constant in earth axes"
+        findings.append(Finding(trial.path, columns, what, truth, "note", evidence))
+    return findings
+
+
+def _antenna(trial: Trial, lever: Fit, clock: Fit | None) -> Finding:
+    forward, starboard = (float(value) for value in lever.values[4:6])
+    truth = f"the antenna is {forward:.3g} m before and {starboard:.3g} m to starboard of the origin"
+    evidence = {
+        "forward_m": forward,
+        "starboard_m": starboard,
+        "standard_error_m": float(max(lever.errors[4:6])),
+    }
+    if clock is not None and clock.differs(4):
+        delay = -float(clock.values[4])
+        evidence["delay_s"] = delay
+        rival = f"{'x and y' if delay > 0 else 'the velocities'} are late by {abs(delay):.3g} s"
+        better = clock.residual < 0.99 * lever.residual
+        truth = f"{rival}; or {truth}" if better else f"{truth}; or {rival}"
+    columns = (trial.heading("x_m"), trial.heading("y_m"))
+    what = "x and y move with the heading, or before or after the velocities"
+    return Finding(trial.path, columns, what, truth, "note", evidence)
+
+
+def _scale(trial: Trial, pair: tuple[str, str], found: Fit) -> Finding:
+    factor = float(found.values[0])
+    evidence = {"factor": factor, "standard_error": float(found.errors[0])}
+    truth = f"the log reads {100 * (1 / factor - 1):+.2g} %"
+
+    def scaled(other: Trial) -> Trial:
+        changes = {name: factor * other.signals[name] for name in pair}
+        return with_signals(other, changes, f"{', '.join(pair)} multiplied by {factor:.4g}, by the track")
+
+    what = f"velocity over ground is {factor:.4g} times the velocities"
+    columns = tuple(trial.heading(name) for name in pair)
+    return Finding(trial.path, columns, what, truth, "note", evidence, scaled)
+
+
+def _offset(trial: Trial, found: Fit) -> Finding:
+    """The track is turned against heading and velocities: psi + offset is the heading in the axes of x and y."""
+    offset = float(np.arctan2(found.values[1], found.values[0]))
+    evidence = {"angle_deg": float(np.rad2deg(-offset)), "standard_error_deg": float(np.rad2deg(found.errors[1]))}
+    truth = f"psi reads {np.rad2deg(-offset):+.3g} deg too much (heading offset, or the log's misalignment)"
+
+    def turned(other: Trial) -> Trial:
+        return with_signals(
+            other, {"psi_rad": other.signals["psi_rad"] + offset}, f"psi: offset {offset:.3g} rad added"
+        )
+
+    what = "the track is turned by a constant angle against heading and velocities"
+    return Finding(trial.path, (trial.heading("psi_rad"),), what, truth, "note", evidence, turned)
+
+
+def _of_surge(trial: Trial) -> list[Finding]:
+    """Unit of u alone, by the velocity along the heading."""
+    alone = replace(trial, signals={**trial.signals, "v_mps": np.zeros(len(trial.time_s))})
+    track = _track(alone)
+    found = _units(alone, track, _PAIRS[0], np.asarray(track.signals["u_mps"], dtype=complex))
+    return [_only(found, trial, "u_mps")] if found else []
+
+
+def _of_speed(trial: Trial) -> list[Finding]:
+    """Unit of the speed over ground."""
+    track = _track(trial)
+    found = _units(trial, track, ("sog_mps", "sog_mps"), np.asarray(track.signals["sog_mps"], dtype=complex))
+    return [_only(found, trial, "sog_mps")] if found else []
+
+
+def _only(found: Finding, trial: Trial, name: str) -> Finding:
+    factor = min(UNITS, key=lambda unit: abs(np.log(found.evidence["factor"] / unit)))
+
+    def in_si(other: Trial) -> Trial:
+        told = f"{name}: {found.likely_truth}"
+        return with_signals(other, {name: other.signals[name] * factor}, told)
+
+    return replace(found, columns=(trial.heading(name),), mend=in_si, likely_truth=f"it is in {UNITS[factor]}")

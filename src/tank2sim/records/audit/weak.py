@@ -1,0 +1,198 @@
+"""Comparison of a signal with the rate of another without differentiating noise: the weak form, and its regression."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import oaconvolve
+from scipy.stats import t as student
+
+from tank2sim.records.csv_table import Vector
+from tank2sim.records.trials import Trial, sampling_step
+
+Complex = NDArray[np.complex128]
+Number = TypeVar("Number", np.float64, np.complex128)
+
+FALSE_ALARM = 1e-5
+"""Probability with which a comparison of a right record may alarm: some ten comparisons of a hundred records then give
+one false alarm in a hundred audits. A choice of ours."""
+SHARE = 0.01
+"""The noise that a rate may keep, as a share of the motion: below most of the differences that matter."""
+FEWEST = 12
+"""Independent windows below which nothing is judged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Windows of one width, half a width apart, over a uniform time base.
+
+    For a smooth bump g that vanishes at both ends, the mean of dy/dt weighted with g is that of y weighted with the
+    derivative of g (integration by parts): a signal and the rate of another are compared exactly, at any width.
+    g is the square of a Hann window, so that second derivatives are smooth as well.
+
+    Parameters
+    ----------
+    step_s : float
+        Of the time base.
+    samples : int
+        Width, odd.
+    hop : int
+        Samples from one window to the next; 0: half a width.
+    """
+
+    step_s: float
+    samples: int
+    hop: int = 0
+
+    @property
+    def width_s(self) -> float:
+        """Width, s."""
+        return self.step_s * (self.samples + 1)
+
+    def noise_of_mean(self, noise: float) -> float:
+        """Standard deviation that white noise in a signal leaves in :meth:`mean`."""
+        return noise * float(np.sqrt(35 / 18 * self.step_s / self.width_s))
+
+    def noise_of_rate(self, noise: float) -> float:
+        """Standard deviation, per s, that white noise in a signal leaves in :meth:`rate`."""
+        return noise * float(np.sqrt(10 / 9 * (2 * np.pi) ** 2 * self.step_s / self.width_s**3))
+
+    def mean(self, values: NDArray[Number]) -> NDArray[Number]:
+        """Weighted mean in each window, (windows,); nan where a value is missing."""
+        return self._convolved(values, 0)
+
+    def rate(self, values: NDArray[Number]) -> NDArray[Number]:
+        """Weighted mean of the first derivative in each window, (windows,), per s."""
+        return self._convolved(values, 1)
+
+    def acceleration(self, values: NDArray[Number]) -> NDArray[Number]:
+        """Weighted mean of the second derivative in each window, (windows,), per s2."""
+        return self._convolved(values, 2)
+
+    def _convolved(self, values: NDArray[Number], order: int) -> NDArray[Number]:
+        if len(values) < self.samples:
+            return np.empty(0, dtype=values.dtype)
+        missing = ~np.isfinite(values)
+        kernel = self._kernel(order)
+        filled = np.where(missing, 0, values)
+        offset = np.mean(filled)  # the kernels of derivatives sum to zero: less rounding
+        inside = oaconvolve(filled - (offset if order else 0), kernel, mode="valid")
+        holes = oaconvolve(missing.astype(float), np.ones(self.samples), mode="valid") > 0.5
+        picked: NDArray[Number] = np.where(holes, np.nan, inside)[:: self.hop or (self.samples + 1) // 2]
+        return picked
+
+    def _kernel(self, order: int) -> Vector:
+        width = self.width_s
+        phase = 2 * np.pi * np.arange(1, self.samples + 1) / (self.samples + 1)
+        # (1 - cos p)^2 = 3/2 - 2 cos p + cos(2 p)/2, of mean 3/2; p = 2 pi t/width
+        turn = 2 * np.pi / width
+        shapes = (
+            1.5 - 2 * np.cos(phase) + 0.5 * np.cos(2 * phase),
+            turn * (2 * np.sin(phase) - np.sin(2 * phase)),
+            turn**2 * (2 * np.cos(phase) - 2 * np.cos(2 * phase)),
+        )
+        kernel: Vector = shapes[order] / (1.5 * width) * self.step_s
+        return kernel
+
+
+def windows_for(noise: float, motion: float, step_s: float, count: int) -> Windows:
+    """Windows in which the rate of a signal with this noise is known to a hundredth of the rate of the motion.
+
+    White noise s in the signal leaves s sqrt(10/9 (2 pi)^2 step/width^3) in its rate. At least eight samples wide,
+    and at most a twentieth of the record.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of the signal.
+    motion : float
+        Root mean square of its rate, per s.
+    step_s, count : float, int
+        Time base.
+    """
+    wanted = (10 / 9 * (2 * np.pi) ** 2 * step_s * (noise / max(SHARE * motion, 1e-9 * noise, 1e-300)) ** 2) ** (
+        1 / 3
+    ) / step_s
+    samples = int(np.clip(wanted, 8, max(8, count / 20)))
+    return Windows(step_s, samples + 1 - samples % 2)
+
+
+def windows_of(values: NDArray[Number], noise: float, step_s: float) -> Windows:
+    """Windows fit for the rate of a signal (n,) with this noise, by :func:`windows_for` and its own motion."""
+    windows = Windows(step_s, 9)
+    for _ in range(2):  # narrow windows still hold noise, which the second pass does not
+        rate = np.abs(windows.rate(values))
+        rate = rate[np.isfinite(rate)]
+        motion = float(np.sqrt(np.mean(rate**2))) if rate.size else 0.0
+        windows = windows_for(noise, motion, step_s, len(values))
+    return windows
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Least-squares coefficients (k,), their standard errors (k,), and the root mean square of the residual."""
+
+    values: Vector
+    errors: Vector
+    residual: float
+    freedom: float
+
+    def differs(self, place: int, expected: float = 0.0) -> bool:
+        """Whether a coefficient is not the expected one, at the false-alarm probability of the audit."""
+        limit = float(student.isf(FALSE_ALARM / 2, self.freedom))
+        return bool(abs(self.values[place] - expected) > limit * self.errors[place])
+
+
+def fit(target: Vector | Complex, regressors: Sequence[Vector | Complex]) -> Fit | None:
+    """Regression of a target (windows,) on regressors, real or complex.
+
+    None if there are too few windows, or the regressors cannot be told apart.
+
+    Complex ones give two coefficients each, real and imaginary part. Standard errors are those of Newey & West (1987)
+    with residuals correlated over four half-overlapping windows, so that they hold for coloured noise, or the
+    ordinary ones where these are larger: where few windows decide (the entry of a turn), the former are too small.
+    """
+    import statsmodels.api as models  # here, for it takes a second to import
+
+    table = np.column_stack(regressors)
+    whole = np.isfinite(target) & np.isfinite(table).all(axis=1)
+    table, wanted = table[whole], target[whole]
+    if np.iscomplexobj(target) or np.iscomplexobj(table):
+        both = np.stack([table, 1j * table], axis=2).reshape(len(table), -1)
+        design = np.stack([both.real, both.imag], axis=1).reshape(-1, both.shape[1])
+        wanted = np.stack([wanted.real, wanted.imag], axis=1).ravel()
+    else:
+        design = table.real
+    independent = int(np.count_nonzero(whole)) / 2
+    freedom = independent - design.shape[1]
+    size = np.sqrt(np.mean(design**2, axis=0)) if len(design) else np.zeros(1)
+    if independent < FEWEST or freedom < FEWEST / 2 or not np.all(size > 0):
+        return None
+    design = design / size
+    if np.linalg.matrix_rank(design) < design.shape[1]:
+        return None
+    lags = 4 * (len(wanted) // int(np.count_nonzero(whole)))
+    result = models.OLS(wanted, design).fit()
+    robust = result.get_robustcov_results(cov_type="HAC", maxlags=lags, use_correction=True)
+    residual = float(np.sqrt(np.mean(np.asarray(result.resid) ** 2)))
+    errors = np.maximum(np.asarray(result.bse), np.asarray(robust.bse))
+    return Fit(np.asarray(result.params) / size, errors / size, residual, freedom)
+
+
+def on_uniform_time(trial: Trial) -> tuple[float, dict[str, Vector]]:
+    """Step (s) and signals on a uniform time base: as they are if theirs is uniform, else interpolated linearly.
+
+    What lies in a gap of more than two steps is nan.
+    """
+    time, step = trial.time_s, sampling_step(trial)
+    even = time[0] + step * np.arange(len(time))
+    if np.max(np.abs(time - even)) < 0.5 * step:
+        return step, dict(trial.signals)
+    grid = np.arange(time[0], time[-1] + step / 2, step)
+    after = np.clip(np.searchsorted(time, grid), 1, len(time) - 1)
+    gap = (time[after] - time[after - 1]) > 2 * step
+    return step, {name: np.where(gap, np.nan, np.interp(grid, time, v)) for name, v in trial.signals.items()}

@@ -1,0 +1,259 @@
+"""Rate of turn against heading: unit, sign, factor, bias and clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import correlate, correlation_lags
+
+from tank2sim.records.audit.finding import Finding, Mend
+from tank2sim.records.audit.noise import estimated_noise
+from tank2sim.records.audit.rudder import rudder_response
+from tank2sim.records.audit.weak import Fit, Windows, fit, on_uniform_time, windows_of
+from tank2sim.records.csv_table import Vector
+from tank2sim.records.trials import Trial, unwrapped, with_signals
+
+DEGREE = np.pi / 180
+UNIT_TOLERANCE = 0.1
+"""How far a factor may be from that of a unit to be taken for it; 57.3 and 60 are told apart by which is nearer."""
+FACTOR = 0.02
+"""Scale error of a rate of turn worth a word: above what rate gyros are usually calibrated to. A choice of ours."""
+_ALIKE = 0.9  # correlation from which two signals are taken for the same motion
+
+
+def yaw_findings(trial: Trial) -> list[Finding]:
+    """What rate of turn and heading (and the track, where they disagree) tell of each other."""
+    if "psi_rad" not in trial.signals:
+        return []
+    if "r_radps" not in trial.signals:
+        return _heading_by_track(trial)
+    step, signals = on_uniform_time(trial)
+    rate, heading = signals["r_radps"], signals["psi_rad"]
+    noise = estimated_noise(trial)
+    for candidate in _headings(trial, heading):
+        alike = _comparison(windows_of(candidate, noise["psi_rad"], step), rate, candidate, step)
+        if alike is not None and alike.alike:
+            return _judged(trial, alike)
+    windows = windows_of(heading, noise["psi_rad"], step)
+    found = _comparison(windows, rate, heading, step)
+    if found is None:
+        return []
+    expected = np.hypot(windows.noise_of_rate(noise["psi_rad"]), windows.noise_of_mean(noise["r_radps"]))
+    if found.fit.residual < 3 * expected:
+        return _without_turn(trial, windows.rate(heading) - windows.mean(rate))
+    ends = [trial.heading(name) for name in ("r_radps", "psi_rad")]
+    figures = {"correlation": found.correlation}
+    what = f"r and dpsi/dt are not the same motion (correlation {found.correlation:.2f})"
+    return [Finding(trial.path, tuple(ends), what, "one of the two is no yaw motion of this ship", evidence=figures)]
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """dpsi/dt = factor r(t + lag) + bias in windows, factor and lag by regression."""
+
+    fit: Fit
+    lag_s: float
+    lag_error_s: float
+    correlation: float
+    step_s: float
+    shift: int
+
+    @property
+    def alike(self) -> bool:
+        return abs(self.correlation) > _ALIKE
+
+    @property
+    def factor(self) -> float:
+        return float(self.fit.values[0])
+
+
+def _headings(trial: Trial, heading: Vector) -> list[Vector]:
+    """The heading, and as it is if it is in rad, wrapped at 2 pi, under the name of degrees."""
+    turn = 2 * np.pi * DEGREE
+    if "deg" not in trial.heading("psi_rad") or np.nanmax(np.abs(heading)) > 1.01 * turn:
+        return [heading]
+    known = np.isfinite(heading)
+    again = heading.copy()
+    again[known] = np.unwrap(heading[known], period=turn)
+    return [again, heading]
+
+
+def _comparison(windows: Windows, rate: Vector, heading: Vector, step: float) -> _Comparison | None:
+    """The comparison as they stand, or at the lag that makes them alike; None if there is too little to judge."""
+    first = _at(windows, rate, heading, step, 0)
+    if first is None:
+        return None
+    found = first if first.alike else _at(windows, rate, heading, step, _coarse_lag(windows, rate, heading))
+    for _ in range(3):  # the regression's lag is of first order: repeated from where it leads
+        if found is None or not found.alike:
+            return first
+        shift = round(found.lag_s / step)
+        if abs(shift - found.shift) <= 1:
+            break
+        found = _at(windows, rate, heading, step, shift)
+    return found
+
+
+def _at(windows: Windows, rate: Vector, heading: Vector, step: float, shift: int) -> _Comparison | None:
+    """The comparison with r taken `shift` rows later, and the lag left over from regression on dr/dt."""
+    moved = _shifted(rate, shift)
+    r, target = windows.mean(moved), windows.rate(heading)
+    found = fit(target, [r, np.ones(len(r)), windows.rate(moved)])
+    if found is None or found.values[0] == 0:
+        return None
+    whole = np.isfinite(r) & np.isfinite(target)
+    correlation = float(np.corrcoef(r[whole], target[whole])[0, 1])
+    lag, error = (float(value[2] / found.values[0]) for value in (found.values, found.errors))
+    return _Comparison(found, shift * step + lag, abs(error), correlation, step, shift)
+
+
+def _shifted(values: Vector, samples: int) -> Vector:
+    """Values as they are `samples` rows later; nan where there are none."""
+    moved = np.full(len(values), np.nan)
+    if samples >= 0:
+        moved[: len(values) - samples] = values[samples:]
+    else:
+        moved[-samples:] = values[:samples]
+    return moved
+
+
+def _coarse_lag(windows: Windows, rate: Vector, heading: Vector) -> int:
+    """Rows by which r is late, from the largest cross-correlation with dpsi/dt, within a tenth of the record."""
+    every = replace(windows, hop=1)
+    r, target = every.mean(rate), every.rate(heading)
+    r, target = (np.nan_to_num(values - np.nanmean(values)) for values in (r, target))
+    likeness = correlate(r, target, mode="full", method="fft")
+    lags = correlation_lags(len(r), len(target))
+    near = np.abs(lags) <= len(rate) // 10
+    return int(lags[near][np.argmax(np.abs(likeness[near]))])
+
+
+def _judged(trial: Trial, found: _Comparison) -> list[Finding]:
+    findings = []
+    wrong_unit = _unit(trial, abs(found.factor))
+    if wrong_unit is not None:
+        findings.append(wrong_unit)
+    if found.factor < 0:
+        findings.append(_sign(trial, found))
+    factor = abs(found.factor)
+    unexplained = wrong_unit is None and abs(factor - 1) > FACTOR
+    if unexplained and found.fit.differs(0, np.sign(found.factor)):
+        what = f"dpsi/dt is {factor:.4g} times r"
+        truth = f"r is to be multiplied by {factor:.4g} if the heading is right"
+        findings.append(_note(trial, what, truth, {"factor": factor, "standard_error": float(found.fit.errors[0])}))
+    if found.fit.differs(1) and wrong_unit is None:
+        findings.append(_bias(trial, -float(found.fit.values[1]) / found.factor, float(found.fit.errors[1]) / factor))
+    if abs(found.lag_s) > max(found.step_s, 4.5 * found.lag_error_s):  # 4.5 errors: 1e-5 of normal ones
+        late = "r is late" if found.lag_s > 0 else "psi is late"
+        truth = f"{late} by {abs(found.lag_s):.3g} s (its clock, or a filter in the sensor)"
+        what = "r and dpsi/dt are alike when one of them is shifted in time"
+        findings.append(_note(trial, what, truth, {"lag_s": found.lag_s, "standard_error_s": found.lag_error_s}))
+    return findings
+
+
+def _note(trial: Trial, what: str, truth: str, evidence: dict[str, float]) -> Finding:
+    return Finding(trial.path, (trial.heading("r_radps"),), what, truth, "note", evidence)
+
+
+def _without_turn(trial: Trial, difference: Vector) -> list[Finding]:
+    """A bias, where noise hides the turn: dpsi/dt less r is constant."""
+    found = fit(difference, [np.ones(len(difference))])
+    if found is None or not found.differs(0):
+        return []
+    return [_bias(trial, -float(found.values[0]), float(found.errors[0]))]
+
+
+def _bias(trial: Trial, bias: float, error: float) -> Finding:
+    in_degrees = {"bias_degps": bias / DEGREE, "standard_error_degps": error / DEGREE}
+    truth = f"the gyro reads {bias / DEGREE:+.3g} deg/s when the ship does not turn (bias)"
+
+    def unbiased(other: Trial) -> Trial:
+        return with_signals(other, {"r_radps": other.signals["r_radps"] - bias}, f"r: bias of {bias:.3g} rad/s removed")
+
+    note = _note(trial, "r differs from dpsi/dt by a constant", truth, in_degrees)
+    return replace(note, mend=unbiased)
+
+
+def _unit(trial: Trial, factor: float) -> Finding | None:
+    """The unit that a factor between dpsi/dt and r tells of."""
+    units = {1.0: "", 1 / DEGREE: "small", DEGREE: "large", 1 / 60.0: "minute"}
+    nearest = min(units, key=lambda unit: abs(np.log(factor / unit)))
+    if not units[nearest] or abs(np.log(factor / nearest)) > UNIT_TOLERANCE:
+        return None
+    evidence = {"factor": factor}
+    r, psi = trial.heading("r_radps"), trial.heading("psi_rad")
+    what = f"dpsi/dt is {factor:.4g} times r"
+    if units[nearest] == "minute":
+        truth = "r is in deg/min" if "deg" in r else "r is 60 times too large"
+        return Finding(trial.path, (r,), what, truth, "fault", evidence, _scaled("r_radps", 1 / 60, truth), safe=True)
+    small = units[nearest] == "small"
+    r_can, psi_can = ("deg" in r, "deg" not in psi) if small else ("deg" not in r, "deg" in psi)
+    slope = _course_slope(trial)
+    by_track = slope is not None and abs(np.log(abs(slope) * nearest)) < 1.0  # the course turns as r does
+    if psi_can and (by_track or not r_can):
+        truth = "psi is in degrees" if small else "psi is in radians"
+        mend = _scaled("psi_rad", nearest**-1 if small else 1 / DEGREE, truth)
+        return Finding(trial.path, (psi,), what, truth, "fault", evidence, mend, safe=True)
+    truth = "r is in rad/s" if small else "r is in deg/s"
+    return Finding(trial.path, (r,), what, truth, "fault", evidence, _scaled("r_radps", nearest, truth), safe=True)
+
+
+def _scaled(name: str, factor: float, notice: str) -> Mend:
+    def scaled(trial: Trial) -> Trial:
+        values = trial.signals[name] * factor
+        return with_signals(trial, {name: unwrapped(values) if name == "psi_rad" else values}, notice)
+
+    return scaled
+
+
+def _sign(trial: Trial, found: _Comparison) -> Finding:
+    """Which of r and psi has the wrong sign: the one against the track; without one, against the rudder; else r."""
+    slope = _course_slope(trial)
+    response = rudder_response(trial)
+    psi_right = slope > 0 if slope is not None else response >= 0 if response else True
+    if slope is None and response:
+        psi_right = response < 0  # the response is that of r
+    wrong = "r_radps" if psi_right else "psi_rad"
+    truth = f"{'r' if psi_right else 'psi'} is positive to port"
+    what = "r and dpsi/dt have opposite signs"
+
+    def turned(other: Trial) -> Trial:
+        return with_signals(other, {wrong: 0.0 - other.signals[wrong]}, f"{truth} in the file")
+
+    evidence = {"factor": found.factor, "correlation": found.correlation}
+    return Finding(trial.path, (trial.heading(wrong),), what, truth, "fault", evidence, turned, safe=True)
+
+
+def _course_slope(trial: Trial) -> float | None:
+    """Change of the course of the track for one of the heading, or None if there is no track or no turn."""
+    if not {"x_m", "y_m"} <= set(trial.signals):
+        return None
+    step, signals = on_uniform_time(trial)
+    noise = estimated_noise(trial)
+    place = signals["x_m"] + 1j * signals["y_m"]
+    windows = windows_of(place, max(noise["x_m"], noise["y_m"]), step)
+    velocity = windows.rate(place)
+    if not np.isfinite(velocity).any():
+        return None
+    going = np.abs(velocity) > 0.3 * np.nanmedian(np.abs(velocity))
+    course = unwrapped(np.where(going, np.angle(velocity), np.nan))
+    found = fit(course, [windows.mean(signals["psi_rad"]), np.ones(len(course))])
+    turned = np.nanmax(course) - np.nanmin(course) > 10 * DEGREE  # beyond any drift of a straight run
+    return float(found.values[0]) if found is not None and found.differs(0) and turned else None
+
+
+def _heading_by_track(trial: Trial) -> list[Finding]:
+    """Unit of a heading without a rate of turn, by the course of the track."""
+    slope = _course_slope(trial)
+    if slope is None or slope <= 0:
+        return []
+    heading = trial.heading("psi_rad")
+    degrees = "deg" in heading
+    factor = 1 / DEGREE if degrees else DEGREE
+    if abs(np.log(slope / factor)) > 3 * UNIT_TOLERANCE:  # the drift angle turns as well
+        return []
+    truth = "psi is in radians" if degrees else "psi is in degrees"
+    what = f"the course over ground turns {slope:.3g} times as far as psi"
+    mend = _scaled("psi_rad", factor, truth)
+    return [Finding(trial.path, (heading,), what, truth, "fault", {"factor": slope}, mend, safe=True)]

@@ -1,0 +1,95 @@
+"""Names, words and units of the signals of a trial, as a reader of its file knows them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tank2sim.errors import InputError
+from tank2sim.records.trials import Trial
+from tank2sim.units import from_si, to_si
+
+HELD = frozenset({"delta_order_rad", "n_radps"})
+"""Signals that hold until their next value: orders."""
+
+DIRECTIONS = frozenset({"psi_rad", "cog_rad", "wind_direction_rad", "wind_rel_direction_rad"})
+"""Signals that go round the compass: a step through north is no jump."""
+
+_WORDS = {
+    "delta": "rudder angle",
+    "delta_order": "rudder order",
+    "n": "propeller speed",
+    "u": "surge velocity",
+    "v": "sway velocity",
+    "u_ground": "surge velocity over ground",
+    "v_ground": "sway velocity over ground",
+    "sog": "speed over ground",
+    "cog": "course over ground",
+    "r": "yaw rate",
+    "psi": "heading",
+    "x": "north",
+    "y": "east",
+    "phi": "heel",
+    "wind_speed": "wind speed",
+    "wind_direction": "wind direction",
+    "wind_rel_speed": "relative wind speed",
+    "wind_rel_direction": "relative wind direction",
+}
+
+# Suffix in SI to the suffix in which the trial format writes it, and to the unit as it is read.
+_FILE_SUFFIX = {"rad": "deg", "radps": "degps"}
+_UNIT = {"deg": "deg", "degps": "deg/s", "rpm": "rpm", "mps": "m/s", "m": "m"}
+
+
+@dataclass(frozen=True)
+class SignalName:
+    """One signal of a trial.
+
+    Parameters
+    ----------
+    si : str
+        Its name in SI, the key in ``Trial.signals``: ``r_radps``.
+    """
+
+    si: str
+
+    @property
+    def stem(self) -> str:
+        """The quantity without its unit: ``r``."""
+        return self.si.rpartition("_")[0] or self.si
+
+    @property
+    def file(self) -> str:
+        """Its column in a trial file: ``r_degps``, ``n_rpm``."""
+        stem, _, suffix = self.si.rpartition("_")
+        return "n_rpm" if self.si == "n_radps" else f"{stem}_{_FILE_SUFFIX.get(suffix, suffix)}"
+
+    @property
+    def unit(self) -> str:
+        """Unit of that column, for a reader: ``deg/s``."""
+        return _UNIT.get(self.file.rpartition("_")[2], "")
+
+    @property
+    def words(self) -> str:
+        """What it is: ``yaw rate``."""
+        return _WORDS.get(self.stem, self.stem.replace("_", " "))
+
+    @property
+    def factor(self) -> float:
+        """What a value in SI is multiplied by to stand in that column."""
+        return from_si(self.file, 1.0)
+
+
+def find_signal(asked: str, trial: Trial) -> str:
+    """The name in SI of a signal asked for as ``r_degps``, ``r_radps``, ``r``, or as its file calls it.
+
+    Raises
+    ------
+    InputError
+        The trial has no such signal.
+    """
+    name = to_si(asked, 1.0)[0]
+    for one in trial.signals:
+        if name in (one, SignalName(one).stem) or asked == trial.heading(one):
+            return one
+    columns = ", ".join(SignalName(one).file for one in trial.signals)
+    raise InputError(trial.path, f"column {asked}", "is not in the trial", f"give --column one of {columns}")

@@ -1,0 +1,92 @@
+"""Auto- and cross-correlation, the correlation time, and how many independent samples a record is worth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+
+from tank2sim.records.csv_table import Vector
+from tank2sim.records.signals.sampling import Series, at_common_times
+
+_NORMAL = 1.959964
+"""Two-sided 95 % point of the normal distribution."""
+
+
+@dataclass(frozen=True, eq=False)
+class Correlation:
+    """Correlation coefficient of two signals, or of one with itself, against the lag.
+
+    Parameters
+    ----------
+    lag_s : array (m,)
+        Rising, from minus to plus a quarter of the record; positive: the second signal comes after the first.
+    coefficient : array (m,)
+        Between -1 and 1.
+    bound : float
+        What 95 % of the coefficients of two independent signals with these autocorrelations stay within, by
+        Bartlett's formula: 1.96 sqrt(sum over the lags of rho_1 rho_2 / n) (Box & Jenkins 1976, section 11.1.3).
+    """
+
+    lag_s: Vector
+    coefficient: Vector
+    bound: float
+
+    @property
+    def largest(self) -> tuple[float, float]:
+        """Lag (s) and coefficient where the coefficient is largest in size."""
+        place = int(np.argmax(np.abs(self.coefficient)))
+        return float(self.lag_s[place]), float(self.coefficient[place])
+
+
+@dataclass(frozen=True, eq=False)
+class Autocorrelation:
+    """Correlation of a signal with itself later.
+
+    Parameters
+    ----------
+    lag_s, coefficient : array (m,)
+        From lag 0, where it is 1, to a quarter of the record.
+    correlation_time_s : float
+        Integral of the coefficient from 0 to its first zero: the time constant of a first-order process.
+    effective_count : float
+        Independent samples that the record is worth, its length over twice the correlation time (Bayley & Hammersley
+        1946); at most its number of samples.
+    """
+
+    lag_s: Vector
+    coefficient: Vector
+    correlation_time_s: float
+    effective_count: float
+
+
+def autocorrelation(series: Series) -> Autocorrelation:
+    """Autocorrelation of a signal about its mean; the signal must not be constant."""
+    coefficient = _coefficients(series.values, series.values)[len(series.values) - 1 :]
+    kept = len(series.values) // 4 + 1
+    before_zero = int(np.argmax(coefficient <= 0.0))  # it sums to -1/2 over all lags, so there is a first zero
+    # The trapezoidal rule: half the value at lag 0, and so half a step for white noise, of which all samples count.
+    time = series.step_s * (float(np.sum(coefficient[:before_zero])) - 0.5)
+    count = min(float(len(series.values)), series.duration_s / (2.0 * time))
+    return Autocorrelation(series.step_s * np.arange(kept, dtype=np.float64), coefficient[:kept], time, count)
+
+
+def cross_correlation(first: Series, second: Series) -> Correlation:
+    """Correlation of the second signal with the first, each about its mean; neither may be constant."""
+    first, second = at_common_times(first, second)
+    count = len(first.values)
+    # scipy's lag is positive where its first argument comes later.
+    coefficient = _coefficients(second.values, first.values)
+    lags = signal.correlation_lags(count, count)
+    kept = np.abs(lags) <= count // 4
+    own = [_coefficients(one.values, one.values)[kept] for one in (first, second)]
+    bound = _NORMAL * float(np.sqrt(max(float(np.sum(own[0] * own[1])), 1.0) / count))
+    return Correlation(first.step_s * lags[kept], coefficient[kept], bound)
+
+
+def _coefficients(one: Vector, other: Vector) -> Vector:
+    """At all lags from -(n - 1) to n - 1; divided by n and not by the number of pairs, whose scatter is greater."""
+    one, other = one - one.mean(), other - other.mean()
+    product: Vector = signal.correlate(one, other, method="fft")
+    return product / (len(one) * float(one.std()) * float(other.std()))

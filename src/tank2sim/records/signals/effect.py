@@ -1,0 +1,82 @@
+"""What a filter does to amplitude and phase: as numbers over frequency, and as a sentence."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.records.csv_table import Vector
+from tank2sim.records.signals.sampling import Series
+
+_FREQUENCIES = 400
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """Frequency response of a filter, and where its ends are not to be believed.
+
+    Parameters
+    ----------
+    frequency_hz : array (m,)
+        Rising, from one period a record to below the Nyquist frequency.
+    response : complex array (m,)
+        Output over input; a negative angle: the output comes later. Its unit is 1, or 1/s of a derivative.
+    delay_s : array (m,)
+        Group delay: by how much a packet of waves about a frequency comes later.
+    ends_s : (float, float)
+        What is distorted at the begin and at the end of the record.
+    sentence : str
+        All that in words.
+    """
+
+    frequency_hz: Vector
+    response: NDArray[np.complex128]
+    delay_s: Vector
+    ends_s: tuple[float, float]
+    sentence: str
+
+    @property
+    def gain(self) -> Vector:
+        """Amplitude of the output over that of the input."""
+        return np.abs(self.response)
+
+    @property
+    def phase_rad(self) -> Vector:
+        """Angle of the response, negative: later. Continuous, and within half a turn where the gain is largest.
+
+        Without delay it is not made continuous: it is 0, or half a turn where waves come out upside down.
+        """
+        angle: Vector = np.angle(self.response)
+        if not self.delay_s.any():
+            return np.where(angle < 1e-6 - math.pi, math.pi, angle)
+        phase: Vector = np.unwrap(angle)
+        turn = 2.0 * math.pi
+        return phase - turn * round(float(phase[np.argmax(self.gain)]) / turn)
+
+    def at(self, frequency_hz: float) -> complex:
+        """Response at a frequency (Hz), between those given by straight lines over the logarithm of frequency."""
+        place, known = math.log(frequency_hz), np.log(self.frequency_hz)
+        return complex(np.interp(place, known, self.response.real), np.interp(place, known, self.response.imag))
+
+
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """A filtered signal and what the filter did to it."""
+
+    series: Series
+    effect: Effect
+
+
+def frequencies(series: Series) -> Vector:
+    """Frequencies (Hz) at which an effect is told, evenly spread over their logarithm, (400,)."""
+    # Not quite to Nyquist, where low-pass filters have a zero and no phase.
+    grid: Vector = np.geomspace(1.0 / series.duration_s, 0.499 * series.rate_hz, _FREQUENCIES)
+    return grid
+
+
+def decibel(gain: float) -> str:
+    """A gain in words: ``-6 dB``."""
+    return f"{20.0 * math.log10(max(gain, 1e-10)):+.2g} dB"

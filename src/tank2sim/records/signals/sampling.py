@@ -1,0 +1,171 @@
+"""A signal as evenly sampled values: what every test, spectrum and filter here rests on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.errors import InputError
+from tank2sim.records.csv_table import Vector
+from tank2sim.records.signals.columns import DIRECTIONS, HELD, SignalName
+from tank2sim.records.trials import Trial
+
+FEWEST = 50
+"""Samples below which nothing is analysed; a choice of ours: eight spectral segments of eleven samples."""
+
+GAP_STEPS = 5
+"""Longest gap that is bridged unasked, in sampling steps; a choice of ours. A straight line over five steps loses what
+has a period below about ten steps, which is already near the end of the spectrum."""
+
+_JITTER = 0.05
+"""Part of a step by which times may miss an even grid and be taken as even: at half the Nyquist frequency it is an
+error of phase of 4.5 deg, and of times written with two digits at 10 Hz it is the rounding. A choice of ours."""
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Evenly sampled values of one signal, without gaps.
+
+    Parameters
+    ----------
+    source : Path
+        File of the trial.
+    name : str
+        Name of the signal in SI, as in ``Trial.signals``.
+    start_s, step_s : float
+        Time of the first sample, and from one to the next.
+    values : array (n,)
+        In SI.
+    notices : tuple of str
+        What was done to get here.
+    """
+
+    source: Path
+    name: str
+    start_s: float
+    step_s: float
+    values: Vector
+    notices: tuple[str, ...] = ()
+
+    @property
+    def time_s(self) -> Vector:
+        """Times of the samples, (n,)."""
+        return self.start_s + self.step_s * np.arange(len(self.values), dtype=np.float64)
+
+    @property
+    def duration_s(self) -> float:
+        """Number of samples times the step."""
+        return len(self.values) * self.step_s
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second."""
+        return 1.0 / self.step_s
+
+    @property
+    def constant(self) -> bool:
+        """True if it does not vary by more than numbers are exact to."""
+        return bool(np.ptp(self.values) <= 1e-9 * max(float(np.max(np.abs(self.values))), 1e-12))
+
+    def with_values(self, values: Vector) -> Series:
+        """The same signal with other values at the same times."""
+        return replace(self, values=values)
+
+
+def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Series:
+    """One signal of a trial at an even step, that which its own times usually have.
+
+    Short gaps and uneven times are bridged by straight lines (orders are held), and it says so; what is missing at
+    the two ends is cut off; a direction is made continuous.
+
+    Parameters
+    ----------
+    trial : Trial
+        Any trial.
+    name : str
+        Key of ``trial.signals``.
+    max_gap_s : float, optional
+        Longest gap to bridge; by default five steps.
+
+    Raises
+    ------
+    InputError
+        There are fewer than 50 values, or a gap is longer.
+    """
+    column = f"column {SignalName(name).file}"
+    values = np.asarray(trial.signals[name], dtype=float)
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size < FEWEST:
+        problem = f"has {known.size} values, and at least {FEWEST} are needed"
+        raise InputError(trial.path, column, problem, "give a longer record or leave the column out")
+    time, values = trial.time_s[known], values[known]
+    notices = _ends_cut(trial, known)
+    if name in DIRECTIONS:
+        continuous: Vector = np.unwrap(values)
+        if not np.array_equal(continuous, values):
+            notices.append("was made continuous through north")
+            values = continuous
+    steps = np.diff(time)
+    # The mean of the usual steps: their median is as coarse as the digits with which times are written.
+    usual = float(np.median(steps))
+    step = float(np.mean(steps[np.abs(steps - usual) < usual / 2]))
+    place = int(np.argmax(steps))
+    # Half a step more, so that a gap of five steps in times that are rounded is five steps.
+    if steps[place] > (limit := (GAP_STEPS + 0.5) * step if max_gap_s is None else max_gap_s):
+        problem = f"has no value from {time[place]:.6g} to {time[place + 1]:.6g} s, longer than {limit:.3g} s"
+        raise InputError(trial.path, column, problem, "cut the record there, or allow it with --max-gap SECONDS")
+    count = round(float(time[-1] - time[0]) / step) + 1
+    step = float(time[-1] - time[0]) / (count - 1)
+    grid = time[0] + step * np.arange(count, dtype=np.float64)
+    if count != time.size or np.max(np.abs(time - grid)) > _JITTER * step:
+        values = _at(time, values, grid, held=name in HELD)
+        way = "held" if name in HELD else "interpolated by straight lines"
+        notices.append(f"is unevenly sampled or has gaps of up to {steps[place]:.4g} s; it was {way} at {step:.4g} s")
+    told = tuple(f"{column.removeprefix('column ')} {notice}" for notice in notices)
+    return Series(trial.path, name, float(time[0]), step, values, told)
+
+
+def at_common_times(first: Series, second: Series) -> tuple[Series, Series]:
+    """Two signals of one trial at the same times: where both are known, at the shorter of their steps.
+
+    Raises
+    ------
+    InputError
+        They have fewer than 50 samples in common.
+    """
+    start = max(first.start_s, second.start_s)
+    end = min(float(first.time_s[-1]), float(second.time_s[-1]))
+    step = min(first.step_s, second.step_s)
+    count = int(np.floor((end - start) / step + 1e-6)) + 1
+    names = " and ".join(SignalName(one.name).file for one in (first, second))
+    if count < FEWEST:
+        problem = f"have {max(count, 0)} samples at the same times, and at least {FEWEST} are needed"
+        raise InputError(first.source, f"columns {names}", problem, "give a longer record")
+    grid = start + step * np.arange(count, dtype=np.float64)
+    return _moved(first, grid, step), _moved(second, grid, step)
+
+
+def _moved(series: Series, grid: Vector, step: float) -> Series:
+    own = series.time_s
+    if len(own) == len(grid) and np.max(np.abs(own - grid)) <= _JITTER * step:
+        return series
+    values = _at(own, series.values, grid, held=series.name in HELD)
+    return replace(series, start_s=float(grid[0]), step_s=step, values=values)
+
+
+def _at(time: Vector, values: Vector, grid: Vector, *, held: bool) -> Vector:
+    if held:
+        places = np.searchsorted(time, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1
+        stands: Vector = values[np.clip(places, 0, None)]
+        return stands
+    between: Vector = np.interp(grid, time, values)
+    return between
+
+
+def _ends_cut(trial: Trial, known: np.ndarray[tuple[int], np.dtype[np.int64]]) -> list[str]:
+    before, after = int(known[0]), len(trial.time_s) - 1 - int(known[-1])
+    if not before and not after:
+        return []
+    return [f"is known from {trial.time_s[known[0]]:.6g} to {trial.time_s[known[-1]]:.6g} s only"]

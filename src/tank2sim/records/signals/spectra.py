@@ -1,0 +1,276 @@
+"""Spectra with confidence limits, the main peak, and the transfer function from one signal to another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import signal, stats
+
+from tank2sim.errors import InputError
+from tank2sim.records.csv_table import Vector
+from tank2sim.records.signals.columns import SignalName
+from tank2sim.records.signals.correlation import autocorrelation
+from tank2sim.records.signals.sampling import Series, at_common_times
+
+CONFIDENCE = 0.95
+
+_SEGMENTS = 8
+"""Segments by default, each overlapping half of the next; a choice of ours between scatter and resolution."""
+
+_CORRELATION_TIMES = 20.0
+"""Correlation times that a segment lasts by default if half the record allows it, whatever that does to their number:
+the spectrum of a first-order process bends at 1/(2 pi correlation time), about three times its step. Our choice."""
+
+_FEWEST_IN_SEGMENT = 10
+
+
+@dataclass(frozen=True)
+class Averaging:
+    """How a record was cut into segments: Hann windows that overlap by half (Welch 1967).
+
+    Parameters
+    ----------
+    samples : int
+        Of one segment.
+    segments : int
+        How many there are.
+    freedom : float
+        Degrees of freedom of a spectrum's chi-square distribution: two a segment, less what their overlap shares.
+    """
+
+    samples: int
+    segments: int
+    freedom: float
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The largest peak of a spectrum.
+
+    Parameters
+    ----------
+    frequency_hz : float
+        Where it is, to within the distance of two frequencies of the spectrum.
+    density : float
+        Its height.
+    distinct : bool
+        True if it rises above what surrounds it by more than scatter can (see :func:`spectrum`).
+    lowest : bool
+        True if it is at the lowest frequency, where it cannot be told from a slow drift.
+    """
+
+    frequency_hz: float
+    density: float
+    distinct: bool
+    lowest: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """One-sided power spectral density; its integral over frequency is the variance.
+
+    Parameters
+    ----------
+    frequency_hz : array (m,)
+        Above zero and below the Nyquist frequency, where the estimate would have half the degrees of freedom.
+    density, low, high : array (m,)
+        The density (unit squared over Hz), and its 95 % confidence limits by chi-square at each frequency.
+    averaging : Averaging
+        What it rests on.
+    peak : Peak or None
+        None if the density only falls or only rises.
+    """
+
+    frequency_hz: Vector
+    density: Vector
+    low: Vector
+    high: Vector
+    averaging: Averaging
+    peak: Peak | None
+
+    @property
+    def peak_in_words(self) -> str:
+        """Frequency of the main peak (Hz), and whether it is one."""
+        if self.peak is None:
+            return "none"
+        if self.peak.lowest:
+            return f"{self.peak.frequency_hz:.3g} or below"
+        return f"{self.peak.frequency_hz:.3g}" + ("" if self.peak.distinct else ", not distinct")
+
+
+@dataclass(frozen=True, eq=False)
+class Transfer:
+    """Linear response of one signal to another, estimated as cross spectrum over spectrum of the input.
+
+    What the output has beside the response (noise, wind) does not bias it unless it comes back in the input: in a
+    zigzag the rudder follows the heading, and the estimate holds where the coherence is high only.
+
+    Parameters
+    ----------
+    frequency_hz : array (m,)
+        As of :class:`Spectrum`.
+    response : complex array (m,)
+        Output over input; a negative angle: the output comes later.
+    coherence : array (m,)
+        Part of the output's power that is a linear response to the input, 0 to 1.
+    error : array (m,)
+        Standard error of the gain over the gain, and of the phase in rad (Bendat & Piersol 2010, eq. 9.90 and 9.91):
+        sqrt(1 - coherence) / sqrt(coherence * degrees of freedom).
+    cross_density : complex array (m,)
+        Cross spectral density, product of the units over Hz.
+    significant : float
+        Coherence that 95 % of estimates stay below where there is none.
+    averaging : Averaging
+        What it rests on.
+    """
+
+    frequency_hz: Vector
+    response: NDArray[np.complex128]
+    coherence: Vector
+    error: Vector
+    cross_density: NDArray[np.complex128]
+    significant: float
+    averaging: Averaging
+
+    @property
+    def gain(self) -> Vector:
+        """Size of the response, output unit over input unit."""
+        return np.abs(self.response)
+
+    @property
+    def phase_rad(self) -> Vector:
+        """Its angle, between -pi and pi: where there is no coherence nothing says how many turns it has made."""
+        return np.angle(self.response)
+
+    @property
+    def half_width(self) -> Vector:
+        """Half the 95 % interval of the gain's logarithm and of the phase (rad), by Student's t: the segments are few.
+
+        It holds where the output mostly is the response: of low coherences those that are high by chance, with gains
+        that are high by chance, are the ones that are looked at.
+        """
+        factor = float(stats.t.ppf((1.0 + CONFIDENCE) / 2.0, max(self.averaging.freedom - 2.0, 1.0)))
+        return factor * self.error
+
+    @property
+    def sure(self) -> NDArray[np.bool_]:
+        """Where the coherence is above chance, its median over three neighbours: one alone is above now and then."""
+        median: Vector = signal.medfilt(self.coherence, 3)
+        return median > self.significant
+
+
+def spectrum(series: Series, segment_s: float | None = None) -> Spectrum:
+    """Welch's spectrum, the mean taken off each segment.
+
+    A peak is called distinct if its lower confidence limit, at 5 % over all frequencies together, is above the
+    surroundings: the geometric mean of the medians over the octave below and the octave above, which on a spectrum
+    that is any power of the frequency is the spectrum itself.
+
+    Parameters
+    ----------
+    series : Series
+        What to analyse.
+    segment_s : float, optional
+        Length of a segment; by default that of which eight cover the record, or twenty correlation times if these
+        are longer, but at most half the record.
+
+    Raises
+    ------
+    InputError
+        The segment is shorter than ten samples or longer than half the record.
+    """
+    averaging = _averaging([series], segment_s)
+    frequency, density = signal.welch(series.values, **_options(series, averaging))
+    inner = _inner(averaging)
+    tail = (1.0 - CONFIDENCE) / 2.0
+    low, high = (averaging.freedom / stats.chi2.ppf(p, averaging.freedom) for p in (1.0 - tail, tail))
+    peak = _peak(frequency[inner], density[inner], averaging.freedom)
+    return Spectrum(frequency[inner], density[inner], low * density[inner], high * density[inner], averaging, peak)
+
+
+def transfer_function(source: Series, result: Series, segment_s: float | None = None) -> Transfer:
+    """Transfer function from `source` to `result` of one trial; segments and errors as of :func:`spectrum`."""
+    source, result = at_common_times(source, result)
+    averaging = _averaging([source, result], segment_s)
+    if averaging.segments < 2:
+        problem = "is the only segment, and one segment has a coherence of 1 whatever the signals"
+        raise InputError(source.source, "segment", problem, "give a shorter --segment")
+    options = _options(source, averaging)
+    inner = _inner(averaging)
+    frequency, power = signal.welch(source.values, **options)
+    _, cross = signal.csd(source.values, result.values, **options)
+    _, coherence = signal.coherence(source.values, result.values, **_without_scaling(options))
+    names = " and ".join(SignalName(one.name).file for one in (source, result))
+    if not np.all(power[inner] > 0):
+        raise InputError(source.source, f"columns {names}", "have no power at some frequency", "leave them out")
+    kept = np.clip(coherence[inner], 1e-12, 1.0)
+    error = np.sqrt((1.0 - kept) / (kept * averaging.freedom))
+    # Of n independent averages the coherence of nothing exceeds c with probability (1 - c)^(n - 1) (Goodman 1957).
+    significant = 1.0 - (1.0 - CONFIDENCE) ** (1.0 / (averaging.freedom / 2.0 - 1.0))
+    return Transfer(frequency[inner], cross[inner] / power[inner], kept, error, cross[inner], significant, averaging)
+
+
+def _averaging(signals: Sequence[Series], segment_s: float | None) -> Averaging:
+    """How signals of the same times are cut."""
+    series = signals[0]
+    count = len(series.values)
+    if segment_s is None:
+        slowest = max(autocorrelation(one).correlation_time_s for one in signals)
+        # Segments of n samples that begin every n/2: (segments + 1) n/2 samples.
+        samples = min(
+            count // 2, max(2 * count // (_SEGMENTS + 1), round(_CORRELATION_TIMES * slowest / series.step_s))
+        )
+    else:
+        samples = round(segment_s / series.step_s)
+    if not _FEWEST_IN_SEGMENT <= samples <= count // 2:
+        allowed = f"{_FEWEST_IN_SEGMENT * series.step_s:.4g} to {count // 2 * series.step_s:.4g} s"
+        problem = f"{samples * series.step_s:.4g} s is no length of a segment of {series.source}"
+        raise InputError("--segment", "", problem, f"give {allowed}")
+    hop = samples - samples // 2
+    segments = (count - samples) // hop + 1
+    window = signal.get_window("hann", samples)
+    shared = 0.0
+    # Welch 1967: variance of the mean of segments, of which the j-th next shares a part of the window.
+    for later in range(1, min(segments, -(-samples // hop))):
+        part = float(window[: samples - later * hop] @ window[later * hop :]) / float(window @ window)
+        shared += 2.0 * (segments - later) / segments * part**2
+    return Averaging(samples, segments, 2.0 * segments / (1.0 + shared))
+
+
+def _options(series: Series, averaging: Averaging) -> dict[str, object]:
+    samples = averaging.samples
+    return {
+        "fs": series.rate_hz, "window": "hann", "nperseg": samples, "noverlap": samples // 2,
+        "detrend": "constant", "scaling": "density",
+    }  # fmt: skip
+
+
+def _without_scaling(options: dict[str, object]) -> dict[str, object]:
+    return {key: value for key, value in options.items() if key != "scaling"}
+
+
+def _inner(averaging: Averaging) -> slice:
+    """Frequencies but for zero and, of an even number of samples, Nyquist."""
+    return slice(1, averaging.samples // 2 if averaging.samples % 2 == 0 else averaging.samples // 2 + 1)
+
+
+def _peak(frequency: Vector, density: Vector, freedom: float) -> Peak | None:
+    # With zero on both sides the ends can be peaks; the last frequency is none of interest.
+    places = [place - 1 for place in signal.find_peaks(np.concatenate([[0.0], density]))[0]]
+    if not places:
+        return None
+    place = max(places, key=lambda one: float(density[one]))
+    top = float(frequency[place])
+    below = density[(frequency >= top / 2) & (frequency < top)]
+    above = density[(frequency > top) & (frequency <= 2 * top)]
+    lowest = place == 0
+    distinct = False
+    if not lowest and above.size:
+        # The median of a chi-square variable is below its mean.
+        around = float(np.sqrt(np.median(below) * np.median(above))) * freedom / stats.chi2.median(freedom)
+        sure = freedom / stats.chi2.ppf(1.0 - (1.0 - CONFIDENCE) / len(frequency), freedom)
+        distinct = bool(sure * density[place] > around)
+    return Peak(top, float(density[place]), distinct, lowest)

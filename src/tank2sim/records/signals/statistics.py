@@ -1,0 +1,224 @@
+"""Is a signal stationary, is it normal, and how are its values distributed."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from scipy import stats
+
+from tank2sim.records.csv_table import Vector
+from tank2sim.records.signals.correlation import Autocorrelation
+from tank2sim.records.signals.sampling import Series
+
+SIGNIFICANCE = 0.05
+"""Probability below which a null hypothesis is rejected, as is usual."""
+
+FEWEST_INDEPENDENT = 20
+"""Independent samples below which no test of normality is made: that of kurtosis is not valid (scipy.stats)."""
+
+_BLOCKS = (200, 1000)
+_DENSITY_POINTS = 201
+
+
+class Stationary(StrEnum):
+    """What the two tests say together: their null hypotheses are opposite, so there are four outcomes.
+
+    The fourth is parted in two by the same tests about a straight line.
+    """
+
+    YES = "stationary"
+    TREND = "about a trend"
+    NO = "not stationary"
+    CONTRADICTORY = "contradictory"
+    UNDECIDED = "undecided"
+
+    @property
+    def meaning(self) -> str:
+        """The verdict in full."""
+        return _MEANINGS[self]
+
+
+_MEANINGS = {
+    Stationary.YES: "it returns to its level (Dickey-Fuller), and nothing speaks against a steady level (KPSS)",
+    Stationary.TREND: "it returns to a straight line in time, and nothing speaks against that; --filter detrend:1",
+    Stationary.NO: "its level wanders as in a random walk (both tests); mean and spectrum tell little, detrend it",
+    Stationary.CONTRADICTORY: "neither a steady level nor a random walk: a step, a bend or a change of spread",
+    Stationary.UNDECIDED: "the record is too short to tell a steady level from a random walk",
+}
+
+
+@dataclass(frozen=True)
+class UnitRootTests:
+    """p-values of the two tests about a constant level, or about a linear trend.
+
+    Parameters
+    ----------
+    dickey_fuller : float
+        Augmented Dickey-Fuller; null hypothesis: a random walk. Small: it returns to its level.
+    kpss : float
+        Kwiatkowski, Phillips, Schmidt & Shin; null hypothesis: stationary. Small: it does not. Their table ends at
+        0.01 and 0.1, which stand for what is beyond.
+    """
+
+    dickey_fuller: float
+    kpss: float
+
+
+@dataclass(frozen=True)
+class Stationarity:
+    """Whether a signal keeps its level and its spread.
+
+    Parameters
+    ----------
+    verdict : Stationary
+        In words, at 5 %.
+    level, trend : UnitRootTests
+        About a constant level, and about a linear trend.
+    block : int
+        Samples averaged to one value of the tests, so that their few lags reach over the correlation time.
+    mean, variance : (float, float)
+        Of the first and the second half, in the signal's unit and its square.
+    """
+
+    verdict: Stationary
+    level: UnitRootTests
+    trend: UnitRootTests
+    block: int
+    mean: tuple[float, float]
+    variance: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Normality:
+    """Whether values are normally distributed, tested on samples far enough apart to be independent.
+
+    Parameters
+    ----------
+    verdict : str
+        In a few words, with the samples tested; the smallest p-value times the number of tests is held against 5 %
+        (Bonferroni).
+    normal : bool or None
+        False: rejected; None: too few samples to test.
+    p_values : mapping
+        By test: ``dagostino_pearson jarque_bera shapiro_wilk anderson_darling``.
+    count : int
+        Samples tested, one every two correlation times. All samples together would make the tests reject what is
+        normal: they take each for new evidence.
+    skewness, excess_kurtosis : float
+        Of all samples; both 0 for a normal distribution.
+    """
+
+    verdict: str
+    normal: bool | None
+    p_values: Mapping[str, float]
+    count: int
+    skewness: float
+    excess_kurtosis: float
+
+
+@dataclass(frozen=True, eq=False)
+class Density:
+    """Probability density beside that of a normal distribution of the same mean and standard deviation.
+
+    Parameters
+    ----------
+    values : array (m,)
+        In the signal's unit.
+    density, normal : array (m,)
+        In one over that unit.
+    """
+
+    values: Vector
+    density: Vector
+    normal: Vector
+
+
+def stationarity(series: Series, correlation: Autocorrelation) -> Stationarity:
+    """Augmented Dickey-Fuller and KPSS tests (statsmodels), and the two halves side by side.
+
+    The tests look back over a number of lags that grows with the number of samples only. So the signal is averaged
+    over blocks of half a correlation time, but not to fewer than 200 nor more than 1000 values; a choice of ours.
+    """
+    values = series.values
+    fewest, most = _BLOCKS
+    wanted = round(correlation.correlation_time_s / series.step_s / 2)
+    block = max(1, min(wanted, len(values) // fewest), -(-len(values) // most))
+    whole = len(values) // block * block
+    means = values[:whole].reshape(-1, block).mean(axis=1)
+    level, trend = _unit_root_tests(means, "c"), _unit_root_tests(means, "ct")
+    halves = np.array_split(values, 2)
+    return Stationarity(
+        _verdict(level, trend),
+        level,
+        trend,
+        block,
+        (float(halves[0].mean()), float(halves[1].mean())),
+        (float(halves[0].var()), float(halves[1].var())),
+    )
+
+
+def normality(series: Series, correlation: Autocorrelation) -> Normality:
+    """Tests of D'Agostino-Pearson, Jarque-Bera, Shapiro-Wilk and Anderson-Darling on independent samples."""
+    from statsmodels.stats.diagnostic import normal_ad
+
+    values = series.values
+    apart = max(1, round(len(values) / correlation.effective_count))
+    thinned = values[::apart]
+    skewness, kurtosis = float(stats.skew(values)), float(stats.kurtosis(values))
+    if len(thinned) < FEWEST_INDEPENDENT or np.ptp(thinned) == 0.0:
+        told = f"too few samples ({len(thinned)})"
+        return Normality(told, None, {}, len(thinned), skewness, kurtosis)
+    p_values = {
+        "dagostino_pearson": float(stats.normaltest(thinned).pvalue),
+        "jarque_bera": float(stats.jarque_bera(thinned).pvalue),
+        "shapiro_wilk": float(stats.shapiro(thinned[:5000]).pvalue),  # its p-value holds up to 5000 samples
+        "anderson_darling": float(normal_ad(thinned)[1]),
+    }
+    normal = min(p_values.values()) * len(p_values) >= SIGNIFICANCE
+    told = f"may be ({len(thinned)})" if normal else f"no, {_shape(skewness, kurtosis)} ({len(thinned)})"
+    return Normality(told, normal, p_values, len(thinned), skewness, kurtosis)
+
+
+def probability_density(series: Series) -> Density:
+    """Kernel estimate of the density, its width by Scott's rule from all samples.
+
+    That they are correlated hardly changes the best width (Hall, Lahiri & Truong 1995), but a bump of a record that is
+    worth few independent samples may be chance.
+    """
+    values = series.values
+    mean, spread = float(values.mean()), float(values.std())
+    reach = 3.0 * spread * len(values) ** (-0.2)
+    across = np.linspace(values.min() - reach, values.max() + reach, _DENSITY_POINTS)
+    return Density(across, stats.gaussian_kde(values)(across), stats.norm.pdf(across, mean, spread))
+
+
+def _unit_root_tests(values: Vector, about: str) -> UnitRootTests:
+    # Loaded where it is used: it takes more than a second.
+    from statsmodels.tsa.stattools import adfuller, kpss
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # p-values beyond the table of KPSS, as Stationarity tells
+        return UnitRootTests(float(adfuller(values, regression=about)[1]), float(kpss(values, regression=about)[1]))
+
+
+def _verdict(level: UnitRootTests, trend: UnitRootTests) -> Stationary:
+    returns, wanders = level.dickey_fuller < SIGNIFICANCE, level.kpss < SIGNIFICANCE
+    if returns and not wanders:
+        return Stationary.YES
+    if trend.dickey_fuller < SIGNIFICANCE <= trend.kpss:
+        return Stationary.TREND
+    if returns:
+        return Stationary.CONTRADICTORY
+    return Stationary.NO if wanders else Stationary.UNDECIDED
+
+
+def _shape(skewness: float, kurtosis: float) -> str:
+    """What is most unlike a normal distribution."""
+    # Of skewed distributions such as gamma and lognormal the kurtosis is 1.5 to 2 times the square of the skewness.
+    if 3.0 * skewness**2 > abs(kurtosis):
+        return "skewed to high" if skewness > 0 else "skewed to low"
+    return "heavy tails" if kurtosis > 0 else "flat"

@@ -1,0 +1,85 @@
+"""A trial with a filtered column as a trial file."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tank2sim.errors import InputError
+from tank2sim.records.csv_table import Vector
+from tank2sim.records.signals.columns import HELD, SignalName
+from tank2sim.records.signals.effect import Filtered
+from tank2sim.records.signals.sampling import Series, even_series
+from tank2sim.records.trials import Trial, with_signals
+
+_CIRCLE = frozenset({"cog_rad", "wind_direction_rad", "wind_rel_direction_rad"})
+
+
+def with_filtered(trial: Trial, filtered: Filtered, told: str) -> Trial:
+    """The trial with one signal filtered, at its own times; nan where the filtered signal does not reach.
+
+    The noise stated of that signal is left out: it is no longer true.
+    """
+    series = filtered.series
+    name = series.name
+    known = series.time_s
+    values = np.interp(trial.time_s, known, series.values)
+    # Rows may miss the even grid by a rounding at its two ends.
+    outside = (trial.time_s < known[0] - series.step_s / 2) | (trial.time_s > known[-1] + series.step_s / 2)
+    values[outside] = np.nan
+    noise = {key: value for key, value in trial.noise.items() if key != name}
+    return replace(with_signals(trial, {name: _on_circle(name, values)}, told), noise=noise)
+
+
+def thinned(trial: Trial, filtered: Sequence[Filtered], told: str) -> Trial:
+    """The trial at the fewer times of thinned signals, all of them; orders are taken as they stood at these times.
+
+    Raises
+    ------
+    InputError
+        The signals do not have the same times.
+    """
+    time = filtered[0].series.time_s
+    signals: dict[str, Vector] = {}
+    for one in filtered:
+        series = one.series
+        if len(series.values) != len(time) or abs(series.start_s - time[0]) > series.step_s / 10:
+            names = " and ".join(SignalName(other.series.name).file for other in (filtered[0], one))
+            remedy = "cut the record to where all columns are known"
+            raise InputError(trial.path, f"columns {names}", "are not known over the same times", remedy)
+        signals[series.name] = _on_circle(series.name, series.values)
+    for name in trial.signals:
+        if name in HELD:
+            signals[name] = _held(even_series(trial, name), time)
+    return replace(trial, time_s=time, signals=signals, noise={}, notices=(*trial.notices, told))
+
+
+def trial_text(trial: Trial, remarks: Sequence[str]) -> str:
+    """Text of a trial CSV, rudder positive to starboard; `remarks` are its first comment lines."""
+    names = list(trial.signals)
+    text = io.StringIO()
+    for remark in remarks:
+        text.write(f"# {' '.join(remark.split())}\n")
+    if trial.scale is not None:
+        text.write(f"# scale: {trial.scale:.10g}\n")
+    if stated := [f"{SignalName(name).file} {SignalName(name).factor * trial.noise[name]:.6g}" for name in trial.noise]:
+        text.write(f"# noise: {', '.join(stated)}\n")
+    text.write(",".join(["t_s", *(SignalName(name).file for name in names)]) + "\n")
+    columns = [SignalName(name).factor * trial.signals[name] for name in names]
+    for time, *values in zip(trial.time_s.tolist(), *(column.tolist() for column in columns), strict=True):
+        cells = (f"{value + 0.0:.10g}" if math.isfinite(value) else "" for value in values)
+        text.write(",".join([f"{time:.10g}", *cells]) + "\n")
+    return text.getvalue()
+
+
+def _on_circle(name: str, values: Vector) -> Vector:
+    return np.mod(values, 2.0 * np.pi) if name in _CIRCLE else values
+
+
+def _held(order: Series, time: Vector) -> Vector:
+    places = np.searchsorted(order.time_s, time + 1e-6 * order.step_s, side="right") - 1
+    return order.values[np.clip(places, 0, None)]

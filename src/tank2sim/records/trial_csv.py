@@ -1,0 +1,107 @@
+"""The project's own trial files: a CSV whose column names bear the units, with comment lines."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.errors import InputError
+from tank2sim.records.csv_table import Table, Vector, read_table
+from tank2sim.records.trials import MEASURED, RUDDERS, SIGNALS, Trial, unwrapped
+from tank2sim.units import to_si
+
+
+def read_trial_csv(path: Path | str) -> Trial:
+    """Read a trial such as ``t_s,delta_deg,n_rpm,u_mps,v_mps,r_degps,psi_deg,x_m,y_m``; times as they stand.
+
+    Comment lines: ``# rudder_sign: port`` turns rudder angles and orders to positive to starboard; ``# noise: u_mps
+    0.03, psi_deg 0.1`` states standard deviations; ``# scale: 45.714`` the length of the ship over that of the model.
+    Columns that are no part of the format are left out, and a notice names them.
+
+    Raises
+    ------
+    InputError
+        The table is at fault (:func:`tank2sim.records.csv_table.read_table`); there is no ``t_s`` in each row, no
+        rudder or nothing measured; a column has the name of a signal and another unit; a comment is not understood.
+    """
+    raw = read_table(path)
+    table = raw.si()
+    time = table.column("t_s")
+    empty = np.flatnonzero(np.isnan(time))
+    if empty.size:
+        raise InputError(table.path, table.place(int(empty[0]), "t_s"), "is empty", "give each row its time")
+    signals = {name: values for name, values in table.columns.items() if name in SIGNALS}
+    left_out = [name for name in table.columns if name != "t_s" and name not in SIGNALS]
+    for name in left_out:
+        _refuse_slip(table, name)
+    _check_content(table, signals)
+    notices = []
+    if left_out:
+        told = ", ".join(table.heading(name) for name in left_out)
+        notices.append(f"columns that are no part of the trial format are left out: {told}")
+    if "psi_rad" in signals:
+        signals["psi_rad"] = unwrapped(signals["psi_rad"])
+    if _rudder_sign(table) == "port":
+        signals |= {name: 0.0 - signals[name] for name in RUDDERS if name in signals}
+        notices.append("the rudder is positive to port in the file, and to starboard here")
+    scale = table.comment_number("scale")
+    if scale is not None and scale <= 0:
+        raise InputError(table.path, "comment scale", f"is {scale:g}", "a positive number was expected")
+    columns = {name: table.heading(name) for name in signals if table.heading(name) != name}
+    return Trial(table.path, time, signals, _noise(table), scale, tuple(notices), columns)
+
+
+def _refuse_slip(table: Table, name: str) -> None:
+    """Refuse what looks like a signal of the format misspelt or with a unit that it cannot have."""
+    stem = name.rpartition("_")[0] or name
+    same = [signal for signal in SIGNALS if signal.rpartition("_")[0] == stem]
+    near = same or difflib.get_close_matches(name, SIGNALS, n=1, cutoff=0.85)
+    if near:
+        remedy = f"call it as {near[0]} (or with another unit of that kind), or delete the column"
+        raise InputError(table.path, f"column {table.heading(name)}", "is no signal of a trial", remedy)
+
+
+def _check_content(table: Table, signals: dict[str, Vector]) -> None:
+    if not any(name in signals for name in RUDDERS):
+        present = ", ".join(table.heading(name) for name in table.columns)
+        remedy = f"add delta_deg (angle) or delta_order_deg (order); the columns are {present}"
+        raise InputError(table.path, "header", "there is no rudder", remedy)
+    if not any(name in signals for name in MEASURED):
+        remedy = "add at least one measured column, such as r_degps, psi_deg or u_mps"
+        raise InputError(table.path, "header", "nothing measured is in it", remedy)
+    if len(table.lines) < 2:
+        raise InputError(table.path, "", "has a single row", "give the manoeuvre row by row")
+    for name, values in signals.items():
+        if np.isnan(values).all():
+            raise InputError(table.path, f"column {table.heading(name)}", "has no value", "delete the column")
+
+
+def _rudder_sign(table: Table) -> str:
+    sign = table.comments.get("rudder_sign", "starboard").strip()
+    if sign not in ("port", "starboard"):
+        raise InputError(table.path, "comment rudder_sign", f"is {sign!r}", "write port or starboard")
+    return sign
+
+
+def _noise(table: Table) -> dict[str, float]:
+    """Stated standard deviations by signal, SI."""
+    stated: dict[str, float] = {}
+    if "noise" not in table.comments:
+        return stated
+    for part in table.comments["noise"].replace("\n", ",").split(","):
+        words = part.split()
+        if not words:
+            continue
+        try:
+            name, value = to_si(words[0], float(words[1]))
+        except (IndexError, ValueError):
+            name, value = words[0], np.nan
+        if len(words) != 2 or not 0 < value < np.inf:
+            remedy = "write such as '# noise: u_mps 0.03, psi_deg 0.1', with positive standard deviations"
+            raise InputError(table.path, "comment noise", f"{part.strip()!r} is not understood", remedy)
+        if name not in SIGNALS or name not in table.columns:
+            raise InputError(table.path, "comment noise", f"there is no column {words[0]}", "name a measured column")
+        stated[name] = value
+    return stated

@@ -1,0 +1,135 @@
+"""Free-running trials: what was measured while a ship or a model manoeuvred by herself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.errors import InputError
+from tank2sim.records.csv_table import Vector
+
+RUDDERS = ("delta_rad", "delta_order_rad")
+"""Angle and order of the rudder: a trial has one of them or both."""
+MEASURED = (
+    *("u_mps", "v_mps", "u_ground_mps", "v_ground_mps", "sog_mps", "cog_rad", "r_radps", "psi_rad", "x_m", "y_m"),
+    *("phi_rad", "wind_speed_mps", "wind_direction_rad", "wind_rel_speed_mps", "wind_rel_direction_rad"),
+)
+"""What sensors tell of the motion and the wind."""
+SIGNALS = (*RUDDERS, "n_radps", *MEASURED)
+"""Every signal of the trial format, in SI."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One free-running manoeuvre.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    time_s : array (n,)
+        Rising; begins where the file begins.
+    signals : mapping
+        Name to values (n,), SI, rad, nan where nothing was measured. Names are those of the trial format in SI:
+        ``delta_rad`` (angle), ``delta_order_rad`` (order, held until the next), both positive to starboard;
+        ``n_radps u_mps v_mps u_ground_mps v_ground_mps sog_mps cog_rad r_radps psi_rad x_m y_m phi_rad wind_speed_mps
+        wind_direction_rad wind_rel_speed_mps wind_rel_direction_rad``. psi is continuous.
+    noise : mapping
+        Standard deviation of the measurement by signal, where the file states it, SI.
+    scale : float or None
+        Length of the ship over that of the model of this trial, where the file or its format tells it.
+    notices : tuple of str
+        What was done to the data on reading.
+    columns : mapping
+        Signal to what its column is called in the file, where that differs.
+    """
+
+    path: Path
+    time_s: Vector
+    signals: Mapping[str, Vector]
+    noise: Mapping[str, float] = field(default_factory=dict)
+    scale: float | None = None
+    notices: tuple[str, ...] = ()
+    columns: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """File name without its ending."""
+        return self.path.stem
+
+    def heading(self, signal: str) -> str:
+        """What the column of a signal is called in the file."""
+        return self.columns.get(signal, signal)
+
+
+def sampling_step(trial: Trial) -> float:
+    """Median of the time between rows, s."""
+    return float(np.median(np.diff(trial.time_s)))
+
+
+def window(trial: Trial, begin_s: float, end_s: float) -> Trial:
+    """The rows from one time to another, both included; times stay as they are.
+
+    Raises
+    ------
+    InputError
+        Fewer than two rows are in it.
+    """
+    inside = (trial.time_s >= begin_s) & (trial.time_s <= end_s)
+    if np.count_nonzero(inside) < 2:
+        span = f"the trial lasts from {trial.time_s[0]:g} s to {trial.time_s[-1]:g} s"
+        raise InputError(trial.path, "", f"has no two rows between {begin_s:g} s and {end_s:g} s", span)
+    return select_rows(trial, np.flatnonzero(inside))
+
+
+def select_rows(trial: Trial, rows: np.ndarray) -> Trial:
+    """The rows of these indices, in this order."""
+    signals = {name: values[rows] for name, values in trial.signals.items()}
+    return replace(trial, time_s=trial.time_s[rows], signals=signals)
+
+
+def with_signals(trial: Trial, changes: Mapping[str, Vector | None], notice: str) -> Trial:
+    """The trial with some signals changed or added, or left out where the change is None, and a notice that says so.
+
+    The stated noise of what is left out goes with it.
+    """
+    gone = {name for name, values in changes.items() if values is None}
+    signals = {name: values for name, values in {**trial.signals, **changes}.items() if values is not None}
+    noise = {name: value for name, value in trial.noise.items() if name not in gone}
+    return replace(trial, signals=signals, noise=noise, notices=(*trial.notices, notice))
+
+
+def froude_scaled(trial: Trial, length_ratio: float) -> Trial:
+    """The same manoeuvre of a geometrically similar ship whose length is `length_ratio` times as great.
+
+    By Froude's law with the same gravity (ITTC): lengths times the ratio, times and speeds times its root, rates of
+    turn and revolutions divided by its root, angles as they are; so the stated noise. ``scale`` tells of the model
+    that was tested and stays.
+
+    Raises
+    ------
+    ValueError
+        The ratio is not positive.
+    """
+    if not 0 < length_ratio < math.inf:
+        raise ValueError(f"the ratio of lengths is {length_ratio:g}; a positive one was expected")
+    factors = {"m": length_ratio, "mps": math.sqrt(length_ratio), "radps": 1 / math.sqrt(length_ratio), "rad": 1.0}
+    signals = {name: values * factors[_unit(name)] for name, values in trial.signals.items()}
+    noise = {name: value * factors[_unit(name)] for name, value in trial.noise.items()}
+    return replace(trial, time_s=trial.time_s * math.sqrt(length_ratio), signals=signals, noise=noise)
+
+
+def unwrapped(angle: Vector) -> Vector:
+    """A wrapped angle (n,), rad, made continuous; nan stays, and the angle goes the shorter way past it."""
+    known = np.isfinite(angle)
+    continuous = angle.copy()
+    continuous[known] = np.unwrap(angle[known])
+    return continuous
+
+
+def _unit(signal: str) -> str:
+    return signal.rpartition("_")[2]

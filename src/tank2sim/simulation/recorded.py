@@ -1,0 +1,257 @@
+"""A recorded trial as a manoeuvre: which one it was, how it was steered, and the figures it shows.
+
+So that the same manoeuvre can be simulated in closed loop, from the measured state at the execute, and its figures be
+compared with the measured ones: a zigzag's rudder turns when the *simulated* heading tells it to, with the delay that
+the controller of the trial had.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from tank2sim.dynamics.model import Model, Vector
+from tank2sim.records.trials import Trial
+from tank2sim.simulation.figures import Figures, figures_of
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Turn, Zigzag
+from tank2sim.simulation.run import Run, simulate
+from tank2sim.simulation.trajectory import Trajectory
+
+NOMINAL_HEADINGS_DEG = (1, 2, 5, 10, 15, 20, 25, 30, 35)
+"""Headings at which zigzags are reversed (ITTC 7.5-04-02-01, and the modified ones of SIMMAN)."""
+
+SMOOTHING = 0.3
+"""Recorded signals are smoothed over this many L/u0 before figures are read off (ours: below the time of any peak)."""
+
+LEAST_RUDDER = math.radians(2.0)
+"""A rudder that never exceeds this is no manoeuvre."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """What a trial was.
+
+    Parameters
+    ----------
+    trial : Trial
+        The record, at the scale of the model that simulates it.
+    manoeuvre : Turn or Zigzag
+        With the rudder as it was reached, and the controller's lag.
+    begin_s, end_s : float
+        Execute, and end of what belongs to the manoeuvre (a turn ends when its rudder is taken back), s.
+    rudder_rate_radps : float
+        Rate at which the rudder went over.
+    start : dict
+        ``initial.*`` parameters of a model for the state at the execute.
+    inputs : dict
+        Other inputs of a model, at their mean.
+    figures : Figures
+        As measured.
+    """
+
+    trial: Trial
+    manoeuvre: Turn | Zigzag
+    begin_s: float
+    end_s: float
+    rudder_rate_radps: float
+    start: dict[str, float]
+    inputs: dict[str, float]
+    figures: Figures
+
+
+def recorded(trial: Trial, model: Model) -> Recorded | None:
+    """Recognise a turning circle or a zigzag in a trial; None if it is neither.
+
+    Parameters
+    ----------
+    trial : Trial
+        With a rudder, heading, yaw rate, velocities and positions.
+    model : Model
+        Of a ship of the trial's size: for L/u0 and the names of its variables.
+    """
+    needed = ("psi_rad", "r_radps", "u_mps", "v_mps", "x_m", "y_m")
+    if any(name not in trial.signals or np.isnan(trial.signals[name]).all() for name in needed):
+        return None
+    rudder = _filled(trial.time_s, trial.signals.get("delta_rad", trial.signals.get("delta_order_rad")))
+    held = _plateaus(trial.time_s, rudder)
+    if not held:
+        return None
+    first = held[0]
+    values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+    ship_time = values["ship.length"] / values["ship.speed"]
+    smooth = {name: _smoothed(trial, name, ship_time) for name in needed}
+    turned = np.abs(smooth["psi_rad"] - np.interp(first.execute_s, trial.time_s, smooth["psi_rad"]))
+    inside = (trial.time_s >= first.execute_s) & (trial.time_s <= first.end_s)
+    manoeuvre: Turn | Zigzag | None = None
+    if len(held) >= 2 and all(a.angle * b.angle < 0 for a, b in zip(held, held[1:], strict=False)):
+        manoeuvre = _zigzag(trial, held, smooth)
+        end = float(trial.time_s[-1])
+    elif turned[inside].max(initial=0.0) > math.radians(120):
+        manoeuvre, end = Turn(first.angle), first.end_s
+    if manoeuvre is None:
+        return None
+    track = _trajectory(trial, model, manoeuvre, (first.execute_s, end), (held, smooth))
+    figures = figures_of(manoeuvre, track, float(values["ship.length"]))
+    start = {f"initial.{name[7:]}": float(track[name][0]) for name in _STATES.values()}
+    names = {"n_radps": "propeller.speed", "wind_speed_mps": "wind.speed", "wind_direction_rad": "wind.direction"}
+    inputs = {
+        there: float(np.nanmean(trial.signals[name]))
+        for name, there in names.items()
+        if name in trial.signals and there in model.input_names
+    }
+    start["initial.rudder_angle"] = float(np.interp(first.execute_s, trial.time_s, rudder))
+    return Recorded(trial, manoeuvre, first.execute_s, end, first.rate, start, inputs, figures)
+
+
+def repeat(what: Recorded, integrator: Integrator, parameters: dict[str, float] | None = None) -> Run:
+    """Simulate a recorded manoeuvre in closed loop from its measured start.
+
+    Parameters
+    ----------
+    what : Recorded
+        From :func:`recorded`.
+    integrator : Integrator
+        Of a model with steering gear.
+    parameters : dict, optional
+        Values of the model's parameters by name.
+
+    Raises
+    ------
+    InputError
+        The motion leaves all bounds.
+    """
+    model = integrator.model
+    gear = {"steering.max_rate": what.rudder_rate_radps, "steering.max_angle": math.pi / 2}
+    values = {name: value for name, value in gear.items() if name in model.parameter_names}
+    known = {name: value for name, value in what.start.items() if name in model.parameter_names}
+    duration = what.end_s - what.begin_s
+    return simulate(
+        model,
+        what.manoeuvre,
+        duration_s=duration,
+        inputs=what.inputs,
+        parameters={**values, **known, **(parameters or {})},
+        integrator=integrator,
+    )
+
+
+_STATES = {
+    "u_mps": "motion.u",
+    "v_mps": "motion.v",
+    "r_radps": "motion.r",
+    "psi_rad": "motion.psi",
+    "x_m": "motion.x",
+    "y_m": "motion.y",
+}
+
+
+@dataclass(frozen=True)
+class _Plateau:
+    """A rudder angle that was held: when the rudder began to move there, how fast, and until when it stayed."""
+
+    angle: float
+    execute_s: float
+    rate: float
+    end_s: float
+
+
+def _plateaus(time: Vector, rudder: Vector) -> list[_Plateau]:
+    size = float(np.percentile(np.abs(rudder), 95))
+    if size < LEAST_RUDDER:
+        return []
+    side = np.where(np.abs(rudder) > 0.8 * size, np.sign(rudder), 0)
+    places = np.flatnonzero(side)
+    groups = np.split(places, np.flatnonzero(np.diff(side[places]) != 0) + 1)
+    found: list[_Plateau] = []
+    before = 0
+    for group in groups:
+        if len(group) < 3:
+            continue
+        sign = side[group[0]]
+        inside = rudder[group]
+        angle = float(np.median(inside))
+        origin = found[-1].angle if found else float(np.median(rudder[: max(1, group[0] // 4)]))
+        course = sign * (rudder[before : group[0] + 1] - origin)
+        whole = sign * (angle - origin)
+        times = time[before : group[0] + 1]
+        quarter, most = (_last_crossing(times, course, share * whole) for share in (0.25, 0.7))
+        rate = 0.45 * whole / max(most - quarter, 1e-9)
+        execute = quarter - 0.25 * whole / rate
+        found.append(_Plateau(angle, execute, min(rate, math.pi), float(time[group[-1]])))
+        before = int(group[-1])
+    return found
+
+
+def _last_crossing(time: Vector, course: Vector, level: float) -> float:
+    below = np.flatnonzero(course < level)
+    last = int(below[-1]) if len(below) else 0
+    if last + 1 >= len(course):
+        return float(time[last])
+    share = (level - course[last]) / (course[last + 1] - course[last])
+    return float(time[last] + share * (time[last + 1] - time[last]))
+
+
+def _zigzag(trial: Trial, held: list[_Plateau], smooth: dict[str, Vector]) -> Zigzag | None:
+    """Rudder, nominal heading of the reversals, and the lag with which they came."""
+
+    def at(name: str, time: float) -> float:
+        return float(np.interp(time, trial.time_s, smooth[name]))
+
+    begin = at("psi_rad", held[0].execute_s)
+    headings = [
+        math.copysign(1, a.angle) * (at("psi_rad", b.execute_s) - begin) for a, b in zip(held, held[1:], strict=False)
+    ]
+    rates = [math.copysign(1, a.angle) * at("r_radps", b.execute_s) for a, b in zip(held, held[1:], strict=False)]
+    nominal = [angle for angle in NOMINAL_HEADINGS_DEG if math.radians(angle - 0.3) <= min(headings)]
+    if not nominal or min(rates) <= 0:
+        return None
+    heading = math.radians(max(nominal))
+    lag = float(np.median([(h - heading) / r for h, r in zip(headings, rates, strict=True)]))
+    angle = float(np.median([abs(plateau.angle) for plateau in held]))
+    return Zigzag(math.copysign(angle, held[0].angle), heading, max(lag, 0.0))
+
+
+def _trajectory(
+    trial: Trial,
+    model: Model,
+    manoeuvre: Turn | Zigzag,
+    span: tuple[float, float],
+    seen: tuple[list[_Plateau], dict[str, Vector]],
+) -> Trajectory:
+    """The record between two times as a trajectory of the model, so that figures are read off it as off a simulation."""
+    held, smooth = seen
+    inside = (trial.time_s > span[0]) & (trial.time_s <= span[1])
+    t = np.concatenate([[span[0]], trial.time_s[inside]])
+    x = np.zeros((len(t), len(model.states)))
+    for name, there in _STATES.items():
+        x[:, model.state_names.index(there)] = np.interp(t, trial.time_s, smooth[name])
+    u = np.tile(model.input_values(), (len(t), 1))
+    command = model.input_names.index("rudder.command")
+    for plateau in held:
+        u[t >= plateau.execute_s, command] = plateau.angle
+    y = np.array(model.output(x.T, u.T, np.repeat(model.parameter_values()[:, None], len(t), axis=1))).T
+    y[:, model.outputs.index("motion.rdot")] = np.gradient(x[:, model.state_names.index("motion.r")], t)
+    return Trajectory(model, t - span[0], x, u, y)
+
+
+def _smoothed(trial: Trial, name: str, ship_time: float) -> Vector:
+    values = _filled(trial.time_s, trial.signals[name])
+    window = int(SMOOTHING * ship_time / float(np.median(np.diff(trial.time_s)))) // 2 * 2 + 1
+    if window < 5 or window > len(values):
+        return values
+    smooth: Vector = savgol_filter(values, window, 3)
+    return smooth
+
+
+def _filled(time: Vector, values: Vector | None) -> Vector:
+    assert values is not None  # a trial without rudder is refused on reading
+    known = ~np.isnan(values)
+    return np.interp(time, time[known], values[known])
+
+
+__all__ = ["Recorded", "recorded", "repeat"]
+_ = replace

@@ -1,0 +1,92 @@
+"""A model's motion under recorded inputs, with its exact derivatives by initial state and by parameters.
+
+The steps are those of :func:`tank2sim.simulation.scheme.runge_kutta_step`; their Jacobians come from CasADi. Many pieces
+of motion of one length are carried forward together: each step is one product of stacks of small matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.dynamics.model import Model, Vector
+from tank2sim.simulation.rows import Chain, Rows
+from tank2sim.simulation.scheme import runge_kutta_step
+
+Array = NDArray[np.float64]
+
+
+class Sensitivity:
+    """Motion of a model and its derivatives.
+
+    Parameters
+    ----------
+    model : Model
+        nx states, nu inputs, np parameters.
+    free : sequence of str
+        Names of the k parameters by which to derive.
+    seen : sequence of str
+        Names of the ny states and quantities to be compared with measurements.
+    """
+
+    def __init__(self, model: Model, free: Sequence[str], seen: Sequence[str]):
+        self.model, self.free, self.seen = model, tuple(free), tuple(seen)
+        step = runge_kutta_step(model)
+        h = ca.SX.sym("h")
+        theta = ca.vcat([model.symbol(name) for name in free])
+        arguments = [model.x, model.u, model.p]
+        following = step(*arguments, h)
+        tangents = [ca.densify(ca.jacobian(following, by)) for by in (model.x, theta)]
+        seen_values = model.expand(ca.vcat([model.symbol(name) for name in seen]))
+        shown = [seen_values, *(ca.jacobian(seen_values, by) for by in (model.x, theta))]
+        cse = {"cse": True}
+        self._steps = Chain(step)
+        self._tangents = Rows(ca.Function("tangents", [*arguments, h], tangents, cse))
+        self._shown = Rows(ca.Function("shown", arguments, [ca.densify(value) for value in shown], cse))
+
+    def motion(self, start: Vector, inputs: Array, p: Vector, h: float) -> Array:
+        """States (n + 1, nx) from `start` (nx,), each row of `inputs` (n, nu) held for `h` s."""
+        return self._steps.run(start, inputs, p, np.array([h]))
+
+    def shown(self, states: Array, inputs: Array, p: Vector) -> Array:
+        """What is seen (n, ny) at `states` (n, nx) with `inputs` (n, nu)."""
+        return self._shown(states, inputs, p)[0]
+
+    def derivatives(self, states: Array, inputs: Array, p: Vector, h: float) -> tuple[Array, Array, Array]:
+        """States at the ends, and what is seen, derived by initial state and parameters.
+
+        Parameters
+        ----------
+        states : array (pieces, n + 1, nx)
+            Motions from :meth:`motion`.
+        inputs : array (pieces, n + 1, nu)
+            The last row of each is only for what is seen at its end.
+
+        Returns
+        -------
+        seen : array (pieces, n + 1, ny)
+        by : array (pieces, n + 1, ny, nx + k)
+            Its derivatives by the initial state of its own piece, and by the free parameters.
+        end_by : array (pieces, nx, nx + k)
+            Derivatives of the state at the end.
+        """
+        pieces, rows, nx = states.shape
+        k = len(self.free)
+        flat = inputs[:, :-1].reshape(-1, inputs.shape[2])
+        by_state, by_theta = self._tangents(states[:, :-1].reshape(-1, nx), flat, p, np.array([h]))
+        A = by_state.reshape(pieces, rows - 1, nx, nx).transpose(0, 1, 3, 2)
+        B = by_theta.reshape(pieces, rows - 1, k, nx).transpose(0, 1, 3, 2)
+        S = np.zeros((pieces, rows, nx, nx + k))
+        S[:, 0, :, :nx] = np.eye(nx)
+        for row in range(rows - 1):
+            np.matmul(A[:, row], S[:, row], out=S[:, row + 1])
+            S[:, row + 1, :, nx:] += B[:, row]
+        seen, C, D = self._shown(states.reshape(-1, nx), inputs.reshape(-1, inputs.shape[2]), p)
+        ny = len(self.seen)
+        C = C.reshape(pieces, rows, nx, ny).transpose(0, 1, 3, 2)
+        by = C @ S
+        by[..., nx:] += D.reshape(pieces, rows, k, ny).transpose(0, 1, 3, 2)
+        return seen.reshape(pieces, rows, ny), by, S[:, -1]

@@ -1,0 +1,72 @@
+"""``tank2sim audit``: findings on the screen and as JSON, one line for bad input."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from tank2sim.cli.audit import command
+from tank2sim.errors import InputError
+from tests.records.motions import motion, trial
+
+
+def run(*arguments):
+    result = CliRunner().invoke(command, [str(argument) for argument in arguments])
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write_csv(name, change=lambda signals: {}):
+        signals = motion(duration=300.0)
+        record = trial({**signals, **change(signals)})
+        table = [record.time_s, *record.signals.values()]
+        heads = ["t_s", *record.signals]
+        path = tmp_path / name
+        np.savetxt(path, np.column_stack(table), delimiter=",", header=",".join(heads), comments="", fmt="%.8g")
+        return path
+
+    return write_csv
+
+
+def test_findings_stand_on_the_screen_and_in_the_json(write, tmp_path):
+    good = write("good.csv")
+    bad = write("bad.csv", lambda signals: {"delta_rad": -signals["delta_rad"]})
+    result = tmp_path / "result.json"
+    shown = run(good, bad, "--json", result)
+    assert shown.exit_code == 0
+    assert "nothing is found wrong" in shown.output
+    assert "delta_rad" in shown.output
+    assert "u_mps 0.02*" in shown.output
+    found = json.loads(result.read_text())
+    (entry,) = found["findings"]
+    assert (entry["file"], entry["column"]) == (str(bad), "delta_rad")
+    assert "positive to port" in entry["likely_truth"]
+    assert entry["what"]
+    first = found["trials"][0]
+    assert (first["duration_s"], first["step_s"], first["rows"]) == pytest.approx((300.0, 0.1, 3001))
+    assert first["noise"]["u_mps"]["sigma"] == pytest.approx(0.02, rel=0.1)
+    assert first["noise"]["u_mps"]["from"] == "estimated"
+
+
+def test_a_time_that_falls_is_a_finding_and_no_bad_input(write):
+    path = write("bad.csv")
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([*lines[:100], lines[99], *lines[100:]]) + "\n")
+    shown = run(path)
+    assert shown.exit_code == 0
+    assert "repeated" in shown.output
+
+
+def test_bad_input_is_refused_and_nothing_is_written(write, tmp_path):
+    result = tmp_path / "result.json"
+    with pytest.raises(InputError, match="no such file"):
+        run(write("good.csv"), tmp_path / "none.csv", "--json", result)
+    assert not result.exists()
+    bad = tmp_path / "bad.csv"
+    bad.write_text("t_s,delta_deg,u_mps\n0,0,x\n1,0,1\n")
+    with pytest.raises(InputError, match="line 2, column u_mps: 'x' is no number"):
+        run(bad)

@@ -1,0 +1,216 @@
+"""What holds for every effect: names, neutral parameters, bounds, symmetry, and the uses a model is put to."""
+
+from __future__ import annotations
+
+import re
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from tank2sim.analysis.linearisation import state_space, straight_course
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.model import Parameter
+from tank2sim.errors import InputError
+from tank2sim.fmu.interface import interface
+from tank2sim.simulation.scheme import runge_kutta_step
+from tank2sim.units import from_si, to_si
+
+from .ships import FORCES, STATES, TYPICAL, card_with, forces, mariner_text, ship, state, values
+
+OUTPUTS = [*FORCES, "motion.udot", "motion.vdot", "motion.rdot", "motion.xdot", "motion.ydot"]
+
+# Parameters at which an effect changes nothing; those of the gear have none (a lag of 0 is no lag).
+NEUTRAL: dict[str, dict[str, float]] = {
+    name: dict.fromkeys(parameters, 0.0)
+    for name, parameters in TYPICAL.items()
+    if name not in ("wind", "rudder_rate_limit", "rudder_lag", "telemotor_lag", "flow_memory", "water_depth")
+} | {
+    "rudder_stall": {"angle_deg": 20.0, "loss": 0.0},
+    "flow_memory": {"share": 0.0, "time_constant_s": 8.0},
+    "water_depth": {"depth_m": 1e4},
+    "hump_resistance": {"X_prime": 0.0, "speed_mps": 6.0},
+    "wind": {"speed_mps": 10.0, "direction_deg": 0.0, "surge_coefficient": 0.0, "sway_coefficient": 0.0,
+             "yaw_coefficient": 0.0},
+}  # fmt: skip
+
+
+def test_every_effect_of_the_library_is_tried_here() -> None:
+    # loaded_rudder has a test of its own
+    assert set(EFFECTS) - {"loaded_rudder"} == set(TYPICAL)
+
+
+@pytest.mark.parametrize("name", TYPICAL)
+def test_an_effect_says_what_it_is_and_where_it_comes_from(name: str) -> None:
+    effect = EFFECTS[name]
+    assert effect.name == name and effect.description.endswith(".") and effect.source
+    assert all(one.minimum < one.maximum for one in effect.parameters)
+
+
+@pytest.mark.parametrize("name", TYPICAL)
+def test_parameters_become_named_variables_that_start_at_the_cards_values(name: str) -> None:
+    model, effect = ship({name: TYPICAL[name]}), EFFECTS[name]
+    names = effect.model_names()
+    given = dict(to_si(key, value) for key, value in TYPICAL[name].items())
+    for parameter in effect.parameters:
+        variable = model[names[parameter.name]]
+        if isinstance(variable, Parameter):
+            assert variable.name == f"{name}.{re.sub('_(rad|radps|mps|m|s|prime)$', '', parameter.name)}"
+            assert variable.tunable and (variable.minimum, variable.maximum) == (parameter.minimum, parameter.maximum)
+        if parameter.name in given:
+            assert variable.start == pytest.approx(given[parameter.name])
+
+
+@pytest.mark.parametrize("name", NEUTRAL)
+@pytest.mark.parametrize("at", STATES)
+def test_neutral_parameters_change_nothing(name: str, at: dict[str, float]) -> None:
+    at = {**at, "motion.psi": 0.7, "rudder.command": 0.3}
+    names = [*OUTPUTS, "rudder.rate"]
+    # 1e-12: the depth of 10 km that stands for deep water leaves (T/H)^2 and rounding
+    tolerance = 2e-3 if name == "water_depth" else 1e-12
+    np.testing.assert_allclose(
+        values(ship({name: NEUTRAL[name]}), names, at), values(ship(), names, at), rtol=tolerance
+    )
+
+
+@pytest.mark.parametrize("name", TYPICAL)
+def test_typical_parameters_change_something(name: str) -> None:
+    at = {
+        **state(6.5, 0.5, 0.01, 0.5),
+        **{"motion.psi": 0.7, "rudder.command": 0.45, "propeller.speed": -5.0, "motion.phi": 0.02},
+    }
+    model, bare = ship({name: TYPICAL[name]}), ship()
+    names = [*OUTPUTS, "rudder.rate"]
+    known = {key: value for key, value in at.items() if key in bare}
+    found, without = values(model, names, at), values(bare, names, known)
+    assert np.max(np.abs(found - without) / np.abs(without)) > 1e-6
+
+
+@pytest.mark.parametrize("name", TYPICAL)
+def test_a_model_with_an_effect_is_trimmed_linearised_and_integrated(name: str) -> None:
+    model = ship({name: TYPICAL[name]})
+    x = np.array(model.initial(model.parameter_values())).ravel()
+    u, p = model.input_values({"rudder.command": 0.2}), model.parameter_values()
+    trimmed = x
+    for _ in range(15):
+        trimmed = np.array(model.trim_step(trimmed, u, p)).ravel()
+    steady = [place for place, one in enumerate(model.states) if one.steady]
+    assert np.max(np.abs(np.array(model.rhs(trimmed, u, p)).ravel()[steady])) < 1e-12
+    system = state_space(model, straight_course(model))
+    assert np.all(np.isfinite(system.A)) and np.all(np.isfinite(system.B))
+    step = runge_kutta_step(model)
+    for _ in range(20):
+        x = np.array(step(x, u, p, model.step_s)).ravel()
+    assert np.all(np.isfinite(x))
+
+
+@pytest.mark.parametrize("name", TYPICAL)
+def test_slopes_are_finite_where_nothing_happens(name: str) -> None:
+    """Straight ahead with the rudder midships, |.|, limits and roots have their corners."""
+    model = ship({name: TYPICAL[name]})
+    slope = ca.Function("slope", [model.x, model.u, model.p], [ca.jacobian(model.rates, ca.vcat([model.x, model.p]))])
+    x = np.array(model.initial(model.parameter_values())).ravel()
+    assert np.all(np.isfinite(np.array(slope(x, model.input_values(), model.parameter_values()))))
+
+
+@pytest.mark.parametrize("name", TYPICAL)
+def test_values_out_of_bounds_are_refused_with_their_key(name: str) -> None:
+    for key in TYPICAL[name]:
+        si, _ = to_si(key, 1.0)
+        bounds = {one.name: one for one in EFFECTS[name].parameters}[si]
+        for wrong in (bounds.minimum - 0.1, bounds.maximum + 0.1):
+            with pytest.raises(InputError, match=rf"effects\.0\.parameters\.{key}.* was expected"):
+                ship({name: {**TYPICAL[name], key: from_si(key, wrong)}})
+
+
+@pytest.mark.parametrize("name", TYPICAL)
+def test_a_missing_or_unknown_parameter_is_refused(name: str) -> None:
+    for key in TYPICAL[name]:
+        rest = {other: value for other, value in TYPICAL[name].items() if other != key}
+        with pytest.raises(InputError, match=r"effects\.0\.parameters.*is missing"):
+            ship({name: rest})
+    with pytest.raises(InputError, match="is no parameter of"):
+        ship({name: {**TYPICAL[name], "strength": 1.0}})
+
+
+@pytest.mark.parametrize("name", TYPICAL)
+def test_an_fmu_can_declare_every_variable_of_an_effect(name: str) -> None:
+    declared = {one.name: one for one in interface(ship({name: TYPICAL[name]})).variables}
+    for own in EFFECTS[name].model_names().values():
+        one = declared[own]
+        assert one.start is not None and one.description and one.nominal != 0
+        assert one.minimum is None or one.minimum <= one.start
+        assert one.maximum is None or one.start <= one.maximum
+
+
+ODD = [
+    "rudder_effectiveness", "rudder_slipstream", "rudder_stall", "cross_flow_drag", "cubic_yaw_damping",
+    "sway_yaw_coupling", "turning_drag", "added_yaw_inertia", "linear_yaw_damping", "linear_sway_damping",
+    "shallow_water", "hull_fouling", "engine_droop", "flow_memory", "roll_coupling", "trim", "hump_resistance",
+]  # fmt: skip
+EVEN = ["propeller_side_force", "bank_suction", "asymmetric_turning", "loading_side_force"]
+SYMMETRIC = mariner_text(
+    **{name: f"{name} = 0.0" for name in ("Y0", "Y0u", "Y0uu", "N0", "N0u", "N0uu")},
+    speed_scale='speed_scale = "nominal"',
+)
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_effects_alike_to_both_sides_keep_a_symmetric_ship_symmetric(name: str) -> None:
+    model = ship({name: TYPICAL[name]}, SYMMETRIC)
+    at = {**STATES[1], "motion.phi": 0.05, "motion.p": 0.01, "flow_memory.v": 0.3}
+    at = {key: value for key, value in at.items() if key in model}
+    mirrored = {key: value if key == "motion.u" else -value for key, value in at.items()}
+    names = [*FORCES, "motion.udot", "motion.vdot", "motion.rdot"]
+    signs = np.array([1, -1, -1, 1, -1, -1])
+    np.testing.assert_allclose(values(model, names, mirrored), values(model, names, at) * signs, rtol=1e-11)
+
+
+@pytest.mark.parametrize("name", EVEN)
+def test_one_sided_effects_push_the_same_way_in_both_turns(name: str) -> None:
+    at = STATES[1]
+    mirrored = {key: value if key == "motion.u" else -value for key, value in at.items()}
+    model, bare = ship({name: TYPICAL[name]}), ship()
+    one, other = (forces(model, place) - forces(bare, place) for place in (at, mirrored))
+    np.testing.assert_allclose(one, other, rtol=1e-8, atol=1e-6)
+    assert np.all(one[1:] != 0)
+
+
+def test_effects_stand_on_top_of_each_other_in_any_order() -> None:
+    names = ["wind", "current", "rudder_bias", "rudder_stall", "linear_yaw_damping", "shallow_water", "rudder_backlash"]
+    at = {**STATES[1], "motion.psi": 0.7, "rudder.command": 0.2}
+    several = {name: TYPICAL[name] for name in names}
+    backwards = {name: TYPICAL[name] for name in reversed(names)}
+    wanted = [*OUTPUTS, "rudder.rate"]
+    np.testing.assert_allclose(values(ship(several), wanted, at), values(ship(backwards), wanted, at), rtol=1e-11)
+
+
+def test_effects_say_what_they_miss_in_a_card() -> None:
+    bare = mariner_text(**dict.fromkeys(("beam_m", "draught_m", "projected_area_front_m2"), ""))
+    for name, key in (("wind", "projected_area_front_m2"), ("cross_flow_drag", "draught_m"), ("trim", "draught_m"),
+                      ("wave_drift", "beam_m"), ("water_depth", "beam_m")):  # fmt: skip
+        with pytest.raises(InputError, match=rf"ship\.{key}: is missing.*{name} needs"):
+            ship({name: TYPICAL[name]}, bare)
+    without = mariner_text().split("[propulsion]")[0]
+    for name in ("engine_droop", "propeller_walk"):
+        with pytest.raises(InputError, match="propulsion: is missing"):
+            ship({name: TYPICAL[name]}, without)
+    with pytest.raises(InputError, match="a linear model has no Yrrr"):
+        ship({"cubic_yaw_damping": TYPICAL["cubic_yaw_damping"]}, mariner_text(kind='kind = "linear"'))
+
+
+def test_the_linear_model_takes_the_effects_that_it_can() -> None:
+    linear = mariner_text(kind='kind = "linear"')
+    refused = []
+    for name, parameters in TYPICAL.items():
+        try:
+            found = forces(ship({name: parameters}, linear), state(7.0, 0.2, 0.002, 0.1))
+            assert np.all(np.isfinite(found))
+        except InputError:
+            refused.append(name)
+    assert refused == ["cubic_yaw_damping", "sway_yaw_coupling", "turning_drag"]
+
+
+def test_cards_without_an_effect_have_none_of_its_variables() -> None:
+    assert not [one.name for one in ship().variables if one.name.split(".")[0] in EFFECTS]
+    assert card_with().effects == ()

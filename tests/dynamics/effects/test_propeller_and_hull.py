@@ -1,0 +1,108 @@
+"""Forces of propeller, engine and hull drag against their equations in plain numpy."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from .ships import N0, RHO, STATES, TYPICAL, U0, L, T, added_forces, mariner_text, ship, state, values
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5, -0.7])
+def test_the_side_force_goes_with_revolutions_squared_whatever_the_ships_speed(share: float) -> None:
+    q = 0.5 * RHO * L**2 * U0**2 * share * abs(share)
+    for at in STATES:
+        found = added_forces(
+            "propeller_side_force", {"Y_prime": -1e-4, "N_prime": 4e-5}, {**at, "propeller.speed": share * N0}
+        )
+        np.testing.assert_allclose(found, [0.0, -1e-4 * q, 4e-5 * q * L], rtol=1e-6, atol=1e-5)
+
+
+def test_without_propulsion_the_revolutions_are_nominal() -> None:
+    text = mariner_text().split("[propulsion]")[0]
+    found = added_forces("propeller_side_force", {"Y_prime": -1e-4, "N_prime": 4e-5}, STATES[0], text)
+    q = 0.5 * RHO * L**2 * U0**2
+    np.testing.assert_allclose(found, [0.0, -1e-4 * q, 4e-5 * q * L], rtol=1e-6, atol=1e-5)
+
+
+def test_a_propeller_walks_only_astern() -> None:
+    given = TYPICAL["propeller_walk"]
+    assert not np.any(added_forces("propeller_walk", given, {**STATES[0], "propeller.speed": N0}))
+    q = 0.5 * RHO * L**2 * U0**2 * 0.36
+    found = added_forces("propeller_walk", given, {**STATES[0], "propeller.speed": -0.6 * N0})
+    np.testing.assert_allclose(found, [0.0, -1e-4 * q, 5e-5 * q * L], rtol=1e-6, atol=1e-5)
+
+
+@pytest.mark.parametrize("at", STATES)
+def test_side_force_by_loading(at: dict[str, float]) -> None:
+    U, n = np.hypot(at["motion.u"], at["motion.v"]), 0.9
+    q = 0.5 * RHO * L**2 * U**2 * (n * U0 / U - 1)
+    found = added_forces("loading_side_force", TYPICAL["loading_side_force"], {**at, "propeller.speed": n * N0})
+    np.testing.assert_allclose(found, [0.0, -1e-4 * q, 5e-5 * q * L], rtol=1e-6, atol=1e-5)
+
+
+def test_a_drooping_engine_loses_revolutions_with_speed() -> None:
+    model = ship({"engine_droop": {"droop": 0.4}})
+    n = values(model, ["propeller.speed_actual"], {"motion.u": 0.75 * U0, "propeller.speed": 8.0})
+    np.testing.assert_allclose(n, 8.0 * (1 - 0.4 * 0.25))
+    found = added_forces("engine_droop", {"droop": 0.4}, {"motion.u": 0.75 * U0, "propeller.speed": 8.0})
+    thrust = 0.5 * RHO * L**2 * U0**2 * 77e-5 * (8.0 / N0) ** 2 * ((1 - 0.1) ** 2 - 1)
+    np.testing.assert_allclose(found, [thrust, 0.0, 0.0], rtol=1e-7, atol=1e-6)
+
+
+def closed_cross_flow(v: float, r: float) -> tuple[float, float]:
+    """Integrals of |w| w and x |w| w, w = v + x r, over the length, piecewise in closed form."""
+    ends = [-L / 2, L / 2]
+    if r and abs(v / r) < L / 2:
+        ends.insert(1, -v / r)
+    total = np.zeros(2)
+    square = np.polynomial.Polynomial([v, r]) ** 2
+    for low, high in itertools.pairwise(ends):
+        sign = np.sign(v + r * (low + high) / 2)
+        for place, integrand in enumerate((square, square * np.polynomial.Polynomial([0, 1]))):
+            whole = integrand.integ()
+            total[place] += sign * (whole(high) - whole(low))
+    return float(total[0]), float(total[1])
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(-3, 3), st.floats(-0.03, 0.03))
+def test_cross_flow_drag_is_the_integral_over_the_hull(v: float, r: float) -> None:
+    found = added_forces("cross_flow_drag", {"drag_coefficient": 0.8}, state(5.0, v, r))
+    expected = -0.5 * RHO * T * 0.8 * np.array(closed_cross_flow(v, r))
+    largest = 0.5 * RHO * T * 0.8 * L * (abs(v) + abs(r) * L / 2) ** 2
+    # rounding of the whole force that the added one is taken out of
+    assert found[0] == 0
+    assert abs(found[1] - expected[0]) <= 3e-4 * largest + 1e-6
+    assert abs(found[2] - expected[1]) <= 3e-4 * largest * L / 2 + 1e-4
+
+
+def test_cross_flow_drag_opposes_drift_and_turning() -> None:
+    _, Y, _ = added_forces("cross_flow_drag", {"drag_coefficient": 0.8}, state(5.0, 1.0, 0.0))
+    _, _, N = added_forces("cross_flow_drag", {"drag_coefficient": 0.8}, state(5.0, 0.0, 0.01))
+    np.testing.assert_allclose([Y, N], [-0.5 * RHO * T * 0.8 * L, -0.5 * RHO * T * 0.8 * 1e-4 * L**4 / 32], rtol=1e-3)
+
+
+@pytest.mark.parametrize("u", [6.0, -2.0])
+def test_fouling_resists_motion_either_way(u: float) -> None:
+    found = added_forces("hull_fouling", {"X_prime": -2e-4}, state(u, 0.3, 0.001))
+    np.testing.assert_allclose(found, [-2e-4 * 0.5 * RHO * L**2 * u * abs(u), 0.0, 0.0], rtol=1e-7)
+
+
+def test_a_hump_is_felt_at_its_speed() -> None:
+    given = {"X_prime": -2e-4, "speed_mps": 6.0, "width_mps": 0.5}
+    for u in (5.0, 6.0, 6.7):
+        expected = -2e-4 * 0.5 * RHO * L**2 * u**2 * np.exp(-(((u - 6.0) / 0.5) ** 2) / 2)
+        np.testing.assert_allclose(added_forces("hump_resistance", given, state(u, 0, 0))[0], expected, rtol=1e-6)
+    assert ship({"hump_resistance": TYPICAL["hump_resistance"]})["hump_resistance.width"].start == 0.05 * U0
+
+
+def test_asymmetric_turning_goes_with_the_square_of_the_rate() -> None:
+    for at in STATES:
+        found = added_forces("asymmetric_turning", {"Yrr": 1e-4, "Nrr": -2e-4}, at)
+        q = 0.5 * RHO * L**4 * at["motion.r"] ** 2
+        np.testing.assert_allclose(found, [0.0, 1e-4 * q, -2e-4 * q * L], rtol=1e-6, atol=1e-5)

@@ -1,0 +1,143 @@
+"""Rudder forces and the steering gear with effects, against plain numpy and exact solutions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tank2sim.simulation.scheme import runge_kutta_step
+
+from .ships import FORCES, STATES, U0, forces, mariner_text, ship, values
+
+DEG = np.pi / 180
+
+
+def rudder_force(at: dict[str, float], delta: float | None = None) -> np.ndarray:
+    """Force of the bare ship less that with the rudder midships: all that the rudder does."""
+    turned = at if delta is None else {**at, "rudder.angle": delta}
+    return forces(ship(), turned) - forces(ship(), {**at, "rudder.angle": 0.0})
+
+
+def with_rudder(multiplier: float, at: dict[str, float]) -> np.ndarray:
+    return forces(ship(), at) + (multiplier - 1) * rudder_force(at)
+
+
+@pytest.mark.parametrize("at", STATES)
+def test_rudder_effectiveness_multiplies_all_that_the_rudder_does(at) -> None:
+    found = forces(ship({"rudder_effectiveness": {"factor": -0.25}}), at)
+    np.testing.assert_allclose(found, with_rudder(0.75, at), rtol=1e-9)
+
+
+@pytest.mark.parametrize("at", STATES)
+def test_the_slipstream_keeps_up_the_rudder_as_speed_is_lost(at) -> None:
+    found = forces(ship({"rudder_slipstream": {"gain": 1.5}}), at)
+    np.testing.assert_allclose(found, with_rudder(1 + 1.5 * (1 - at["motion.u"] / U0), at), rtol=1e-9)
+
+
+@pytest.mark.parametrize(("angle_deg", "lost"), [(15.0, 0.0), (-22.5, 0.2), (30.0, 0.4), (21.25, 0.4 * 5 / 32)])
+def test_a_rudder_loses_its_share_over_five_degrees_past_stall(angle_deg: float, lost: float) -> None:
+    at = {**STATES[0], "rudder.angle": angle_deg * DEG}
+    found = forces(ship({"rudder_stall": {"angle_deg": 20.0, "loss": 0.4}}), at)
+    np.testing.assert_allclose(found, with_rudder(1 - lost, at), rtol=1e-9)
+
+
+def test_a_biased_rudder_is_a_rudder_at_another_angle() -> None:
+    at = {**STATES[0], "rudder.angle": 0.1}
+    found = forces(ship({"rudder_bias": {"angle_deg": 2.0}}), at)
+    np.testing.assert_allclose(found, forces(ship(), {**at, "rudder.angle": 0.1 + 2 * DEG}), rtol=1e-12)
+    assert values(ship({"rudder_bias": {"angle_deg": 2.0}}), ["rudder.angle"], at) == 0.1
+
+
+def rate(effects: dict[str, dict[str, float]], command: float, angle: float, text: str | None = None) -> float:
+    return float(values(ship(effects, text), ["rudder.rate"], {"rudder.command": command, "rudder.angle": angle})[0])
+
+
+WITHOUT_LIMIT = mariner_text(max_rate_degps="")
+
+
+@pytest.mark.parametrize("text", [None, WITHOUT_LIMIT])
+def test_the_rate_limit_takes_the_place_of_the_cards(text: str | None) -> None:
+    for k in (2.0, 20.0):
+        effects = {"rudder_rate_limit": {"max_rate_degps": k}}
+        assert rate(effects, 0.6, 0.0, text) == pytest.approx(min(k * DEG, 0.6))
+        assert rate(effects, -0.6, 0.0, text) == pytest.approx(-min(k * DEG, 0.6))
+        assert rate(effects, 0.01, 0.0, text) == pytest.approx(0.01)
+    model = ship({"rudder_rate_limit": {"max_rate_degps": 2.0}})
+    assert "steering.max_rate" not in model and "steering.max_angle" in model
+
+
+def test_the_lag_takes_the_place_of_the_cards() -> None:
+    assert rate({"rudder_lag": {"time_constant_s": 4.0}}, 0.1, 0.02) == pytest.approx(0.08 / 4)
+    model = ship({"rudder_lag": {"time_constant_s": 4.0}})
+    assert "steering.time_constant" not in model and model.step_s == ship().step_s
+    assert ship({"rudder_lag": {"time_constant_s": 0.2}}).step_s <= 0.2 / 5
+    nothing = mariner_text(time_constant_s="")
+    assert any("no time constant" in notice for notice in ship(text=nothing).notices)
+    assert not ship({"rudder_lag": {"time_constant_s": 4.0}}, nothing).notices
+
+
+def test_play_holds_the_rudder_until_the_order_has_moved_by_half_of_it() -> None:
+    play = {"rudder_backlash": {"width_deg": 4.0}}
+    assert rate(play, 0.1 + 1.9 * DEG, 0.1) == 0.0 and rate(play, 0.1 - 1.9 * DEG, 0.1) == 0.0
+    assert rate(play, 0.1 + 3.0 * DEG, 0.1) == pytest.approx(1.0 * DEG)
+    assert rate(play, 0.1 - 3.0 * DEG, 0.1) == pytest.approx(-1.0 * DEG)
+    assert rate(play, 0.6, 0.0) == pytest.approx(5 * DEG)  # a large error still has the gear's full rate
+
+
+def test_play_is_the_play_operator_for_slow_orders() -> None:
+    """Order up, down and up again, far slower than the gear: the rudder is max(min(.)) of the order -+ b/2."""
+    model = ship({"rudder_backlash": {"width_deg": 4.0}})
+    step, p = runge_kutta_step(model), model.parameter_values()
+    x = np.array(model.initial(p)).ravel()
+    x[model.state_names.index("motion.u")] = U0
+    place, played, worst = model.state_names.index("rudder.angle"), 0.0, 0.0
+    orders = 0.2 * np.sin(np.linspace(0, 3 * np.pi, 3000)) * np.linspace(1, 0.3, 3000)
+    for order in orders:
+        played = min(max(played, order - 2 * DEG), order + 2 * DEG)
+        x = np.array(step(x, model.input_values({"rudder.command": order}), p, model.step_s)).ravel()
+        worst = max(worst, abs(x[place] - played))
+    fastest = np.max(np.abs(np.diff(orders))) / model.step_s
+    assert worst < 1.05 * fastest * 1.0  # the gear's own lag of 1 s
+
+
+def test_small_orders_about_midships_move_nothing() -> None:
+    band = {"rudder_dead_band": {"half_width_deg": 3.0}}
+    assert rate(band, 2.9 * DEG, 0.0) == 0.0 and rate(band, -2.9 * DEG, 0.0) == 0.0
+    assert rate(band, 5.0 * DEG, 0.0) == pytest.approx(2.0 * DEG)
+    assert rate(band, 2.0 * DEG, 1.0 * DEG) == pytest.approx(-1.0 * DEG)  # goes back to midships: no memory
+
+
+def test_two_stages_of_lag_follow_the_exact_solution() -> None:
+    """Step of 2 deg: delta = d (1 - (T1 e^(-t/T1) - T2 e^(-t/T2))/(T1 - T2))."""
+    model = ship({"telemotor_lag": {"time_constant_s": 0.4}})
+    step, p, u = runge_kutta_step(model), model.parameter_values(), model.input_values({"rudder.command": 2 * DEG})
+    assert model.step_s <= 0.4 / 5
+    x, t = np.array(model.initial(p)).ravel(), 0.0
+    place = model.state_names.index("rudder.angle")
+    while t < 2.0:
+        x = np.array(step(x, u, p, model.step_s)).ravel()
+        t += model.step_s
+        exact = 2 * DEG * (1 - (1.0 * np.exp(-t / 1.0) - 0.4 * np.exp(-t / 0.4)) / 0.6)
+        assert x[place] == pytest.approx(exact, abs=1e-4 * DEG)
+
+
+def test_a_failed_gear_still_holds_the_rudder() -> None:
+    for effects in (
+        {"rudder_rate_limit": {"max_rate_degps": 2.0}},
+        {"rudder_lag": {"time_constant_s": 4.0}},
+        {"rudder_backlash": {"width_deg": 4.0}},
+        {"telemotor_lag": {"time_constant_s": 4.0}},
+    ):
+        at = {"rudder.command": 0.3, "rudder.angle": 0.1, "telemotor_lag.order": 0.2, "steering.failed": 1.0}
+        model = ship(effects)
+        assert values(model, ["rudder.rate"], {key: value for key, value in at.items() if key in model}) == 0.0
+
+
+def test_the_rudders_share_of_the_force_is_what_the_forces_hold() -> None:
+    model = ship()
+    names = ["rudder.X", "rudder.Y", "rudder.N", *FORCES]
+    for at in STATES:
+        found = values(model, names, at)
+        midships = values(model, names, {**at, "rudder.angle": 0.0})
+        np.testing.assert_allclose(found[:3], found[3:] - midships[3:], rtol=1e-9, atol=1e-6)
+        np.testing.assert_array_equal(midships[:3], 0.0)

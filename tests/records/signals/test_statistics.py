@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+
+from tank2sim.records.signals.correlation import autocorrelation
+from tank2sim.records.signals.statistics import Stationary, normality, probability_density, stationarity
+from tests.records.signals.made import first_order, series, white
+
+
+def verdicts(make, seeds=14):
+    return [stationarity(one, autocorrelation(one)).verdict for one in (series(make(seed)) for seed in range(seeds))]
+
+
+@pytest.mark.parametrize("steps", [2.0, 50.0])
+def test_a_first_order_process_is_stationary_whatever_its_correlation_time(steps):
+    found = verdicts(lambda seed: first_order(seed, steps))
+    assert found.count(Stationary.YES) >= 10
+    assert Stationary.NO not in found
+
+
+def test_a_random_walk_is_not_stationary():
+    found = verdicts(lambda seed: np.cumsum(white(seed)))
+    assert found.count(Stationary.NO) >= 8
+    assert found.count(Stationary.YES) <= 2
+
+
+def test_noise_on_a_straight_line_is_stationary_about_a_trend():
+    found = verdicts(lambda seed: first_order(seed, 10.0) + np.linspace(0.0, 8.0, 4000))
+    assert found.count(Stationary.TREND) >= 12
+
+
+def test_a_step_in_the_level_is_no_stationary_signal():
+    found = verdicts(lambda seed: white(seed) + np.where(np.arange(4000) < 2000, 0.0, 1.0))
+    assert Stationary.YES not in found
+
+
+def test_the_four_outcomes_are_told_apart_by_the_two_tests():
+    found = stationarity(series(white(1)), autocorrelation(series(white(1))))
+    assert found.level.dickey_fuller < 0.01
+    assert found.level.kpss > 0.05
+    walk = series(np.cumsum(white(1)))
+    found = stationarity(walk, autocorrelation(walk))
+    assert found.level.dickey_fuller > 0.05
+    assert found.level.kpss < 0.05
+
+
+def test_halves_tell_mean_and_variance():
+    values = np.concatenate([white(1, 2000), 5.0 + white(2, 2000, spread=3.0)])
+    found = stationarity(series(values), autocorrelation(series(values)))
+    assert found.mean == pytest.approx((0.0, 5.0), abs=0.2)
+    assert found.variance == pytest.approx((1.0, 9.0), rel=0.1)
+
+
+@pytest.mark.parametrize("steps", [0.01, 10.0])
+def test_correlated_normal_samples_are_not_called_abnormal(steps):
+    normal = [normality(one, autocorrelation(one)).normal for one in (series(first_order(s, steps)) for s in range(40))]
+    assert normal.count(False) <= 5
+
+
+def test_all_samples_together_would_be_too_eager():
+    from scipy import stats
+
+    rejected = [stats.normaltest(first_order(seed, 10.0)).pvalue < 0.05 for seed in range(40)]
+    assert sum(rejected) > 10
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [(np.exp, "skewed to high"), (lambda x: -np.exp(x), "skewed to low"), (lambda x: x**3, "heavy tails"),
+     (np.sign, "flat")],
+)  # fmt: skip
+def test_what_is_not_normal_is_said_to_be_so_and_how(make, told):
+    one = series(make(first_order(4, 3.0)))
+    found = normality(one, autocorrelation(one))
+    assert found.normal is False
+    assert told in found.verdict
+
+
+def test_too_few_independent_samples_are_not_judged():
+    one = series(first_order(1, 300.0))
+    found = normality(one, autocorrelation(one))
+    assert found.normal is None
+    assert found.count < 20
+
+
+def test_the_density_of_normal_noise_is_the_normal_one():
+    found = probability_density(series(3.0 + 2.0 * white(1, 20000)))
+    assert np.trapezoid(found.density, found.values) == pytest.approx(1.0, abs=1e-3)
+    exact = np.exp(-0.5 * ((found.values - 3.0) / 2.0) ** 2) / (2.0 * np.sqrt(2.0 * np.pi))
+    assert np.max(np.abs(found.normal - exact)) < 0.01
+    assert np.max(np.abs(found.density - exact)) < 0.012

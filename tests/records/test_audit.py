@@ -1,0 +1,312 @@
+"""The audit: each fault put into a made-up record is found, a clean one raises no alarm; then real records."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tank2sim.records.audit import audit, estimated_noise, mended
+from tank2sim.records.reading import read_trial
+from tank2sim.records.trials import select_rows
+from tests.records.motions import NOISE, NONE, motion, trial
+
+DEG = np.pi / 180
+MOTIONS = {kind: motion(kind) for kind in ("zigzag", "turn", "turn_port", "straight")}
+
+
+def over_ground(m):
+    return (m["u_mps"] + 1j * m["v_mps"]) * np.exp(1j * m["psi_rad"])
+
+
+def moved(m, offset):
+    return {"x_m": m["x_m"] + offset.real, "y_m": m["y_m"] + offset.imag}
+
+
+def late(m, name, seconds):
+    return {name: np.interp(m["t_s"] - seconds, m["t_s"], m[name])}
+
+
+# What is done to the motion (and the noise of what it is done to, which scales along), and what is to be found of it.
+FAULTS = {
+    "r in rad/s": (lambda m: {"r_radps": m["r_radps"] * DEG}, "r_degps", "rad/s"),
+    "psi in radians": (lambda m: {"psi_rad": m["psi_rad"] * DEG}, "psi_deg", "radians"),
+    "psi in radians, wrapped": (lambda m: {"psi_rad": m["psi_rad"] % (2 * np.pi) * DEG}, "psi_deg", "radians"),
+    "velocities in knots": (
+        lambda m: {name: m[name] * 3600 / 1852 for name in ("u_mps", "v_mps")},
+        "u_mps, v_mps",
+        "knots",
+    ),
+    "u in knots": (lambda m: {"u_mps": m["u_mps"] * 3600 / 1852}, "u_mps", "knots"),
+    "r to port": (lambda m: {"r_radps": -m["r_radps"]}, "r_degps", "positive to port"),
+    "psi to port": (lambda m: {"psi_rad": -m["psi_rad"]}, "psi_deg", "positive to port"),
+    "psi and r to port": (
+        lambda m: {name: -m[name] for name in ("psi_rad", "r_radps")},
+        "psi_deg, r_degps",
+        "anticlockwise",
+    ),
+    "v to port": (lambda m: {"v_mps": -m["v_mps"]}, "v_mps", "positive to port"),
+    "u and v interchanged": (lambda m: {"u_mps": m["v_mps"], "v_mps": m["u_mps"]}, "u_mps, v_mps", "interchanged"),
+    "earth-fixed": (
+        lambda m: {"u_mps": over_ground(m).real, "v_mps": over_ground(m).imag},
+        "u_mps, v_mps",
+        "earth-fixed velocities, along x and y",
+    ),
+    "earth-fixed, west": (
+        lambda m: {"u_mps": over_ground(m).real, "v_mps": -over_ground(m).imag},
+        "u_mps, v_mps",
+        "earth-fixed velocities, along x and against y",
+    ),
+    "earth-fixed, interchanged": (
+        lambda m: {"u_mps": over_ground(m).imag, "v_mps": over_ground(m).real},
+        "u_mps, v_mps",
+        "earth-fixed velocities, along y and x",
+    ),
+    "y to west": (lambda m: {"y_m": -m["y_m"]}, "x_m, y_m", "positive to west"),
+    "x and y interchanged": (lambda m: {"x_m": m["y_m"], "y_m": m["x_m"]}, "x_m, y_m", "interchanged"),
+    "rudder to port": (lambda m: {"delta_rad": -m["delta_rad"]}, "delta_deg", "positive to port"),
+    "rudder in radians": (lambda m: {"delta_rad": m["delta_rad"] * DEG}, "delta_deg", "in radians"),
+}
+SHRUNK = {"r in rad/s": "r_radps", "psi in radians": "psi_rad", "psi in radians, wrapped": "psi_rad"}
+
+
+def faulty(kind, change, shrunk=None, **options):
+    noise = {**NOISE, shrunk: NOISE[shrunk] * DEG} if shrunk else NOISE
+    return trial({**MOTIONS[kind], **change(MOTIONS[kind])}, noise=noise, **options)
+
+
+@pytest.mark.parametrize("kind", ["zigzag", "turn_port"])
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_wrong_column_is_named_and_mended(kind, name):
+    change, column, truth = FAULTS[name]
+    record = faulty(kind, change, SHRUNK.get(name))
+    (finding,) = audit(record)
+    assert (finding.column, finding.kind) == (column, "fault")
+    assert truth in finding.likely_truth
+    right, applied = mended(record)
+    assert [one.column for one in applied] == [column]
+    assert any(truth in notice for notice in right.notices) or "rudder" in name
+    for signal in ("u_mps", "v_mps", "r_radps", "delta_rad", "x_m", "y_m"):
+        expected = MOTIONS[kind][signal]
+        spread = 6 * max(NOISE.get(signal, 0.0) * (2 if "knots" in name else 1), 0.02 if "mps" in signal else 0)
+        # turning by psi and back adds u times the noise of psi to v
+        assert np.max(np.abs(right.signals[signal] - expected)) < spread + 1e-9
+    assert not audit(right)
+
+
+def test_several_faults_at_once_are_told_apart():
+    def change(m):
+        earth = over_ground(m)
+        rest = {"delta_rad": -m["delta_rad"], "r_radps": m["r_radps"] * DEG}
+        return {"u_mps": earth.real, "v_mps": earth.imag, **rest}
+
+    findings = audit(faulty("zigzag", change, "r_radps"))
+    assert [one.column for one in findings] == ["r_degps", "u_mps, v_mps", "delta_deg"]
+
+
+@pytest.mark.parametrize("kind", MOTIONS)
+def test_a_clean_record_raises_no_alarm(kind):
+    for seed in range(4):
+        assert audit(trial(MOTIONS[kind], seed=seed)) == ()
+    assert audit(trial(MOTIONS[kind], noise=NONE)) == ()
+
+
+LESSER = {
+    "current": (lambda m: moved(m, (0.3 - 0.4j) * m["t_s"]), {"speed_mps": 0.5, "direction_deg": 306.87}, "a current"),
+    "log": (lambda m: {name: 1.05 * m[name] for name in ("u_mps", "v_mps")}, {"factor": 1 / 1.05}, "the log reads +"),
+    "compass": (lambda m: {"psi_rad": m["psi_rad"] + 3 * DEG}, {"angle_deg": 3.0}, "too much"),
+    "antenna": (
+        lambda m: moved(m, (30 - 5j) * np.exp(1j * m["psi_rad"])),
+        {"forward_m": 30.0, "starboard_m": -5.0},
+        "the antenna is",
+    ),
+    "gyro": (lambda m: {"r_radps": m["r_radps"] + 0.05 * DEG}, {"bias_degps": 0.05}, "the gyro reads +0.0"),
+    "late r": (lambda m: late(m, "r_radps", 2.0), {"lag_s": 2.0}, "r is late by"),
+    "very late r": (lambda m: late(m, "r_radps", 25.0), {"lag_s": 25.0}, "r is late by"),
+    "late x, y": (lambda m: late(m, "x_m", 3.0) | late(m, "y_m", 3.0), {"delay_s": 3.0}, "x and y are late by"),
+}
+
+
+@pytest.mark.parametrize("name", LESSER)
+def test_lesser_faults_are_noted_with_their_size_and_left_as_they_are(name):
+    change, expected, truth = LESSER[name]
+    record = faulty("zigzag", change)
+    (finding,) = audit(record)
+    assert (finding.kind, finding.safe) == ("note", False)
+    assert truth in finding.likely_truth
+    error = max(value for key, value in finding.evidence.items() if key.startswith("standard_error"))
+    for key, value in expected.items():
+        tolerance = {"direction_deg": 8.0, "delay_s": 0.2}.get(key, 5 * error)
+        assert finding.evidence[key] == pytest.approx(value, abs=tolerance)
+    right, applied = mended(record)
+    assert not applied
+    assert right is record
+    if finding.mend is not None and name in ("log", "compass", "gyro"):
+        assert not audit(finding.mend(record))
+
+
+def rows(*slices):
+    return lambda record: select_rows(record, np.concatenate([np.arange(a, b) for a, b in slices]))
+
+
+def put(name, change):
+    def changed(record):
+        values = record.signals[name].copy()
+        change(values)
+        return replace(record, signals={**record.signals, name: values})
+
+    return changed
+
+
+def held(begin, end):
+    return lambda values: values.__setitem__(slice(begin, end), values[begin])
+
+
+SENSORS = {
+    "repeated rows": (rows((0, 100), (99, 200), (199, 4001)), "t_s", "fault", "repeated"),
+    "rows in disorder": (rows((0, 1000), (1500, 2000), (1000, 1500), (2000, 4001)), "t_s", "fault", "not in the order"),
+    "rounded times": (lambda r: replace(r, time_s=np.round(r.time_s)), "t_s", "fault", "step is uniform, 0.1 s"),
+    "a clock set back": (
+        lambda r: replace(r, time_s=np.where(r.time_s < 300, r.time_s, r.time_s - 200)),
+        "t_s",
+        "fault",
+        "fall back",
+    ),
+    "a gap": (rows((0, 1000), (1200, 4001)), "t_s", "note", "about 200 rows were not recorded"),
+    "uneven times": (
+        lambda r: replace(r, time_s=r.time_s + np.random.default_rng(1).uniform(-0.03, 0.03, len(r.time_s))),
+        "t_s",
+        "note",
+        "uneven",
+    ),
+    "a noisy sensor stuck": (put("u_mps", held(1000, 1400)), "u_mps", "fault", "stuck"),
+    "stuck to the end": (put("r_radps", held(2500, 4001)), "r_degps", "fault", "stuck"),
+    "a short outage": (put("psi_rad", held(1000, 1050)), "psi_deg", "note", "stuck"),
+    "missing values": (put("v_mps", lambda v: v.__setitem__(slice(500, 600), np.nan)), "v_mps", "note", "not recorded"),
+    "spikes": (put("psi_rad", lambda v: v.__iadd__(0.5 * np.isin(np.arange(4001), [300, 900]))), "psi_deg", "note", ""),
+    "a sensor not read": (put("v_mps", lambda v: v.fill(0.0)), "v_mps", "fault", "not read"),
+}
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_faults_of_time_and_sensors_are_found(name):
+    change, column, kind, truth = SENSORS[name]
+    findings = audit(change(trial(MOTIONS["zigzag"])))
+    assert (findings[0].column, findings[0].kind) == (column, kind)
+    assert truth in findings[0].likely_truth
+    assert len(findings) == 1
+
+
+@pytest.mark.parametrize("name", ["repeated rows", "rows in disorder", "rounded times"])
+def test_a_mended_time_base_is_the_true_one(name):
+    record = trial(MOTIONS["zigzag"])
+    right, (finding,) = mended(SENSORS[name][0](record))
+    np.testing.assert_allclose(right.time_s, record.time_s, atol=2e-3 * 400)
+    np.testing.assert_array_equal(right.signals["x_m"], record.signals["x_m"])
+    assert finding.column == "t_s"
+    assert right.notices
+
+
+def test_failed_readings_are_left_out_and_nothing_else():
+    right, _ = mended(put("u_mps", held(1000, 1400))(trial(MOTIONS["zigzag"])))
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(right.signals["u_mps"])), np.arange(1001, 1400))
+
+
+def test_a_coarse_sensor_and_slow_positions_are_no_fault():
+    record = trial(MOTIONS["zigzag"])
+    coarse = {"psi_rad": np.round(record.signals["psi_rad"] / DEG) * DEG, "x_m": np.round(record.signals["x_m"])}
+    assert audit(replace(record, signals={**record.signals, **coarse})) == ()
+
+
+@pytest.mark.parametrize("count", [2, 5, 8, 30, 200])
+def test_a_short_record_is_left_alone(count):
+    assert audit(select_rows(trial(MOTIONS["turn"]), np.arange(count))) == ()
+
+
+@pytest.mark.parametrize("gone", ["psi_rad", "r_radps", "x_m", "v_mps", "delta_rad"])
+def test_a_record_without_a_signal_is_judged_by_the_rest(gone):
+    record = faulty("zigzag", lambda m: {"delta_rad": -m["delta_rad"]})
+    signals = {name: values for name, values in record.signals.items() if name != gone}
+    findings = audit(replace(record, signals=signals))
+    assert [one.column for one in findings] == ([] if gone == "delta_rad" else ["delta_deg"])
+
+
+def test_a_rudder_that_stops_before_its_order_is_noted():
+    record = trial(MOTIONS["zigzag"])
+    order = {"delta_order_rad": 1.5 * record.signals["delta_rad"]}
+    (finding,) = audit(replace(record, signals={**record.signals, **order}))
+    assert "stands at 20 deg" in finding.what
+
+
+def test_velocities_over_ground_that_are_through_the_water_are_found():
+    m = MOTIONS["turn"]
+    record = trial({**m, **moved(m, (0.3 - 0.4j) * m["t_s"])})
+    names = {"u_mps": "u_ground_mps", "v_mps": "v_ground_mps"}
+    signals = {names.get(name, name): values for name, values in record.signals.items()}
+    (finding,) = audit(replace(record, signals=signals))
+    assert finding.column == "u_ground_mps, v_ground_mps"
+    assert "through the water, in a current of 0.5" in finding.likely_truth
+
+
+def test_speed_over_ground_in_knots_is_found():
+    record = trial(MOTIONS["turn"])
+    sog = np.hypot(record.signals["u_mps"], record.signals["v_mps"]) * 3600 / 1852
+    (finding,) = audit(replace(record, signals={**record.signals, "sog_mps": sog}))
+    assert (finding.column, finding.likely_truth) == ("sog_mps", "it is in knots")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_white_noise_is_estimated_to_a_few_per_cent_in_spite_of_spikes(seed):
+    record = trial(MOTIONS["zigzag"], seed=seed)
+    record.signals["u_mps"][::200] += 5.0
+    estimated = estimated_noise(record)
+    for name, sigma in NOISE.items():
+        assert estimated[name] == pytest.approx(sigma, rel=0.08)
+    assert estimated_noise(replace(record, noise={"u_mps": 0.5}))["u_mps"] == 0.5
+
+
+def test_a_finding_becomes_one_entry_a_column():
+    change, _, _ = FAULTS["earth-fixed"]
+    (finding,) = audit(faulty("turn", change))
+    entries = json.loads(json.dumps(finding.as_json()))
+    assert [entry["column"] for entry in entries] == ["u_mps", "v_mps"]
+    assert {"file", "column", "what", "likely_truth"} <= set(entries[0])
+
+
+def test_kvlcc2_velocities_are_found_to_be_earth_fixed(data):
+    """On each record of HSVA and MARIN, and nothing else is called a fault."""
+    files = sorted(data.glob("data/kvlcc2_*/*.dat"))
+    assert len(files) == 10
+    for file in files:
+        record = read_trial(file)
+        (finding,) = [one for one in audit(record) if one.kind == "fault"]
+        assert finding.column == "u_mps, v_mps", file
+        assert "earth-fixed" in finding.likely_truth
+        right, _ = mended(record)
+        assert any("turned to body axes" in notice for notice in right.notices)
+        assert np.nanmedian(right.signals["u_mps"]) > 0.5
+        # a ship in a turn drifts outward: v against r
+        turning = np.abs(right.signals["r_radps"]) > np.quantile(np.abs(right.signals["r_radps"]), 0.7)
+        assert np.corrcoef(right.signals["v_mps"][turning], right.signals["r_radps"][turning])[0, 1] < -0.8
+
+
+def test_the_esso_osaka_is_right_as_it_is(data):
+    files = sorted(data.glob("data/esso_osaka/*/*.csv"))
+    assert len(files) == 13
+    for file in files:
+        assert [one for one in audit(read_trial(file)) if one.kind == "fault"] == [], file
+
+
+def test_hidden_effects_of_the_gap_cases_are_measured_and_a_clean_one_is_clean(data):
+    expected = {1: ("speed_mps", 0.5288), 5: ("bias_degps", 0.02792), 8: ("speed_mps", 0.4699)}
+    for case in range(1, 9):
+        for name in ("zigzag20_20", "turn35_stbd", "accel"):
+            findings = audit(read_trial(data / f"data/gap_cases/case_{case}/{name}.csv"))
+            if case not in expected:
+                assert findings == (), (case, name)
+                continue
+            key, value = expected[case]
+            (finding,) = findings
+            assert finding.kind == "note"
+            error = max(entry for key, entry in finding.evidence.items() if key.startswith("standard_error"))
+            assert finding.evidence[key] == pytest.approx(value, abs=4 * error)

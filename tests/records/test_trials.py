@@ -1,0 +1,201 @@
+"""Reading trials of every format, and what is done to them as a whole."""
+
+import re
+
+import numpy as np
+import pytest
+
+from tank2sim.errors import InputError
+from tank2sim.records.reading import read_trial
+from tank2sim.records.trials import froude_scaled, sampling_step, window, with_signals
+from tests.records.motions import motion, trial
+
+GOOD = "t_s,delta_deg,u_mps,r_degps,psi_deg\n0,0,1,0,350\n1,10,2,1,359\n2,-10,3,-1,8\n"
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write_text(text, name="run.csv"):
+        path = tmp_path / name
+        path.write_bytes(text.encode("latin-1"))
+        return path
+
+    return write_text
+
+
+def test_a_csv_is_read_in_si_with_a_continuous_heading(write):
+    read = read_trial(write("# scale: 45.714\n# noise: u_mps 0.03, psi_deg 0.1\n" + GOOD))
+    np.testing.assert_allclose(read.signals["delta_rad"], np.deg2rad([0, 10, -10]))
+    np.testing.assert_allclose(read.signals["psi_rad"], np.deg2rad([350, 359, 368]))
+    np.testing.assert_allclose(read.signals["r_radps"], np.deg2rad([0, 1, -1]))
+    assert read.scale == 45.714
+    assert read.noise == pytest.approx({"u_mps": 0.03, "psi_rad": np.deg2rad(0.1)})
+    assert read.heading("r_radps") == "r_degps"
+    assert read.heading("u_mps") == "u_mps"
+    assert sampling_step(read) == 1.0
+
+
+def test_a_rudder_positive_to_port_is_turned_once(write):
+    read = read_trial(write("# rudder_sign: port\n" + GOOD.replace("delta_deg", "delta_order_deg")))
+    np.testing.assert_allclose(read.signals["delta_order_rad"], np.deg2rad([0, -10, 10]))
+    np.testing.assert_allclose(read.signals["r_radps"], np.deg2rad([0, 1, -1]))
+    assert any("positive to port" in notice for notice in read.notices)
+
+
+def test_a_foreign_column_is_left_out_and_named(write):
+    read = read_trial(write(GOOD.replace("u_mps", "thrust_N")))
+    assert "thrust_N" not in read.signals
+    assert "thrust_N" in read.notices[0]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("t_s", "time", "header: there is no column t_s"),
+        ("delta_deg", "helm_deg", "header: there is no rudder; add delta_deg"),
+        ("r_degps", "r_deg", "column r_deg: is no signal of a trial; call it as r_radps"),
+        ("1,10,2", ",10,2", "line 3, column t_s: is empty"),
+        ("1,10,2", "x,10,2", "line 3, column t_s: 'x' is no number"),
+        ("1,10,2", "0,10,2", "row 2, column t_s: 0 does not come after 0 of the row before"),
+        ("t_s,", "# rudder_sign: left\nt_s,", "comment rudder_sign: is 'left'"),
+        ("t_s,", "# noise: u_mps\nt_s,", "comment noise: 'u_mps' is not understood"),
+        ("t_s,", "# noise: u_mps -1\nt_s,", "comment noise: 'u_mps -1' is not understood"),
+        ("t_s,", "# noise: v_mps 1\nt_s,", "comment noise: there is no column v_mps"),
+        ("t_s,", "# scale: 0\nt_s,", "comment scale: is 0"),
+    ],
+)
+def test_faulty_csvs_are_refused_with_their_place(write, old, new, said):
+    assert old in GOOD
+    path = write(GOOD.replace(old, new, 1))
+    with pytest.raises(InputError, match=re.escape(f"{path}: {said}")):
+        read_trial(path)
+
+
+def test_a_time_that_falls_is_let_through_to_the_audit(write):
+    read = read_trial(write(GOOD.replace("1,10,2", "0,10,2")), rising=False)
+    np.testing.assert_array_equal(read.time_s, [0, 0, 2])
+
+
+HSVA = " HSVA, experimental data CPMC\n KVLCC2\n Z10\xb0/10\xb0\n Time series\n" + "".join(
+    f"  {0.05 * k:.9f}  {k}.5  .2  3.0  1.1  .05  2.0  .3  -10.0  10.0  40.  1.0\n" for k in range(4)
+)
+MARIN = "MARIN(Maritime Research Institute Netherlands)\nZig-zag for KVLCC2 : 10 / -10\n\n" + "".join(
+    f"{0.135 * k:.2E}\t{k:.2E}\t0.00E+00\t0.1E+00\t3.00E+00\t7.9E+00\t1.0E-02\t0.00E+00\t2.0E-01\t-1.0E+01\t9.0E+01\n"
+    for k in range(2000)
+)
+
+
+def test_a_record_of_hsva_is_read_at_model_scale(write):
+    read = read_trial(write(HSVA, "Z.dat"))
+    assert read.scale == 45.714
+    np.testing.assert_allclose(read.time_s, [0, 0.05, 0.10, 0.15])
+    expected = {"x_m": 0.5, "y_m": 0.2, "psi_rad": np.deg2rad(3), "u_mps": 1.1, "v_mps": 0.05, "r_radps": np.deg2rad(2)}
+    expected |= {"delta_rad": np.deg2rad(10), "n_radps": 20 * np.pi}
+    assert {name: values[0] for name, values in read.signals.items()} == pytest.approx(expected)
+
+
+def test_repeating_times_of_marin_become_a_uniform_base_and_this_is_said(write):
+    read = read_trial(write(MARIN, "Z.dat"))
+    assert read.scale == 45.714
+    np.testing.assert_allclose(read.time_s, 0.135 * np.arange(2000), rtol=1e-3)
+    assert np.ptp(np.diff(read.time_s)) < 1e-9
+    assert any("uniform step" in notice for notice in read.notices)
+    assert read.signals["delta_rad"][0] == pytest.approx(np.deg2rad(10))
+    assert read.signals["n_radps"][0] == pytest.approx(3 * np.pi)
+
+
+def test_a_sample_lost_from_a_record_of_marin_is_not_papered_over(write):
+    lines = MARIN.split("\n")
+    path = write("\n".join(lines[:300] + lines[340:]), "Z.dat")
+    with pytest.raises(InputError, match=r"line \d+, column t_s: the times do not rise"):
+        read_trial(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (HSVA.replace("HSVA,", "SSPA,"), "line 1: is no record of MARIN or HSVA"),
+        (HSVA.replace(" 1.5 ", " x "), "line 6, column x_m: 'x' is no number"),
+        (HSVA.replace(" 1.5 ", " "), "line 6: the number of cells is 11, and that of columns 12"),
+        (HSVA[:100], "has no rows of measured values"),
+    ],
+)
+def test_faulty_dat_files_are_refused_with_their_place(write, text, said):
+    path = write(text, "Z.dat")
+    with pytest.raises(InputError, match=re.escape(said)):
+        read_trial(path)
+
+
+def test_a_record_of_the_esso_osaka_may_hold_nan(write):
+    header = "t [s],x_position_mid [m],u_velo [m/s],y_position_mid [m],vm_velo [m/s],psi_hat [rad],r_angvelo [rad/s],"
+    header += "n_prop [rps],delta_rudder [rad],wind_velo_relative_mid [m/s],wind_dir_relative_mid [rad],"
+    header += "wind_velo_true [m/s],wind_dir_true [rad]\n"
+    rows = ["0,1,2,3,4,6.2,.1,10,.2,1,2,3,4", "0.1,1,NaN,3,4,0.1,.1,-10,.2,1,2,3,4", "0.2,1,,3,4,0.2,.1,10,.2,1,2,3,4"]
+    read = read_trial(write(header + "\n".join(rows)))
+    np.testing.assert_array_equal(np.isnan(read.signals["u_mps"]), [False, True, True])
+    np.testing.assert_allclose(read.signals["psi_rad"], [6.2, 0.1 + 2 * np.pi, 0.2 + 2 * np.pi])
+    np.testing.assert_allclose(read.signals["n_radps"], 2 * np.pi * np.array([10, -10, 10]))
+    assert read.signals["delta_rad"][0] == 0.2
+    assert read.signals["wind_direction_rad"][0] == 4
+    with pytest.raises(InputError, match=re.escape("line 3, column delta_rudder [rad]: 'x' is no number")):
+        read_trial(write(header + "\n".join(rows).replace("-10,.2", "-10,x")))
+    with pytest.raises(InputError, match=re.escape("there is not one column vm_velo [m/s]")):
+        read_trial(write((header + "\n".join(rows)).replace("vm_velo", "v")))
+
+
+def test_wind_of_the_esso_osaka_is_where_it_comes_from(data):
+    """The true wind, less the ship's own, is the relative one: both directions are where the wind comes from."""
+    read = read_trial(data / "data/esso_osaka/turning/turn_14-Sep-2020_13_39_32.csv")
+    s = read.signals
+    air = -s["wind_speed_mps"] * np.exp(1j * s["wind_direction_rad"])
+    relative = -(air * np.exp(-1j * s["psi_rad"]) - (s["u_mps"] + 1j * s["v_mps"]))
+    given = s["wind_rel_speed_mps"] * np.exp(1j * s["wind_rel_direction_rad"])
+    assert np.sqrt(np.mean(np.abs(relative - given) ** 2)) < 0.005
+    ahead = s["u_mps"] > 0.15
+    assert np.corrcoef(s["delta_rad"][ahead], s["r_radps"][ahead])[0, 1] > 0.9
+
+
+def test_every_real_record_is_read(data):
+    files = [*data.glob("data/kvlcc2_*/*.dat"), *data.glob("data/esso_osaka/*/*.csv")]
+    assert len(files) == 23
+    for file in files:
+        read = read_trial(file)
+        assert np.all(np.diff(read.time_s) > 0)
+        assert {"u_mps", "v_mps", "r_radps", "psi_rad", "x_m", "y_m", "delta_rad", "n_radps"} <= set(read.signals)
+
+
+def test_froude_scaling_keeps_every_number_without_dimension():
+    small = trial(motion(duration=60.0))
+    large = froude_scaled(small, 25.0)
+    np.testing.assert_allclose(large.time_s, 5 * small.time_s)
+    factors = {"u_mps": 5, "v_mps": 5, "r_radps": 0.2, "psi_rad": 1, "x_m": 25, "y_m": 25, "delta_rad": 1}
+    for name, factor in factors.items():
+        np.testing.assert_allclose(large.signals[name], factor * small.signals[name])
+    back = froude_scaled(large, 1 / 25.0)
+    np.testing.assert_allclose(back.signals["r_radps"], small.signals["r_radps"])
+    for wrong in (0.0, -1.0, np.inf, np.nan):
+        with pytest.raises(ValueError, match="ratio of lengths"):
+            froude_scaled(small, wrong)
+
+
+def test_stated_noise_is_scaled_as_its_signal(write):
+    read = froude_scaled(read_trial(write("# noise: u_mps 0.03, r_degps 0.1\n" + GOOD)), 4.0)
+    assert read.noise == pytest.approx({"u_mps": 0.06, "r_radps": np.deg2rad(0.05)})
+
+
+def test_a_window_holds_both_its_ends():
+    part = window(trial(motion(duration=60.0)), 10.0, 20.0)
+    assert (part.time_s[0], part.time_s[-1]) == pytest.approx((10.0, 20.0))
+    assert all(len(values) == 101 for values in part.signals.values())
+    with pytest.raises(InputError, match="has no two rows between 70 s and 80 s"):
+        window(part, 70.0, 80.0)
+
+
+def test_changed_signals_leave_the_others_and_say_so(write):
+    before = read_trial(write("# noise: u_mps 0.03\n" + GOOD))
+    after = with_signals(before, {"u_mps": None, "r_radps": 2 * before.signals["r_radps"]}, "changed")
+    assert "u_mps" not in after.signals
+    assert after.noise == {}
+    assert after.notices[-1] == "changed"
+    np.testing.assert_array_equal(after.signals["psi_rad"], before.signals["psi_rad"])
+    np.testing.assert_array_equal(after.signals["r_radps"], 2 * before.signals["r_radps"])
