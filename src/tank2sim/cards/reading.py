@@ -99,23 +99,28 @@ def changed_text(text: str, source: str, changes: Mapping[str, object]) -> str:
         *sections, last = key.split(".")
         table: Any = document
         for section in sections:
+            if isinstance(table, list) and section.isdigit() and int(section) < len(table):
+                table = table[int(section)]
+                continue
             if section not in table:
                 table[section] = tomlkit.table()
             table = table[section]
-            if not isinstance(table, dict):
+            if not isinstance(table, dict | list):
                 raise InputError(source, key, f"cannot be set: {section} is no section", "give section.key=value")
         table[last] = value
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
     return mark + tomlkit.dumps(document)
 
 
-def revised(card: ManoeuvringCard, derivatives: Mapping[str, tuple[float, float]]) -> ManoeuvringCard:
+def revised(
+    card: ManoeuvringCard, derivatives: Mapping[str, tuple[float, float]], others: Mapping[str, object] | None = None
+) -> ManoeuvringCard:
     """A card with other derivatives: canonical name to (value, standard error), prime and starboard-positive.
 
-    They are written in the conventions of the card's own text.
+    They are written in the conventions of the card's own text; `others` are further values at dotted keys of the text.
     """
     scales = card.scales if card.model.scaling == "dimensional" else None
-    changes: dict[str, object] = {}
+    changes: dict[str, object] = dict(others or {})
     for name, (value, error) in derivatives.items():
         term = parse_term(name)
         if term is None:

@@ -19,7 +19,19 @@ import click
 from tank2sim import __version__
 from tank2sim.errors import InputError
 
-COMMANDS = ("demo", "ships", "simulate", "reduce", "tow", "audit", "signals", "export", "check", "stability")
+COMMANDS = (
+    "demo",
+    "ships",
+    "simulate",
+    "reduce",
+    "tow",
+    "audit",
+    "identify",
+    "signals",
+    "export",
+    "check",
+    "stability",
+)
 
 
 class _Commands(click.Group):

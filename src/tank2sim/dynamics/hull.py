@@ -59,7 +59,7 @@ class Hull:
 
 
 def motion_quantities(hull: Hull) -> tuple[Quantity, ...]:
-    """``rudder.X``, ``.Y``, ``.N``, ``force.*``, ``inertia.*``, ``motion.udot``, ``.vdot``, ``.rdot``, ``.speed``, ``.beta`` and ``validity``."""
+    """Forces ``rudder.*`` and ``force.*``, ``inertia.*``, accelerations, speed and drift, and ``validity``."""
     forces = _force_quantities(hull)
     X, Y, N = forces[-3:]
     masses = _inertia_quantities(hull)

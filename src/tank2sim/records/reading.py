@@ -13,6 +13,9 @@ from tank2sim.records.simman import is_simman, read_simman
 from tank2sim.records.trial_csv import read_trial_csv
 from tank2sim.records.trials import Trial
 
+HEAD_BYTES = 4096
+"""What of a file is looked at to tell whether it is a trial."""
+
 
 def read_trial(path: Path | str, *, rising: bool = True) -> Trial:
     """Read a trial; its first line tells the format: the project's CSV, a SIMMAN ``.dat`` or an Esso Osaka CSV.
@@ -46,6 +49,16 @@ def read_trial(path: Path | str, *, rising: bool = True) -> Trial:
     if rising:
         _refuse_falling_time(trial)
     return trial
+
+
+def looks_like_a_trial(path: Path) -> bool:
+    """True if a file's beginning is that of a trial of a known format: for folders that hold other files, too."""
+    if path.suffix.lower() not in (".csv", ".dat"):
+        return False
+    with path.open("rb") as file:
+        text = file.read(HEAD_BYTES).decode("latin-1")
+    header = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
+    return is_esso_osaka(text) or is_simman(text) or "t_s" in (name.strip() for name in header.split(","))
 
 
 def _refuse_falling_time(trial: Trial) -> None:

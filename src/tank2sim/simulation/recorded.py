@@ -8,12 +8,17 @@ the controller of the trial had.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.signal import savgol_filter
 
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.form import SteeringGear
+from tank2sim.cards.reading import revised
 from tank2sim.dynamics.model import Model, Vector
+from tank2sim.dynamics.steering_gear import UNSTATED_LAG
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import Integrator
@@ -43,8 +48,8 @@ class Recorded:
         With the rudder as it was reached, and the controller's lag.
     begin_s, end_s : float
         Execute, and end of what belongs to the manoeuvre (a turn ends when its rudder is taken back), s.
-    rudder_rate_radps : float
-        Rate at which the rudder went over.
+    rudder_rate_radps : float or None
+        Rate at which the rudder went over; None where only its order is known, which the gear of the ship follows.
     start : dict
         ``initial.*`` parameters of a model for the state at the execute.
     inputs : dict
@@ -57,7 +62,7 @@ class Recorded:
     manoeuvre: Turn | Zigzag
     begin_s: float
     end_s: float
-    rudder_rate_radps: float
+    rudder_rate_radps: float | None
     start: dict[str, float]
     inputs: dict[str, float]
     figures: Figures
@@ -87,7 +92,7 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
     turned = np.abs(smooth["psi_rad"] - np.interp(first.execute_s, trial.time_s, smooth["psi_rad"]))
     inside = (trial.time_s >= first.execute_s) & (trial.time_s <= first.end_s)
     manoeuvre: Turn | Zigzag | None = None
-    if len(held) >= 2 and all(a.angle * b.angle < 0 for a, b in zip(held, held[1:], strict=False)):
+    if len(held) >= 2 and all(a.angle * b.angle < 0 for a, b in pairwise(held)):
         manoeuvre = _zigzag(trial, held, smooth)
         end = float(trial.time_s[-1])
     elif turned[inside].max(initial=0.0) > math.radians(120):
@@ -104,7 +109,19 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
         if name in trial.signals and there in model.input_names
     }
     start["initial.rudder_angle"] = float(np.interp(first.execute_s, trial.time_s, rudder))
-    return Recorded(trial, manoeuvre, first.execute_s, end, first.rate, start, inputs, figures)
+    rate = first.rate if "delta_rad" in trial.signals else None
+    return Recorded(trial, manoeuvre, first.execute_s, end, rate, start, inputs, figures)
+
+
+def steerable(card: ManoeuvringCard) -> ManoeuvringCard:
+    """The card with limits of the gear where it states none, so wide that they limit nothing.
+
+    :func:`repeat` then has a rate to set in the model.
+    """
+    gear = card.steering_gear or SteeringGear()
+    wide = {"max_rate_degps": 180.0, "max_angle_deg": 89.0}
+    stated = {"max_rate_degps": gear.max_rate_radps, "max_angle_deg": gear.max_angle_rad}
+    return revised(card, {}, {f"steering_gear.{key}": wide[key] for key, value in stated.items() if value is None})
 
 
 def repeat(what: Recorded, integrator: Integrator, parameters: dict[str, float] | None = None) -> Run:
@@ -115,7 +132,7 @@ def repeat(what: Recorded, integrator: Integrator, parameters: dict[str, float] 
     what : Recorded
         From :func:`recorded`.
     integrator : Integrator
-        Of a model with steering gear.
+        Of a model with steering gear (of a card made :func:`steerable`, so that the recorded rate can be set).
     parameters : dict, optional
         Values of the model's parameters by name.
 
@@ -125,16 +142,24 @@ def repeat(what: Recorded, integrator: Integrator, parameters: dict[str, float] 
         The motion leaves all bounds.
     """
     model = integrator.model
-    gear = {"steering.max_rate": what.rudder_rate_radps, "steering.max_angle": math.pi / 2}
-    values = {name: value for name, value in gear.items() if name in model.parameter_names}
-    known = {name: value for name, value in what.start.items() if name in model.parameter_names}
+    values = {}
+    if what.rudder_rate_radps is not None:  # the record shows what came of order and gear: a ramp, and nothing else
+        known = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+        lag = UNSTATED_LAG * known["ship.length"] / known["ship.speed"]
+        gear = {
+            "steering.max_rate": what.rudder_rate_radps,
+            "steering.max_angle": math.pi / 2,
+            "steering.time_constant": lag,
+        }
+        values = {name: value for name, value in gear.items() if name in model.parameter_names}
+    start = {name: value for name, value in what.start.items() if name in model.parameter_names}
     duration = what.end_s - what.begin_s
     return simulate(
         model,
         what.manoeuvre,
         duration_s=duration,
         inputs=what.inputs,
-        parameters={**values, **known, **(parameters or {})},
+        parameters={**values, **start, **(parameters or {})},
         integrator=integrator,
     )
 
@@ -202,10 +227,8 @@ def _zigzag(trial: Trial, held: list[_Plateau], smooth: dict[str, Vector]) -> Zi
         return float(np.interp(time, trial.time_s, smooth[name]))
 
     begin = at("psi_rad", held[0].execute_s)
-    headings = [
-        math.copysign(1, a.angle) * (at("psi_rad", b.execute_s) - begin) for a, b in zip(held, held[1:], strict=False)
-    ]
-    rates = [math.copysign(1, a.angle) * at("r_radps", b.execute_s) for a, b in zip(held, held[1:], strict=False)]
+    headings = [math.copysign(1, a.angle) * (at("psi_rad", b.execute_s) - begin) for a, b in pairwise(held)]
+    rates = [math.copysign(1, a.angle) * at("r_radps", b.execute_s) for a, b in pairwise(held)]
     nominal = [angle for angle in NOMINAL_HEADINGS_DEG if math.radians(angle - 0.3) <= min(headings)]
     if not nominal or min(rates) <= 0:
         return None
@@ -222,7 +245,7 @@ def _trajectory(
     span: tuple[float, float],
     seen: tuple[list[_Plateau], dict[str, Vector]],
 ) -> Trajectory:
-    """The record between two times as a trajectory of the model, so that figures are read off it as off a simulation."""
+    """The record between two times as a trajectory of the model: figures are read off it as off a simulation."""
     held, smooth = seen
     inside = (trial.time_s > span[0]) & (trial.time_s <= span[1])
     t = np.concatenate([[span[0]], trial.time_s[inside]])
@@ -251,7 +274,3 @@ def _filled(time: Vector, values: Vector | None) -> Vector:
     assert values is not None  # a trial without rudder is refused on reading
     known = ~np.isnan(values)
     return np.interp(time, time[known], values[known])
-
-
-__all__ = ["Recorded", "recorded", "repeat"]
-_ = replace

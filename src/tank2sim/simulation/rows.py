@@ -1,6 +1,6 @@
 """A CasADi function over many rows of arguments, or over a chain of states, in machine code where there is a compiler.
 
-:class:`Rows` evaluates ``f(a, b, ...) -> (y, ...)`` for each row of its arguments; :class:`Chain` feeds the first result
+:class:`Rows` evaluates ``f(a, b, ...) -> (y, ...)`` for each row of its arguments; :class:`Chain` feeds the one result
 back as the first argument, as integration does. Without a compiler CasADi's own loops do the same.
 """
 
@@ -80,8 +80,7 @@ class Rows:
 
     def _in_casadi(self, n: int, arrays: Sequence[Array]) -> tuple[Array, ...]:
         columns = [array.T if array.ndim == 2 else np.repeat(array[:, None], n, axis=1) for array in arrays]
-        results = self.function.map(n)(*columns)
-        results = results if isinstance(results, tuple) else (results,)
+        results = self.function.map(n).call(columns)
         shapes = [self.function.size_out(place) for place in range(self.function.n_out())]
         return tuple(
             np.array(result).reshape(shape[0], n, shape[1]).transpose(1, 2, 0).reshape(n, -1)

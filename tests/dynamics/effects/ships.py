@@ -28,6 +28,7 @@ TYPICAL: dict[str, dict[str, float]] = {
     "rudder_effectiveness": {"factor": 0.1},
     "rudder_slipstream": {"gain": 0.5},
     "rudder_stall": {"angle_deg": 20.0, "loss": 0.3},
+    "loaded_rudder": {"loading": 0.6, "straightening": 0.5, "lever": -0.8},
     "rudder_rate_limit": {"max_rate_degps": 2.0},
     "rudder_lag": {"time_constant_s": 3.0},
     "rudder_backlash": {"width_deg": 2.0},

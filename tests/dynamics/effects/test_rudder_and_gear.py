@@ -7,7 +7,7 @@ import pytest
 
 from tank2sim.simulation.scheme import runge_kutta_step
 
-from .ships import FORCES, STATES, U0, forces, mariner_text, ship, values
+from .ships import FORCES, N0, RHO, STATES, U0, L, forces, mariner_text, ship, values
 
 DEG = np.pi / 180
 
@@ -141,3 +141,39 @@ def test_the_rudders_share_of_the_force_is_what_the_forces_hold() -> None:
         midships = values(model, names, {**at, "rudder.angle": 0.0})
         np.testing.assert_allclose(found[:3], found[3:] - midships[3:], rtol=1e-9, atol=1e-6)
         np.testing.assert_array_equal(midships[:3], 0.0)
+
+
+def slipstream(at: dict[str, float], loading: float, straightening: float, lever: float) -> np.ndarray:
+    """X, Y, N of the rudder in the slipstream, with the Mariner's Yd, Nd, Xdd (rudder to starboard) and revolutions."""
+    u, v, r, delta = (at[name] for name in ("motion.u", "motion.v", "motion.r", "rudder.angle"))
+    speed = np.hypot(u, v)
+    inflow = speed + loading * (U0 * at.get("propeller.speed", N0) / N0 - speed)
+    across = straightening * (v + lever * L * r)
+    lift = inflow**2 * np.sin(delta + np.arctan(across / inflow))
+    side = lift * np.cos(delta) - across * speed
+    scale = 0.5 * RHO * L**2
+    drag = -95e-5 * lift * np.sin(delta)
+    return scale * np.array([drag, -278e-5 * side, L * 139e-5 * side])
+
+
+@pytest.mark.parametrize("at", STATES)
+@pytest.mark.parametrize(("loading", "straightening", "lever"), [(0.0, 0.0, 0.0), (0.6, 0.5, -0.8), (1.1, 0.2, -2.0)])
+def test_the_loaded_rudder_is_a_foil_in_the_propellers_jet(at, loading, straightening, lever) -> None:
+    model = ship({"loaded_rudder": {"loading": loading, "straightening": straightening, "lever": lever}})
+    found = values(model, ["rudder.X", "rudder.Y", "rudder.N"], at)
+    np.testing.assert_allclose(found, slipstream(at, loading, straightening, lever), rtol=1e-9)
+
+
+def test_the_loaded_rudder_leaves_the_linear_derivatives_of_the_hull_as_measured() -> None:
+    model = ship({"loaded_rudder": {"loading": 0.6, "straightening": 0.5, "lever": -0.8}})
+    amidships = {"motion.u": U0, "motion.v": 1e-4, "motion.r": 1e-6, "rudder.angle": 0.0}
+    side = values(model, ["rudder.Y", "rudder.N"], amidships)
+    hard = values(model, ["rudder.Y", "rudder.N"], {**amidships, "rudder.angle": 0.3})
+    assert np.all(np.abs(side) < 1e-4 * np.abs(hard))
+
+
+def test_the_loaded_rudder_stays_finite_at_rest_and_astern() -> None:
+    model = ship({"loaded_rudder": {"loading": 0.6, "straightening": 0.5, "lever": -0.8}})
+    for at in ({"motion.u": 0.0, "motion.v": 0.01}, {"motion.u": 2.0, "propeller.speed": -N0}):
+        state = {"motion.v": 0.0, "motion.r": 0.0, "rudder.angle": 0.2, **at}
+        assert np.isfinite(values(model, ["rudder.X", "rudder.Y", "rudder.N"], state)).all()

@@ -1,6 +1,15 @@
 """Physical effects on top of the polynomial: each a function from model to model."""
 
-from tank2sim.dynamics.effects import derivatives, gear, hull, memory, propeller, rudder, surroundings
+from tank2sim.dynamics.effects import (
+    derivatives,
+    gear,
+    hull,
+    loaded_rudder,
+    memory,
+    propeller,
+    rudder,
+    surroundings,
+)
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter
 
 EFFECTS: dict[str, Effect] = {
@@ -18,6 +27,7 @@ EFFECTS: dict[str, Effect] = {
         rudder.RUDDER_EFFECTIVENESS,
         rudder.RUDDER_SLIPSTREAM,
         rudder.RUDDER_STALL,
+        loaded_rudder.LOADED_RUDDER,
         gear.RUDDER_RATE_LIMIT,
         gear.RUDDER_LAG,
         gear.RUDDER_BACKLASH,

@@ -7,18 +7,25 @@ width of the prior can be scaled by the evidence (MacKay 1992, Neural Computatio
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from tank2sim.dynamics.model import Vector
-from tank2sim.identification.trials.noise import Noise, estimated_noise, white
+from tank2sim.identification.trials.inference import evidence_scale, sandwich, scaled_prior
+from tank2sim.identification.trials.noise import estimated_noise, white
 from tank2sim.identification.trials.problem import Estimate, Problem, Progress, silent
 from tank2sim.identification.trials.shooting import Normal, Pieces, Shooting, Weights, cut
 
 Array = NDArray[np.float64]
+
+LONGEST_SEARCH = 25
+"""Steps after which a search ends; it needs 3 to 10."""
+
+INTERRUPTED = "interrupted: the estimates are the best found until then"
 
 
 @dataclass(frozen=True)
@@ -53,7 +60,7 @@ class _Search:
     values: Vector
     starts: list[Array]
     weights: Weights
-    scale: float = 1.0
+    scale: dict[str, float] = field(default_factory=dict)
     costs: list[float] = field(default_factory=list)
 
 
@@ -77,23 +84,22 @@ def output_error(
     pieces = [cut(problem, run, settings.piece_s) for run in problem.runs]
     values = problem.prior_mean if start is None else start
     search = _Search(values.copy(), [piece.starts.copy() for piece in pieces], _first_weights(problem, pieces))
-    for number in range(settings.rounds):
-        import os
-
-        if os.environ.get("T"):
-            print(
-                [(round(n.sigma, 5), round(n.phi, 3), round(n.psi, 3)) for n in search.weights.noise],
-                search.costs[-1:],
-                search.scale,
-            )
-        last = number == settings.rounds - 1
-        normals = _minimise(problem, shooting, pieces, search, progress, tolerance=1e-4 if last else 1e-2)
-        if last:
-            break
-        search.weights = _new_weights(problem, pieces, search, normals, settings)
-        if settings.scale_prior:
-            search.scale = _evidence_scale(problem, search, normals)
-    return _estimate(problem, pieces, search, normals)
+    notices = []
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as threads:
+        work = _Work(problem, shooting, pieces, threads, progress)
+        try:
+            for number in range(settings.rounds):
+                last = number == settings.rounds - 1
+                normals = _minimise(work, search, tolerance=1e-4 if last else 1e-2)
+                if not last:
+                    search.weights = _new_weights(problem, pieces, search, normals, settings)
+                    if settings.scale_prior:
+                        information = np.asarray(sum(normal.matrix for normal in normals))
+                        search.scale = evidence_scale(problem, information, search.values, search.scale)
+        except KeyboardInterrupt:
+            notices.append(INTERRUPTED)
+            normals = work.normals(search)
+    return _estimate(problem, search, normals, tuple(notices))
 
 
 def _first_weights(problem: Problem, pieces: list[Pieces]) -> Weights:
@@ -103,45 +109,65 @@ def _first_weights(problem: Problem, pieces: list[Pieces]) -> Weights:
     return Weights(tuple(white(0.1 * float(one) if one > 0 else 1.0) for one in spread))
 
 
-def _minimise(
-    problem: Problem, shooting: Shooting, pieces: list[Pieces], search: _Search, progress: Progress, tolerance: float
-) -> list[Normal]:
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """What does not change during a search. Runs are independent, and machine code lets threads run side by side."""
+
+    problem: Problem
+    shooting: Shooting
+    pieces: list[Pieces]
+    threads: ThreadPoolExecutor
+    progress: Progress
+
+    def normals(self, search: _Search) -> list[Normal]:
+        """Normal equations of all runs where the search stands."""
+        return list(
+            self.threads.map(
+                lambda piece, start: self.shooting.normal(piece, start, search.values, search.weights),
+                self.pieces,
+                search.starts,
+            )
+        )
+
+    def cost(self, search: _Search, values: Vector, starts: list[Array], prior: Vector) -> float:
+        """Sum of squares of all runs and of the prior at other values and initial states."""
+        own = float(np.sum(((values - self.problem.prior_mean) / prior) ** 2))
+        runs = self.threads.map(
+            lambda piece, start: self.shooting.cost(piece, start, values, search.weights), self.pieces, starts
+        )
+        return own + sum(runs)
+
+
+def _minimise(work: _Work, search: _Search, tolerance: float) -> list[Normal]:
     """Damped Gauss-Newton steps from where the search stands; leaves it at the best point."""
-    damping = 0.0
-    prior = search.scale * problem.prior_error
-
-    def cost_at(values: Vector, starts: list[Array]) -> float:
-        runs = zip(pieces, starts, strict=True)
-        own = float(np.sum(((values - problem.prior_mean) / prior) ** 2))
-        return own + sum(shooting.cost(piece, start, values, search.weights) for piece, start in runs)
-
-    best = cost_at(search.values, search.starts)
-    for _ in range(25):
-        runs = zip(pieces, search.starts, strict=True)
-        normals = [shooting.normal(piece, start, search.values, search.weights) for piece, start in runs]
+    problem, damping = work.problem, 0.0
+    prior = scaled_prior(problem, search.scale)
+    best = work.cost(search, search.values, search.starts, prior)
+    for _ in range(LONGEST_SEARCH):
+        normals = work.normals(search)
         H = sum(normal.matrix for normal in normals) + np.diag(1 / prior**2)
         g = sum(normal.vector for normal in normals) + (search.values - problem.prior_mean) / prior**2
         for _ in range(12):
             step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
+            step = np.clip(search.values + step, *problem.bounds) - search.values
             starts = [
                 start - (normal.step + normal.states @ step).reshape(start.shape)
                 for start, normal in zip(search.starts, normals, strict=True)
             ]
-            cost = cost_at(search.values + step, starts)
+            cost = work.cost(search, search.values + step, starts, prior)
             if cost < best:
                 break
             damping = max(10 * damping, 1e-3)
         else:
             return normals
-        gain = best - cost
-        search.values, search.starts, best = search.values + step, starts, cost
+        gain, best = best - cost, cost
+        search.values, search.starts = search.values + step, starts
         search.costs.append(cost)
         damping = damping / 10 if damping > 1e-6 else 0.0
-        progress("output error", search.values, cost)
+        work.progress("output error", search.values, cost)
         if gain < tolerance * max(1.0, 1e-3 * best):
             break
-    runs = zip(pieces, search.starts, strict=True)
-    return [shooting.normal(piece, start, search.values, search.weights) for piece, start in runs]
+    return work.normals(search)
 
 
 def _new_weights(
@@ -165,46 +191,17 @@ def _new_weights(
     return Weights(tuple(noise), joints)
 
 
-def _evidence_scale(problem: Problem, search: _Search, normals: list[Normal]) -> float:
-    """Factor on the prior's errors: distance from the mean over the number of parameters that the trials determine."""
-    prior = search.scale * problem.prior_error
-    H = sum(normal.matrix for normal in normals) + np.diag(1 / prior**2)
-    determined = len(prior) - float(np.trace(np.linalg.inv(H) / prior**2))
-    away = float(np.sum(((search.values - problem.prior_mean) / problem.prior_error) ** 2))
-    return max(1.0, float(np.sqrt(away / max(determined, 1.0))))
-
-
-def _estimate(problem: Problem, pieces: list[Pieces], search: _Search, normals: list[Normal]) -> Estimate:
-    prior = np.diag(1 / (search.scale * problem.prior_error) ** 2)
+def _estimate(problem: Problem, search: _Search, normals: list[Normal], notices: tuple[str, ...]) -> Estimate:
     information = np.asarray(sum(normal.matrix for normal in normals))
-    bread = np.linalg.inv(information + prior)
-    covariance = bread @ (_meat(information, [normal.scores for normal in normals]) + prior) @ bread
-    noise: list[Noise] = list(search.weights.noise)
+    prior = scaled_prior(problem, search.scale)
     return Estimate(
         method="output_error",
         free=problem.free,
         values=search.values,
-        covariance=covariance,
+        covariance=sandwich(information, prior, [normal.scores for normal in normals]),
         information=information,
-        noise={name: one.deviation for name, one in zip(problem.seen, noise, strict=True)},
+        noise={name: one.deviation for name, one in zip(problem.seen, search.weights.noise, strict=True)},
         cost=tuple(search.costs),
         prior_scale=search.scale,
+        notices=notices,
     )
-
-
-def _meat(information: Array, scores: list[Array]) -> Array:
-    """Covariance of the gradient (k, k) from blocks of time and their neighbours (Newey and West 1987, one lag).
-
-    Model error makes residuals hang together far longer than the noise model says; white-noise theory would make the
-    intervals several times too narrow. In no direction is it less than that theory's `information`.
-    """
-    total = np.zeros_like(information)
-    for score in scores:
-        lagged = score[1:].T @ score[:-1]
-        total += score.T @ score + 0.5 * (lagged + lagged.T)
-    count = sum(len(score) for score in scores)
-    total *= count / max(count - 1, 1)
-    values, vectors = eigh(total, information + 1e-12 * np.diag(np.diag(information)) + 1e-300 * np.eye(len(total)))
-    root = information @ vectors
-    meat: Array = (root * np.maximum(values, 1.0)) @ root.T
-    return meat

@@ -13,6 +13,9 @@ from tank2sim.identification.trials.runs import Run
 
 Array = NDArray[np.float64]
 
+LITTLE_KNOWN = 0.25
+"""A standard error of this share of the value or more is taken as it is (ours)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -37,6 +40,18 @@ class Problem:
     runs: tuple[Run, ...]
 
     @property
+    def groups(self) -> tuple[str, ...]:
+        """Group of each parameter whose error may be too small (k,): its equation, X, Y or N; "" for all others.
+
+        A card's standard errors are of the tests that gave it; another basin, Reynolds number or ship differs by more.
+        An error of the size of the value itself says already that little is known.
+        """
+        return tuple(
+            name.partition(".")[2][0] if name.startswith("derivatives.") and error < LITTLE_KNOWN * abs(mean) else ""
+            for name, mean, error in zip(self.free, self.prior_mean, self.prior_error, strict=True)
+        )
+
+    @property
     def seen(self) -> tuple[str, ...]:
         """Variables that are compared with measurements, in the order of the columns of each run."""
         return self.runs[0].seen
@@ -47,6 +62,13 @@ class Problem:
         p = self.model.parameter_values()
         names = self.model.parameter_names
         return float(p[names.index("ship.length")] / p[names.index("ship.speed")])
+
+    @property
+    def bounds(self) -> tuple[Vector, Vector]:
+        """Least and largest value of each free parameter (k,), infinite where the model states none."""
+        chosen = [self.model[name] for name in self.free]
+        lowest = np.array([-np.inf if one.minimum is None else one.minimum for one in chosen])
+        return lowest, np.array([np.inf if one.maximum is None else one.maximum for one in chosen])
 
     def parameters(self, values: Vector) -> Vector:
         """The model's parameter vector with the free ones at `values` (k,)."""
@@ -77,8 +99,8 @@ class Estimate:
         Standard deviation of the residual by variable.
     cost : tuple of float
         What was minimised, after each iteration.
-    prior_scale : float
-        Factor on the prior's standard errors that was chosen or given.
+    prior_scale : mapping
+        Factor on the prior's standard errors by group (:attr:`Problem.groups`) that was chosen.
     notices : tuple of str
         What a user should be told.
     """
@@ -90,7 +112,7 @@ class Estimate:
     information: Array
     noise: Mapping[str, float] = field(default_factory=dict)
     cost: tuple[float, ...] = ()
-    prior_scale: float = 1.0
+    prior_scale: Mapping[str, float] = field(default_factory=dict)
     notices: tuple[str, ...] = ()
 
     @property

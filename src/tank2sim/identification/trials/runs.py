@@ -67,7 +67,8 @@ class Run:
     @property
     def times(self) -> Vector:
         """Instants in the trial's own time (n,), s."""
-        return self.begin_s + self.step_s * np.arange(len(self.measured))
+        times: Vector = self.begin_s + self.step_s * np.arange(len(self.measured), dtype=float)
+        return times
 
     def column(self, name: str) -> Vector:
         """What was measured of a variable (n,), nan where nothing was."""
@@ -100,7 +101,7 @@ def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | 
     step = stride * sampling
     count = int((trial.time_s[-1] - trial.time_s[0]) / step + 1e-6)
     begin = float(trial.time_s[0]) + 0.5 * (stride - 1) * sampling
-    grid = begin + step * np.arange(count)
+    grid: Vector = begin + step * np.arange(count, dtype=float)
     if count < 10:
         raise InputError(trial.path, "", f"is only {trial.time_s[-1] - trial.time_s[0]:g} s long", "leave it out")
     inputs = np.tile(model.input_values(), (count, 1))
@@ -110,9 +111,8 @@ def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | 
     signals = {variable: signal for signal, variable in SEEN.items()}
     measured = np.full((count, len(seen)), np.nan)
     for place, name in enumerate(seen):
-        values = trial.signals.get(signals[name])
-        if values is not None:
-            measured[:, place] = _averaged(trial.time_s, values, grid, stride)
+        if (values_there := trial.signals.get(signals[name])) is not None:
+            measured[:, place] = _averaged(trial.time_s, values_there, grid, stride)
     if np.isnan(measured).all():
         raise InputError(
             trial.path, "header", "none of the signals to be compared is there", "give u_mps, r_degps, ..."
@@ -157,6 +157,6 @@ def _averaged(time: Vector, values: Vector, grid: Vector, stride: int) -> Vector
     there = np.interp(fine, time[known], values[known], left=np.nan, right=np.nan)
     after = np.clip(np.searchsorted(time[known], fine), 1, len(known) - 1)
     gap = time[known[after]] - time[known[after - 1]]
-    there[gap > LONGEST_GAP * sampling] = np.nan
+    there[gap > (LONGEST_GAP + 1.5) * sampling] = np.nan  # three missing: four steps from known to known
     mean: Vector = there.reshape(len(grid), stride).mean(axis=1)
     return mean

@@ -14,16 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.dynamics.model import Vector
+from tank2sim.identification.trials.inference import BLOCK
 from tank2sim.identification.trials.noise import Noise
 from tank2sim.identification.trials.problem import Problem
 from tank2sim.identification.trials.runs import Run
 from tank2sim.simulation.sensitivity import Sensitivity
 
 Array = NDArray[np.float64]
-
-BLOCK = 5.0
-"""Residuals farther apart than this many ship lengths count as independent in standard errors (ours: the memory of the
-flow and of a slow model error are of that order)."""
 
 START_WINDOW = 5
 """First guess of an initial state: a straight line through this many instants on either side (ours)."""

@@ -1,0 +1,77 @@
+"""KVLCC2 from free-running trials: each structure fitted to HSVA's zigzags, held against what was not fitted.
+
+HSVA's seven zigzags are split three ways: each time some are held out. Then a fit of all seven is held against MARIN's
+runs, which are of another basin and never fitted. Overshoots and turns are simulated in closed loop, with the delay of
+the controller as the trial shows it; yaw-rate errors are over windows of 5 ship lengths (30 s of the 7 m model).
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.identification.trials.evaluation import Figure, pooled
+from tank2sim.identification.trials.identify import Comparison, Options, compared, identify, noise_of
+from tank2sim.identification.trials.measured import Measured, measured
+from tank2sim.identification.trials.question import pose
+
+DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data"
+ZIGZAGS = ("05_01", "10_05", "10_10_P", "10_10_S", "20_10_S", "25_05", "35_05")
+HELD_OUT = (("10_10_S", "25_05"), ("10_10_P", "35_05"), ("10_05", "20_10_S"))
+STRUCTURES = ("linear", "card", "third_order", "cross_flow")
+
+
+def main() -> None:
+    warnings.filterwarnings("ignore", category=RuntimeWarning)
+    card = read_card("kvlcc2")
+    assert isinstance(card, ManoeuvringCard)
+    zigzags = {name: _read(card, DATA / "kvlcc2_hsva" / f"HSVA_CPMC_KVLCC2_Z_{name}.dat") for name in ZIGZAGS}
+    marin = _read(card, *sorted((DATA / "kvlcc2_marin").glob("*.dat")))
+    print(f"{'':24s}{'HSVA held out':>26s}{'MARIN, never fitted':>44s}")
+    heads = ("OS1 deg", "OS2 deg", "r %", "OS1 deg", "OS2 deg", "r %", "advance %", "t.diam. %")
+    print(f"{'root mean square error':24s}" + "".join(f"{head:>10s}" for head in heads))
+    everything = _together(*zigzags.values())
+    noise = noise_of(everything, pose(card, everything.trials, everything.driven_by))
+    _row("card, not fitted", [compared(card, everything, noise)], compared(card, marin, noise))
+    for structure in STRUCTURES:
+        options = Options(structure=structure)
+        held = []
+        for names in HELD_OUT:
+            fitted = _together(*(one for name, one in zigzags.items() if name not in names))
+            result = identify(card, fitted, _together(*(zigzags[name] for name in names)), options)
+            assert result.holdout is not None
+            held.append(result.holdout)
+        final = identify(card, everything, marin, options)
+        assert final.holdout is not None
+        _row(structure, held, final.holdout)
+
+
+def _read(card: ManoeuvringCard, *paths: Path) -> Measured:
+    return measured(paths, card)
+
+
+def _together(*groups: Measured) -> Measured:
+    return Measured(tuple(trial for group in groups for trial in group.trials), groups[0].driven_by, ())
+
+
+def _row(name: str, held: list[Comparison], marin: Comparison) -> None:
+    cells = []
+    for comparisons in (held, [marin]):
+        figures = [figure for comparison in comparisons for figure in comparison.figures]
+        runs = [run for comparison in comparisons for run in comparison.following]
+        cells += [_overshoot(figures, 1), _overshoot(figures, 2), 100 * pooled(runs, "motion.r")]
+    turn = [100 * figure.error for figure in marin.figures if figure.name in ("advance_m", "tactical_diameter_m")]
+    print(f"{name:24s}" + "".join(f"{cell:10.2f}" for cell in [*cells, *turn]), flush=True)
+
+
+def _overshoot(figures: list[Figure], number: int) -> float:
+    errors = [figure.error for figure in figures if figure.name == f"overshoot_{number}_deg"]
+    return float(np.sqrt(np.mean(np.square(errors))))
+
+
+if __name__ == "__main__":
+    main()

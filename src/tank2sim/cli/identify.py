@@ -1,0 +1,166 @@
+"""``tank2sim identify``: coefficients from free-running trials."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from tank2sim.cards import ManoeuvringCard, parse_card, read_card
+from tank2sim.cli.progress import showing_progress
+from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.errors import InputError
+from tank2sim.files import writable_folder, write_together
+from tank2sim.identification.trials.as_json import (
+    estimate_rows,
+    figure_rows,
+    following_rows,
+    identification_as_json,
+    improved_text,
+    structure_rows,
+)
+from tank2sim.identification.trials.identify import AUTO, METHODS, Identification, Options, identify
+from tank2sim.identification.trials.measured import Measured, measured
+from tank2sim.identification.trials.structures import STRUCTURES
+from tank2sim.records.reading import looks_like_a_trial
+
+
+@click.command("identify")
+@click.argument("card")
+@click.argument("trials", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--holdout", multiple=True, type=click.Path(path_type=Path), metavar="TRIAL", help="Compare with it; do not fit it."
+)
+@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the card found.")
+@click.option("--method", type=click.Choice(METHODS), default="output_error", show_default=True)
+@click.option(
+    "--structure",
+    type=click.Choice((*STRUCTURES, AUTO)),
+    default="card",
+    show_default=True,
+    help="; ".join(f"{one.name}: {one.description}" for one in STRUCTURES.values())
+    + f"; {AUTO}: cross-validation decides.",
+)
+@click.option("--inertia", is_flag=True, help="Estimate acceleration derivatives, too.")
+@click.option("--piece", type=float, metavar="S", help="Length of the pieces of output error, s; by default 5 L/u0.")
+@click.option(
+    "--workers", type=click.IntRange(1), metavar="N", help="Processes for cross-validation; by default all cores."
+)
+@click.option(
+    "--members",
+    type=click.IntRange(0),
+    default=100,
+    show_default=True,
+    help="Simulations behind the intervals of figures of trials held out.",
+)
+@click.option("--trust-card", is_flag=True, help="Take the card's standard errors as they are.")
+@click.option("--plot", "plots", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Plots, page.")
+@json_option
+def command(
+    card: str,
+    trials: tuple[Path, ...],
+    *,
+    holdout: tuple[Path, ...],
+    output: Path | None,
+    plots: Path | None,
+    **more: object,
+) -> None:
+    """Estimate the coefficients of CARD from the free-running TRIALs (CSV, SIMMAN .dat or Esso Osaka CSV)."""
+    json_file = more.pop("json_file")
+    known = read_card(card)
+    if not isinstance(known, ManoeuvringCard):
+        raise InputError(known.source, "model.kind", "is no ship that manoeuvres", "give a linear or abkowitz card")
+    options = _options(more)
+    fitted, held = measured(_files(trials), known), measured(_files(holdout), known)
+    with showing_progress("fitting") as progress, _executor(options, more["workers"]) as executor:
+        result = identify(known, fitted, held, options, progress, executor)
+    text = improved_text(result, [trial.name for trial in fitted.trials])
+    parse_card(text, str(output or "the card found"))
+    files: dict[Path, str | bytes] = {}
+    if output:
+        files[output] = text
+    if isinstance(json_file, Path):
+        files[json_file] = json_text(identification_as_json(result))
+    if plots:
+        files |= _pictures(result, known, (fitted, held), plots)
+    asked = [output, json_file if isinstance(json_file, Path) else None]
+    write_together(
+        files, inputs=[*_files(trials), *_files(holdout), *([Path(card)] if Path(card).exists() else [])], outputs=asked
+    )
+    _show(result)
+    if output:
+        screen.print(f"{output}: {len(result.estimate.free)} coefficients", soft_wrap=True, markup=False)
+
+
+@contextmanager
+def _executor(options: Options, workers: object) -> Iterator[Executor | None]:
+    """Processes for cross-validation, where it is asked for; they begin anew, as threads are at work in this one."""
+    if options.structure != AUTO:
+        yield None
+        return
+    count = workers if isinstance(workers, int) else os.cpu_count()
+    with ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn")) as executor:
+        yield executor
+
+
+def _options(given: dict[str, object]) -> Options:
+    piece = given["piece"]
+    if isinstance(piece, float) and not 0 < piece < 1e6:
+        raise InputError("--piece", "", f"is {piece:g} s", "a positive number of seconds was expected")
+    return Options(
+        method=str(given["method"]),
+        structure=str(given["structure"]),
+        inertia=bool(given["inertia"]),
+        piece_s=piece if isinstance(piece, float) else None,
+        scale_prior=not given["trust_card"],
+        members=int(str(given["members"])),
+    )
+
+
+def _pictures(
+    result: Identification, known: ManoeuvringCard, trials: tuple[Measured, Measured], folder: Path
+) -> dict[Path, str | bytes]:
+    """A picture of each chart, and the page that has them all."""
+    from tank2sim.report.charts import chart_png
+    from tank2sim.report.identification_page import identification_charts, identification_page, pairs_of
+    from tank2sim.report.page import render_page
+
+    writable_folder(folder)
+    fitted, held = (pairs_of(known, result, those) if those.trials else () for those in trials)
+    charts = identification_charts(result, fitted, held)
+    pictures: dict[Path, str | bytes] = {folder / f"{stem}.png": chart_png(chart) for stem, chart in charts.items()}
+    return {**pictures, folder / "report.html": render_page(identification_page(result, charts))}
+
+
+def _files(given: tuple[Path, ...]) -> list[Path]:
+    """The files named; a folder stands for the trials in it."""
+    found: list[Path] = []
+    for path in given:
+        inside = sorted(file for file in path.glob("*") if looks_like_a_trial(file)) if path.is_dir() else [path]
+        if not inside:
+            raise InputError(path, "", "holds no trial", "a folder with trials (.csv or .dat) was expected")
+        found += inside
+    return found
+
+
+def _show(result: Identification) -> None:
+    estimate = result.estimate
+    title = f"{result.card.ship.name}: {len(estimate.free)} coefficients from {len(result.problem.runs)} trials"
+    show_table(title, ["", "found", "before", "from trials"], estimate_rows(result))
+    show_table(
+        "Yaw rate: error over windows of 5 ship lengths, of its root mean square",
+        ["trial", "", "before", "now"],
+        following_rows(result),
+    )
+    if rows := structure_rows(result):
+        title = "Yaw-rate error of trials left out of the fit, %"
+        show_table(title, ["structure", "one at a time, mean", "those of largest amplitude"], rows)
+    if rows := figure_rows(result):
+        heads = ["trial", "", "figure", "measured", "before", "now", "95 %", "error"]
+        show_table("Figures, simulated in closed loop from the measured start", heads, rows)
+    show_notices([*result.notices, *result.identifiability.notices])

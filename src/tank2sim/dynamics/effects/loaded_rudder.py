@@ -1,0 +1,63 @@
+"""The rudder in the slipstream of a loaded propeller, with the flow turned towards it by hull and propeller."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols
+from tank2sim.dynamics.effects.forces import scales
+from tank2sim.dynamics.model import Model
+
+LEAST_INFLOW = 0.05
+"""The flow over the rudder is never slower than this share of u0: the formula does not hold for a propeller that turns
+astern, and must not divide by zero there (a choice of ours)."""
+
+
+def _in_loaded_slipstream(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Rudder forces by angle of attack and inflow speed, in place of all terms of the polynomial that hold the rudder.
+
+    w = U + k (u0 n/n0 - U) is the inflow speed over its share at u0 and n0; alpha = delta + atan(gamma (v + l L r)/w);
+
+    Y = 1/2 rho L^2 (w^2 sin(alpha) cos(delta) - gamma (v + l L r) U) Y_d, N likewise with N_d and L,
+    X = 1/2 rho L^2 w^2 sin(alpha) sin(delta) X_dd.
+
+    What is subtracted is the force at delta = 0 with the propeller at its nominal loading, to first order: that is part
+    of the card's Yv, Nv, Yr, Nr, which were measured with the rudder amidships. After the rudder of the MMG model:
+    Yasukawa and Yoshimura (2015), J. Mar. Sci. Technol. 20, 37-52, with its slipstream linear in the loading.
+    """
+    u, v, r, delta = (model.symbol(name) for name in ("motion.u", "motion.v", "motion.r", "rudder.effective"))
+    u0, length = model.symbol("ship.speed"), model.symbol("ship.length")
+    speed = ca.sqrt(u * u + v * v)
+    driven = u0
+    if "propeller.speed" in model:
+        driven = u0 * model.symbol("propeller.speed_actual") / model.symbol("propulsion.nominal_speed")
+    inflow = ca.fmax(speed + given["loading"] * (driven - speed), LEAST_INFLOW * u0)
+    across = given["straightening"] * (v + given["lever"] * length * r)
+    attack = delta + ca.atan2(across, inflow)
+    force = scales(model, ca.SX(1)).force
+    lift = inflow**2 * ca.sin(attack)
+    side = lift * ca.cos(delta) - across * speed
+    slope = {name: model.symbol(f"derivatives.{name}") for name in ("Yd", "Nd")}
+    drag = model.symbol("derivatives.Xdd") if "derivatives.Xdd" in model else ca.SX(0)
+    return (
+        model.redefine("rudder.X", lambda _: force * lift * ca.sin(delta) * drag)
+        .redefine("rudder.Y", lambda _: force * side * slope["Yd"])
+        .redefine("rudder.N", lambda _: force * length * side * slope["Nd"])
+    )
+
+
+LOADED_RUDDER = Effect(
+    name="loaded_rudder",
+    acts_on="force",
+    description="The propeller's jet over the rudder grows as the ship slows, and meets it at the angle of the flow.",
+    source="rudder of the MMG model: Yasukawa and Yoshimura (2015), J. Mar. Sci. Technol. 20, 37-52",
+    parameters=(
+        EffectParameter(
+            "loading", "relative gain of inflow speed at the rudder by relative loss of the ship's speed", 0.0, 1.5
+        ),
+        EffectParameter("straightening", "share of the cross flow that reaches the rudder", 0.0, 2.0),
+        EffectParameter("lever", "place that tells the cross flow, in ship lengths forward of midships", -4.0, 0.0),
+    ),
+    equations=_in_loaded_slipstream,
+)

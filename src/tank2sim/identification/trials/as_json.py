@@ -1,0 +1,162 @@
+"""The result of an identification as JSON, and its rows for screen and page."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.identification.trials.evaluation import Figure, pooled
+from tank2sim.identification.trials.identify import Comparison, Identification, misfit
+
+
+def identification_as_json(result: Identification) -> dict[str, object]:
+    """Everything a script may want: ``derivatives``, ``effects``, ``misfit``, ``figures``, ``identifiability``, ..."""
+    estimate, known = result.estimate, result.identifiability
+    parameters = {
+        name: {
+            "value": value,
+            "standard_error": error,
+            "before": before,
+            "before_standard_error": before_error,
+            "share_from_trials": share,
+        }
+        for name, value, error, before, before_error, share in zip(
+            estimate.free,
+            estimate.values,
+            estimate.standard_errors,
+            result.problem.prior_mean,
+            result.problem.prior_error,
+            known.share,
+            strict=True,
+        )
+    }
+    return {
+        "method": estimate.method,
+        "derivatives": {
+            name.partition(".")[2]: entry for name, entry in parameters.items() if name.startswith("derivatives.")
+        },
+        "effects": {name: entry for name, entry in parameters.items() if not name.startswith("derivatives.")},
+        "misfit": {
+            "noise": dict(result.noise),
+            "fit": misfit(result.fit, result.noise),
+            "holdout": misfit(result.holdout, result.noise) if result.holdout else None,
+            "before": {
+                "fit": misfit(result.before, result.noise),
+                "holdout": misfit(result.before_holdout, result.noise) if result.before_holdout else None,
+            },
+        },
+        "yaw_rate_error_over_windows": {
+            "fit": _windows(result.fit),
+            "holdout": _windows(result.holdout) if result.holdout else None,
+        },
+        "figures": {
+            "fit": [_figure(figure) for figure in result.fit.figures],
+            "holdout": [_figure(figure) for figure in result.holdout.figures] if result.holdout else [],
+        },
+        "structures": {
+            name: {"errors": one.errors, "left_out": [list(fold.left_out) for fold in (*one.single, one.extrapolation)]}
+            for name, one in result.structures.items()
+        },
+        "residual_noise": dict(estimate.noise),
+        "prior_scale": dict(estimate.prior_scale),
+        "cost": list(estimate.cost),
+        "identifiability": {
+            "condition": known.condition,
+            "singular_values": known.singular_values,
+            "correlated_pairs": [[one, other, value] for one, other, value in known.pairs],
+            "unseen": [list(direction) for direction in known.unseen],
+        },
+        "warnings": [*result.notices, *known.notices],
+    }
+
+
+def estimate_rows(result: Identification) -> list[list[object]]:
+    """Name, estimate, before, share of the information that the trials gave: a row for each free parameter."""
+    rows: list[list[object]] = []
+    problem, estimate = result.problem, result.estimate
+    for place, name in enumerate(estimate.free):
+        own = f"{estimate.values[place]:.5g} ± {estimate.standard_errors[place]:.2g}"
+        before = f"{problem.prior_mean[place]:.5g} ± {problem.prior_error[place]:.2g}"
+        share = f"{100 * result.identifiability.share[place]:.0f} %"
+        rows.append([name.removeprefix("derivatives."), own, before, share])
+    return rows
+
+
+def following_rows(result: Identification) -> list[list[object]]:
+    """Run, fitted or held out, yaw-rate error over windows and over the whole run, before and now."""
+    rows: list[list[object]] = []
+    pairs = [("fitted", result.before, result.fit)]
+    if result.holdout and result.before_holdout:
+        pairs.append(("held out", result.before_holdout, result.holdout))
+    for word, before, now in pairs:
+        for old, new in zip(before.following, now.following, strict=True):
+            rows.append([new.name, word, *(_percent(one, "motion.r") for one in (old, new))])
+    return rows
+
+
+def structure_rows(result: Identification) -> list[list[object]]:
+    """Structure, mean yaw-rate error of runs left out one at a time, and of those of largest amplitude, %."""
+    return [
+        [name, 100 * float(np.mean(one.errors[:-1])), 100 * float(one.errors[-1])]
+        for name, one in result.structures.items()
+    ]
+
+
+def figure_rows(result: Identification) -> list[list[object]]:
+    """Trial, fitted or held out, figure, measured, predicted before and now, its 95 % interval, error now."""
+    rows: list[list[object]] = []
+    pairs = [("fitted", result.before, result.fit)]
+    if result.holdout and result.before_holdout:
+        pairs.append(("held out", result.before_holdout, result.holdout))
+    for word, before, now in pairs:
+        old = {(figure.trial, figure.name): figure for figure in before.figures}
+        for figure in now.figures:
+            earlier = old.get((figure.trial, figure.name))
+            error = f"{100 * figure.error:+.1f} %" if figure.name.endswith("_m") else f"{figure.error:+.2f}"
+            rows.append(
+                [
+                    figure.trial,
+                    word,
+                    figure.name,
+                    figure.measured,
+                    earlier.predicted if earlier else None,
+                    figure.predicted,
+                    f"{figure.interval[0]:.4g} to {figure.interval[1]:.4g}" if figure.interval else "-",
+                    "-" if np.isnan(figure.error) else error,
+                ]
+            )
+    return rows
+
+
+def improved_text(result: Identification, trials: list[str]) -> str:
+    """Text of the card found, with the trials told in its source."""
+    from tank2sim.cards.reading import changed_text
+
+    card: ManoeuvringCard = result.card
+    source = f"{card.ship.source}; identified by tank2sim ({result.estimate.method}) from {', '.join(trials)}"
+    return changed_text(card.text, card.source, {"ship.source": source})
+
+
+def _windows(comparison: Comparison) -> dict[str, float]:
+    runs = {one.name: one.relative("motion.r") for one in comparison.following if "motion.r" in one.windows}
+    return {**runs, "all": pooled(comparison.following, "motion.r")}
+
+
+def _percent(one: object, signal: str) -> str:
+    from tank2sim.identification.trials.evaluation import Following
+
+    assert isinstance(one, Following)
+    if signal not in one.windows:
+        return "-"
+    return f"{100 * one.relative(signal):.3g} %"
+
+
+def _figure(figure: Figure) -> dict[str, object]:
+    return {
+        "trial": figure.trial,
+        "figure": figure.name,
+        "measured": figure.measured,
+        "predicted": figure.predicted,
+        "error": figure.error,
+        "interval_95": figure.interval,
+    }

@@ -1,0 +1,315 @@
+"""From a card and trials to a better card, with what the trials can and cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics import build
+from tank2sim.dynamics.model import Vector
+from tank2sim.errors import InputError
+from tank2sim.identification.trials.disturbances import Disturbances, disturbances_of
+from tank2sim.identification.trials.equation_error import equation_error
+from tank2sim.identification.trials.evaluation import Figure, Following, following, predicted_figures
+from tank2sim.identification.trials.identifiability import Identifiability, identifiability, refuse_unseen
+from tank2sim.identification.trials.kalman import kalman
+from tank2sim.identification.trials.measured import Measured
+from tank2sim.identification.trials.output_error import Settings, output_error
+from tank2sim.identification.trials.portable import Ship, portable
+from tank2sim.identification.trials.prediction import Settings as BandSettings
+from tank2sim.identification.trials.prediction import bands
+from tank2sim.identification.trials.problem import Estimate, Problem, Progress, silent
+from tank2sim.identification.trials.question import answered, pose
+from tank2sim.identification.trials.recursive import recursive
+from tank2sim.identification.trials.runs import SEEN
+from tank2sim.identification.trials.selection import CrossValidation, cross_validate, simplest, yaw_rate_error
+from tank2sim.identification.trials.structures import STRUCTURES
+from tank2sim.records.audit import estimated_noise
+from tank2sim.simulation.recorded import recorded, steerable
+
+PIECE = 5.0
+"""Length of the pieces of output error, in L/u0: on the KVLCC2 30 s of model time, in which the model's error stays
+small against the motion; shorter pieces see less of what the derivatives do, longer ones run away when unstable."""
+
+WHOLE_RUN_MISFIT = 3.0
+"""Whole runs are fitted when the model follows them, too: to this many times the noise, in every signal (ours)."""
+
+METHODS: tuple[str, ...] = ("output_error", "equation_error", "kalman", "recursive")
+
+
+@dataclass(frozen=True)
+class Options:
+    """How trials are fitted.
+
+    Parameters
+    ----------
+    method : str
+        One of :data:`METHODS`.
+    structure : str
+        One of :data:`tank2sim.identification.trials.structures.STRUCTURES`, or :data:`AUTO`.
+    inertia : bool
+        Estimate acceleration derivatives, too.
+    piece_s : float, optional
+        Length of the pieces of output error, s; by default :data:`PIECE`.
+    scale_prior : bool
+        Let the trials tell how far the card's standard errors may be trusted.
+    members : int
+        Simulations from which the intervals of the figures of trials held out are taken; 0 for none.
+    """
+
+    method: str = "output_error"
+    structure: str = "card"
+    inertia: bool = False
+    piece_s: float | None = None
+    scale_prior: bool = True
+    members: int = 100
+
+
+IN_BANDS = {f"overshoots_deg.{number}": f"overshoot_{number}_deg" for number in (1, 2)}
+"""Name of a figure in :mod:`.prediction` to its name here, where they differ."""
+
+AUTO = "auto"
+"""Structure that stands for the one cross-validation prefers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A model against trials: over windows and whole runs, and in the figures of manoeuvres."""
+
+    following: tuple[Following, ...]
+    figures: tuple[Figure, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """What came of trials.
+
+    Parameters
+    ----------
+    started : ManoeuvringCard
+        The card from which the estimate began: that given, in the structure asked for.
+    card : ManoeuvringCard
+        With the estimates and their standard errors.
+    problem : Problem
+        What was asked of the trials to fit.
+    estimate : Estimate
+    identifiability : Identifiability
+    noise : mapping
+        Standard deviation of measurement noise by variable, from the files or estimated: the unit of misfit.
+    fit, holdout : Comparison
+        The new card against the trials it was fitted to, and against those it was not (None: there are none).
+    before, before_holdout : Comparison
+        The card that was given, against the same.
+    structures : mapping
+        Cross-validation of each structure that was tried: none, unless the choice was left to it.
+    notices : tuple of str
+    """
+
+    started: ManoeuvringCard
+    card: ManoeuvringCard
+    problem: Problem
+    estimate: Estimate
+    identifiability: Identifiability
+    noise: Mapping[str, float]
+    fit: Comparison
+    holdout: Comparison | None
+    before: Comparison
+    before_holdout: Comparison | None
+    structures: Mapping[str, CrossValidation]
+    notices: tuple[str, ...]
+
+
+def identify(
+    card: ManoeuvringCard,
+    trials: Measured,
+    holdout: Measured | None = None,
+    options: Options | None = None,
+    progress: Progress = silent,
+    executor: Executor | None = None,
+) -> Identification:
+    """Estimate the coefficients of a card from free-running trials.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        What is known of the ship; its standard errors say how well.
+    trials, holdout : Measured
+        Trials to fit, and trials only to compare with.
+    options : Options, optional
+    progress : callable
+        Told of each better estimate. A KeyboardInterrupt ends the search with the best so far.
+    executor : concurrent.futures.Executor, optional
+        For the fits of cross-validation.
+
+    Raises
+    ------
+    InputError
+        The trials do not excite what is to be estimated, lack signals that are needed, or are driven otherwise than
+        those held out.
+    """
+    options = options or Options()
+    tried = cross_validated(card, trials, options, executor) if options.structure == AUTO else {}
+    structure = simplest(tried) if tried else options.structure
+    started = STRUCTURES[structure].start(card)
+    problem = pose(started, trials.trials, trials.driven_by, inertia=options.inertia)
+    refuse_unseen(problem)
+    estimate = estimated(problem, options, progress)
+    improved = answered(started, estimate)
+    answer = _Answer(problem, estimate, improved)
+    noise = noise_of(trials, problem)
+    result = identifiability(problem, estimate)
+    held = holdout if holdout is not None and holdout.trials else None
+    return Identification(
+        started=started,
+        card=improved,
+        problem=problem,
+        estimate=estimate,
+        identifiability=result,
+        noise=noise,
+        fit=compared(improved, trials, noise),
+        holdout=_held_out(answer, held, noise, options.members) if held else None,
+        before=compared(card, trials, noise),
+        before_holdout=compared(card, held, noise) if held else None,
+        structures=tried,
+        notices=(*trials.notices, *(held.notices if held else ()), *_told(card), *estimate.notices),
+    )
+
+
+def estimated(problem: Problem, options: Options, progress: Progress = silent) -> Estimate:
+    """The estimate by the method asked for; output error begins at what equation error found, if that is better."""
+    if options.method == "kalman":
+        return kalman(problem, progress=progress)
+    if options.method == "recursive":
+        return recursive(problem, progress=progress)
+    if options.method == "equation_error":
+        return equation_error(problem, progress=progress)
+    length = options.piece_s or PIECE * problem.ship_time
+    settings = Settings(piece_s=length, scale_prior=options.scale_prior)
+    in_pieces = output_error(problem, _start(problem), settings, progress)
+    if in_pieces.notices or not _follows_whole_runs(problem, in_pieces):
+        return in_pieces
+    return output_error(problem, in_pieces.values, replace(settings, piece_s=None), progress)
+
+
+def cross_validated(
+    card: ManoeuvringCard, trials: Measured, options: Options, executor: Executor | None = None
+) -> dict[str, CrossValidation]:
+    """Each structure fitted without some of the trials, and its yaw-rate error on them."""
+    results = {}
+    for name, structure in STRUCTURES.items():
+        started = structure.start(card)
+        problem = pose(started, trials.trials, trials.driven_by, inertia=options.inertia)
+        asked = portable(problem, started, trials.driven_by)
+        results[name] = cross_validate(asked, partial(_in_pieces, options=options), yaw_rate_error, executor)
+    return results
+
+
+def _in_pieces(problem: Problem, options: Options) -> Estimate:
+    """What a fold is fitted by: pieces only, and fewer rounds, for it is compared with its like."""
+    if options.method != "output_error":
+        return estimated(problem, options)
+    length = options.piece_s or PIECE * problem.ship_time
+    return output_error(problem, _start(problem), Settings(length, scale_prior=options.scale_prior, rounds=3))
+
+
+def _start(problem: Problem) -> Vector | None:
+    """Values from which output error begins: those of the weak form, which needs no start; None without velocities."""
+    try:
+        return equation_error(problem).values
+    except InputError:
+        return None
+
+
+def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
+    results = following(problem, estimate.values, estimate.noise)
+    limits = {name: WHOLE_RUN_MISFIT * deviation for name, deviation in estimate.noise.items()}
+    return all(error <= limits[name] for result in results for name, error in result.whole.items())
+
+
+def compared(card: ManoeuvringCard, trials: Measured, noise: Mapping[str, float]) -> Comparison:
+    """A card's model against trials."""
+    whole = pose(card, trials.trials, trials.driven_by)
+    # Nothing is estimated here: one free parameter instead of all saves making and compiling their sensitivities.
+    problem = replace(whole, free=whole.free[:1], prior_mean=whole.prior_mean[:1], prior_error=whole.prior_error[:1])
+    weights = {name: noise.get(name) or 1.0 for name in problem.seen}
+    return Comparison(
+        following(problem, problem.prior_mean, weights),
+        predicted_figures(card, trials.trials),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Answer:
+    """A problem, what was found, and the card with it."""
+
+    problem: Problem
+    estimate: Estimate
+    card: ManoeuvringCard
+
+
+def _held_out(answer: _Answer, held: Measured, noise: Mapping[str, float], members: int) -> Comparison:
+    """The new card against trials held out, with the interval in which each figure was to be expected.
+
+    The interval is that of simulations with coefficients drawn from their covariance, under random forces as large and
+    as slow as those that the fit left unexplained (:mod:`.prediction`).
+    """
+    plain = compared(answer.card, held, noise)
+    if not members or not plain.figures:
+        return plain
+    card = steerable(answer.card)
+    ship, model = Ship(card.text, "order"), build(card)
+    left = _disturbances(answer)
+    intervals: dict[tuple[str, str], tuple[float, float]] = {}
+    for trial in held.trials:
+        what = recorded(trial, model)
+        if what is None:
+            continue
+        try:
+            found = bands(ship, answer.estimate, what, left, BandSettings(members=members)).quantiles
+        except InputError:  # every member ran away: no interval can be told
+            continue
+        for name, (lowest, *_, highest) in found.items():
+            intervals[trial.name, IN_BANDS.get(name, name)] = (lowest, highest)
+    figures = tuple(replace(one, interval=intervals.get((one.trial, one.name))) for one in plain.figures)
+    return replace(plain, figures=figures)
+
+
+def _disturbances(answer: _Answer) -> Disturbances | None:
+    """What the fit left unexplained, as random forces; None where the velocities for it were not measured."""
+    try:
+        return disturbances_of(answer.problem, answer.estimate.values)
+    except InputError:
+        return None
+
+
+def noise_of(trials: Measured, problem: Problem) -> dict[str, float]:
+    """Measurement noise of each variable, SI: as stated in the files, else estimated; the largest of all trials."""
+    noise: dict[str, float] = {}
+    for trial in trials.trials:
+        levels = {**estimated_noise(trial), **trial.noise}
+        for signal, variable in SEEN.items():
+            if variable in problem.seen and levels.get(signal):
+                noise[variable] = max(noise.get(variable, 0.0), float(levels[signal]))
+    return noise
+
+
+def misfit(comparison: Comparison, noise: Mapping[str, float]) -> float:
+    """Root mean square over runs and signals of (simulated - measured)/noise, each run from one initial state."""
+    ratios = [
+        error / noise[name]
+        for result in comparison.following
+        for name, error in result.whole.items()
+        if noise.get(name)
+    ]
+    return float(np.sqrt(np.mean(np.square(ratios)))) if ratios else np.nan
+
+
+def _told(card: ManoeuvringCard) -> Sequence[str]:
+    if card.uncertainty:
+        return ()
+    return ("the card states no uncertainty: 2 % of each derivative is taken, and widened as the trials demand",)

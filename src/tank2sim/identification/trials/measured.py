@@ -1,0 +1,105 @@
+"""Trials as they are taken for identification: audited, mended, and brought to the size of the card's ship."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.errors import InputError
+from tank2sim.records.audit import mended
+from tank2sim.records.reading import read_trial
+from tank2sim.records.trials import Trial, froude_scaled
+
+APPROACH_SHARE = 0.05
+"""The approach speed is read off this share of a trial at its beginning."""
+
+FARTHEST_FROUDE = 2.5
+"""A trial whose approach differs from the card's speed by more than this factor is at another scale than it seems."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Trials at the size of the ship.
+
+    Parameters
+    ----------
+    trials : tuple of Trial
+    driven_by : str
+        ``angle`` if the rudder's angle was measured in all of them, ``order`` if only its order is known.
+    notices : tuple of str
+        What was mended and scaled.
+    """
+
+    trials: tuple[Trial, ...]
+    driven_by: str
+    notices: tuple[str, ...]
+
+
+def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
+    """Read trials, mend what the audit is sure of, and scale them to the card's ship.
+
+    Raises
+    ------
+    InputError
+        A file is at fault, two trials have one name, a trial is of another size and does not tell its scale, or the
+        rudder's angle is known in some trials and only its order in others.
+    """
+    trials, notices = [], []
+    for path in paths:
+        trial, findings = mended(read_trial(path))
+        notices += [f"{path.name}: {one.column}: {one.what}; taken so: {one.likely_truth}" for one in findings]
+        scaled, factor = at_size_of(trial, card)
+        if factor != 1:
+            notices.append(f"{path.name}: scaled by Froude's law to a ship {factor:.4g} times as long")
+        trials.append(scaled)
+    names = [trial.name for trial in trials]
+    for trial in trials:
+        if names.count(trial.name) > 1:
+            raise InputError(trial.path, "", "has the name of another trial", "give each file once, under its own name")
+    by_angle = ["delta_rad" in trial.signals for trial in trials]
+    if any(by_angle) and not all(by_angle):
+        odd = trials[by_angle.index(False)]
+        remedy = "give trials that all have delta_deg, or all only delta_order_deg"
+        raise InputError(odd.path, "header", "has no delta_deg, as others have", remedy)
+    return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(dict.fromkeys(notices)))
+
+
+def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
+    """The trial at the size of the card's ship, and the factor on its lengths.
+
+    A trial that tells its scale may hold numbers of the model or of the ship, and the card may be of either: the factor
+    is the scale, one over it, or 1, whichever brings the approach speed nearest to the card's.
+
+    Raises
+    ------
+    InputError
+        None of them brings it near.
+    """
+    speed = approach_speed(trial)
+    candidates = [1.0] if trial.scale is None else [1.0, trial.scale, 1 / trial.scale]
+    if speed is None:
+        return trial, 1.0
+    away = [abs(math.log(speed * math.sqrt(factor) / card.model.speed_mps)) for factor in candidates]
+    factor = candidates[int(np.argmin(away))]
+    if min(away) > math.log(FARTHEST_FROUDE) and trial.scale is None:
+        problem = f"begins at {speed:.3g} m/s, and the card is of {card.model.speed_mps:.3g} m/s"
+        remedy = "if it is of a model, add the comment '# scale: 45.7' (ship length over model length)"
+        raise InputError(trial.path, "", problem, remedy)
+    return (trial if factor == 1 else froude_scaled(trial, factor)), factor
+
+
+def approach_speed(trial: Trial) -> float | None:
+    """Speed at the beginning of a trial, m/s; None if neither speed nor position was measured."""
+    count = max(3, int(APPROACH_SHARE * len(trial.time_s)))
+    for name in ("u_mps", "u_ground_mps", "sog_mps"):
+        if name in trial.signals and not np.isnan(trial.signals[name][:count]).all():
+            return float(abs(np.nanmedian(trial.signals[name][:count])))
+    if "x_m" in trial.signals and "y_m" in trial.signals:
+        x, y, t = trial.signals["x_m"], trial.signals["y_m"], trial.time_s
+        return float(np.hypot(x[count] - x[0], y[count] - y[0]) / (t[count] - t[0]))
+    return None

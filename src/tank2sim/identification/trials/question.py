@@ -1,0 +1,105 @@
+"""The problem that a card and trials pose: what is free, and what was known of it before."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.reading import revised
+from tank2sim.dynamics import build
+from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.identification.trials.driving import driven_by_angle, with_ground_velocities
+from tank2sim.identification.trials.problem import Estimate, Problem
+from tank2sim.identification.trials.runs import prepare, seen_in
+from tank2sim.records.trials import Trial
+
+ASSUMED_EFFECT_ERROR = 0.25
+"""Standard error of an effect's parameter without one, as a share of its bounds' distance (ours)."""
+
+
+def driven_model(card: ManoeuvringCard, driven_by: str) -> Model:
+    """The card's model, driven by the measured angle of the rudder or by its order."""
+    model = with_ground_velocities(build(card))
+    return driven_by_angle(model) if driven_by == "angle" else model
+
+
+def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str, tuple[float, float]]:
+    """Name in the model of each free parameter, to its value and standard error before the trials.
+
+    Every derivative that the card has (with a value or an uncertainty) but for accelerations, unless `inertia` asks for
+    them: motion alone cannot tell a mass from a force. Every parameter of the card's effects that is no input.
+    """
+    free = {}
+    for name in {**card.derivatives, **card.uncertainty}:
+        if name in ACCELERATION_TERMS and not inertia:
+            continue
+        error = card.standard_error(name)
+        if error > 0 and name in _used(card):
+            free[f"derivatives.{name}"] = card.derivatives.get(name, 0.0), error
+    for entry in card.effects:
+        effect = EFFECTS[entry.name]
+        for one in effect.parameters:
+            if one.input_name:
+                continue
+            error = entry.uncertainty.get(one.name, ASSUMED_EFFECT_ERROR * (one.maximum - one.minimum))
+            free[f"{effect.name}.{one.stem}"] = one.value(entry.parameters, card), error
+    return free
+
+
+def pose(card: ManoeuvringCard, trials: Sequence[Trial], driven_by: str, *, inertia: bool = False) -> Problem:
+    """The problem of fitting a card's free parameters to trials.
+
+    Raises
+    ------
+    InputError
+        A trial is too short or has nothing to compare, or the card leaves nothing free.
+    """
+    model = driven_model(card, driven_by)
+    free = free_parameters(card, inertia=inertia)
+    if not free:
+        raise InputError(card.source, "derivatives", "there is nothing to estimate", "give derivatives with a value")
+    seen = seen_in(model, trials)
+    if not seen:
+        raise InputError(trials[0].path, "header", "none of its signals can be compared", "give u_mps, r_degps, ...")
+    runs = tuple(prepare(model, trial, seen) for trial in trials)
+    values = np.array(list(free.values()))
+    return Problem(model, tuple(free), values[:, 0], values[:, 1], runs)
+
+
+def answered(card: ManoeuvringCard, estimate: Estimate) -> ManoeuvringCard:
+    """The card with the estimates in place of its values, and their standard errors."""
+    found = dict(zip(estimate.free, zip(estimate.values, estimate.standard_errors, strict=True), strict=True))
+    derivatives = {
+        name.partition(".")[2]: (rounded(value, error), float(f"{error:.3g}"))
+        for name, (value, error) in found.items()
+        if name.startswith("derivatives.")
+    }
+    changes: dict[str, object] = {}
+    for number, entry in enumerate(card.effects):
+        effect = EFFECTS[entry.name]
+        for one in effect.parameters:
+            if (name := f"{effect.name}.{one.stem}") in found:
+                value, error = found[name]
+                for section, figure in (("parameters", rounded(value, error)), ("uncertainty", float(f"{error:.3g}"))):
+                    key, shown = card.in_file(f"effects.{number}.{section}.{one.name}", figure)
+                    changes[key] = shown
+    return revised(card, derivatives, changes)
+
+
+def rounded(value: float, error: float) -> float:
+    """A value to a thousandth of its standard error: no figure is lost that means anything."""
+    if not 0 < error < np.inf:
+        return float(f"{value:.10g}")
+    places = int(np.ceil(3 - np.log10(error)))
+    return float(round(value, places))
+
+
+def _used(card: ManoeuvringCard) -> set[str]:
+    if card.model.kind == "abkowitz":
+        return set(ALL_TERMS)
+    return {*LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS}

@@ -1,0 +1,135 @@
+"""``tank2sim identify`` as a user calls it, on made-up trials of a ship whose equations share no code with it."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tank2sim.cards import ManoeuvringCard, parse_card, read_card
+from tests.identification.trials.made_up_ship import CARD, TRUTH, trial, turn, zigzag
+
+from .command_line import refused, tank2sim
+
+COLUMNS = {"delta_rad": "delta_deg", "u_mps": "u_mps", "v_mps": "v_mps", "r_radps": "r_degps", "psi_rad": "psi_deg"}
+
+
+def write(folder: Path, name: str, rudder, seed: int = 1, scale: float | None = None) -> Path:
+    made = trial(rudder, name=name, duration=200.0, step=0.5, seed=seed)
+    lengths = 1.0 if scale is None else scale
+    columns = {"t_s": made.time_s / np.sqrt(lengths)}
+    for there, here in COLUMNS.items():
+        factor = np.sqrt(lengths) if there == "r_radps" else 1 / np.sqrt(lengths) if there.endswith("mps") else 1.0
+        values = made.signals[there] * factor
+        columns[here] = np.rad2deg(values) if "deg" in here else values
+    columns |= {name: made.signals[name] / lengths for name in ("x_m", "y_m")}
+    path = folder / f"{name}.csv"
+    comment = "" if scale is None else f"# scale: {scale}\n"
+    np.savetxt(
+        path, np.column_stack(list(columns.values())), delimiter=",", header=comment + ",".join(columns), comments=""
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Trials, and the card with every hydrodynamic coefficient off by a fifth."""
+    folder = tmp_path_factory.mktemp("trials")
+    write(folder, "zigzag20", zigzag(20), seed=1)
+    write(folder, "zigzag10", zigzag(10), seed=2)
+    write(folder, "turn25", turn(25), seed=3)
+    write(folder, "turn-35", turn(-35), seed=4)
+    write(folder, "straight", lambda t: 0.0, seed=5)
+    write(folder, "small", zigzag(20), seed=6, scale=25.0)
+    rng = np.random.default_rng(7)
+    text = CARD.split("[derivatives]")[0] + "[derivatives]\n"
+    for name, value in TRUTH.items():
+        text += f"{name} = {value if name.endswith('dot') else value * (1 + 0.2 * rng.choice([-1, 1]))}\n"
+    (folder / "off.toml").write_text(text, encoding="utf-8")
+    return folder
+
+
+FITTED = ("zigzag20.csv", "zigzag10.csv", "turn25.csv")
+
+
+def test_a_card_that_is_off_comes_back_to_the_truth(folder: Path) -> None:
+    result = tank2sim(
+        *("identify", "off.toml", *FITTED, "--holdout", "turn-35.csv", "-o", "found.toml", "--json", "found.json"),
+        cwd=folder,
+    )
+    assert result.returncode == 0, result.stderr
+    found = json.loads((folder / "found.json").read_text())
+    within = [
+        abs(entry["value"] - TRUTH[name]) < 3.5 * entry["standard_error"]
+        for name, entry in found["derivatives"].items()
+    ]
+    assert np.mean(within) > 0.9
+    for name in ("Nv", "Nr", "Nd", "Yv"):
+        assert found["derivatives"][name]["value"] == pytest.approx(TRUTH[name], rel=0.05), name
+    assert found["misfit"]["holdout"] < 1.5
+    assert found["misfit"]["before"]["holdout"] > 5
+    card = read_card(str(folder / "found.toml"))
+    assert isinstance(card, ManoeuvringCard)
+    assert card.derivatives["Nr"] == pytest.approx(found["derivatives"]["Nr"]["value"], rel=1e-3)
+    assert card.uncertainty["Nr"] == pytest.approx(found["derivatives"]["Nr"]["standard_error"], rel=0.01)
+    turns = {figure["figure"]: figure for figure in found["figures"]["holdout"]}
+    assert turns["advance_m"]["predicted"] == pytest.approx(turns["advance_m"]["measured"], rel=0.02)
+
+
+def test_a_trial_of_a_model_identifies_the_ship(folder: Path) -> None:
+    """A 4 m model's zigzag, Froude-scaled, beside the ship's own turn."""
+    result = tank2sim("identify", "off.toml", "small.csv", "turn25.csv", "--json", "small.json", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    assert "25 times as long" in " ".join(result.stdout.split())
+    found = json.loads((folder / "small.json").read_text())["derivatives"]
+    assert found["Nr"]["value"] == pytest.approx(TRUTH["Nr"], rel=0.08)
+    assert found["Nd"]["value"] == pytest.approx(TRUTH["Nd"], rel=0.08)
+
+
+@pytest.mark.parametrize("method", ["equation_error", "recursive"])
+def test_other_methods_answer_the_same_question(folder: Path, method: str) -> None:
+    result = tank2sim("identify", "off.toml", *FITTED, "--method", method, "--json", f"{method}.json", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    found = json.loads((folder / f"{method}.json").read_text())
+    assert found["method"] == method
+    assert found["derivatives"]["Nr"]["value"] == pytest.approx(TRUTH["Nr"], rel=0.15)
+
+
+def test_a_trial_without_excitation_is_refused_by_the_terms_it_cannot_see(folder: Path) -> None:
+    result = tank2sim("identify", "off.toml", "straight.csv", "-o", "never.toml", cwd=folder)
+    refused(result, "straight", "Nr", "Nd")
+    assert not (folder / "never.toml").exists()
+
+
+def test_bad_input_is_one_line_and_nothing_is_written(folder: Path) -> None:
+    refused(tank2sim("identify", "off.toml", "no-such.csv", "-o", "n.toml", cwd=folder), "no-such.csv")
+    refused(tank2sim("identify", "off.toml", "zigzag20.csv", "-o", "zigzag20.csv", cwd=folder), "zigzag20.csv")
+    refused(tank2sim("identify", "wilinski-zellman", "zigzag20.csv", cwd=folder), "manoeuvr")
+    refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--piece", "-3", cwd=folder), "--piece")
+    assert not (folder / "n.toml").exists()
+
+
+def test_an_interrupt_keeps_the_best_card_so_far(folder: Path) -> None:
+    program = "from tank2sim.cli import main; main()"
+    command = [sys.executable, "-c", program, "identify", "off.toml", *FITTED, "-o", "stopped.toml", "--json", "s.json"]
+    slow = "import time; from tank2sim.identification.trials import output_error as o; e = o.Shooting.normal\n"
+    slow += "o.Shooting.normal = lambda *a: (print('at it', flush=True), time.sleep(0.2), e(*a))[2]\n"
+    command[2] = slow + program
+    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    for line in process.stdout:
+        if "at it" in line:
+            break
+    time.sleep(1.5)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    assert "interrupted" in out
+    card = parse_card((folder / "stopped.toml").read_text(encoding="utf-8"), "stopped.toml")
+    assert isinstance(card, ManoeuvringCard)

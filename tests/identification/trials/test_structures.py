@@ -1,0 +1,85 @@
+"""Structures turn a card into the card to start from, and questions and answers go through cards unharmed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tank2sim.cards import ManoeuvringCard, parse_card, read_card
+from tank2sim.dynamics import build
+from tank2sim.identification.trials.problem import Estimate
+from tank2sim.identification.trials.question import answered, free_parameters, rounded
+from tank2sim.identification.trials.structures import STRUCTURES, prior_of_absent
+
+
+@pytest.fixture(scope="module")
+def kvlcc2() -> ManoeuvringCard:
+    card = read_card("kvlcc2")
+    assert isinstance(card, ManoeuvringCard)
+    return card
+
+
+@pytest.mark.parametrize("name", STRUCTURES)
+def test_every_structure_is_a_card_that_builds_and_leaves_something_free(name: str, kvlcc2: ManoeuvringCard) -> None:
+    started = STRUCTURES[name].start(kvlcc2)
+    build(started)
+    free = free_parameters(started)
+    assert free and all(error > 0 for _, error in free.values())
+    assert not any(parameter.endswith("dot") for parameter in free), "inertia comes from the card"
+
+
+def test_cross_flow_drag_takes_the_place_of_cubic_terms_and_keeps_the_linear_ones(kvlcc2: ManoeuvringCard) -> None:
+    started = STRUCTURES["cross_flow"].start(kvlcc2)
+    for name in ("Yvvv", "Nvvv", "Yddd", "Ydu", "Nduu"):
+        assert name in kvlcc2.derivatives and name not in started.derivatives
+    for name in ("Yv", "Nr", "Yd", "Nd", "Xdd", "Yvdot"):
+        assert started.derivatives[name] == kvlcc2.derivatives[name]
+    assert [effect.name for effect in started.effects] == ["cross_flow_drag", "loaded_rudder"]
+    assert {"cross_flow_drag.drag_coefficient", "loaded_rudder.lever"} < set(free_parameters(started))
+
+
+def test_the_structure_of_the_card_is_the_card(kvlcc2: ManoeuvringCard) -> None:
+    assert STRUCTURES["card"].start(kvlcc2).text == kvlcc2.text
+
+
+def test_third_order_adds_what_is_absent_with_an_uncertainty_and_changes_no_motion_but_by_xvr(
+    kvlcc2: ManoeuvringCard,
+) -> None:
+    started = STRUCTURES["third_order"].start(kvlcc2)
+    assert {"Yvvr", "Nvrr", "Nrrr"} < set(started.uncertainty)
+    changed = {name for name, value in started.derivatives.items() if value != kvlcc2.derivatives.get(name, 0.0)}
+    assert changed == {"Xvr"}
+    assert started.derivatives["Xvr"] == -kvlcc2.derivatives["Yvdot"]
+
+
+def test_an_absent_term_is_held_to_a_share_of_the_linear_force_in_a_hard_turn(kvlcc2: ManoeuvringCard) -> None:
+    value, error = prior_of_absent(kvlcc2, "Nrrr")
+    assert value == 0.0
+    assert error * 0.7**3 == pytest.approx(0.3 * abs(kvlcc2.derivatives["Nr"]) * 0.7)
+
+
+def _estimate(free: dict[str, tuple[float, float]], factor: float) -> Estimate:
+    values = np.array([value * factor for value, _ in free.values()])
+    errors = np.array([error for _, error in free.values()])
+    return Estimate("test", tuple(free), values, np.diag(errors**2), np.diag(errors**-2))
+
+
+@pytest.mark.parametrize("name", ["mariner", "kvlcc2"])
+def test_an_answer_goes_into_the_card_in_its_own_signs_and_scaling(name: str) -> None:
+    card = read_card(name)
+    assert isinstance(card, ManoeuvringCard)
+    started = STRUCTURES["cross_flow"].start(card)
+    free = free_parameters(started)
+    new = answered(started, _estimate(free, 1.25))
+    again = parse_card(new.text, "again")
+    assert isinstance(again, ManoeuvringCard)
+    found = free_parameters(again)
+    assert set(found) == set(free)
+    for parameter, (value, error) in free.items():
+        assert found[parameter][0] == pytest.approx(1.25 * value, abs=1e-3 * error)
+        assert found[parameter][1] == pytest.approx(error, rel=0.01)
+
+
+def test_rounding_keeps_a_thousandth_of_the_standard_error() -> None:
+    assert rounded(-0.0123456789, 0.00012) == pytest.approx(-0.0123457, abs=1.2e-7)
+    assert rounded(1.23456789, 0.0) == 1.23456789

@@ -1,0 +1,236 @@
+"""The page of an identification shows what was measured, what the cards make of it, and what was estimated."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from tank2sim.cards import parse_card
+from tank2sim.cli.identify import command
+from tank2sim.identification.trials.evaluation import passages
+from tank2sim.identification.trials.identify import Options, identify
+from tank2sim.identification.trials.inference import scaled_prior
+from tank2sim.identification.trials.measured import Measured
+from tank2sim.identification.trials.question import pose
+from tank2sim.records.trials import Trial
+from tank2sim.report.charts import chart_specification
+from tank2sim.report.identification_charts import AFTER, BEFORE, MEASURED, track_grid
+from tank2sim.report.identification_page import MOST_TRIALS, identification_charts, identification_page, pairs_of
+from tank2sim.report.page import Verdict
+from tests.identification.trials import made_up_ship
+
+OFF = {"Nd": 1.25, "Nr": 0.8, "Yv": 1.2, "Xu": 0.8}
+COLUMNS = {"delta_deg": "delta_rad", "u_mps": "u_mps", "v_mps": "v_mps", "r_degps": "r_radps", "psi_deg": "psi_rad"}
+
+
+def text_of(factors):
+    """The made-up ship's card in which these derivatives are off, little known, and the only ones to estimate."""
+    lines, errors = [], ["[uncertainty]"]
+    gear = "[steering_gear]\nmax_rate_degps = 20.0\nmax_angle_deg = 40.0"
+    for line in made_up_ship.CARD.replace("[steering_gear]", gear).splitlines():
+        name, _, value = line.partition(" = ")
+        factor = factors.get(name) if name in made_up_ship.TRUTH else None
+        lines.append(f"{name} = {float(value) * factor}" if factor else line)
+        if name in made_up_ship.TRUTH:
+            errors.append(f"{name} = {0.25 * abs(float(value)) if factor else 0.0}")
+    return "\n".join([*lines, *errors])
+
+
+@pytest.fixture(scope="module")
+def trials():
+    """A turn, and a rudder that goes to and fro by the clock: no zigzag, for the heading does not tell it when."""
+    runs = {"turn": made_up_ship.turn(20), "by_the_clock": made_up_ship.zigzag(15, 45.0)}
+    return {
+        name: made_up_ship.trial(rudder, name=name, duration=220.0, step=0.5, noise=0.0)
+        for name, rudder in runs.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def found(trials):
+    known = parse_card(text_of(OFF), "off.toml")
+    fitted = Measured((trials["by_the_clock"],), "angle", ("mended",))
+    held = Measured((trials["turn"],), "angle", ())
+    result = identify(known, fitted, held, Options(method="equation_error"))
+    pairs = pairs_of(known, result, fitted), pairs_of(known, result, held)
+    return result, pairs, identification_charts(result, *pairs)
+
+
+def over_ground(trial: Trial) -> Trial:
+    names = {"u_mps": "u_ground_mps", "v_mps": "v_ground_mps"}
+    return replace(trial, signals={names.get(name, name): values for name, values in trial.signals.items()})
+
+
+def rows_of(chart, series, panel=None):
+    sets = chart_specification(chart)["datasets"]
+    return [row for name, rows in sets.items() for row in rows if row.get("run") == series and panel in (None, name)]
+
+
+@pytest.mark.parametrize("seen_from", [lambda trial: trial, over_ground], ids=["through the water", "over the ground"])
+def test_the_true_card_runs_along_with_the_record(trials, seen_from) -> None:
+    truth = parse_card(text_of({"Nd": 1.0}), "true.toml")
+    both = tuple(seen_from(trial) for trial in trials.values())
+    turn, clock = passages(pose(truth, both, "angle"), truth, both, {})
+    assert (turn.closed_loop, clock.closed_loop) == ("u_mps" in both[0].signals, False)
+    limits = {"rudder": 0.02, "motion.psi": 0.01, "motion.r": 5e-4, "motion.beta": 0.005}
+    for passage in (turn, clock):
+        inside = (passage.time_s > passage.model_time_s[0] + 2) & (passage.time_s < passage.model_time_s[-1] - 2)
+        for name, limit in {**limits, "motion.speed": 0.01, "motion.x": 1.0, "motion.y": 1.0}.items():
+            measured = passage.measured[name][inside]
+            simulated = np.interp(passage.time_s[inside], passage.model_time_s, passage.simulated[name])
+            assert np.abs(simulated - measured).max() < limit < np.abs(measured).max() / 10, (passage.name, name)
+
+
+def test_speed_and_drift_are_those_of_the_measured_track(trials) -> None:
+    """The track's direction, and how fast it is run, tell both without the velocities."""
+    truth, turn = parse_card(text_of({"Nd": 1.0}), "true.toml"), trials["turn"]
+    (passage,) = passages(pose(truth, (turn,), "angle"), truth, (turn,), {})
+    north, east = (np.gradient(turn.signals[name], turn.time_s) for name in ("x_m", "y_m"))
+    drift = turn.signals["psi_rad"] - np.unwrap(np.arctan2(east, north))
+    for name, there in (("motion.beta", drift), ("motion.speed", np.hypot(north, east))):
+        shown = np.interp(turn.time_s[5:-5], passage.time_s, passage.measured[name])
+        np.testing.assert_allclose(shown, there[5:-5], atol=0.01, err_msg=name)
+    assert np.abs(drift).max() > 0.1
+
+
+def test_histories_are_in_degrees_and_thinned(found, trials) -> None:
+    _, _, charts = found
+    chart = charts["histories_held_out"]
+    measured = rows_of(chart, MEASURED)
+    assert max(row["s1"] for row in measured) == pytest.approx(
+        np.rad2deg(trials["turn"].signals["psi_rad"].max()), 1e-2
+    )
+    assert max(row["s0"] for row in measured) == pytest.approx(20, 1e-3)
+    assert len(measured) < 60 and len(rows_of(chart, AFTER)) < 160
+    titles = [
+        one["layer"][0]["encoding"]["y"]["axis"]["title"] for one in chart_specification(chart)["concat"][0]["vconcat"]
+    ]
+    assert titles == ["rudder (deg)", "heading (deg)", "yaw rate (deg/s)", "speed (m/s)", "drift angle (deg)"]
+
+
+def test_a_track_has_one_scale_and_all_three_series(found) -> None:
+    _, (_, held), _ = found
+    chart = track_grid(held)
+    (panel,) = chart_specification(chart)["concat"]
+    across, up = (panel["layer"][0]["encoding"][axis]["scale"]["domain"] for axis in ("x", "y"))
+    assert (across[1] - across[0]) / panel["width"] == pytest.approx((up[1] - up[0]) / panel["height"])
+    assert {series for series in (MEASURED, BEFORE, AFTER) if rows_of(chart, series)} == {MEASURED, BEFORE, AFTER}
+
+
+def test_the_card_before_is_drawn_as_before_and_the_card_found_as_found(found) -> None:
+    """The card that was off misses the record, the one found does not."""
+    _, (_, held), _ = found
+    chart = track_grid(held)
+    ends = {series: rows_of(chart, series)[-1] for series in (MEASURED, BEFORE, AFTER)}
+    distance = {
+        series: np.hypot(ends[series]["x"] - ends[MEASURED]["x"], ends[series]["y"] - ends[MEASURED]["y"])
+        for series in (BEFORE, AFTER)
+    }
+    assert distance[AFTER] < 5 < distance[BEFORE]
+
+
+def test_windows_show_the_share_of_each_signal_by_trial(found) -> None:
+    result, _, charts = found
+    cells = [
+        row for rows in chart_specification(charts["windows"])["datasets"].values() for row in rows if "share" in row
+    ]
+    now = {(row["trial"], row["signal"]): row["share"] for row in cells}  # the card found comes last of each trial
+    for one in (*result.fit.following, *result.holdout.following):
+        assert now[one.name, "r"] == pytest.approx(100 * one.relative("motion.r"), 1e-4)
+        assert now[one.name, "ψ"] == pytest.approx(100 * one.relative("motion.psi"), 1e-4)
+
+
+def test_parameters_are_in_standard_errors_of_the_prior(found) -> None:
+    result, _, charts = found
+    rows = [
+        row for rows in chart_specification(charts["parameters"])["datasets"].values() for row in rows if "own" in row
+    ]
+    unit = scaled_prior(result.problem, result.estimate.prior_scale)
+    for place, name in enumerate(result.estimate.free):
+        own, prior = (
+            next(row for row in rows if row["name"] == name.partition(".")[2] and row.get("run") == run)
+            for run in ("estimate", "prior")
+        )
+        moved = (result.estimate.values[place] - result.problem.prior_mean[place]) / unit[place]
+        assert own["v"] == pytest.approx(moved, 1e-4) and prior["v"] == 0
+        assert own["high"] - own["low"] == pytest.approx(
+            2 * 1.96 * result.estimate.standard_errors[place] / unit[place], 1e-2
+        )
+        assert (prior["low"], prior["high"]) == pytest.approx((-1.96, 1.96), abs=1e-3)
+        assert own["share"] == pytest.approx(100 * result.identifiability.share[place], 1e-4)
+
+
+def test_figures_stand_with_their_errors_in_percent(found) -> None:
+    result, _, charts = found
+    rows = [
+        row for rows in chart_specification(charts["figures"])["datasets"].values() for row in rows if "measured" in row
+    ]
+    advance = next(one for one in result.before_holdout.figures if one.name == "advance_m")
+    (shown,) = (row for row in rows if row["run"] == BEFORE and row["name"] == "turn · advance")
+    assert shown["measured"] == pytest.approx(advance.measured, 1e-4)
+    assert shown["error"] == pytest.approx(100 * (advance.predicted / advance.measured - 1), 1e-3)
+    assert abs(shown["error"]) > 1
+
+
+def test_the_page_tells_the_errors_of_what_was_held_out(found) -> None:
+    result, _, charts = found
+    page = identification_page(result, charts)
+    figures = {figure.label: figure for figure in page.figures}
+    assert figures["Trials fitted"].value == figures["Trials held out"].value == 1
+    assert figures["Coefficients"].value == len(OFF)
+    (turn,), (before,) = result.holdout.following, result.before_holdout.following
+    shown = figures["Yaw-rate error, held out"]
+    assert shown.value == pytest.approx(100 * turn.relative("motion.r"), 1e-2) and shown.unit == "%"
+    assert f"{100 * before.relative('motion.r'):.3g} %" in shown.note and shown.verdict is Verdict.NONE
+    assert "Advance error, held out" in figures
+    assert sum(len(section.charts) for section in page.sections) == len(charts)
+    assert page.sections[-1].tables[0].rows == [["mended"], *([notice] for notice in result.notices[1:])]
+    heading = next(section.heading for section in page.sections if charts["tracks_held_out"] in _drawn(section))
+    assert heading == "Trials held out"
+
+
+def _drawn(section):
+    return [illustration.chart for illustration in section.charts]
+
+
+def test_many_trials_stay_a_page_that_opens(found) -> None:
+    result, (fitted, _), _ = found
+    many = [
+        replace(pair, before=replace(pair.before, name=name), after=replace(pair.after, name=name))
+        for place in range(MOST_TRIALS + 2)
+        for pair in fitted
+        if (name := f"{pair.name}_{place}")
+    ]
+    charts = identification_charts(result, many)
+    shown = [len(chart.to_dict(validate=False)["concat"]) for stem, chart in charts.items() if "histories" in stem]
+    assert sum(shown) == MOST_TRIALS and max(shown) <= 6
+    drawn = sum(len(json.dumps(chart.to_dict(validate=False))) for chart in charts.values())
+    assert drawn < 2e6  # as many may be held out; the page's own script is another 1 MB
+
+
+def written(trial: Trial, folder: Path) -> Path:
+    columns = {"t_s": trial.time_s} | {
+        name: np.rad2deg(trial.signals[signal]) if "deg" in name else trial.signals[signal]
+        for name, signal in (COLUMNS | {"x_m": "x_m", "y_m": "y_m"}).items()
+    }
+    path = folder / f"{trial.name}.csv"
+    np.savetxt(path, np.stack(list(columns.values()), axis=1), "%.9g", ",", header=",".join(columns), comments="")
+    return path
+
+
+def test_the_command_writes_the_page_and_its_pictures(trials, tmp_path) -> None:
+    card, plots = tmp_path / "off.toml", tmp_path / "plots"
+    card.write_text(text_of(OFF), encoding="utf-8")
+    path = written(trials["turn"], tmp_path)
+    shown = CliRunner().invoke(command, [str(card), str(path), "--method", "equation_error", "--plot", str(plots)])
+    assert shown.exit_code == 0, shown.exception
+    stems = ("windows", "figures", "tracks_fitted", "histories_fitted", "parameters", "correlation", "singular_values")
+    assert {one.name for one in plots.iterdir()} == {"report.html", *(f"{stem}.png" for stem in stems)}
+    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in plots.glob("*.png"))
+    page = (plots / "report.html").read_text(encoding="utf-8")
+    assert "Made up" in page and "Nd" in page and page.count("<script src") == 0

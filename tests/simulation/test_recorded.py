@@ -1,0 +1,135 @@
+"""Recorded manoeuvres recognised and repeated: on a made-up ship under a made-up controller, stepped in plain numpy."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tank2sim.cards import parse_card
+from tank2sim.dynamics import build
+from tank2sim.records.trials import Trial
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Turn, Zigzag
+from tank2sim.simulation.recorded import recorded, repeat
+from tests.identification.trials.made_up_ship import CARD, NOISE, SPEED, TRUTH, accelerations
+
+RATE, STEP = np.deg2rad(3.0), 0.05
+GEAR = "time_constant_s = 0.1\nmax_rate_degps = 3.0\nmax_angle_deg = 40.0"
+
+
+@pytest.fixture(scope="module")
+def model():
+    return build(parse_card(CARD.replace("time_constant_s = 0.5", GEAR), "made_up.toml"))
+
+
+def sail(order, duration, noise=0.0, begin_heading=0.4):
+    """The record, every second step, of a ship whose rudder follows ``order(t, psi, r, rudder order before)``."""
+    count = int(duration / STEP)
+    x = np.array([SPEED, 0.0, 0.0, begin_heading, 10.0, -20.0])
+    rows, rudder, wanted = [], 0.0, 0.0
+    for k in range(count):
+        rows.append([*x, rudder])
+        wanted = order(k * STEP, x[3] - begin_heading, wanted)
+        rudder += np.clip(wanted - rudder, -RATE * STEP, RATE * STEP)
+
+        def rates(s, rudder=rudder):
+            u, v, r, psi = s[:4]
+            c, n = np.cos(psi), np.sin(psi)
+            return np.array([*accelerations(u, v, r, rudder, TRUTH), r, u * c - v * n, u * n + v * c])
+
+        middle = rates(x + STEP / 2 * rates(x))
+        x = x + STEP * middle
+    names = ("u_mps", "v_mps", "r_radps", "psi_rad", "x_m", "y_m", "delta_rad")
+    rng, rows = np.random.default_rng(1), np.array(rows)[::2]
+    signals = {
+        name: column + noise * NOISE.get(name, 0.0) * rng.standard_normal(len(column))
+        for name, column in zip(names, rows.T, strict=True)
+    }
+    return Trial(Path("made_up.csv"), 2 * STEP * np.arange(len(rows)), signals)
+
+
+def controller(angle, heading, lag, begin=12.0):
+    """A zigzag: the order is reversed `lag` s after the heading is reached."""
+    state = {"side": np.sign(angle), "due": None}
+
+    def order(t, turned, before):
+        if t < begin:
+            return 0.0
+        if state["due"] is None and state["side"] * turned >= heading:
+            state["due"] = t + lag
+        if state["due"] is not None and t >= state["due"]:
+            state["side"], state["due"] = -state["side"], None
+        return state["side"] * abs(angle)
+
+    return order
+
+
+def overshoots(trial, heading):
+    """Largest headings beyond the nominal one, either way in turn, deg."""
+    turned = trial.signals["psi_rad"] - trial.signals["psi_rad"][0]
+    parts = np.split(turned, np.flatnonzero(np.diff(np.sign(turned)) != 0) + 1)
+    peaks = [np.abs(part).max() for part in parts if np.abs(part).max() > heading]
+    return np.degrees(np.array(peaks) - heading)
+
+
+@pytest.mark.parametrize(("side", "lag"), [(1, 0.0), (-1, 2.0)])
+def test_a_zigzag_is_recognised_with_its_controller(model, side, lag):
+    heading, angle = np.deg2rad(10), np.deg2rad(20)
+    trial = sail(controller(side * angle, heading, lag), 260.0)
+    what = recorded(trial, model)
+    assert isinstance(what.manoeuvre, Zigzag)
+    assert what.manoeuvre.rudder == pytest.approx(side * angle, rel=0.01)
+    assert what.manoeuvre.heading == pytest.approx(heading)
+    assert what.manoeuvre.lag_s == pytest.approx(lag, abs=0.15)
+    assert what.begin_s == pytest.approx(12.0, abs=0.1)
+    assert what.rudder_rate_radps == pytest.approx(RATE, rel=0.03)
+    expected = overshoots(trial, heading)
+    np.testing.assert_allclose(what.figures["overshoots_deg"][:3], expected[:3], atol=0.1)
+
+
+def test_the_zigzag_is_repeated_by_the_ship_that_made_it(model):
+    trial = sail(controller(np.deg2rad(20), np.deg2rad(20), 1.0), 300.0, noise=1.0)
+    what = recorded(trial, model)
+    again = repeat(what, Integrator(model))
+    np.testing.assert_allclose(again.figures["overshoots_deg"][:2], what.figures["overshoots_deg"][:2], atol=0.4)
+    early = replace(what, manoeuvre=replace(what.manoeuvre, lag_s=0.0))
+    without = repeat(early, Integrator(model)).figures["overshoots_deg"]
+    assert without[0] < again.figures["overshoots_deg"][0] - 0.3
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_turn_begins_at_its_rudder_and_ends_with_it(model, side):
+    angle = np.deg2rad(30)
+    trial = sail(lambda t, turned, before: side * angle * (12 <= t < 240), 300.0)
+    what = recorded(trial, model)
+    assert isinstance(what.manoeuvre, Turn)
+    assert what.manoeuvre.rudder == pytest.approx(side * angle, rel=0.01)
+    assert (what.begin_s, what.end_s) == pytest.approx((12.0, 240.0), abs=3.0)
+    signals, t = trial.signals, trial.time_s
+    turned = side * (signals["psi_rad"] - signals["psi_rad"][0])
+    heading, at = signals["psi_rad"][0], np.interp([np.pi / 2, np.pi], turned, t)
+    x, y = (signals[name] - np.interp(12.0, t, signals[name]) for name in ("x_m", "y_m"))
+    along, across = x * np.cos(heading) + y * np.sin(heading), side * (y * np.cos(heading) - x * np.sin(heading))
+    assert what.figures["advance_m"] == pytest.approx(np.interp(at[0], t, along), rel=0.01)
+    assert what.figures["tactical_diameter_m"] == pytest.approx(np.interp(at[1], t, across), rel=0.01)
+    again = repeat(what, Integrator(model)).figures
+    assert again["advance_m"] == pytest.approx(what.figures["advance_m"], rel=0.01)
+    assert again["tactical_diameter_m"] == pytest.approx(what.figures["tactical_diameter_m"], rel=0.01)
+
+
+def test_the_start_is_the_measured_state_at_the_execute(model):
+    trial = sail(controller(np.deg2rad(20), np.deg2rad(10), 0.0), 150.0)
+    start = recorded(trial, model).start
+    assert start["initial.u"] == pytest.approx(SPEED, rel=1e-3)
+    assert start["initial.psi"] == pytest.approx(0.4, abs=1e-3)
+    assert start["initial.x"] == pytest.approx(10 + 12 * SPEED * np.cos(0.4), rel=0.02)
+    assert start["initial.rudder_angle"] == pytest.approx(0.0, abs=0.01)
+
+
+def test_other_runs_are_neither(model):
+    assert recorded(sail(lambda t, turned, before: 0.0, 60.0), model) is None
+    assert recorded(sail(lambda t, turned, before: 0.3 * (t > 12), 40.0), model) is None  # turned too little
+    trial = sail(controller(np.deg2rad(20), np.deg2rad(10), 0.0), 100.0)
+    less = {name: values for name, values in trial.signals.items() if name != "v_mps"}
+    assert recorded(replace(trial, signals=less), model) is None
