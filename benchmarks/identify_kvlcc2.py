@@ -15,9 +15,8 @@ import numpy as np
 
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.identification.trials.evaluation import Figure, pooled
-from tank2sim.identification.trials.identify import Comparison, Options, compared, identify, noise_of
+from tank2sim.identification.trials.identify import Comparison, Options, identify
 from tank2sim.identification.trials.measured import Measured, measured
-from tank2sim.identification.trials.question import pose
 
 DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data"
 ZIGZAGS = ("05_01", "10_05", "10_10_P", "10_10_S", "20_10_S", "25_05", "35_05")
@@ -32,11 +31,9 @@ def main() -> None:
     zigzags = {name: _read(card, DATA / "kvlcc2_hsva" / f"HSVA_CPMC_KVLCC2_Z_{name}.dat") for name in ZIGZAGS}
     marin = _read(card, *sorted((DATA / "kvlcc2_marin").glob("*.dat")))
     print(f"{'':24s}{'HSVA held out':>26s}{'MARIN, never fitted':>44s}")
-    heads = ("OS1 deg", "OS2 deg", "r %", "OS1 deg", "OS2 deg", "r %", "advance %", "t.diam. %")
+    heads = ("OS1 deg", "OS2 deg", "r %", "OS1 deg", "OS2 deg", "r %", "advance %", "t.diam. %", "in 95 %")
     print(f"{'root mean square error':24s}" + "".join(f"{head:>10s}" for head in heads))
     everything = _together(*zigzags.values())
-    noise = noise_of(everything, pose(card, everything.trials, everything.driven_by))
-    _row("card, not fitted", [compared(card, everything, noise)], compared(card, marin, noise))
     for structure in STRUCTURES:
         options = Options(structure=structure)
         held = []
@@ -48,6 +45,9 @@ def main() -> None:
         final = identify(card, everything, marin, options)
         assert final.holdout is not None
         _row(structure, held, final.holdout)
+        if structure == STRUCTURES[-1]:
+            assert final.before_holdout is not None
+            _row("card, not fitted", [final.before], final.before_holdout)
 
 
 def _read(card: ManoeuvringCard, *paths: Path) -> Measured:
@@ -65,12 +65,19 @@ def _row(name: str, held: list[Comparison], marin: Comparison) -> None:
         runs = [run for comparison in comparisons for run in comparison.following]
         cells += [_overshoot(figures, 1), _overshoot(figures, 2), 100 * pooled(runs, "motion.r")]
     turn = [100 * figure.error for figure in marin.figures if figure.name in ("advance_m", "tactical_diameter_m")]
-    print(f"{name:24s}" + "".join(f"{cell:10.2f}" for cell in [*cells, *turn]), flush=True)
+    inside = [
+        one.interval[0] <= one.measured <= one.interval[1]
+        for comparison in (*held, marin)
+        for one in comparison.figures
+        if one.interval is not None
+    ]
+    told = f"{sum(inside):6d} of {len(inside)}" if inside else ""
+    print(f"{name:24s}" + "".join(f"{cell:10.2f}" for cell in [*cells, *turn]) + told, flush=True)
 
 
 def _overshoot(figures: list[Figure], number: int) -> float:
     errors = [figure.error for figure in figures if figure.name == f"overshoot_{number}_deg"]
-    return float(np.sqrt(np.mean(np.square(errors))))
+    return float(np.sqrt(np.nanmean(np.square(errors))))  # of those that the simulation reached
 
 
 if __name__ == "__main__":

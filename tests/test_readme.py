@@ -34,6 +34,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     campaign = DATA / "data" / "pmm_synthetic_12"
     if campaign.is_dir():
         shutil.copytree(campaign, path / "campaign")
+    trials = DATA / "data" / "gap_cases" / "case_6"
+    if trials.is_dir():
+        shutil.copytree(trials, path / "trials")
     return path
 
 

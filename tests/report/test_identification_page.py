@@ -18,8 +18,9 @@ from tank2sim.identification.trials.inference import scaled_prior
 from tank2sim.identification.trials.measured import Measured
 from tank2sim.identification.trials.question import pose
 from tank2sim.records.trials import Trial
+from tank2sim.report import identification_page as identification_page_module
 from tank2sim.report.charts import chart_specification
-from tank2sim.report.identification_charts import AFTER, BEFORE, MEASURED, track_grid
+from tank2sim.report.identification_charts import AFTER, BEFORE, MEASURED, Pair, track_grid
 from tank2sim.report.identification_page import MOST_TRIALS, identification_charts, identification_page, pairs_of
 from tank2sim.report.page import Verdict
 from tests.identification.trials import made_up_ship
@@ -122,6 +123,15 @@ def test_a_track_has_one_scale_and_all_three_series(found) -> None:
     assert {series for series in (MEASURED, BEFORE, AFTER) if rows_of(chart, series)} == {MEASURED, BEFORE, AFTER}
 
 
+def test_without_positions_the_cards_alone_have_tracks(trials) -> None:
+    truth = parse_card(text_of({"Nd": 1.0}), "true.toml")
+    seen = {name: values for name, values in trials["turn"].signals.items() if name not in ("x_m", "y_m")}
+    blind = (replace(trials["turn"], signals=seen),)
+    (passage,) = passages(pose(truth, blind, "angle"), truth, blind, {})
+    chart = track_grid([Pair(before=passage, after=passage)])
+    assert rows_of(chart, AFTER) and not rows_of(chart, MEASURED)
+
+
 def test_the_card_before_is_drawn_as_before_and_the_card_found_as_found(found) -> None:
     """The card that was off misses the record, the one found does not."""
     _, (_, held), _ = found
@@ -198,19 +208,36 @@ def _drawn(section):
     return [illustration.chart for illustration in section.charts]
 
 
-def test_many_trials_stay_a_page_that_opens(found) -> None:
-    result, (fitted, _), _ = found
+def test_of_many_trials_those_are_shown_that_are_followed_worst(found, monkeypatch) -> None:
+    result, (fitted, held), _ = found
+    monkeypatch.setattr(identification_page_module, "MOST_TRIALS", 2)
+    monkeypatch.setattr(identification_page_module, "PER_SHEET", 1)
+    names = ("b", "c", "a")
     many = [
-        replace(pair, before=replace(pair.before, name=name), after=replace(pair.after, name=name))
-        for place in range(MOST_TRIALS + 2)
-        for pair in fitted
-        if (name := f"{pair.name}_{place}")
+        replace(held[0], **{side: replace(held[0].after, name=name) for side in ("before", "after")}) for name in names
     ]
-    charts = identification_charts(result, many)
-    shown = [len(chart.to_dict(validate=False)["concat"]) for stem, chart in charts.items() if "histories" in stem]
-    assert sum(shown) == MOST_TRIALS and max(shown) <= 6
-    drawn = sum(len(json.dumps(chart.to_dict(validate=False))) for chart in charts.values())
-    assert drawn < 2e6  # as many may be held out; the page's own script is another 1 MB
+    followed = [
+        replace(result.holdout.following[0], name=name, windows={"motion.r": (error, 1.0)})
+        for name, error in zip(names, (0.2, 0.1, 0.3), strict=True)
+    ]
+    comparison = replace(result.holdout, following=tuple(followed))
+    other = replace(result, holdout=comparison, before_holdout=comparison)
+    shown = identification_charts(other, fitted, many)
+    sheets = [chart_specification(shown[stem])["concat"] for stem in ("histories_held_out", "histories_held_out_2")]
+    assert [[panel["title"]["text"] for panel in sheet] for sheet in sheets] == [["b"], ["a"]]
+    notes = [
+        section.text for section in identification_page(other, shown).sections if section.heading == "Trials held out"
+    ]
+    assert notes == ["The 2 of 3 trials with the largest error of yaw rate."]
+
+
+def test_one_trial_takes_little_of_the_page(found) -> None:
+    """Pictures of as many trials as are shown, fitted and held out, stay below 3 MB; the page's script has 1 MB."""
+    _, _, charts = found
+    sizes = [
+        len(json.dumps(charts[stem].to_dict(validate=False))) for stem in ("tracks_held_out", "histories_held_out")
+    ]
+    assert sum(sizes) * 2 * MOST_TRIALS < 3e6
 
 
 def written(trial: Trial, folder: Path) -> Path:

@@ -75,14 +75,21 @@ class Pair:
         return self.after.name
 
 
-def track_grid(pairs: Sequence[Pair], *, title: str = "") -> alt.ConcatChart:
+def track_grid(pairs: Sequence[Pair], *, title: str = "") -> alt.ConcatChart | None:
     """Tracks, a panel a trial, x north up and y east to the right in one scale; measured as points, models as lines.
 
-    The scale is that of what was measured and of the card found: the card before may leave the panel.
+    The scale is that of what was measured and of the card found: the card before may leave the panel. None where no
+    trial has a track.
     """
     panels, rows_of = [], {}
     for pair in pairs:
-        series = _series(pair, ("motion.x", "motion.y"))
+        series = {
+            label: columns
+            for label, columns in _series(pair, ("motion.x", "motion.y")).items()
+            if {"motion.x", "motion.y"} <= set(columns)
+        }
+        if not series:
+            continue
         shown = [columns for label, columns in series.items() if label != BEFORE] or list(series.values())
         north, east = (np.concatenate([columns[name] for columns in shown]) for name in ("motion.x", "motion.y"))
         frame = equal_frame(east, north, width_px=205, height_px=260)
@@ -100,7 +107,9 @@ def track_grid(pairs: Sequence[Pair], *, title: str = "") -> alt.ConcatChart:
         rows_of[pair.name] = rows
         layers = alt.layer(*_marks(position, tooltip), data=alt.NamedData(pair.name))
         panels.append(layers.properties(title=_small(pair.name), width=frame.width_px, height=frame.height_px))
-    told = f"Tracks of {', '.join(pair.name for pair in pairs)}, measured and simulated; north is up."
+    if not panels:
+        return None
+    told = f"Tracks of {', '.join(rows_of)}, measured and simulated; north is up."
     slender = all(panel.width <= 110 for panel in panels)
     chart = _grid(panels, title, told, columns=ACROSS + slender).properties(usermeta={"equal_scales": True})
     return _with_rows(chart, rows_of)
@@ -260,10 +269,11 @@ def _figure_row(one: Figure, ending: str) -> Record:
 def _figure_panels(rows: list[Record], words: str, unit: str, error_unit: str) -> alt.HConcatChart:
     look = series_look([AFTER, BEFORE], as_points=[AFTER, BEFORE])
     reached = [row for row in rows if row["predicted"] is not None]
-    ends = extent(np.array([row[key] for row in reached or rows for key in ("measured", "predicted")], dtype=float))
+    ends = extent(np.array([row[key] for row in reached or rows for key in ("measured", "low", "high")], dtype=float))
     scale = alt.Scale(domain=[min(0.0, ends[0]), 1.05 * ends[1]], nice=False)
     tooltip = [
         alt.Tooltip("name:N", title="figure"),
+        alt.Tooltip("set:N", title="trial is"),
         alt.Tooltip("run:N", title="by"),
         alt.Tooltip("measured:Q", title=f"measured ({unit})", format=NUMBER),
         alt.Tooltip("predicted:Q", title=f"predicted ({unit})", format=NUMBER),
@@ -275,7 +285,7 @@ def _figure_panels(rows: list[Record], words: str, unit: str, error_unit: str) -
         y=alt.Y("b:Q", scale=scale, title=f"predicted {words} ({unit})", axis=alt.Axis(tickCount=5)),
     )
     base = alt.Chart(data(reached)).encode(color=look.colour, shape=look.shape, tooltip=tooltip)
-    bars = alt.Chart(data(reached)).mark_rule(strokeWidth=1.5, opacity=0.6, clip=True).encode(color=look.colour)
+    bars = alt.Chart(data(reached)).mark_rule(strokeWidth=1.2, clip=True).encode(color=look.colour)
     points = base.mark_point(filled=False, size=46).encode(
         x=alt.X("measured:Q", scale=scale), y=alt.Y("predicted:Q", scale=scale)
     )
@@ -314,7 +324,7 @@ def _series(pair: Pair, names: Sequence[str]) -> dict[str, dict[str, Vector]]:
     series = {}
     for label, (time, columns) in sources.items():
         there = {name: columns[name] for name in names if name in columns}
-        if label == MEASURED:
+        if label == MEASURED and there:
             inside = _simulated_part(pair, time)
             series[label] = {name: values[inside] for name, values in {"time": time, **there}.items()}
         elif there:

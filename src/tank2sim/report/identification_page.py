@@ -59,7 +59,8 @@ def identification_charts(
     for word, pairs in ((HELD_OUT, held), (FITTED, fitted)):
         if pairs:
             stem, shown = word.replace(" ", "_"), _worst(pairs, sets[word][1])
-            charts[f"tracks_{stem}"] = track_grid(shown, title=f"Tracks of trials {word}")
+            if tracks := track_grid(shown, title=f"Tracks of trials {word}"):
+                charts[f"tracks_{stem}"] = tracks
             for first in range(0, len(shown), PER_SHEET):
                 part = f"_{first // PER_SHEET + 1}" if first else ""
                 own = shown[first : first + PER_SHEET]

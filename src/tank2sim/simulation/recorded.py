@@ -32,6 +32,9 @@ NOMINAL_HEADINGS_DEG = (1, 2, 5, 10, 15, 20, 25, 30, 35)
 SMOOTHING = 0.3
 """Recorded signals are smoothed over this many L/u0 before figures are read off (ours: below the time of any peak)."""
 
+HALF_TURNS = 2.0
+"""A turn is repeated for this many times as long as the measured one took to turn through 180 deg."""
+
 LEAST_RUDDER = math.radians(2.0)
 """A rudder that never exceeds this is no manoeuvre."""
 
@@ -154,6 +157,9 @@ def repeat(what: Recorded, integrator: Integrator, parameters: dict[str, float] 
         values = {name: value for name, value in gear.items() if name in model.parameter_names}
     start = {name: value for name, value in what.start.items() if name in model.parameter_names}
     duration = what.end_s - what.begin_s
+    half = what.figures.get("time_180_s")
+    if isinstance(half, float):  # what comes long after says nothing of the figures, and may leave the model's range
+        duration = min(duration, HALF_TURNS * half)
     return simulate(
         model,
         what.manoeuvre,

@@ -208,7 +208,8 @@ def passages(
         simulated: Trajectory | None
         if what is None:
             shooting = shooting or Shooting(problem)
-            begin, simulated = run.begin_s, _replayed(shooting, run, noise)
+            begin, replayed = run.begin_s, _replayed(shooting, run, noise)
+            simulated = replayed if replayed.is_finite() else None
         else:
             try:
                 begin, simulated = what.begin_s, repeat(what, integrator).trajectory
@@ -295,7 +296,8 @@ def chosen(figures: Mapping[str, object], *, turn: bool) -> dict[str, float]:
 def _rms(values: Vector) -> float:
     if not np.isfinite(values[~np.isnan(values)]).all():
         return np.inf
-    return float(np.sqrt(np.nanmean(values**2)))
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(np.nanmean(values**2)))
 
 
 def _spread(name: str, values: Vector) -> float:

@@ -36,6 +36,9 @@ PIECE = 5.0
 """Length of the pieces of output error, in L/u0: on the KVLCC2 30 s of model time, in which the model's error stays
 small against the motion; shorter pieces see less of what the derivatives do, longer ones run away when unstable."""
 
+LEAST_NOISE = 1e-3
+"""Noise of a signal that states none is taken as this share of its standard deviation at least (ours)."""
+
 WHOLE_RUN_MISFIT = 3.0
 """Whole runs are fitted when the model follows them, too: to this many times the noise, in every signal (ours)."""
 
@@ -171,10 +174,10 @@ def identify(
         estimate=estimate,
         identifiability=result,
         noise=noise,
-        fit=compared(improved, trials, noise),
-        holdout=_held_out(answer, held, noise, options.members) if held else None,
-        before=compared(card, trials, noise),
-        before_holdout=compared(card, held, noise) if held else None,
+        fit=compared(improved, trials, estimate.noise),
+        holdout=_held_out(answer, held, options.members) if held else None,
+        before=compared(card, trials, estimate.noise),
+        before_holdout=compared(card, held, estimate.noise) if held else None,
         structures=tried,
         notices=(*trials.notices, *(held.notices if held else ()), *_told(card), *estimate.notices),
     )
@@ -231,12 +234,21 @@ def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
     return all(error <= limits[name] for result in results for name, error in result.whole.items())
 
 
-def compared(card: ManoeuvringCard, trials: Measured, noise: Mapping[str, float]) -> Comparison:
-    """A card's model against trials."""
+def compared(card: ManoeuvringCard, trials: Measured, residual: Mapping[str, float]) -> Comparison:
+    """A card's model against trials.
+
+    Parameters
+    ----------
+    card, trials
+        At the same size.
+    residual : mapping
+        Standard deviation that is to be expected of each variable's error: it weighs the signals where the initial
+        state of a window is found. Weighed by the noise of the sensors alone, the state would follow one signal.
+    """
     whole = pose(card, trials.trials, trials.driven_by)
     # Nothing is estimated here: one free parameter instead of all saves making and compiling their sensitivities.
     problem = replace(whole, free=whole.free[:1], prior_mean=whole.prior_mean[:1], prior_error=whole.prior_error[:1])
-    weights = {name: noise.get(name) or 1.0 for name in problem.seen}
+    weights = {name: residual.get(name) or 1.0 for name in problem.seen}
     return Comparison(
         following(problem, problem.prior_mean, weights),
         predicted_figures(card, trials.trials),
@@ -252,13 +264,13 @@ class _Answer:
     card: ManoeuvringCard
 
 
-def _held_out(answer: _Answer, held: Measured, noise: Mapping[str, float], members: int) -> Comparison:
+def _held_out(answer: _Answer, held: Measured, members: int) -> Comparison:
     """The new card against trials held out, with the interval in which each figure was to be expected.
 
     The interval is that of simulations with coefficients drawn from their covariance, under random forces as large and
     as slow as those that the fit left unexplained (:mod:`.prediction`).
     """
-    plain = compared(answer.card, held, noise)
+    plain = compared(answer.card, held, answer.estimate.noise)
     if not members or not plain.figures:
         return plain
     card = steerable(answer.card)
@@ -288,13 +300,17 @@ def _disturbances(answer: _Answer) -> Disturbances | None:
 
 
 def noise_of(trials: Measured, problem: Problem) -> dict[str, float]:
-    """Measurement noise of each variable, SI: as stated in the files, else estimated; the largest of all trials."""
+    """Measurement noise of each variable, SI: as stated in the files, else estimated; the largest of all trials.
+
+    At least :data:`LEAST_NOISE`: a record that was smoothed shows no noise, and still is not that exact.
+    """
     noise: dict[str, float] = {}
     for trial in trials.trials:
         levels = {**estimated_noise(trial), **trial.noise}
         for signal, variable in SEEN.items():
             if variable in problem.seen and levels.get(signal):
-                noise[variable] = max(noise.get(variable, 0.0), float(levels[signal]))
+                least = LEAST_NOISE * float(np.nanstd(trial.signals[signal])) if signal not in trial.noise else 0.0
+                noise[variable] = max(noise.get(variable, 0.0), least, float(levels[signal]))
     return noise
 
 

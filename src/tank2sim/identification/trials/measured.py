@@ -15,11 +15,11 @@ from tank2sim.records.audit import mended
 from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import Trial, froude_scaled
 
-APPROACH_SHARE = 0.05
-"""The approach speed is read off this share of a trial at its beginning."""
+TYPICAL_SPEED = 95
+"""Percentile of the speed that stands for a trial's approach: some begin at rest, and all are slower afterwards."""
 
 FARTHEST_FROUDE = 2.5
-"""A trial whose approach differs from the card's speed by more than this factor is at another scale than it seems."""
+"""A trial whose approach speed differs from the card's speed by more than this factor is at another scale."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,19 +87,23 @@ def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
     away = [abs(math.log(speed * math.sqrt(factor) / card.model.speed_mps)) for factor in candidates]
     factor = candidates[int(np.argmin(away))]
     if min(away) > math.log(FARTHEST_FROUDE) and trial.scale is None:
-        problem = f"begins at {speed:.3g} m/s, and the card is of {card.model.speed_mps:.3g} m/s"
+        problem = f"reaches {speed:.3g} m/s, and the card is of {card.model.speed_mps:.3g} m/s"
         remedy = "if it is of a model, add the comment '# scale: 45.7' (ship length over model length)"
         raise InputError(trial.path, "", problem, remedy)
     return (trial if factor == 1 else froude_scaled(trial, factor)), factor
 
 
 def approach_speed(trial: Trial) -> float | None:
-    """Speed at the beginning of a trial, m/s; None if neither speed nor position was measured."""
-    count = max(3, int(APPROACH_SHARE * len(trial.time_s)))
+    """Speed at which a trial was approached, m/s; None if neither speed nor position was measured."""
+    signals = trial.signals
     for name in ("u_mps", "u_ground_mps", "sog_mps"):
-        if name in trial.signals and not np.isnan(trial.signals[name][:count]).all():
-            return float(abs(np.nanmedian(trial.signals[name][:count])))
-    if "x_m" in trial.signals and "y_m" in trial.signals:
-        x, y, t = trial.signals["x_m"], trial.signals["y_m"], trial.time_s
-        return float(np.hypot(x[count] - x[0], y[count] - y[0]) / (t[count] - t[0]))
+        if name in signals and not np.isnan(signals[name]).all():
+            return float(np.nanpercentile(np.abs(signals[name]), TYPICAL_SPEED))
+    if "x_m" in signals and "y_m" in signals:
+        known = ~np.isnan(signals["x_m"] + signals["y_m"])
+        t, x, y = (values[known] for values in (trial.time_s, signals["x_m"], signals["y_m"]))
+        if len(t) > 1:
+            stride = max(1, len(t) // 100)  # over a hundredth of the trial, so that noise of positions does not count
+            way = np.hypot(np.diff(x[::stride]), np.diff(y[::stride])) / np.diff(t[::stride])
+            return float(np.percentile(way, TYPICAL_SPEED))
     return None

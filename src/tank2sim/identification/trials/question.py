@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.form import Propulsion
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
@@ -15,8 +16,18 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.driving import driven_by_angle, with_ground_velocities
 from tank2sim.identification.trials.problem import Estimate, Problem
-from tank2sim.identification.trials.runs import prepare, seen_in
+from tank2sim.identification.trials.runs import Run, in_range, prepare, seen_in
 from tank2sim.records.trials import Trial
+
+LEAST_PART = 2.0
+"""Parts of a run inside the card's range of speeds are used if they last this many L/u0 (ours)."""
+
+REVOLUTIONS = "propulsion.Xnn"
+REVOLUTIONS_ERROR = 0.2
+"""Standard error before the trials of the effect of revolutions, as a share of it: a card states none (ours)."""
+
+REVOLUTIONS_VARY = 0.01
+"""Revolutions that vary by less than this share of their nominal number tell nothing of their effect."""
 
 ASSUMED_EFFECT_ERROR = 0.25
 """Standard error of an effect's parameter without one, as a share of its bounds' distance (ours)."""
@@ -47,6 +58,8 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
             if one.input_name:
                 continue
             error = entry.uncertainty.get(one.name, ASSUMED_EFFECT_ERROR * (one.maximum - one.minimum))
+            if error <= 0:  # stated as certain
+                continue
             free[f"{effect.name}.{one.stem}"] = one.value(entry.parameters, card), error
     return free
 
@@ -61,14 +74,32 @@ def pose(card: ManoeuvringCard, trials: Sequence[Trial], driven_by: str, *, iner
     """
     model = driven_model(card, driven_by)
     free = free_parameters(card, inertia=inertia)
+    if card.propulsion is not None and card.propulsion.Xnn and _revolutions_vary(card.propulsion, trials):
+        free[REVOLUTIONS] = card.propulsion.Xnn, REVOLUTIONS_ERROR * abs(card.propulsion.Xnn)
     if not free:
         raise InputError(card.source, "derivatives", "there is nothing to estimate", "give derivatives with a value")
     seen = seen_in(model, trials)
     if not seen:
         raise InputError(trials[0].path, "header", "none of its signals can be compared", "give u_mps, r_degps, ...")
-    runs = tuple(prepare(model, trial, seen) for trial in trials)
+    runs = tuple(part for trial in trials for part in _parts(card, model, prepare(model, trial, seen)))
+    if not runs:
+        low, high = card.model.speed_range_mps
+        problem = f"never goes for long at {low:g} to {high:g} m/s, where the card holds"
+        raise InputError(trials[0].path, "", problem, "change model.valid_speed_mps of the card, or leave it out")
     values = np.array(list(free.values()))
     return Problem(model, tuple(free), values[:, 0], values[:, 1], runs)
+
+
+def _revolutions_vary(propulsion: Propulsion, trials: Sequence[Trial]) -> bool:
+    known = [trial.signals["n_radps"] for trial in trials if "n_radps" in trial.signals]
+    return bool(known) and float(np.nanstd(np.concatenate(known))) > REVOLUTIONS_VARY * propulsion.nominal_radps
+
+
+def _parts(card: ManoeuvringCard, model: Model, run: Run) -> tuple[Run, ...]:
+    """The parts of a run at speeds at which the card says that it holds; the whole run if it does not say."""
+    if card.model.valid_speed_mps is None:
+        return (run,)
+    return in_range(run, model, card.model.valid_speed_mps, LEAST_PART * card.ship.length_m / card.model.speed_mps)
 
 
 def answered(card: ManoeuvringCard, estimate: Estimate) -> ManoeuvringCard:
@@ -88,6 +119,9 @@ def answered(card: ManoeuvringCard, estimate: Estimate) -> ManoeuvringCard:
                 for section, figure in (("parameters", rounded(value, error)), ("uncertainty", float(f"{error:.3g}"))):
                     key, shown = card.in_file(f"effects.{number}.{section}.{one.name}", figure)
                     changes[key] = shown
+    if REVOLUTIONS in found:
+        scale = float(card.scales.force) if card.model.scaling == "dimensional" else 1.0
+        changes[REVOLUTIONS] = rounded(*found[REVOLUTIONS]) * scale
     return revised(card, derivatives, changes)
 
 

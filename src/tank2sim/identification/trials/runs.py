@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from tank2sim.dynamics.model import Model, Vector
 from tank2sim.errors import InputError
@@ -120,6 +121,35 @@ def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | 
     return Run(trial.name, begin, step, inputs, measured, tuple(seen))
 
 
+def in_range(run: Run, model: Model, speeds: tuple[float, float], least_s: float) -> tuple[Run, ...]:
+    """The parts of a run in which the ship goes at speeds (m/s) at which the model holds, each of `least_s` s or more.
+
+    Speed is judged by its mean over half of L/u0, for single readings jump. Without a measured speed the run is kept.
+    """
+    speed = _speed(run)
+    if speed is None:
+        return (run,)
+    p = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+    width = max(1, round(0.5 * p["ship.length"] / p["ship.speed"] / run.step_s))
+    smooth = uniform_filter1d(speed, width)
+    inside = (smooth >= speeds[0]) & (smooth <= speeds[1])
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
+    pairs = [(begin, end) for begin, end in zip(edges[::2], edges[1::2], strict=True) if end - begin > 1]
+    parts = [run.part(int(begin), int(end)) for begin, end in pairs if (end - begin - 1) * run.step_s >= least_s]
+    if len(parts) == 1 and len(parts[0].measured) == len(run.measured):
+        return (run,)
+    return tuple(replace(part, name=f"{run.name} at {part.begin_s:.0f} s") for part in parts)
+
+
+def _speed(run: Run) -> Vector | None:
+    for name in ("motion.u", "motion.u_ground", "motion.sog"):
+        speed = run.column(name)
+        known = ~np.isnan(speed)
+        if np.count_nonzero(known) > 1:
+            return np.interp(run.times, run.times[known], speed[known])
+    return None
+
+
 def seen_in(model: Model, trials: Sequence[Trial]) -> tuple[str, ...]:
     """Variables of the model that at least one of the trials measured."""
     there = {signal for trial in trials for signal in trial.signals}
@@ -130,7 +160,19 @@ def _input_signals(model: Model, trial: Trial) -> dict[str, Vector]:
     given = {variable: trial.signals[name] for name, variable in FED.items() if name in trial.signals}
     angle = trial.signals.get("delta_rad")
     given["rudder.command"] = trial.signals["delta_order_rad"] if angle is None else angle
-    return {name: values for name, values in given.items() if name in model.input_names}
+    return {
+        name: _continuous(values) if name.endswith("direction") else values
+        for name, values in given.items()
+        if name in model.input_names
+    }
+
+
+def _continuous(direction: Vector) -> Vector:
+    """A direction without jumps of a full turn, so that it can be averaged."""
+    known = ~np.isnan(direction)
+    whole = direction.copy()
+    whole[known] = np.unwrap(direction[known])
+    return whole
 
 
 def _means(time: Vector, values: Vector, grid: Vector, step: float, *, held: bool) -> Vector:
