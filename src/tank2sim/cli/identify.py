@@ -48,15 +48,20 @@ from tank2sim.records.reading import looks_like_a_trial
 )
 @click.option("--inertia", is_flag=True, help="Estimate acceleration derivatives, too.")
 @click.option("--piece", type=float, metavar="S", help="Length of the pieces of output error, s; by default 5 L/u0.")
-@click.option(
-    "--workers", type=click.IntRange(1), metavar="N", help="Processes for cross-validation; by default all cores."
-)
+@click.option("--workers", type=click.IntRange(1), metavar="N", help="Processes for cross-validation and bootstrap.")
 @click.option(
     "--members",
     type=click.IntRange(0),
     default=100,
     show_default=True,
     help="Simulations behind the intervals of figures of trials held out.",
+)
+@click.option(
+    "--bootstrap",
+    type=click.IntRange(0),
+    default=0,
+    metavar="N",
+    help="Fit N sets of trials simulated anew with the estimate, for the scatter of the estimates.",
 )
 @click.option("--trust-card", is_flag=True, help="Take the card's standard errors as they are.")
 @click.option("--plot", "plots", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Plots, page.")
@@ -99,8 +104,8 @@ def command(
 
 @contextmanager
 def _executor(options: Options, workers: object) -> Iterator[Executor | None]:
-    """Processes for cross-validation, where it is asked for; they begin anew, as threads are at work in this one."""
-    if options.structure != AUTO:
+    """Processes for cross-validation and bootstrap; they begin anew, as threads are at work in this one."""
+    if options.structure != AUTO and not options.bootstrap:
         yield None
         return
     count = workers if isinstance(workers, int) else os.cpu_count()
@@ -119,6 +124,7 @@ def _options(given: dict[str, object]) -> Options:
         piece_s=piece if isinstance(piece, float) else None,
         scale_prior=not given["trust_card"],
         members=int(str(given["members"])),
+        bootstrap=int(str(given["bootstrap"])),
     )
 
 
@@ -152,6 +158,11 @@ def _show(result: Identification) -> None:
     estimate = result.estimate
     title = f"{result.card.ship.name}: {len(estimate.free)} coefficients from {len(result.problem.runs)} trials"
     show_table(title, ["", "found", "before", "from trials"], estimate_rows(result))
+    if result.bootstrap is not None:
+        scatter = result.bootstrap.std(axis=0, ddof=1)
+        pairs = zip(estimate.free, estimate.standard_errors, scatter, strict=True)
+        title = f"Standard errors, and scatter over {len(result.bootstrap)} sets of trials simulated anew"
+        show_table(title, ["", "standard error", "bootstrap"], [[name, float(a), float(b)] for name, a, b in pairs])
     show_table(
         "Yaw rate: error over windows of 5 ship lengths, of its root mean square",
         ["trial", "", "before", "now"],
@@ -161,6 +172,6 @@ def _show(result: Identification) -> None:
         title = "Yaw-rate error of trials left out of the fit, %"
         show_table(title, ["structure", "one at a time, mean", "those of largest amplitude"], rows)
     if rows := figure_rows(result):
-        heads = ["trial", "", "figure", "measured", "before", "now", "95 %", "error"]
+        heads = ["trial", "", "figure", "measured", "before", "now", "error", "95 %"]
         show_table("Figures, simulated in closed loop from the measured start", heads, rows)
     show_notices([*result.notices, *result.identifiability.notices])

@@ -212,7 +212,7 @@ def _widened(result: Identification) -> str:
 
 
 def _figure_tables(result: Identification) -> list[Table]:
-    heads = ("trial", "figure", "measured", "before", "now", "95 %", "error")
+    heads = ("trial", "figure", "measured", "before", "now", "error", "95 %")
     tables = []
     for word in (HELD_OUT, FITTED):
         rows = [

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.identification.trials.evaluation import Figure, pooled
+from tank2sim.cards.reading import changed_text
+from tank2sim.identification.trials.evaluation import Figure, Following, pooled
 from tank2sim.identification.trials.identify import Comparison, Identification, misfit
 
 
@@ -57,6 +57,19 @@ def identification_as_json(result: Identification) -> dict[str, object]:
             name: {"errors": one.errors, "left_out": [list(fold.left_out) for fold in (*one.single, one.extrapolation)]}
             for name, one in result.structures.items()
         },
+        "criteria": result.criteria
+        and {
+            "aic": result.criteria.aic,
+            "bic": result.criteria.bic,
+            "samples": result.criteria.samples,
+            "parameters": result.criteria.parameters,
+        },
+        "bootstrap": None
+        if result.bootstrap is None
+        else {
+            "members": len(result.bootstrap),
+            "standard_errors": dict(zip(estimate.free, np.std(result.bootstrap, axis=0, ddof=1), strict=True)),
+        },
         "residual_noise": dict(estimate.noise),
         "prior_scale": dict(estimate.prior_scale),
         "cost": list(estimate.cost),
@@ -103,7 +116,7 @@ def structure_rows(result: Identification) -> list[list[object]]:
 
 
 def figure_rows(result: Identification) -> list[list[object]]:
-    """Trial, fitted or held out, figure, measured, predicted before and now, its 95 % interval, error now."""
+    """Trial, fitted or held out, figure, measured, predicted before and now, error now, 95 % interval."""
     rows: list[list[object]] = []
     pairs = [("fitted", result.before, result.fit)]
     if result.holdout and result.before_holdout:
@@ -121,8 +134,8 @@ def figure_rows(result: Identification) -> list[list[object]]:
                     figure.measured,
                     earlier.predicted if earlier else None,
                     figure.predicted,
-                    f"{figure.interval[0]:.4g} to {figure.interval[1]:.4g}" if figure.interval else "-",
                     "-" if np.isnan(figure.error) else error,
+                    f"{figure.interval[0]:.4g} to {figure.interval[1]:.4g}" if figure.interval else "-",
                 ]
             )
     return rows
@@ -130,9 +143,7 @@ def figure_rows(result: Identification) -> list[list[object]]:
 
 def improved_text(result: Identification, trials: list[str]) -> str:
     """Text of the card found, with the trials told in its source."""
-    from tank2sim.cards.reading import changed_text
-
-    card: ManoeuvringCard = result.card
+    card = result.card
     source = f"{card.ship.source}; identified by tank2sim ({result.estimate.method}) from {', '.join(trials)}"
     return changed_text(card.text, card.source, {"ship.source": source})
 
@@ -142,10 +153,7 @@ def _windows(comparison: Comparison) -> dict[str, float]:
     return {**runs, "all": pooled(comparison.following, "motion.r")}
 
 
-def _percent(one: object, signal: str) -> str:
-    from tank2sim.identification.trials.evaluation import Following
-
-    assert isinstance(one, Following)
+def _percent(one: Following, signal: str) -> str:
     if signal not in one.windows:
         return "-"
     return f"{100 * one.relative(signal):.3g} %"

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
@@ -22,15 +23,24 @@ from tank2sim.identification.trials.measured import Measured
 from tank2sim.identification.trials.output_error import Settings, output_error
 from tank2sim.identification.trials.portable import Ship, portable
 from tank2sim.identification.trials.prediction import Settings as BandSettings
-from tank2sim.identification.trials.prediction import bands
+from tank2sim.identification.trials.prediction import bands, bootstrap
 from tank2sim.identification.trials.problem import Estimate, Problem, Progress, silent
 from tank2sim.identification.trials.question import answered, pose
 from tank2sim.identification.trials.recursive import recursive
 from tank2sim.identification.trials.runs import SEEN
-from tank2sim.identification.trials.selection import CrossValidation, cross_validate, simplest, yaw_rate_error
+from tank2sim.identification.trials.selection import (
+    Criteria,
+    CrossValidation,
+    criteria,
+    cross_validate,
+    simplest,
+    yaw_rate_error,
+)
 from tank2sim.identification.trials.structures import STRUCTURES
 from tank2sim.records.audit import estimated_noise
 from tank2sim.simulation.recorded import recorded, steerable
+
+Array = NDArray[np.float64]
 
 PIECE = 5.0
 """Length of the pieces of output error, in L/u0: on the KVLCC2 30 s of model time, in which the model's error stays
@@ -63,6 +73,8 @@ class Options:
         Let the trials tell how far the card's standard errors may be trusted.
     members : int
         Simulations from which the intervals of the figures of trials held out are taken; 0 for none.
+    bootstrap : int
+        Members of a parametric bootstrap of the estimates; 0 for none.
     """
 
     method: str = "output_error"
@@ -71,6 +83,7 @@ class Options:
     piece_s: float | None = None
     scale_prior: bool = True
     members: int = 100
+    bootstrap: int = 0
 
 
 IN_BANDS = {f"overshoots_deg.{number}": f"overshoot_{number}_deg" for number in (1, 2)}
@@ -110,6 +123,11 @@ class Identification:
         The card that was given, against the same.
     structures : mapping
         Cross-validation of each structure that was tried: none, unless the choice was left to it.
+    criteria : Criteria or None
+        Information criteria of the fit, to compare with those of another model of the same trials; None where the
+        velocities for them were not measured.
+    bootstrap : array (members, k) or None
+        Estimates from trials that were simulated anew with the estimate (:mod:`.prediction`), where asked for.
     notices : tuple of str
     """
 
@@ -124,6 +142,8 @@ class Identification:
     before: Comparison
     before_holdout: Comparison | None
     structures: Mapping[str, CrossValidation]
+    criteria: Criteria | None
+    bootstrap: Array | None
     notices: tuple[str, ...]
 
 
@@ -179,6 +199,8 @@ def identify(
         before=compared(card, trials, estimate.noise),
         before_holdout=compared(card, held, estimate.noise) if held else None,
         structures=tried,
+        criteria=_criteria(answer),
+        bootstrap=_bootstrapped(answer, trials.driven_by, options, executor),
         notices=(*trials.notices, *(held.notices if held else ()), *_told(card), *estimate.notices),
     )
 
@@ -289,6 +311,26 @@ def _held_out(answer: _Answer, held: Measured, members: int) -> Comparison:
             intervals[trial.name, IN_BANDS.get(name, name)] = (lowest, highest)
     figures = tuple(replace(one, interval=intervals.get((one.trial, one.name))) for one in plain.figures)
     return replace(plain, figures=figures)
+
+
+def _criteria(answer: _Answer) -> Criteria | None:
+    try:
+        return criteria(answer.problem, answer.estimate)
+    except InputError:
+        return None
+
+
+def _bootstrapped(answer: _Answer, driven_by: str, options: Options, executor: Executor | None) -> Array | None:
+    """Estimates from trials simulated anew; None where they were not asked for, or the residual forces are unknown."""
+    if not options.bootstrap:
+        return None
+    left = _disturbances(answer)
+    if left is None:  # no velocities: nothing tells how large the forces are that the model leaves out
+        return None
+    # Simulated trials are as wide awake as the estimate says: the prior stays what it was when that was found.
+    asked = portable(answer.problem, answer.card, driven_by)
+    settings = BandSettings(members=options.bootstrap)
+    return bootstrap(asked, answer.estimate, partial(_in_pieces, options=options), left, settings, executor)
 
 
 def _disturbances(answer: _Answer) -> Disturbances | None:
