@@ -94,7 +94,7 @@ def test_a_trial_of_a_model_identifies_the_ship(folder: Path) -> None:
 
 @pytest.mark.parametrize("method", ["equation_error", "recursive"])
 def test_other_methods_answer_the_same_question(folder: Path, method: str) -> None:
-    result = tank2sim("identify", "off.toml", *FITTED, "--method", method, "--json", f"{method}.json", cwd=folder)
+    result = tank2sim("identify", "off.toml", "zigzag20.csv", "--method", method, "--json", f"{method}.json", cwd=folder)
     assert result.returncode == 0, result.stderr
     found = json.loads((folder / f"{method}.json").read_text())
     assert found["method"] == method
@@ -119,7 +119,7 @@ def test_an_interrupt_keeps_the_best_card_so_far(folder: Path) -> None:
     program = "from tank2sim.cli import main; main()"
     command = [sys.executable, "-c", program, "identify", "off.toml", *FITTED, "-o", "stopped.toml", "--json", "s.json"]
     slow = "import time; from tank2sim.identification.trials import output_error as o; e = o.Shooting.normal\n"
-    slow += "o.Shooting.normal = lambda *a: (print('at it', flush=True), time.sleep(0.2), e(*a))[2]\n"
+    slow += "o.Shooting.normal = lambda *a: (print('at it', flush=True), time.sleep(0.1), e(*a))[2]\n"
     command[2] = slow + program
     process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
