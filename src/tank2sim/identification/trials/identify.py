@@ -18,6 +18,7 @@ from tank2sim.identification.trials.disturbances import Disturbances, disturbanc
 from tank2sim.identification.trials.equation_error import equation_error
 from tank2sim.identification.trials.evaluation import Figure, Following, following, predicted_figures
 from tank2sim.identification.trials.identifiability import Identifiability, identifiability, refuse_unseen
+from tank2sim.identification.trials.inference import scaled_prior
 from tank2sim.identification.trials.kalman import kalman
 from tank2sim.identification.trials.measured import Measured
 from tank2sim.identification.trials.output_error import Settings, output_error
@@ -210,7 +211,7 @@ def estimated(problem: Problem, options: Options, progress: Progress = silent) -
     if options.method == "kalman":
         return kalman(problem, progress=progress)
     if options.method == "recursive":
-        return recursive(problem, progress=progress)
+        return _recursive(problem, options, progress)
     if options.method == "equation_error":
         return equation_error(problem, progress=progress)
     length = options.piece_s or PIECE * problem.ship_time
@@ -248,6 +249,15 @@ def _start(problem: Problem) -> Vector | None:
         return equation_error(problem).values
     except InputError:
         return None
+
+
+def _recursive(problem: Problem, options: Options, progress: Progress) -> Estimate:
+    """The recursive estimator, which takes its prior as it is: widened first by what the weak form says of it."""
+    if not options.scale_prior:
+        return recursive(problem, progress=progress)
+    scale = equation_error(problem).prior_scale
+    widened = replace(problem, prior_error=scaled_prior(problem, scale))
+    return replace(recursive(widened, progress=progress), prior_scale=scale)
 
 
 def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
