@@ -107,11 +107,33 @@ def test_a_trial_without_excitation_is_refused_by_the_terms_it_cannot_see(folder
     assert not (folder / "never.toml").exists()
 
 
+def test_a_term_that_is_held_stays_as_the_card_has_it(folder: Path) -> None:
+    arguments = ("identify", "off.toml", *FITTED[::2], "--hold", "Xvv", "-o", "held.toml", "--json", "held.json")
+    result = tank2sim(*arguments, cwd=folder)
+    assert result.returncode == 0, result.stderr
+    assert "Xvv" not in json.loads((folder / "held.json").read_text())["derivatives"]
+    before, after = (read_card(str(folder / name)) for name in ("off.toml", "held.toml"))
+    assert isinstance(before, ManoeuvringCard) and isinstance(after, ManoeuvringCard)
+    assert after.derivatives["Xvv"] == before.derivatives["Xvv"]
+    assert after.derivatives["Nr"] != before.derivatives["Nr"]
+    assert after.model.valid_speed_mps is not None and after.model.valid_speed_mps[1] > 4.9
+    assert "# Identified by tank2sim" in after.text.splitlines()[0]
+    refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--hold", "Nope", cwd=folder), "--hold", "Nope")
+
+
+def test_what_the_trials_demand_of_the_prior_is_told(folder: Path) -> None:
+    result = tank2sim("identify", "off.toml", *FITTED[::2], "--method", "equation_error", cwd=folder)
+    assert "standard errors were widened" in " ".join(result.stdout.split())
+
+
 def test_bad_input_is_one_line_and_nothing_is_written(folder: Path) -> None:
     refused(tank2sim("identify", "off.toml", "no-such.csv", "-o", "n.toml", cwd=folder), "no-such.csv")
     refused(tank2sim("identify", "off.toml", "zigzag20.csv", "-o", "zigzag20.csv", cwd=folder), "zigzag20.csv")
     refused(tank2sim("identify", "wilinski-zellman", "zigzag20.csv", cwd=folder), "manoeuvr")
     refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--piece", "-3", cwd=folder), "--piece")
+    both = ("identify", "off.toml", "zigzag20.csv", "--holdout", "zigzag20.csv")
+    refused(tank2sim(*both, cwd=folder), "both fitted and held out")
+    refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--piece", "0.1", cwd=folder), "--piece", "or more")
     assert not (folder / "n.toml").exists()
 
 

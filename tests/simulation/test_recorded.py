@@ -1,13 +1,15 @@
 """Recorded manoeuvres recognised and repeated: on a made-up ship under a made-up controller, stepped in plain numpy."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tank2sim.cards import parse_card
+from tank2sim.cards import parse_card, read_card
 from tank2sim.dynamics import build
+from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
@@ -133,3 +135,18 @@ def test_other_runs_are_neither(model):
     trial = sail(controller(np.deg2rad(20), np.deg2rad(10), 0.0), 100.0)
     less = {name: values for name, values in trial.signals.items() if name != "v_mps"}
     assert recorded(replace(trial, signals=less), model) is None
+
+
+def test_the_course_of_a_zigzag_is_that_before_the_ship_drifted_off_it(data: Path) -> None:
+    """An asymmetric ship has turned 0.6 deg before the execute: the reversals are at 20 and 10 deg of the first course.
+
+    Overshoots as read off the raw heading, smoothed over 5 s, by hand.
+    """
+    folder = data / "data/gap_cases/case_6"
+    ship = build(read_card(str(folder / "ship.toml")))
+    for name, heading, overshoots in (("zigzag20_20", 20.0, (7.9, 6.4)), ("zigzag10_10", 10.0, (4.9, 4.5))):
+        what = recorded(read_trial(folder / f"{name}.csv"), ship)
+        assert what is not None and isinstance(what.manoeuvre, Zigzag)
+        assert math.degrees(what.manoeuvre.heading) == pytest.approx(heading)
+        assert what.manoeuvre.lag_s < 1.0
+        assert what.figures["overshoots_deg"][:2] == pytest.approx(overshoots, abs=0.5)

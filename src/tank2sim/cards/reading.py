@@ -86,8 +86,10 @@ def parse_card(text: str, source: str) -> Card:
     return _surge_card(form, text, source)
 
 
-def changed_text(text: str, source: str, changes: Mapping[str, object]) -> str:
+def changed_text(text: str, source: str, changes: Mapping[str, object], *, comment: str | None = None) -> str:
     """A card's text with values at dotted keys replaced or added; everything else stays as it is, comments included.
+
+    With a `comment` the changed keys bear that instead of their own, which told of the value that is gone.
 
     Raises
     ------
@@ -108,16 +110,23 @@ def changed_text(text: str, source: str, changes: Mapping[str, object]) -> str:
             if not isinstance(table, dict | list):
                 raise InputError(source, key, f"cannot be set: {section} is no section", "give section.key=value")
         table[last] = value
+        if comment is not None:
+            table[last].comment(comment)
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
     return mark + tomlkit.dumps(document)
 
 
 def revised(
-    card: ManoeuvringCard, derivatives: Mapping[str, tuple[float, float]], others: Mapping[str, object] | None = None
+    card: ManoeuvringCard,
+    derivatives: Mapping[str, tuple[float, float]],
+    others: Mapping[str, object] | None = None,
+    *,
+    comment: str | None = None,
 ) -> ManoeuvringCard:
     """A card with other derivatives: canonical name to (value, standard error), prime and starboard-positive.
 
-    They are written in the conventions of the card's own text; `others` are further values at dotted keys of the text.
+    They are written in the conventions of the card's own text; `others` are further values at dotted keys of the text;
+    `comment` takes the place of the comments of all that is changed.
     """
     scales = card.scales if card.model.scaling == "dimensional" else None
     changes: dict[str, object] = dict(others or {})
@@ -129,7 +138,7 @@ def revised(
         key = card.places.get(name, name)
         changes[f"derivatives.{key}"] = value * factor
         changes[f"uncertainty.{key}"] = error * abs(factor)
-    new = parse_card(changed_text(card.text, card.source, changes), card.source)
+    new = parse_card(changed_text(card.text, card.source, changes, comment=comment), card.source)
     assert isinstance(new, ManoeuvringCard)
     return new
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -26,6 +27,7 @@ from tank2sim.identification.trials.as_json import (
 )
 from tank2sim.identification.trials.identify import AUTO, METHODS, Identification, Options, identify
 from tank2sim.identification.trials.measured import Measured, measured
+from tank2sim.identification.trials.remarks import remarks
 from tank2sim.identification.trials.structures import STRUCTURES
 from tank2sim.records.reading import looks_like_a_trial
 
@@ -63,6 +65,7 @@ from tank2sim.records.reading import looks_like_a_trial
     metavar="N",
     help="Fit N sets of trials simulated anew with the estimate, for the scatter of the estimates.",
 )
+@click.option("--hold", multiple=True, metavar="NAME", help="Leave a derivative or parameter as the card has it.")
 @click.option("--trust-card", is_flag=True, help="Take the card's standard errors as they are.")
 @click.option("--plot", "plots", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Plots, page.")
 @json_option
@@ -82,22 +85,26 @@ def command(
         raise InputError(known.source, "model.kind", "is no ship that manoeuvres", "give a linear or abkowitz card")
     options = _options(more)
     fitted, held = measured(_files(trials), known), measured(_files(holdout), known)
+    for trial in held.trials:
+        if trial.name in {other.name for other in fitted.trials}:
+            raise InputError(trial.path, "", "is both fitted and held out", "hold out what is not fitted")
     with showing_progress("fitting") as progress, _executor(options, more["workers"]) as executor:
         result = identify(known, fitted, held, options, progress, executor)
+    told = remarks(result)
     text = improved_text(result, [trial.name for trial in fitted.trials])
     parse_card(text, str(output or "the card found"))
     files: dict[Path, str | bytes] = {}
     if output:
         files[output] = text
     if isinstance(json_file, Path):
-        files[json_file] = json_text(identification_as_json(result))
+        files[json_file] = json_text(identification_as_json(result, told))
     if plots:
         files |= _pictures(result, known, (fitted, held), plots)
     asked = [output, json_file if isinstance(json_file, Path) else None]
     write_together(
         files, inputs=[*_files(trials), *_files(holdout), *([Path(card)] if Path(card).exists() else [])], outputs=asked
     )
-    _show(result)
+    _show(result, told)
     if output:
         screen.print(f"{output}: {len(result.estimate.free)} coefficients", soft_wrap=True, markup=False)
 
@@ -109,13 +116,15 @@ def _executor(options: Options, workers: object) -> Iterator[Executor | None]:
         yield None
         return
     count = workers if isinstance(workers, int) else os.cpu_count()
-    with ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn")) as executor:
+    context = multiprocessing.get_context("spawn")
+    # An interrupt is for this process alone: workers that were told of it, too, would each say so.
+    with ProcessPoolExecutor(count, context, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as executor:
         yield executor
 
 
 def _options(given: dict[str, object]) -> Options:
     piece = given["piece"]
-    if isinstance(piece, float) and not 0 < piece < 1e6:
+    if isinstance(piece, float) and not 0 < piece < float("inf"):
         raise InputError("--piece", "", f"is {piece:g} s", "a positive number of seconds was expected")
     return Options(
         method=str(given["method"]),
@@ -125,6 +134,7 @@ def _options(given: dict[str, object]) -> Options:
         scale_prior=not given["trust_card"],
         members=int(str(given["members"])),
         bootstrap=int(str(given["bootstrap"])),
+        hold=tuple(str(name) for name in given["hold"]),  # type: ignore[attr-defined]
     )
 
 
@@ -154,7 +164,7 @@ def _files(given: tuple[Path, ...]) -> list[Path]:
     return found
 
 
-def _show(result: Identification) -> None:
+def _show(result: Identification, told: tuple[str, ...]) -> None:
     estimate = result.estimate
     title = f"{result.card.ship.name}: {len(estimate.free)} coefficients from {len(result.problem.runs)} trials"
     show_table(title, ["", "found", "before", "from trials"], estimate_rows(result))
@@ -174,4 +184,4 @@ def _show(result: Identification) -> None:
     if rows := figure_rows(result):
         heads = ["trial", "", "figure", "measured", "before", "now", "error", "95 %"]
         show_table("Figures, simulated in closed loop from the measured start", heads, rows)
-    show_notices([*result.notices, *result.identifiability.notices])
+    show_notices([*result.notices, *result.identifiability.notices, *told])

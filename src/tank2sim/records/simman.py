@@ -27,6 +27,7 @@ class _Laboratory:
     columns: tuple[str, ...]
     left_out: str
     values: str
+    KVLCC2_length_m: float
 
 
 _LABORATORIES = {
@@ -34,11 +35,13 @@ _LABORATORIES = {
         columns=tuple("t_s x_m y_m psi_deg u_mps v_mps r_degps heel delta_deg n_rps thrust_N torque_Nm".split()),
         left_out="column 8 (probably heel), thrust and torque are no part of the trial format and left out",
         values="values are those of the model",
+        KVLCC2_length_m=7.0,
     ),
     "MARIN": _Laboratory(
         columns=tuple("t_s x_m y_m phi_deg psi_deg u_mps v_mps p_degps r_degps delta_deg n_rpm".split()),
         left_out="the rate of roll is no part of the trial format and left out",
         values="values are those of the ship, scaled from a model",
+        KVLCC2_length_m=320.0,
     ),
 }
 
@@ -80,7 +83,16 @@ def read_simman(path: Path | str) -> Trial:
         time, told = _uniform_time(path, rows)
         notices.append(told)
     known = {name: head for name, head in columns.items() if name in signals and name != head}
-    return Trial(path, time, signals, {}, KVLCC2_SCALE if "KVLCC2" in header else None, tuple(notices), known)
+    tanker = "KVLCC2" in header
+    return Trial(
+        path,
+        time,
+        signals,
+        scale=KVLCC2_SCALE if tanker else None,
+        notices=tuple(notices),
+        columns=known,
+        length_m=laboratory.KVLCC2_length_m if tanker else None,
+    )
 
 
 def _laboratory(text: str) -> _Laboratory | None:

@@ -42,6 +42,8 @@ class Trial:
         Standard deviation of the measurement by signal, where the file states it, SI.
     scale : float or None
         Length of the ship over that of the model of this trial, where the file or its format tells it.
+    length_m : float or None
+        Length between perpendiculars of what the values belong to, ship or model, where the format tells it.
     notices : tuple of str
         What was done to the data on reading.
     columns : mapping
@@ -55,6 +57,7 @@ class Trial:
     scale: float | None = None
     notices: tuple[str, ...] = ()
     columns: Mapping[str, str] = field(default_factory=dict)
+    length_m: float | None = None
 
     @property
     def name(self) -> str:
@@ -120,7 +123,8 @@ def froude_scaled(trial: Trial, length_ratio: float) -> Trial:
     factors = {"m": length_ratio, "mps": math.sqrt(length_ratio), "radps": 1 / math.sqrt(length_ratio), "rad": 1.0}
     signals = {name: values * factors[_unit(name)] for name, values in trial.signals.items()}
     noise = {name: value * factors[_unit(name)] for name, value in trial.noise.items()}
-    return replace(trial, time_s=trial.time_s * math.sqrt(length_ratio), signals=signals, noise=noise)
+    length = None if trial.length_m is None else trial.length_m * length_ratio
+    return replace(trial, time_s=trial.time_s * math.sqrt(length_ratio), signals=signals, noise=noise, length_m=length)
 
 
 def unwrapped(angle: Vector) -> Vector:

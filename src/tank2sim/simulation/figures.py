@@ -37,8 +37,8 @@ def figures_of(manoeuvre: object, trajectory: Trajectory, length: float) -> Figu
     match manoeuvre:
         case Turn(rudder):
             return _turn(trajectory, math.copysign(1.0, rudder), length)
-        case Zigzag(rudder=rudder, heading=heading):
-            return _zigzag(trajectory, math.copysign(1.0, rudder), heading, length)
+        case Zigzag():
+            return _zigzag(trajectory, manoeuvre, length)
         case PullOut(rudder):
             return _pull_out(trajectory, rudder)
         case Spiral(rudders):
@@ -118,16 +118,18 @@ def _is_steady(run: Trajectory, length: float) -> bool:
     return all(same)
 
 
-def _zigzag(run: Trajectory, side: float, heading: float, length: float) -> Figures:
+def _zigzag(run: Trajectory, zigzag: Zigzag, length: float) -> Figures:
+    side, heading = math.copysign(1.0, zigzag.rudder), zigzag.heading
     execute = _Execute(run, side)
+    course = execute.heading if zigzag.course is None else zigzag.course
     executes = run.t[1:][np.diff(run["rudder.command"]) != 0]
     turns = run.crossings("motion.r", "motion.rdot", 0.0)
     peaks = [later[0] for time in executes if len(later := turns[turns > time])]
     overshoots = [
-        math.degrees(side * (-1) ** number * (run.at("motion.psi", time) - execute.heading) - heading)
+        math.degrees(side * (-1) ** number * (run.at("motion.psi", time) - course) - heading)
         for number, time in enumerate(peaks)
     ]
-    returns = run.crossings("motion.psi", "motion.r", execute.heading)
+    returns = run.crossings("motion.psi", "motion.r", course)
     returns = returns[returns > executes[0]] if len(executes) else returns[:0]
     distance = math.hypot(*execute.place(float(executes[0]))) if len(executes) else None
     return {

@@ -59,16 +59,18 @@ class Zigzag:
     """Zigzag: rudder `rudder` until the heading has changed by `heading`, then the other way, and so on.
 
     A negative rudder begins to port; `heading` is positive. The order comes `lag_s` after the heading is reached: the
-    delay of a helmsman or of a model basin's controller (0.1 to 0.6 s at model scale).
+    delay of a helmsman or of a model basin's controller (0.1 to 0.6 s at model scale). Headings count from `course`
+    (rad), by default from that at the execute.
     """
 
     rudder: float
     heading: float
     lag_s: float = 0.0
+    course: float | None = None
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Run for `duration` s, or to the heading's return after the fifth execute (at most 150 L/u0)."""
-        begin = running.state("motion.psi")
+        begin = running.state("motion.psi") if self.course is None else self.course
         end = 150 * ship_time if duration is None else duration
         side = math.copysign(1.0, self.rudder)
         executes = 0

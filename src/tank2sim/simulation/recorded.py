@@ -32,6 +32,9 @@ NOMINAL_HEADINGS_DEG = (1, 2, 5, 10, 15, 20, 25, 30, 35)
 SMOOTHING = 0.3
 """Recorded signals are smoothed over this many L/u0 before figures are read off (ours: below the time of any peak)."""
 
+FARTHEST_OFF_COURSE = math.radians(2.0)
+"""Farther from its first heading at the execute, a trial did not begin on its course."""
+
 HALF_TURNS = 2.0
 """A turn is repeated for this many times as long as the measured one took to turn through 180 deg."""
 
@@ -232,16 +235,20 @@ def _zigzag(trial: Trial, held: list[_Plateau], smooth: dict[str, Vector]) -> Zi
     def at(name: str, time: float) -> float:
         return float(np.interp(time, trial.time_s, smooth[name]))
 
-    begin = at("psi_rad", held[0].execute_s)
+    # The course is that at the beginning of the record: until the execute a ship with any asymmetry has drifted off it.
+    begin = float(smooth["psi_rad"][0])
+    if abs(at("psi_rad", held[0].execute_s) - begin) > FARTHEST_OFF_COURSE:
+        begin = at("psi_rad", held[0].execute_s)
     headings = [math.copysign(1, a.angle) * (at("psi_rad", b.execute_s) - begin) for a, b in pairwise(held)]
     rates = [math.copysign(1, a.angle) * at("r_radps", b.execute_s) for a, b in pairwise(held)]
-    nominal = [angle for angle in NOMINAL_HEADINGS_DEG if math.radians(angle - 0.3) <= min(headings)]
+    typical = float(np.mean([np.median(headings[side::2]) for side in (0, 1) if headings[side::2]]))
+    nominal = [angle for angle in NOMINAL_HEADINGS_DEG if math.radians(angle - 0.4) <= typical]
     if not nominal or min(rates) <= 0:
         return None
     heading = math.radians(max(nominal))
     lag = float(np.median([(h - heading) / r for h, r in zip(headings, rates, strict=True)]))
     angle = float(np.median([abs(plateau.angle) for plateau in held]))
-    return Zigzag(math.copysign(angle, held[0].angle), heading, max(lag, 0.0))
+    return Zigzag(math.copysign(angle, held[0].angle), heading, max(lag, 0.0), begin)
 
 
 def _trajectory(

@@ -83,3 +83,14 @@ def test_hsva_and_marin_come_to_the_same_ship(data: Path) -> None:
         assert trial.signals["u_mps"][:50].mean() == pytest.approx(card.model.speed_mps, rel=0.02)
         assert np.abs(trial.signals["v_mps"]).max() < 2.0, "body velocities after the audit"
     assert hsva.signals["r_radps"].max() == pytest.approx(marin.signals["r_radps"].max(), rel=0.1)
+
+
+def test_a_tanker_is_no_mariner(data: Path, card: ManoeuvringCard) -> None:
+    with pytest.raises(InputError, match=r"7 m.*160\.93 m"):
+        measured([data / "data/kvlcc2_hsva/HSVA_CPMC_KVLCC2_Z_10_10_P.dat"], card)
+
+
+def test_wind_that_the_card_cannot_take_is_told(tmp_path: Path, card: ManoeuvringCard) -> None:
+    rows = "".join(f"{t},{np.sin(t / 9):.3f},7.7,5,200\n" for t in range(60))
+    one = write(tmp_path / "a.csv", "t_s,delta_deg,u_mps,wind_speed_mps,wind_direction_deg", rows)
+    assert any("wind was measured" in notice for notice in measured([one], card).notices)

@@ -35,7 +35,8 @@ def errors(result: Identification, basin: str, figure: str) -> np.ndarray:
 
 def test_yaw_rate_is_followed_in_both_basins(result: Identification) -> None:
     assert result.holdout is not None and result.before_holdout is not None
-    assert pooled(result.holdout.following, "motion.r") < 0.07
+    for basin, most in (("HSVA", 0.07), ("MARIN", 0.12)):
+        assert pooled([run for run in result.holdout.following if basin in run.name], "motion.r") < most
     assert pooled(result.before_holdout.following, "motion.r") > 0.5, "the captive card cannot"
 
 

@@ -5,12 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from tank2sim.cards.reading import changed_text
+from tank2sim.files import BYTE_ORDER_MARK
 from tank2sim.identification.trials.evaluation import Figure, Following, pooled
 from tank2sim.identification.trials.identify import Comparison, Identification, misfit
+from tank2sim.identification.trials.remarks import speeds_of
 
 
-def identification_as_json(result: Identification) -> dict[str, object]:
-    """Everything a script may want: ``derivatives``, ``effects``, ``misfit``, ``figures``, ``identifiability``, ..."""
+def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -> dict[str, object]:
+    """Everything a script may want: ``derivatives``, ``effects``, ``misfit``, ``figures``, ``identifiability``, ...
+
+    `told` is what the user was told beside the notices of the result.
+    """
     estimate, known = result.estimate, result.identifiability
     parameters = {
         name: {
@@ -32,6 +37,7 @@ def identification_as_json(result: Identification) -> dict[str, object]:
     }
     return {
         "method": estimate.method,
+        "structure": result.structure,
         "derivatives": {
             name.partition(".")[2]: entry for name, entry in parameters.items() if name.startswith("derivatives.")
         },
@@ -79,7 +85,7 @@ def identification_as_json(result: Identification) -> dict[str, object]:
             "correlated_pairs": [[one, other, value] for one, other, value in known.pairs],
             "unseen": [list(direction) for direction in known.unseen],
         },
-        "warnings": [*result.notices, *known.notices],
+        "warnings": [*result.notices, *known.notices, *told],
     }
 
 
@@ -144,8 +150,19 @@ def figure_rows(result: Identification) -> list[list[object]]:
 def improved_text(result: Identification, trials: list[str]) -> str:
     """Text of the card found, with the trials told in its source."""
     card = result.card
-    source = f"{card.ship.source}; identified by tank2sim ({result.estimate.method}) from {', '.join(trials)}"
-    return changed_text(card.text, card.source, {"ship.source": source})
+    how = f"identified by tank2sim ({result.estimate.method}, {result.structure}) from {', '.join(trials)}"
+    changes: dict[str, object] = {"ship.source": f"{card.ship.source}; {how}"}
+    if card.ship.notes:
+        changes["ship.notes"] = f"Before it was {how}: {card.ship.notes}"
+    speeds = speeds_of(result)
+    if card.model.valid_speed_mps is None and speeds is not None:
+        changes["model.valid_speed_mps"] = list(speeds)
+    head = (
+        f"# {how[0].upper()}{how[1:]}.\n# Comments below are of the card before, but for keys marked as identified.\n"
+    )
+    text = changed_text(card.text, card.source, changes)
+    mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
+    return mark + head + text.removeprefix(mark)
 
 
 def _windows(comparison: Comparison) -> dict[str, float]:

@@ -68,6 +68,8 @@ class Weights:
         whole = np.empty_like(alone)
         for place, one in enumerate(self.colour):
             for piece in pieces:
+                if not alone[place, piece].size:
+                    continue
                 whole[place, piece] = one.whitened(alone[place, piece][None])[0]
         result: Array = whole.transpose(1, 0, 2).reshape(values.shape)
         return result

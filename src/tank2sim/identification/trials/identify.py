@@ -47,6 +47,9 @@ PIECE = 5.0
 """Length of the pieces of output error, in L/u0: on the KVLCC2 30 s of model time, in which the model's error stays
 small against the motion; shorter pieces see less of what the derivatives do, longer ones run away when unstable."""
 
+LEAST_PIECE = 0.5
+"""Shortest piece, in L/u0: in less the state hardly answers the rudder, and there are more initial states than data."""
+
 LEAST_NOISE = 1e-3
 """Noise of a signal that states none is taken as this share of its standard deviation at least (ours)."""
 
@@ -76,6 +79,8 @@ class Options:
         Simulations from which the intervals of the figures of trials held out are taken; 0 for none.
     bootstrap : int
         Members of a parametric bootstrap of the estimates; 0 for none.
+    hold : tuple of str
+        Derivatives (``Xuuu``) and parameters of effects (``wind.yaw_coefficient``) that stay as the card has them.
     """
 
     method: str = "output_error"
@@ -85,6 +90,7 @@ class Options:
     scale_prior: bool = True
     members: int = 100
     bootstrap: int = 0
+    hold: tuple[str, ...] = ()
 
 
 IN_BANDS = {f"overshoots_deg.{number}": f"overshoot_{number}_deg" for number in (1, 2)}
@@ -122,6 +128,8 @@ class Identification:
         The new card against the trials it was fitted to, and against those it was not (None: there are none).
     before, before_holdout : Comparison
         The card that was given, against the same.
+    structure : str
+        Of the model: the one asked for, or chosen.
     structures : mapping
         Cross-validation of each structure that was tried: none, unless the choice was left to it.
     criteria : Criteria or None
@@ -142,6 +150,7 @@ class Identification:
     holdout: Comparison | None
     before: Comparison
     before_holdout: Comparison | None
+    structure: str
     structures: Mapping[str, CrossValidation]
     criteria: Criteria | None
     bootstrap: Array | None
@@ -177,10 +186,26 @@ def identify(
         those held out.
     """
     options = options or Options()
+    try:
+        return _identified(card, trials, holdout, options, (progress, executor))
+    except np.linalg.LinAlgError:
+        names = ", ".join(trial.name for trial in trials.trials)
+        remedy = "add runs in which rudder, yaw, sway and speed change, or hold terms (--hold)"
+        raise InputError(names, "", "excites too little to estimate anything", remedy) from None
+
+
+def _identified(
+    card: ManoeuvringCard,
+    trials: Measured,
+    holdout: Measured | None,
+    options: Options,
+    how: tuple[Progress, Executor | None],
+) -> Identification:
+    progress, executor = how
     tried = cross_validated(card, trials, options, executor) if options.structure == AUTO else {}
     structure = simplest(tried) if tried else options.structure
     started = STRUCTURES[structure].start(card)
-    problem = pose(started, trials.trials, trials.driven_by, inertia=options.inertia)
+    problem = pose(started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold)
     refuse_unseen(problem)
     estimate = estimated(problem, options, progress)
     improved = answered(started, estimate)
@@ -199,6 +224,7 @@ def identify(
         holdout=_held_out(answer, held, options.members) if held else None,
         before=compared(card, trials, estimate.noise),
         before_holdout=compared(card, held, estimate.noise) if held else None,
+        structure=structure,
         structures=tried,
         criteria=_criteria(answer),
         bootstrap=_bootstrapped(answer, trials.driven_by, options, executor),
@@ -215,6 +241,11 @@ def estimated(problem: Problem, options: Options, progress: Progress = silent) -
     if options.method == "equation_error":
         return equation_error(problem, progress=progress)
     length = options.piece_s or PIECE * problem.ship_time
+    if length < LEAST_PIECE * problem.ship_time:
+        least = LEAST_PIECE * problem.ship_time
+        raise InputError(
+            "--piece", "", f"is {length:g} s", f"{least:.3g} s or more ({LEAST_PIECE:g} L/u0) tell anything"
+        )
     settings = Settings(piece_s=length, scale_prior=options.scale_prior)
     in_pieces = output_error(problem, _start(problem), settings, progress)
     if in_pieces.notices or not _follows_whole_runs(problem, in_pieces):
@@ -229,7 +260,7 @@ def cross_validated(
     results = {}
     for name, structure in STRUCTURES.items():
         started = structure.start(card)
-        problem = pose(started, trials.trials, trials.driven_by, inertia=options.inertia)
+        problem = pose(started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold)
         asked = portable(problem, started, trials.driven_by)
         results[name] = cross_validate(asked, partial(_in_pieces, options=options), yaw_rate_error, executor)
     return results

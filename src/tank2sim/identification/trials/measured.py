@@ -11,12 +11,15 @@ import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.errors import InputError
-from tank2sim.records.audit import mended
+from tank2sim.records.audit import audit, mended
 from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import Trial, froude_scaled
 
 TYPICAL_SPEED = 95
 """Percentile of the speed that stands for a trial's approach: some begin at rest, and all are slower afterwards."""
+
+SAME_LENGTH = 0.03
+"""Lengths that differ by less than this share are those of one ship: not all count them alike."""
 
 FARTHEST_FROUDE = 2.5
 """A trial whose approach speed differs from the card's speed by more than this factor is at another scale."""
@@ -53,6 +56,12 @@ def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
     for path in paths:
         trial, findings = mended(read_trial(path))
         notices += [f"{path.name}: {one.column}: {one.what}; taken so: {one.likely_truth}" for one in findings]
+        notices += [
+            f"{path.name}: {one.column}: {one.what}; left as it is: {one.likely_truth}"
+            for one in audit(trial)
+            if not (one.safe and one.mend is not None)
+        ]
+        notices += _unused(trial, card)
         scaled, factor = at_size_of(trial, card)
         if factor != 1:
             notices.append(f"{path.name}: scaled by Froude's law to a ship {factor:.4g} times as long")
@@ -69,6 +78,20 @@ def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
     return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(dict.fromkeys(notices)))
 
 
+def _unused(trial: Trial, card: ManoeuvringCard) -> list[str]:
+    """What of a trial does not enter, in words."""
+    told = []
+    if {"wind_speed_mps", "wind_direction_rad"} <= set(trial.signals) and all(
+        one.name != "wind" for one in card.effects
+    ):
+        told.append(f"{trial.path.name}: wind was measured, and the card has no effect 'wind': it is not used")
+    rudder = trial.signals.get("delta_rad", trial.signals.get("delta_order_rad"))
+    empty = 0 if rudder is None else int(np.isnan(rudder).sum())
+    if empty:
+        told.append(f"{trial.path.name}: the rudder is empty in {empty} rows: taken as straight between its readings")
+    return told
+
+
 def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
     """The trial at the size of the card's ship, and the factor on its lengths.
 
@@ -80,6 +103,8 @@ def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
     InputError
         None of them brings it near.
     """
+    if trial.length_m is not None:
+        return _at_length(trial, card)
     speed = approach_speed(trial)
     candidates = [1.0] if trial.scale is None else [1.0, trial.scale, 1 / trial.scale]
     if speed is None:
@@ -88,8 +113,19 @@ def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
     factor = candidates[int(np.argmin(away))]
     if min(away) > math.log(FARTHEST_FROUDE) and trial.scale is None:
         problem = f"reaches {speed:.3g} m/s, and the card is of {card.model.speed_mps:.3g} m/s"
-        remedy = "if it is of a model, add the comment '# scale: 45.7' (ship length over model length)"
+        remedy = "if one of the two is a model, add the comment '# scale: LAMBDA' (ship length over model length)"
         raise InputError(trial.path, "", problem, remedy)
+    return (trial if factor == 1 else froude_scaled(trial, factor)), factor
+
+
+def _at_length(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
+    """The same for a trial whose format tells the length of the ship or model: it must be the card's, or its model."""
+    assert trial.length_m is not None
+    own, scale = card.ship.length_m / trial.length_m, trial.scale or 1.0
+    factor = min((1.0, scale, 1 / scale), key=lambda one: abs(math.log(own / one)))
+    if abs(math.log(own / factor)) > SAME_LENGTH:
+        problem = f"is of a ship or model of {trial.length_m:g} m, and the card of one of {card.ship.length_m:g} m"
+        raise InputError(trial.path, "", problem, f"neither is the other at 1:{scale:g}; give the card of that ship")
     return (trial if factor == 1 else froude_scaled(trial, factor)), factor
 
 

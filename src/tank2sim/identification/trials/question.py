@@ -64,8 +64,15 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
     return free
 
 
-def pose(card: ManoeuvringCard, trials: Sequence[Trial], driven_by: str, *, inertia: bool = False) -> Problem:
-    """The problem of fitting a card's free parameters to trials.
+def pose(
+    card: ManoeuvringCard,
+    trials: Sequence[Trial],
+    driven_by: str,
+    *,
+    inertia: bool = False,
+    hold: Sequence[str] = (),
+) -> Problem:
+    """The problem of fitting a card's free parameters to trials, but for those in `hold`.
 
     Raises
     ------
@@ -76,6 +83,12 @@ def pose(card: ManoeuvringCard, trials: Sequence[Trial], driven_by: str, *, iner
     free = free_parameters(card, inertia=inertia)
     if card.propulsion is not None and card.propulsion.Xnn and _revolutions_vary(card.propulsion, trials):
         free[REVOLUTIONS] = card.propulsion.Xnn, REVOLUTIONS_ERROR * abs(card.propulsion.Xnn)
+    for name in hold:
+        known = name if name in free else f"derivatives.{name}"
+        if known not in free:
+            told = " ".join(one.removeprefix("derivatives.") for one in free)
+            raise InputError("--hold", "", f"{name} is not estimated anyway", f"estimated are {told}")
+        del free[known]
     if not free:
         raise InputError(card.source, "derivatives", "there is nothing to estimate", "give derivatives with a value")
     seen = seen_in(model, trials)
@@ -122,7 +135,7 @@ def answered(card: ManoeuvringCard, estimate: Estimate) -> ManoeuvringCard:
     if REVOLUTIONS in found:
         scale = float(card.scales.force) if card.model.scaling == "dimensional" else 1.0
         changes[REVOLUTIONS] = rounded(*found[REVOLUTIONS]) * scale
-    return revised(card, derivatives, changes)
+    return revised(card, derivatives, changes, comment="identified from trials")
 
 
 def rounded(value: float, error: float) -> float:

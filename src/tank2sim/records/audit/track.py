@@ -307,6 +307,9 @@ def _scale(trial: Trial, pair: tuple[str, str], found: Fit) -> Finding:
 
     what = f"velocity over ground is {factor:.4g} times the velocities"
     columns = tuple(trial.heading(name) for name in pair)
+    if factor < 0:  # no log reads backwards
+        truth = "both are of the opposite sign"
+        return Finding(trial.path, columns, what, truth, "fault", evidence, scaled)
     return Finding(trial.path, columns, what, truth, "note", evidence, scaled)
 
 
