@@ -310,3 +310,20 @@ def test_hidden_effects_of_the_gap_cases_are_measured_and_a_clean_one_is_clean(d
             assert finding.kind == "note"
             error = max(entry for key, entry in finding.evidence.items() if key.startswith("standard_error"))
             assert finding.evidence[key] == pytest.approx(value, abs=4 * error)
+
+
+@pytest.mark.parametrize(("unit", "name"), [(60.0, "minutes"), (3600.0, "hours")])
+@pytest.mark.parametrize("kind", ["zigzag", "turn"])
+def test_time_in_another_unit_is_told_from_a_rate_in_another_unit(unit, name, kind):
+    right = trial(motion(kind))
+    wrong = replace(right, time_s=right.time_s / unit)
+    (finding,) = [one for one in audit(wrong) if one.kind == "fault"]
+    assert finding.columns == ("t_s",) and name in finding.likely_truth
+    np.testing.assert_allclose(mended(wrong)[0].time_s, right.time_s)
+
+
+def test_velocities_of_the_opposite_sign_are_a_fault():
+    right = trial(motion("zigzag"))
+    signals = {**right.signals, "u_mps": -right.signals["u_mps"], "v_mps": -right.signals["v_mps"]}
+    found = [one for one in audit(replace(right, signals=signals)) if one.kind == "fault"]
+    assert [one.likely_truth for one in found] == ["both are of the opposite sign"]

@@ -186,8 +186,10 @@ def _remedy(missing: list[str]) -> str:
     terms = [term for name in missing if (term := parse_term(_short(name))) is not None]
     motions = {"v": "sway", "r": "yaw", "d": "rudder", "u": "speed"}
     needed = [word for letter, word in motions.items() if any(getattr(term, letter) for term in terms)]
-    moving = f"add a run in which {_listed(needed)} change, or " if needed else ""
-    return f"{moving}do not estimate them"
+    verb = "changes" if len(needed) == 1 else "change"
+    moving = f"add a run in which {_listed(needed)} {verb}, or " if needed else ""
+    held = " ".join(f"--hold {_short(name)}" for name in missing)
+    return f"{moving}leave them as they are: {held}"
 
 
 def _pairs(names: tuple[str, ...], correlations: Array) -> tuple[tuple[str, str, float], ...]:

@@ -8,12 +8,14 @@ from tank2sim.records.audit.finding import Finding
 from tank2sim.records.audit.rudder import rudder_findings
 from tank2sim.records.audit.sensors import sensor_findings
 from tank2sim.records.audit.time_base import time_findings
+from tank2sim.records.audit.time_unit import time_unit_findings
 from tank2sim.records.audit.track import track_findings
 from tank2sim.records.audit.yaw import yaw_findings
 from tank2sim.records.trials import Trial
 
 CHECKS: tuple[Callable[[Trial], list[Finding]], ...] = (
     time_findings,
+    time_unit_findings,
     sensor_findings,
     yaw_findings,
     track_findings,
