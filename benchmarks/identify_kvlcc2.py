@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.identification.trials.comparison import Comparison
 from tank2sim.identification.trials.evaluation import Figure, pooled
-from tank2sim.identification.trials.identify import Comparison, Options, identify
+from tank2sim.identification.trials.identify import Options, identify
 from tank2sim.identification.trials.measured import Measured, measured
 
 DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data"

@@ -9,8 +9,9 @@ import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.identification.trials.as_json import estimate_rows, figure_rows, following_rows, structure_rows
+from tank2sim.identification.trials.comparison import Comparison
 from tank2sim.identification.trials.evaluation import TURN_FIGURES, passages, pooled
-from tank2sim.identification.trials.identify import Comparison, Identification
+from tank2sim.identification.trials.identify import Identification
 from tank2sim.identification.trials.inference import scaled_prior
 from tank2sim.identification.trials.measured import Measured
 from tank2sim.identification.trials.question import pose

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import numpy as np
 
 from tank2sim.cards.reading import changed_text
 from tank2sim.files import BYTE_ORDER_MARK
+from tank2sim.identification.trials.comparison import Comparison, misfit
 from tank2sim.identification.trials.evaluation import Figure, Following, pooled
-from tank2sim.identification.trials.identify import Comparison, Identification, misfit
+from tank2sim.identification.trials.identify import Identification
 from tank2sim.identification.trials.remarks import speeds_of
 
 
@@ -17,7 +20,45 @@ def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -
     `told` is what the user was told beside the notices of the result.
     """
     estimate, known = result.estimate, result.identifiability
-    parameters = {
+    parameters = _parameters(result)
+    return {
+        "method": estimate.method,
+        "structure": result.structure,
+        "derivatives": {
+            name.partition(".")[2]: entry for name, entry in parameters.items() if name.startswith("derivatives.")
+        },
+        "effects": {name: entry for name, entry in parameters.items() if not name.startswith("derivatives.")},
+        "misfit": _misfit(result),
+        "yaw_rate_error_over_windows": {
+            "fit": _windows(result.fit),
+            "holdout": _windows(result.holdout) if result.holdout else None,
+        },
+        "figures": {
+            "fit": [_figure(figure) for figure in result.fit.figures],
+            "holdout": [_figure(figure) for figure in result.holdout.figures] if result.holdout else [],
+        },
+        "structures": {
+            name: {"errors": one.errors, "left_out": [list(fold.left_out) for fold in (*one.single, one.extrapolation)]}
+            for name, one in result.structures.items()
+        },
+        "criteria": None if result.criteria is None else asdict(result.criteria),
+        "bootstrap": _bootstrap(result),
+        "residual_noise": dict(estimate.noise),
+        "prior_scale": dict(estimate.prior_scale),
+        "cost": list(estimate.cost),
+        "identifiability": {
+            "condition": known.condition,
+            "singular_values": known.singular_values,
+            "correlated_pairs": [[one, other, value] for one, other, value in known.pairs],
+            "unseen": [list(direction) for direction in known.unseen],
+        },
+        "warnings": [*result.notices, *known.notices, *told],
+    }
+
+
+def _parameters(result: Identification) -> dict[str, dict[str, float]]:
+    estimate, known = result.estimate, result.identifiability
+    return {
         name: {
             "value": value,
             "standard_error": error,
@@ -35,58 +76,25 @@ def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -
             strict=True,
         )
     }
+
+
+def _misfit(result: Identification) -> dict[str, object]:
     return {
-        "method": estimate.method,
-        "structure": result.structure,
-        "derivatives": {
-            name.partition(".")[2]: entry for name, entry in parameters.items() if name.startswith("derivatives.")
+        "noise": dict(result.noise),
+        "fit": misfit(result.fit, result.noise),
+        "holdout": misfit(result.holdout, result.noise) if result.holdout else None,
+        "before": {
+            "fit": misfit(result.before, result.noise),
+            "holdout": misfit(result.before_holdout, result.noise) if result.before_holdout else None,
         },
-        "effects": {name: entry for name, entry in parameters.items() if not name.startswith("derivatives.")},
-        "misfit": {
-            "noise": dict(result.noise),
-            "fit": misfit(result.fit, result.noise),
-            "holdout": misfit(result.holdout, result.noise) if result.holdout else None,
-            "before": {
-                "fit": misfit(result.before, result.noise),
-                "holdout": misfit(result.before_holdout, result.noise) if result.before_holdout else None,
-            },
-        },
-        "yaw_rate_error_over_windows": {
-            "fit": _windows(result.fit),
-            "holdout": _windows(result.holdout) if result.holdout else None,
-        },
-        "figures": {
-            "fit": [_figure(figure) for figure in result.fit.figures],
-            "holdout": [_figure(figure) for figure in result.holdout.figures] if result.holdout else [],
-        },
-        "structures": {
-            name: {"errors": one.errors, "left_out": [list(fold.left_out) for fold in (*one.single, one.extrapolation)]}
-            for name, one in result.structures.items()
-        },
-        "criteria": result.criteria
-        and {
-            "aic": result.criteria.aic,
-            "bic": result.criteria.bic,
-            "samples": result.criteria.samples,
-            "parameters": result.criteria.parameters,
-        },
-        "bootstrap": None
-        if result.bootstrap is None
-        else {
-            "members": len(result.bootstrap),
-            "standard_errors": dict(zip(estimate.free, np.std(result.bootstrap, axis=0, ddof=1), strict=True)),
-        },
-        "residual_noise": dict(estimate.noise),
-        "prior_scale": dict(estimate.prior_scale),
-        "cost": list(estimate.cost),
-        "identifiability": {
-            "condition": known.condition,
-            "singular_values": known.singular_values,
-            "correlated_pairs": [[one, other, value] for one, other, value in known.pairs],
-            "unseen": [list(direction) for direction in known.unseen],
-        },
-        "warnings": [*result.notices, *known.notices, *told],
     }
+
+
+def _bootstrap(result: Identification) -> dict[str, object] | None:
+    if result.bootstrap is None:
+        return None
+    errors = np.std(result.bootstrap, axis=0, ddof=1)
+    return {"members": len(result.bootstrap), "standard_errors": dict(zip(result.estimate.free, errors, strict=True))}
 
 
 def estimate_rows(result: Identification) -> list[list[object]]:

@@ -11,35 +11,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Vector
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.disturbances import Disturbances, disturbances_of
+from tank2sim.identification.trials.comparison import Comparison, compared, noise_of
 from tank2sim.identification.trials.equation_error import equation_error
-from tank2sim.identification.trials.evaluation import Figure, Following, following, predicted_figures
+from tank2sim.identification.trials.evaluation import following
+from tank2sim.identification.trials.foretelling import Answer, bootstrapped, criteria_or_none, held_out
 from tank2sim.identification.trials.identifiability import Identifiability, identifiability, refuse_unseen
 from tank2sim.identification.trials.inference import scaled_prior
 from tank2sim.identification.trials.kalman import kalman
 from tank2sim.identification.trials.measured import Measured
 from tank2sim.identification.trials.output_error import Settings, output_error
-from tank2sim.identification.trials.portable import Ship, portable
-from tank2sim.identification.trials.prediction import Settings as BandSettings
-from tank2sim.identification.trials.prediction import bands, bootstrap
+from tank2sim.identification.trials.portable import portable
 from tank2sim.identification.trials.problem import Estimate, Problem, Progress, silent
 from tank2sim.identification.trials.question import answered, pose
 from tank2sim.identification.trials.recursive import recursive
-from tank2sim.identification.trials.runs import SEEN
 from tank2sim.identification.trials.selection import (
     Criteria,
     CrossValidation,
-    criteria,
     cross_validate,
     simplest,
     yaw_rate_error,
 )
 from tank2sim.identification.trials.structures import STRUCTURES
-from tank2sim.records.audit import estimated_noise
-from tank2sim.simulation.recorded import recorded, steerable
 
 Array = NDArray[np.float64]
 
@@ -49,9 +43,6 @@ small against the motion; shorter pieces see less of what the derivatives do, lo
 
 LEAST_PIECE = 0.5
 """Shortest piece, in L/u0: in less the state hardly answers the rudder, and there are more initial states than data."""
-
-LEAST_NOISE = 1e-3
-"""Noise of a signal that states none is taken as this share of its standard deviation at least (ours)."""
 
 WHOLE_RUN_MISFIT = 3.0
 """Whole runs are fitted when the model follows them, too: to this many times the noise, in every signal (ours)."""
@@ -93,19 +84,8 @@ class Options:
     hold: tuple[str, ...] = ()
 
 
-IN_BANDS = {f"overshoots_deg.{number}": f"overshoot_{number}_deg" for number in (1, 2)}
-"""Name of a figure in :mod:`.prediction` to its name here, where they differ."""
-
 AUTO = "auto"
 """Structure that stands for the one cross-validation prefers."""
-
-
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """A model against trials: over windows and whole runs, and in the figures of manoeuvres."""
-
-    following: tuple[Following, ...]
-    figures: tuple[Figure, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +189,7 @@ def _identified(
     refuse_unseen(problem)
     estimate = estimated(problem, options, progress)
     improved = answered(started, estimate)
-    answer = _Answer(problem, estimate, improved)
+    answer = Answer(problem, estimate, improved)
     noise = noise_of(trials, problem)
     result = identifiability(problem, estimate)
     held = holdout if holdout is not None and holdout.trials else None
@@ -221,13 +201,15 @@ def _identified(
         identifiability=result,
         noise=noise,
         fit=compared(improved, trials, estimate.noise),
-        holdout=_held_out(answer, held, options.members) if held else None,
+        holdout=held_out(answer, held, options.members) if held else None,
         before=compared(card, trials, estimate.noise),
         before_holdout=compared(card, held, estimate.noise) if held else None,
         structure=structure,
         structures=tried,
-        criteria=_criteria(answer),
-        bootstrap=_bootstrapped(answer, trials.driven_by, options, executor),
+        criteria=criteria_or_none(answer),
+        bootstrap=bootstrapped(
+            answer, trials.driven_by, partial(_in_pieces, options=options), options.bootstrap, executor
+        ),
         notices=(*trials.notices, *(held.notices if held else ()), *_told(card), *estimate.notices),
     )
 
@@ -295,117 +277,6 @@ def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
     results = following(problem, estimate.values, estimate.noise)
     limits = {name: WHOLE_RUN_MISFIT * deviation for name, deviation in estimate.noise.items()}
     return all(error <= limits[name] for result in results for name, error in result.whole.items())
-
-
-def compared(card: ManoeuvringCard, trials: Measured, residual: Mapping[str, float]) -> Comparison:
-    """A card's model against trials.
-
-    Parameters
-    ----------
-    card, trials
-        At the same size.
-    residual : mapping
-        Standard deviation that is to be expected of each variable's error: it weighs the signals where the initial
-        state of a window is found. Weighed by the noise of the sensors alone, the state would follow one signal.
-    """
-    whole = pose(card, trials.trials, trials.driven_by)
-    # Nothing is estimated here: one free parameter instead of all saves making and compiling their sensitivities.
-    problem = replace(whole, free=whole.free[:1], prior_mean=whole.prior_mean[:1], prior_error=whole.prior_error[:1])
-    weights = {name: residual.get(name) or 1.0 for name in problem.seen}
-    return Comparison(
-        following(problem, problem.prior_mean, weights),
-        predicted_figures(card, trials.trials),
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Answer:
-    """A problem, what was found, and the card with it."""
-
-    problem: Problem
-    estimate: Estimate
-    card: ManoeuvringCard
-
-
-def _held_out(answer: _Answer, held: Measured, members: int) -> Comparison:
-    """The new card against trials held out, with the interval in which each figure was to be expected.
-
-    The interval is that of simulations with coefficients drawn from their covariance, under random forces as large and
-    as slow as those that the fit left unexplained (:mod:`.prediction`).
-    """
-    plain = compared(answer.card, held, answer.estimate.noise)
-    if not members or not plain.figures:
-        return plain
-    card = steerable(answer.card)
-    ship, model = Ship(card.text, "order"), build(card)
-    left = _disturbances(answer)
-    intervals: dict[tuple[str, str], tuple[float, float]] = {}
-    for trial in held.trials:
-        what = recorded(trial, model)
-        if what is None:
-            continue
-        try:
-            found = bands(ship, answer.estimate, what, left, BandSettings(members=members)).quantiles
-        except InputError:  # every member ran away: no interval can be told
-            continue
-        for name, (lowest, *_, highest) in found.items():
-            intervals[trial.name, IN_BANDS.get(name, name)] = (lowest, highest)
-    figures = tuple(replace(one, interval=intervals.get((one.trial, one.name))) for one in plain.figures)
-    return replace(plain, figures=figures)
-
-
-def _criteria(answer: _Answer) -> Criteria | None:
-    try:
-        return criteria(answer.problem, answer.estimate)
-    except InputError:
-        return None
-
-
-def _bootstrapped(answer: _Answer, driven_by: str, options: Options, executor: Executor | None) -> Array | None:
-    """Estimates from trials simulated anew; None where they were not asked for, or the residual forces are unknown."""
-    if not options.bootstrap:
-        return None
-    left = _disturbances(answer)
-    if left is None:  # no velocities: nothing tells how large the forces are that the model leaves out
-        return None
-    # Simulated trials are as wide awake as the estimate says: the prior stays what it was when that was found.
-    asked = portable(answer.problem, answer.card, driven_by)
-    settings = BandSettings(members=options.bootstrap)
-    return bootstrap(asked, answer.estimate, partial(_in_pieces, options=options), left, settings, executor)
-
-
-def _disturbances(answer: _Answer) -> Disturbances | None:
-    """What the fit left unexplained, as random forces; None where the velocities for it were not measured."""
-    try:
-        return disturbances_of(answer.problem, answer.estimate.values)
-    except InputError:
-        return None
-
-
-def noise_of(trials: Measured, problem: Problem) -> dict[str, float]:
-    """Measurement noise of each variable, SI: as stated in the files, else estimated; the largest of all trials.
-
-    At least :data:`LEAST_NOISE`: a record that was smoothed shows no noise, and still is not that exact.
-    """
-    noise: dict[str, float] = {}
-    for trial in trials.trials:
-        levels = {**estimated_noise(trial), **trial.noise}
-        for signal, variable in SEEN.items():
-            if variable in problem.seen and levels.get(signal):
-                least = LEAST_NOISE * float(np.nanstd(trial.signals[signal])) if signal not in trial.noise else 0.0
-                noise[variable] = max(noise.get(variable, 0.0), least, float(levels[signal]))
-    return noise
-
-
-def misfit(comparison: Comparison, noise: Mapping[str, float]) -> float:
-    """Root mean square over runs and signals of (simulated - measured)/noise, each run from one initial state."""
-    ratios = [
-        error / noise[name]
-        for result in comparison.following
-        for name, error in result.whole.items()
-        if noise.get(name)
-    ]
-    return float(np.sqrt(np.mean(np.square(ratios)))) if ratios else np.nan
 
 
 def _told(card: ManoeuvringCard) -> Sequence[str]:
