@@ -137,3 +137,30 @@ def test_a_ship_whose_modes_both_grow_is_not_called_stable() -> None:
 def test_the_imo_criteria_are_those_of_calm_water(mariner) -> None:
     effect = [{"name": "current", "parameters": {"speed_mps": 0.8, "direction_deg": 40.0}}]
     assert imo_criteria(build(read_card("mariner", {"effects": effect}))) == imo_criteria(mariner)
+
+
+def test_a_flow_with_memory_changes_no_slow_motion() -> None:
+    """z follows v: in slow motion v - z is nothing, and criterion, modes and Nomoto's K are those without memory."""
+    card = read_card("mariner")
+    effect = "\n[[effects]]\nname = 'flow_memory'\n[effects.parameters]\nshare = 0.3\ntime_constant_s = 8.0\n"
+    with_memory = stability(build(parse_card(card.text + effect, "memory.toml")))
+    without = stability(build(card))
+    assert with_memory.criterion == pytest.approx(without.criterion, rel=0.02)  # about a slightly other course
+    assert with_memory.nomoto.K_per_s == pytest.approx(without.nomoto.K_per_s, rel=0.02)
+
+
+def test_settled_states_are_those_of_the_slow_limit() -> None:
+    """With roll: the heel that the steady yaw rate holds adds its force, as the slow end of the whole system shows."""
+    effect = (
+        "\n[[effects]]\nname = 'roll_coupling'\n[effects.parameters]\nYphi = 1e-4\nNphi = -5e-5\nroll_period_s = 12.0\n"
+    )
+    model = build(parse_card(read_card("mariner", SYMMETRIC).text + effect, "roll.toml"))
+    point = straight_course(model)
+    motion = ["motion.v", "motion.r"]
+    extra = [name for name in model.state_names if name not in {"rudder.angle", *(f"motion.{c}" for c in "uvrxy")}]
+    extra.remove("motion.psi")
+    small = state_space(model, point, states=motion, inputs=["rudder.angle"], outputs=["motion.r"], settled=extra)
+    whole = state_space(model, point, states=[*motion, *extra], inputs=["rudder.angle"], outputs=["motion.r"])
+    assert control.dcgain(small) == pytest.approx(control.dcgain(whole), rel=1e-9)
+    frozen = state_space(model, point, states=motion, inputs=["rudder.angle"], outputs=["motion.r"])
+    assert abs(control.dcgain(frozen) / control.dcgain(whole) - 1) > 1e-3

@@ -75,9 +75,27 @@ def straight_course(model: Model, speed_mps: float | None = None) -> OperatingPo
 
 
 def jacobians(
-    model: Model, point: OperatingPoint, values: Sequence[str], states: Sequence[str], inputs: Sequence[str]
+    model: Model,
+    point: OperatingPoint,
+    values: Sequence[str],
+    states: Sequence[str],
+    inputs: Sequence[str],
+    *,
+    settled: Sequence[str] = (),
 ) -> tuple[Vector, Vector]:
-    """Derivatives (nv, ns) and (nv, ni) of named quantities or states by named states and by named inputs."""
+    """Derivatives (nv, ns) and (nv, ni) of named quantities or states by named states and by named inputs.
+
+    States in `settled` are eliminated: they follow the others at once, as if at rest (the Schur complement of their
+    own rates). Other states that are not named stay where they are.
+    """
+    if settled:
+        derivative = {state.name: state.derivative for state in model.states}
+        rates = [derivative[name] for name in settled]
+        whole, inputs_whole = jacobians(model, point, [*values, *rates], [*states, *settled], inputs)
+        n, m = len(values), len(states)
+        # pinv: a state that nothing drives back (a play) has no place of rest, and moves nothing then
+        follow = whole[:n, m:] @ np.linalg.pinv(whole[n:, m:])
+        return whole[:n, :m] - follow @ whole[n:, :m], inputs_whole[:n] - follow @ inputs_whole[n:]
     expressions = model.expand(ca.vcat([model.symbol(name) for name in values]))
     by_state = ca.jacobian(expressions, ca.vcat([model.symbol(name) for name in states]))
     by_input = ca.jacobian(expressions, ca.vcat([ca.SX(0, 1), *(model.symbol(name) for name in inputs)]))
@@ -92,6 +110,7 @@ def state_space(
     states: Sequence[str] | None = None,
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
+    settled: Sequence[str] = (),
 ) -> control.StateSpace:
     """The linearised model as a ``control.StateSpace`` whose signals bear the model's names (:func:`signal_name`).
 
@@ -102,13 +121,15 @@ def state_space(
     states, inputs, outputs : sequences of str, optional
         Names to keep; by default all that are real. States left out are held at the point. A state may be an input: the
         rudder angle without its gear.
+    settled : sequence of str
+        States left out that follow the others at once (:func:`jacobians`).
     """
     states = list(model.state_names if states is None else states)
     inputs = [v.name for v in model.inputs if not v.boolean] if inputs is None else list(inputs)
     outputs = list(model.outputs if outputs is None else outputs)
     derivative = {state.name: state.derivative for state in model.states}
-    A, B = jacobians(model, point, [derivative[name] for name in states], states, inputs)
-    C, D = jacobians(model, point, outputs, states, inputs)
+    A, B = jacobians(model, point, [derivative[name] for name in states], states, inputs, settled=settled)
+    C, D = jacobians(model, point, outputs, states, inputs, settled=settled)
     return control.StateSpace(
         A,
         B,

@@ -95,12 +95,15 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
     speed = float(np.hypot(at["motion.u"], at["motion.v"]))
     length, density = values["ship.length"], values["ship.water_density"]
 
-    whole = state_space(model, point, states=["motion.u", "motion.v", "motion.r"])
+    settled = _memory(model)
+    whole = state_space(model, point, states=["motion.u", "motion.v", "motion.r"], settled=settled)
     eigenvalues = sorted((complex(value) for value in whole.poles()), key=lambda value: -value.real)
-    slopes, _ = jacobians(model, point, ["force.Y", "force.N"], ["motion.v", "motion.r"], [])
+    slopes, _ = jacobians(model, point, ["force.Y", "force.N"], ["motion.v", "motion.r"], [], settled=settled)
     # Y_v N_r and N_v Y_r are both in (1/2 rho)^2 L^6 V^2.
     criterion = float(np.linalg.det(slopes)) / (0.25 * density**2 * length**6 * speed**2)
-    steering = state_space(model, point, states=["motion.v", "motion.r"], inputs=["rudder.angle"], outputs=["motion.r"])
+    steering = state_space(
+        model, point, states=["motion.v", "motion.r"], inputs=["rudder.angle"], outputs=["motion.r"], settled=settled
+    )
     own = nomoto(steering)
     time = length / speed
     return Stability(
@@ -120,6 +123,12 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
             own.T3_s / time,
         ),
     )
+
+
+def _memory(model: Model) -> list[str]:
+    """States of effects (the memory of the flow, roll): stability on a straight course is that of slow motions."""
+    own = {f"motion.{name}" for name in ("u", "v", "r", "psi", "x", "y")}
+    return [name for name in model.state_names if name not in own and not name.startswith("rudder.")]
 
 
 def nomoto(steering: control.StateSpace) -> Nomoto:
