@@ -30,6 +30,7 @@ from tank2sim.identification.trials.measured import Measured, measured
 from tank2sim.identification.trials.remarks import remarks
 from tank2sim.identification.trials.structures import STRUCTURES
 from tank2sim.records.reading import looks_like_a_trial
+from tank2sim.units import in_words
 
 
 @click.command("identify")
@@ -183,5 +184,6 @@ def _show(result: Identification, told: tuple[str, ...]) -> None:
         show_table(title, ["structure", "one at a time, mean", "those of largest amplitude"], rows)
     if rows := figure_rows(result):
         heads = ["trial", "", "figure", "measured", "before", "now", "error", "95 %"]
-        show_table("Figures, simulated in closed loop from the measured start", heads, rows)
+        named = [[trial, word, ", ".join(in_words(str(name))), *rest] for trial, word, name, *rest in rows]
+        show_table("Figures, simulated in closed loop from the measured start", heads, named)
     show_notices([*result.notices, *result.identifiability.notices, *told])

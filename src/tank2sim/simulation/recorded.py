@@ -73,6 +73,15 @@ class Recorded:
     inputs: dict[str, float]
     figures: Figures
 
+    @property
+    def words(self) -> str:
+        """What it was, for people: ``zigzag 20/10, reversed 2.4 s late``."""
+        rudder = math.degrees(self.manoeuvre.rudder)
+        if isinstance(self.manoeuvre, Turn):
+            return f"turn {rudder:.3g}"
+        late = f"{self.manoeuvre.lag_s:.2g} s late"
+        return f"zigzag {rudder:.3g}/{math.degrees(self.manoeuvre.heading):.3g}, reversed {late}"
+
 
 def recorded(trial: Trial, model: Model) -> Recorded | None:
     """Recognise a turning circle or a zigzag in a trial; None if it is neither.

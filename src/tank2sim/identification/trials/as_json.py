@@ -13,6 +13,9 @@ from tank2sim.identification.trials.evaluation import Figure, Following, pooled
 from tank2sim.identification.trials.identify import Identification
 from tank2sim.identification.trials.remarks import speeds_of
 
+NO_YAW = 3.0
+"""A run whose yaw rate stays below this many times its noise goes straight."""
+
 
 def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -> dict[str, object]:
     """Everything a script may want: ``derivatives``, ``effects``, ``misfit``, ``figures``, ``identifiability``, ...
@@ -24,6 +27,7 @@ def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -
     return {
         "method": estimate.method,
         "structure": result.structure,
+        "manoeuvres": dict(result.manoeuvres),
         "derivatives": {
             name.partition(".")[2]: entry for name, entry in parameters.items() if name.startswith("derivatives.")
         },
@@ -117,7 +121,8 @@ def following_rows(result: Identification) -> list[list[object]]:
         pairs.append(("held out", result.before_holdout, result.holdout))
     for word, before, now in pairs:
         for old, new in zip(before.following, now.following, strict=True):
-            rows.append([new.name, word, *(_percent(one, "motion.r") for one in (old, new))])
+            noise = result.noise.get("motion.r", 0.0)
+            rows.append([new.name, word, *(_yaw_error(one, noise) for one in (old, new))])
     return rows
 
 
@@ -178,10 +183,13 @@ def _windows(comparison: Comparison) -> dict[str, float]:
     return {**runs, "all": pooled(comparison.following, "motion.r")}
 
 
-def _percent(one: Following, signal: str) -> str:
-    if signal not in one.windows:
-        return "-"
-    return f"{100 * one.relative(signal):.3g} %"
+def _yaw_error(one: Following, noise: float) -> str:
+    """Error of the yaw rate over windows, %; in words where a share of it would say nothing."""
+    if "motion.r" not in one.windows:
+        return "no yaw rate measured"
+    if one.windows["motion.r"][1] < NO_YAW * noise:
+        return "no yaw"
+    return f"{100 * one.relative('motion.r'):.3g} %"
 
 
 def _figure(figure: Figure) -> dict[str, object]:
@@ -190,6 +198,6 @@ def _figure(figure: Figure) -> dict[str, object]:
         "figure": figure.name,
         "measured": figure.measured,
         "predicted": figure.predicted,
-        "error": figure.error,
+        "error": None if figure.predicted is None else figure.predicted - figure.measured,
         "interval_95": figure.interval,
     }

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Vector
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.comparison import Comparison, compared, noise_of
@@ -34,6 +35,8 @@ from tank2sim.identification.trials.selection import (
     yaw_rate_error,
 )
 from tank2sim.identification.trials.structures import STRUCTURES
+from tank2sim.records.trials import Trial
+from tank2sim.simulation.recorded import recorded
 
 Array = NDArray[np.float64]
 
@@ -110,6 +113,8 @@ class Identification:
         The card that was given, against the same.
     structure : str
         Of the model: the one asked for, or chosen.
+    manoeuvres : mapping
+        Trial to what it was recognised as, in words.
     structures : mapping
         Cross-validation of each structure that was tried: none, unless the choice was left to it.
     criteria : Criteria or None
@@ -134,6 +139,7 @@ class Identification:
     structures: Mapping[str, CrossValidation]
     criteria: Criteria | None
     bootstrap: Array | None
+    manoeuvres: Mapping[str, str]
     notices: tuple[str, ...]
 
 
@@ -210,8 +216,15 @@ def _identified(
         bootstrap=bootstrapped(
             answer, trials.driven_by, partial(_in_pieces, options=options), options.bootstrap, executor
         ),
+        manoeuvres=_manoeuvres(improved, (*trials.trials, *(held.trials if held else ()))),
         notices=(*trials.notices, *(held.notices if held else ()), *_told(card), *estimate.notices),
     )
+
+
+def _manoeuvres(card: ManoeuvringCard, trials: Sequence[Trial]) -> dict[str, str]:
+    model = build(card)
+    known = {trial.name: recorded(trial, model) for trial in trials}
+    return {name: what.words for name, what in known.items() if what is not None}
 
 
 def estimated(problem: Problem, options: Options, progress: Progress = silent) -> Estimate:

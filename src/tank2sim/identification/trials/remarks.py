@@ -28,12 +28,18 @@ WORSE = 1.05
 def remarks(result: Identification) -> tuple[str, ...]:
     """All of them, as sentences."""
     return (
+        *_recognised(result),
         *_chosen(result),
         *_widened(result.estimate.prior_scale),
         *_worse(result),
         *_outside(result),
         *_stops(result.card),
     )
+
+
+def _recognised(result: Identification) -> list[str]:
+    told = "; ".join(f"{name}: {words}" for name, words in result.manoeuvres.items())
+    return [f"recognised, to starboard positive: {told}"] if told else []
 
 
 def _chosen(result: Identification) -> list[str]:
