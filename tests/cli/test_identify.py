@@ -121,6 +121,25 @@ def test_a_term_that_is_held_stays_as_the_card_has_it(folder: Path) -> None:
     refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--hold", "Nope", cwd=folder), "--hold", "Nope")
 
 
+def test_holdout_takes_all_that_follow_it_up_to_the_next_option(folder: Path) -> None:
+    several = ("--holdout", "turn-35.csv", "turn25.csv", "--members", "0", "--json", "several.json")
+    result = tank2sim(
+        "identify",
+        "off.toml",
+        *FITTED[:2],
+        *several,
+        "--method",
+        "equation_error",
+        "--holdout",
+        "small.csv",
+        cwd=folder,
+    )
+    assert result.returncode == 0, result.stderr
+    found = json.loads((folder / "several.json").read_text())["yaw_rate_error_over_windows"]
+    assert set(found["fit"]) == {"zigzag20", "zigzag10", "all"}
+    assert set(found["holdout"]) == {"turn-35", "turn25", "small", "all"}
+
+
 def test_what_the_trials_demand_of_the_prior_is_told(folder: Path) -> None:
     result = tank2sim("identify", "off.toml", *FITTED[::2], "--method", "equation_error", cwd=folder)
     assert "standard errors were widened" in " ".join(result.stdout.split())
@@ -134,6 +153,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(folder: Path) -> None:
     both = ("identify", "off.toml", "zigzag20.csv", "--holdout", "zigzag20.csv")
     refused(tank2sim(*both, cwd=folder), "both fitted and held out")
     refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--piece", "0.1", cwd=folder), "--piece", "or more")
+    refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--holdout", cwd=folder), "--holdout names no trial")
     assert not (folder / "n.toml").exists()
 
 

@@ -8,6 +8,7 @@ import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 
 import click
@@ -33,11 +34,33 @@ from tank2sim.records.reading import looks_like_a_trial
 from tank2sim.units import in_words
 
 
-@click.command("identify")
+class TakesSeveral(click.Command):
+    """A command whose ``--holdout`` takes all file names up to the next option: ``--holdout A B -o C``."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Give each of the file names an option of its own, as click has it."""
+        spread: list[str] = []
+        taking = False
+        for word, following in pairwise([*args, "-"]):
+            if word == "--holdout" and following.startswith("-"):
+                raise click.UsageError("--holdout names no trial", ctx)
+            if word.startswith("-"):
+                taking = word == "--holdout"
+                spread += [] if taking else [word]
+            else:
+                spread += ["--holdout", word] if taking else [word]
+        return super().parse_args(ctx, spread)
+
+
+@click.command("identify", cls=TakesSeveral)
 @click.argument("card")
 @click.argument("trials", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
-    "--holdout", multiple=True, type=click.Path(path_type=Path), metavar="TRIAL", help="Compare with it; do not fit it."
+    "--holdout",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar="TRIAL...",
+    help="Compare with these; do not fit them.",
 )
 @click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the card found.")
 @click.option("--method", type=click.Choice(METHODS), default="output_error", show_default=True)
