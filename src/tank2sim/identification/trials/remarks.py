@@ -43,6 +43,10 @@ def _recognised(result: Identification) -> list[str]:
 
 
 def _chosen(result: Identification) -> list[str]:
+    if not result.structures and result.structure == "card":
+        return [
+            "other structures were not tried: --structure auto cross-validates them, cross_flow extrapolates to turns"
+        ]
     if not result.structures:
         return []
     return [
