@@ -83,3 +83,21 @@ def test_an_answer_goes_into_the_card_in_its_own_signs_and_scaling(name: str) ->
 def test_rounding_keeps_a_thousandth_of_the_standard_error() -> None:
     assert rounded(-0.0123456789, 0.00012) == pytest.approx(-0.0123457, abs=1.2e-7)
     assert rounded(1.23456789, 0.0) == 1.23456789
+
+
+def test_the_force_of_sway_and_yaw_is_that_of_ideal_fluid_in_either_convention() -> None:
+    """X = (m + m_y) v r whether the equations add m v r or the card's term holds it."""
+    text = (read_card("mariner").text).replace("Xvr = 798e-5", "Xvr = 0.0")
+    total = parse_card(text, "total")
+    bare = parse_card(text.replace('yaw_rate_terms = "total"', 'yaw_rate_terms = "hydrodynamic"'), "bare")
+    assert isinstance(total, ManoeuvringCard) and isinstance(bare, ManoeuvringCard)
+    whole = prior_of_absent(total, "Xvr")[0]
+    assert whole == pytest.approx(total.rigid_body.mass - total.derivatives["Yvdot"])
+    assert whole == pytest.approx(prior_of_absent(bare, "Xvr")[0] + bare.rigid_body.mass)
+
+
+def test_a_card_with_a_byte_order_mark_is_restructured_like_any_other(kvlcc2: ManoeuvringCard) -> None:
+    marked = parse_card("\ufeff" + kvlcc2.text, "marked")
+    assert isinstance(marked, ManoeuvringCard)
+    plain, found = (STRUCTURES["cross_flow"].start(card) for card in (kvlcc2, marked))
+    assert found.derivatives == plain.derivatives and found.effects == plain.effects

@@ -16,6 +16,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import linear, revised
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import LINEAR_TERMS, TERMS
+from tank2sim.files import BYTE_ORDER_MARK
 
 TYPICAL = {"v": 0.3, "r": 0.7, "d": 0.6, "u": 0.4}
 """Primes of a hard turn (v', r', rudder in rad, Du'): sizes at which terms are compared (KVLCC2, 35 deg turn)."""
@@ -109,13 +110,16 @@ STRUCTURES: dict[str, Structure] = {
 def prior_of_absent(card: ManoeuvringCard, name: str, share: float = SHARE_OF_LINEAR) -> tuple[float, float]:
     """Value and standard error (prime) before the trials of a term that the card has not.
 
-    X_vr is -Yvdot: in ideal fluid the force of the added mass in sway, m_y v r (the MMG model's (m + m_y) v r). All
-    others are 0 within `share` of the linear force of a hard turn, asymmetry within :data:`SHARE_OF_ASYMMETRY` of it.
+    X_vr is -Yvdot: in ideal fluid the force of the added mass in sway, m_y v r (the MMG model's (m + m_y) v r); where the
+    card's terms in r are "total", it holds m v r as well. All others are 0 within `share` of the linear force of a hard
+    turn, asymmetry within :data:`SHARE_OF_ASYMMETRY` of it.
     """
     known = card.derivatives
     term = known_term(name)
     if name == "Xvr":
         value = -known.get("Yvdot", 0.0)
+        if card.model.yaw_rate_terms == "total":
+            value += card.rigid_body.mass
         return value, max(0.3 * abs(value), 1e-4)
     sizes = {
         "X": max(abs(known.get("Xu", 0.0)) * TYPICAL["u"], 5e-4),
@@ -141,7 +145,7 @@ def _with_terms(card: ManoeuvringCard, names: list[str], share: float = SHARE_OF
 
 
 def _without(card: ManoeuvringCard, names: set[str]) -> ManoeuvringCard:
-    document = tomlkit.parse(card.text)
+    document = tomlkit.parse(card.text.removeprefix(BYTE_ORDER_MARK))
     for name in names & set(card.derivatives):
         key = card.places.get(name, name)
         for section in ("derivatives", "uncertainty"):
@@ -154,7 +158,7 @@ def _with_effect(card: ManoeuvringCard, name: str, parameters: Terms) -> Manoeuv
     """The card with an effect; one that it has already stays as it is."""
     if any(entry.name == name for entry in card.effects):
         return card
-    document = tomlkit.parse(card.text)
+    document = tomlkit.parse(card.text.removeprefix(BYTE_ORDER_MARK))
     effect = tomlkit.table()
     effect["name"] = name
     values, errors = tomlkit.table(), tomlkit.table()
