@@ -110,9 +110,9 @@ STRUCTURES: dict[str, Structure] = {
 def prior_of_absent(card: ManoeuvringCard, name: str, share: float = SHARE_OF_LINEAR) -> tuple[float, float]:
     """Value and standard error (prime) before the trials of a term that the card has not.
 
-    X_vr is -Yvdot: in ideal fluid the force of the added mass in sway, m_y v r (the MMG model's (m + m_y) v r); where the
-    card's terms in r are "total", it holds m v r as well. All others are 0 within `share` of the linear force of a hard
-    turn, asymmetry within :data:`SHARE_OF_ASYMMETRY` of it.
+    X_vr is -Yvdot: in ideal fluid the force of the added mass in sway, m_y v r (the MMG model's (m + m_y) v r); where
+    the card's terms in r are "total", it holds m v r as well. All others are 0 within `share` of the linear force of a
+    hard turn, asymmetry within :data:`SHARE_OF_ASYMMETRY` of it.
     """
     known = card.derivatives
     term = known_term(name)
