@@ -29,6 +29,23 @@ from tank2sim.simulation.trajectory import Trajectory
 NOMINAL_HEADINGS_DEG = (1, 2, 5, 10, 15, 20, 25, 30, 35)
 """Headings at which zigzags are reversed (ITTC 7.5-04-02-01, and the modified ones of SIMMAN)."""
 
+STATES = {
+    "u_mps": "motion.u",
+    "v_mps": "motion.v",
+    "r_radps": "motion.r",
+    "psi_rad": "motion.psi",
+    "x_m": "motion.x",
+    "y_m": "motion.y",
+}
+"""Signal of a trial to the state of a model that it measures."""
+
+FED = {
+    "n_radps": "propeller.speed",
+    "wind_speed_mps": "wind.speed",
+    "wind_direction_rad": "wind.direction",
+}
+"""Signal of a trial to the input of a model that it gives, beside the rudder."""
+
 SMOOTHING = 0.3
 """Recorded signals are smoothed over this many L/u0 before figures are read off (ours: below the time of any peak)."""
 
@@ -116,11 +133,10 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
         return None
     track = _trajectory(trial, model, manoeuvre, (first.execute_s, end), (held, smooth))
     figures = figures_of(manoeuvre, track, float(values["ship.length"]))
-    start = {f"initial.{name[7:]}": float(track[name][0]) for name in _STATES.values()}
-    names = {"n_radps": "propeller.speed", "wind_speed_mps": "wind.speed", "wind_direction_rad": "wind.direction"}
+    start = {f"initial.{name[7:]}": float(track[name][0]) for name in STATES.values()}
     inputs = {
         there: float(np.nanmean(trial.signals[name]))
-        for name, there in names.items()
+        for name, there in FED.items()
         if name in trial.signals and there in model.input_names
     }
     start["initial.rudder_angle"] = float(np.interp(first.execute_s, trial.time_s, rudder))
@@ -180,16 +196,6 @@ def repeat(what: Recorded, integrator: Integrator, parameters: dict[str, float] 
         parameters={**values, **start, **(parameters or {})},
         integrator=integrator,
     )
-
-
-_STATES = {
-    "u_mps": "motion.u",
-    "v_mps": "motion.v",
-    "r_radps": "motion.r",
-    "psi_rad": "motion.psi",
-    "x_m": "motion.x",
-    "y_m": "motion.y",
-}
 
 
 @dataclass(frozen=True)
@@ -272,7 +278,7 @@ def _trajectory(
     inside = (trial.time_s > span[0]) & (trial.time_s <= span[1])
     t = np.concatenate([[span[0]], trial.time_s[inside]])
     x = np.zeros((len(t), len(model.states)))
-    for name, there in _STATES.items():
+    for name, there in STATES.items():
         x[:, model.state_names.index(there)] = np.interp(t, trial.time_s, smooth[name])
     u = np.tile(model.input_values(), (len(t), 1))
     command = model.input_names.index("rudder.command")

@@ -12,29 +12,18 @@ from scipy.ndimage import uniform_filter1d
 from tank2sim.dynamics.model import Model, Vector
 from tank2sim.errors import InputError
 from tank2sim.records.trials import Trial
+from tank2sim.simulation.recorded import FED, STATES
 
 Array = NDArray[np.float64]
 
 SEEN = {
-    "u_mps": "motion.u",
-    "v_mps": "motion.v",
-    "r_radps": "motion.r",
-    "psi_rad": "motion.psi",
-    "x_m": "motion.x",
-    "y_m": "motion.y",
+    **STATES,
     "u_ground_mps": "motion.u_ground",
     "v_ground_mps": "motion.v_ground",
     "sog_mps": "motion.sog",
     "phi_rad": "motion.phi",
 }
 """Signal of a trial to the variable of a model that it measures."""
-
-FED = {
-    "n_radps": "propeller.speed",
-    "wind_speed_mps": "wind.speed",
-    "wind_direction_rad": "wind.direction",
-}
-"""Signal of a trial to the input of a model that it gives, beside the rudder."""
 
 LONGEST_GAP = 3
 """Gaps of up to this many samples are bridged; in longer ones nothing counts as measured (a choice of ours)."""
