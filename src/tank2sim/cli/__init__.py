@@ -27,6 +27,7 @@ COMMANDS = (
     "tow",
     "audit",
     "identify",
+    "gap",
     "signals",
     "export",
     "check",

@@ -8,7 +8,6 @@ import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
-from itertools import pairwise
 from pathlib import Path
 
 import click
@@ -16,6 +15,7 @@ import click
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.cli.trials import TakesSeveral, fitted_and_held, trial_files
 from tank2sim.errors import InputError
 from tank2sim.files import writable_folder, write_together
 from tank2sim.identification.trials.as_json import (
@@ -27,32 +27,13 @@ from tank2sim.identification.trials.as_json import (
     structure_rows,
 )
 from tank2sim.identification.trials.identify import AUTO, METHODS, Identification, Options, identify
-from tank2sim.identification.trials.measured import Measured, measured
+from tank2sim.identification.trials.measured import Measured
 from tank2sim.identification.trials.remarks import remarks
 from tank2sim.identification.trials.structures import STRUCTURES
-from tank2sim.records.reading import looks_like_a_trial
 from tank2sim.units import in_words
 
 
-class TakesSeveral(click.Command):
-    """A command whose ``--holdout`` takes all file names up to the next option: ``--holdout A B -o C``."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Give each of the file names an option of its own, as click has it."""
-        spread: list[str] = []
-        taking = False
-        for word, following in pairwise([*args, "-"]):
-            if word == "--holdout" and following.startswith("-"):
-                raise click.UsageError("--holdout names no trial", ctx)
-            if word.startswith("-"):
-                taking = word == "--holdout"
-                spread += [] if taking else [word]
-            else:
-                spread += ["--holdout", word] if taking else [word]
-        return super().parse_args(ctx, spread)
-
-
-@click.command("identify", cls=TakesSeveral)
+@click.command("identify", cls=TakesSeveral, several=("--holdout",))
 @click.argument("card")
 @click.argument("trials", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
@@ -108,10 +89,7 @@ def command(
     if not isinstance(known, ManoeuvringCard):
         raise InputError(known.source, "model.kind", "is no ship that manoeuvres", "give a linear or abkowitz card")
     options = _options(more)
-    fitted, held = measured(_files(trials), known), measured(_files(holdout), known)
-    for trial in held.trials:
-        if trial.name in {other.name for other in fitted.trials}:
-            raise InputError(trial.path, "", "is both fitted and held out", "hold out what is not fitted")
+    fitted, held = fitted_and_held(trials, holdout, known)
     with showing_progress("fitting") as progress, _executor(options, more["workers"]) as executor:
         result = identify(known, fitted, held, options, progress, executor)
     told = remarks(result)
@@ -126,7 +104,9 @@ def command(
         files |= _pictures(result, known, (fitted, held), plots)
     asked = [output, json_file if isinstance(json_file, Path) else None]
     write_together(
-        files, inputs=[*_files(trials), *_files(holdout), *([Path(card)] if Path(card).exists() else [])], outputs=asked
+        files,
+        inputs=[*trial_files(trials), *trial_files(holdout), *([Path(card)] if Path(card).exists() else [])],
+        outputs=asked,
     )
     _show(result, told)
     if output:
@@ -175,17 +155,6 @@ def _pictures(
     charts = identification_charts(result, fitted, held)
     pictures: dict[Path, str | bytes] = {folder / f"{stem}.png": chart_png(chart) for stem, chart in charts.items()}
     return {**pictures, folder / "report.html": render_page(identification_page(result, charts))}
-
-
-def _files(given: tuple[Path, ...]) -> list[Path]:
-    """The files named; a folder stands for the trials in it."""
-    found: list[Path] = []
-    for path in given:
-        inside = sorted(file for file in path.glob("*") if looks_like_a_trial(file)) if path.is_dir() else [path]
-        if not inside:
-            raise InputError(path, "", "holds no trial", "a folder with trials (.csv or .dat) was expected")
-        found += inside
-    return found
 
 
 def _show(result: Identification, told: tuple[str, ...]) -> None:

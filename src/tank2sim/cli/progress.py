@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
@@ -15,15 +15,26 @@ from tank2sim.identification.trials.problem import Progress as Told
 @contextmanager
 def showing_progress(what: str) -> Iterator[Told]:
     """A line that says how far a search is, on the error stream and only where that is a terminal."""
-    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(what, total=None)
+    with showing_stages(what) as show:
         steps = 0
 
         def told(stage: str, values: Vector, cost: float) -> None:
             nonlocal steps
             steps += 1
-            bar.update(task, description=f"{stage}: step {steps}, cost {cost:.6g} (Ctrl-C keeps the best so far)")
+            show(f"{stage}: step {steps}, cost {cost:.6g} (Ctrl-C keeps the best so far)")
+
+        yield told
+
+
+@contextmanager
+def showing_stages(what: str) -> Iterator[Callable[[str], None]]:
+    """A line that says what is being done, and for how long; shown as that of :func:`showing_progress`."""
+    columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(what, total=None)
+
+        def told(stage: str) -> None:
+            bar.update(task, description=stage)
 
         yield told

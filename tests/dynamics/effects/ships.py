@@ -50,6 +50,14 @@ TYPICAL: dict[str, dict[str, float]] = {
     "trim": {"by_stern_m": 1.0},
     "roll_coupling": {"Yphi": 1e-4, "Nphi": -5e-5},
     "flow_memory": {"share": 0.3, "time_constant_s": 8.0},
+    "gyro_bias": {"rate_degps": 0.05},
+    "gyro_scale": {"factor": 0.05},
+    "heading_offset": {"angle_deg": 2.0},
+    "antenna_lever_arm": {"forward_m": -40.0, "starboard_m": 5.0},
+    "log_scale": {"factor": 0.05},
+    "log_misalignment": {"angle_deg": 2.0},
+    "log_lever_arm": {"forward_m": 30.0},
+    "rudder_time_offset": {"delay_s": 1.0},
 }
 """Each effect with parameters of a usual size, as cards give them."""
 

@@ -1,4 +1,4 @@
-"""What holds for every effect: names, neutral parameters, bounds, symmetry, and the uses a model is put to."""
+"""What holds for every effect: names, bounds, symmetry, and the uses a model is put to."""
 
 from __future__ import annotations
 
@@ -20,22 +20,7 @@ from .ships import FORCES, STATES, TYPICAL, card_with, forces, mariner_text, shi
 
 OUTPUTS = [*FORCES, "motion.udot", "motion.vdot", "motion.rdot", "motion.xdot", "motion.ydot"]
 
-# Parameters at which an effect changes nothing; those of the gear have none (a lag of 0 is no lag).
-NEVER_NEUTRAL = (
-    *("wind", "loaded_rudder", "rudder_rate_limit", "rudder_lag", "telemotor_lag", "flow_memory", "water_depth"),
-)
-NEUTRAL: dict[str, dict[str, float]] = {
-    name: dict.fromkeys(parameters, 0.0)
-    for name, parameters in TYPICAL.items()
-    if name not in NEVER_NEUTRAL
-} | {
-    "rudder_stall": {"angle_deg": 20.0, "loss": 0.0},
-    "flow_memory": {"share": 0.0, "time_constant_s": 8.0},
-    "water_depth": {"depth_m": 1e4},
-    "hump_resistance": {"X_prime": 0.0, "speed_mps": 6.0},
-    "wind": {"speed_mps": 10.0, "direction_deg": 0.0, "surge_coefficient": 0.0, "sway_coefficient": 0.0,
-             "yaw_coefficient": 0.0},
-}  # fmt: skip
+ON_THE_SHIP = [name for name, effect in EFFECTS.items() if effect.acts_on != "sensor"]
 
 
 def test_every_effect_of_the_library_is_tried_here() -> None:
@@ -63,19 +48,7 @@ def test_parameters_become_named_variables_that_start_at_the_cards_values(name: 
             assert variable.start == pytest.approx(given[parameter.name])
 
 
-@pytest.mark.parametrize("name", NEUTRAL)
-@pytest.mark.parametrize("at", STATES)
-def test_neutral_parameters_change_nothing(name: str, at: dict[str, float]) -> None:
-    at = {**at, "motion.psi": 0.7, "rudder.command": 0.3}
-    names = [*OUTPUTS, "rudder.rate"]
-    # 1e-12: the depth of 10 km that stands for deep water leaves (T/H)^2 and rounding
-    tolerance = 2e-3 if name == "water_depth" else 1e-12
-    np.testing.assert_allclose(
-        values(ship({name: NEUTRAL[name]}), names, at), values(ship(), names, at), rtol=tolerance
-    )
-
-
-@pytest.mark.parametrize("name", TYPICAL)
+@pytest.mark.parametrize("name", ON_THE_SHIP)
 def test_typical_parameters_change_something(name: str) -> None:
     at = {
         **state(6.5, 0.5, 0.01, 0.5),
@@ -188,15 +161,8 @@ def test_effects_stand_on_top_of_each_other_in_any_order() -> None:
 
 
 def test_effects_say_what_they_miss_in_a_card() -> None:
-    bare = mariner_text(**dict.fromkeys(("beam_m", "draught_m", "projected_area_front_m2"), ""))
-    for name, key in (("wind", "projected_area_front_m2"), ("cross_flow_drag", "draught_m"), ("trim", "draught_m"),
-                      ("wave_drift", "beam_m"), ("water_depth", "beam_m")):  # fmt: skip
-        with pytest.raises(InputError, match=rf"ship\.{key}: is missing.*{name} needs"):
-            ship({name: TYPICAL[name]}, bare)
-    without = mariner_text().split("[propulsion]")[0]
-    for name in ("engine_droop", "propeller_walk"):
-        with pytest.raises(InputError, match="propulsion: is missing"):
-            ship({name: TYPICAL[name]}, without)
+    with pytest.raises(InputError, match="propulsion: is missing"):
+        ship({"propeller_walk": TYPICAL["propeller_walk"]}, mariner_text().split("[propulsion]")[0])
     with pytest.raises(InputError, match="a linear model has no Yrrr"):
         ship({"cubic_yaw_damping": TYPICAL["cubic_yaw_damping"]}, mariner_text(kind='kind = "linear"'))
 

@@ -54,6 +54,16 @@ def test_a_drooping_engine_loses_revolutions_with_speed() -> None:
     np.testing.assert_allclose(found, [thrust, 0.0, 0.0], rtol=1e-7, atol=1e-6)
 
 
+def test_without_propulsion_an_engine_droops_from_a_typical_resistance() -> None:
+    text = mariner_text().split("[propulsion]")[0]
+    found = added_forces("engine_droop", {"droop": 0.4}, {"motion.u": 0.75 * U0}, text)
+    thrust = 0.5 * RHO * L**2 * U0**2 * 6e-4 * (0.9**2 - 1)
+    assert thrust < 0
+    np.testing.assert_allclose(found, [thrust, 0.0, 0.0], rtol=1e-7, atol=1e-6)
+    told = [notice for notice in ship({"engine_droop": {"droop": 0.4}}, text).notices if "engine_droop" in notice]
+    assert len(told) == 1 and "0.0006" in told[0]
+
+
 def closed_cross_flow(v: float, r: float) -> tuple[float, float]:
     """Integrals of |w| w and x |w| w, w = v + x r, over the length, piecewise in closed form."""
     ends = [-L / 2, L / 2]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tank2sim.dynamics.effects.gear import CONTACT
 from tank2sim.simulation.scheme import runge_kutta_step
 
 from .ships import FORCES, N0, RHO, STATES, U0, L, forces, mariner_text, ship, values
@@ -76,35 +77,29 @@ def test_the_lag_takes_the_place_of_the_cards() -> None:
     assert not ship({"rudder_lag": {"time_constant_s": 4.0}}, nothing).notices
 
 
-def test_play_holds_the_rudder_until_the_order_has_moved_by_half_of_it() -> None:
-    play = {"rudder_backlash": {"width_deg": 4.0}}
-    assert rate(play, 0.1 + 1.9 * DEG, 0.1) == 0.0 and rate(play, 0.1 - 1.9 * DEG, 0.1) == 0.0
-    assert rate(play, 0.1 + 3.0 * DEG, 0.1) == pytest.approx(1.0 * DEG)
-    assert rate(play, 0.1 - 3.0 * DEG, 0.1) == pytest.approx(-1.0 * DEG)
-    assert rate(play, 0.6, 0.0) == pytest.approx(5 * DEG)  # a large error still has the gear's full rate
+def test_the_gear_does_not_act_within_its_dead_band() -> None:
+    band = {"rudder_dead_band": {"half_width_deg": 2.0}}
+    assert rate(band, 0.1 + 1.9 * DEG, 0.1) == 0.0 and rate(band, 0.1 - 1.9 * DEG, 0.1) == 0.0
+    assert rate(band, 0.1 + 3.0 * DEG, 0.1) == pytest.approx(1.0 * DEG)
+    assert rate(band, 0.1 - 3.0 * DEG, 0.1) == pytest.approx(-1.0 * DEG)
+    assert rate(band, 0.6, 0.0) == pytest.approx(5 * DEG)  # a large error still has the gear's full rate
 
 
-def test_play_is_the_play_operator_for_slow_orders() -> None:
-    """Order up, down and up again, far slower than the gear: the rudder is max(min(.)) of the order -+ b/2."""
+def test_the_rudder_follows_the_gear_by_the_play_operator() -> None:
+    """Order up, down and up again: the rudder is max(min(.)) of the gear's angle -+ b/2."""
     model = ship({"rudder_backlash": {"width_deg": 4.0}})
     step, p = runge_kutta_step(model), model.parameter_values()
     x = np.array(model.initial(p)).ravel()
     x[model.state_names.index("motion.u")] = U0
-    place, played, worst = model.state_names.index("rudder.angle"), 0.0, 0.0
-    orders = 0.2 * np.sin(np.linspace(0, 3 * np.pi, 3000)) * np.linspace(1, 0.3, 3000)
-    for order in orders:
-        played = min(max(played, order - 2 * DEG), order + 2 * DEG)
+    gear, rudder = (model.state_names.index(name) for name in ("rudder_backlash.gear", "rudder.angle"))
+    played, worst, fastest = 0.0, 0.0, 0.0
+    for order in 0.2 * np.sin(np.linspace(0, 3 * np.pi, 3000)) * np.linspace(1, 0.3, 3000):
+        before = x[gear]
         x = np.array(step(x, model.input_values({"rudder.command": order}), p, model.step_s)).ravel()
-        worst = max(worst, abs(x[place] - played))
-    fastest = np.max(np.abs(np.diff(orders))) / model.step_s
-    assert worst < 1.05 * fastest * 1.0  # the gear's own lag of 1 s
-
-
-def test_small_orders_about_midships_move_nothing() -> None:
-    band = {"rudder_dead_band": {"half_width_deg": 3.0}}
-    assert rate(band, 2.9 * DEG, 0.0) == 0.0 and rate(band, -2.9 * DEG, 0.0) == 0.0
-    assert rate(band, 5.0 * DEG, 0.0) == pytest.approx(2.0 * DEG)
-    assert rate(band, 2.0 * DEG, 1.0 * DEG) == pytest.approx(-1.0 * DEG)  # goes back to midships: no memory
+        played = min(max(played, x[gear] - 2 * DEG), x[gear] + 2 * DEG)
+        worst, fastest = max(worst, abs(x[rudder] - played)), max(fastest, abs(x[gear] - before) / model.step_s)
+    assert worst < 1.1 * fastest * CONTACT * 160.93 / U0  # the contact gives by its own time
+    assert abs(x[rudder] - x[gear]) == pytest.approx(2 * DEG, rel=0.02)
 
 
 def test_two_stages_of_lag_follow_the_exact_solution() -> None:
@@ -129,6 +124,7 @@ def test_a_failed_gear_still_holds_the_rudder() -> None:
         {"telemotor_lag": {"time_constant_s": 4.0}},
     ):
         at = {"rudder.command": 0.3, "rudder.angle": 0.1, "telemotor_lag.order": 0.2, "steering.failed": 1.0}
+        at |= {"rudder_backlash.gear": 0.1}
         model = ship(effects)
         assert values(model, ["rudder.rate"], {key: value for key, value in at.items() if key in model}) == 0.0
 

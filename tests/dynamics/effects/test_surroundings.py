@@ -42,6 +42,16 @@ def test_a_ship_that_creeps_ahead_in_still_air_meets_a_pure_head_wind() -> None:
     np.testing.assert_allclose(found, [-0.5 * RHO_AIR * FRONT * 0.7 * 0.5**2, 0.0, 0.0], rtol=1e-9, atol=1e-6)
 
 
+def test_what_the_card_holds_of_still_air_is_not_counted_twice() -> None:
+    at = {**state(7.0, 0.4, 0.0), "motion.psi": 0.6}
+    given = {"speed_mps": 12.0, "direction_deg": 100.0}
+    still = wind_by_angle(0.0, 0.0, at, (0.0, 0.0))
+    felt = wind_by_angle(12.0, np.radians(100.0), at, (0.0, 0.0))
+    for share in (0.0, 0.3, 1.0):
+        found = added_forces("wind", {**given, "still_air": share, "centroid_forward_m": -5.0}, at)
+        np.testing.assert_allclose(found, felt - (1 - share) * still, rtol=1e-7)
+
+
 def test_wind_from_starboard_drives_the_ship_to_port_and_turns_a_fine_bow_away() -> None:
     """Heading north at rest, wind from the north-east: 45 deg on the starboard bow."""
     X, Y, N = added_forces("wind", {"speed_mps": 15.0, "direction_deg": 45.0}, state(0.001, 0.0, 0.0))

@@ -8,6 +8,7 @@ from tank2sim.dynamics.effects import (
     memory,
     propeller,
     rudder,
+    sensors,
     surroundings,
 )
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter
@@ -49,6 +50,14 @@ EFFECTS: dict[str, Effect] = {
         derivatives.TRIM,
         memory.ROLL_COUPLING,
         memory.FLOW_MEMORY,
+        sensors.GYRO_BIAS,
+        sensors.GYRO_SCALE,
+        sensors.HEADING_OFFSET,
+        sensors.ANTENNA_LEVER_ARM,
+        sensors.LOG_SCALE,
+        sensors.LOG_MISALIGNMENT,
+        sensors.LOG_LEVER_ARM,
+        sensors.RUDDER_TIME_OFFSET,
     )
 }
 """All effects by the name that cards use."""

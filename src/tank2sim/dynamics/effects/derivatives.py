@@ -9,9 +9,15 @@ import casadi as ca
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Equations, Symbols, particular
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Equations, Symbols
 from tank2sim.dynamics.effects.forces import scales
+from tank2sim.dynamics.effects.particulars import with_particulars
+from tank2sim.dynamics.effects.sizes import lengths
 from tank2sim.dynamics.model import Model
+
+USUAL_CHANGE = 0.15
+"""Relative change of linear damping at which a search begins: as derivatives of one ship from different tanks differ
+(SIMMAN 2008); a choice of ours. Added masses, which are measured less well, have more."""
 
 
 def with_changes(model: Model, changes: Mapping[str, ca.SX], card: ManoeuvringCard) -> Model:
@@ -67,8 +73,9 @@ CUBIC_YAW_DAMPING = Effect(
     description="The hull resists fast turning more than in proportion to the rate of turn.",
     source="(3.8) of paper 2, Krezelewski and Misiag; Abkowitz (1964)",
     parameters=(
-        EffectParameter("Yrrr", "change of Yrrr, prime", -0.1, 0.1),
-        EffectParameter("Nrrr", "change of Nrrr, prime, negative damps", -0.1, 0.1),
+        # About 15 % of the Mariner's N by turning at r' = 0.5, as cubic terms have there (ours).
+        EffectParameter("Yrrr", "change of Yrrr, prime", -0.1, 0.1, absent=0.0, typical=(1e-3,)),
+        EffectParameter("Nrrr", "change of Nrrr, prime, negative damps", -0.1, 0.1, absent=0.0, typical=(-1e-3,)),
     ),
     equations=_added,
 )
@@ -79,8 +86,9 @@ SWAY_YAW_COUPLING = Effect(
     description="Drifting and turning together give a force and a moment that neither gives alone.",
     source="(3.8) of paper 2, Krezelewski and Misiag; Abkowitz (1964)",
     parameters=(
-        EffectParameter("Yvrr", "change of Yvrr, prime", -0.5, 0.5),
-        EffectParameter("Nvrr", "change of Nvrr, prime", -0.5, 0.5),
+        # At v' = 0.2 and r' = 0.5 about 15 % of the forces of the linear terms (ours).
+        EffectParameter("Yvrr", "change of Yvrr, prime", -0.5, 0.5, absent=0.0, typical=(-5e-3,)),
+        EffectParameter("Nvrr", "change of Nvrr, prime", -0.5, 0.5, absent=0.0, typical=(-2e-3,)),
     ),
     equations=_added,
 )
@@ -91,7 +99,14 @@ TURNING_DRAG = Effect(
     description="The ship loses more (or less) speed in a turn.",
     source="(3.8) of paper 2, Krezelewski and Misiag: the term X_vr v r",
     parameters=(
-        EffectParameter("Xvr", "change of Xvr, prime, positive slows a turning ship more (v r < 0)", -0.05, 0.05),
+        EffectParameter(
+            "Xvr",
+            "change of Xvr, prime, positive slows a turning ship more (v r < 0)",
+            -0.05,
+            0.05,
+            absent=0.0,
+            typical=(2e-3,),  # a quarter of the m' of a cargo ship, which X_vr + m' holds with added mass (ours)
+        ),
     ),
     equations=_added,
 )
@@ -101,7 +116,7 @@ ADDED_YAW_INERTIA = Effect(
     acts_on="mass",
     description="More (or less) water turns with the ship when its rate of turn changes.",
     source="(3.7) of paper 2, Krezelewski and Misiag: J_z - Nrdot; Alyshev (2019)",
-    parameters=(EffectParameter("factor", "relative change of Nrdot", -1.0, 5.0),),
+    parameters=(EffectParameter("factor", "relative change of Nrdot", -1.0, 5.0, absent=0.0, typical=(0.3,)),),
     equations=_magnified(["Nrdot"]),
 )
 
@@ -110,7 +125,7 @@ ADDED_SWAY_MASS = Effect(
     acts_on="mass",
     description="More (or less) water moves with the ship when its drift changes.",
     source="(3.7) of paper 2, Krezelewski and Misiag: m - Yvdot",
-    parameters=(EffectParameter("factor", "relative change of Yvdot", -0.9, 5.0),),
+    parameters=(EffectParameter("factor", "relative change of Yvdot", -0.9, 5.0, absent=0.0, typical=(0.2,)),),
     equations=_magnified(["Yvdot"]),
 )
 
@@ -119,7 +134,11 @@ LINEAR_YAW_DAMPING = Effect(
     acts_on="force",
     description="The hull resists turning more (or less), at small rates of turn too.",
     source="(3.5) of paper 2, Krezelewski and Misiag: hydrodynamic parts of Yr and Nr",
-    parameters=(EffectParameter("factor", "relative change of the hydrodynamic Yr and Nr", -1.0, 5.0),),
+    parameters=(
+        EffectParameter(
+            "factor", "relative change of the hydrodynamic Yr and Nr", -1.0, 5.0, absent=0.0, typical=(USUAL_CHANGE,)
+        ),
+    ),
     equations=_magnified(["Yr", "Nr"]),
 )
 
@@ -128,7 +147,9 @@ LINEAR_SWAY_DAMPING = Effect(
     acts_on="force",
     description="The hull resists drifting sideways more (or less), at small drift too.",
     source="(3.5) of paper 2, Krezelewski and Misiag: Yv and Nv",
-    parameters=(EffectParameter("factor", "relative change of Yv and Nv", -1.0, 5.0),),
+    parameters=(
+        EffectParameter("factor", "relative change of Yv and Nv", -1.0, 5.0, absent=0.0, typical=(USUAL_CHANGE,)),
+    ),
     equations=_magnified(["Yv", "Nv"]),
 )
 
@@ -164,6 +185,8 @@ SHALLOW_WATER = Effect(
             "relative increase of added masses and of sway and yaw damping (0 in deep water)",
             -0.5,
             5.0,
+            absent=0.0,
+            typical=(0.3,),  # damping at a depth of some three draughts, by the factors below (ours)
         ),
     ),
     equations=_in_shallow_water,
@@ -177,10 +200,7 @@ def _at_depth(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
     J. Soc. Naval Arch. Japan 168. f is 1 in deep water. h is held below 0.95: at 1 the ship is aground. Added masses,
     Y_r and the terms of higher order stay as they are; the card must be of deep water.
     """
-    beam, draught, block = (
-        particular(card, key, "water_depth needs beam_m, draught_m and block_coefficient")
-        for key in ("beam_m", "draught_m", "block_coefficient")
-    )
+    model, (beam, draught, block) = with_particulars(model, card, "beam_m", "draught_m", "block_coefficient")
     h = ca.fmin(draught / ca.fmax(given["depth"], draught), 0.95)
     fullness = block * beam / draught
     powers = {"Yv": 0.40 * fullness, "Nv": 0.425 * fullness, "Nr": 1.5 - 14.28 * draught / card.ship.length_m}
@@ -193,7 +213,10 @@ WATER_DEPTH = Effect(
     acts_on="force",
     description="The hull resists drift and turning more as the water under it becomes shallow.",
     source="Kijima, Katsuno, Nakiri and Furukawa (1990), J. Soc. Naval Architects of Japan 168",
-    parameters=(EffectParameter("depth_m", "depth of the water", 0.01, 1e4, input_name="water.depth"),),
+    parameters=(
+        # Not sought in trials: what they show of shallow water is one factor, that of SHALLOW_WATER.
+        EffectParameter("depth_m", "depth of the water", 0.01, 1e4, input_name="water.depth"),
+    ),
     equations=_at_depth,
 )
 
@@ -205,7 +228,7 @@ def _trimmed(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
 
     Inoue, Hirano and Kijima (1981), Hydrodynamic derivatives on ship manoeuvring, Int. Shipbuilding Progress 28 (321).
     """
-    draught = particular(card, "draught_m", "trim needs the mean draught, m")
+    model, (draught,) = with_particulars(model, card, "draught_m")
     share = given["by_stern"] / draught
     changes = {
         "Yv": 2 / 3 * share * hydrodynamic(model, "Yv", card),
@@ -222,6 +245,15 @@ TRIM = Effect(
     acts_on="force",
     description="A hull deeper aft than forward keeps its course better, and one deeper forward worse.",
     source="Inoue, Hirano and Kijima (1981), International Shipbuilding Progress 28 (321)",
-    parameters=(EffectParameter("by_stern_m", "trim, draught aft less draught forward", -10.0, 10.0),),
+    parameters=(
+        EffectParameter(
+            "by_stern_m",
+            "trim, draught aft less draught forward",
+            -10.0,
+            10.0,
+            absent=0.0,
+            typical=lengths(0.005),  # a tenth of a usual draught (ours)
+        ),
+    ),
     equations=_trimmed,
 )

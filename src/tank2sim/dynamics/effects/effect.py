@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.model import Input, Model, Parameter
+from tank2sim.dynamics.model import Input, Model, Parameter, Quantity
 
 _UNITS = {"mps": "m/s", "radps": "rad/s", "rad": "rad", "m": "m", "s": "s", "prime": "1"}
 """Suffix of a parameter's name to its unit; a name without one of these has unit 1."""
@@ -18,6 +18,9 @@ _SHOWN = {"rad": "deg", "radps": "deg/s", "mps": "knots"}
 STEPS_PER_TIME_CONSTANT = 5
 """Integration steps in a time constant, as for the steering gear: classical Runge-Kutta then errs by less than 1e-5 of
 the change, (1/5)^5/120, in each step."""
+
+
+Values = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,17 @@ class EffectParameter:
     input_name : str, optional
         The parameter is an input of the model under this name (``current.speed``), which starts at the card's value.
         All others become tunable parameters of the model.
+    absent : float, optional
+        Value, SI, at which the effect vanishes; if several parameters have one, when all of them are at it. None for
+        what only shapes an effect (directions, times), and for what stands in place of something that the ship has
+        anyway (the gear).
+    typical : tuple or callable, optional
+        Values, SI, from which a search begins, or what tells them from the card: one for an amplitude, of the size in
+        which the effect is common; a short grid over what is plausible for a shape, the likeliest first. An effect with
+        a required parameter without typical values is not tried on trials.
+    spread : float or callable, optional
+        Standard deviation, SI, of what is known beforehand of a parameter with a default, if a search shall estimate
+        it with the others; None: it stays at its default.
     """
 
     name: str
@@ -45,6 +59,9 @@ class EffectParameter:
     maximum: float
     default: float | Callable[[ManoeuvringCard], float] | None = None
     input_name: str | None = None
+    absent: float | None = field(default=None, kw_only=True)
+    typical: Values | Callable[[ManoeuvringCard], Values] = field(default=(), kw_only=True)
+    spread: float | Callable[[ManoeuvringCard], float] | None = field(default=None, kw_only=True)
 
     @property
     def stem(self) -> str:
@@ -57,6 +74,14 @@ class EffectParameter:
         if self.name in values or self.default is None:
             return values[self.name]
         return self.default(card) if callable(self.default) else self.default
+
+    def typical_values(self, card: ManoeuvringCard) -> Values:
+        """Values from which a search begins on this ship, SI; none if it is not to be tried."""
+        return self.typical(card) if callable(self.typical) else self.typical
+
+    def spread_value(self, card: ManoeuvringCard) -> float | None:
+        """Standard deviation beforehand on this ship, SI; None if the parameter stays at its default."""
+        return self.spread(card) if callable(self.spread) else self.spread
 
     def variable(self, effect: str, value: float) -> Parameter | Input:
         """The model's variable that holds it, ``<effect>.<name without its unit>`` if it is no input."""
@@ -89,6 +114,18 @@ Symbols = Mapping[str, ca.SX]
 
 Equations = Callable[[Model, Symbols, ManoeuvringCard], Model]
 
+Readings = Callable[[Symbols, Symbols], Mapping[str, ca.SX]]
+"""``readings(motion, given)``: what sensors show, by the name of the variable that they measure; `motion` holds the
+symbols of :data:`MEASURED`, `given` those of the effect's parameters."""
+
+MEASURED = ("motion.u", "motion.v", "motion.r", "motion.psi", "motion.x", "motion.y")
+"""Variables that a sensor may show wrongly."""
+
+
+def unchanged(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """The equations of an effect that does not reach the ship."""
+    return model
+
 
 @dataclass(frozen=True)
 class Effect:
@@ -99,7 +136,7 @@ class Effect:
     name : str
         Name in cards.
     acts_on : str
-        ``force``, ``mass``, ``force and mass``, ``actuator``, ``propulsion`` or ``kinematics``.
+        ``force``, ``mass``, ``force and mass``, ``actuator``, ``propulsion``, ``kinematics`` or ``sensor``.
     description : str
         A sentence for people.
     source : str
@@ -107,7 +144,13 @@ class Effect:
     parameters : tuple
         What a card gives; those without a default are required.
     equations : callable
-        ``equations(model, symbols, card) -> model``: changes a model that has the parameters already.
+        ``equations(model, symbols, card) -> model``: changes a model that has the parameters already; by default not.
+    readings : callable, optional
+        What faulty sensors show: see :data:`Readings`. The expressions must be affine in the variables that they are
+        of, so that a record can be corrected.
+    delays : mapping
+        Name of an input to the parameter (a time, s) by which the ship answers late to the record of that input: it
+        acts at t on what stands in the record at t - delay.
     """
 
     name: str
@@ -115,7 +158,23 @@ class Effect:
     description: str
     source: str
     parameters: tuple[EffectParameter, ...]
-    equations: Equations
+    equations: Equations = unchanged
+    readings: Readings | None = None
+    delays: Mapping[str, str] = field(default_factory=dict)
+
+    def required(self) -> tuple[str, ...]:
+        """Names of the parameters without a default."""
+        return tuple(one.name for one in self.parameters if one.default is None)
+
+    def free(self, card: ManoeuvringCard) -> tuple[str, ...]:
+        """Names of the parameters that a search estimates: the required ones, and those with a spread."""
+        required = self.required()
+        return tuple(one.name for one in self.parameters if one.name in required or one.spread_value(card) is not None)
+
+    def tried(self, card: ManoeuvringCard) -> bool:
+        """True if a search can begin: every required parameter has typical values on this ship."""
+        required = self.required()
+        return all(one.typical_values(card) for one in self.parameters if one.name in required)
 
     def model_names(self) -> dict[str, str]:
         """Name of each parameter (in SI) to the name of the model's variable that holds it."""
@@ -142,7 +201,44 @@ class Effect:
         """
         variables = {one.stem: one.variable(self.name, one.value(values, card)) for one in self.parameters}
         symbols = {stem: variable.symbol for stem, variable in variables.items()}
-        return self.equations(model.extend(*variables.values()), symbols, card)
+        changed = self.equations(model.extend(*variables.values()), symbols, card)
+        if self.readings is None:
+            return changed
+        return with_readings(changed, self.readings({name: model.symbol(name) for name in MEASURED}, symbols))
+
+
+def with_readings(model: Model, shown: Mapping[str, ca.SX]) -> Model:
+    """The model with quantities ``sensor.*`` of what its sensors show: ``sensor.psi`` for ``motion.psi``.
+
+    Parameters
+    ----------
+    model : Model
+        Where it has such a quantity already, the new fault acts on what the earlier one shows.
+    shown : mapping
+        Name of the variable measured to the expression shown, of the model's symbols.
+    """
+    names = {name: name.replace("motion.", "sensor.") for name in shown}
+    faulty = [name for name in shown if names[name] in model]
+    earlier = {one.name: one.value for one in model.quantities if one.name.startswith("sensor.")}
+    symbols, values = [model.symbol(name) for name in faulty], [earlier[names[name]] for name in faulty]
+    for name, expression in shown.items():
+        true = model[name]
+        value = ca.substitute(expression, ca.vcat(symbols), ca.vcat(values)) if faulty else expression
+        if name in faulty:
+            model = model.redefine(names[name], lambda _, value=value: value)  # type: ignore[misc]
+            continue
+        description = f"What the sensor shows: {true.description[0].lower()}{true.description[1:]}"
+        model = model.extend(
+            Quantity(
+                name=names[name],
+                unit=true.unit,
+                description=description,
+                display_unit=true.display_unit,
+                nominal=true.nominal,
+                value=ca.SX(value),
+            )
+        )
+    return model
 
 
 def with_steps_for(model: Model, name: str, share: float = 1.0) -> Model:

@@ -9,6 +9,7 @@ import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols, with_steps_for
+from tank2sim.dynamics.effects.sizes import passages, rates
 from tank2sim.dynamics.model import Model, Quantity, State
 from tank2sim.dynamics.steering_gear import assumed_lag_notice
 
@@ -30,7 +31,16 @@ RUDDER_RATE_LIMIT = Effect(
     acts_on="actuator",
     description="The steering gear turns the rudder no faster than this.",
     source="van Amerongen (1982), Adaptive steering of ships, thesis, Delft: pump capacity of the gear",
-    parameters=(EffectParameter("max_rate_radps", "largest rate of the rudder", 1e-4, 2.0),),
+    parameters=(
+        EffectParameter(
+            "max_rate_radps",
+            "largest rate of the rudder",
+            1e-4,
+            2.0,
+            # 1 to 5 deg/s where L/u0 is 20 s; SOLAS II-1/29 asks for 2.3 deg/s.
+            typical=rates(*(math.radians(angle) for angle in (40.0, 20.0, 60.0, 100.0))),
+        ),
+    ),
     equations=_with_rate_limit,
 )
 
@@ -48,7 +58,15 @@ RUDDER_LAG = Effect(
     acts_on="actuator",
     description="The rudder follows its order with this delay.",
     source="van Amerongen (1982), Adaptive steering of ships, thesis, Delft",
-    parameters=(EffectParameter("time_constant_s", "time constant of the steering gear", 0.01, 100.0),),
+    parameters=(
+        EffectParameter(
+            "time_constant_s",
+            "time constant of the steering gear",
+            0.01,
+            100.0,
+            typical=passages(0.1, 0.05, 0.2),  # 1 to 4 s where L/u0 is 20 s (ours)
+        ),
+    ),
     equations=_with_lag,
 )
 
@@ -58,41 +76,89 @@ def _beyond(value: ca.SX, limit: ca.SX) -> ca.SX:
     return value - _limited(value, limit)
 
 
-def _with_backlash(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
-    """The gear acts on that part of order - delta which exceeds half the play b; within it the rudder stays.
+CONTACT = 0.005
+"""Time in which the rudder follows the gear once the gap between them is closed, in L/u0: a stiff contact, a tenth of a
+second on a ship of 160 m (ours); the play operator is its limit at 0."""
 
-    The rudder's own angle is the state of the hysteresis: for slow orders it is the play operator, which lags by b/2
-    behind an order that rises and by b/2 behind one that falls (Brokate and Sprekels 1996, Hysteresis and Phase
-    Transitions). The rate is continuous in all states and inputs. Play behind the sensor of the angle is another thing.
+
+def _with_backlash(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """Play between the gear and the rudder: the rudder stays until the gear has crossed the play, then follows.
+
+        d delta/dt = e/T_c,   e what g - delta exceeds half the play b by, either way
+
+    g is the angle of the gear, delta that of the rudder. For T_c to 0 it is the play operator, which lags by b/2 behind
+    an angle that rises and by b/2 behind one that falls (Brokate and Sprekels 1996, Hysteresis and Phase Transitions).
     """
-    return model.redefine("rudder.error", lambda error: _beyond(error, given["width"] / 2))
+    rudder, rate = model["rudder.angle"], model["rudder.rate"]
+    assert isinstance(rudder, State) and isinstance(rate, Quantity)
+    contact = CONTACT * card.ship.length_m / card.model.speed_mps
+    gear = State(
+        name="rudder_backlash.gear",
+        unit="rad",
+        description="Angle of the steering gear before its play, positive to starboard",
+        display_unit="deg",
+        nominal=0.35,
+        derivative="rudder_backlash.rate",
+        start=rudder.start,
+        trim=rudder.trim,
+    )
+    turning = Quantity(
+        name="rudder_backlash.rate",
+        unit="rad/s",
+        description="Rate of the steering gear before its play, positive to starboard",
+        display_unit="deg/s",
+        nominal=0.05,
+        value=rate.value,
+    )
+    played = _beyond(gear.symbol - rudder.symbol, given["width"] / 2) / contact
+    return (
+        model.extend(gear, turning)
+        .redefine("rudder.error", lambda error: ca.substitute(error, rudder.symbol, gear.symbol))
+        .redefine("rudder.rate", lambda _: played)
+    )
 
 
 RUDDER_BACKLASH = Effect(
     name="rudder_backlash",
     acts_on="actuator",
-    description="The steering gear has play: small changes of the order do not reach the rudder.",
+    description="There is play between the steering gear and the rudder: small changes do not reach it.",
     source="Brokate and Sprekels (1996), Hysteresis and Phase Transitions: play operator",
-    parameters=(EffectParameter("width_rad", "whole play of the gear", 0.0, math.radians(20.0)),),
+    parameters=(
+        EffectParameter(
+            "width_rad",
+            "whole play of the gear",
+            0.0,
+            math.radians(20.0),
+            absent=0.0,
+            typical=(math.radians(2.0),),  # worn, but not yet out of the rules (ours)
+        ),
+    ),
     equations=_with_backlash,
 )
 
 
 def _with_dead_band(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
-    """Orders within +-b of midships move nothing, larger ones move the rudder by what they exceed b.
+    """The gear acts on that part of order - delta which exceeds the band b: it stops b short of its order.
 
-    The static dead zone (no memory, unlike :data:`RUDDER_BACKLASH`) of a valve with overlap about its middle.
+    The dead zone of a servo valve with overlap; unlike :data:`RUDDER_BACKLASH` the rudder is not late at first.
     """
-    return model.substitute("rudder.command", _beyond(model.symbol("rudder.command"), given["half_width"]))
+    return model.redefine("rudder.error", lambda error: _beyond(error, given["half_width"]))
 
 
 RUDDER_DEAD_BAND = Effect(
     name="rudder_dead_band",
     acts_on="actuator",
-    description="Small orders about midships move nothing.",
-    source="van Amerongen (1982), Adaptive steering of ships, thesis, Delft; static dead zone",
+    description="The steering gear does not act on small differences between order and rudder.",
+    source="van Amerongen (1982), Adaptive steering of ships, thesis, Delft; dead zone of the servo",
     parameters=(
-        EffectParameter("half_width_rad", "largest order either way that moves nothing", 0.0, math.radians(10.0)),
+        EffectParameter(
+            "half_width_rad",
+            "largest difference of order and rudder that moves nothing",
+            0.0,
+            math.radians(10.0),
+            absent=0.0,
+            typical=(math.radians(1.0),),  # half the play above, either way (ours)
+        ),
     ),
     equations=_with_dead_band,
 )
@@ -136,6 +202,14 @@ TELEMOTOR_LAG = Effect(
     acts_on="actuator",
     description="Orders reach the steering gear late.",
     source="van Amerongen (1982), Adaptive steering of ships, thesis, Delft",
-    parameters=(EffectParameter("time_constant_s", "time constant before the steering gear", 0.01, 100.0),),
+    parameters=(
+        EffectParameter(
+            "time_constant_s",
+            "time constant before the steering gear",
+            0.01,
+            100.0,
+            typical=passages(0.05, 0.025, 0.1),  # half those of the gear itself (ours)
+        ),
+    ),
     equations=_with_telemotor_lag,
 )

@@ -6,8 +6,10 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols, particular
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols
 from tank2sim.dynamics.effects.forces import scales, with_forces
+from tank2sim.dynamics.effects.particulars import with_particulars
+from tank2sim.dynamics.effects.sizes import speeds
 from tank2sim.dynamics.model import Model
 
 STRIPS = 12
@@ -21,7 +23,7 @@ def _with_cross_flow_drag(model: Model, given: Symbols, card: ManoeuvringCard) -
     Norrbin (1971), Theory and observations on the use of a mathematical model for ship manoeuvring, SSPA 68; Faltinsen
     (1990), Sea Loads, 6.4; one C_D for all stations. It comes on top of the card's own cubic terms.
     """
-    draught = particular(card, "draught_m", "cross_flow_drag needs the draught, m")
+    model, (draught,) = with_particulars(model, card, "draught_m")
     half = model.symbol("ship.length") / 2
     Y = N = ca.SX(0)
     for station, weight in zip(*np.polynomial.legendre.leggauss(STRIPS), strict=True):
@@ -38,7 +40,16 @@ CROSS_FLOW_DRAG = Effect(
     acts_on="force",
     description="Water that crosses under and round the hull drags on every slice of it.",
     source="Norrbin (1971), SSPA publication 68; Faltinsen (1990), Sea Loads on Ships and Offshore Structures, 6.4",
-    parameters=(EffectParameter("drag_coefficient", "cross-flow drag coefficient", -1.0, 3.0),),
+    parameters=(
+        EffectParameter(
+            "drag_coefficient",
+            "cross-flow drag coefficient",
+            -1.0,
+            3.0,
+            absent=0.0,
+            typical=(0.3,),  # of 0.6 to 1 for whole hulls (Faltinsen 1990, 6.4) what cubic terms may leave out (ours)
+        ),
+    ),
     equations=_with_cross_flow_drag,
 )
 
@@ -54,7 +65,16 @@ HULL_FOULING = Effect(
     acts_on="force",
     description="Growth on the hull makes it rough and slows the ship.",
     source="ITTC 7.5-02-03-01.4, 1978 performance prediction method: roughness allowance",
-    parameters=(EffectParameter("X_prime", "surge force, prime, negative: more resistance", -0.005, 0.005),),
+    parameters=(
+        EffectParameter(
+            "X_prime",
+            "surge force, prime, negative: more resistance",
+            -0.005,
+            0.005,
+            absent=0.0,
+            typical=(-1e-4,),  # a sixth of a usual resistance (ours)
+        ),
+    ),
     equations=_with_fouling,
 )
 
@@ -76,8 +96,21 @@ HUMP_RESISTANCE = Effect(
     description="About one speed the ship's own waves add up and resist more than at speeds below and above.",
     source="Faltinsen (2005), Hydrodynamics of High-Speed Marine Vehicles, 4.2; Gaussian hump of ours",
     parameters=(
-        EffectParameter("X_prime", "surge force at the hump, prime, negative: more resistance", -0.005, 0.005),
-        EffectParameter("speed_mps", "speed of the hump through the water", 0.0, 50.0),
+        EffectParameter(
+            "X_prime",
+            "surge force at the hump, prime, negative: more resistance",
+            -0.005,
+            0.005,
+            absent=0.0,
+            typical=(-1e-4,),  # a sixth of a usual resistance (ours)
+        ),
+        EffectParameter(
+            "speed_mps",
+            "speed of the hump through the water",
+            0.0,
+            50.0,
+            typical=speeds(0.8, 0.7, 0.9, 0.6, 1.0),  # what a turn sweeps, at twice the width below (ours)
+        ),
         EffectParameter(
             "width_mps",
             "width of the hump (standard deviation), by default a twentieth of u0",
@@ -106,8 +139,23 @@ ASYMMETRIC_TURNING = Effect(
     description="The ship turns more tightly to one side than to the other.",
     source="Abkowitz (1964), HyA report Hy-5: even terms of an asymmetric ship",
     parameters=(
-        EffectParameter("Yrr", "coefficient of r^2 in Y, prime, positive to starboard", -0.05, 0.05),
-        EffectParameter("Nrr", "coefficient of r^2 in N, prime, positive to starboard", -0.05, 0.05),
+        # About 5 % of Nr r at r' = 0.5, as tactical diameters of SIMMAN 2008 differ between the sides (ours).
+        EffectParameter(
+            "Yrr",
+            "coefficient of r^2 in Y, prime, positive to starboard",
+            -0.05,
+            0.05,
+            absent=0.0,
+            typical=(1e-4,),
+        ),
+        EffectParameter(
+            "Nrr",
+            "coefficient of r^2 in N, prime, positive to starboard",
+            -0.05,
+            0.05,
+            absent=0.0,
+            typical=(-1.5e-4,),
+        ),
     ),
     equations=_turning_unlike,
 )

@@ -8,6 +8,8 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols, with_steps_for
 from tank2sim.dynamics.effects.forces import scales, speed_of_scaling, with_forces
+from tank2sim.dynamics.effects.particulars import particular
+from tank2sim.dynamics.effects.sizes import passages
 from tank2sim.dynamics.model import Model, Quantity, State
 
 
@@ -48,21 +50,26 @@ FLOW_MEMORY = Effect(
     description="The flow round the hull needs time to answer a change of drift.",
     source="Cummins (1962), Schiffstechnik 9, in its simplest form; linear sway damping",
     parameters=(
-        EffectParameter("share", "share of the linear sway damping that answers late", -1.0, 1.0),
-        EffectParameter("time_constant_s", "time in which it answers", 0.05, 300.0),
+        # Circulation settles within the time in which the flow passes the hull once or a part of it (sizes ours).
+        EffectParameter(
+            "share", "share of the linear sway damping that answers late", -1.0, 1.0, absent=0.0, typical=(0.3,)
+        ),
+        EffectParameter(
+            "time_constant_s", "time in which it answers", 0.05, 300.0, typical=passages(0.4, 0.2, 0.8, 1.6)
+        ),
     ),
     equations=_remembering,
 )
 
 TYPICAL_STABILITY = 0.05
 """Metacentric height in beams where a card gives none: in the middle of 0.03 to 0.08 of loaded merchant ships; a choice
-of ours, as are the beam of a seventh of the length, and the parameters' defaults."""
+of ours, as are the parameters' defaults."""
 
 
 def _natural_period(card: ManoeuvringCard) -> float:
     """Roll period (s): 2 pi k / sqrt(g GM) with k = 0.4 B, so 0.80 B/sqrt(GM): near 2 C B/sqrt(GM) of the IMO
     2008 Intact Stability Code, part A, 2.3."""
-    beam = card.ship.beam_m or card.ship.length_m / 7
+    beam = particular(card, "beam_m")
     height = card.ship.metacentric_height_m
     stable = height if height is not None and height > 0 else TYPICAL_STABILITY * beam
     return 2 * math.pi * 0.4 * beam / math.sqrt(card.environment.gravity_mps2 * stable)
@@ -133,10 +140,23 @@ ROLL_COUPLING = Effect(
     description="The ship heels in a turn, and a heeled hull is pushed and turned aside.",
     source="Hirano and Takashina (1980), Trans. West Japan Soc. Naval Arch. 59; Son and Nomoto (1981)",
     parameters=(
-        EffectParameter("Yphi", "sway force by heel, prime, both positive to starboard", -0.05, 0.05),
-        EffectParameter("Nphi", "yaw moment by heel, prime, both positive to starboard", -0.05, 0.05),
-        EffectParameter("roll_period_s", "natural period of roll", 0.2, 60.0, _natural_period),
-        EffectParameter("damping", "roll damping over the critical one", 0.0, 2.0, 0.1),
+        # 0.05 rad of heel then give some 5 % of the forces of a hard turn (ours).
+        EffectParameter(
+            "Yphi", "sway force by heel, prime, both positive to starboard", -0.05, 0.05, absent=0.0, typical=(1e-3,)
+        ),
+        EffectParameter(
+            "Nphi", "yaw moment by heel, prime, both positive to starboard", -0.05, 0.05, absent=0.0, typical=(-5e-4,)
+        ),
+        # Period and damping are known about so well (ours). The ratio stays: only its product with Yphi and Nphi acts.
+        EffectParameter(
+            "roll_period_s",
+            "natural period of roll",
+            0.2,
+            60.0,
+            _natural_period,
+            spread=lambda card: 0.2 * _natural_period(card),
+        ),
+        EffectParameter("damping", "roll damping over the critical one", 0.0, 2.0, 0.1, spread=0.05),
         EffectParameter("heel_ratio", "outward heel in a steady turn over u r/g", 0.0, 20.0, 3.0),
     ),
     equations=_rolling,

@@ -8,11 +8,34 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols
 from tank2sim.dynamics.effects.forces import scales, with_forces
 from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.propulsion import propeller_force
 
-_SIDE_FORCE = (
-    EffectParameter("Y_prime", "sway force at nominal revolutions, prime at u0, positive to starboard", -0.01, 0.01),
-    EffectParameter("N_prime", "yaw moment at nominal revolutions, prime at u0, positive to starboard", -0.01, 0.01),
-)
+
+def _side_force(Y: float, N: float) -> tuple[EffectParameter, EffectParameter]:
+    """Parameters of a side force by the propeller, with their typical values (prime)."""
+    return (
+        EffectParameter(
+            "Y_prime",
+            "sway force at nominal revolutions, prime at u0, positive to starboard",
+            -0.01,
+            0.01,
+            absent=0.0,
+            typical=(Y,),
+        ),
+        EffectParameter(
+            "N_prime",
+            "yaw moment at nominal revolutions, prime at u0, positive to starboard",
+            -0.01,
+            0.01,
+            absent=0.0,
+            typical=(N,),
+        ),
+    )
+
+
+RESISTANCE = 6e-4
+"""Resistance, and so effective thrust, at u0 over 1/2 rho L^2 u0^2 where a card states no propulsion: between those of
+a tanker (5e-4) and of the Mariner (8e-4); a choice of ours."""
 
 
 def _relative_revolutions(model: Model) -> ca.SX:
@@ -38,14 +61,10 @@ PROPELLER_SIDE_FORCE = Effect(
     acts_on="force",
     description="A single propeller pushes the stern to one side as it turns.",
     source="Saunders (1957), Hydrodynamics in Ship Design; Brix (ed.) (1993), Manoeuvring Technical Manual",
-    parameters=_SIDE_FORCE,
+    # Y0 and N0 of the Mariner (Chislett and Strom-Tejsen 1965), a ship with one screw.
+    parameters=_side_force(-4e-5, 3e-5),
     equations=_with_side_force,
 )
-
-
-def _refuse_without_propulsion(card: ManoeuvringCard, effect: str) -> None:
-    if card.propulsion is None:
-        raise card.fault("propulsion", "is missing", f"{effect} needs nominal_rpm and Xnn")
 
 
 def _with_walk(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
@@ -54,7 +73,8 @@ def _with_walk(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
     Then its jet meets one side of the stern: Brix (ed.) (1993), Manoeuvring Technical Manual; a right-handed propeller
     throws the stern to port and the bow to starboard (Y' < 0, N' > 0).
     """
-    _refuse_without_propulsion(card, "propeller_walk")
+    if card.propulsion is None:
+        raise card.fault("propulsion", "is missing", "propeller_walk needs nominal_rpm and Xnn")
     astern = ca.fmin(_relative_revolutions(model), 0)
     force = scales(model, model.symbol("ship.speed")).force * astern**2
     return with_forces(model, Y=force * given["Y"], N=force * model.symbol("ship.length") * given["N"])
@@ -65,7 +85,8 @@ PROPELLER_WALK = Effect(
     acts_on="force",
     description="A propeller that turns astern throws the stern to one side.",
     source="Brix (ed.) (1993), Manoeuvring Technical Manual",
-    parameters=_SIDE_FORCE,
+    # A few times the side force ahead (ours).
+    parameters=_side_force(-2e-4, 1e-4),
     equations=_with_walk,
 )
 
@@ -89,8 +110,23 @@ LOADING_SIDE_FORCE = Effect(
     description="The harder the propeller works for the ship's speed, the more it pushes the stern to one side.",
     source="form of ours, after the asymmetry of the KVLCC2 in SIMMAN 2008",
     parameters=(
-        EffectParameter("Y_prime", "sway force by propeller loading, prime, positive to starboard", -0.01, 0.01),
-        EffectParameter("N_prime", "yaw moment by propeller loading, prime, positive to starboard", -0.01, 0.01),
+        # The Mariner's side force, at the loading of a ship that has lost a third of its speed (ours).
+        EffectParameter(
+            "Y_prime",
+            "sway force by propeller loading, prime, positive to starboard",
+            -0.01,
+            0.01,
+            absent=0.0,
+            typical=(-8e-5,),
+        ),
+        EffectParameter(
+            "N_prime",
+            "yaw moment by propeller loading, prime, positive to starboard",
+            -0.01,
+            0.01,
+            absent=0.0,
+            typical=(6e-5,),
+        ),
     ),
     equations=_with_loading_side_force,
 )
@@ -100,11 +136,16 @@ def _with_droop(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
     """n = order (1 - droop (1 - u/u0)): the engine is not held at its revolutions when the ship slows.
 
     First order in the loss of speed of an engine at constant torque or power, whose propeller load rises in a turn: the
-    propulsion strategies that ITTC 7.5-02-06-01, free running model tests, tells apart.
+    propulsion strategies that ITTC 7.5-02-06-01, free running model tests, tells apart. On a card without propulsion
+    the order is the nominal one, and :data:`RESISTANCE` stands for Xnn.
     """
-    _refuse_without_propulsion(card, "engine_droop")
     loss = 1 - model.symbol("motion.u") / model.symbol("ship.speed")
-    return model.redefine("propeller.speed_actual", lambda order: order * (1 - given["droop"] * loss))
+    if "propeller.speed_actual" in model:
+        return model.redefine("propeller.speed_actual", lambda order: order * (1 - given["droop"] * loss))
+    told = f"the card states no propulsion: engine_droop takes Xnn = {RESISTANCE:g}, a typical resistance at u0"
+    lost = propeller_force(1 - given["droop"] * loss, ca.SX(1), ca.SX(RESISTANCE))
+    thrust = scales(model, model.symbol("ship.speed")).force * lost
+    return with_forces(model.extend(notices=[told]), X=thrust)
 
 
 ENGINE_DROOP = Effect(
@@ -112,6 +153,15 @@ ENGINE_DROOP = Effect(
     acts_on="propulsion",
     description="The engine slows down when the ship loses speed.",
     source="ITTC 7.5-02-06-01, propulsion strategy of free running tests; first order in the loss of speed",
-    parameters=(EffectParameter("droop", "relative loss of revolutions by relative loss of speed", -1.0, 1.0),),
+    parameters=(
+        EffectParameter(
+            "droop",
+            "relative loss of revolutions by relative loss of speed",
+            -1.0,
+            1.0,
+            absent=0.0,
+            typical=(0.3,),  # between constant revolutions (0) and torque in proportion to n^2 (towards 1) (ours)
+        ),
+    ),
     equations=_with_droop,
 )

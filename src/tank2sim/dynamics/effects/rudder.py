@@ -34,7 +34,12 @@ RUDDER_BIAS = Effect(
     source="formats of the ship card; kinematics",
     parameters=(
         EffectParameter(
-            "angle_rad", "rudder angle when the indicator shows midships, positive to starboard", -0.35, 0.35
+            "angle_rad",
+            "rudder angle when the indicator shows midships, positive to starboard",
+            -0.35,
+            0.35,
+            absent=0.0,
+            typical=(math.radians(1.0),),  # what a linkage or an indicator is out by (ours)
         ),
     ),
     equations=_biased,
@@ -51,7 +56,16 @@ RUDDER_EFFECTIVENESS = Effect(
     acts_on="force",
     description="The rudder gives more (or less) force than the card says.",
     source="(3.8) of paper 2, Krezelewski and Misiag: its terms in delta",
-    parameters=(EffectParameter("factor", "relative change of the force of the rudder", -1.0, 3.0),),
+    parameters=(
+        EffectParameter(
+            "factor",
+            "relative change of the force of the rudder",
+            -1.0,
+            3.0,
+            absent=0.0,
+            typical=(0.15,),  # as rudder coefficients of model and ship differ, by wake and thrust (ours)
+        ),
+    ),
     equations=_more_effective,
 )
 
@@ -71,7 +85,16 @@ RUDDER_SLIPSTREAM = Effect(
     acts_on="force",
     description="The propeller's jet keeps up the force of the rudder when the ship has lost speed.",
     source="Brix (ed.) (1993), Manoeuvring Technical Manual; Ogawa and Kasai (1978)",
-    parameters=(EffectParameter("gain", "relative gain of rudder force by relative loss of speed", -3.0, 5.0),),
+    parameters=(
+        EffectParameter(
+            "gain",
+            "relative gain of rudder force by relative loss of speed",
+            -3.0,
+            5.0,
+            absent=0.0,
+            typical=(0.7,),  # below the 1 or 2 of a jet that keeps its speed altogether (ours)
+        ),
+    ),
     equations=_in_slipstream,
 )
 
@@ -89,8 +112,22 @@ RUDDER_STALL = Effect(
     description="Beyond some angle the flow leaves the rudder, which then loses a share of its force.",
     source="Molland and Turnock (2007), Marine Rudders and Control Surfaces, chapter 5",
     parameters=(
-        EffectParameter("angle_rad", "rudder angle at which stall begins, either way", 0.0, math.pi / 2),
-        EffectParameter("loss", "share of the rudder force that is lost beyond it", 0.0, 1.0),
+        EffectParameter(
+            "angle_rad",
+            "rudder angle at which stall begins, either way",
+            0.0,
+            math.pi / 2,
+            # Rudders of usual aspect ratio stall at 15 to 35 deg: Molland and Turnock (2007), chapter 5.
+            typical=tuple(math.radians(angle) for angle in (20.0, 25.0, 15.0, 30.0)),
+        ),
+        EffectParameter(
+            "loss",
+            "share of the rudder force that is lost beyond it",
+            0.0,
+            1.0,
+            absent=0.0,
+            typical=(0.4,),  # ours
+        ),
     ),
     equations=_stalled,
 )

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols, particular
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols
 from tank2sim.dynamics.effects.forces import scales, with_forces
+from tank2sim.dynamics.effects.particulars import AREA_ERROR, with_particulars
+from tank2sim.dynamics.effects.sizes import DIRECTIONS, lengths, speeds, wave_speeds
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model
 
@@ -33,13 +36,22 @@ CURRENT = Effect(
     description="The water moves over the ground and carries the ship with it.",
     source="kinematics of a moving frame; formats of the ship card",
     parameters=(
-        EffectParameter("speed_mps", "speed of the current over the ground", 0.0, 5.0, input_name="current.speed"),
+        EffectParameter(
+            "speed_mps",
+            "speed of the current over the ground",
+            0.0,
+            5.0,
+            input_name="current.speed",
+            absent=0.0,
+            typical=speeds(0.05),  # 0.4 m/s at 15 knots (ours)
+        ),
         EffectParameter(
             "direction_rad",
             "direction towards which the current sets, clockwise from north",
             -2 * math.pi,
             2 * math.pi,
             input_name="current.direction",
+            typical=DIRECTIONS,
         ),
     ),
     equations=_with_current,
@@ -72,18 +84,29 @@ def _with_wind(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
     c_N 0.05 to 0.2 for ships with symmetric superstructures; the defaults are in the middle of the first two, and for
     c_N that of Blendermann (1994), J. Wind Eng. Ind. Aerodyn. 51, whose arm 0.18 (pi/2 - gamma) L gives
     0.10 at 45 deg. x_A is the centroid of the side area; L between perpendiculars stands for the length over all.
-    The whole relative wind acts: a card whose X already holds the resistance of still air counts it twice.
+    The whole relative wind acts, so that a ship meets still air too. Where the card's X holds that resistance already
+    it would count twice: a share 1 - a of the force in still air is taken off, a the parameter ``still_air``.
     """
     density = card.environment.air_density_kgpm3
-    front = particular(card, "projected_area_front_m2", "wind needs the area above the water seen from ahead")
-    side = particular(card, "projected_area_side_m2", "wind needs the area above the water seen from the side")
-    forward, starboard = air_over_ship(model, given["speed"], given["direction"])
-    speed = ca.sqrt(forward**2 + starboard**2 + STILL_MPS**2)
-    X = 0.5 * density * front * given["surge_coefficient"] * speed * forward
-    Y = 0.5 * density * side * given["sway_coefficient"] * speed * starboard
-    # sin(2 gamma) = 2 sin cos, forward = -V cos, starboard = -V sin
-    turning = -density * side * model.symbol("ship.length") * given["yaw_coefficient"] * forward * starboard
-    return with_forces(model, X=X, Y=Y, N=turning + given["centroid_forward"] * Y)
+    model, (front, side) = with_particulars(model, card, "projected_area_front_m2", "projected_area_side_m2")
+
+    def force(forward: ca.SX, starboard: ca.SX) -> ca.SX:
+        speed = ca.sqrt(forward**2 + starboard**2 + STILL_MPS**2)
+        X = 0.5 * density * front * given["surge_coefficient"] * speed * forward
+        Y = 0.5 * density * side * given["sway_coefficient"] * speed * starboard
+        # sin(2 gamma) = 2 sin cos, forward = -V cos, starboard = -V sin
+        turning = -density * side * model.symbol("ship.length") * given["yaw_coefficient"] * forward * starboard
+        return ca.vertcat(X, Y, turning + given["centroid_forward"] * Y)
+
+    felt = force(*air_over_ship(model, given["speed"], given["direction"]))
+    in_still_air = force(*air_over_ship(model, ca.SX(0), ca.SX(0)))
+    X, Y, N = ca.vertsplit(felt - (1 - given["still_air"]) * in_still_air)
+    return with_forces(model, X=X, Y=Y, N=N)
+
+
+def _coefficient_error(error: float, value: float, area: str) -> Callable[[ManoeuvringCard], float]:
+    """Standard error of a wind coefficient, wider where the area is estimated, for only their product acts."""
+    return lambda card: error if getattr(card.ship, area) else math.hypot(error, AREA_ERROR * value)
 
 
 WIND = Effect(
@@ -92,18 +115,65 @@ WIND = Effect(
     description="Wind pushes and turns the part of the ship above the water.",
     source="Fossen (2011), Handbook of Marine Craft Hydrodynamics and Motion Control, 8.1; Blendermann (1994)",
     parameters=(
-        EffectParameter("speed_mps", "true speed of the wind", 0.0, 60.0, input_name="wind.speed"),
+        EffectParameter(
+            "speed_mps",
+            "true speed of the wind",
+            0.0,
+            60.0,
+            input_name="wind.speed",
+            absent=0.0,
+            typical=wave_speeds(0.25),  # 10 m/s, a fresh breeze (Beaufort 5), for a ship of 160 m (ours)
+        ),
         EffectParameter(
             "direction_rad",
             "direction from which the wind comes, clockwise from north",
             -2 * math.pi,
             2 * math.pi,
             input_name="wind.direction",
+            typical=DIRECTIONS,
         ),
-        EffectParameter("surge_coefficient", "wind force coefficient in surge, on the frontal area", 0.0, 2.0, 0.7),
-        EffectParameter("sway_coefficient", "wind force coefficient in sway, on the side area", 0.0, 2.0, 0.8),
-        EffectParameter("yaw_coefficient", "wind moment coefficient, on the side area and length", -0.5, 0.5, 0.1),
-        EffectParameter("centroid_forward_m", "centroid of the side area forward of midships", -200.0, 200.0, 0.0),
+        # Spreads: half the ranges of Fossen (2011) above; that of the centroid is ours.
+        EffectParameter(
+            "surge_coefficient",
+            "wind force coefficient in surge, on the frontal area",
+            0.0,
+            2.0,
+            0.7,
+            spread=_coefficient_error(0.15, 0.7, "projected_area_front_m2"),
+        ),
+        EffectParameter(
+            "sway_coefficient",
+            "wind force coefficient in sway, on the side area",
+            0.0,
+            2.0,
+            0.8,
+            spread=_coefficient_error(0.15, 0.8, "projected_area_side_m2"),
+        ),
+        EffectParameter(
+            "yaw_coefficient",
+            "wind moment coefficient, on the side area and length",
+            -0.5,
+            0.5,
+            0.1,
+            spread=_coefficient_error(0.05, 0.1, "projected_area_side_m2"),
+        ),
+        EffectParameter(
+            "centroid_forward_m",
+            "centroid of the side area forward of midships",
+            -200.0,
+            200.0,
+            0.0,
+            spread=lambda card: 0.03 * card.ship.length_m,
+        ),
+        EffectParameter(
+            "still_air",
+            "share of the resistance of still air that the card's own forces lack (0: they hold it)",
+            0.0,
+            1.0,
+            1.0,
+            absent=0.0,
+            spread=0.5,  # cards seldom say which it is (ours)
+        ),
     ),
     equations=_with_wind,
 )
@@ -120,7 +190,7 @@ def _with_wave_drift(model: Model, given: Symbols, card: ManoeuvringCard) -> Mod
     1/2 rho g zeta^2 over the spectrum. Faltinsen (1990), Sea Loads on Ships and Offshore Structures, chapter 5:
     c_Y = 1 for a vertical side, c_X = 2/3 for a semicircular bow; c_N = 0 for a hull alike fore and aft.
     """
-    beam = particular(card, "beam_m", "wave_drift needs the beam, m")
+    model, (beam,) = with_particulars(model, card, "beam_m")
     chi = given["direction"] - model.symbol("motion.psi")
     length = model.symbol("ship.length")
     pressure = model.symbol("ship.water_density") * card.environment.gravity_mps2 * given["height"] ** 2 / 16
@@ -139,16 +209,29 @@ WAVE_DRIFT = Effect(
     description="Waves that the hull throws back push it slowly along with them.",
     source="Faltinsen (1990), Sea Loads on Ships and Offshore Structures, chapter 5 (short waves)",
     parameters=(
-        EffectParameter("height_m", "significant wave height", 0.0, 20.0),
+        EffectParameter(
+            "height_m",
+            "significant wave height",
+            0.0,
+            20.0,
+            absent=0.0,
+            typical=lengths(0.0125),  # 2 m, sea state 4, for a ship of 160 m (ours)
+        ),
         EffectParameter(
             "direction_rad",
             "direction from which the waves come, clockwise from north",
             -2 * math.pi,
             2 * math.pi,
+            typical=DIRECTIONS,
         ),
-        EffectParameter("surge_coefficient", "wave drift coefficient in surge, on the beam", 0.0, 3.0, 2 / 3),
-        EffectParameter("sway_coefficient", "wave drift coefficient in sway, on the length", 0.0, 3.0, 1.0),
-        EffectParameter("yaw_coefficient", "wave drift moment coefficient, on the length squared", -1.0, 1.0, 0.0),
+        # Spreads: waves that are not short are reflected in part, and hulls differ (ours).
+        EffectParameter(
+            "surge_coefficient", "wave drift coefficient in surge, on the beam", 0.0, 3.0, 2 / 3, spread=0.3
+        ),
+        EffectParameter("sway_coefficient", "wave drift coefficient in sway, on the length", 0.0, 3.0, 1.0, spread=0.3),
+        EffectParameter(
+            "yaw_coefficient", "wave drift moment coefficient, on the length squared", -1.0, 1.0, 0.0, spread=0.05
+        ),
     ),
     equations=_with_wave_drift,
 )
@@ -170,8 +253,13 @@ BANK_SUCTION = Effect(
     description="A bank or wall alongside draws the ship to it and turns its bow away.",
     source="Norrbin (1974), 10th Symposium on Naval Hydrodynamics, 71-88",
     parameters=(
-        EffectParameter("Y_prime", "sway force by a bank, prime, positive to starboard", -0.01, 0.01),
-        EffectParameter("N_prime", "yaw moment by a bank, prime, positive to starboard", -0.01, 0.01),
+        # A tenth of the Mariner's force and moment at 10 deg of rudder: a bank that is felt (ours).
+        EffectParameter(
+            "Y_prime", "sway force by a bank, prime, positive to starboard", -0.01, 0.01, absent=0.0, typical=(5e-5,)
+        ),
+        EffectParameter(
+            "N_prime", "yaw moment by a bank, prime, positive to starboard", -0.01, 0.01, absent=0.0, typical=(-2.5e-5,)
+        ),
     ),
     equations=_with_bank_suction,
 )

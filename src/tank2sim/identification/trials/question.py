@@ -55,7 +55,8 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
     for entry in card.effects:
         effect = EFFECTS[entry.name]
         for one in effect.parameters:
-            if one.input_name:
+            unsaid = one.default is not None and one.absent is not None and one.name not in entry.parameters
+            if one.input_name or unsaid:  # an input, or a part of the effect that the card does not say to be there
                 continue
             error = entry.uncertainty.get(one.name, ASSUMED_EFFECT_ERROR * (one.maximum - one.minimum))
             if error <= 0:  # stated as certain

@@ -1,0 +1,23 @@
+"""Free-running trials of the Mariner with hidden effects: an independent truth for the gap workflow.
+
+Shares no code with the program it judges: own integrator, own ship, each effect in another form of the same physics.
+"""
+
+from gap_truth.draws import EFFECTS, OUTSIDERS, SENSORS
+from gap_truth.lane import Setting
+from gap_truth.make import SHIP_TOML, Made, make, truth, write
+from gap_truth.manoeuvres import FIT, HOLDOUT
+
+__all__ = [
+    "EFFECTS",
+    "FIT",
+    "HOLDOUT",
+    "OUTSIDERS",
+    "SENSORS",
+    "SHIP_TOML",
+    "Made",
+    "Setting",
+    "make",
+    "truth",
+    "write",
+]

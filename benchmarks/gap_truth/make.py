@@ -1,0 +1,83 @@
+"""Sets of trials with a known hidden effect, made and written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gap_truth.draws import OUTSIDERS
+from gap_truth.integrate import integrate
+from gap_truth.lane import Lane, Setting, lanes_of, parameters_of
+from gap_truth.manoeuvres import FIT, HOLDOUT
+from gap_truth.record import COLUMNS, recorded
+from gap_truth.ship import Array, ship_toml
+
+SHIP_TOML = ship_toml()
+SETS_AT_ONCE = 64
+"""Histories of so many sets of thirteen trials take 300 MB; the result does not depend on it."""
+
+_DECIMALS = dict(zip(COLUMNS, (2, 3, 2, 5, 5, 5, 4, 3, 3), strict=True))
+
+
+@dataclass(frozen=True)
+class Made:
+    """A set: its setting, the truth in file units, and trials by name, columns by name (10 Hz, not rounded)."""
+
+    setting: Setting
+    parameters: dict[str, dict[str, float]]
+    trials: dict[str, dict[str, Array]]
+
+    @property
+    def verdict(self) -> str:
+        """What an analyst should say."""
+        if not self.setting.effects:
+            return "no missing effect"
+        outside = any(name in OUTSIDERS for name in self.setting.effects)
+        return "outside the library" if outside else "missing effect"
+
+
+def make(settings: Sequence[Setting]) -> list[Made]:
+    """All sets, in batches of lanes; a set is the same to the bit whatever others are made beside it."""
+    made: list[Made] = []
+    for start in range(0, len(settings), SETS_AT_ONCE):
+        chosen = settings[start : start + SETS_AT_ONCE]
+        lanes: list[Lane] = [lane for setting in chosen for lane in lanes_of(setting)]
+        history = integrate(lanes)
+        trials = iter(recorded(lane, history, column) for column, lane in enumerate(lanes))
+        for setting in chosen:
+            made.append(Made(setting, parameters_of(setting), {name: next(trials) for name in setting.trials}))
+    return made
+
+
+def truth(made: Made) -> dict[str, object]:
+    """What `truth.json` says."""
+    inside = [name for name in made.setting.effects if name not in OUTSIDERS]
+    return {
+        "verdict": made.verdict,
+        "effects": inside,
+        "parameters": made.parameters,
+        "fit": [name for name in FIT if name in made.trials],
+        "holdout": [name for name in HOLDOUT if name in made.trials],
+        "setting": {
+            "seed": made.setting.seed,
+            "strength": made.setting.strength,
+            "noise": made.setting.noise,
+            "process": made.setting.process,
+            "coefficients": made.setting.coefficients,
+        },
+    }
+
+
+def write(made: Made, folder: Path) -> None:
+    """Trials as CSV rounded like the worked cases, `ship.toml` and `truth.json` into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "ship.toml").write_text(SHIP_TOML, encoding="utf-8")
+    (folder / "truth.json").write_text(json.dumps(truth(made), indent=1) + "\n", encoding="utf-8")
+    formats = [f"%.{_DECIMALS[name]}f" for name in COLUMNS]
+    for name, trial in made.trials.items():
+        table = np.column_stack([trial[column] for column in COLUMNS])
+        np.savetxt(folder / f"{name}.csv", table, formats, delimiter=",", header=",".join(COLUMNS), comments="")

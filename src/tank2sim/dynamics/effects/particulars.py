@@ -1,0 +1,83 @@
+"""Particulars of the ship that effects need: those of the card, or estimates that the model's notices tell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.model import Model
+
+BEAMS_IN_LENGTH = 7.0
+BEAMS_IN_DRAUGHT = 0.4
+"""L/B = 7 and B/T = 2.5 are in the middle of loaded merchant ships (6 to 8, 2 to 3.5): choices of ours."""
+
+FRONT_IN_BEAMS = 0.6
+SIDE_IN_LENGTHS = 0.055
+"""Areas above the water over B^2 and L^2, between those of a loaded tanker (0.35 and 0.03) and of a container ship
+(0.95 and 0.1): choices of ours."""
+
+AREA_ERROR = 0.4
+"""Standard error of such an area, relative: the distance from the middle to those of tanker and container ship."""
+
+FULLEST, FINEST = 0.95, 0.3
+"""Block coefficients are held within these bounds where mass and an estimated draught disagree (ours)."""
+
+
+def _beam(card: ManoeuvringCard) -> float:
+    return card.ship.length_m / BEAMS_IN_LENGTH
+
+
+def _draught(card: ManoeuvringCard) -> float:
+    return BEAMS_IN_DRAUGHT * particular(card, "beam_m")
+
+
+def _block(card: ManoeuvringCard) -> float:
+    """C_B = m/(rho L B T), with the mass of the card's equations of motion."""
+    scales = card.scales
+    box = card.ship.length_m * particular(card, "beam_m") * particular(card, "draught_m")
+    return float(min(max(card.rigid_body.mass * scales.mass / (scales.density * box), FINEST), FULLEST))
+
+
+_ESTIMATES: dict[str, tuple[str, str, str, Callable[[ManoeuvringCard], float]]] = {
+    "beam_m": ("beam", "m", "L/7", _beam),
+    "draught_m": ("draught", "m", "0.4 of the beam", _draught),
+    "block_coefficient": ("block coefficient", "", "from mass, length, beam and draught", _block),
+    "projected_area_front_m2": (
+        "area above the water seen from ahead",
+        "m2",
+        f"{FRONT_IN_BEAMS:g} of the beam squared",
+        lambda card: FRONT_IN_BEAMS * particular(card, "beam_m") ** 2,
+    ),
+    "projected_area_side_m2": (
+        "area above the water seen from the side",
+        "m2",
+        f"{SIDE_IN_LENGTHS:g} of the length squared",
+        lambda card: SIDE_IN_LENGTHS * card.ship.length_m**2,
+    ),
+}
+
+
+def particular(card: ManoeuvringCard, key: str) -> float:
+    """A number of the card's ``[ship]``, or an estimate of it (SI).
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    key : str
+        ``beam_m``, ``draught_m``, ``block_coefficient``, ``projected_area_front_m2`` or ``projected_area_side_m2``.
+    """
+    value = getattr(card.ship, key)
+    return float(_ESTIMATES[key][-1](card) if value is None else value)
+
+
+def with_particulars(model: Model, card: ManoeuvringCard, *keys: str) -> tuple[Model, tuple[float, ...]]:
+    """Particulars by their keys (SI), and the model with a notice on each that the card does not state."""
+    for key in keys:
+        name, unit, source, _ = _ESTIMATES[key]
+        if getattr(card.ship, key) is not None:
+            continue
+        told = f"the card states no {key}: a {name} of {particular(card, key):.3g} {unit}".rstrip()
+        notice = f"{told} is taken ({source}, typical)"
+        if notice not in model.notices:
+            model = model.extend(notices=[notice])
+    return model, tuple(particular(card, key) for key in keys)

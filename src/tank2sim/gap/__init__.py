@@ -1,0 +1,1 @@
+"""Where simulation and measurement differ: the missing physical effect named, added, and proved."""

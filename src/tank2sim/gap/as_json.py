@@ -1,0 +1,203 @@
+"""What the gap workflow found, as JSON; and its parameters as a card and a reader have them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.gap.result import Gap, Named, NextTest, Passed
+from tank2sim.identification.trials.evaluation import Figure
+from tank2sim.identification.trials.runs import SEEN
+from tank2sim.records.signals.columns import SignalName
+from tank2sim.units import from_si
+
+NEXT_TEST_FILE = "next_test.csv"
+"""File beside ``gap.json`` with the orders of the next test."""
+
+NOISE_FLOOR = 1.0
+"""Misfit of a perfect model: it is counted in standard deviations of the measurement noise."""
+
+_IN_FILE = {"rad": "deg", "radps": "degps"}
+
+
+def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, object]:
+    """All that was found, in the form of ``gap.json``; angles in degrees, what is not finite is None.
+
+    Parameters
+    ----------
+    gap : Gap
+    files : mapping, optional
+        Trial's name to its file's; by default that of the trial format, ``<name>.csv``.
+    """
+    names = {one.name: (files or {}).get(one.name, f"{one.name}.csv") for one in gap.passed}
+    return {
+        "verdict": gap.verdict,
+        "effects": [_effect(one) for one in gap.effects],
+        "alternatives": [joined(one) for one in gap.alternatives],
+        "where": [
+            {
+                "trial": names.get(place.trial, f"{place.trial}.csv"),
+                "signal": signal_name(place.signal).file,
+                "t_start_s": _finite(place.t_start_s),
+                "t_end_s": _finite(place.t_end_s),
+                "share_of_misfit": _finite(place.share),
+            }
+            for place in gap.where
+        ],
+        "equation": gap.equation,
+        "misfit": _misfit(gap),
+        "could_hide": {
+            effect: {in_file(name, size)[0]: _finite(in_file(name, size)[1]) for name, size in sizes.items()}
+            for effect, sizes in gap.could_hide.items()
+        },
+        "next_test": _next_test(gap.next_test),
+        "rivals": [
+            {"effects": list(one.effects), "loss": _finite(one.loss), "probability": _finite(one.probability)}
+            for one in gap.rivals
+        ],
+        "trials": [_trial(one, names[one.name]) for one in gap.passed],
+        "figures": [
+            {
+                "trial": names.get(now.trial, now.trial),
+                "figure": now.name,
+                "measured": _finite(now.measured),
+                "before": _finite(before.predicted if before else None),
+                "after": _finite(now.predicted),
+            }
+            for before, now in paired_figures(gap)
+        ],
+        "agreement": _agreement(gap, names),
+        "missing_force": _missing_force(gap),
+        "notices": list(gap.notices),
+    }
+
+
+def joined(effects: tuple[str, ...]) -> str:
+    """Effects of one explanation as one name: ``current + wind``; ``none`` without any."""
+    return " + ".join(effects) or "none"
+
+
+def signal_name(variable: str) -> SignalName:
+    """The signal of a trial that measures a variable of the model: ``motion.psi`` is ``psi_deg`` in a file."""
+    signals = {own: signal for signal, own in SEEN.items()}
+    return SignalName(signals.get(variable, variable.removeprefix("motion.")))
+
+
+def in_file(name: str, value: float) -> tuple[str, float]:
+    """Name and value of an effect's parameter as a card has them, from those in SI: degrees in place of radians."""
+    stem, _, suffix = name.rpartition("_")
+    own = f"{stem}_{_IN_FILE[suffix]}" if stem and suffix in _IN_FILE else name
+    return own, from_si(own, value)
+
+
+def estimate_in_file(name: str, value: float) -> tuple[str, float]:
+    """As :func:`in_file`, a direction from 0 to 360 deg."""
+    return in_file(name, value % (2 * math.pi) if name == "direction_rad" else value)
+
+
+class Meant(NamedTuple):
+    """A variable of a model that holds a parameter of an effect: the effect's name, the parameter's in SI."""
+
+    effect: str
+    parameter: str
+
+
+def meant(variable: str) -> Meant:
+    """The parameter that a variable of a model holds: ``current.direction`` is ``direction_rad`` of ``current``."""
+    for effect in EFFECTS.values():
+        for parameter, own in effect.model_names().items():
+            if own == variable:
+                return Meant(effect.name, parameter)
+    effect_name, _, parameter = variable.rpartition(".")
+    return Meant(effect_name, parameter)
+
+
+def measured_in(trial: Passed) -> tuple[str, ...]:
+    """The variables of which a trial has measurements."""
+    return tuple(name for name in trial.noise if np.isfinite(trial.measured[name]).any())
+
+
+def paired_figures(gap: Gap) -> list[tuple[Figure | None, Figure]]:
+    """Each figure of a turn or zigzag, before (None if it is not there) and after; the same where nothing was added."""
+    old = {(one.trial, one.name): one for one in gap.figures_before}
+    return [(old.get((one.trial, one.name)), one) for one in gap.figures_after or gap.figures_before]
+
+
+def _effect(one: Named) -> dict[str, object]:
+    return {
+        "name": one.name,
+        "parameters": {own: _finite(there) for own, there in _each(one.parameters, wrapped=True)},
+        "standard_errors": {own: _finite(there) for own, there in _each(one.standard_errors, wrapped=False)},
+        "confidence": _finite(one.confidence),
+    }
+
+
+def _each(values: Mapping[str, float], *, wrapped: bool) -> list[tuple[str, float]]:
+    convert = estimate_in_file if wrapped else in_file
+    return [convert(name, value) for name, value in values.items()]
+
+
+def _misfit(gap: Gap) -> dict[str, object]:
+    noise = {}
+    for variable, (sigma, origin) in gap.noise.items():
+        name = signal_name(variable)
+        noise[name.file] = {"sigma": _finite(name.factor * sigma), "from": origin}
+    sets = {"fit": False, "holdout": True}
+    return {
+        "noise": noise,
+        "noise_floor": NOISE_FLOOR,
+        **{
+            which: {word: _finite(gap.misfit(which, held_out=held)) for word, held in sets.items()}
+            for which in ("before", "after", "black_box")
+        },
+    }
+
+
+def _trial(one: Passed, file: str) -> dict[str, object]:
+    whiches = ("before", "after", *(("black_box",) if one.black_box else ()))
+    return {
+        "trial": file,
+        "held_out": one.held_out,
+        "misfit": {which: _finite(one.misfit(which)) for which in whiches} if measured_in(one) else {},
+        "signals": {
+            signal_name(variable).file: {which: _finite(one.misfit(which, variable)) for which in whiches}
+            for variable in measured_in(one)
+        },
+    }
+
+
+def _agreement(gap: Gap, names: Mapping[str, str]) -> dict[str, object]:
+    told: dict[str, object] = {}
+    for variable, trials in gap.agreement.items():
+        effect, parameter = meant(variable)
+        told[f"{effect}.{in_file(parameter, 0.0)[0]}"] = {
+            names.get(trial, trial): {
+                "value": _finite(estimate_in_file(parameter, value)[1]),
+                "standard_error": _finite(in_file(parameter, error)[1]),
+            }
+            for trial, (value, error) in trials.items()
+        }
+    return told
+
+
+def _missing_force(gap: Gap) -> dict[str, object] | None:
+    if gap.missing_force is None:
+        return None
+    force = gap.missing_force
+    explained = {state: _finite(share) for state, share in force.explained.items()}
+    return {"equation": force.equation, "explaining": force.explaining, "explained": explained}
+
+
+def _next_test(test: NextTest | None) -> dict[str, object] | None:
+    if test is None:
+        return None
+    expected = {manoeuvre: _finite(score) for manoeuvre, score in test.expected.items()}
+    return {"manoeuvre": test.manoeuvre, "orders": NEXT_TEST_FILE, "why": test.why, "expected": expected}
+
+
+def _finite(value: float | None) -> float | None:
+    return float(value) if value is not None and math.isfinite(value) else None

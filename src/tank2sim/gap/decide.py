@@ -1,0 +1,266 @@
+"""What may be said of the scores: a name, none, several names, or that nothing in the library fits.
+
+An explanation needs a score well below that of "none"; a second effect one well below that of the best single effect.
+All that is as good as the best is named beside it. And something always fits: where the innovations of the best
+explanation are not noise, a name would be a guess, and is withheld.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+from scipy.stats import chi2, gamma
+
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.gap.add import CHANGING_DERIVATIVES, changed_derivatives
+from tank2sim.gap.fit import Fit
+from tank2sim.gap.likelihood import Likelihood
+from tank2sim.gap.prove import agreement
+from tank2sim.gap.residuals import each_trial, estimates
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE
+from tank2sim.gap.search import Search
+
+Array = NDArray[np.float64]
+
+ENOUGH = 10.0
+"""By how much the score must fall for an effect more: odds of exp(5) = 150 to 1 in its favour, "very strong" by Kass
+and Raftery (1995), Bayes Factors, J. Am. Stat. Assoc. 90, whose 2 log(odds) this is."""
+
+ALIKE = 6.0
+"""Explanations within this of the best are as good: odds of exp(3) = 20 to 1 ("strong" begins here, ibid.)."""
+
+OF_ONE_KIND = {"actuator": 0.25, "force": 0.1}
+"""Share of the whole gain that a second effect of the same kind must have (ours): less is what the first one's formula
+may be wrong by, beyond what :data:`.likelihood.FORM` covers."""
+
+STANDARD_ERRORS = 3.0
+"""An effect is named if its size exceeds so many of its standard errors."""
+
+TEMPER = 3.0
+"""Scores are divided by this before they become probabilities: so calibrated on made-up trials, benchmarks/gap.py."""
+
+
+SUREST = 0.99
+"""No name is surer than this: something outside the library may look like it (ours)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """What is said.
+
+    Parameters
+    ----------
+    verdict : str
+        One of :data:`.result.VERDICTS`.
+    best : Fit
+        The explanation that is named, "none" among them; the best of all where a name is withheld.
+    alike : tuple of Fit
+        Others that are as good.
+    probabilities : mapping
+        Of each explanation that was fitted, by its effects.
+    strange : tuple of Strange
+        Where the innovations of the best are not noise.
+    """
+
+    verdict: str
+    best: Fit
+    alike: tuple[Fit, ...]
+    probabilities: dict[tuple[str, ...], float]
+    strange: tuple[Strange, ...]
+
+    def confidence(self, effect: str) -> float:
+        """Probability that an effect is among what is missing."""
+        sure = sum(p for effects, p in self.probabilities.items() if effect in effects)
+        return float(min(sure, SUREST))
+
+
+@dataclass(frozen=True)
+class Strange:
+    """A place where the innovations are not noise.
+
+    Parameters
+    ----------
+    what : str
+        ``passage`` (a time in one trial), ``trial`` (a whole one) or ``period`` (an oscillation in all).
+    trial : str
+        Empty for a period.
+    begin_s, end_s : float
+        In the trial's own time; for a period both are its length.
+    excess : float
+        -2 log of the probability that noise does as much anywhere, as a score.
+    """
+
+    what: str
+    trial: str
+    begin_s: float
+    end_s: float
+    excess: float
+
+
+def decide(search: Search) -> Decision:
+    """What the scores of a search allow to say."""
+    none = search.none
+    best = none
+    single = next((fit for fit in search.fits if len(fit.explained.effects) == 1 and stands_out(fit)), None)
+    pair = next((fit for fit in search.fits if len(fit.explained.effects) == 2 and stands_out(fit)), None)
+    if single is not None and single.score < none.score - ENOUGH:
+        best = single
+    if pair is not None and pair.score < min(one.score for one in (best, single) if one is not None) - ENOUGH:
+        best = pair
+    alike = tuple(
+        fit
+        for fit in search.fits
+        if fit is not best
+        and fit.score < best.score + ALIKE
+        and stands_out(fit)
+        and not set(fit.explained.effects) > set(best.explained.effects)
+        and len(fit.explained.effects) <= max(len(best.explained.effects), 1)
+        and best is not none
+    )
+    scores = np.array([fit.score for fit in search.fits]) / TEMPER
+    weights = np.exp(-0.5 * scores - logsumexp(-0.5 * scores))
+    probabilities = {fit.explained.effects: float(w) for fit, w in zip(search.fits, weights, strict=True)}
+    strange = strangeness(search.likelihood, best)
+    verdict = NOTHING if best is none else AMBIGUOUS if alike else MISSING
+    return Decision(OUTSIDE if strange else verdict, best, alike, probabilities, strange)
+
+
+def _share(pair: Fit) -> float:
+    """Share of the whole gain that the second of two effects must have."""
+    kinds = {_kind(name) for name in pair.explained.effects}
+    return OF_ONE_KIND.get(kinds.pop(), 0.0) if len(kinds) == 1 else 0.0
+
+
+def _kind(name: str) -> str:
+    if name in ("rudder_bias", "rudder_time_offset"):
+        return {"rudder_bias": "force", "rudder_time_offset": "actuator"}[name]  # by what they look like
+    return EFFECTS[name].acts_on.partition(" ")[0]
+
+
+def stands_out(fit: Fit) -> bool:
+    """Whether each effect has an amplitude that is more than :data:`STANDARD_ERRORS` from its absence.
+
+    One that only changes derivatives of the card must change one of them by as many of *its* standard errors: less is
+    what the card may be wrong by.
+    """
+    errors = np.sqrt(np.diag(fit.covariance))
+    for name in fit.explained.effects:
+        sizes = [
+            abs(value - one.parameter.absent) / error if error > 0 else np.inf
+            for one, value, error in zip(fit.explained.asked, fit.theta, errors, strict=True)
+            if one.effect == name and one.parameter.absent is not None and one.parameter.default is None
+        ]
+        if sizes and max(sizes) < STANDARD_ERRORS:
+            return False
+        if name in CHANGING_DERIVATIVES and _change(fit, name) < STANDARD_ERRORS:
+            return False
+    return True
+
+
+def _change(fit: Fit, name: str) -> float:
+    """Largest change of a derivative of the card by an effect, in standard errors of the card."""
+    card = fit.explained.card
+    values = next(values for effect, values, _ in estimates(fit) if effect == name)
+    changes = [
+        abs(after - card.derivatives.get(term, 0.0)) / error if (error := card.standard_error(term)) > 0 else np.inf
+        for term, after, *_ in changed_derivatives(card, name, values, {})
+    ]
+    return max(changes, default=0.0)
+
+
+WINDOWS = (6, 12, 24, 48)
+"""Lengths of the passages that are looked at, in blocks: 0.75 to 6 L/u0 (ours)."""
+
+RARE = {"passage": 1e-4, "period": 1e-12, "trial": 1e-6}
+"""Probability in all trials together below which noise is no explanation (ours, on made-up trials with nothing missing:
+innovations are not quite normal, and not quite white where the sea or the wind has a colour of its own)."""
+
+NEIGHBOURS = (3.0, 12.0)
+"""A line is compared with the spectrum from here to there on both sides, in steps of one over the length of the longest
+run: beyond the width of the window's own peak."""
+
+LOWEST = 4
+"""Below this line of the padded spectrum are trends, which passages tell."""
+
+PADDED = 512
+"""Points of the periodograms: at least as many as blocks in a run, so that a line is not missed between two of them."""
+
+
+def strangeness(likelihood: Likelihood, fit: Fit) -> tuple[Strange, ...]:
+    """Where the innovations of an explanation are not noise, the strangest first."""
+    e = likelihood.innovations(fit)
+    found = [*_passages(likelihood, e), *_periods(likelihood, e), *_disagreements(likelihood, fit)]
+    rare = [one for one in found if one.excess > -2 * np.log(RARE[one.what])]
+    return tuple(sorted(rare, key=lambda one: -one.excess))
+
+
+def _passages(likelihood: Likelihood, e: Array) -> list[Strange]:
+    """The strangest passage of each trial: sums of squares over windows, against chi squared."""
+    motion, found = likelihood.motion, []
+    squares, counts = (e**2).sum(axis=2), likelihood.known.sum(axis=2)
+    for run, name in enumerate(motion.names):
+        strangest = Strange("passage", name, 0.0, 0.0, -np.inf)
+        for length in WINDOWS:
+            if length > motion.blocks:
+                continue
+            sums, degrees = (np.convolve(one[run], np.ones(length), "valid") for one in (squares, counts))
+            log_p = np.where(degrees > 0, chi2.logsf(sums, np.maximum(degrees, 1)), 0.0)
+            place = int(np.argmin(log_p))
+            excess = float(np.minimum(-2 * (log_p[place] + np.log(counts.size)), MOST))
+            if excess > strangest.excess:
+                last = min(place + length, motion.lengths[run]) - 1  # a window may reach beyond a shorter run
+                begin, end = motion.times[run][[place, last]]
+                strangest = Strange("passage", name, float(begin), float(end), excess)
+        found.append(strangest)
+    return found
+
+
+MOST = 1e4
+"""An excess beyond this is this: probabilities that small underflow."""
+
+
+def _periods(likelihood: Likelihood, e: Array) -> list[Strange]:
+    """The strongest line in each signal's spectrum, of the innovations of all trials: means of as many exponentials.
+
+    A line stands out from its own neighbourhood; waves and gusts have a band, and that is noise.
+    """
+    motion, found = likelihood.motion, []
+    size = max(PADDED, motion.blocks)
+    near, far = (round(width * size / motion.blocks) for width in NEIGHBOURS)
+    ring = np.concatenate([np.ones(far - near), np.zeros(2 * near + 1), np.ones(far - near)])
+    for signal in range(e.shape[2]):
+        spectra = []
+        for run, length in enumerate(motion.lengths):
+            window = np.hanning(length)
+            known = likelihood.known[run, :length, signal]
+            if known.any():
+                shown = np.abs(np.fft.rfft(e[run, :length, signal] * window, size)) ** 2
+                spectra.append(shown / np.sum(window[known] ** 2))
+        if not spectra:
+            continue
+        mean = np.mean(spectra, axis=0)
+        around = np.convolve(np.pad(mean, far, mode="reflect"), ring / ring.sum(), "valid")
+        above = (mean / np.maximum(around, 1.0))[LOWEST:]
+        place = int(np.argmax(above))
+        log_p = gamma.logsf(len(spectra) * above[place], len(spectra)) + np.log(mean.size * e.shape[2])
+        period = size * motion.block_s / (LOWEST + place)
+        found.append(Strange("period", "", period, period, float(min(-2 * log_p, MOST))))
+    return found
+
+
+def _disagreements(likelihood: Likelihood, fit: Fit) -> list[Strange]:
+    """The trial that is furthest from the others about a parameter, where they disagree: Cochran's Q."""
+    found = []
+    for values in each_trial(likelihood, fit).values():
+        if len(values) < 2:
+            continue
+        said = agreement(values)
+        name = max(values, key=lambda one: abs(values[one][0] - said.mean) / values[one][1])
+        times = likelihood.motion.times[likelihood.motion.names.index(name)]
+        excess = float(min(-2 * np.log(max(said.p, 1e-300)), MOST))
+        last = likelihood.motion.lengths[likelihood.motion.names.index(name)] - 1
+        found.append(Strange("trial", name, float(times[0]), float(times[last]), excess))
+    return found

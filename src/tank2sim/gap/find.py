@@ -1,0 +1,250 @@
+"""The gap workflow: locate the gap, screen and fit what could be missing, decide, add it, and prove it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.form import EffectEntry
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.errors import InputError
+from tank2sim.gap.add import Found, added
+from tank2sim.gap.correct import corrected
+from tank2sim.gap.decide import ENOUGH, Decision, Strange, decide
+from tank2sim.gap.explained import CLOCK
+from tank2sim.gap.fit import Fit
+from tank2sim.gap.fitting import Progress
+from tank2sim.gap.next_test import Explanation, next_test
+from tank2sim.gap.posing import candidates, pose
+from tank2sim.gap.prove import agreement, black_box, worse
+from tank2sim.gap.replay import passed, with_black_box
+from tank2sim.gap.residuals import could_hide, each_trial, estimates, force_lacking
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE, Gap, Named, NextTest, Passed, Rival
+from tank2sim.gap.search import Search, search
+from tank2sim.gap.where import equation_of, figures, places
+from tank2sim.identification.trials.measured import Measured
+from tank2sim.identification.trials.runs import SEEN
+from tank2sim.records.trials import Trial
+
+RIVALS = 12
+"""Explanations that are told of."""
+
+DOUBT = 1e-3
+"""Probability below which trials that disagree about a parameter are told of."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How the missing effect is sought.
+
+    Parameters
+    ----------
+    effects : tuple of str, optional
+        Only these; by default the whole library.
+    without : tuple of str
+        Not these.
+    max_effects : int
+        1 or 2.
+    workers : int, optional
+        Processes; by default as many as there are processors.
+    """
+
+    effects: tuple[str, ...] | None = None
+    without: tuple[str, ...] = ()
+    max_effects: int = 2
+    workers: int | None = None
+
+
+def find_gap(
+    card: ManoeuvringCard,
+    fitted: Measured,
+    held: Measured,
+    options: Options | None = None,
+    progress: Progress = lambda text: None,
+    executor: Executor | None = None,
+) -> Gap:
+    """Find where a card's model and trials differ, name what is missing, add it, and prove it.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        The ship as it is known.
+    fitted, held : Measured
+        Trials that name the effect, and trials that only prove it (may be none).
+    options : Options, optional
+    progress : callable
+        Told what is being done.
+    executor : Executor, optional
+        For fitting explanations; by default processes of this machine.
+
+    Raises
+    ------
+    InputError
+        A trial is too short or tells too little, or an effect that was asked for cannot be tried on this card.
+    """
+    options = options or Options()
+    names = _names(card, fitted, options)
+    likelihood = pose(card, fitted)
+    with _processes(options, executor) as pool:
+        found = search(likelihood, progress, pool, names, most=options.max_effects)
+    decision = decide(found)
+    progress("proving")
+    return _told(card, (fitted, held), found, decision, progress)
+
+
+def _names(card: ManoeuvringCard, fitted: Measured, options: Options) -> tuple[str, ...]:
+    possible = candidates(card, fitted.driven_by)
+    for name in options.effects or ():
+        if name not in possible:
+            have = any(entry.name == name for entry in card.effects)
+            why = "is on the card already" if have else "cannot be tried on this card and these trials"
+            raise InputError("--effects", "", f"{name} {why}", f"possible are: {', '.join(possible)}")
+    return tuple(name for name in options.effects or possible if name not in options.without)
+
+
+@contextmanager
+def _processes(options: Options, executor: Executor | None) -> Iterator[Executor | None]:
+    count = options.workers or os.cpu_count() or 1
+    if executor is not None or count == 1:
+        yield executor
+        return
+    context = multiprocessing.get_context("spawn")
+    # An interrupt is for this process alone: workers that were told of it, too, would each say so.
+    with ProcessPoolExecutor(count, context, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
+        try:
+            yield pool
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _told(
+    card: ManoeuvringCard, trials: tuple[Measured, Measured], found: Search, decision: Decision, progress: Progress
+) -> Gap:
+    """Everything that follows from the decision."""
+    fitted, held = trials
+    estimated: list[Found] = estimates(decision.best) if decision.verdict in (MISSING, AMBIGUOUS) else []
+    improved = added(card, estimated)
+    sensors = [one for one in estimated if EFFECTS[one[0]].acts_on == "sensor"]
+    noise = _noise(found, decision.best, fitted)
+    sigmas = {name: sigma for name, (sigma, _) in noise.items()}
+    results: list[Passed] = []
+    box = black_box(card, fitted, sigmas, max(len(decision.best.theta), 1)) if estimated else None
+    for group, held_out in ((fitted, False), (held, True)):
+        if group.trials:
+            mended = _mended(group, sensors)
+            some = passed(card, improved, group, sigmas, held_out, mended)
+            results += with_black_box(some, box.card, group, sigmas) if box else some
+    progress("where and how much")
+    force = force_lacking(found.likelihood, found.none)
+    every = (*fitted.trials, *held.trials)
+    told = each_trial(found.likelihood, decision.best) if estimated else {}
+    return Gap(
+        card=card,
+        improved=improved,
+        verdict=decision.verdict,
+        effects=tuple(Named(*one, decision.confidence(one[0])) for one in estimated),
+        alternatives=tuple(fit.explained.effects for fit in decision.alike) if estimated else (),
+        rivals=_rivals(found, decision),
+        where=places(results),
+        equation=equation_of([name for name, *_ in estimated], improved, force, results),
+        noise=noise,
+        passed=tuple(results),
+        figures_before=figures(card, every, results, "before"),
+        figures_after=figures(improved, _after(every, fitted, held, sensors), results, "after"),
+        missing_force=force,
+        could_hide=could_hide(found, decision.best, ENOUGH),
+        agreement=told,
+        next_test=_next(card, found, decision, sigmas),
+        notices=_notices(decision, results, told, (fitted, held)),
+    )
+
+
+def _mended(group: Measured, sensors: Sequence[Found]) -> Measured | None:
+    if not sensors:
+        return None
+    return replace(group, trials=tuple(corrected(trial, sensors) for trial in group.trials))
+
+
+def _after(every: Sequence[Trial], fitted: Measured, held: Measured, sensors: Sequence[Found]) -> Sequence[Trial]:
+    groups = (_mended(group, sensors) or group for group in (fitted, held))
+    return [trial for group in groups for trial in group.trials] if sensors else every
+
+
+def _noise(found: Search, best: Fit, fitted: Measured) -> dict[str, tuple[float, str]]:
+    """Standard deviation of one reading of each variable: white and slow noise together, SI."""
+    motion, noise = found.likelihood.motion, best.noise
+    stated = {SEEN[name]: value for trial in fitted.trials for name, value in trial.noise.items() if name in SEEN}
+    sizes = {}
+    for place, name in enumerate(motion.seen):
+        sigma = float(np.sqrt(noise.white[place] ** 2 * motion.fine + noise.slow[place] ** 2))
+        sizes[name] = (stated[name], "stated") if name in stated else (sigma, "estimated")
+    return sizes
+
+
+def _rivals(found: Search, decision: Decision) -> tuple[Rival, ...]:
+    least = found.fits[0].score
+    some = [*found.fits[:RIVALS]]
+    some += [found.none] if found.none not in some else []
+    return tuple(
+        Rival(fit.explained.effects, fit.score - least, decision.probabilities[fit.explained.effects]) for fit in some
+    )
+
+
+def _next(card: ManoeuvringCard, found: Search, decision: Decision, noise: Mapping[str, float]) -> NextTest | None:
+    """The manoeuvre that would tell apart what these trials could not."""
+    if decision.verdict != AMBIGUOUS:
+        return None
+    rivals = [_explanation(card, found, fit) for fit in (decision.best, *decision.alike)]
+    return next_test(rivals, noise)
+
+
+def _explanation(card: ManoeuvringCard, found: Search, fit: Fit) -> Explanation:
+    """A card with an explanation's effects, and what of it is not known exactly."""
+    entries = [
+        EffectEntry(name=name, parameters=dict(values), uncertainty=dict(errors))
+        for name, values, errors in estimates(fit)
+    ]
+    whole = replace(card, effects=(*card.effects, *entries))
+    coefficients = found.likelihood.coefficients
+    names = (*(one.variable for one in fit.explained.asked), *(one for one in coefficients.names if one != CLOCK))
+    kept = [place for place, one in enumerate(coefficients.names) if one != CLOCK]
+    shared = fit.width * coefficients.mixing[kept]
+    spread = np.zeros((len(names), len(names)))
+    spread[len(fit.theta) :, len(fit.theta) :] = shared @ shared.T
+    spread[: len(fit.theta), : len(fit.theta)] = fit.covariance
+    return Explanation(" and ".join(fit.explained.effects) or "none", whole, names, spread)
+
+
+def _notices(
+    decision: Decision,
+    results: Sequence[Passed],
+    told: Mapping[str, Mapping[str, tuple[float, float]]],
+    trials: tuple[Measured, Measured],
+) -> tuple[str, ...]:
+    notices = [*trials[0].notices, *trials[1].notices]
+    notices += [_in_words(one) for one in decision.strange]
+    if decision.verdict in (MISSING, AMBIGUOUS):
+        notices += [f"{name}: the improved card follows it worse than the given one" for name in worse(results)]
+    for variable, values in told.items():
+        if len(values) > 1 and (said := agreement(values)).p < DOUBT:
+            notices.append(f"the trials do not agree about {variable} (Cochran Q {said.q:.3g}, p {said.p:.1g})")
+    return tuple(dict.fromkeys(notices))
+
+
+def _in_words(one: Strange) -> str:
+    when = f"from {one.begin_s:.0f} to {one.end_s:.0f} s"
+    if one.what == "period":
+        return f"all trials: an oscillation with a period of {one.begin_s:.3g} s that nothing in the library makes"
+    return f"{one.trial}: {when} the ship does what nothing in the library explains"
+
+
+__all__ = ["AMBIGUOUS", "MISSING", "NOTHING", "OUTSIDE", "Options", "find_gap"]

@@ -1,0 +1,328 @@
+"""A Kalman filter about the measured motion: how likely the measurements are, whatever is missing.
+
+The error of the measured motion, the slow forces that nobody modelled (process noise) and the slow errors of the
+sensors are the states; the filter is linear, so that what an effect adds to the motion passes through it as a column of
+its own, and every explanation with the same noise is one small least-squares problem.
+
+    state      z = (dx of 6 states, 3 accelerations, ny sensor errors)
+    dx[k+1]    = Phi dx[k] + Gamma (g a[k] + w[k] + d[k]),   d = what the model's rates have beyond the measured change
+    a, e       first-order Gauss-Markov processes (white noise through a lag)
+    y - h(x)   = H dx + e + white noise
+
+Durbin and Koopman (2012), Time Series Analysis by State Space Methods, 2nd ed., chapters 4 and 7: likelihood by
+innovations, its slope in the noise's own parameters by the backward (disturbance) smoother.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Truths = NDArray[np.bool_]
+
+DOUBLINGS = 3
+"""Doublings of an eighth of a block, over which even a hull in very shallow water moves little."""
+
+FORCES = 3
+"""Accelerations of surge, sway and yaw."""
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Levels and times of the noise.
+
+    Parameters
+    ----------
+    white, slow, slow_s : array (ny,)
+        Of each sensor: standard deviation of the white noise of a block's mean, of the slow error, its time constant.
+    force, force_s : array (3,)
+        Of the accelerations that nobody modelled: standard deviation (m/s2, m/s2, rad/s2) and time constant.
+    """
+
+    white: Array
+    slow: Array
+    slow_s: Array
+    force: Array
+    force_s: Array
+
+    @property
+    def logs(self) -> Array:
+        """Logarithms of all in one vector (3 ny + 6,)."""
+        logs: Array = np.log(np.concatenate([self.white, self.slow, self.slow_s, self.force, self.force_s]))
+        return logs
+
+    @staticmethod
+    def of(logs: Array) -> Noise:
+        """From :attr:`logs`."""
+        ny = (len(logs) - 2 * FORCES) // 3
+        values = np.exp(logs)
+        white, slow, slow_s = (values[part * ny : (part + 1) * ny] for part in range(3))
+        return Noise(white, slow, slow_s, values[3 * ny : 3 * ny + FORCES], values[3 * ny + FORCES :])
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """The motion about which the filter is linear.
+
+    Parameters
+    ----------
+    transition : array (R, T - 1, 6, 6)
+        From the middle of each block to that of the next.
+    spreading : array (R, T - 1, 6, 6)
+        What rates that are added during that time come to at its end, over what they would if nothing moved on.
+    reading : array (R, T, ny, 6)
+        Readings by states.
+    known : array (R, T, ny)
+        Where something was measured.
+    block_s : float
+    wide : array (6,)
+        Standard deviation of the error of the smoothed motion at the beginning: generous.
+    """
+
+    transition: Array
+    spreading: Array
+    reading: Array
+    known: Truths
+    block_s: float
+    wide: Array
+
+
+def linear(by_state: Array, reading: Array, known: Truths, block_s: float, wide: Array) -> Linear:
+    """From the rates by states (R, T - 1, 6, 6): exp(A h), and its mean over the time to the end of the block.
+
+    By Taylor's series over h/8 and three doublings (scaling and squaring: Moler and Van Loan 2003, SIAM Review 45).
+    """
+    A = by_state * block_s / 2**DOUBLINGS
+    eye = np.eye(6)
+    square = A @ A
+    transition = eye + A + square / 2 + square @ A / 6
+    spreading = eye + A / 2 + square / 6
+    for _ in range(DOUBLINGS):
+        spreading = 0.5 * (spreading + transition @ spreading)
+        transition = transition @ transition
+    return Linear(transition, spreading, reading, known, block_s, wide)
+
+
+@dataclass(frozen=True, eq=False)
+class Observer:
+    """The filter for one noise: gains, and what a backward pass needs.
+
+    Parameters
+    ----------
+    what : Linear
+    noise : Noise
+    F : array (R, T, nz, nz)
+        Whole transition from each block to the next; nothing follows the last, whose own is not used.
+    H : array (R, T, ny, nz)
+        Zero rows where nothing was measured.
+    gain : array (R, T, nz, ny)
+    white : array (R, T, ny, ny)
+        Inverse of the lower Cholesky factor of the innovations' covariance.
+    filtered : array (R, T, nz, nz)
+        Covariance after each measurement.
+    log_det : float
+        Sum of log det of the innovations' covariance, over what was measured.
+    """
+
+    what: Linear
+    noise: Noise
+    F: Array
+    H: Array
+    gain: Array
+    white: Array
+    filtered: Array
+    log_det: float
+
+    def whitened(self, driving: Array, shown: Array) -> Array:
+        """Innovations in units of their standard deviation, of several columns at once.
+
+        Parameters
+        ----------
+        driving : array (R, T - 1, 6, C)
+            What the rates add to the states from block to block.
+        shown : array (R, T, ny, C)
+            What the sensors show; nan where nothing was measured.
+
+        Returns
+        -------
+        array (R, T, ny, C)
+            0 where nothing was measured.
+        """
+        innovations, _ = self.passed(driving, shown)
+        whitened: Array = self.white @ innovations
+        return whitened
+
+    def passed(self, driving: Array, shown: Array) -> tuple[Array, Array]:
+        """Innovations (R, T, ny, C), and states after each measurement (R, T, nz, C), of arguments as above."""
+        runs, blocks, ny, nz = self.H.shape
+        count = shown.shape[-1]
+        shown = np.where(self.what.known[..., None], shown, 0.0)
+        z = np.zeros((runs, nz, count))
+        innovations, after = np.empty((runs, blocks, ny, count)), np.empty((runs, blocks, nz, count))
+        for k in range(blocks):
+            innovations[:, k] = shown[:, k] - self.H[:, k] @ z
+            after[:, k] = z + self.gain[:, k] @ innovations[:, k]
+            if k + 1 < blocks:
+                z = self.F[:, k] @ after[:, k]
+                z[:, :6] += self.what.spreading[:, k] @ driving[:, k]
+        return innovations, after
+
+    def smoothed(self, driving: Array, shown: Array) -> Array:
+        """States given all measurements (R, T, nz), of one column; arguments as in :meth:`whitened` without C."""
+        runs, blocks, _, nz = self.H.shape
+        innovations, after = self.passed(driving[..., None], shown[..., None])
+        states = np.empty((runs, blocks, nz))
+        r = np.zeros((runs, nz, 1))
+        for k in range(blocks - 1, -1, -1):
+            # r carries what later measurements say of the state after this one
+            later = self.F[:, k].swapaxes(-1, -2) @ r if k + 1 < blocks else r
+            states[:, k] = (after[:, k] + self.filtered[:, k] @ later)[..., 0]
+            weighed = self.white[:, k].swapaxes(-1, -2) @ self.white[:, k] @ innovations[:, k]
+            HT = self.H[:, k].swapaxes(-1, -2)
+            r = later + HT @ (weighed - self.gain[:, k].swapaxes(-1, -2) @ later)
+        return states
+
+
+@dataclass(frozen=True, eq=False)
+class _Pushed:
+    """An acceleration of first order over a block (3,): the change of speed that its value at the beginning makes
+    (`gain`), and the variances of what comes on top by chance: of that change, of it with the acceleration at the end
+    (`both`), and the slopes of all three in the logarithm of the time constant. Singer (1970), IEEE Trans. AES 6(4)."""
+
+    gain: Array
+    way: Array
+    both: Array
+    gain_slope: Array
+    way_slope: Array
+    both_slope: Array
+
+
+def _pushed(noise: Noise, block_s: float) -> _Pushed:
+    time, level = noise.force_s, noise.force
+    x = block_s / time
+    f = np.exp(-x)
+    gain = time * (1 - f)
+    way = (level * time) ** 2 * (2 * x - 3 + 4 * f - f**2)
+    both = level**2 * time * (1 - f) ** 2
+    return _Pushed(
+        gain,
+        way,
+        both,
+        gain - time * f * x,
+        2 * way + (level * time) ** 2 * (-2 * x + 4 * f * x - 2 * f**2 * x),
+        both - 2 * level**2 * time * (1 - f) * f * x,
+    )
+
+
+def observer(what: Linear, noise: Noise) -> Observer:
+    """The filter of a noise: the covariance recursion, once for all columns."""
+    runs, blocks, ny, _ = what.reading.shape
+    nz = 6 + FORCES + ny
+    fading = np.exp(-what.block_s / np.concatenate([noise.force_s, noise.slow_s]))
+    levels = np.concatenate([noise.force, noise.slow])
+    pushed = _pushed(noise, what.block_s)
+    B = what.spreading[..., :FORCES]
+    F = np.zeros((runs, blocks, nz, nz))
+    F[:, :-1, :6, :6] = what.transition
+    F[:, :-1, :6, 6:9] = B * pushed.gain
+    F[..., range(6, nz), range(6, nz)] = fading
+    Q = np.zeros((runs, blocks - 1, nz, nz))
+    Q[..., range(6, nz), range(6, nz)] = levels**2 * (1 - fading**2)
+    Q[..., :6, :6] = (B * pushed.way) @ B.swapaxes(-1, -2)
+    Q[..., :6, 6:9] = B * pushed.both
+    Q[..., 6:9, :6] = Q[..., :6, 6:9].swapaxes(-1, -2)
+    H = np.zeros((runs, blocks, ny, nz))
+    H[..., :6] = what.reading
+    H[..., range(ny), range(9, nz)] = 1.0
+    H = H * what.known[..., None]
+    R = np.where(what.known, noise.white**2, 1.0)
+    P = np.zeros((runs, nz, nz))
+    P[:, range(nz), range(nz)] = np.concatenate([what.wide**2, levels**2])
+    gain = np.empty((runs, blocks, nz, ny))
+    white = np.empty((runs, blocks, ny, ny))
+    filtered = np.empty((runs, blocks, nz, nz))
+    places = np.arange(ny)
+    for k in range(blocks):
+        Hk = H[:, k]
+        PH = P @ Hk.swapaxes(-1, -2)
+        S = Hk @ PH
+        S[:, places, places] += R[:, k]
+        lower = np.linalg.inv(np.linalg.cholesky(S))
+        white[:, k] = lower
+        K = PH @ (lower.swapaxes(-1, -2) @ lower)
+        gain[:, k] = K
+        P = P - K @ PH.swapaxes(-1, -2)
+        filtered[:, k] = P
+        if k + 1 < blocks:
+            Fk = F[:, k]
+            P = Fk @ P @ Fk.swapaxes(-1, -2) + Q[:, k]
+            P = 0.5 * (P + P.swapaxes(-1, -2))
+    # rows without a measurement have S = 1 on their diagonal and count nothing
+    log_det = float(-2 * np.sum(np.log(white[..., places, places])))
+    return Observer(what, noise, F, H, gain, white, filtered, log_det)
+
+
+def slopes(seen: Observer, driving: Array, shown: Array, whitened: Array) -> Array:
+    """Slope of ``sum(log det S) + |whitened|^2`` in the logarithms of the noise (:attr:`Noise.logs`).
+
+    `whitened` (R, T, ny, C) are the columns that count: the residual, and those of uncertain coefficients each times
+    the root of its covariance; `driving` and `shown` are what they were made of.
+
+    d(log det V + e'V^-1 e) = tr(V^-1 dV) - e'V^-1 dV V^-1 e, which the backward recursion gives for every noise at
+    once: r carries V^-1 e back to the states, N its covariance under the model (Durbin and Koopman, 7.3.3).
+    """
+    what, noise = seen.what, seen.noise
+    runs, blocks, ny, nz = seen.H.shape
+    _, after = seen.passed(driving, shown)
+    fading = np.exp(-what.block_s / np.concatenate([noise.force_s, noise.slow_s]))
+    by_variance = np.zeros(nz - 6)  # of the driving noise of each slow process
+    by_fading = np.zeros(nz - 6)
+    by_white = np.zeros(ny)
+    by_way, by_both, by_gain = np.zeros(FORCES), np.zeros(FORCES), np.zeros(FORCES)
+    r = np.zeros((runs, nz, whitened.shape[-1]))
+    N = np.zeros((runs, nz, nz))
+    own = np.arange(6, nz)
+    diagonal = np.arange(ny)
+    for k in range(blocks - 1, -1, -1):
+        W, K, H = seen.white[:, k], seen.gain[:, k], seen.H[:, k]
+        if k + 1 < blocks:
+            F = seen.F[:, k]
+            by_variance += (N[:, own, own] - (r[:, 6:] ** 2).sum(axis=2)).sum(axis=0)
+            BT = what.spreading[:, k, :, :FORCES].swapaxes(-1, -2)
+            pushing, NF = BT @ r[:, :6], N @ F
+            BN = BT @ N[:, :6]
+            by_way += (np.einsum("rjs,rjs->rj", BN[..., :6], BT) - (pushing**2).sum(axis=2)).sum(axis=0)
+            crossed = BN[:, range(FORCES), range(6, 6 + FORCES)] - (pushing * r[:, 6 : 6 + FORCES]).sum(axis=2)
+            by_both += 2 * crossed.sum(axis=0)
+            later = F.swapaxes(-1, -2) @ r
+            smooth = after[:, k, 6:] + (seen.filtered[:, k] @ later)[:, 6:]
+            P = seen.filtered[:, k][:, :, 6:]
+            mixed = np.einsum("rij,rji->ri", NF[:, 6:], P)
+            by_fading += -2 * ((r[:, 6:] * smooth).sum(axis=2) - mixed).sum(axis=0)
+            mixed = np.einsum("rij,rji->ri", BT @ NF[:, :6], P[..., :FORCES])
+            by_gain += -2 * ((pushing * smooth[:, :FORCES]).sum(axis=2) - mixed).sum(axis=0)
+            N = F.swapaxes(-1, -2) @ N @ F
+        else:
+            later = r
+        KT = K.swapaxes(-1, -2)
+        u = W.swapaxes(-1, -2) @ whitened[:, k] - KT @ later
+        D = W.swapaxes(-1, -2) @ W + KT @ N @ K
+        by_white += np.where(what.known[:, k], D[:, diagonal, diagonal] - (u**2).sum(axis=2), 0.0).sum(axis=0)
+        left = np.eye(nz) - K @ H
+        r = later + H.swapaxes(-1, -2) @ u
+        N = left.swapaxes(-1, -2) @ N @ left + H.swapaxes(-1, -2) @ (W.swapaxes(-1, -2) @ W) @ H
+    at_start = (N[:, own, own] - (r[:, 6:] ** 2).sum(axis=2)).sum(axis=0)
+    levels = np.concatenate([noise.force, noise.slow])
+    times = np.concatenate([noise.force_s, noise.slow_s])
+    by_level = 2 * levels**2 * ((1 - fading**2) * by_variance + at_start)
+    # d fading/d log time = fading h/time; the driving variance is level^2 (1 - fading^2)
+    by_time = (by_fading - 2 * fading * levels**2 * by_variance) * fading * what.block_s / times
+    pushed = _pushed(noise, what.block_s)
+    by_level[:FORCES] += 2 * (by_way * pushed.way + by_both * pushed.both)
+    by_time[:FORCES] += by_way * pushed.way_slope + by_both * pushed.both_slope + by_gain * pushed.gain_slope
+    return np.concatenate(
+        [2 * noise.white**2 * by_white, by_level[FORCES:], by_time[FORCES:], by_level[:FORCES], by_time[:FORCES]]
+    )

@@ -1,0 +1,241 @@
+"""What the gap workflow found: the values that the JSON, the screen and the page show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.identification.trials.evaluation import Figure
+
+Array = NDArray[np.float64]
+
+MISSING = "missing effect"
+NOTHING = "no missing effect"
+AMBIGUOUS = "ambiguous"
+OUTSIDE = "outside the library"
+VERDICTS = (MISSING, NOTHING, AMBIGUOUS, OUTSIDE)
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect that was named.
+
+    Parameters
+    ----------
+    name : str
+        Key of :data:`tank2sim.dynamics.effects.EFFECTS`.
+    parameters : mapping
+        What was found, by the names of the effect's parameters (SI).
+    standard_errors : mapping
+        Of those that were estimated, SI.
+    confidence : float
+        Calibrated probability that this effect is there.
+    """
+
+    name: str
+    parameters: Mapping[str, float]
+    standard_errors: Mapping[str, float]
+    confidence: float
+
+
+@dataclass(frozen=True)
+class Rival:
+    """One explanation among those that were compared.
+
+    Parameters
+    ----------
+    effects : tuple of str
+        Empty for "none".
+    loss : float
+        Score (-2 log likelihood, penalised) above that of the best explanation; 0 for the best.
+    probability : float
+        Calibrated.
+    """
+
+    effects: tuple[str, ...]
+    loss: float
+    probability: float
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a part of the misfit is.
+
+    Parameters
+    ----------
+    trial, signal : str
+        Trial's name; variable of the model (``motion.x``).
+    t_start_s, t_end_s : float
+        When, in the trial's own time, s.
+    share : float
+        Of the whole misfit (sum of squares of simulated less measured, in noise units, beyond the noise).
+    """
+
+    trial: str
+    signal: str
+    t_start_s: float
+    t_end_s: float
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class Passed:
+    """One trial as measured and as simulated, free running with the recorded inputs, before and after.
+
+    Parameters
+    ----------
+    name : str
+        Of the trial.
+    held_out : bool
+        It was not used for naming the effect.
+    time_s : array (n,)
+        In the trial's own time.
+    noise : mapping
+        Variable (``motion.u``, ``motion.psi``, ...) to the standard deviation of its measurement, SI.
+    measured, before, after : mapping
+        Variable to what was measured (nan where nothing was), to what the given card's model makes of the trial, and
+        the improved one's; (n,) each, SI, rad. `after` is `before` where nothing was added; a simulation that left all
+        bounds is nan from there. Sensor faults that were found are in `after` as the sensor would show them.
+    black_box : mapping
+        The same for a linear model with as many coefficients as the effect has parameters; may be empty.
+    """
+
+    name: str
+    held_out: bool
+    time_s: Array
+    noise: Mapping[str, float]
+    measured: Mapping[str, Array]
+    before: Mapping[str, Array]
+    after: Mapping[str, Array]
+    black_box: Mapping[str, Array] = field(default_factory=dict)
+
+    def misfit(self, which: str, variable: str | None = None) -> float:
+        """Root mean square of (simulated - measured)/noise of one variable, or of all: 1 is noise.
+
+        `which` is ``before``, ``after`` or ``black_box``; inf where the simulation left all bounds.
+        """
+        simulated: Mapping[str, Array] = getattr(self, which)
+        names = list(self.noise) if variable is None else [variable]
+        squares = [
+            ((simulated[name] - self.measured[name]) / self.noise[name])[np.isfinite(self.measured[name])] ** 2
+            for name in names
+        ]
+        mean = float(np.mean(np.concatenate(squares)))
+        return float(np.sqrt(mean)) if np.isfinite(mean) else np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class MissingForce:
+    """The force that the given card lacks, as the smoother needs it to follow the measurements.
+
+    Parameters
+    ----------
+    equation : str
+        ``X`` (N), ``Y`` (N) or ``N`` (N m): the equation that lacks most, in units of its standard error.
+    trials : tuple of str
+        Name of the trial of each row.
+    time_s, force : array (n,)
+        Rows of all trials together.
+    states : mapping
+        ``rudder``, ``drift``, ``yaw rate``, ``speed``, ``heading`` to values (n,), SI, rad.
+    explaining : str
+        The one of `states` that explains most of the force.
+    explained : mapping
+        Each of `states` to the share of the force's variance that its bins explain.
+    """
+
+    equation: str
+    trials: tuple[str, ...]
+    time_s: Array
+    force: Array
+    states: Mapping[str, Array]
+    explaining: str
+    explained: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class NextTest:
+    """The manoeuvre that would decide.
+
+    Parameters
+    ----------
+    manoeuvre : str
+        As `simulate --manoeuvre` takes it, or ``file:next_test.csv``.
+    orders : str
+        CSV text ``t_s,delta_order_deg,n_rpm`` that `simulate --manoeuvre file:` runs.
+    why : str
+        A sentence: what it would tell apart, and how clearly (expected gain of the score).
+    expected : mapping
+        Each manoeuvre that was considered to the score by which it would tell the explanations apart.
+    """
+
+    manoeuvre: str
+    orders: str
+    why: str
+    expected: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Gap:
+    """All that was found.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        As given.
+    improved : ManoeuvringCard
+        With the effect; the given card where no effect of the ship was named (nothing, or a sensor's fault).
+    verdict : str
+        One of :data:`VERDICTS`.
+    effects : tuple of Named
+    alternatives : tuple of tuples of str
+        Explanations that these data cannot tell from the named one.
+    rivals : tuple of Rival
+        Best first; "none" is among them.
+    where : tuple of Place
+        Largest first.
+    equation : str
+        In which equation the gap is: surge, sway, yaw, actuator, kinematics or sensor.
+    noise : mapping
+        Variable to (standard deviation, ``stated`` or ``estimated``), SI.
+    passed : tuple of Passed
+        Each trial.
+    figures_before, figures_after : tuple of Figure
+        Of turns and zigzags.
+    missing_force : MissingForce or None
+    could_hide : mapping
+        Effect to {parameter: size (SI)} below which these data could not show it.
+    agreement : mapping
+        Effect parameter's model name to {trial: (value, standard error)}: what each trial alone would have it.
+    next_test : NextTest or None
+    notices : tuple of str
+    """
+
+    card: ManoeuvringCard
+    improved: ManoeuvringCard
+    verdict: str
+    effects: tuple[Named, ...]
+    alternatives: tuple[tuple[str, ...], ...]
+    rivals: tuple[Rival, ...]
+    where: tuple[Place, ...]
+    equation: str
+    noise: Mapping[str, tuple[float, str]]
+    passed: tuple[Passed, ...]
+    figures_before: tuple[Figure, ...]
+    figures_after: tuple[Figure, ...]
+    missing_force: MissingForce | None
+    could_hide: Mapping[str, Mapping[str, float]]
+    agreement: Mapping[str, Mapping[str, tuple[float, float]]]
+    next_test: NextTest | None
+    notices: tuple[str, ...] = ()
+
+    def misfit(self, which: str, *, held_out: bool) -> float | None:
+        """Root mean square over all fitting (or held-out) trials of (simulated - measured)/noise; None without any."""
+        trials = [one for one in self.passed if one.held_out == held_out]
+        if not trials or (which == "black_box" and not all(one.black_box for one in trials)):
+            return None
+        return float(np.sqrt(np.mean([one.misfit(which) ** 2 for one in trials])))

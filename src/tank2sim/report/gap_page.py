@@ -1,0 +1,391 @@
+"""The page of a gap: what the model lacks, how sure that is, what it changes, and which test would tell more."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import altair as alt
+
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.gap.as_json import NEXT_TEST_FILE, estimate_in_file, in_file, measured_in, paired_figures, signal_name
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, Gap, Named
+from tank2sim.report.gap_cause_charts import agreement_chart, as_percent, expected_chart, force_chart, rival_chart
+from tank2sim.report.gap_charts import (
+    MOST_TRIALS,
+    SETS,
+    added,
+    gap_tracks,
+    misfit_chart,
+    place_chart,
+    shown_models,
+    signal_misfit,
+)
+from tank2sim.report.numbers import format_column, format_number
+from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
+from tank2sim.units import in_words
+
+GOOD = 1.5
+"""Misfit in noise units up to which a model is said to follow the measurements (ours): its own error is then about as
+large as the noise, sqrt(1.5^2 - 1) = 1.1."""
+
+SURE = 0.9
+"""Confidence from which a name is shown without caution (ours)."""
+
+
+def gap_charts(gap: Gap) -> dict[str, alt.TopLevelMixin]:
+    """File stem to chart; what a gap has nothing for is left out."""
+    force, test = gap.missing_force, gap.next_test
+    made: dict[str, alt.TopLevelMixin | None] = {
+        "rivals": rival_chart(gap, title="Explanations compared"),
+        "misfit": misfit_chart(gap, title="Misfit by signal and manoeuvre"),
+        "places": place_chart(gap, title="Where the misfit is worst"),
+        "force": force_chart(force, title="The missing force over what explains it") if force else None,
+        **{
+            f"tracks_{word.replace(' ', '_')}": gap_tracks(gap, held_out=held, title=f"Tracks, trials {_ON[word]}")
+            for word, held in SETS.items()
+        },
+        "agreement": agreement_chart(gap, title="What each trial alone would have"),
+        "expected": expected_chart(test, title="What other manoeuvres would tell") if test else None,
+    }
+    return {stem: chart for stem, chart in made.items() if chart is not None}
+
+
+def gap_page(gap: Gap, charts: Mapping[str, alt.TopLevelMixin]) -> Page:
+    """The page; `charts` as :func:`gap_charts` gives them."""
+
+    def drawn(*stems: str) -> list[Illustration]:
+        return [Illustration(chart=charts[stem], caption=_CAPTIONS[stem]) for stem in stems if stem in charts]
+
+    sections = [
+        Section(
+            heading="Verdict",
+            text="\n\n".join([verdict_in_words(gap), *_beside(gap)]),
+            tables=[*_parameters(gap), *_explanations(gap)],
+            charts=drawn("rivals"),
+        ),
+        Section(
+            heading="Before and after" if added(gap) else "How well the card follows",
+            text=_BEFORE_AND_AFTER + ("" if added(gap) else _UNCHANGED) + (_BLACK_BOX if _black_box(gap) else ""),
+            tables=[_signals(gap), _trials(gap)],
+            charts=drawn("misfit"),
+        ),
+        Section(
+            heading="Where the gap is", text=_place_text(gap), tables=_places(gap), charts=drawn("places", "force")
+        ),
+        Section(heading="Tracks", text=_track_text(gap), charts=drawn("tracks_held_out", "tracks_fitting")),
+    ]
+    if figures := _figures(gap):
+        sections.append(Section(heading="Figures of manoeuvres", text=_FIGURES, tables=figures))
+    if "agreement" in charts:
+        sections.append(Section(heading="Do the trials agree", text=_AGREEMENT, charts=drawn("agreement")))
+    if hidden := _could_hide(gap):
+        sections.append(Section(heading="What could hide", text=_COULD_HIDE, tables=[hidden]))
+    sections.append(Section(heading="Next test", text=_next_test(gap), charts=drawn("expected")))
+    # One section: a tenth would not find room for its number in the list of contents.
+    noise = [_noise(gap), *([_table("Notices", ("",), [[one] for one in gap.notices])] if gap.notices else [])]
+    sections.append(Section(heading="Noise and notices" if gap.notices else "Noise", text=_NOISE, tables=noise))
+    fitting = sum(not one.held_out for one in gap.passed)
+    subtitle = (
+        f"What the model lacks, from {_count(fitting, 'trial')} and {len(gap.passed) - fitting or 'none'} held out"
+    )
+    shown = [section for section in sections if section.text or section.tables or section.charts]
+    return Page(title=gap.card.ship.name, subtitle=subtitle, figures=_key_figures(gap), sections=shown)
+
+
+def effect_in_words(name: str) -> str:
+    """Name of an effect for a reader: ``rudder_bias`` is "rudder bias"."""
+    return name.replace("_", " ")
+
+
+def verdict_in_words(gap: Gap) -> str:
+    """What was found, in a sentence or two."""
+    after = gap.misfit("after", held_out=False)
+    follows = "" if after is None else f" follows the fitting trials to {_noises(after)}"
+    if gap.verdict == MISSING and gap.effects:
+        names = " and ".join(_with_values(one) for one in gap.effects)
+        told = " ".join(EFFECTS[one.name].description for one in gap.effects if one.name in EFFECTS)
+        if all(one.name in EFFECTS and EFFECTS[one.name].acts_on == "sensor" for one in gap.effects):
+            return f"A sensor is at fault, not the model: {names}. {told}".strip()
+        return f"The model lacks {'an effect' if len(gap.effects) == 1 else 'effects'}: {names}. {told}".strip()
+    if gap.verdict == AMBIGUOUS:
+        candidates = dict.fromkeys(
+            [*([tuple(one.name for one in gap.effects)] if gap.effects else []), *gap.alternatives]
+        )
+        names = ", or ".join(" with ".join(map(effect_in_words, one)) for one in candidates)
+        return f"Something is missing, but these data cannot tell which of several effects it is: {names}."
+    if gap.verdict == NOTHING:
+        good = after is None or after <= GOOD
+        rest = "" if good else ", which is more than noise, but no effect explains the rest better than none"
+        return f"No missing effect shows in these data{': the card as given' + follows + rest if follows else ''}."
+    return (
+        "Something is missing that no effect of the library explains: what is left has a pattern of its own, "
+        "and no name is given although some effect always fits a little."
+    )
+
+
+def _with_values(one: Named) -> str:
+    values = []
+    for name in one.parameters:
+        words, value, unit, _ = _parameter(one, name)
+        values.append(f"{words} {value}{'' if unit == '-' else f' {unit}'}")
+    return f"{effect_in_words(one.name)} ({', '.join(values)})" if values else effect_in_words(one.name)
+
+
+def _beside(gap: Gap) -> list[str]:
+    """Confidence, rivals and place, a paragraph each."""
+    told = []
+    if gap.effects:
+        sure = "; ".join(f"{effect_in_words(one.name)} {as_percent(one.confidence)}" for one in gap.effects)
+        told.append(f"Probability that the effect is there: {sure}.")
+    if gap.alternatives and gap.verdict != AMBIGUOUS:
+        names = "; ".join(" with ".join(map(effect_in_words, one)) for one in gap.alternatives)
+        told.append(f"What else it could be: {names}. These data cannot tell them apart.")
+    elif gap.effects and gap.verdict == MISSING:
+        told.append("What else it could be: none of the other explanations that were tried comes near.")
+    if gap.verdict != NOTHING and gap.equation:
+        told.append(f"The gap is in {_EQUATIONS.get(gap.equation, gap.equation)}.")
+    return told
+
+
+_ON = {"held out": "held out", "fitting": "used for fitting"}
+_EQUATIONS = {
+    "surge": "surge: the force ahead",
+    "sway": "sway: the force to the side",
+    "yaw": "yaw: the turning moment",
+    "actuator": "the steering gear or the propeller: what the orders become",
+    "kinematics": "the motion over the ground",
+    "sensor": "the measurements",
+}
+_BEFORE_AND_AFTER = (
+    "Each trial is simulated freely from its beginning to its end with the recorded inputs alone. Misfit is the root "
+    "mean square of simulated less measured, in standard deviations of the measurement noise: 1 is the noise floor, "
+    "which no model gets below but by chance. Trials held out took no part in naming the effect."
+)
+_UNCHANGED = " Nothing was added to the card: there is no after."
+_BLACK_BOX = (
+    " Beside it stands a linear black box: the card with as many of its linear coefficients refitted as the effect has "
+    "parameters, whatever the cause."
+)
+_FIGURES = (
+    "Advance, transfer, diameters and overshoots are of turns and zigzags simulated in closed loop, the others of the "
+    "trials replayed. Before is the card as given, after the one with the effect."
+)
+_AGREEMENT = (
+    "A true effect has the same size in every trial. Where trials want different sizes, the name is wrong or not all."
+)
+_COULD_HIDE = (
+    "Effects smaller than this could be there without showing in these data; a larger one would have been seen."
+)
+_NOISE = (
+    "By these standard deviations misfits are counted. Stated: by the files; estimated: from the records themselves."
+)
+_TRACKS = (
+    "Points: measured. Lines: before, by the card as given, and with what was found; one upon the other where nothing "
+    "was added."
+)
+_CAPTIONS = {
+    "rivals": "",
+    "misfit": "The colour scale ends at 100.",
+    "places": "Points: measured. Shaded red: the time of the misfit.",
+    "force": "The force that the given card needs in addition to follow the measurements. Points: instants of all "
+    "trials; squares: means of bins, with 95 % bars by the spread between trials.",
+    "tracks_held_out": _TRACKS,
+    "tracks_fitting": _TRACKS,
+    "agreement": "Bars: 95 % intervals. Grey: all fitting trials together. Trials that tell little may leave the "
+    "picture.",
+    "expected": "The larger, the clearer the manoeuvre would decide.",
+}
+
+
+def _key_figures(gap: Gap) -> list[Figure]:
+    named = ", ".join(effect_in_words(one.name) for one in gap.effects)
+    caution = Verdict.NONE if gap.verdict in (MISSING, NOTHING) else Verdict.CAUTION
+    figures = [Figure(label="Verdict", value=gap.verdict, verdict=caution, note=named)]
+    if gap.effects:
+        least = min(one.confidence for one in gap.effects)
+        unsure = Verdict.CAUTION if not least >= SURE else Verdict.NONE
+        figures.append(Figure(label="Probability of the name", value=as_percent(least), verdict=unsure))
+    for word, held in SETS.items():
+        before, after = (gap.misfit(which, held_out=held) for which in ("before", "after"))
+        if before is not None and after is not None:
+            worse = Verdict.CAUTION if after > max(before, GOOD) else Verdict.NONE
+            note = f"noise units; before {format_number(before, 3)}" if added(gap) else "noise units"
+            figures.append(Figure(label=f"Misfit, trials {_ON[word]}", value=_rounded(after), verdict=worse, note=note))
+    if gap.next_test:
+        figures.append(Figure(label="Next test", value=gap.next_test.manoeuvre))
+    return figures
+
+
+def _parameters(gap: Gap) -> list[Table]:
+    rows: list[list[Cell]] = [
+        [effect_in_words(one.name), *_parameter(one, name)] for one in gap.effects for name in one.parameters
+    ]
+    heads = ("effect", "parameter", "value", "unit", "meaning")
+    return [_table("What was found, ± one standard error", heads, rows)] if rows else []
+
+
+def _explanations(gap: Gap) -> list[Table]:
+    """What each effect does that is no more than possible."""
+    named = [one.name for one in gap.effects] if gap.verdict == AMBIGUOUS else []
+    possible = dict.fromkeys([*named, *(name for one in gap.alternatives for name in one)])
+    rows: list[list[Cell]] = [
+        [effect_in_words(name), EFFECTS[name].description] for name in possible if name in EFFECTS
+    ]
+    return [_table("Effects that these data cannot tell apart", ("effect", "in words"), rows)] if rows else []
+
+
+def _parameter(one: Named, name: str) -> list[Cell]:
+    own, value = estimate_in_file(name, one.parameters[name])
+    words, unit = in_words(own)
+    error = in_file(name, one.standard_errors[name])[1] if name in one.standard_errors else math.nan
+    meaning = f"{_meaning(one.name, name)}{'' if name in one.standard_errors else ' (held)'}"
+    return [words, with_error(value, error), unit or "-", meaning]
+
+
+def with_error(value: float, error: float) -> str:
+    """A value and its standard error with two figures of the error: ``121.3 ± 2.1``; the value alone without one."""
+    if not (math.isfinite(error) and error > 0):
+        return format_number(value, 4)
+    digits = 2
+    if value and abs(value) > error:
+        digits += math.floor(math.log10(abs(value))) - math.floor(math.log10(error))
+    return " ± ".join(format_column([float(value), float(error)], digits))
+
+
+def _meaning(effect: str, parameter: str) -> str:
+    known = EFFECTS[effect].parameters if effect in EFFECTS else ()
+    return next((one.description for one in known if one.name == parameter), "")
+
+
+def _black_box(gap: Gap) -> bool:
+    return any(one.black_box for one in gap.passed)
+
+
+def _trials(gap: Gap) -> Table:
+    rows: list[list[Cell]] = [
+        [one.name, word]
+        + [_cell(None if which == "black_box" and not one.black_box else one.misfit(which)) for which in _compared(gap)]
+        for word, held in SETS.items()
+        for one in gap.passed
+        if one.held_out == held and measured_in(one)
+    ]
+    heads = ("trial", "", *(which.replace("_", " ") for which in _compared(gap)))
+    return _table("Misfit of each trial, noise units", heads, rows, digits=_ALL)
+
+
+def _signals(gap: Gap) -> Table:
+    there = {name for one in gap.passed for name in measured_in(one)}
+    words = [word for word, held in SETS.items() if any(one.held_out == held for one in gap.passed)]
+    columns = [(word, which) for word in words for which in _compared(gap)]
+    rows: list[list[Cell]] = [
+        [signal_name(name).words]
+        + [_cell(signal_misfit(gap, which, name, held_out=SETS[word])) for word, which in columns]
+        for name in gap.noise
+        if name in there
+    ]
+    rows.append(["all", *(_cell(gap.misfit(which, held_out=SETS[word])) for word, which in columns)])
+    heads = ("signal", *(f"{word}, {which.replace('_', ' ')}" for word, which in columns))
+    return _table("Misfit of each signal, noise units", heads, rows, digits=_ALL)
+
+
+def _compared(gap: Gap) -> tuple[str, ...]:
+    return (*shown_models(gap), *(("black_box",) if _black_box(gap) else ()))
+
+
+_ALL = 7
+"""Significant digits that cut nothing off: misfits are rounded to hundredths of the noise before, in every column."""
+
+
+def _cell(misfit: float | None) -> float | None:
+    return misfit if misfit is None or not math.isfinite(misfit) else round(misfit, 2)
+
+
+def _place_text(gap: Gap) -> str:
+    if not gap.where:
+        return "No part of any trial stands out of the noise. The largest misfits are shown all the same."
+    first, name = gap.where[0], signal_name(gap.where[0].signal)
+    return (
+        f"The largest part of the misfit beyond the noise, {100 * first.share:.0f} %, is in {name.words} "
+        f"({name.file}) of {first.trial}, from {first.t_start_s:.0f} s to {first.t_end_s:.0f} s."
+    )
+
+
+def _places(gap: Gap) -> list[Table]:
+    rows: list[list[Cell]] = [
+        [one.trial, signal_name(one.signal).words, one.t_start_s, one.t_end_s, 100 * one.share] for one in gap.where
+    ]
+    columns = [
+        *(Column(title=head) for head in ("trial", "signal")),
+        *(Column(title=head, unit="s", digits=3) for head in ("from", "to")),
+        Column(title="share of the misfit", unit="%", digits=2),
+    ]
+    return [Table(caption="Where the misfit is, beyond the noise", columns=columns, rows=rows)] if rows else []
+
+
+def _track_text(gap: Gap) -> str:
+    counts = {word: sum(one.held_out == held for one in gap.passed) for word, held in SETS.items()}
+    many = [
+        f"{word}: the {MOST_TRIALS} of {count} with the largest misfit before"
+        for word, count in counts.items()
+        if count > MOST_TRIALS
+    ]
+    return f"Trials {'; '.join(many)}." if many else ""
+
+
+def _figures(gap: Gap) -> list[Table]:
+    held = {one.name: one.held_out for one in gap.passed}
+    groups: dict[str, list[list[Cell]]] = {}
+    for before, now in sorted(paired_figures(gap), key=lambda pair: not held.get(pair[1].trial)):
+        words, unit = in_words(now.name)
+        word = "held out" if held.get(now.trial) else "fitting"
+        simulated = [before.predicted if before else None, *([now.predicted] if added(gap) else [])]
+        groups.setdefault(unit, []).append([now.trial, word, words, now.measured, *simulated])
+    heads = ("trial", "", "figure", "measured", *shown_models(gap))
+    return [_table(f"Figures in {unit}", heads, rows, digits=4) for unit, rows in groups.items()]
+
+
+def _could_hide(gap: Gap) -> Table | None:
+    rows: list[list[Cell]] = []
+    for effect, sizes in gap.could_hide.items():
+        for name, size in sizes.items():
+            own, value = in_file(name, size)
+            words, unit = in_words(own)
+            shown = format_number(value, 2)
+            rows.append([effect_in_words(effect), words, shown, unit or "-", _meaning(effect, name)])
+    heads = ("effect", "parameter", "smaller than", "unit", "meaning")
+    return _table("Sizes that these data cannot show", heads, rows) if rows else None
+
+
+def _next_test(gap: Gap) -> str:
+    test = gap.next_test
+    if test is None:
+        return "" if gap.verdict in (MISSING, NOTHING) else "No manoeuvre was found that would tell more."
+    # The command stands alone: in a line with others it is broken at its hyphens.
+    command = f"tank2sim simulate improved.toml --manoeuvre {test.manoeuvre}"
+    return f"{test.why}\n\nIts orders stand in {NEXT_TEST_FILE}. To see it beforehand:\n\n{command}"
+
+
+def _noise(gap: Gap) -> Table:
+    rows: list[list[Cell]] = []
+    for variable, (sigma, origin) in gap.noise.items():
+        name = signal_name(variable)
+        rows.append([name.words, name.file, format_number(name.factor * sigma, 3), name.unit, origin])
+    heads = ("signal", "column", "standard deviation", "unit", "from")
+    return _table("Measurement noise", heads, rows)
+
+
+def _table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[Cell]], *, digits: int = 4) -> Table:
+    return Table(caption=caption, columns=[Column(title=head, digits=digits) for head in heads], rows=rows)
+
+
+def _noises(misfit: float) -> str:
+    return f"{format_number(misfit, 3)} times the noise" if math.isfinite(misfit) else "no end: the simulation ran away"
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.3g}")
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"

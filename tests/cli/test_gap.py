@@ -1,0 +1,261 @@
+"""``tank2sim gap`` as a user calls it: files whole or not at all, and what they hold."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.dynamics import build
+from tank2sim.gap.add import added, improved_text
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, Gap, Named
+from tank2sim.simulation.manoeuvres import parse_manoeuvre
+from tank2sim.simulation.run import simulate
+from tank2sim.simulation.trial_file import trial_csv
+from tank2sim.units import to_si
+from tests.dynamics.effects.ships import TYPICAL
+from tests.gap import made_up
+
+from .command_line import refused, tank2sim
+
+CURRENT = Named(
+    "current",
+    {"speed_mps": 0.45, "direction_rad": math.radians(-110.0)},
+    {"speed_mps": 0.02, "direction_rad": math.radians(2.0)},
+    0.97,
+)
+BIAS = Named("gyro_bias", {"rate_radps": math.radians(0.05)}, {"rate_radps": math.radians(0.001)}, 0.95)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three simulated trials of the Mariner."""
+    folder = tmp_path_factory.mktemp("gap")
+    model = build(read_card("mariner"))
+    for name, manoeuvre in (("turn20", "turn:20"), ("zigzag", "zigzag:20/20"), ("turn-35", "turn:-35")):
+        run = simulate(model, parse_manoeuvre(manoeuvre), duration_s=150.0)
+        (folder / f"{name}.csv").write_text(trial_csv(run.trajectory, name), encoding="utf-8")
+    return folder
+
+
+Find = Callable[..., Gap]
+
+
+@pytest.fixture
+def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[tuple[object, ...]]]:
+    """Lets the workflow find this, for what the command makes of it; gives the calls."""
+
+    def found(effects: tuple[Named, ...], verdict: str = MISSING, *, fails: BaseException | None = None):
+        calls: list[tuple[object, ...]] = []
+
+        def find_gap(card, fitted, held, options, progress) -> Gap:
+            calls.append((card, fitted, held, options))
+            progress("looking")
+            if fails is not None:
+                raise fails
+            passed = tuple(
+                made_up.passed(trial.name, 8.0, 1.0, held_out=trial in held.trials)
+                for trial in (*fitted.trials, *held.trials)
+            )
+            improved = added(card, [(one.name, one.parameters, one.standard_errors) for one in effects])
+            gap = replace(made_up.missing(), card=card, improved=improved, verdict=verdict, effects=effects)
+            where = tuple(replace(one, trial=passed[0].name) for one in gap.where)
+            return replace(gap, passed=passed, where=where, missing_force=None, agreement={}, figures_before=())
+
+        monkeypatch.setattr("tank2sim.cli.gap.find_gap", find_gap)
+        return calls
+
+    return found
+
+
+def written(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_current_is_written_into_a_card_a_page_and_json(folder: Path, tmp_path: Path, finding) -> None:
+    (call,) = [finding((CURRENT,))]
+    result = tank2sim(
+        *("gap", "mariner", "turn20.csv", "zigzag.csv", "--holdout", "turn-35.csv", "-o", str(tmp_path / "new/out")),
+        *("--json", str(tmp_path / "g.json"), "--without", "wind", "trim", "--max-effects", "1", "--workers", "1"),
+        cwd=folder,
+    )
+    assert result.returncode == 0, result.stderr
+    out = tmp_path / "new/out"
+    assert written(out) == {"gap.json", "improved.toml", "report.html", "next_test.csv"}
+    ((card, fitted, held, options),) = call
+    assert isinstance(card, ManoeuvringCard) and fitted.driven_by == "angle"
+    assert [one.name for one in fitted.trials] == ["turn20", "zigzag"] and [one.name for one in held.trials] == [
+        "turn-35"
+    ]
+    assert options.without == ("wind", "trim") and options.max_effects == 1 and options.workers == 1
+
+    told = json.loads((out / "gap.json").read_text())
+    assert (tmp_path / "g.json").read_text() == (out / "gap.json").read_text()
+    (effect,) = told["effects"]
+    assert effect["name"] == "current" and effect["parameters"]["direction_deg"] == pytest.approx(250.0)
+    assert {one["trial"] for one in told["trials"]} == {"turn20.csv", "zigzag.csv", "turn-35.csv"}
+    assert told["where"][0]["trial"] == "turn20.csv"
+    improved = read_card(out / "improved.toml")
+    assert isinstance(improved, ManoeuvringCard)
+    assert [one.name for one in improved.effects] == ["current"]
+    assert improved.text.startswith("# current added by tank2sim gap from turn20, zigzag\n")
+    assert (out / "next_test.csv").read_text().startswith("t_s,delta_order_deg")
+    assert "</html>" in (out / "report.html").read_text(encoding="utf-8")
+
+    words = " ".join(result.stdout.split())
+    for told in ("The model lacks an effect: current", "0.45", "250", "m/s", "turn-35", "held out", "8.00", "1.00"):
+        assert told in words, told
+    assert "next test: turn:35. A turn tells most." in words
+    again = tank2sim("stability", str(out / "improved.toml"), cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+
+
+def test_a_faulty_sensor_leaves_the_card_and_corrects_the_trials(folder: Path, tmp_path: Path, finding) -> None:
+    finding((BIAS,))
+    before = {name: (folder / name).read_bytes() for name in ("turn20.csv", "turn-35.csv")}
+    result = tank2sim("gap", "mariner", "turn20.csv", "--holdout", "turn-35.csv", "-o", str(tmp_path), cwd=folder)
+    assert result.returncode == 0, result.stderr
+    corrected = {"corrected/turn20.csv", "corrected/turn-35.csv"}
+    assert written(tmp_path) == {"gap.json", "improved.toml", "report.html", "next_test.csv", *corrected}
+    assert (tmp_path / "improved.toml").read_text() == Path(read_card("mariner").source).read_text()
+    old, new = (np.genfromtxt(there / "turn20.csv", delimiter=",", names=True, skip_header=skip)
+                for there, skip in ((folder, 1), (tmp_path / "corrected", 2)))  # fmt: skip
+    np.testing.assert_allclose(new["r_degps"], old["r_degps"] - 0.05, atol=1e-9)
+    np.testing.assert_array_equal(new["psi_deg"], old["psi_deg"])
+    assert {name: (folder / name).read_bytes() for name in before} == before
+
+    finding((), NOTHING)  # what is left of the last run is told
+    result = tank2sim("gap", "mariner", "turn20.csv", "-o", str(tmp_path), cwd=folder)
+    assert result.returncode == 0 and "corrected/turn20.csv is of an earlier run" in " ".join(result.stdout.split())
+
+
+def test_trials_are_not_corrected_for_what_is_only_possible(folder: Path, tmp_path: Path, finding) -> None:
+    finding((BIAS,), AMBIGUOUS)
+    result = tank2sim("gap", "mariner", "turn20.csv", "-o", str(tmp_path), cwd=folder)
+    assert result.returncode == 0 and not (tmp_path / "corrected").exists()
+
+
+def test_a_run_that_is_stopped_leaves_nothing(folder: Path, tmp_path: Path, finding) -> None:
+    finding((CURRENT,), fails=KeyboardInterrupt())
+    result = tank2sim(
+        "gap", "mariner", "turn20.csv", "-o", "out", "--json", "g.json", cwd=_with_trials(folder, tmp_path)
+    )
+    assert result.returncode == 130 and "nothing is left half-written" in result.stderr
+    assert not (tmp_path / "out").exists() and not (tmp_path / "g.json").exists()
+
+
+def _with_trials(folder: Path, new: Path) -> Path:
+    for path in folder.glob("*.csv"):
+        (new / path.name).write_bytes(path.read_bytes())
+    return new
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["mariner", "turn20.csv", "turn20.csv"], ["turn20.csv", "has the name of another trial"]),
+        (["mariner", "turn20.csv", "--holdout", "turn20.csv"], ["turn20.csv", "both fitted and held out"]),
+        (["mariner", "turn20.csv", "--holdout", "sub/turn20.csv"], ["turn20.csv", "both fitted and held out"]),
+        (["mariner", "no.csv"], ["no.csv", "no such file"]),
+        (["mariner", "turn20.csv", "--holdout", "no.csv"], ["no.csv"]),
+        (["titanic", "turn20.csv"], ["titanic"]),
+        (["linear.toml", "turn20.csv"], ["linear.toml", "model.kind", "linear"]),
+        (["wilinski-zellman", "turn20.csv"], ["model.kind", "manoeuvres"]),
+        (["mariner"], ["TRIALS"]),
+        (["mariner", "turn20.csv", "--effects", "curent"], ["--effects", "curent", "did you mean current"]),
+        (["mariner", "turn20.csv", "--without", "kraken"], ["--without", "kraken"]),
+        (["mariner", "turn20.csv", "--without", "--workers", "2"], ["--without names no effect"]),
+        (["mariner", "turn20.csv", "--max-effects", "3"], ["--max-effects"]),
+        (["mariner", "empty"], ["empty", "holds no trial"]),
+    ],
+)
+def test_bad_input_is_one_line_and_no_folder_is_made(
+    folder: Path, tmp_path: Path, arguments: list[str], words: list[str]
+) -> None:
+    _with_trials(folder, tmp_path)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub/turn20.csv").write_bytes((folder / "turn20.csv").read_bytes())
+    text = Path(read_card("mariner").source).read_text().replace('kind = "abkowitz"', 'kind = "linear"')
+    (tmp_path / "linear.toml").write_text(text)
+    refused(tank2sim("gap", *arguments, "-o", "out", cwd=tmp_path), *words)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_the_work(folder: Path, tmp_path: Path, finding) -> None:
+    calls = finding((CURRENT,))
+    (tmp_path / "file").write_text("no folder")
+    refused(tank2sim("gap", "mariner", "turn20.csv", "-o", str(tmp_path / "file"), cwd=folder), "file", "no folder")
+    if os.geteuid() != 0:
+        (tmp_path / "locked").mkdir(mode=0o555)
+        refused(tank2sim("gap", "mariner", "turn20.csv", "-o", str(tmp_path / "locked"), cwd=folder), "locked")
+    assert not calls
+    refused(tank2sim("gap", "mariner", "turn20.csv", cwd=folder), "-o")
+
+
+def test_no_input_is_overwritten(folder: Path, tmp_path: Path, finding) -> None:
+    """A card that was improved before stands where the new one is to be written; so may a trial."""
+    calls = finding((CURRENT,))
+    card = Path(read_card("mariner").source).read_text()
+    (tmp_path / "improved.toml").write_text(card)
+    result = tank2sim("gap", "improved.toml", "turn20.csv", "-o", ".", cwd=_with_trials(folder, tmp_path))
+    refused(result, "improved.toml", "would be overwritten")
+    assert (tmp_path / "improved.toml").read_text() == card and not (tmp_path / "gap.json").exists()
+    result = tank2sim("gap", "mariner", "turn20.csv", "-o", "out", "--json", "no/g.json", cwd=tmp_path)
+    refused(result, "no/g.json", "no such folder")
+    assert not calls and not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_a_slow_rudder_is_found_and_enters_the_card(data: Path, tmp_path: Path) -> None:
+    """Synthetic trials of a ship whose gear is slower than the card says, made by equations that share no code."""
+    case = data / "data" / "gap_cases" / "case_2"
+    truth = json.loads((case.parent / "case_2-truth.json").read_text())
+    trials = [str(case / f"{name}.csv") for name in ("zigzag20_20", "zigzag10_10", "turn35_stbd")]
+    result = tank2sim(
+        *("gap", str(case / "ship.toml"), *trials, "--holdout", str(case / "turn35_port.csv"), "-o", "out"),
+        *("--max-effects", "1"),
+        cwd=tmp_path,
+    )
+    assert result.returncode == 0, result.stderr
+    found = json.loads((tmp_path / "out/gap.json").read_text())
+    assert found["verdict"] == truth["verdict"]
+    assert [one["name"] for one in found["effects"]] == truth["effects"]
+    (rate,) = truth["parameters"]["rudder_rate_limit"].values()
+    improved = read_card(tmp_path / "out/improved.toml")
+    assert isinstance(improved, ManoeuvringCard) and improved.steering_gear is not None
+    assert improved.steering_gear.max_rate_radps == pytest.approx(math.radians(rate), rel=0.05)
+    assert "was 5.0 before rudder_rate_limit" in improved.text
+    misfit = found["misfit"]
+    assert misfit["after"]["holdout"] < 1.2 < misfit["before"]["holdout"]
+    assert {"gap.json", "improved.toml", "report.html"} <= written(tmp_path / "out")
+
+
+LONG = ("current", "rudder_rate_limit", "flow_memory", "trim")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [*(pytest.param(one, marks=pytest.mark.slow) for one in ("wind", "roll_coupling"))]
+    + [*(pytest.param(one, marks=pytest.mark.long) for one in LONG)],
+)
+def test_an_improved_card_goes_all_the_way_to_a_checked_fmu(name: str, tmp_path: Path) -> None:
+    found = [(name, dict(to_si(key, value) for key, value in TYPICAL[name].items()), {})]
+    card = read_card("mariner")
+    assert isinstance(card, ManoeuvringCard)
+    (tmp_path / "improved.toml").write_text(improved_text(added(card, found), found, ["turn20"]), encoding="utf-8")
+    for arguments in (
+        ["simulate", "improved.toml", "--manoeuvre", "turn:20"],
+        ["stability", "improved.toml"],
+        ["export", "improved.toml", "-o", "ship.fmu", "--platforms", "host"],
+        ["check", "ship.fmu", "--card", "improved.toml"],
+    ):
+        result = tank2sim(*arguments, cwd=tmp_path)
+        assert result.returncode == 0, (arguments, result.stdout, result.stderr)

@@ -1,0 +1,225 @@
+"""What a fitted explanation leaves and tells: against least squares trial by trial, and forces known in newtons."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gap_truth import SHIP_TOML, Made, Setting, write
+from gap_truth.integrate import integrate
+from gap_truth.lane import lanes_of
+from gap_truth.record import recorded
+
+from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.gap.explained import Explained
+from tank2sim.gap.fit import Fit
+from tank2sim.gap.likelihood import COUNTED, Likelihood
+from tank2sim.gap.posing import pose
+from tank2sim.gap.residuals import SIZES, could_hide, each_trial, estimates, force_lacking
+from tank2sim.gap.screen import variants
+from tank2sim.gap.search import Search
+from tank2sim.identification.trials.measured import Measured, measured
+from tests.gap.dense import Dense
+from tests.gap.test_likelihood import LOGS, NOISE, WIDTH, judge
+from tests.gap.toy import Toy, toy_motion
+from tests.identification.trials import made_up_ship
+
+# -- what each trial says ------------------------------------------------------------------------------------------
+
+
+def by_hand(of: Likelihood, fit: Fit, run: int, place: int) -> tuple[float, float]:
+    """A parameter and its standard error by generalised least squares of one run as one Gaussian vector."""
+    toy, part = fit.explained, Dense(of.linear(fit.explained, fit.theta), NOISE, run)
+
+    def error(theta):
+        driving, shown = of.residual(toy, theta)
+        return part.error(driving[run], shown[run])
+
+    e = error(fit.theta)
+    slopes = np.stack([(error(fit.theta + 0.01 * one) - e) / 0.01 for one in np.eye(len(fit.theta))], axis=-1)
+    vary = [WIDTH * of.of_coefficients(toy, fit.theta)]
+    vary.append(of.of_form(of.residual(toy, fit.theta)[0], directed=False))
+    covariance = part.covariance.copy()
+    for one in np.moveaxis(np.concatenate(vary, axis=-1)[run], -1, 0):
+        column = part.of_driving @ one.ravel()
+        covariance += np.outer(column, column)
+    others = [other for other in range(len(fit.theta)) if other != place]
+    covariance += slopes[:, others] @ fit.covariance[np.ix_(others, others)] @ slopes[:, others].T
+    weighed = np.linalg.solve(covariance, slopes[:, place])
+    information = weighed @ slopes[:, place]
+    return float(fit.theta[place] - weighed @ e / information), float(1 / np.sqrt(information))
+
+
+@pytest.mark.parametrize("theta", [(0.8,), (0.8, -0.6), (0.8, -0.6, 0.5)])
+def test_each_trial_says_what_its_own_least_squares_say(theta) -> None:
+    of = judge(toy_motion(theta, (0.3, -0.2)))
+    toy = Toy((None,) * len(theta))
+    fit = of.at_best(toy, np.array(theta), [LOGS], [0])
+    told = each_trial(of, fit)
+    assert list(told) == [one.variable for one in toy.asked]
+    for place, values in enumerate(told.values()):
+        assert list(values) == ["a", "b"]
+        for run, found in enumerate(values.values()):
+            assert found == pytest.approx(by_hand(of, fit, run, place), rel=1e-6)
+            value, error = found
+            assert abs(value - theta[place]) < 4 * error < 4.0
+
+
+def test_a_trial_that_tells_nothing_is_left_out() -> None:
+    motion = toy_motion((0.8,))
+    silent = motion.measured.copy()
+    silent[1] = np.nan
+    of = judge(replace(motion, measured=silent))
+    (values,) = each_trial(of, of.at_best(Toy((None,)), np.array([0.8]), [LOGS], [0])).values()
+    assert list(values) == ["a"]
+
+
+# -- what could hide -----------------------------------------------------------------------------------------------
+
+HIDDEN = ("gyro_bias", "current", "linear_yaw_damping")
+
+
+@pytest.fixture(scope="module")
+def card() -> ManoeuvringCard:
+    read = parse_card(made_up_ship.CARD, "made_up.toml")
+    assert isinstance(read, ManoeuvringCard)
+    return read
+
+
+def judged(card: ManoeuvringCard, *, bias: float = 0.0, noise: float = 1.0, duration: float = 120.0) -> Likelihood:
+    trials = [
+        made_up_ship.trial(made_up_ship.zigzag(20), name="zigzag", duration=duration, step=0.5, noise=noise),
+        made_up_ship.trial(made_up_ship.turn(30), name="turn", duration=duration, step=0.5, noise=noise, seed=2),
+    ]
+    for one in trials:
+        one.signals["r_radps"][:] += bias
+    return pose(card, Measured(tuple(trials), "angle", ()))
+
+
+def none_of(likelihood: Likelihood) -> Fit:
+    return likelihood.at_best(likelihood.none, np.zeros(0), [likelihood.belief.logs], [15])
+
+
+def sizes(likelihood: Likelihood, enough: float = 10.0, names=HIDDEN) -> dict[str, dict[str, float]]:
+    none = likelihood.none
+    explained = [Explained(none.card, none.driven_by, [name]) for name in names]
+    every = tuple(one for each in explained for one in variants(likelihood, each))
+    best = none_of(likelihood)
+    return could_hide(Search(likelihood, (best,), every), best, enough)
+
+
+def test_what_could_hide_goes_with_the_root_of_what_is_enough(card) -> None:
+    likelihood = judged(card)
+    price = np.log(likelihood.count / COUNTED)
+    some, more = sizes(likelihood, 10.0), sizes(likelihood, 50.0)
+    for name, asked in (("gyro_bias", 1), ("linear_yaw_damping", 1), ("current", 2)):
+        for parameter, size in some[name].items():
+            root = np.sqrt((50.0 + asked * price) / (10.0 + asked * price))
+            assert more[name][parameter] == pytest.approx(root * size), name
+    assert set(some["current"]) == {"speed_mps"} and set(some) == set(HIDDEN)
+
+
+def test_what_could_hide_grows_with_the_noise_and_falls_with_the_length(card) -> None:
+    one, loud, long = (sizes(judged(card, **how)) for how in ({}, {"noise": 4.0}, {"duration": 480.0}))
+    # a rate is a mean over the time, half as uncertain over four times as long; a current is a way over the time
+    for name, parameter, least, most in (("gyro_bias", "rate_radps", 0.3, 0.8), ("current", "speed_mps", 0.1, 0.35)):
+        assert 2.5 < loud[name][parameter] / one[name][parameter] < 4.5, name
+        assert least < long[name][parameter] / one[name][parameter] < most, name
+
+
+def test_what_could_hide_is_where_the_score_begins_to_tell(card) -> None:
+    """Four times as much is told by more than is enough, a third is not: by fits of trials that have it.
+
+    In between the noise, that is sought anew without the effect, takes part of it for the sensor's slow error.
+    """
+    size = sizes(judged(card))["gyro_bias"]["rate_radps"]
+    gains = []
+    for share in (1 / 3, 4.0):
+        likelihood = judged(card, bias=share * size)
+        explained = Explained(card, "angle", ["gyro_bias"])
+        none = none_of(likelihood)
+        one = likelihood.at_best(explained, np.array([share * size]), [none.logs, likelihood.belief.logs], [0, 6])
+        gains.append(none.score - one.score)
+    assert gains[0] < 10.0 < gains[1]
+
+
+def test_beside_what_is_named_it_is_not_told_again(card) -> None:
+    likelihood = judged(card, bias=0.002)
+    explained = Explained(card, "angle", ["gyro_bias"])
+    best = likelihood.at_best(explained, np.array([0.002]), [likelihood.belief.logs], [0, 6])
+    every = [one for name in HIDDEN for one in variants(likelihood, Explained(card, "angle", [name]))]
+    assert set(could_hide(Search(likelihood, (best,), tuple(every)), best, 10.0)) == set(HIDDEN) - {"gyro_bias"}
+
+
+def test_of_an_effect_without_amplitude_a_value_is_told_that_does_not_show(card) -> None:
+    """A lag of the gear: the longest that was tried and does not show, and the next longer one would."""
+    trial = made_up_ship.trial(made_up_ship.zigzag(20, rate_degps=1000.0), duration=150, step=0.5)
+    trial.signals["delta_order_rad"] = trial.signals.pop("delta_rad")
+    likelihood = pose(card, Measured((trial,), "order", ()))
+    found = sizes(likelihood, names=("rudder_lag",))["rudder_lag"]
+    explained = Explained(card, "order", ["rudder_lag"])
+    typical = explained.asked[0].parameter.typical_values(card)[0]
+    tried = sorted(share * typical for share in SIZES if share * typical >= explained.bounds[0][0])
+    (value,) = found.values()
+    assert value == pytest.approx(min(tried, key=lambda one: abs(one - value)))
+    best = none_of(likelihood)
+
+    def cost(lag: float) -> float:
+        """What the lag makes worse at the noise of none, nothing but the coefficients given way."""
+        held = replace(best, explained=explained, theta=np.array([lag]))
+        return likelihood._parameters(held, likelihood.base, likelihood.coefficient_columns, 1).score - best.score
+
+    longer = [one for one in tried if one > value]
+    assert not longer or cost(longer[0]) > cost(value)
+
+
+def test_estimates_are_told_by_effect_and_parameter() -> None:
+    toy = Toy((None, None))
+    fit = Fit(toy, np.array([0.5, -0.3]), np.diag([0.04, 0.09]), LOGS, 0.0, np.zeros(0))
+    first, second = estimates(fit)
+    assert first == ("toy yaw", {"size": 0.5}, {"size": pytest.approx(0.2)})
+    assert second == ("toy surge", {"size": -0.3}, {"size": pytest.approx(0.3)})
+
+
+# -- the force that is lacking -------------------------------------------------------------------------------------
+
+LENGTH_M, WATER_KGPM3, SPEED_MPS = 160.93, 1025.0, 7.7175
+NEWTONS = 0.5 * WATER_KGPM3 * LENGTH_M**2 * SPEED_MPS**2
+"""Of a prime force at the design speed; a moment has the length more."""
+
+PUSHES = {
+    "X": ("out_drag_step", {"X": -3e-4, "t0": 80.0}, -3e-4 * NEWTONS),
+    "Y": ("out_tug", {"F": 3e-4, "lever": 0.0, "t0": 80.0, "dur": 300.0}, 3e-4 * NEWTONS),
+    "N": ("out_tug", {"F": 3e-4, "lever": -0.4, "t0": 80.0, "dur": 300.0}, -1.2e-4 * NEWTONS * LENGTH_M),
+}
+
+
+def short_run(effect: str, parameters: dict[str, float], folder: Path) -> Likelihood:
+    """Three minutes of the straight course of a Mariner that is pushed from 80 s on, by the generator of trials."""
+    (lane,) = lanes_of(Setting((), 1, manoeuvres=("straight",)))
+    manoeuvre = replace(lane.manoeuvre, duration_s=180.0, keeps_course=False)
+    lane = replace(lane, manoeuvre=manoeuvre, effects={effect: parameters})
+    write(Made(lane.setting, {}, {"straight": recorded(lane, integrate([lane]), 0)}), folder)
+    card = parse_card(SHIP_TOML, "ship.toml")
+    assert isinstance(card, ManoeuvringCard)
+    return pose(card, measured([folder / "straight.csv"], card))
+
+
+@pytest.mark.parametrize("equation", PUSHES)
+def test_a_force_that_was_added_is_found_in_newtons(equation: str, tmp_path: Path) -> None:
+    effect, parameters, true = PUSHES[equation]
+    likelihood = short_run(effect, parameters, tmp_path)
+    found = force_lacking(likelihood, none_of(likelihood))
+    assert found is not None and found.equation == equation and set(found.trials) == {"straight"}
+    before, after = found.time_s < 70.0, (found.time_s > 95.0) & (found.time_s < 165.0)
+    assert np.median(found.force[after]) == pytest.approx(true, rel=0.15)
+    assert abs(np.median(found.force[before])) < 0.15 * abs(true)
+    assert set(found.states) == {"rudder", "drift", "yaw rate", "speed", "heading"}
+    assert found.states["speed"][before] == pytest.approx(SPEED_MPS, abs=0.1)
+
+
+def test_where_nothing_is_added_no_force_is_lacking(tmp_path: Path) -> None:
+    likelihood = short_run("out_drag_step", {"X": 0.0, "t0": 80.0}, tmp_path)
+    assert force_lacking(likelihood, none_of(likelihood)) is None

@@ -1,0 +1,212 @@
+"""The page of a gap says what was found in words and shows it, whatever the verdict."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE, Rival
+from tank2sim.report.charts import chart_specification
+from tank2sim.report.gap_cause_charts import agreement_chart, binned, rival_chart
+from tank2sim.report.gap_charts import gap_tracks, in_noise, misfit_chart, shown_places, signal_misfit
+from tank2sim.report.gap_page import gap_charts, gap_page, verdict_in_words, with_error
+from tank2sim.report.page import Verdict, render_page
+from tests.gap import made_up
+
+
+@pytest.fixture(scope="module")
+def charts():
+    return gap_charts(made_up.missing())
+
+
+def page_of(gap):
+    return gap_page(gap, gap_charts(gap))
+
+
+def rows_of(chart):
+    return [row for rows in chart_specification(chart)["datasets"].values() for row in rows]
+
+
+def tables_of(page):
+    return {table.caption: table for section in page.sections for table in section.tables}
+
+
+@pytest.mark.parametrize("verdict", made_up.EVERY)
+def test_every_verdict_has_a_whole_page(verdict) -> None:
+    gap = made_up.EVERY[verdict]()
+    drawn = gap_charts(gap)
+    page = gap_page(gap, drawn)
+    html = render_page(page)
+    assert verdict in html and "nan" not in html.partition("<script")[0].lower()
+    assert sum(len(section.charts) for section in page.sections) == len(drawn)
+    assert all(section.text or section.tables or section.charts for section in page.sections)
+    assert page.figures[0].value == verdict
+    assert (page.figures[0].verdict is Verdict.CAUTION) == (verdict in (AMBIGUOUS, OUTSIDE))
+
+
+def test_a_named_effect_is_told_in_words_and_in_a_mariners_units() -> None:
+    words = verdict_in_words(made_up.missing())
+    assert "current (speed 0.45 ± 0.02 m/s, direction 270.0 ± 1.5 deg)" in words
+    assert "The water moves over the ground" in words
+    (row,) = (row for row in tables_of(page_of(made_up.missing()))["What was found, ± one standard error"].rows[1:])
+    assert row[:4] == ["current", "direction", "270.0 ± 1.5", "deg"]
+
+
+def test_a_sensor_at_fault_is_not_called_a_fault_of_the_model() -> None:
+    gap = made_up.missing()
+    gyro = replace(gap.effects[0], name="gyro_bias", parameters={"rate_radps": np.deg2rad(0.1)}, standard_errors={})
+    words = verdict_in_words(replace(gap, effects=(gyro,)))
+    assert words.startswith("A sensor is at fault, not the model: gyro bias (rate 0.1 deg/s)")
+
+
+def test_ambiguity_names_each_explanation_once() -> None:
+    gap = made_up.ambiguous()
+    assert verdict_in_words(gap).endswith("which of several effects it is: current, or wind with rudder bias.")
+    told = tables_of(page_of(gap))["Effects that these data cannot tell apart"].rows
+    assert [row[0] for row in told] == ["current", "wind", "rudder bias"]
+
+
+def test_nothing_missing_says_how_well_the_card_follows() -> None:
+    gap = made_up.nothing()
+    assert "follows the fitting trials to 1.02 times the noise" in verdict_in_words(gap)
+    page = page_of(gap)
+    heads = [column.title for column in tables_of(page)["Misfit of each trial, noise units"].columns]
+    assert heads == ["trial", "", "before"]
+    assert "How well the card follows" in [section.heading for section in page.sections]
+    worse = replace(gap, passed=tuple(made_up.passed(one.name, 4.0, 4.0) for one in gap.passed))
+    assert "4 times the noise, which is more than noise" in verdict_in_words(worse)
+
+
+def test_misfits_stand_before_and_after_beside_the_black_box() -> None:
+    tables = tables_of(page_of(made_up.missing()))
+    signals = tables["Misfit of each signal, noise units"]
+    assert [column.title for column in signals.columns[1:4]] == [
+        "held out, before",
+        "held out, after",
+        "held out, black box",
+    ]
+    assert signals.rows[0] == ["north", 9.0, 1.5, 3.0, pytest.approx(7.07), 1.0, 3.0]
+    assert signals.rows[-1] == ["all", 9.0, 1.5, 3.0, pytest.approx(7.07), 1.0, 3.0]
+    assert tables["Misfit of each trial, noise units"].rows[0] == ["turn20", "held out", 9.0, 1.5, 3.0]
+    assert tables["Figures in m"].rows == [
+        ["turn35", "fitting", "advance", 500.0, pytest.approx(550), pytest.approx(505)]
+    ]
+
+
+def test_the_map_has_a_cell_for_each_signal_and_trial_before_and_after() -> None:
+    cells = [row for row in rows_of(misfit_chart(made_up.missing())) if "misfit" in row]
+    assert len(cells) == 2 * 3 * 5
+    held = [row for row in cells if row["trial"] == "turn20" and row["signal"] == "psi"]
+    assert {row["text"] for row in held} == {"9.0", "1.5"}
+
+
+def test_what_left_all_bounds_is_darkest_and_infinite() -> None:
+    cells = [row for row in rows_of(misfit_chart(made_up.outside())) if row.get("trial") == "turn35"]
+    lost = [row for row in cells if row["signal"] != "psi"]  # of which nothing is measured where the motion is lost
+    assert {row["text"] for row in lost} == {"∞"} and {row["misfit"] for row in lost} == {100.0}
+    assert signal_misfit(made_up.outside(), "before", "motion.x", held_out=False) == np.inf
+
+
+def test_places_show_what_is_left_in_the_units_of_the_column(charts) -> None:
+    chart = chart_specification(charts["places"])
+    titles = [panel["title"]["text"] for panel in chart["concat"]]
+    assert titles == ["turn35 · north", "zigzag · heading"]
+    below = chart["concat"][1]["vconcat"][1]
+    drawn = next(layer for layer in below["layer"] if layer["mark"]["type"] == "line")
+    rows = chart["datasets"][drawn["data"]["name"]]
+    for run, size in (("card before", 1.2), ("card found", 0.2)):
+        assert {round(row["v"], 4) for row in rows if row["run"] == run} == {size}
+    (band,) = (row for row in rows_of(charts["places"]) if row.get("high") == pytest.approx(0.4))
+    assert band["low"] == pytest.approx(-0.4)
+
+
+def test_without_places_the_largest_misfits_are_shown() -> None:
+    gap = made_up.nothing()
+    worse = replace(gap, passed=(*gap.passed, made_up.passed("worst", 5.0, 5.0)))
+    assert {place.trial for place in shown_places(worse)[:5]} == {"worst"}
+
+
+def test_tracks_are_of_their_own_set() -> None:
+    tracks = [chart_specification(gap_tracks(made_up.missing(), held_out=held))["concat"] for held in (True, False)]
+    assert [[panel["title"]["text"] for panel in panels] for panels in tracks] == [["turn20"], ["turn35", "zigzag"]]
+
+
+def test_means_of_bins_err_by_the_spread_between_trials() -> None:
+    """Two trials a unit apart: mean 0.5, standard error 0.5; a third alone in its bin has no interval."""
+    state = np.array([0.0] * 20 + [1.0] * 5)
+    force = np.array([0.0] * 10 + [1.0] * 10 + [7.0] * 5)
+    low, high = binned(state, force, np.array(["a"] * 10 + ["b"] * 10 + ["c"] * 5))
+    assert low["f"] == 0.5 and low["high"] - low["f"] == pytest.approx(1.96 * 0.5, rel=1e-4)
+    assert high["f"] == 7.0 and high["low"] is None
+
+
+def test_the_missing_force_is_drawn_over_one_turn_of_the_compass(charts) -> None:
+    rows = rows_of(charts["force"])
+    means = [row for row in rows if row.get("trials") == 2]
+    assert len(means) == 12 and all(0 <= row["s"] < 360 for row in rows if "s" in row)
+    assert max(row["f"] for row in means) == pytest.approx(2.0, abs=0.1)  # MN
+    assert np.sign(np.interp([90.0, 270.0], *zip(*[(row["s"], row["f"]) for row in means], strict=True))).tolist() == [
+        1,
+        -1,
+    ]
+
+
+def test_directions_of_trials_lie_beside_each_other(charts) -> None:
+    rows = [row for row in rows_of(charts["agreement"]) if row.get("name") == "zigzag"]
+    assert {round(row["v"], 3) for row in rows} == {0.47, 271.0}
+
+
+def test_across_north_too() -> None:
+    """All trials together say 359 deg, one alone 1 deg: it is drawn at 361 deg."""
+    gap = made_up.missing()
+    north = replace(gap.effects[0], parameters={"direction_rad": np.deg2rad(-1.0)})
+    alone = {"current.direction": {"turn35": (np.deg2rad(1.0), 0.01)}}
+    rows = rows_of(agreement_chart(replace(gap, effects=(north,), agreement=alone)))
+    assert [row["v"] for row in rows if row.get("name") == "turn35"] == [pytest.approx(361)]
+
+
+def test_rivals_are_ranked_and_none_is_always_among_them() -> None:
+    gap = made_up.missing()
+    many = tuple(Rival((f"effect_{place}",), 10.0 + place, 0.0) for place in range(20))
+    rows = rows_of(rival_chart(replace(gap, rivals=(*many, *gap.rivals))))
+    names = [row["name"] for row in rows]
+    assert names[:2] == ["current", "effect 0"] and names[-1] == "none (the card as it is)" and len(names) == 13
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "shown"),
+    [
+        (121.26, 2.04, "121.3 ± 2.0"),
+        (-0.012, 0.2, "−0.01 ± 0.20"),
+        (0.45, np.nan, "0.45"),
+        (3.2e-5, 1.1e-6, "3.2×10⁻⁵ ± 1.1×10⁻⁶"),
+    ],
+)
+def test_a_value_is_told_to_two_figures_of_its_error(value, error, shown) -> None:
+    assert with_error(value, error) == shown
+
+
+@pytest.mark.parametrize(("misfit", "text"), [(0.98, "1.0"), (9.97, "10"), (251.3, "251"), (3e5, "3e5"), (np.inf, "∞")])
+def test_a_misfit_fits_into_its_cell(misfit, text) -> None:
+    assert in_noise(misfit) == text
+
+
+def test_thirteen_trials_take_little_of_the_page() -> None:
+    gap = made_up.missing()
+    trials = tuple(made_up.passed(f"trial_{place}", 5.0, 1.0, held_out=place > 6) for place in range(13))
+    charts = gap_charts(replace(gap, passed=trials))
+    assert sum(len(json.dumps(chart.to_dict(validate=False))) for chart in charts.values()) < 2e6
+
+
+def test_what_was_found_but_not_measured_does_not_break_the_page() -> None:
+    """One trial has nothing but a heading: no tracks, and no cells of what it lacks."""
+    gap = made_up.missing()
+    turn = gap.passed[0]
+    gone = {name: np.full(100, np.nan) for name in turn.measured}
+    blind = replace(turn, measured={**gone, "motion.psi": turn.measured["motion.psi"]})
+    page = page_of(replace(gap, passed=(blind,), where=(), verdict=NOTHING, effects=()))
+    assert len(tables_of(page)["Misfit of each signal, noise units"].rows) == 2
+    assert verdict_in_words(replace(gap, verdict=MISSING))
