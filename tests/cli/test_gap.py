@@ -213,7 +213,7 @@ def test_no_input_is_overwritten(folder: Path, tmp_path: Path, finding) -> None:
     assert not calls and not (tmp_path / "out").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_slow_rudder_is_found_and_enters_the_card(data: Path, tmp_path: Path) -> None:
     """Synthetic trials of a ship whose gear is slower than the card says, made by equations that share no code."""
     case = data / "data" / "gap_cases" / "case_2"
@@ -243,8 +243,10 @@ LONG = ("current", "rudder_rate_limit", "flow_memory", "trim")
 
 @pytest.mark.parametrize(
     "name",
-    [*(pytest.param(one, marks=pytest.mark.slow) for one in ("wind", "roll_coupling"))]
-    + [*(pytest.param(one, marks=pytest.mark.long) for one in LONG)],
+    [
+        *(pytest.param(one, marks=pytest.mark.slow) for one in ("wind", "roll_coupling")),
+        *(pytest.param(one, marks=pytest.mark.long) for one in LONG),
+    ],
 )
 def test_an_improved_card_goes_all_the_way_to_a_checked_fmu(name: str, tmp_path: Path) -> None:
     found = [(name, dict(to_si(key, value) for key, value in TYPICAL[name].items()), {})]

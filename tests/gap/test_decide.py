@@ -13,6 +13,7 @@ from tank2sim.gap import decide as module
 from tank2sim.gap.decide import (
     ALIKE,
     ENOUGH,
+    OF_ONE_KIND,
     STANDARD_ERRORS,
     SUREST,
     TEMPER,
@@ -29,7 +30,7 @@ from tests.gap.test_likelihood import LOGS, judge
 from tests.gap.toy import NAMES, Toy, toy_motion
 from tests.identification.trials import made_up_ship
 
-YAW, SURGE, SWAY = NAMES
+YAW, SURGE, SWAY, *_ = NAMES
 SETS = ((), (0,), (1,), (2,), (0, 1), (0, 2), (1, 2))
 
 
@@ -106,6 +107,28 @@ def test_verdicts_follow_the_scores(fits, verdict, effects, alike) -> None:
     found = of_scores(*fits)
     assert (found.verdict, found.best.explained.effects) == (verdict, effects)
     assert [one.explained.effects for one in found.alike] == alike
+
+
+FORCE, DRAG, BIAS, LAG, LATE = range(2, 7)
+
+
+@pytest.mark.usefixtures("calm")
+@pytest.mark.parametrize(
+    ("pair", "share"),
+    [
+        ((FORCE, DRAG), OF_ONE_KIND["force"]),
+        ((DRAG, BIAS), OF_ONE_KIND["force"]),
+        ((LAG, LATE), OF_ONE_KIND["actuator"]),
+        ((FORCE, LAG), 0.0),
+        ((0, 1), 0.0),
+    ],
+)
+def test_a_second_effect_of_the_same_kind_must_have_a_share_of_the_gain(pair, share: float) -> None:
+    """Of a gain of 2000 in all: a little less than the share, a little more, and what is enough otherwise."""
+    names = tuple(NAMES[place] for place in pair)
+    for part in (share * 2000 - 1, share * 2000 + 1, ENOUGH + 1):
+        found = of_scores(fit(0), fit(-2000 + part, pair[0]), fit(-2000, *pair))
+        assert found.best.explained.effects == (names if part > max(share * 2000, ENOUGH) else names[:1]), part
 
 
 @pytest.mark.usefixtures("calm")

@@ -10,9 +10,11 @@ import pytest
 from scipy.linalg import block_diag
 from scipy.optimize import minimize_scalar
 
+from tank2sim.gap import forms
 from tank2sim.gap import likelihood as module
 from tank2sim.gap.fit import Belief, Coefficients, Fit
-from tank2sim.gap.likelihood import COUNTED, FORM, LEAST_GAIN, WIDTHS, Likelihood
+from tank2sim.gap.forms import Forms
+from tank2sim.gap.likelihood import COUNTED, LEAST_GAIN, WIDTHS, Likelihood
 from tank2sim.gap.observer import Noise
 from tests.gap.dense import Dense
 from tests.gap.toy import WHITE, Toy, toy_motion, toy_trials
@@ -34,6 +36,11 @@ def fitted(of: Likelihood, toy: Toy, start=None, logs=LOGS) -> Fit:
     return of.at_best(toy, theta, [logs], [0])
 
 
+def forms_of(of: Likelihood, toy: Toy, theta) -> np.ndarray:
+    """By how much the effects may differ from their formula at some parameters."""
+    return Forms(of.motion, 0).columns(of.added(toy, theta)[0], directed=toy.directed)
+
+
 def dense_cost(of: Likelihood, toy: Toy, theta, *, about=None, marginal=()) -> float:
     """-2 log density of both runs as one Gaussian, without its n log 2 pi.
 
@@ -47,8 +54,7 @@ def dense_cost(of: Likelihood, toy: Toy, theta, *, about=None, marginal=()) -> f
     mixed = WIDTH * of.motion.block_s * inside * (slopes @ of.coefficients.mixing) if slopes.ndim else slopes[None][:0]
     vary = list(np.moveaxis(mixed, -1, 0))
     if len(theta):
-        there = of.residual(toy, theta if about is None else about)[0]
-        vary += list(np.moveaxis(of.of_form(there, directed=toy.directed), -1, 0))
+        vary += list(np.moveaxis(forms_of(of, toy, theta if about is None else about), -1, 0))
     for place in marginal:
         moved = theta.copy()
         moved[place] += toy.priors[place][1]
@@ -126,50 +132,6 @@ def test_a_free_parameter_beside_a_known_one() -> None:
     assert fit.score == pytest.approx(best.fun + np.log(of.count / COUNTED) + believed(of), abs=2 * LEAST_GAIN)
 
 
-SIZES = np.array([0.8, -0.6, 0.9])
-"""Of a hidden force in yaw, in surge and in sway."""
-
-
-def pushes(motion) -> np.ndarray:
-    """What that force adds to the three speeds in each block (R, T - 1, 3), 0 beyond a run's end."""
-    more = Toy((None,) * 3).rates_between(motion, SIZES) - Toy().rates_between(motion, [])
-    return motion.block_s * np.where(motion.inside[:, 1:, None], motion.over_blocks(more)[..., :3], 0.0)
-
-
-def shapes(motion) -> list[np.ndarray]:
-    """Rudder, yaw rate and loss of speed, each from -1 where it is least to 1 where it is largest."""
-    courses = np.abs(motion.block_inputs[..., 0]), np.abs(motion.block_states[..., 2]), -motion.block_states[..., 0]
-    return [np.interp(one, (one.min(), one.max()), (-1, 1)) for one in courses]
-
-
-@pytest.mark.parametrize("directed", [False, True])
-def test_the_form_of_a_force_may_differ_by_shares_of_it(directed: bool) -> None:
-    motion = toy_motion(tuple(SIZES))
-    of = judge(motion)
-    found = of.of_form(of.residual(Toy((None,) * 3), SIZES)[0], directed=directed) / FORM
-    force = pushes(motion)
-    assert np.all(found[..., 3:, :] == 0)
-    expected = [force * [1, -1, -1], force * [0, 1, -1]]
-    heading = motion.block_states[..., 3]
-    turns = [np.cos(heading), np.sin(heading), np.cos(2 * heading), np.sin(2 * heading)] if directed else []
-    for shape in (*shapes(motion), *turns):
-        expected += [force * shape[..., None] * np.eye(3)[axis] for axis in range(3)]
-    late = np.concatenate([0 * force[:, :1], np.diff(force, axis=1)], axis=1)
-    expected += [late * np.eye(3)[axis] for axis in range(3)]
-    assert found[..., :3, :] == pytest.approx(np.stack(expected, axis=-1), abs=1e-12)
-
-
-def test_the_form_of_a_force_leaves_its_size_to_the_effect() -> None:
-    """Surge, sway and yaw may be wrong against each other; all larger together is the effect's own parameter."""
-    of = judge(toy_motion(tuple(SIZES)))
-    force = pushes(of.motion)
-    first, second, *_ = np.moveaxis(of.of_form(of.residual(Toy((None,) * 3), SIZES)[0], directed=False), -1, 0)
-    whole = np.stack([one[..., :3].ravel() for one in (first, second, force)], axis=-1)
-    assert np.linalg.matrix_rank(whole) == 3
-    left = force.ravel() - whole[:, :2] @ np.linalg.lstsq(whole[:, :2], force.ravel(), rcond=None)[0]
-    assert np.linalg.norm(left) > 0.3 * np.linalg.norm(force)
-
-
 def test_a_force_with_a_direction_may_differ_with_the_heading() -> None:
     of = judge(toy_motion((0.8,)))
     for toy in (Toy((None,)), Toy((None,), directed=True)):
@@ -183,8 +145,8 @@ def test_a_force_with_a_direction_may_differ_with_the_heading() -> None:
 def test_a_form_that_differs_beyond_belief_costs_its_excess(monkeypatch, largest: float) -> None:
     of, toy = judge(toy_motion((0.8,))), Toy((None,))
     fit = fitted(of, toy)
-    forms = np.abs(fit.change[2:])
-    assert np.all(forms < module.LARGEST_FORM) and np.count_nonzero(forms > largest) > 2
+    away = np.abs(fit.change[2:])
+    assert np.all(away < module.LARGEST_FORM) and np.count_nonzero(away > largest) > 2
     monkeypatch.setattr(module, "LEAST_GAIN", np.inf)  # the parameters stay where they begin
     scores = []
     for limit in (np.inf, largest):
@@ -192,12 +154,12 @@ def test_a_form_that_differs_beyond_belief_costs_its_excess(monkeypatch, largest
         there = fitted(of, toy, fit.theta)
         np.testing.assert_array_equal(there.theta, fit.theta)
         scores.append(there.score)
-    assert scores[1] - scores[0] == pytest.approx(module.IMPOSSIBLE * np.maximum(forms - largest, 0).sum())
+    assert scores[1] - scores[0] == pytest.approx(module.IMPOSSIBLE * np.maximum(away - largest, 0).sum())
 
 
 def test_residuals_are_remembered_for_each_explanation_and_its_parameters(monkeypatch) -> None:
     of, asked = judge(toy_motion((0.8, -0.6))), []
-    one, both = Toy((None,)), Toy((None, None))
+    one, other, both = Toy((None,)), Toy((None,), which=(1,)), Toy((None, None))
     fresh = Likelihood._residual
 
     def counted(self, explained, theta):
@@ -205,11 +167,18 @@ def test_residuals_are_remembered_for_each_explanation_and_its_parameters(monkey
         return fresh(self, explained, theta)
 
     monkeypatch.setattr(Likelihood, "_residual", counted)
-    for explained, theta in ((one, [0.5]), (one, [0.6]), (both, [0.5, 0.0]), (one, [0.5]), (both, [0.5, 0.1])):
+    for explained, theta in (
+        (one, [0.5]),
+        (other, [0.5]),
+        (one, [0.6]),
+        (both, [0.5, 0.0]),
+        (one, [0.5]),
+        (both, [0.5, 0.1]),
+    ):
         exact = fresh(of, explained, np.array(theta))
         for found, true in zip(of.residual(explained, np.array(theta)), exact, strict=True):
             np.testing.assert_array_equal(found, true)
-    assert len(asked) == 4
+    assert len(asked) == 5
     for size in np.arange(3 * module.REMEMBERED):
         of.residual(one, np.array([float(size)]))
     assert len(of._residuals) <= module.REMEMBERED
@@ -259,7 +228,7 @@ def test_the_best_of_several_noises_is_begun_with() -> None:
 
 def test_known_amplitudes_are_recovered_within_their_errors(monkeypatch) -> None:
     """Over ten sets of noise the squared errors in standard deviations have a mean near one, for an exact formula."""
-    monkeypatch.setattr(module, "FORM", 1e-6)
+    monkeypatch.setattr(forms, "FORM", 1e-6)
     toy, away = Toy((None, None)), []
     true = np.array([0.8, -0.6])
     for seed in range(10):

@@ -22,7 +22,7 @@ from tank2sim.gap.screen import variants
 from tank2sim.gap.search import Search
 from tank2sim.identification.trials.measured import Measured, measured
 from tests.gap.dense import Dense
-from tests.gap.test_likelihood import LOGS, NOISE, WIDTH, judge
+from tests.gap.test_likelihood import LOGS, NOISE, WIDTH, forms_of, judge
 from tests.gap.toy import Toy, toy_motion
 from tests.identification.trials import made_up_ship
 
@@ -40,7 +40,7 @@ def by_hand(of: Likelihood, fit: Fit, run: int, place: int) -> tuple[float, floa
     e = error(fit.theta)
     slopes = np.stack([(error(fit.theta + 0.01 * one) - e) / 0.01 for one in np.eye(len(fit.theta))], axis=-1)
     vary = [WIDTH * of.of_coefficients(toy, fit.theta)]
-    vary.append(of.of_form(of.residual(toy, fit.theta)[0], directed=False))
+    vary.append(forms_of(of, toy, fit.theta))
     covariance = part.covariance.copy()
     for one in np.moveaxis(np.concatenate(vary, axis=-1)[run], -1, 0):
         column = part.of_driving @ one.ravel()
@@ -179,8 +179,8 @@ def test_estimates_are_told_by_effect_and_parameter() -> None:
     toy = Toy((None, None))
     fit = Fit(toy, np.array([0.5, -0.3]), np.diag([0.04, 0.09]), LOGS, 0.0, np.zeros(0))
     first, second = estimates(fit)
-    assert first == ("toy yaw", {"size": 0.5}, {"size": pytest.approx(0.2)})
-    assert second == ("toy surge", {"size": -0.3}, {"size": pytest.approx(0.3)})
+    assert first == ("gyro_bias", {"size": 0.5}, {"size": pytest.approx(0.2)})
+    assert second == ("current", {"size": -0.3}, {"size": pytest.approx(0.3)})
 
 
 # -- the force that is lacking -------------------------------------------------------------------------------------

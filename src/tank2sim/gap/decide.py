@@ -34,7 +34,7 @@ ALIKE = 6.0
 
 OF_ONE_KIND = {"actuator": 0.25, "force": 0.1}
 """Share of the whole gain that a second effect of the same kind must have (ours): less is what the first one's formula
-may be wrong by, beyond what :data:`.likelihood.FORM` covers."""
+may be wrong by, beyond what :data:`.forms.FORM` covers."""
 
 STANDARD_ERRORS = 3.0
 """An effect is named if its size exceeds so many of its standard errors."""
@@ -108,8 +108,9 @@ def decide(search: Search) -> Decision:
     pair = next((fit for fit in search.fits if len(fit.explained.effects) == 2 and stands_out(fit)), None)
     if single is not None and single.score < none.score - ENOUGH:
         best = single
-    if pair is not None and pair.score < min(one.score for one in (best, single) if one is not None) - ENOUGH:
-        best = pair
+    if pair is not None:
+        worth = max(ENOUGH, _share(pair) * (none.score - pair.score))
+        best = pair if pair.score < min(one.score for one in (best, single) if one is not None) - worth else best
     alike = tuple(
         fit
         for fit in search.fits

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,7 @@ from scipy.optimize import minimize
 
 from tank2sim.gap.explained import Explained
 from tank2sim.gap.fit import Belief, Coefficients, Columns, Fit
+from tank2sim.gap.forms import Forms
 from tank2sim.gap.motion import KNOWN, Motion
 from tank2sim.gap.observer import FORCES, Linear, Observer, linear, observer, slopes
 
@@ -35,11 +35,6 @@ WIDE = 10.0
 
 GUESSED = (0.1, 0.1, 1e-3, 0.01, 1.0, 1.0)
 """Error of the smoothed motion in u, v (m/s), r (rad/s), psi (rad), x and y (m) where they were derived (ours)."""
-
-FORM = 0.15
-"""Standard deviation of the factors by which the force of a real effect differs from its formula, as a whole and with
-rudder, yaw rate and loss of speed, and of the time by which it differs, in blocks (ours; 10 to 20 % is what empirical
-force formulas are worth). Without it the difference would be taken for a second effect where the noise is small."""
 
 LARGEST_FORM, IMPOSSIBLE = 3.5, 1000.0
 """Standard deviations by which a form may differ, and what each beyond costs (ours): a force that is all but taken back
@@ -83,6 +78,7 @@ class Likelihood:
         changes = np.diff(motion.middles, axis=1)
         self._lack = (motion.block_s * none.fine_rates(motion, nothing) - changes) * self._inside
         self._shown = motion.measured - none.readings(motion, nothing, self._own)
+        self._forms = Forms(motion, none.model.input_names.index("rudder.command"))
         self.known = ~np.isnan(motion.measured) & motion.inside[..., None]
         self.count = int(self.known.sum())
         self.wide = WIDE * _size_of_error(motion)
@@ -146,40 +142,15 @@ class Likelihood:
             change = moved[place] - theta[place]
             driven.append((more[0] - driving) / change)
             seen.append((more[1] - shown) / change)
-        forms = self.of_form(driving, directed=explained.directed) if len(theta) else np.zeros((*driving.shape, 0))
+        forms = (
+            self._forms.columns(driving - self._lack, directed=explained.directed)
+            if len(theta)
+            else np.zeros((*driving.shape, 0))
+        )
         pairs = np.concatenate([np.stack(driven, axis=-1), of_coefficients, forms], axis=-1)
         readings = np.zeros((*shown.shape, pairs.shape[-1]))
         readings[..., : 1 + len(theta)] = np.stack(seen, axis=-1)
         return Columns(pairs, readings, len(theta), of_coefficients.shape[-1])
-
-    def of_form(self, driving: Array, *, directed: bool) -> Array:
-        """Driving by which an effect's force may differ from its formula, by one standard deviation each (..., 6, nf).
-
-        `driving` (R, T - 1, 6) is of the residual at the effect's parameters. Only accelerations count: kinematics and
-        sensors are what their formulas say. As a whole each acceleration may differ from the others alone, for their
-        common size is a parameter of the effect. One that has a direction (wind) may differ with the heading as well.
-        """
-        added = (driving - self._lack)[..., :FORCES]
-        late = np.diff(added, axis=1, prepend=added[:, :1])
-        parts = [added[..., [row]] * np.eye(6)[row] for row in range(FORCES)]
-        whole = [parts[0] - parts[1] - parts[2], parts[1] - parts[2]]
-        shaped = [part * shape for shape in (*self._shapes, *(self._turns if directed else ())) for part in parts]
-        delayed = [late[..., [row]] * np.eye(6)[row] for row in range(FORCES)]
-        return FORM * np.stack([*whole, *shaped, *delayed], axis=-1)
-
-    @cached_property
-    def _shapes(self) -> tuple[Array, ...]:
-        """Rudder, yaw rate and loss of speed between -1 and 1 of their range (R, T - 1, 1)."""
-        motion = self.motion
-        rudder = np.abs(motion.block_inputs[..., [self.none.model.input_names.index("rudder.command")]])
-        speed, rate = motion.block_states[..., [0]], np.abs(motion.block_states[..., [2]])
-        return tuple(2 * (one - one.min()) / (np.ptp(one) or 1.0) - 1 for one in (rudder, rate, -speed))
-
-    @cached_property
-    def _turns(self) -> tuple[Array, ...]:
-        """Once and twice round the compass (R, T - 1, 1)."""
-        heading = self.motion.block_states[..., [3]]
-        return np.cos(heading), np.sin(heading), np.cos(2 * heading), np.sin(2 * heading)
 
     def whitened(self, fit: Fit) -> tuple[Array, Array]:
         """Columns of an explanation in units of the innovations (R, T, ny, C), and its innovations (R, T, ny)."""

@@ -274,55 +274,69 @@ def slopes(seen: Observer, driving: Array, shown: Array, whitened: Array) -> Arr
     d(log det V + e'V^-1 e) = tr(V^-1 dV) - e'V^-1 dV V^-1 e, which the backward recursion gives for every noise at
     once: r carries V^-1 e back to the states, N its covariance under the model (Durbin and Koopman, 7.3.3).
     """
-    what, noise = seen.what, seen.noise
-    runs, blocks, ny, nz = seen.H.shape
-    _, after = seen.passed(driving, shown)
-    fading = np.exp(-what.block_s / np.concatenate([noise.force_s, noise.slow_s]))
-    by_variance = np.zeros(nz - 6)  # of the driving noise of each slow process
-    by_fading = np.zeros(nz - 6)
-    by_white = np.zeros(ny)
-    by_way, by_both, by_gain = np.zeros(FORCES), np.zeros(FORCES), np.zeros(FORCES)
-    r = np.zeros((runs, nz, whitened.shape[-1]))
-    N = np.zeros((runs, nz, nz))
-    own = np.arange(6, nz)
-    diagonal = np.arange(ny)
-    for k in range(blocks - 1, -1, -1):
-        W, K, H = seen.white[:, k], seen.gain[:, k], seen.H[:, k]
-        if k + 1 < blocks:
-            F = seen.F[:, k]
-            by_variance += (N[:, own, own] - (r[:, 6:] ** 2).sum(axis=2)).sum(axis=0)
-            BT = what.spreading[:, k, :, :FORCES].swapaxes(-1, -2)
-            pushing, NF = BT @ r[:, :6], N @ F
-            BN = BT @ N[:, :6]
-            by_way += (np.einsum("rjs,rjs->rj", BN[..., :6], BT) - (pushing**2).sum(axis=2)).sum(axis=0)
-            crossed = BN[:, range(FORCES), range(6, 6 + FORCES)] - (pushing * r[:, 6 : 6 + FORCES]).sum(axis=2)
-            by_both += 2 * crossed.sum(axis=0)
-            later = F.swapaxes(-1, -2) @ r
-            smooth = after[:, k, 6:] + (seen.filtered[:, k] @ later)[:, 6:]
-            P = seen.filtered[:, k][:, :, 6:]
-            mixed = np.einsum("rij,rji->ri", NF[:, 6:], P)
-            by_fading += -2 * ((r[:, 6:] * smooth).sum(axis=2) - mixed).sum(axis=0)
-            mixed = np.einsum("rij,rji->ri", BT @ NF[:, :6], P[..., :FORCES])
-            by_gain += -2 * ((pushing * smooth[:, :FORCES]).sum(axis=2) - mixed).sum(axis=0)
-            N = F.swapaxes(-1, -2) @ N @ F
-        else:
-            later = r
-        KT = K.swapaxes(-1, -2)
-        u = W.swapaxes(-1, -2) @ whitened[:, k] - KT @ later
-        D = W.swapaxes(-1, -2) @ W + KT @ N @ K
-        by_white += np.where(what.known[:, k], D[:, diagonal, diagonal] - (u**2).sum(axis=2), 0.0).sum(axis=0)
-        left = np.eye(nz) - K @ H
-        r = later + H.swapaxes(-1, -2) @ u
-        N = left.swapaxes(-1, -2) @ N @ left + H.swapaxes(-1, -2) @ (W.swapaxes(-1, -2) @ W) @ H
-    at_start = (N[:, own, own] - (r[:, 6:] ** 2).sum(axis=2)).sum(axis=0)
+    noise, block_s = seen.noise, seen.what.block_s
+    sums = _backward(seen, seen.passed(driving, shown)[1], whitened)
     levels = np.concatenate([noise.force, noise.slow])
     times = np.concatenate([noise.force_s, noise.slow_s])
-    by_level = 2 * levels**2 * ((1 - fading**2) * by_variance + at_start)
+    fading = np.exp(-block_s / times)
+    by_level = 2 * levels**2 * ((1 - fading**2) * sums.variance + sums.start)
     # d fading/d log time = fading h/time; the driving variance is level^2 (1 - fading^2)
-    by_time = (by_fading - 2 * fading * levels**2 * by_variance) * fading * what.block_s / times
-    pushed = _pushed(noise, what.block_s)
-    by_level[:FORCES] += 2 * (by_way * pushed.way + by_both * pushed.both)
-    by_time[:FORCES] += by_way * pushed.way_slope + by_both * pushed.both_slope + by_gain * pushed.gain_slope
-    return np.concatenate(
-        [2 * noise.white**2 * by_white, by_level[FORCES:], by_time[FORCES:], by_level[:FORCES], by_time[:FORCES]]
-    )
+    by_time = (sums.fading - 2 * fading * levels**2 * sums.variance) * fading * block_s / times
+    pushed = _pushed(noise, block_s)
+    by_level[:FORCES] += 2 * (sums.way * pushed.way + sums.both * pushed.both)
+    by_time[:FORCES] += sums.way * pushed.way_slope + sums.both * pushed.both_slope + sums.gain * pushed.gain_slope
+    by_white = 2 * noise.white**2 * sums.white
+    return np.concatenate([by_white, by_level[FORCES:], by_time[FORCES:], by_level[:FORCES], by_time[:FORCES]])
+
+
+class _Sums:
+    """Slopes in what the noise is made of: the variance of each slow process's driving noise and of its beginning, its
+    fading; the variances and the gain of :class:`_Pushed`; the variance of each sensor's white noise."""
+
+    def __init__(self, ny: int):
+        self.variance, self.start, self.fading = (np.zeros(FORCES + ny) for _ in range(3))
+        self.way, self.both, self.gain = (np.zeros(FORCES) for _ in range(3))
+        self.white = np.zeros(ny)
+
+    def take_between(self, r: Array, N: Array, NF: Array, BT: Array, P: Array, smooth: Array) -> None:
+        """Add what a step between two blocks tells; r, N of what follows, P of before."""
+        own = np.arange(6, N.shape[1])
+        self.variance += (N[:, own, own] - (r[:, 6:] ** 2).sum(axis=2)).sum(axis=0)
+        pushing, BN = BT @ r[:, :6], BT @ N[:, :6]
+        self.way += (np.einsum("rjs,rjs->rj", BN[..., :6], BT) - (pushing**2).sum(axis=2)).sum(axis=0)
+        crossed = BN[:, range(FORCES), range(6, 6 + FORCES)] - (pushing * r[:, 6 : 6 + FORCES]).sum(axis=2)
+        self.both += 2 * crossed.sum(axis=0)
+        mixed = np.einsum("rij,rji->ri", NF[:, 6:], P)
+        self.fading += -2 * ((r[:, 6:] * smooth).sum(axis=2) - mixed).sum(axis=0)
+        mixed = np.einsum("rij,rji->ri", BT @ NF[:, :6], P[..., :FORCES])
+        self.gain += -2 * ((pushing * smooth[:, :FORCES]).sum(axis=2) - mixed).sum(axis=0)
+
+
+def _backward(seen: Observer, after: Array, whitened: Array) -> _Sums:
+    """The backward recursion of r and N, and the sums over all blocks."""
+    what = seen.what
+    runs, blocks, ny, nz = seen.H.shape
+    sums = _Sums(ny)
+    r = np.zeros((runs, nz, whitened.shape[-1]))
+    N = np.zeros((runs, nz, nz))
+    diagonal, own = np.arange(ny), np.arange(6, nz)
+    for k in range(blocks - 1, -1, -1):
+        W, K, H = seen.white[:, k], seen.gain[:, k], seen.H[:, k]
+        later = r
+        if k + 1 < blocks:
+            F, filtered = seen.F[:, k], seen.filtered[:, k]
+            FT = F.swapaxes(-1, -2)
+            NF, later = N @ F, FT @ r
+            smooth = after[:, k, 6:] + (filtered @ later)[:, 6:]
+            BT = what.spreading[:, k, :, :FORCES].swapaxes(-1, -2)
+            sums.take_between(r, N, NF, BT, filtered[:, :, 6:], smooth)
+            N = FT @ NF
+        KT, WT = K.swapaxes(-1, -2), W.swapaxes(-1, -2)
+        u = WT @ whitened[:, k] - KT @ later
+        D = WT @ W + KT @ N @ K
+        sums.white += np.where(what.known[:, k], D[:, diagonal, diagonal] - (u**2).sum(axis=2), 0.0).sum(axis=0)
+        left = np.eye(nz) - K @ H
+        r = later + H.swapaxes(-1, -2) @ u
+        N = left.swapaxes(-1, -2) @ N @ left + H.swapaxes(-1, -2) @ (WT @ W) @ H
+    sums.start += (N[:, own, own] - (r[:, 6:] ** 2).sum(axis=2)).sum(axis=0)
+    return sums
