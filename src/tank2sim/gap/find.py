@@ -131,7 +131,9 @@ def _told(
 ) -> Gap:
     """Everything that follows from the decision."""
     fitted, held = trials
-    estimated: list[Found] = estimates(decision.best) if decision.verdict in (MISSING, AMBIGUOUS) else []
+    estimated: list[Found] = []
+    if decision.verdict in (MISSING, AMBIGUOUS):
+        estimated = estimates(found.likelihood.by_formula(decision.best))
     improved = added(card, estimated)
     sensors = [one for one in estimated if EFFECTS[one[0]].acts_on == "sensor"]
     noise = _noise(found, decision.best, fitted)

@@ -12,6 +12,7 @@ smaller T holds, by more than chance if T differs by some 10.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +23,7 @@ from scipy.optimize import minimize
 from tank2sim.gap.explained import Explained
 from tank2sim.gap.fit import Belief, Coefficients, Columns, Fit
 from tank2sim.gap.forms import Forms
-from tank2sim.gap.motion import KNOWN, Motion
+from tank2sim.gap.motion import Motion
 from tank2sim.gap.observer import FORCES, Linear, Observer, linear, observer, slopes
 
 Array = NDArray[np.float64]
@@ -33,12 +34,12 @@ COUNTED = 20.0
 WIDE = 10.0
 """Error of the smoothed motion at the beginning of a run, in its noise: wide, so that no initial state is assumed."""
 
-GUESSED = (0.1, 0.1, 1e-3, 0.01, 1.0, 1.0)
-"""Error of the smoothed motion in u, v (m/s), r (rad/s), psi (rad), x and y (m) where they were derived (ours)."""
-
 LARGEST_FORM, IMPOSSIBLE = 3.5, 1000.0
 """Standard deviations by which a form may differ, and what each beyond costs (ours): a force that is all but taken back
 by its form is none, and its slope is then that of another force."""
+
+BY_FORMULA = (6, 4)
+"""Iterations on the noise, for parameters by the formula alone: the noise must first cover what the formula lacks."""
 
 REMEMBERED = 100
 """Residuals that are kept: a search asks for the same ones again and again."""
@@ -78,10 +79,10 @@ class Likelihood:
         changes = np.diff(motion.middles, axis=1)
         self._lack = (motion.block_s * none.fine_rates(motion, nothing) - changes) * self._inside
         self._shown = motion.measured - none.readings(motion, nothing, self._own)
-        self._forms = Forms(motion, none.model.input_names.index("rudder.command"))
+        self._forms: Forms | None = Forms(motion, none.model.input_names.index("rudder.command"))
         self.known = ~np.isnan(motion.measured) & motion.inside[..., None]
         self.count = int(self.known.sum())
-        self.wide = WIDE * _size_of_error(motion)
+        self.wide = WIDE * motion.errors
         self.base = self.linear(none, nothing)
         self.coefficient_columns = self.of_coefficients(none, nothing)
 
@@ -142,11 +143,9 @@ class Likelihood:
             change = moved[place] - theta[place]
             driven.append((more[0] - driving) / change)
             seen.append((more[1] - shown) / change)
-        forms = (
-            self._forms.columns(driving - self._lack, directed=explained.directed)
-            if len(theta)
-            else np.zeros((*driving.shape, 0))
-        )
+        forms = np.zeros((*driving.shape, 0))
+        if len(theta) and self._forms is not None:
+            forms = self._forms.columns(driving - self._lack, directed=explained.directed)
         pairs = np.concatenate([np.stack(driven, axis=-1), of_coefficients, forms], axis=-1)
         readings = np.zeros((*shown.shape, pairs.shape[-1]))
         readings[..., : 1 + len(theta)] = np.stack(seen, axis=-1)
@@ -179,6 +178,16 @@ class Likelihood:
         between = explained.rates_between(motion, theta) - np.diff(motion.states, axis=1) / motion.step_s
         moved = motion.moved(states[..., :6], seen.what.transition, between, more * self._inside / motion.block_s)
         return Likelihood(moved, self.none, self.coefficients, self.belief)
+
+    def by_formula(self, fit: Fit) -> Fit:
+        """An explanation with the parameters that suit the measurements best if its formula is to be taken as it is.
+
+        So a simulation takes it. The standard errors stay those of a formula that may be a little wrong.
+        """
+        strict = copy(self)
+        strict._forms = None
+        found = strict.at_best(fit.explained, fit.theta, [fit.logs], BY_FORMULA)
+        return replace(fit, theta=found.theta)
 
     def innovations(self, fit: Fit) -> Array:
         """Innovations of an explanation, each over its standard deviation (R, T, ny), 0 where nothing was measured."""
@@ -389,9 +398,3 @@ class _Solved:
     left: float
     weights: Array
     whitened: Array
-
-
-def _size_of_error(motion: Motion) -> Array:
-    """Error of the smoothed motion (6,): the noise of the sensor of each state, or else :data:`GUESSED`."""
-    noise = dict(zip(motion.seen, motion.noise, strict=True))
-    return np.array([noise.get(name, guess) for name, guess in zip(KNOWN, GUESSED, strict=True)])

@@ -37,6 +37,10 @@ LEAST_NOISE = 1e-5
 far below the noise of any sensor)."""
 
 
+GUESSED = (0.1, 0.1, 1e-3, 0.01, 1.0, 1.0)
+"""Error of the smoothed motion in u, v (m/s), r (rad/s), psi (rad), x and y (m) where they were derived (ours)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """Trials side by side, padded to one length.
@@ -124,6 +128,12 @@ class Motion:
     def middles(self) -> Array:
         """States in the middle of each block (R, T, 6)."""
         return self.states[:, self.fine // 2 :: self.fine]
+
+    @property
+    def errors(self) -> Array:
+        """About how well each state is known (6,): as its sensor shows it; a guess where none does."""
+        noise = dict(zip(self.seen, self.noise, strict=True))
+        return np.array([noise.get(name, guess) for name, guess in zip(KNOWN, GUESSED, strict=True)])
 
     def moved(self, away: Array, transition: Array, lack: Array, more: Array) -> Motion:
         """The same trials about a motion that is `away` from this one.
