@@ -175,7 +175,7 @@ def _change(fit: Fit, name: str) -> float:
 WINDOWS = (6, 12, 24, 48)
 """Lengths of the passages that are looked at, in blocks: 0.75 to 6 L/u0 (ours)."""
 
-RARE = {"passage": 1e-4, "period": 1e-12, "trial": 1e-6}
+RARE = {"passage": 3e-3, "period": 1e-12, "trial": 1e-6}
 """Probability in all trials together below which noise is no explanation (ours, on made-up trials with nothing missing:
 innovations are not quite normal, and not quite white where the sea or the wind has a colour of its own)."""
 
@@ -199,25 +199,34 @@ def strangeness(likelihood: Likelihood, fit: Fit) -> tuple[Strange, ...]:
 
 
 def _passages(likelihood: Likelihood, e: Array) -> list[Strange]:
-    """The strangest passage of each trial: sums of squares over windows, against chi squared."""
-    motion, found = likelihood.motion, []
+    """The strangest passage of each trial: sums of squares over windows, against chi squared.
+
+    Noise of another colour than the filter's (waves) makes these sums vary more than they should, everywhere alike; by
+    how much is told by the middle of their spread, and their degrees of freedom are fewer by as much (Satterthwaite).
+    """
+    motion = likelihood.motion
     squares, counts = (e**2).sum(axis=2), likelihood.known.sum(axis=2)
-    for run, name in enumerate(motion.names):
-        strangest = Strange("passage", name, 0.0, 0.0, -np.inf)
-        for length in WINDOWS:
-            if length > motion.blocks:
-                continue
-            sums, degrees = (np.convolve(one[run], np.ones(length), "valid") for one in (squares, counts))
-            log_p = np.where(degrees > 0, chi2.logsf(sums, np.maximum(degrees, 1)), 0.0)
-            place = int(np.argmin(log_p))
-            excess = float(np.minimum(-2 * (log_p[place] + np.log(counts.size)), MOST))
-            if excess > strangest.excess:
+    strangest = {name: Strange("passage", name, 0.0, 0.0, -np.inf) for name in motion.names}
+    for length in (one for one in WINDOWS if one <= motion.blocks):
+        sums, degrees = (
+            np.array([np.convolve(run, np.ones(length), "valid") for run in one]) for one in (squares, counts)
+        )
+        whole = degrees > 0
+        deviation = float(np.median(np.abs(sums[whole] - degrees[whole]))) / NORMAL_MEDIAN
+        excess_spread = max(1.0, deviation**2 / (2 * float(np.mean(degrees[whole]))))
+        log_p = np.where(whole, chi2.logsf(sums / excess_spread, np.maximum(degrees, 1) / excess_spread), 0.0)
+        for run, name in enumerate(motion.names):
+            place = int(np.argmin(log_p[run]))
+            excess = float(np.minimum(-2 * (log_p[run, place] + np.log(counts.size)), MOST))
+            if excess > strangest[name].excess:
                 last = min(place + length, motion.lengths[run]) - 1  # a window may reach beyond a shorter run
                 begin, end = motion.times[run][[place, last]]
-                strangest = Strange("passage", name, float(begin), float(end), excess)
-        found.append(strangest)
-    return found
+                strangest[name] = Strange("passage", name, float(begin), float(end), excess)
+    return list(strangest.values())
 
+
+NORMAL_MEDIAN = 0.6745
+"""Median of the absolute deviation of a normal variable, in its standard deviations."""
 
 MOST = 1e4
 """An excess beyond this is this: probabilities that small underflow."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.effects import EFFECTS, Effect, EffectParameter
+from tank2sim.dynamics.effects import EFFECTS, EffectParameter
 from tank2sim.gap.motion import KNOWN, Motion
 from tank2sim.identification.trials.question import driven_model
 from tank2sim.simulation.rows import Chain
@@ -88,7 +88,7 @@ class Explained:
             start = {one.name: one.typical_values(card)[0] for one in effect.parameters if one.typical_values(card)}
             model = effect.apply(model, start, card)
             places = effect.model_names()
-            asked += [Asked(name, one, places[one.name]) for one in free_of(effect, card)]
+            asked += [Asked(name, one, places[one.name]) for one in effect.parameters if one.name in effect.free(card)]
         self.model = model
         self.asked = tuple(asked)
         self.own = tuple(name for name in model.state_names if name not in KNOWN)
@@ -375,11 +375,6 @@ class Explained:
             xi[moving] -= np.linalg.lstsq(slope_there[part], rate[moving, 0], rcond=None)[0]
             xi = np.where(moving, xi, np.array(self._begin(xi, x, u, p)).ravel())
         return xi
-
-
-def free_of(effect: Effect, card: ManoeuvringCard) -> tuple[EffectParameter, ...]:
-    """The parameters of an effect that are estimated: those without a default, and those with a known spread."""
-    return tuple(one for one in effect.parameters if one.default is None or one.spread_value(card))
 
 
 def _rowwise(function: ca.Function, *arguments: Array) -> Array:
