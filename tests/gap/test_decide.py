@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.gap import decide as module
@@ -179,9 +180,10 @@ RUNS, BLOCKS, NY, BLOCK_S = 4, 200, 6, 2.5
 LENGTHS = np.array([200, 200, 150, 90])
 
 
-def made_up(seed: int, *, added=0.0, theta=None, gaps: float = 0.05):
+def made_up(seed: int, *, added=0.0, theta=None, gaps: float = 0.05, pushed=0.0):
     """A likelihood and a fit of two parameters by least squares, to white noise; `theta` (R, 2) are each trial's own
-    values of them, less those of the fit."""
+    values of them, less those of the fit. The force that is left over is of first order by scipy's filter, four times
+    as large as the smoother may be wrong by, and `pushed` (R, BLOCKS, 3) more."""
     rng = np.random.default_rng(seed)
     inside = np.arange(BLOCKS) < LENGTHS[:, None]
     known = inside[..., None] & (rng.random((RUNS, BLOCKS, NY)) > gaps)
@@ -200,10 +202,21 @@ def made_up(seed: int, *, added=0.0, theta=None, gaps: float = 0.05):
         lengths=LENGTHS,
         times=100.0 * np.arange(RUNS)[:, None] + BLOCK_S * (np.arange(BLOCKS) + 0.5),
     )
+    fades = np.exp(-BLOCK_S / np.exp(LOGS[-4:-1]))
+    shocks = rng.standard_normal((RUNS, 2 * BLOCKS, 3))
+    forces = np.stack([lfilter([np.sqrt(1 - f**2)], [1, -f], shocks[..., i], axis=1) for i, f in enumerate(fades)], -1)
+    states = np.zeros((RUNS, BLOCKS, 9 + NY))
+    states[..., 6:9] = 4 * forces[:, BLOCKS:] + pushed
+    spread = np.broadcast_to(np.eye(3), (RUNS, BLOCKS, 3, 3))
+    motion.inside = inside
     # what is left over falls as a parameter grows
     whitened = np.concatenate([e[..., None], -X], axis=-1)
     likelihood = SimpleNamespace(
-        motion=motion, known=known, innovations=lambda fit: e, whitened=lambda fit: (whitened, e)
+        motion=motion,
+        known=known,
+        innovations=lambda fit: e,
+        whitened=lambda fit: (whitened, e),
+        smoothed=lambda fit: (states, spread),
     )
     return likelihood, Fit(Toy((None, None)), best, np.linalg.inv(flat.T @ flat), LOGS, 0.0, np.zeros(0))
 
@@ -241,6 +254,20 @@ def test_a_line_in_all_trials_is_a_period(period: float) -> None:
     found = strangeness(*made_up(3, added=added, gaps=0.0))
     assert [one.what for one in found] == ["period"]
     assert found[0].begin_s == found[0].end_s == pytest.approx(period, rel=0.05)
+
+
+@pytest.mark.parametrize(("run", "axis"), [(1, 1), (2, 2)])
+def test_a_force_that_pushes_once_is_strange_and_one_that_pushes_always_is_not(run: int, axis: int) -> None:
+    pushed = np.zeros((RUNS, BLOCKS, 3))
+    pushed[run, 70:95, axis] = 40.0
+    (first,) = strangeness(*made_up(6, pushed=pushed))
+    assert (first.what, first.trial) == ("push", "abcd"[run])
+    begin, end = 100.0 * run + BLOCK_S * np.array([70.5, 94.5])
+    assert first.begin_s == pytest.approx(begin, abs=25 * BLOCK_S) and first.end_s == pytest.approx(
+        end, abs=25 * BLOCK_S
+    )
+    pushed[...] = 40.0 * np.sin(np.arange(BLOCKS))[:, None]
+    assert strangeness(*made_up(6, pushed=pushed)) == ()
 
 
 def test_a_trial_that_has_another_value_disagrees() -> None:

@@ -18,6 +18,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.add import CHANGING_DERIVATIVES, changed_derivatives
 from tank2sim.gap.fit import Fit
 from tank2sim.gap.likelihood import Likelihood
+from tank2sim.gap.observer import FORCES
 from tank2sim.gap.prove import agreement
 from tank2sim.gap.residuals import each_trial, estimates
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE
@@ -29,8 +30,8 @@ ENOUGH = 10.0
 """By how much the score must fall for an effect more: odds of exp(5) = 150 to 1 in its favour, "very strong" by Kass
 and Raftery (1995), Bayes Factors, J. Am. Stat. Assoc. 90, whose 2 log(odds) this is."""
 
-ALIKE = 6.0
-"""Explanations within this of the best are as good: odds of exp(3) = 20 to 1 ("strong" begins here, ibid.)."""
+ALIKE = ENOUGH
+"""Explanations within this of the best are as good."""
 
 OF_ONE_KIND = {"actuator": 0.25, "force": 0.1}
 """Share of the whole gain that a second effect of the same kind must have (ours): less is what the first one's formula
@@ -84,7 +85,8 @@ class Strange:
     Parameters
     ----------
     what : str
-        ``passage`` (a time in one trial), ``trial`` (a whole one) or ``period`` (an oscillation in all).
+        ``passage`` or ``push`` (a time in one trial, by innovations or by the force that is left over), ``trial`` (a
+        whole one) or ``period`` (an oscillation in all).
     trial : str
         Empty for a period.
     begin_s, end_s : float
@@ -175,7 +177,7 @@ def _change(fit: Fit, name: str) -> float:
 WINDOWS = (6, 12, 24, 48)
 """Lengths of the passages that are looked at, in blocks: 0.75 to 6 L/u0 (ours)."""
 
-RARE = {"passage": 3e-3, "period": 1e-12, "trial": 1e-6}
+RARE = {"passage": 3e-3, "period": 1e-12, "trial": 1e-6, "push": 1e-9}
 """Probability in all trials together below which noise is no explanation (ours, on made-up trials with nothing missing:
 innovations are not quite normal, and not quite white where the sea or the wind has a colour of its own)."""
 
@@ -194,6 +196,7 @@ def strangeness(likelihood: Likelihood, fit: Fit) -> tuple[Strange, ...]:
     """Where the innovations of an explanation are not noise, the strangest first."""
     e = likelihood.innovations(fit)
     found = [*_passages(likelihood, e), *_periods(likelihood, e), *_disagreements(likelihood, fit)]
+    found += _pushes(likelihood, fit)
     rare = [one for one in found if one.excess > -2 * np.log(RARE[one.what])]
     return tuple(sorted(rare, key=lambda one: -one.excess))
 
@@ -224,6 +227,38 @@ def _passages(likelihood: Likelihood, e: Array) -> list[Strange]:
                 strangest[name] = Strange("passage", name, float(begin), float(end), excess)
     return list(strangest.values())
 
+
+def _pushes(likelihood: Likelihood, fit: Fit) -> list[Strange]:
+    """The passage of all trials with the largest force that nobody modelled, beside what that force commonly is.
+
+    Gusts and waves push at all times alike; a tug pushes once. The filter follows both, and its innovations tell
+    neither. A window holds as many independent values of the force as it holds twice its time constant.
+    """
+    motion, found = likelihood.motion, []
+    states, spread = likelihood.smoothed(fit)
+    inside = motion.inside
+    for axis, time in enumerate(fit.noise.force_s):
+        squares = np.where(inside, states[..., 6 + axis] ** 2, 0.0)
+        for length in (one for one in WINDOWS[1:] if one <= motion.blocks):
+            window = np.ones(length)
+            sums = np.array([np.convolve(run, window, "valid") for run in squares])
+            whole = np.array([np.convolve(run, window, "valid") for run in inside.astype(float)]) > length - 0.5
+            if not whole.any():
+                continue
+            count = max(1.0, length * motion.block_s / (2 * time))
+            known = np.array([np.convolve(run, window, "valid") for run in spread[..., axis, axis]])
+            seen = whole & (sums > SEEN**2 * known)  # beyond what the smoother may be wrong by
+            ratio = np.where(seen, sums / max(float(np.median(sums[whole])), 1e-300) * chi2.median(count), 0.0)
+            run, place = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
+            log_p = chi2.logsf(ratio[run, place], count) + np.log(FORCES * inside.sum() / length)
+            begin, end = motion.times[run][[place, place + length - 1]]
+            excess = float(min(-2 * log_p, MOST))
+            found.append(Strange("push", motion.names[run], float(begin), float(end), excess))
+    return sorted(found, key=lambda one: -one.excess)[:1]
+
+
+SEEN = 3.0
+"""A force that nobody modelled counts if it exceeds so many of its own standard deviations."""
 
 NORMAL_MEDIAN = 0.6745
 """Median of the absolute deviation of a normal variable, in its standard deviations."""

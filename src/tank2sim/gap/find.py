@@ -37,6 +37,9 @@ from tank2sim.records.trials import Trial
 RIVALS = 12
 """Explanations that are told of."""
 
+MUCH = 3.0
+"""Misfit in noise units from which a user is told that something is left (ours)."""
+
 DOUBT = 1e-3
 """Probability below which trials that disagree about a parameter are told of."""
 
@@ -107,7 +110,10 @@ def _names(card: ManoeuvringCard, fitted: Measured, options: Options) -> tuple[s
             have = any(entry.name == name for entry in card.effects)
             why = "is on the card already" if have else "cannot be tried on this card and these trials"
             raise InputError("--effects", "", f"{name} {why}", f"possible are: {', '.join(possible)}")
-    return tuple(name for name in options.effects or possible if name not in options.without)
+    names = tuple(name for name in options.effects or possible if name not in options.without)
+    if not names:
+        raise InputError("--without", "", "leaves no effect to look for", f"possible are: {', '.join(possible)}")
+    return names
 
 
 @contextmanager
@@ -166,7 +172,7 @@ def _told(
         could_hide=could_hide(found, decision.best, ENOUGH),
         agreement=told,
         next_test=_next(card, found, decision, sigmas),
-        notices=_notices(decision, results, told, (fitted, held)),
+        notices=_notices(card, decision, results, told, (fitted, held)),
     )
 
 
@@ -227,6 +233,7 @@ def _explanation(card: ManoeuvringCard, found: Search, fit: Fit) -> Explanation:
 
 
 def _notices(
+    card: ManoeuvringCard,
     decision: Decision,
     results: Sequence[Passed],
     told: Mapping[str, Mapping[str, tuple[float, float]]],
@@ -234,6 +241,15 @@ def _notices(
 ) -> tuple[str, ...]:
     notices = [*trials[0].notices, *trials[1].notices]
     notices += [_in_words(one) for one in decision.strange]
+    if card.effects:
+        have = ", ".join(entry.name for entry in card.effects)
+        notices.append(f"{have}: held as the card has it, and not sought")
+    left = float(np.sqrt(np.mean([one.misfit("after") ** 2 for one in results])))
+    if decision.verdict != OUTSIDE and left > MUCH:
+        notices.append(
+            f"the trials are still missed by {left:.3g} times the noise: forces that vary by chance (gusts, waves), "
+            "coefficients that are off, or something more that is missing; the standard errors do not cover it"
+        )
     if decision.verdict in (MISSING, AMBIGUOUS):
         notices += [f"{name}: the improved card follows it worse than the given one" for name in worse(results)]
     for variable, values in told.items():

@@ -38,10 +38,20 @@ class Coefficients:
 
 @dataclass(frozen=True, eq=False)
 class Belief:
-    """What is believed of the noise beforehand: each logarithm's mean and standard deviation, and the bounds."""
+    """What is believed beforehand of the noise, and of where a run begins.
+
+    Parameters
+    ----------
+    logs, spread : array
+        Mean and standard deviation of each logarithm (:attr:`.observer.Noise.logs`, and that of the width).
+    wide : array (6,), optional
+        Standard deviation of each state at the beginning of a run about the measured one: wide, for a sensor may be at
+        fault; by default :data:`.likelihood.WIDE` times its noise.
+    """
 
     logs: Array
     spread: Array
+    wide: Array | None = None
 
     @property
     def bounds(self) -> tuple[Array, Array]:

@@ -82,7 +82,7 @@ class Likelihood:
         self._forms: Forms | None = Forms(motion, none.model.input_names.index("rudder.command"))
         self.known = ~np.isnan(motion.measured) & motion.inside[..., None]
         self.count = int(self.known.sum())
-        self.wide = WIDE * motion.errors
+        self.wide = WIDE * motion.errors if belief.wide is None else belief.wide
         self.base = self.linear(none, nothing)
         self.coefficient_columns = self.of_coefficients(none, nothing)
 

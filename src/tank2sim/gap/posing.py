@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.gap.explained import CLOCK, Explained
 from tank2sim.gap.fit import Belief, Coefficients
-from tank2sim.gap.likelihood import Likelihood
+from tank2sim.gap.likelihood import WIDE, Likelihood
 from tank2sim.gap.motion import Motion, side_by_side
 from tank2sim.gap.observer import FORCES, Noise
 from tank2sim.identification.trials.measured import Measured
@@ -35,6 +36,10 @@ FORCE_TIME = 0.5
 GEAR, ASSUMED_GEAR = 0.02, 0.5
 """Standard error of what a card states of its steering gear, as that of a coefficient without one, and of the time
 constant that is assumed where it states none (ours)."""
+
+BEGINNING = 0.1
+"""Standard deviation of the first state about the measured one, in u0, u0/L, rad and 3 L (ours): more than a log, a
+gyro, a compass or the place of an antenna is wrong by."""
 
 CLOCK_SHARE = 0.5
 """Standard error of the time of the rudder's record, in sampling steps (ours)."""
@@ -62,7 +67,10 @@ def pose(card: ManoeuvringCard, measured: Measured) -> Likelihood:
     known |= _of_the_gear(card, none.model)
     known[CLOCK] = CLOCK_SHARE * max(sampling_step(trial) for trial in measured.trials)
     mixing = np.column_stack([np.diag(list(known.values())), *_shared(tuple(known), known, free)])
-    return Likelihood(motion, none, Coefficients(tuple(known), mixing), belief(motion, ship_time))
+    length, speed = card.ship.length_m, card.model.speed_mps
+    wide = BEGINNING * np.array([speed, speed, speed / length, 1.0, 3 * length, 3 * length])
+    known_before = replace(belief(motion, ship_time), wide=np.maximum(wide, WIDE * motion.errors))
+    return Likelihood(motion, none, Coefficients(tuple(known), mixing), known_before)
 
 
 def _group(name: str) -> str:

@@ -112,6 +112,9 @@ def figures(card: ManoeuvringCard, trials: Sequence[Trial], passed: Sequence[Pas
 def _ends(one: Passed, which: str) -> list[Figure]:
     simulated: Mapping[str, Vector] = getattr(one, which)
     measured, predicted = _end_figures(one.measured), _end_figures(simulated)
+    for name in measured.keys() & predicted.keys():
+        if name.endswith("_deg"):  # the same side of north as the measured one
+            predicted[name] = measured[name] + (predicted[name] - measured[name] + 180) % 360 - 180
     return [Figure(one.name, name, value, predicted.get(name)) for name, value in measured.items()]
 
 

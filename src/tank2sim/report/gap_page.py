@@ -142,7 +142,7 @@ def _beside(gap: Gap) -> list[str]:
         names = "; ".join(" with ".join(map(effect_in_words, one)) for one in gap.alternatives)
         told.append(f"What else it could be: {names}. These data cannot tell them apart.")
     elif gap.effects and gap.verdict == MISSING:
-        told.append("What else it could be: none of the other explanations that were tried comes near.")
+        told.append("What else it could be: none of the explanations without it comes near.")
     if gap.verdict != NOTHING and gap.equation:
         told.append(f"The gap is in {_EQUATIONS.get(gap.equation, gap.equation)}.")
     return told
@@ -175,7 +175,8 @@ _AGREEMENT = (
     "A true effect has the same size in every trial. Where trials want different sizes, the name is wrong or not all."
 )
 _COULD_HIDE = (
-    "Effects smaller than this could be there without showing in these data; a larger one would have been seen."
+    "Effects up to this size could be there without showing in these data, each beside what was found; for limits and "
+    "time constants of the gear it is the value furthest from the card's that would not show."
 )
 _NOISE = (
     "By these standard deviations misfits are counted. Stated: by the files; estimated: from the records themselves."
@@ -353,7 +354,7 @@ def _could_hide(gap: Gap) -> Table | None:
             words, unit = in_words(own)
             shown = format_number(value, 2)
             rows.append([effect_in_words(effect), words, shown, unit or "-", _meaning(effect, name)])
-    heads = ("effect", "parameter", "smaller than", "unit", "meaning")
+    heads = ("effect", "parameter", "up to", "unit", "meaning")
     return _table("Sizes that these data cannot show", heads, rows) if rows else None
 
 
