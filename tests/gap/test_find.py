@@ -75,6 +75,7 @@ def made() -> dict[str, Made]:
     return dict(zip(("current", "nothing"), some, strict=True))
 
 
+@pytest.mark.slow
 def test_a_current_is_found_and_proved_on_a_trial_held_out(made, tmp_path: Path) -> None:
     case = sought(tmp_path, made["current"], HELD, FEW)
     assert case.gap.verdict == MISSING and case.named == {"current"}

@@ -117,6 +117,7 @@ def test_none_is_the_worked_case_without_an_effect(data: Path, long: dict[str, l
     assert misfit(long["case"], case(data, 6, "turn20_port", "zigzag20_20", "slowdown")) < 1.6
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("number", "left"), [(1, 0.02), (2, 0.02), (3, 0.2), (4, 0.3), (8, 0.02)])
 def test_effects_explain_the_worked_cases(data: Path, long: dict[str, list[Trial]], number: int, left: float) -> None:
     """Wind and cross flow have other forms than the case, and leave something."""
@@ -139,6 +140,7 @@ def test_noise_has_the_stated_size() -> None:
         assert np.std(np.diff(noise)) / np.sqrt(2.0) == pytest.approx(2.0 * WHITE[name], rel=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", EFFECTS)
 def test_effect_shows(short: dict[str, list[Trial]], name: str) -> None:
     none, one = short["none"], short[name]
@@ -150,27 +152,32 @@ def test_effect_shows(short: dict[str, list[Trial]], name: str) -> None:
         assert misfit(none, one) > 1.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", OUTSIDERS)
 def test_outsider_shows(long: dict[str, list[Trial]], name: str) -> None:
     assert misfit(long["none"], long[name]) > 1.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in EFFECTS if name not in ("rudder_time_offset", "wind")])
 def test_quarter_strength_is_about_a_quarter_of_the_response(short: dict[str, list[Trial]], name: str) -> None:
     full, quarter = (np.linalg.norm(misfits(short["none"], short[key])) for key in (name, f"{name}/4"))
     assert 0.15 < quarter / full < 0.35
 
 
+@pytest.mark.long
 def test_quarter_of_wind_on_the_average_of_directions(long: dict[str, list[Trial]]) -> None:
     full, quarter = (np.linalg.norm(misfits(5 * long["none"], long[key])) for key in ("wind", "wind/4"))
     assert 0.15 < quarter / full < 0.35
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("setting", DISTURBED)
 def test_disturbances_move_the_ship_but_not_absurdly(short: dict[str, list[Trial]], setting: Setting) -> None:
     assert 1.0 < misfit(short["none"], short[f"{setting.process} {setting.coefficients}"]) < 100.0
 
 
+@pytest.mark.long
 def test_set_is_the_same_to_the_bit_in_any_batch() -> None:
     settings = [Setting((name,), 5, process="gusts") for name in EFFECTS if name not in SENSORS]
     settings += [Setting(("wind", "cross_flow_drag"), 5, coefficients="correlated")]

@@ -41,7 +41,8 @@ STANDARD_ERRORS = 3.0
 """An effect is named if its size exceeds so many of its standard errors."""
 
 TEMPER = 3.0
-"""Scores are divided by this before they become probabilities: so calibrated on made-up trials, benchmarks/gap.py."""
+"""Scores are divided by this before they become probabilities (ours): trials have less to say than their scores, for
+noise has colour and formulas have errors. benchmarks/gap.py prints what was claimed beside what was there."""
 
 
 SUREST = 0.99
