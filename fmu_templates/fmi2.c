@@ -1,12 +1,9 @@
 /* The functions of FMI 2.0 for Model Exchange and Co-Simulation. */
 #include "fmi2Functions.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 #include "instance.h"
-
-enum { BEFORE_END = ANY_MODE & ~TERMINATED, SIMULATED = EVENT | CONTINUOUS_TIME | STEPPING };
 
 /* The logger of FMI 2 takes a format, in which # announces a reference to a variable: both signs are doubled. */
 static void send(const Instance *self, Status status, const char *category, const char *message) {
@@ -29,8 +26,8 @@ const char *fmi2GetVersion(void) { return fmi2Version; }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[]) {
-    if (refused(c, __func__, ANY_MODE, ANY_KIND)) return fmi2Error;
-    if (missing(c, __func__, categories, nCategories)) return fmi2Error;
+    if (REFUSED(c, ANY_MODE, ANY_KIND)) return fmi2Error;
+    if (MISSING(c, categories, nCategories)) return fmi2Error;
     return (fmi2Status)select_logging(c, loggingOn != fmi2False, nCategories, categories);
 }
 
@@ -39,18 +36,17 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nC
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
                               fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions,
                               fmi2Boolean visible, fmi2Boolean loggingOn) {
-    Host host = {NULL, NULL, send, calloc, free};
+    /* Memory is never the caller's: engines exist whose allocateMemory cuts the address to 32 bits. */
+    Host host = {.send = send};
+    int kind = 0;
     (void)fmuResourceLocation;
     (void)visible;
     if (!functions) return NULL;
     host.environment = functions->componentEnvironment;
     host.logger = (AnyFunction)functions->logger;
-    if (functions->allocateMemory && functions->freeMemory) {
-        host.allocate = functions->allocateMemory;
-        host.release = functions->freeMemory;
-    }
-    return create_instance(&host, instanceName, fmuGUID,
-                           fmuType == fmi2CoSimulation ? CO_SIMULATION : MODEL_EXCHANGE, loggingOn != fmi2False);
+    if (fmuType == fmi2ModelExchange) kind = MODEL_EXCHANGE;
+    if (fmuType == fmi2CoSimulation) kind = CO_SIMULATION;
+    return create_instance(&host, instanceName, fmuGUID, kind, loggingOn != fmi2False);
 }
 
 void fmi2FreeInstance(fmi2Component c) { free_instance(c); }
@@ -59,29 +55,29 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
     (void)toleranceDefined;
     (void)tolerance;
-    if (refused(c, __func__, INSTANTIATED, ANY_KIND)) return fmi2Error;
+    if (REFUSED(c, INSTANTIATED, ANY_KIND)) return fmi2Error;
     return (fmi2Status)set_experiment(c, startTime, stopTimeDefined != fmi2False, stopTime);
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
-    if (refused(c, __func__, INSTANTIATED, ANY_KIND)) return fmi2Error;
+    if (REFUSED(c, INSTANTIATED, ANY_KIND)) return fmi2Error;
     ((Instance *)c)->mode = INITIALISING;
     return fmi2OK;
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-    if (refused(c, __func__, INITIALISING, ANY_KIND)) return fmi2Error;
+    if (REFUSED(c, INITIALISING, ANY_KIND)) return fmi2Error;
     return (fmi2Status)finish_initialisation(c);
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-    if (refused(c, __func__, SIMULATED, ANY_KIND)) return fmi2Error;
+    if (REFUSED(c, SIMULATED, ANY_KIND)) return fmi2Error;
     ((Instance *)c)->mode = TERMINATED;
     return fmi2OK;
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
-    if (refused(c, __func__, ANY_MODE, ANY_KIND)) return fmi2Error;
+    if (REFUSED(c, ANY_MODE, ANY_KIND)) return fmi2Error;
     reset_instance(c);
     return fmi2OK;
 }
@@ -89,14 +85,14 @@ fmi2Status fmi2Reset(fmi2Component c) {
 /* ---- variables ---- */
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[]) {
-    if (refused(c, __func__, ANY_MODE, ANY_KIND)) return fmi2Error;
-    if (missing(c, __func__, vr, nvr) || missing(c, __func__, value, nvr)) return fmi2Error;
+    if (REFUSED(c, ANY_MODE, ANY_KIND)) return fmi2Error;
+    if (MISSING(c, vr, nvr) || MISSING(c, value, nvr)) return fmi2Error;
     return (fmi2Status)get_reals(c, vr, nvr, value);
 }
 
 fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[]) {
-    if (refused(c, __func__, ANY_MODE, ANY_KIND)) return fmi2Error;
-    if (missing(c, __func__, vr, nvr) || missing(c, __func__, value, nvr)) return fmi2Error;
+    if (REFUSED(c, ANY_MODE, ANY_KIND)) return fmi2Error;
+    if (MISSING(c, vr, nvr) || MISSING(c, value, nvr)) return fmi2Error;
     for (size_t i = 0; i < nvr; ++i) {
         bool held = false;
         if (get_boolean(c, vr[i], &held) != OK) return fmi2Error;
@@ -106,14 +102,14 @@ fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[]) {
-    if (refused(c, __func__, BEFORE_END, ANY_KIND)) return fmi2Error;
-    if (missing(c, __func__, vr, nvr) || missing(c, __func__, value, nvr)) return fmi2Error;
+    if (REFUSED(c, BEFORE_END, ANY_KIND)) return fmi2Error;
+    if (MISSING(c, vr, nvr) || MISSING(c, value, nvr)) return fmi2Error;
     return (fmi2Status)set_reals(c, vr, nvr, value);
 }
 
 fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[]) {
-    if (refused(c, __func__, BEFORE_END, ANY_KIND)) return fmi2Error;
-    if (missing(c, __func__, vr, nvr) || missing(c, __func__, value, nvr)) return fmi2Error;
+    if (REFUSED(c, BEFORE_END, ANY_KIND)) return fmi2Error;
+    if (MISSING(c, vr, nvr) || MISSING(c, value, nvr)) return fmi2Error;
     for (size_t i = 0; i < nvr; ++i) {
         if (check_boolean(c, vr[i]) != OK) return fmi2Error;
     }
@@ -150,38 +146,38 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
 /* ---- the state as a whole ---- */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-    if (refused(c, __func__, ANY_MODE, ANY_KIND) || missing(c, __func__, FMUstate, 1)) return fmi2Error;
+    if (REFUSED(c, BETWEEN_CALLS, ANY_KIND) || MISSING(c, FMUstate, 1)) return fmi2Error;
     return (fmi2Status)save_state(c, FMUstate);
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
-    if (refused(c, __func__, ANY_MODE, ANY_KIND) || missing(c, __func__, FMUstate, 1)) return fmi2Error;
+    if (REFUSED(c, BETWEEN_CALLS, ANY_KIND) || MISSING(c, FMUstate, 1)) return fmi2Error;
     return (fmi2Status)restore_state(c, FMUstate);
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
-    if (refused(c, __func__, ANY_MODE, ANY_KIND)) return fmi2Error;
-    if (FMUstate) free_state(c, FMUstate);
+    if (REFUSED(c, BETWEEN_CALLS, ANY_KIND)) return fmi2Error;
+    if (FMUstate) free_state(FMUstate);
     return fmi2OK;
 }
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size) {
-    if (refused(c, __func__, ANY_MODE, ANY_KIND)) return fmi2Error;
-    if (missing(c, __func__, FMUstate, 1) || missing(c, __func__, size, 1)) return fmi2Error;
+    if (REFUSED(c, BETWEEN_CALLS, ANY_KIND)) return fmi2Error;
+    if (MISSING(c, FMUstate, 1) || MISSING(c, size, 1)) return fmi2Error;
     *size = serialised_size();
     return fmi2OK;
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size) {
-    if (refused(c, __func__, ANY_MODE, ANY_KIND)) return fmi2Error;
-    if (missing(c, __func__, FMUstate, 1) || missing(c, __func__, serializedState, 1)) return fmi2Error;
+    if (REFUSED(c, BETWEEN_CALLS, ANY_KIND)) return fmi2Error;
+    if (MISSING(c, FMUstate, 1) || MISSING(c, serializedState, 1)) return fmi2Error;
     return (fmi2Status)serialise_state(c, FMUstate, serializedState, size);
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
                                    fmi2FMUstate *FMUstate) {
-    if (refused(c, __func__, ANY_MODE, ANY_KIND)) return fmi2Error;
-    if (missing(c, __func__, serializedState, 1) || missing(c, __func__, FMUstate, 1)) return fmi2Error;
+    if (REFUSED(c, BETWEEN_CALLS, ANY_KIND)) return fmi2Error;
+    if (MISSING(c, serializedState, 1) || MISSING(c, FMUstate, 1)) return fmi2Error;
     return (fmi2Status)deserialise_state(c, serializedState, size, FMUstate);
 }
 
@@ -190,28 +186,28 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
                                         const fmi2ValueReference vKnown_ref[], size_t nKnown,
                                         const fmi2Real dvKnown[], fmi2Real dvUnknown[]) {
-    if (refused(c, __func__, ANY_MODE & ~INSTANTIATED, ANY_KIND)) return fmi2Error;
-    if (missing(c, __func__, vUnknown_ref, nUnknown) || missing(c, __func__, dvUnknown, nUnknown)) return fmi2Error;
-    if (missing(c, __func__, vKnown_ref, nKnown) || missing(c, __func__, dvKnown, nKnown)) return fmi2Error;
+    if (REFUSED(c, AFTER_START, ANY_KIND)) return fmi2Error;
+    if (MISSING(c, vUnknown_ref, nUnknown) || MISSING(c, dvUnknown, nUnknown)) return fmi2Error;
+    if (MISSING(c, vKnown_ref, nKnown) || MISSING(c, dvKnown, nKnown)) return fmi2Error;
     return (fmi2Status)directional_derivative(c, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown);
 }
 
 /* ---- Model Exchange ---- */
 
 fmi2Status fmi2EnterEventMode(fmi2Component c) {
-    if (refused(c, __func__, EVENT | CONTINUOUS_TIME, MODEL_EXCHANGE)) return fmi2Error;
+    if (REFUSED(c, EVENT | CONTINUOUS_TIME, MODEL_EXCHANGE)) return fmi2Error;
     ((Instance *)c)->mode = EVENT;
     return fmi2OK;
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo) {
-    if (refused(c, __func__, EVENT, MODEL_EXCHANGE) || missing(c, __func__, eventInfo, 1)) return fmi2Error;
+    if (REFUSED(c, EVENT, MODEL_EXCHANGE) || MISSING(c, eventInfo, 1)) return fmi2Error;
     memset(eventInfo, 0, sizeof *eventInfo);
     return fmi2OK;
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
-    if (refused(c, __func__, EVENT, MODEL_EXCHANGE)) return fmi2Error;
+    if (REFUSED(c, EVENT, MODEL_EXCHANGE)) return fmi2Error;
     ((Instance *)c)->mode = CONTINUOUS_TIME;
     return fmi2OK;
 }
@@ -219,60 +215,53 @@ fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation) {
     (void)noSetFMUStatePriorToCurrentPoint;
-    if (refused(c, __func__, CONTINUOUS_TIME, MODEL_EXCHANGE)) return fmi2Error;
-    if (missing(c, __func__, enterEventMode, 1) || missing(c, __func__, terminateSimulation, 1)) return fmi2Error;
+    if (REFUSED(c, CONTINUOUS_TIME, MODEL_EXCHANGE)) return fmi2Error;
+    if (MISSING(c, enterEventMode, 1) || MISSING(c, terminateSimulation, 1)) return fmi2Error;
     *enterEventMode = fmi2False;
     *terminateSimulation = fmi2False;
     return fmi2OK;
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
-    if (refused(c, __func__, EVENT | CONTINUOUS_TIME, MODEL_EXCHANGE)) return fmi2Error;
+    if (REFUSED(c, EVENT | CONTINUOUS_TIME, MODEL_EXCHANGE)) return fmi2Error;
     return (fmi2Status)set_time(c, time);
 }
 
-/* True if the array of a block cannot be taken: a null pointer, or not as long as the block. */
-static bool unfit(fmi2Component c, const char *function, const void *values, size_t count, size_t expected) {
-    if (count != expected) {
-        report(c, ERROR, "%s: the array has %lu elements and must have %lu", function, (unsigned long)count,
-               (unsigned long)expected);
-        return true;
-    }
-    return missing(c, function, values, count);
-}
-
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
-    if (refused(c, __func__, CONTINUOUS_TIME, MODEL_EXCHANGE)) return fmi2Error;
-    if (unfit(c, __func__, x, nx, STATE_COUNT)) return fmi2Error;
+    if (REFUSED(c, CONTINUOUS_TIME, MODEL_EXCHANGE)) return fmi2Error;
+    if (UNFIT(c, x, nx, STATE_COUNT)) return fmi2Error;
     return (fmi2Status)set_states(c, x);
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
-    if (refused(c, __func__, ANY_MODE & ~INSTANTIATED, MODEL_EXCHANGE)) return fmi2Error;
-    if (unfit(c, __func__, derivatives, nx, STATE_COUNT)) return fmi2Error;
+    if (REFUSED(c, AFTER_START, MODEL_EXCHANGE)) return fmi2Error;
+    if (UNFIT(c, derivatives, nx, STATE_COUNT)) return fmi2Error;
     return (fmi2Status)get_block(c, RATES_BEGIN, RATES_END, derivatives);
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
-    if (refused(c, __func__, ANY_MODE & ~INSTANTIATED, MODEL_EXCHANGE)) return fmi2Error;
-    return unfit(c, __func__, eventIndicators, ni, 0) ? fmi2Error : fmi2OK;
+    if (REFUSED(c, AFTER_START, MODEL_EXCHANGE)) return fmi2Error;
+    if (UNFIT(c, eventIndicators, ni, INDICATOR_COUNT)) return fmi2Error;
+    return (fmi2Status)get_block(c, INDICATORS_BEGIN, INDICATORS_END, eventIndicators);
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
-    if (refused(c, __func__, ANY_MODE & ~INSTANTIATED, MODEL_EXCHANGE)) return fmi2Error;
-    if (unfit(c, __func__, x, nx, STATE_COUNT)) return fmi2Error;
+    if (REFUSED(c, AFTER_START, MODEL_EXCHANGE)) return fmi2Error;
+    if (UNFIT(c, x, nx, STATE_COUNT)) return fmi2Error;
     return (fmi2Status)get_block(c, STATES_BEGIN, STATES_END, x);
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
-    if (refused(c, __func__, ANY_MODE, MODEL_EXCHANGE)) return fmi2Error;
-    if (unfit(c, __func__, x_nominal, nx, STATE_COUNT)) return fmi2Error;
+    if (REFUSED(c, ANY_MODE, MODEL_EXCHANGE)) return fmi2Error;
+    if (UNFIT(c, x_nominal, nx, STATE_COUNT)) return fmi2Error;
     for (size_t i = STATES_BEGIN; i < STATES_END; ++i) x_nominal[i - STATES_BEGIN] = VARIABLES[i].nominal;
     return fmi2OK;
 }
 
 /* ---- Co-Simulation ---- */
 
+/* Orders change in steps, and inputs held over a step are what the reference integrates too: a line through them would
+ * make the result depend on the length of communication steps. */
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[]) {
     (void)vr, (void)nvr, (void)order, (void)value;
@@ -281,14 +270,15 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                         const fmi2Integer order[], fmi2Real value[]) {
-    (void)vr, (void)nvr, (void)order, (void)value;
-    return (fmi2Status)unsupported(c, __func__, "outputs have no derivatives (maxOutputDerivativeOrder is 0)");
+    if (REFUSED(c, STEPPING | TERMINATED, CO_SIMULATION)) return fmi2Error;
+    if (MISSING(c, vr, nvr) || MISSING(c, order, nvr) || MISSING(c, value, nvr)) return fmi2Error;
+    return (fmi2Status)output_derivatives(c, vr, nvr, order, value);
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
     (void)noSetFMUStatePriorToCurrentPoint;
-    if (refused(c, __func__, STEPPING, CO_SIMULATION)) return fmi2Error;
+    if (REFUSED(c, STEPPING, CO_SIMULATION)) return fmi2Error;
     return (fmi2Status)do_step(c, currentCommunicationPoint, communicationStepSize);
 }
 
@@ -297,14 +287,14 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
 }
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
-    if (refused(c, __func__, ANY_MODE, CO_SIMULATION) || missing(c, __func__, value, 1)) return fmi2Error;
+    if (REFUSED(c, ANY_MODE, CO_SIMULATION) || MISSING(c, value, 1)) return fmi2Error;
     if (s != fmi2DoStepStatus) return (fmi2Status)report(c, DISCARD, "%s: no such status", __func__);
     *value = (fmi2Status)((Instance *)c)->last_step;
     return fmi2OK;
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value) {
-    if (refused(c, __func__, ANY_MODE, CO_SIMULATION) || missing(c, __func__, value, 1)) return fmi2Error;
+    if (REFUSED(c, ANY_MODE, CO_SIMULATION) || MISSING(c, value, 1)) return fmi2Error;
     if (s != fmi2LastSuccessfulTime) return (fmi2Status)report(c, DISCARD, "%s: no such status", __func__);
     *value = ((Instance *)c)->value[TIME];
     return fmi2OK;
@@ -312,12 +302,12 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value) {
     (void)s;
-    if (refused(c, __func__, ANY_MODE, CO_SIMULATION) || missing(c, __func__, value, 1)) return fmi2Error;
+    if (REFUSED(c, ANY_MODE, CO_SIMULATION) || MISSING(c, value, 1)) return fmi2Error;
     return (fmi2Status)report(c, DISCARD, "%s: no such status", __func__);
 }
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
-    if (refused(c, __func__, ANY_MODE, CO_SIMULATION) || missing(c, __func__, value, 1)) return fmi2Error;
+    if (REFUSED(c, ANY_MODE, CO_SIMULATION) || MISSING(c, value, 1)) return fmi2Error;
     if (s != fmi2Terminated) return (fmi2Status)report(c, DISCARD, "%s: no such status", __func__);
     /* The same step would fail again: a simulator that only asks whether to go on would ask for ever. */
     *value = ((Instance *)c)->last_step == DISCARD;
@@ -326,6 +316,6 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value) {
     (void)s;
-    if (refused(c, __func__, ANY_MODE, CO_SIMULATION) || missing(c, __func__, value, 1)) return fmi2Error;
+    if (REFUSED(c, ANY_MODE, CO_SIMULATION) || MISSING(c, value, 1)) return fmi2Error;
     return (fmi2Status)report(c, DISCARD, "%s: no such status", __func__);
 }

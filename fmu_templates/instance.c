@@ -44,19 +44,20 @@ void report_event(const Instance *self, const char *format, ...) {
     va_end(arguments);
 }
 
-/* NULL if there is no memory, the name is missing, or the token is that of another FMU. */
+/* NULL if there is no memory, the kind is none, the name is missing, or the token is that of another FMU. */
 Instance *create_instance(const Host *host, const char *name, const char *token, int kind, bool logging) {
     const char *called = name ? name : "";
-    Instance *self = host->allocate(1, sizeof *self);
+    Instance *self = calloc(1, sizeof *self + strlen(called) + 1);
     if (!self) return NULL;
     self->host = *host;
     self->kind = kind;
     self->logged = logging ? LOG_ALL : LOG_ALL & ~(unsigned)LOG_EVENTS;
-    self->name = host->allocate(strlen(called) + 1, 1);
-    if (self->name) strcpy(self->name, called);
+    strcpy(self->name, called);
     reset_instance(self);
-    if (self->name && *called && token && strcmp(token, MODEL_TOKEN) == 0) return self;
-    if (!*called) {
+    if ((kind & ANY_KIND) && *called && token && strcmp(token, MODEL_TOKEN) == 0) return self;
+    if (!(kind & ANY_KIND)) {
+        report(self, ERROR, "an instance can be of Model Exchange or of Co-Simulation, and of nothing else");
+    } else if (!*called) {
         report(self, ERROR, "the instance name is missing");
     } else {
         report(self, ERROR, "the token is %s and must be %s, as in modelDescription.xml",
@@ -67,11 +68,12 @@ Instance *create_instance(const Host *host, const char *name, const char *token,
 }
 
 void free_instance(Instance *self) {
-    void (*release)(void *);
     if (!self) return;
-    release = self->host.release;
-    if (self->name) release(self->name);
-    release(self);
+    if (self->mode == UPDATING) {
+        report(self, ERROR, "an instance cannot be freed in an intermediate update: its step is still being done");
+    } else {
+        free(self);
+    }
 }
 
 void reset_instance(Instance *self) {
@@ -89,11 +91,11 @@ static const char *mode_name(int mode) {
         case EVENT: return "event mode";
         case CONTINUOUS_TIME: return "continuous-time mode";
         case STEPPING: return "step mode";
+        case UPDATING: return "intermediate update";
         default: return "terminated";
     }
 }
 
-/* True, with a line in the log, if the function cannot be called on this instance, or not now. */
 bool refused(const Instance *self, const char *function, int modes, int kinds) {
     if (!self) return true;
     if (!(self->kind & kinds)) {
@@ -108,10 +110,17 @@ bool refused(const Instance *self, const char *function, int modes, int kinds) {
     return false;
 }
 
-/* True, with a line in the log, if an argument that has `count` elements is NULL. */
-bool missing(const Instance *self, const char *function, const void *pointer, size_t count) {
-    if (pointer || count == 0) return false;
-    report(self, ERROR, "%s: an argument is a null pointer", function);
+bool missing(const Instance *self, const char *function, const char *argument, const void *array, size_t count) {
+    if (array || count == 0) return false;
+    report(self, ERROR, "%s: %s is a null pointer", function, argument);
+    return true;
+}
+
+bool unfit(const Instance *self, const char *function, const char *argument, const void *array, size_t count,
+           size_t expected) {
+    if (count == expected) return missing(self, function, argument, array, count);
+    report(self, ERROR, "%s: %s has %lu elements and must have %lu", function, argument, (unsigned long)count,
+           (unsigned long)expected);
     return true;
 }
 
@@ -124,7 +133,9 @@ Status select_logging(Instance *self, bool on, size_t count, const char *const c
     unsigned bits = count == 0 ? LOG_ALL : 0;
     for (size_t i = 0; i < count; ++i) {
         size_t known = 0;
-        while (known < CATEGORY_COUNT && (!categories[i] || strcmp(categories[i], CATEGORIES[known].name) != 0)) ++known;
+        while (known < CATEGORY_COUNT && (!categories[i] || strcmp(categories[i], CATEGORIES[known].name) != 0)) {
+            ++known;
+        }
         if (known == CATEGORY_COUNT) {
             return report(self, ERROR, "there is no log category %s", categories[i] ? categories[i] : "NULL");
         }

@@ -10,7 +10,12 @@ enum { TRIM_ITERATIONS = 50 };
 
 /* H = 1 s with steps of 0.1 s shall be ten steps, although H / 0.1 may come out as 10.000000000000002. */
 static const double STEP_COUNT_ROUNDING = 1e-9;
-static const double MOST_STEPS = 1e9;
+
+/* More internal steps in one communication step are a mistake, in which a simulator would seem to hang (ours). */
+static const double MOST_STEPS = 1e7;
+
+/* States that are not finite stay so: a long step need not go to its end to find it (so often is a choice of ours). */
+enum { STEPS_BETWEEN_CHECKS = 256 };
 
 static const size_t STATE_BYTES = (STATES_END - STATES_BEGIN) * sizeof(double);
 
@@ -35,18 +40,18 @@ static bool settled(const double old[], const double new[]) {
 }
 
 /* Number of Newton iterations to steady motion, which replaces the states; 0 if there is none to be found. */
-static int trim(Instance *self) {
-    double *states = self->value + STATES_BEGIN;
-    const double *arguments[] = {self->next[0], self->value + INPUTS_BEGIN, self->value + PARAMETERS_BEGIN};
-    double *results[] = {self->next[1]};
-    memcpy(self->next[0], states, STATE_BYTES);
+static int trim(Instance *self, Work *work) {
+    double now[STATE_COUNT + 1], next[STATE_COUNT + 1];
+    const double *arguments[] = {now, self->value + INPUTS_BEGIN, self->value + PARAMETERS_BEGIN};
+    double *results[] = {next};
+    memcpy(now, self->value + STATES_BEGIN, STATE_BYTES);
     for (int iteration = 1; iteration <= TRIM_ITERATIONS; ++iteration) {
-        model_trim_step(arguments, results, self->integer_work, self->work, 0);
-        if (settled(self->next[0], self->next[1])) {
-            memcpy(states, self->next[1], STATE_BYTES);
+        model_trim_step(arguments, results, work->integers, work->reals, 0);
+        if (settled(now, next)) {
+            memcpy(self->value + STATES_BEGIN, next, STATE_BYTES);
             return iteration;
         }
-        memcpy(self->next[0], self->next[1], STATE_BYTES);
+        memcpy(now, next, STATE_BYTES);
     }
     return 0;
 }
@@ -55,26 +60,33 @@ static bool trim_wanted(const Instance *self) { return TRIM_SWITCH != TIME && se
 
 /* Initial states from the parameters; returns the iterations of the search for steady motion (0: not found). */
 static int find_initial_states(Instance *self) {
+    Work work;
     const double *arguments[] = {self->value + PARAMETERS_BEGIN};
     double *results[] = {self->value + STATES_BEGIN};
-    model_initial(arguments, results, self->integer_work, self->work, 0);
+    model_initial(arguments, results, work.integers, work.reals, 0);
     self->stale = (self->stale & ~(unsigned)STALE_STATES) | STALE_RATES | STALE_OUTPUTS;
-    return trim_wanted(self) ? trim(self) : 0;
+    return trim_wanted(self) ? trim(self, &work) : 0;
 }
 
 /* Calculate what of `parts` is stale. */
 void refresh(Instance *self, unsigned parts) {
+    Work work;
     const double *arguments[] = {self->value + STATES_BEGIN, self->value + INPUTS_BEGIN,
                                  self->value + PARAMETERS_BEGIN};
     double *rates[] = {self->value + RATES_BEGIN};
     double *outputs[] = {self->value + OUTPUTS_BEGIN};
+    double *constants[] = {self->constant};
     if (self->stale & STALE_STATES) find_initial_states(self);
+    if (self->stale & parts & STALE_CONSTANTS) {
+        model_constants(&arguments[2], constants, work.integers, work.reals, 0);
+        self->stale &= ~(unsigned)STALE_CONSTANTS;
+    }
     if (self->stale & parts & STALE_RATES) {
-        model_rates(arguments, rates, self->integer_work, self->work, 0);
+        model_rates(arguments, rates, work.integers, work.reals, 0);
         self->stale &= ~(unsigned)STALE_RATES;
     }
     if (self->stale & parts & STALE_OUTPUTS) {
-        model_outputs(arguments, outputs, self->integer_work, self->work, 0);
+        model_outputs(arguments, outputs, work.integers, work.reals, 0);
         self->stale &= ~(unsigned)STALE_OUTPUTS;
     }
 }
@@ -86,7 +98,7 @@ Status set_experiment(Instance *self, double start, bool stop_defined, double st
     }
     self->value[TIME] = start;
     self->stop_defined = stop_defined;
-    self->stop_time = stop;
+    self->stop_time = stop_defined ? stop : 0;
     return OK;
 }
 
@@ -112,7 +124,11 @@ static Status check_step(const Instance *self, double start, double size) {
     const double rounding = 1e-6 * size + 1e-12 * fabs(start);
     if (!(isfinite(size) && size > 0)) return report(self, ERROR, "a communication step of %g s cannot be done", size);
     if (!(fabs(start - self->value[TIME]) <= rounding)) {
-        return report(self, ERROR, "the step is to start at %.17g s, but the time is %.17g s", start, self->value[TIME]);
+        return report(self, ERROR, "the step is to start at %.17g s, but the time is %.17g s", start,
+                      self->value[TIME]);
+    }
+    if (!(start + size > start && isfinite(start + size))) {
+        return report(self, ERROR, "a communication step of %g s from %.17g s does not change the time", size, start);
     }
     if (self->stop_defined && start + size > self->stop_time + rounding) {
         return report(self, ERROR, "the step would end at %.17g s, after the stop time %.17g s", start + size,
@@ -125,29 +141,80 @@ static Status check_step(const Instance *self, double start, double size) {
     return OK;
 }
 
-/* Integrates over `size` in equal steps, none longer than solver.max_step; if that fails, nothing has changed. */
-Status do_step(Instance *self, double start, double size) {
-    const double *arguments[] = {self->value + STATES_BEGIN, self->value + INPUTS_BEGIN,
-                                 self->value + PARAMETERS_BEGIN, NULL};
-    double *results[1], count, step;
+/* The fewest equal steps, none longer than solver.max_step, into which a communication step is divided. */
+static long internal_steps(const Instance *self, double size) {
+    return (long)fmax(1, ceil(size / self->value[MAX_STEP] * (1 - STEP_COUNT_ROUNDING)));
+}
+
+static void advance(Instance *self, Work *work, const double from[], double step, double to[]) {
+    const double *arguments[] = {from, self->value + INPUTS_BEGIN, self->value + PARAMETERS_BEGIN, self->constant,
+                                 &step};
+    double *results[] = {to};
+    model_step(arguments, results, work->integers, work->reals, 0);
+}
+
+static void arrive(Instance *self, const double states[], double time) {
+    memcpy(self->value + STATES_BEGIN, states, STATE_BYTES);
+    self->value[TIME] = time;
+    self->stale |= STALE_RATES | STALE_OUTPUTS;
+}
+
+static Status diverged(const Instance *self, size_t place, double start, double size) {
+    return report(self, DISCARD, "%s is not finite at the end of the step from %g s to %g s", VARIABLES[place].name,
+                  start, start + size);
+}
+
+/* If it fails, nothing has changed. */
+static Status integrate(Instance *self, double start, double size) {
+    Work work;
+    double path[2][STATE_COUNT + 1];
+    const double *at = self->value + STATES_BEGIN;
+    const long count = internal_steps(self, size);
     size_t place;
+    for (long i = 0; i < count; ++i) {
+        advance(self, &work, at, size / (double)count, path[i & 1]);
+        at = path[i & 1];
+        if ((i + 1) % STEPS_BETWEEN_CHECKS == 0 && !finite_states(at, &place)) break;
+    }
+    if (!finite_states(at, &place)) return diverged(self, place, start, size);
+    arrive(self, at, start + size);
+    return OK;
+}
+
+/* The same with an intermediate update after each internal step, in which the simulator may set inputs and ask to end
+ * early; if it fails, states and time are as they were before. */
+static Status integrate_in_view(Instance *self, double start, double size) {
+    Work work;
+    double before[STATE_COUNT + 1], next[STATE_COUNT + 1];
+    const long count = internal_steps(self, size);
+    const double step = size / (double)count, begun = self->value[TIME];
+    double now = start, end = start + size;
+    size_t place;
+    memcpy(before, self->value + STATES_BEGIN, STATE_BYTES);
+    for (long i = 1; now < end; ++i) {
+        const double regular = i < count ? start + (double)i * step : start + size;
+        double asked;
+        advance(self, &work, self->value + STATES_BEGIN, regular <= end ? step : end - now, next);
+        if (!finite_states(next, &place)) {
+            arrive(self, before, begun);
+            return diverged(self, place, start, size);
+        }
+        asked = now = fmin(regular, end);
+        arrive(self, next, now);
+        self->mode = UPDATING;
+        if (self->host.show(self, self->host.may_end_early && now < end, &asked)) {
+            end = isfinite(asked) ? fmin(end, fmax(now, asked)) : now;
+        }
+        self->mode = STEPPING;
+    }
+    return OK;
+}
+
+/* Integrates over `size` and leaves the time it has come to in value[TIME]. */
+Status do_step(Instance *self, double start, double size) {
     self->last_step = check_step(self, start, size);
     if (self->last_step != OK) return self->last_step;
-    count = fmax(1, ceil(size / self->value[MAX_STEP] * (1 - STEP_COUNT_ROUNDING)));
-    step = size / count;
-    arguments[3] = &step;
-    for (long i = 0; i < (long)count; ++i) {
-        results[0] = self->next[i & 1];
-        model_step(arguments, results, self->integer_work, self->work, 0);
-        arguments[0] = results[0];
-    }
-    if (!finite_states(arguments[0], &place)) {
-        self->last_step = report(self, DISCARD, "%s is not finite at the end of the step from %g s to %g s",
-                                 VARIABLES[place].name, start, start + size);
-        return DISCARD;
-    }
-    memcpy(self->value + STATES_BEGIN, arguments[0], STATE_BYTES);
-    self->value[TIME] = start + size;
-    self->stale |= STALE_RATES | STALE_OUTPUTS;
-    return OK;
+    if (self->stale & STALE_CONSTANTS) refresh(self, STALE_CONSTANTS);
+    self->last_step = self->host.show ? integrate_in_view(self, start, size) : integrate(self, start, size);
+    return self->last_step;
 }

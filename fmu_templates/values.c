@@ -3,9 +3,17 @@
 
 #include <math.h>
 
-static bool is_input(unsigned reference) { return reference >= INPUTS_BEGIN && reference < INPUTS_END; }
+bool is_block(unsigned reference, unsigned begin, unsigned end) { return reference >= begin && reference < end; }
 
-static bool is_parameter(unsigned reference) { return reference >= PARAMETERS_BEGIN && reference <= MAX_STEP; }
+static bool is_input(unsigned reference) { return is_block(reference, INPUTS_BEGIN, INPUTS_END); }
+
+static bool is_parameter(unsigned reference) { return is_block(reference, PARAMETERS_BEGIN, MAX_STEP + 1); }
+
+/* May this variable be read or, if it is an input, set in an intermediate update? As in modelDescription.xml. */
+bool can_update(unsigned reference) {
+    if (reference == TIME || reference >= INDICATORS_BEGIN || is_parameter(reference)) return false;
+    return !VARIABLES[reference].boolean;
+}
 
 static Status check_reference(const Instance *self, unsigned reference, bool boolean) {
     if (reference >= VARIABLE_COUNT) {
@@ -26,7 +34,7 @@ static Status check_settable(const Instance *self, unsigned reference, bool bool
     variable = &VARIABLES[reference];
     if (!is_input(reference) && !is_parameter(reference)) {
         why = "is calculated";
-    } else if (self->mode & (INSTANTIATED | INITIALISING)) {
+    } else if (self->mode & BEFORE_START) {
         return OK;
     } else if (self->mode == TERMINATED) {
         why = "cannot be set after the end";
@@ -34,6 +42,8 @@ static Status check_settable(const Instance *self, unsigned reference, bool bool
         why = "is a fixed parameter: it can be set only before initialisation ends";
     } else if (self->mode == CONTINUOUS_TIME && (boolean || is_parameter(reference))) {
         why = "is not continuous: in Model Exchange it can be set only in event mode";
+    } else if (self->mode == UPDATING && (boolean || is_parameter(reference))) {
+        why = "is not continuous: it cannot be set in an intermediate update";
     } else {
         return OK;
     }
@@ -43,7 +53,7 @@ static Status check_settable(const Instance *self, unsigned reference, bool bool
 static unsigned part_of(unsigned reference) {
     if (reference >= OUTPUTS_BEGIN) return STALE_OUTPUTS;
     if (reference >= RATES_BEGIN) return STALE_RATES;
-    if (reference >= STATES_BEGIN && reference < STATES_END) return STALE_STATES;
+    if (is_block(reference, STATES_BEGIN, STATES_END)) return STALE_STATES;
     return 0;
 }
 
@@ -65,9 +75,10 @@ Status get_reals(Instance *self, const unsigned references[], size_t count, doub
 }
 
 /* What depends on inputs and parameters; the states too while they are still calculated from parameters. */
-static void mark_stale(Instance *self) {
+static void mark_stale(Instance *self, unsigned set) {
     self->stale |= STALE_RATES | STALE_OUTPUTS;
-    if (self->mode & (INSTANTIATED | INITIALISING)) self->stale |= STALE_STATES;
+    if (is_parameter(set)) self->stale |= STALE_CONSTANTS;
+    if (self->mode & BEFORE_START) self->stale |= STALE_STATES;
 }
 
 /* Sets all of the variables or, if one of them cannot be set, none. */
@@ -81,8 +92,10 @@ Status set_reals(Instance *self, const unsigned references[], size_t count, cons
             return report(self, DISCARD, "%s must be positive", VARIABLES[MAX_STEP].name);
         }
     }
-    for (size_t i = 0; i < count; ++i) self->value[references[i]] = values[i];
-    if (count > 0) mark_stale(self);
+    for (size_t i = 0; i < count; ++i) {
+        self->value[references[i]] = values[i];
+        mark_stale(self, references[i]);
+    }
     return OK;
 }
 
@@ -96,14 +109,15 @@ Status check_boolean(Instance *self, unsigned reference) { return check_settable
 
 void set_boolean(Instance *self, unsigned reference, bool value) {
     self->value[reference] = value ? 1.0 : 0.0;
-    mark_stale(self);
+    mark_stale(self, reference);
 }
 
 /* Answer to a call for variables of a type that the model has none of. */
 Status no_such_type(const Instance *self, const char *type, const unsigned references[], size_t count) {
     if (count == 0) return OK;
     if (!references) return report(self, ERROR, "the value references are a null pointer");
-    return report(self, ERROR, "the variable with value reference %u is not of type %s", references[0], type);
+    if (references[0] >= VARIABLE_COUNT) return check_reference(self, references[0], false);
+    return report(self, ERROR, "%s is not of type %s", VARIABLES[references[0]].name, type);
 }
 
 /* Values of a whole block: continuous states, or their derivatives. */

@@ -80,6 +80,7 @@ UNITS: dict[str, Unit] = {
         Unit("1", {}, 1e3),
         Unit("m", {"m": 1}, 1e8),
         Unit("s", {"s": 1}, 1e7),
+        Unit("1/s", {"s": -1}, 1e3),
         Unit("kg", {"kg": 1}, 1e10),
         Unit("rad", {"rad": 1}, 1e5, {"deg": 180.0 / math.pi}),
         Unit("m/s", {"m": 1, "s": -1}, 1e3, {"knots": 1.0 / KNOT_MPS}),

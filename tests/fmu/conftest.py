@@ -14,9 +14,13 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import read_model_description
 
+from tank2sim.cards import ManoeuvringCard
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
-from tank2sim.fmu.export import write_fmu
+from tank2sim.files import write_whole
+from tank2sim.fmu.documents import documents_of
+from tank2sim.fmu.export import ExportedFmu, write_fmu
 from tank2sim.fmu.running import RunningFmu, running
+from tank2sim.fmu.ssp import ship_with_autopilot
 from tank2sim.fmu.unpacking import UnpackedFmu
 
 
@@ -165,6 +169,30 @@ def fmu_file(models: dict[str, Model], session_folder: Path) -> Callable[[str, i
         return path
 
     return file
+
+
+@pytest.fixture(scope="session")
+def mariner_fmu(mariner: Model, mariner_card: ManoeuvringCard, session_folder: Path) -> Callable[[int], Path]:
+    """The FMU of a bundled ship in a version of FMI, with all that its card says, exported once."""
+
+    def file(fmi: int) -> Path:
+        path = session_folder / f"mariner{fmi}.fmu"
+        if not path.exists():
+            write_fmu(mariner, path, fmi=fmi, documents=documents_of(mariner_card))
+        return path
+
+    return file
+
+
+@pytest.fixture(scope="session")
+def mariner_ssp(mariner: Model, mariner_fmu: Callable[[int], Path], session_folder: Path) -> Path:
+    """The SSP package of the same ship, FMI 2."""
+    path = session_folder / "mariner.ssp"
+    if not path.exists():
+        content = mariner_fmu(2).read_bytes()
+        made = ExportedFmu(content=content, fmi=2, model_identifier="Mariner_class", token="", platforms=())
+        write_whole(path, ship_with_autopilot(mariner, made))
+    return path
 
 
 @pytest.fixture(scope="session")

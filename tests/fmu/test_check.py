@@ -97,7 +97,7 @@ def test_a_sign_changed_in_the_generated_code_fails(
 
     def tampered(functions: list[ca.Function], stem: str) -> str:
         code = generate(functions, stem)
-        assert "=sin(" in code
+        assert "=sin(" in code or stem != "equations"  # those of the start have none
         return code.replace("=sin(", "=-sin(")
 
     generate = sources.generate_c

@@ -202,7 +202,14 @@ def test_dependencies_of_the_trimmed_start_include_its_inputs(unpacked: Unpacked
 def test_value_references_stand_in_blocks(hull: Model) -> None:
     described = interface(hull)
     assert [variable.reference for variable in described.variables] == list(range(len(described.variables)))
-    assert [len(block) for block in described.blocks] == [7, 3, 12, 7, 4]
+    assert [len(block) for block in described.blocks] == [
+        7,
+        3,
+        12,
+        7,
+        4 + 2,
+        2,
+    ]  # two event indicators among the outputs
     assert described.variables[described.trim_switch].name == "initial.trim"
 
 

@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -58,6 +59,16 @@ def test_two_instances_at_once_do_not_disturb_each_other(fmi: int, hull: Model, 
             fmu.instance.doStep(currentCommunicationPoint=place * 0.1, communicationStepSize=0.1)
     assert one.read(STATES) == pytest.approx(by_casadi(hull, 50, 0.1, rudder__command=0.2), rel=1e-12, abs=1e-14)
     assert other.read(STATES) == pytest.approx(by_casadi(hull, 50, 0.1, rudder__command=-0.3), rel=1e-12, abs=1e-14)
+
+
+@FMI
+def test_instances_in_threads_do_not_disturb_each_other(fmi: int, hull: Model, instantiate: Instantiate) -> None:
+    orders = [0.02 * place for place in range(8)]
+    fleet = [begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=order) for order in orders]
+    with ThreadPoolExecutor(len(fleet)) as threads:  # calls into a library do not hold Python's lock
+        found = list(threads.map(lambda fmu: steps(fmu, 50, 2.0), fleet))
+    alone = [steps(begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=order), 50, 2.0) for order in orders]
+    assert found == alone
 
 
 @FMI

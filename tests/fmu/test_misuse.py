@@ -13,7 +13,7 @@ import fmpy
 import pytest
 
 from tank2sim.fmu.unpacking import UnpackedFmu
-from tests.fmu.driving import ERROR, Instantiate, Status, begun, steps, untyped
+from tests.fmu.driving import ERROR, STATES, Instantiate, Status, begun, steps, untyped
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 
@@ -121,6 +121,46 @@ def test_functions_for_what_the_model_has_none_of_say_so(instantiate: Instantiat
     for name in names:
         assert getattr(untyped(fmu), f"fmi3{name}")(c, one, ctypes.c_size_t(1), value, value) == ERROR
     assert len(fmu.log) == len(names)
+
+
+@FMI
+def test_the_log_names_the_argument_and_the_variable(fmi: int, instantiate: Instantiate, status: Status) -> None:
+    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+    dll, c, n = untyped(fmu), ctypes.c_void_p(fmu.instance.component), ctypes.c_size_t(1)
+    real, integer, last = ("Real", "Integer", []) if fmi == 2 else ("Float64", "Int32", [n])
+    one, name = (ctypes.c_uint * 1)(*fmu.unpacked.references(["motion.psi"])), "motion.psi"
+    assert getattr(dll, f"fmi{fmi}Get{real}")(c, one, n, None, *last) == ERROR
+    assert re.fullmatch(rf"fmi{fmi}Get{real}: values? is a null pointer", fmu.log[-1])
+    assert getattr(dll, f"fmi{fmi}Get{integer}")(c, one, n, (ctypes.c_int * 1)(), *last) == ERROR
+    assert name in fmu.log[-1]
+    assert getattr(dll, f"fmi{fmi}Set{real}")(c, one, n, (ctypes.c_double * 1)(), *last) == ERROR
+    assert name in fmu.log[-1]
+    assert len(fmu.log) == 3
+
+
+@FMI
+@pytest.mark.parametrize("value", [1e300, -1e300, 1e-300, 5e-324])
+def test_huge_and_tiny_inputs_and_coefficients_do_no_harm(
+    fmi: int, value: float, instantiate: Instantiate, status: Status
+) -> None:
+    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
+    before = steps(fmu, 3)
+    for name in ("rudder.command", "propeller.speed", "derivatives.Yv", "derivatives.drag"):
+        kept = fmu.read([name])[0]
+        fmu.write({name: value})
+        if status(fmu.instance.doStep, *(fmu.read(["time"])[0], 0.1)) != 0:
+            assert fmu.read(STATES) == before
+        assert all(math.isfinite(state) for state in fmu.read(STATES))
+        before = fmu.read(STATES)
+        fmu.write({name: kept})
+
+
+def test_an_instance_of_no_kind_is_refused(instantiate: Instantiate) -> None:
+    fmu = instantiate("hull", 2, "CoSimulation")
+    make = untyped(fmu).fmi2Instantiate
+    make.restype = ctypes.c_void_p
+    token = fmu.unpacked.description.guid.encode()
+    assert make(b"one", 7, token, None, ctypes.byref(fmu.instance.callbacks), 0, 0) is None
 
 
 # ---- log ----

@@ -122,6 +122,47 @@ def test_adjoint_derivatives_are_the_directional_ones_transposed(hull: Model, in
     np.testing.assert_allclose(adjoint(fmu, unknown_names(hull), knowns), expected, rtol=1e-12, atol=1e-12)
 
 
+def at_a_communication_point(fmu: RunningFmu) -> RunningFmu:
+    """In Co-Simulation, in a turn with the rudder still under way."""
+    fmu.initialise(INPUTS)
+    for place in range(25):
+        fmu.instance.doStep(currentCommunicationPoint=0.1 * place, communicationStepSize=0.1)
+    fmu.write({"rudder.command": 0.1})
+    return fmu
+
+
+@FMI
+def test_derivatives_at_communication_points_are_by_inputs_and_tunable_parameters(
+    fmi: int, hull: Model, instantiate: Instantiate
+) -> None:
+    fmu = at_a_communication_point(instantiate("hull", fmi, "CoSimulation"))
+    unknowns, knowns = unknown_names(hull), [*REAL_INPUTS, *(p.name for p in hull.parameters if p.tunable)]
+    values = fmu.read(knowns)
+
+    def evaluate(known: str, value: float) -> list[float]:
+        fmu.write({known: value})
+        answer = fmu.read(unknowns)
+        fmu.write({known: values[knowns.index(known)]})
+        return answer
+
+    found = directional(fmu, unknowns, knowns)
+    assert np.count_nonzero(found) > 8
+    assert_close(found, by_differences(evaluate, knowns, values))
+    if fmi == 3:
+        np.testing.assert_allclose(adjoint(fmu, unknowns, knowns), found, rtol=1e-12, atol=1e-12)
+
+
+@FMI
+def test_a_seed_that_is_not_finite_is_discarded(fmi: int, instantiate: Instantiate, status: Callable[..., int]) -> None:
+    fmu = at_a_communication_point(instantiate("hull", fmi, "CoSimulation"))
+    references = fmu.unpacked.references(["motion.udot"]), fmu.unpacked.references(["propeller.speed"])
+    assert status(fmu.instance.getDirectionalDerivative, *references, [np.nan]) == 2
+    if fmi == 3:
+        assert status(lambda: fmu.instance.getAdjointDerivative(*references, [np.inf], nSensitivity=1)) == 2
+    assert all("the seed of" in line for line in fmu.log)
+    assert len(fmu.log) == fmi - 1
+
+
 def initialising(fmu: RunningFmu, trim: bool) -> RunningFmu:
     fmu.write({"initial.trim": float(trim), "initial.u": 6.5})
     if fmu.unpacked.fmi == 2:
@@ -133,10 +174,11 @@ def initialising(fmu: RunningFmu, trim: bool) -> RunningFmu:
 
 @FMI
 @TRIM
+@pytest.mark.parametrize("kind", ["ModelExchange", "CoSimulation"])
 def test_derivatives_during_initialisation_go_through_the_initial_states(
-    fmi: int, trim: bool, hull: Model, instantiate: Instantiate
+    fmi: int, kind: str, trim: bool, hull: Model, instantiate: Instantiate
 ) -> None:
-    fmu = initialising(instantiate("hull", fmi, "ModelExchange"), trim)
+    fmu = initialising(instantiate("hull", fmi, kind), trim)
     unknowns = [*unknown_names(hull), "motion.x", "motion.v"]
     knowns = [*REAL_INPUTS, *real_parameters(hull)]
     values = fmu.read(knowns)

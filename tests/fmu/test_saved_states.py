@@ -82,3 +82,29 @@ def test_bytes_that_are_no_state_of_this_fmu_are_refused(fmi: int, instantiate: 
     assert [status(restore, fmu, case) for case in bad] == [ERROR] * len(bad)
     assert len(fmu.log) == len(bad)
     assert fmu.read(STATES) == before
+
+
+@FMI
+def test_a_single_bit_that_is_wrong_is_found(fmi: int, instantiate: Instantiate, status: Status) -> None:
+    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.3)
+    before, data = steps(fmu, 5), saved(fmu)
+    for place in range(0, len(data), 7):
+        damaged = bytearray(data)
+        damaged[place] ^= 1 << (place % 8)
+        assert status(restore, fmu, bytes(damaged)) == ERROR
+    assert len(fmu.log) == len(range(0, len(data), 7))
+    assert sum("checksum" in line for line in fmu.log) > len(data) // 14
+    assert fmu.read(STATES) == before
+
+
+@FMI
+def test_a_state_of_another_model_is_named_as_such(fmi: int, instantiate: Instantiate, status: Status) -> None:
+    """Another ship with as many variables: only its token tells."""
+    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+    data = saved(fmu)
+    place = data.index(b"{")
+    other = data[: place + 1] + bytes([data[place + 1] ^ 1]) + data[place + 2 :]
+    assert status(restore, fmu, other) == ERROR
+    assert "another FMU" in fmu.log[0]
+    assert status(restore, fmu, saved(instantiate("gain", fmi, "CoSimulation"))) == ERROR
+    assert "another length" in fmu.log[1]

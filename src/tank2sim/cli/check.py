@@ -49,6 +49,9 @@ def _show(report: CheckReport) -> None:
         rows.append(["limit", *(report.limits[kind] for kind in report.errors)])
         title = f"{report.path}: largest errors in {report.duration_s:g} s, relative to each output's range"
         show_table(title, ["output", *report.errors], rows)
+    if report.reference_error is not None:
+        words = f"repeats the reference result that it carries; largest error {report.reference_error:.1e} of a range"
+        screen.print(f"{report.path}: {words}", soft_wrap=True, markup=False)
     problems = [*report.validation, *report.differences]
     for problem in problems[:MOST_PROBLEMS]:
         screen.print(f"[red]wrong:[/red] {escape(problem)}", soft_wrap=True)

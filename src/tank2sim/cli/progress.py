@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from tank2sim.dynamics.model import Vector
-from tank2sim.identification.trials.problem import Progress as Told
+if TYPE_CHECKING:  # the identification takes long to import, and most commands do without
+    from tank2sim.dynamics.model import Vector
+    from tank2sim.identification.trials.problem import Progress as Told
 
 
 @contextmanager

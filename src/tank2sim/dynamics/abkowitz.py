@@ -6,6 +6,7 @@ equation are one. Taylor factors (1/2, 1/6) are absorbed in the coefficients.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -44,5 +45,7 @@ def polynomial(names: Iterable[str], coefficients: Mapping[str, Any], v: Any, r:
     total: Any = 0
     for name in names:
         term = known_term(name)
-        total += coefficients[name] * v**term.v * r**term.r * d**term.d * du**term.u
+        powers = [base**power for base, power in ((v, term.v), (r, term.r), (d, term.d), (du, term.u)) if power]
+        # The powers by themselves, not one after the other onto the coefficient: Y and N then share them.
+        total += coefficients[name] * math.prod(powers)
     return total

@@ -4,18 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 
 from tank2sim.cards.scaling import Scales
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, LINEAR_TERMS, TERMS, polynomial
+from tank2sim.dynamics.low_speed import (
+    STILL,
+    Forces,
+    hull_forces,
+    lowest_speed,
+    regular_speed,
+    rudder_flow,
+    share_of_low_speed,
+)
 from tank2sim.dynamics.model import Quantity
 from tank2sim.dynamics.propulsion import propeller_force
 from tank2sim.dynamics.rigid_body import Inertia, accelerations, inertia, inertial_forces
 
 VALIDITY_MARGIN = 0.2
-"""Outside the card's range of speeds ``validity`` falls from 1 to 0 over this share of the speed of expansion.
+"""Above the card's range of speeds ``validity`` falls from 1 to 0 over this share of the speed of expansion.
 
 A choice of ours: forces grow with the square of speed, so 20 % of speed is 44 % of force."""
 
@@ -48,10 +58,20 @@ class Hull:
         """Symbol of a derivative (prime)."""
         return self.symbols[f"derivatives.{name}"]
 
-    @property
+    @cached_property
     def speed(self) -> ca.SX:
-        """U, m/s."""
-        return ca.sqrt(self["motion.u"] ** 2 + self["motion.v"] ** 2)
+        """U, m/s, with a slope at rest (:func:`tank2sim.dynamics.low_speed.regular_speed`)."""
+        return regular_speed(self.symbols)
+
+    @cached_property
+    def low_share(self) -> ca.SX:
+        """Share of the forces at low speed (:func:`tank2sim.dynamics.low_speed.share_of_low_speed`)."""
+        return share_of_low_speed(self.symbols)
+
+    @cached_property
+    def X_bound(self) -> ca.SX:
+        """The card's X straight ahead at the lowest speed at which it holds, N."""
+        return _surge_force_ahead(self, lowest_speed(self.symbols))
 
     def scales(self, speed: ca.SX) -> Scales:
         """Scales at a speed, as expressions."""
@@ -74,21 +94,70 @@ def _scales_of_forces(hull: Hull) -> tuple[ca.SX, Scales]:
     return speed, hull.scales(speed)
 
 
-def _polynomials(hull: Hull, with_rudder: bool) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """X, Y, N of the terms of (3.5) or (3.8) that hold the rudder's angle, or of those that do not; N, N and N m."""
+def _terms(hull: Hull, force: str, with_rudder: bool) -> list[str]:
+    """Terms of (3.5) or (3.8) in X, Y or N that hold the rudder's angle, or that do not."""
+    every = (LINEAR_TERMS if hull.linear else TERMS)[force]
+    return [name for name in every if (known_term(name).d > 0) == with_rudder]
+
+
+def _polynomials(hull: Hull, with_rudder: bool) -> Forces:
+    """X, Y, N of the terms of (3.5) or (3.8) that hold the rudder's angle, or of those that do not; N, N and N m.
+
+    They fade out below the lowest speed of the card.
+    """
     speed, scales = _scales_of_forces(hull)
     u, v, r = hull["motion.u"], hull["motion.v"], hull["motion.r"]
-    primes = (v / speed, r * scales.length / speed, hull["rudder.effective"], (u - hull["ship.speed"]) / speed)
+    slowness = speed / speed**2  # one division in the code that CasADi makes of it, where 1/V would be three
+    primes = (v * slowness, r * scales.length * slowness, hull["rudder.effective"], (u - hull["ship.speed"]) * slowness)
     sums = []
     for force in "XYN":
-        every = (LINEAR_TERMS if hull.linear else TERMS)[force]
-        names = [name for name in every if (known_term(name).d > 0) == with_rudder]
+        names = _terms(hull, force, with_rudder)
         sums.append(polynomial(names, {name: hull.coefficient(name) for name in names}, *primes))
-    return scales.force * sums[0], scales.force * sums[1], scales.force * scales.length * sums[2]
+    force = (1 - hull.low_share) * scales.force
+    return force * sums[0], force * sums[1], force * scales.length * sums[2]
+
+
+def _surge_force_ahead(hull: Hull, u: ca.SX) -> ca.SX:
+    """The card's X straight ahead at a speed u, N."""
+    u0 = hull["ship.speed"]
+    speed = u0 if hull.linear or hull.nominal_scale else u
+    names = [name for name in _terms(hull, "X", with_rudder=False) if known_term(name).v + known_term(name).r == 0]
+    coefficients = {name: hull.coefficient(name) for name in names}
+    force: ca.SX = hull.scales(speed).force * polynomial(names, coefficients, 0, 0, 0, (u - u0) / speed)
+    return force
+
+
+def _with_share(share: Forces, forces: Forces, others: Forces) -> Forces:
+    """`others` and a share of `forces`; where the share is none, a compiler leaves out what they alone need."""
+    every = zip(share, forces, others, strict=True)
+    X, Y, N = (other + ca.if_else(part, part * force, 0) for part, force, other in every)
+    return X, Y, N
+
+
+def _of_rudder_alone(name: str) -> bool:
+    term = known_term(name)
+    return (term.v, term.r, term.u) == (0, 0, 0)
+
+
+def _rudder_forces(hull: Hull) -> Forces:
+    """X, Y, N by the rudder; at low speed its terms in delta alone, as at u0, in the flow that meets it there."""
+    at_u0 = hull.scales(hull["ship.speed"])
+    flow, flow_at_u0, swing = rudder_flow(hull.symbols, hull.X_bound)
+    force = at_u0.force / flow_at_u0
+    low = []
+    for name in "XYN":
+        names = [name for name in _terms(hull, name, with_rudder=True) if _of_rudder_alone(name)]
+        coefficients = {name: hull.coefficient(name) for name in names}
+        by_angle = polynomial(names, coefficients, 0, 0, hull["rudder.effective"], 0)
+        by_swing = 0 if name == "X" else hull.coefficient(f"{name}d") * swing
+        low.append(force * (flow * by_angle + by_swing))
+    share = hull.low_share
+    slow = low[0], low[1], at_u0.length * low[2]
+    return _with_share((share, share, share), slow, _polynomials(hull, with_rudder=True))
 
 
 def _rudder_quantities(hull: Hull) -> tuple[Quantity, Quantity, Quantity]:
-    X, Y, N = _polynomials(hull, with_rudder=True)
+    X, Y, N = _rudder_forces(hull)
     return (
         Quantity(name="rudder.X", unit="N", description="Surge force by the rudder, positive forward", value=X),
         Quantity(name="rudder.Y", unit="N", description="Sway force by the rudder, positive to starboard", value=Y),
@@ -96,18 +165,41 @@ def _rudder_quantities(hull: Hull) -> tuple[Quantity, Quantity, Quantity]:
     )
 
 
-def _right_hand_sides(hull: Hull, rudder: tuple[Quantity, Quantity, Quantity]) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _hydrodynamic_linear(hull: Hull) -> dict[str, ca.SX]:
+    """Yv, Yr, Nv, Nr without the inertia that "total" cards put into them; SI at a speed of 1 m/s."""
+    at_one = hull.scales(ca.SX(1))
+    names = ("Yv", "Yr", "Nv", "Nr")
+    found = {name: at_one.derivative(known_term(name)) * hull.coefficient(name) for name in names}
+    if not hull.inertial_terms:
+        found["Yr"] += hull["ship.mass"]
+        found["Nr"] += hull["ship.mass"] * hull["ship.x_G"]
+    return found
+
+
+def _hull_forces(hull: Hull) -> Forces:
+    """X, Y, N of the hull at nominal revolutions, with the inertial terms of (3.1)."""
+    u, v, r = hull["motion.u"], hull["motion.v"], hull["motion.r"]
+    X, Y, N = _polynomials(hull, with_rudder=False)
+    low = hull.low_share
+    kept = 1 - low
+    if hull.inertial_terms:
+        forward = hull["ship.speed"] if hull.linear else u
+        surge, sway, yaw = inertial_forces(hull["ship.mass"], hull["ship.x_G"], forward, v, r)
+        # (3.5a) has no m v r: a product of two small quantities.
+        X, Y, N = X + (0 if hull.linear else kept * surge), Y + kept * sway, N + kept * yaw
+    X_u0 = _surge_force_ahead(hull, hull["ship.speed"])
+    slow = hull_forces(hull.symbols, hull.speed, hull.X_bound, X_u0, _hydrodynamic_linear(hull))
+    # In surge sooner, by the cube: the polynomial of a slow ship soon gives thrust for resistance.
+    return _with_share((1 - kept**3, low, low), slow, (X * kept**2, Y, N))
+
+
+def _right_hand_sides(hull: Hull, rudder: tuple[Quantity, Quantity, Quantity]) -> Forces:
     """f1, f2, f3 of (3.8), or the right-hand sides of (3.5); N and N m."""
-    u, v, r, u0 = hull["motion.u"], hull["motion.v"], hull["motion.r"], hull["ship.speed"]
-    bare = _polynomials(hull, with_rudder=False)
+    bare = _hull_forces(hull)
     X, Y, N = (force + by_rudder.symbol for force, by_rudder in zip(bare, rudder, strict=True))
     if "propeller.speed" in hull.symbols:
         revolutions = hull["propeller.speed_actual"], hull["propulsion.nominal_speed"], hull["propulsion.Xnn"]
-        X = X + hull.scales(u0).force * propeller_force(*revolutions)
-    if hull.inertial_terms:
-        surge, sway, yaw = inertial_forces(hull["ship.mass"], hull["ship.x_G"], u0 if hull.linear else u, v, r)
-        # (3.5a) has no m v r: a product of two small quantities.
-        X, Y, N = X + (0 if hull.linear else surge), Y + sway, N + yaw
+        X = X + hull.scales(hull["ship.speed"]).force * propeller_force(*revolutions)
     return X, Y, N
 
 
@@ -173,7 +265,8 @@ def _acceleration_quantities(motion: tuple[ca.SX, ca.SX, ca.SX]) -> tuple[Quanti
     )
 
 
-def _water_speed_quantities(hull: Hull) -> tuple[Quantity, Quantity, Quantity]:
+def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
+    u, v = hull["motion.u"], hull["motion.v"]
     speed = Quantity(
         name="motion.speed",
         unit="m/s",
@@ -189,16 +282,26 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, Quantity, Quantity]:
         display_unit="deg",
         nominal=0.1,
         # asin(v/U) without its division by zero at rest
-        value=-ca.atan2(hull["motion.v"], ca.fabs(hull["motion.u"])),
+        value=-ca.atan2(v, ca.sqrt(u**2 + (STILL * hull["ship.speed"]) ** 2)),
     )
-    margin = VALIDITY_MARGIN * hull["ship.speed"]
-    inside = ca.fmin(speed.symbol - hull["ship.slowest"], hull["ship.fastest"] - speed.symbol)
+    too_fast = ca.fmax(0, ca.fmin(1, (speed.symbol - hull["ship.fastest"]) / (VALIDITY_MARGIN * hull["ship.speed"])))
+    low = Quantity(
+        name="low_speed.share",
+        unit="1",
+        description="Share of the forces at low speed: 0 in the card's range of speeds, 1 at rest and astern",
+        minimum=0.0,
+        maximum=1.0,
+        value=hull.low_share,
+    )
     validity = Quantity(
         name="validity",
         unit="1",
-        description="1 in the range of speeds in which the card holds, falling to 0 outside it",
+        description=(
+            "1 in the range of speeds in which the card holds; below it the share of the card's polynomial in the "
+            "forces, 0 at low speed and astern; above it falling to 0"
+        ),
         minimum=0.0,
         maximum=1.0,
-        value=ca.fmax(0, ca.fmin(1, 1 + inside / margin)),
+        value=(1 - low.symbol) * (1 - too_fast * too_fast * (3 - 2 * too_fast)),
     )
-    return speed, drift, validity
+    return speed, drift, low, validity

@@ -8,6 +8,10 @@ import casadi as ca
 
 from tank2sim.dynamics.model import Parameter, Quantity, State, Variable
 
+STILL_MPS = 1e-8
+"""Speed over ground below which a ship is at rest, so that speed and course have a slope there: a choice of ours. At
+0.1 m/s it changes the speed by less than 1e-14 of itself."""
+
 
 def earth_velocity(u: ca.SX, v: ca.SX, psi: ca.SX) -> tuple[ca.SX, ca.SX]:
     """dx/dt to north and dy/dt to east (m/s) of a ship with body velocities u, v (m/s) and heading psi (rad)."""
@@ -82,6 +86,7 @@ def _rates(*values: ca.SX) -> tuple[Quantity, ...]:
 
 def _over_ground(xdot: ca.SX, ydot: ca.SX, psi: ca.SX) -> tuple[Quantity, Quantity]:
     forward, starboard = earth_velocity(xdot, ydot, -psi)
+    square = xdot * xdot + ydot * ydot
     return (
         Quantity(
             name="motion.sog",
@@ -89,14 +94,14 @@ def _over_ground(xdot: ca.SX, ydot: ca.SX, psi: ca.SX) -> tuple[Quantity, Quanti
             description="Speed over ground",
             display_unit="knots",
             nominal=5.0,
-            value=ca.sqrt(xdot * xdot + ydot * ydot),
+            value=ca.sqrt(square + STILL_MPS**2),
         ),
         # Heading plus drift instead of atan2(east, north): no jump of a full turn while the ship circles.
         Quantity(
             name="motion.cog",
             unit="rad",
-            description="Course over ground, clockwise from north, within half a turn of the heading",
+            description="Course over ground, clockwise from north, within half a turn of the heading (that at rest)",
             display_unit="deg",
-            value=psi + ca.atan2(starboard, forward),
+            value=psi + ca.atan2(starboard, forward + STILL_MPS * (square < STILL_MPS**2)),
         ),
     )

@@ -7,8 +7,10 @@ import math
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
+from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS, geographic
 from tank2sim.dynamics.hull import Hull, motion_quantities
 from tank2sim.dynamics.kinematics import kinematics
+from tank2sim.dynamics.low_speed import low_speed_parameters
 from tank2sim.dynamics.model import Model, Parameter, State, Variable
 from tank2sim.dynamics.propulsion import propulsion
 from tank2sim.dynamics.rigid_body import inertia
@@ -19,7 +21,8 @@ STEPS_PER_LENGTH = 200
 
 OUTPUTS = (
     *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "motion.speed", "motion.beta"),
-    *("motion.sog", "motion.cog", "motion.udot", "motion.vdot", "motion.rdot", "rudder.angle"),
+    *("motion.sog", "motion.cog", *GEOGRAPHIC_OUTPUTS),
+    *("motion.udot", "motion.vdot", "motion.rdot", "rudder.angle"),
     *("force.X", "force.Y", "force.N", "validity"),
 )
 
@@ -37,8 +40,10 @@ def ship_model(card: ManoeuvringCard) -> Model:
     body = _body_states(card)
     gear, gear_notices = steering_gear(card.steering_gear, card.ship.length_m / card.model.speed_mps)
     engine = propulsion(card.propulsion) if card.propulsion else ()
-    constants = (*_ship_parameters(card), *_derivative_parameters(card, names))
+    constants = (*_ship_parameters(card), *low_speed_parameters(card), *_derivative_parameters(card, names))
     position = kinematics({state.name: state for state in body if isinstance(state, State)})
+    symbols = {variable.name: variable.symbol for variable in position}
+    position = (*position, *geographic(symbols["motion.x"], symbols["motion.y"]))
     given = (*position, *body, *gear, *engine, *constants)
     hull = Hull(
         linear=card.model.kind == "linear",
@@ -180,7 +185,7 @@ def _body_states(card: ManoeuvringCard) -> tuple[Variable, ...]:
     described = (
         ("motion.u", "m/s", "Surge velocity through the water, positive forward", "motion.udot", "knots"),
         ("motion.v", "m/s", "Sway velocity through the water, positive to starboard", "motion.vdot", "knots"),
-        ("motion.r", "rad/s", "Yaw rate, positive to starboard", "motion.rdot", "deg/min"),
+        ("motion.r", "rad/s", "Yaw rate (rate of turn), positive to starboard", "motion.rdot", "deg/min"),
     )
     nominals = (card.model.speed_mps, 0.1 * card.model.speed_mps, card.model.speed_mps / card.ship.length_m)
     states = tuple(

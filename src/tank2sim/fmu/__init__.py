@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from tank2sim.fmu.check import CheckReport, check_fmu
-    from tank2sim.fmu.export import Documents, ExportedFmu, write_fmu
+    from tank2sim.fmu.documents import Documents
+    from tank2sim.fmu.export import ExportedFmu, write_fmu
     from tank2sim.fmu.unpacking import embedded_card
 
 __all__ = ["CheckReport", "Documents", "ExportedFmu", "check_fmu", "embedded_card", "write_fmu"]
 
 _MODULES = {
     **dict.fromkeys(("CheckReport", "check_fmu"), "check"),
-    **dict.fromkeys(("Documents", "ExportedFmu", "write_fmu"), "export"),
+    "Documents": "documents",
+    **dict.fromkeys(("ExportedFmu", "write_fmu"), "export"),
     "embedded_card": "unpacking",
 }
 

@@ -11,15 +11,16 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from fmpy.validation import validate_fmu
 
 from tank2sim.dynamics.model import Model, Vector
+from tank2sim.errors import InputError
 from tank2sim.fmu.comparison import description_differences
 from tank2sim.fmu.interface import MAX_STEP, interface
 from tank2sim.fmu.manoeuvre import Manoeuvre, manoeuvre
 from tank2sim.fmu.process import Drive, drive_apart
-from tank2sim.fmu.reference import by_scheme, exactly
+from tank2sim.fmu.reference import by_scheme, exactly, output_errors, relative_errors
+from tank2sim.fmu.reference_run import read_reference
 from tank2sim.fmu.unpacking import Kind, UnpackedFmu, unpack
 
 LIMITS: dict[Kind, float] = {"ModelExchange": 1e-6, "CoSimulation": 1e-9}
@@ -41,6 +42,8 @@ class CheckReport:
         of the output's range in the run and its nominal value.
     max_error : dict
         Output to the larger of its errors.
+    reference_error : float, optional
+        Largest error of an output when the FMU repeats the reference result that it carries, relative as above.
     compared : bool
         False if there was no model to compare with, and the file alone was validated.
     """
@@ -55,6 +58,7 @@ class CheckReport:
     max_error: dict[str, float] = field(default_factory=dict)
     limits: dict[Kind, float] = field(default_factory=lambda: dict(LIMITS))
     duration_s: float = 0.0
+    reference_error: float | None = None
     passed: bool = False
 
     def as_json(self) -> dict[str, Any]:
@@ -83,13 +87,18 @@ def check_fmu(path: Path, *, model: Model | None = None) -> CheckReport:
         unpacked = unpack(Path(path), Path(folder))
         validation = tuple(str(problem) for problem in validate_fmu(str(path)))
         about: dict[str, Any] = {"path": str(path), "fmi": unpacked.fmi, "kinds": unpacked.kinds}
+        about["validation"] = validation
         if model is None:
-            return CheckReport(**about, validation=validation, compared=False, passed=not validation)
+            differences, about["reference_error"] = _repeat_reference(unpacked)
+            passed = not validation and not differences
+            return CheckReport(**about, compared=False, differences=tuple(differences), passed=passed)
         run = manoeuvre(model)
         differences, errors = _compare(unpacked, model, run)
+        if "CoSimulation" in errors:  # else the library cannot run, which has been said
+            repeated, about["reference_error"] = _repeat_reference(unpacked)
+            differences += repeated
     return CheckReport(
         **about,
-        validation=validation,
         compared=True,
         differences=tuple(differences),
         errors=errors,
@@ -127,8 +136,36 @@ def _compare(unpacked: UnpackedFmu, model: Model, run: Manoeuvre) -> tuple[list[
             if answer.problem:
                 differences.append(f"{kind}: {answer.problem}")
             if answer.outputs is not None:
-                errors[kind] = _errors(model, answer.outputs, expected)
+                found = dict(zip(model.outputs, answer.outputs.T, strict=True))
+                errors[kind] = output_errors(model, expected, found)
     return differences, errors
+
+
+def _repeat_reference(unpacked: UnpackedFmu) -> tuple[list[str], float | None]:
+    """What is wrong when the FMU repeats the reference result it carries, in Co-Simulation, and its largest error."""
+    try:
+        reference = read_reference(unpacked.folder)
+    except InputError as error:
+        return [f"the reference result {error.problem}"], None
+    if reference is None or "CoSimulation" not in unpacked.kinds:
+        return [], None
+    variables = {variable.name: variable for variable in unpacked.description.modelVariables}
+    strangers = [name for name in (*reference.input_names, *reference.output_names) if name not in variables]
+    if strangers:
+        return [f"the reference result has {strangers[0]}, which is no variable of the FMU"], None
+    names: dict[str, tuple[str, ...]] = {"inputs": reference.input_names, "outputs": reference.output_names}
+    answer = drive_apart(unpacked, Drive(kind="CoSimulation", run=reference.run, parameters=(), **names))
+    if answer.outputs is None:
+        return [f"reference result: {answer.problem}"], None
+    expected, found = (
+        dict(zip(reference.output_names, table.T, strict=True)) for table in (reference.outputs, answer.outputs)
+    )
+    nominals = {name: float(variables[name].nominal or 1.0) for name in expected}
+    errors = relative_errors(expected, found, nominals, {name for name in expected if variables[name].unit == "rad"})
+    worst = max(errors, key=lambda name: errors[name])
+    if errors[worst] <= LIMITS["CoSimulation"]:
+        return [], errors[worst]
+    return [f"{worst} differs by {errors[worst]:.1e} of its range from the reference result in the FMU"], errors[worst]
 
 
 def _name_differences(unpacked: UnpackedFmu, model: Model) -> list[str]:
@@ -149,18 +186,6 @@ def _parameter_differences(found: Vector, expected: dict[str, float]) -> list[st
         for name, value in zip(expected, found.tolist(), strict=True)
         if value != expected[name]
     ]
-
-
-def _errors(model: Model, found: Vector, expected: Vector) -> dict[str, float]:
-    errors = {}
-    for place, name in enumerate(model.outputs):
-        difference = np.abs(found[:, place] - expected[:, place])
-        if model[name].unit == "rad" and name not in model.state_names:
-            # An angle that is calculated anew may jump by a full turn, a moment sooner or later.
-            difference = np.minimum(difference, np.abs(difference - 2 * np.pi))
-        scale = max(float(np.ptp(expected[:, place])), abs(model[name].nominal) or 1.0)
-        errors[name] = float(np.max(difference)) / scale
-    return errors
 
 
 def _within(errors: dict[Kind, dict[str, float]]) -> bool:

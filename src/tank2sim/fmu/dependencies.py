@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.dynamics.model import Model
-from tank2sim.fmu.interface import Interface, other_outputs
+from tank2sim.fmu.equations import other_values
+from tank2sim.fmu.interface import Interface
 
 Pattern = NDArray[np.bool_]
 """Rows are unknowns, columns are knowns; True where a row may depend on a column."""
@@ -43,6 +44,7 @@ class Structure:
     outputs: tuple[Unknown, ...]
     rates: tuple[Unknown, ...]
     initial_unknowns: tuple[Unknown, ...]
+    indicators: tuple[Unknown, ...]
 
 
 def structure(model: Model, interface: Interface) -> Structure:
@@ -55,7 +57,7 @@ def structure(model: Model, interface: Interface) -> Structure:
         unknown.reference: unknown
         for unknown in (
             *_unknowns(model, interface, knowns, model.rates, interface.rates.begin),
-            *_unknowns(model, interface, knowns, _other_output_values(model), interface.outputs.begin),
+            *_unknowns(model, interface, knowns, other_values(model), interface.outputs.begin),
             # An output that is a state depends on itself alone.
             *(Unknown(place, (place,), ("constant",)) for place in range(interface.states.begin, interface.states.end)),
         )
@@ -66,11 +68,10 @@ def structure(model: Model, interface: Interface) -> Structure:
         outputs=tuple(while_running[reference] for reference in outputs),
         rates=tuple(while_running[reference] for reference in rates),
         initial_unknowns=_initial_unknowns(model, interface),
+        indicators=tuple(
+            while_running[reference] for reference in range(interface.indicators.begin, interface.indicators.end)
+        ),
     )
-
-
-def _other_output_values(model: Model) -> ca.SX:
-    return model.expand(ca.vcat([model.symbol(name) for name in other_outputs(model)]))
 
 
 def _unknowns(model: Model, interface: Interface, knowns: list[int], results: ca.SX, begin: int) -> list[Unknown]:
@@ -100,7 +101,7 @@ def _initial_unknowns(model: Model, interface: Interface) -> tuple[Unknown, ...]
     """All that is calculated at the start, through the initial states, from inputs and parameters."""
     x, knowns = ca.SX(model.x), ca.vertcat(ca.SX(model.u), ca.SX(model.p))
     states = _initial_states(model, interface)
-    results = ca.vertcat(ca.SX(model.rates), ca.SX(_other_output_values(model)))
+    results = ca.vertcat(ca.SX(model.rates), ca.SX(other_values(model)))
     direct, through_states = _pattern(results, knowns), _pattern(results, x)
     pattern = np.vstack([states, direct | _product(through_states, states)])
     references = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
+from tank2sim.dynamics.kinks import kinks
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.interface import other_outputs
 from tank2sim.simulation.scheme import runge_kutta_step
@@ -12,14 +13,15 @@ from tank2sim.simulation.scheme import runge_kutta_step
 def equations(model: Model) -> tuple[ca.Function, ...]:
     """The functions that the C template calls, each on whole vectors x, u, p.
 
-    ``model_step(x, u, p, h) -> x``, ``model_rates(x, u, p) -> xdot``, ``model_outputs(x, u, p) -> y`` (those outputs
-    that are neither states nor their rates), ``model_initial(p) -> x``, ``model_trim_step(x, u, p) -> x`` (the identity
-    if the model cannot be trimmed), and their derivatives: ``model_forward`` (tangents of x, u, p to those of xdot, y),
-    ``model_reverse`` (adjoints of xdot, y to those of x, u, p), ``model_initial_forward``, ``model_trim_forward``.
+    ``model_constants(p) -> c`` and with them ``model_step(x, u, p, c, h) -> x``, ``model_rates(x, u, p) -> xdot``,
+    ``model_outputs(x, u, p) -> y`` (of :func:`other_values`), ``model_initial(p) -> x``,
+    ``model_trim_step(x, u, p) -> x`` (the identity if the model cannot be trimmed), and their derivatives:
+    ``model_forward`` (tangents of x, u, p to those of xdot, y), ``model_reverse`` (adjoints of xdot, y to those of x,
+    u, p), ``model_initial_forward``, ``model_trim_forward``.
     """
     x, u, p = model.x, model.u, model.p
     dx, du, dp = (ca.SX.sym(f"d{name}", vector.numel()) for name, vector in (("x", x), ("u", u), ("p", p)))
-    outputs = model.expand(ca.vcat([model.symbol(name) for name in other_outputs(model)]))
+    outputs = other_values(model)
     results, points = ca.vertcat(model.rates, outputs), ca.vertcat(x, u, p)
     tangents = ca.vertcat(dx, du, dp)
     seeds = [ca.SX.sym("xdot_bar", x.numel()), ca.SX.sym("y_bar", outputs.numel())]
@@ -29,8 +31,10 @@ def equations(model: Model) -> tuple[ca.Function, ...]:
     start = model.initial(p)
     trimmed = model.trim_step(x, u, p) if model.trim_step is not None else x
     h = ca.SX.sym("h")
+    step, constants, values = _without_constants(runge_kutta_step(model)(x, u, p, h), p)
     return (
-        _function("model_step", [x, u, p, h], [runge_kutta_step(model)(x, u, p, h)]),
+        _function("model_step", [x, u, p, constants, h], [step]),
+        _function("model_constants", [p], [values]),
         _function("model_rates", [x, u, p], [model.rates]),
         _function("model_outputs", [x, u, p], [outputs]),
         _function("model_initial", [p], [start]),
@@ -40,6 +44,23 @@ def equations(model: Model) -> tuple[ca.Function, ...]:
         _function("model_initial_forward", [p, dp], [ca.jtimes(start, p, dp)]),
         _function("model_trim_forward", [x, u, p, dx, du, dp], [ca.jtimes(trimmed, points, tangents)]),
     )
+
+
+def other_values(model: Model) -> ca.SX:
+    """Outputs that are neither states nor their rates, then the event indicators, as expressions of x, u, p."""
+    outputs = [model.symbol(name) for name in other_outputs(model)]
+    return ca.vertcat(model.expand(ca.vcat(outputs)), *(kink.value for kink in kinks(model)))
+
+
+def _without_constants(expression: ca.SX, p: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """The expression with symbols for what depends on p alone, those symbols, and the values they stand for.
+
+    Masses and their determinant, scales and the like are then calculated when a parameter is set and not in every step,
+    by the same operations, so that no digit changes.
+    """
+    shorter, symbols, values = ca.extract_parametric(expression, p)
+    none = ca.SX(0, 1)
+    return shorter, ca.vertcat(none, *symbols), ca.vertcat(none, *values)
 
 
 def _function(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:

@@ -5,59 +5,45 @@ from __future__ import annotations
 import hashlib
 import io
 import os
-import sys
-import tempfile
 import time
 import uuid
 import zipfile
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tank2sim.bundled import bundled
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.files import write_whole
 from tank2sim.fmu.dependencies import structure
+from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.interface import Interface, interface
-from tank2sim.fmu.platforms import host_platform
+from tank2sim.fmu.libraries import Told, libraries, require_compilers
+from tank2sim.fmu.osp import osp_groups
+from tank2sim.fmu.platforms import Platform
 from tank2sim.fmu.sources import c_sources, headers_notice
 from tank2sim.fmu.templates import c_identifier, render
+from tank2sim.fmu.terminals import terminals
 from tank2sim.fmu.unpacking import CARD_IN_FMU
-from tank2sim.native.compiler import compile_shared, require_compiler
 from tank2sim.units import UNITS
+
+if TYPE_CHECKING:
+    from tank2sim.fmu.evidence import Evidence
 
 _EXPERIMENT_STEPS = 6000
 _EXPERIMENT_TOLERANCE = 1e-6
 _NO_TOKEN = "{00000000-0000-0000-0000-000000000000}"
+_DESCRIPTION = "modelDescription.xml"
+_ICON_FILES = ("icon.png", "icon.svg")
+
+# OSP's engine looks for a copy of this beside the FMU, under the name <modelName>_OspModelDescription.xml.
+_OSP_FILE = "extra/com.open-simulation-platform/OspModelDescription.xml"
+
 _FIRST_TIME_OF_ZIP = 315532800  # 1980-01-01T00:00:00Z
-
-# A library bears neither the name of its file nor the time of its making, so that it is the same each time.
-_LINK_FLAGS = {
-    "linux": ("-Wl,--strip-all",),
-    "darwin": ("-Wl,-install_name,@rpath/model.dylib",),
-    "win32": ("-Wl,--no-insert-timestamp",),
-}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Documents:
-    """What an FMU says of its ship beside the equations.
-
-    Parameters
-    ----------
-    card_text : str, optional
-        The ship card, kept in the FMU as ``resources/ship.toml``.
-    source : str
-        Where the data come from, in a sentence.
-    validity : str
-        Where the model holds, in a sentence.
-    """
-
-    card_text: str | None = None
-    source: str = ""
-    validity: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,8 +74,15 @@ def write_fmu(model: Model, path: Path, *, fmi: int = 2, documents: Documents | 
     return made
 
 
-def make_fmu(model: Model, *, fmi: int = 2, documents: Documents | None = None) -> ExportedFmu:
-    """One FMU with Model Exchange and Co-Simulation for this machine's platform.
+def make_fmu(
+    model: Model,
+    *,
+    fmi: int = 2,
+    documents: Documents | None = None,
+    platforms: Sequence[Platform] | None = None,
+    told: Told = lambda _: None,
+) -> ExportedFmu:
+    """One FMU with Model Exchange and Co-Simulation for this machine's platform, or for others.
 
     The same model and documents give the same bytes: the token comes from the content, and times are those of
     SOURCE_DATE_EPOCH or, without it, constant.
@@ -98,28 +91,38 @@ def make_fmu(model: Model, *, fmi: int = 2, documents: Documents | None = None) 
     ----------
     fmi : int
         Version of FMI, 2 (2.0) or 3 (3.0).
+    platforms : sequence of Platform, optional
+        None: this machine's, compiled by its own compiler; others need the extra ``platforms``.
+    told : callable, optional
+        Hears which libraries are being compiled.
 
     Raises
     ------
     InputError
-        There is no C compiler, this machine's platform has no name in FMI, SOURCE_DATE_EPOCH is no time, or `fmi` is
+        There is no compiler, this machine's platform has no name in FMI, SOURCE_DATE_EPOCH is no time, or `fmi` is
         neither 2 nor 3.
     """
     if fmi not in (2, 3):
         raise InputError("--fmi", "", f"there is no FMI {fmi} here", "choose 2 or 3")
-    require_compiler("exporting an FMU")
-    platform, documents = host_platform(), documents or Documents()
+    require_compilers(platforms)
+    documents = documents or Documents()
     described = interface(model)
     identifier = c_identifier(model.name)
-    files = _texts(model, described, fmi, documents)
-    token = _token(files)
-    for name in ("modelDescription.xml", "sources/model.h"):
-        files[name] = files[name].replace(_NO_TOKEN, token)
-    library = f"binaries/{platform.folder(fmi)}/{identifier}{platform.suffix}"
-    contents = {name: text.encode("utf-8") for name, text in files.items()}
-    contents[library] = _library(files)
+    files, token = _with_token(_texts(model, described, fmi, documents))
+    sources = {name.removeprefix("sources/"): text for name, text in files.items() if name.startswith("sources/")}
+    with ThreadPoolExecutor(1) as pool:  # the reference is calculated while the compiler works
+        promised = pool.submit(_gathered, model)
+        made = libraries(sources, platforms, fmi, told)
+        evidence = promised.result()
+    contents = _encoded(files | evidence.reference_files()) | _icons(fmi)
+    contents |= {f"binaries/{folder}/{identifier}{suffix}": library for (folder, suffix), library in made.items()}
+    contents |= _encoded(evidence.passport_files(documents, zipped(contents, first=_DESCRIPTION), fmi))
     return ExportedFmu(
-        content=_zipped(contents), fmi=fmi, model_identifier=identifier, token=token, platforms=(platform.folder(fmi),)
+        content=zipped(contents, first=_DESCRIPTION),
+        fmi=fmi,
+        model_identifier=identifier,
+        token=token,
+        platforms=tuple(folder for folder, _ in made),
     )
 
 
@@ -128,21 +131,40 @@ def description_text(model: Model, *, fmi: int) -> str:
     return render(f"modelDescription-fmi{fmi}.xml", _values(model, interface(model), fmi, Documents()))
 
 
+def _gathered(model: Model) -> Evidence:
+    from tank2sim.fmu.evidence import gather  # SciPy, which takes as long to load as a reference run
+
+    return gather(model)
+
+
 def _texts(model: Model, described: Interface, fmi: int, documents: Documents) -> dict[str, str]:
     """All files of the FMU but the library, by name, with a token of zeros."""
     sources = c_sources(model, described, fmi, _NO_TOKEN)
     values = _values(model, described, fmi, documents)
     values["sources"] = sorted(name for name in sources if name.endswith(".c"))
     files = {f"sources/{name}": text for name, text in sources.items()}
-    files["modelDescription.xml"] = render(f"modelDescription-fmi{fmi}.xml", values)
+    files[_DESCRIPTION] = render(f"modelDescription-fmi{fmi}.xml", values)
     files["documentation/index.html"] = render("index.html", values)
     files["documentation/licenses/license.txt"] = bundled("LICENSE").read_text(encoding="utf-8")
     files["documentation/licenses/FMI-headers.txt"] = headers_notice(fmi)
+    files[_OSP_FILE] = render("OspModelDescription.xml", {"groups": osp_groups(described)})
     if fmi == 3:
         files["sources/buildDescription.xml"] = render("buildDescription.xml", values)
+        grouped = {"terminals": terminals(described)}
+        files["terminalsAndIcons/terminalsAndIcons.xml"] = render("terminalsAndIcons.xml", grouped)
     if documents.card_text is not None:
         files[CARD_IN_FMU] = documents.card_text
     return files
+
+
+def _encoded(files: dict[str, str]) -> dict[str, bytes]:
+    return {name: text.encode("utf-8") for name, text in files.items()}
+
+
+def _icons(fmi: int) -> dict[str, bytes]:
+    """The pictures by which a tool shows the FMU (FMI 2.0, 2.3; FMI 3.0, 2.5.1)."""
+    names = {"icon.png": "model.png"} if fmi == 2 else {name: f"terminalsAndIcons/{name}" for name in _ICON_FILES}
+    return {name: bundled("fmu_templates", own).read_bytes() for own, name in names.items()}
 
 
 def _values(model: Model, described: Interface, fmi: int, documents: Documents) -> dict[str, Any]:
@@ -172,6 +194,13 @@ def _values(model: Model, described: Interface, fmi: int, documents: Documents) 
     }
 
 
+def _with_token(files: dict[str, str]) -> tuple[dict[str, str], str]:
+    """The files with the token that comes from their content in place of zeros, and the token."""
+    token = _token(files)
+    sealed = {name: files[name].replace(_NO_TOKEN, token) for name in (_DESCRIPTION, "sources/model.h")}
+    return files | sealed, token
+
+
 def _token(files: dict[str, str]) -> str:
     digest = hashlib.sha256()
     for name in sorted(files):
@@ -179,17 +208,6 @@ def _token(files: dict[str, str]) -> str:
             data = part.encode("utf-8")
             digest.update(len(data).to_bytes(8, "big") + data)
     return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
-
-
-def _library(files: dict[str, str]) -> bytes:
-    with tempfile.TemporaryDirectory(prefix="tank2sim-") as name:
-        folder = Path(name)
-        for path, text in files.items():
-            if path.startswith("sources/"):
-                (folder / path.removeprefix("sources/")).write_text(text, encoding="utf-8", newline="\n")
-        library = folder / "library"
-        compile_shared(sorted(folder.glob("*.c")), library, flags=_LINK_FLAGS.get(sys.platform, ()))
-        return library.read_bytes()
 
 
 def _epoch() -> int | None:
@@ -210,12 +228,12 @@ def _date() -> str:
     return "" if seconds is None else time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))
 
 
-def _zipped(contents: dict[str, bytes]) -> bytes:
+def zipped(contents: Mapping[str, bytes], *, first: str) -> bytes:
+    """A zip archive, the same bytes each time, with one entry before the others: readers that stream want it first."""
     moment = time.gmtime(max(_epoch() or 0, _FIRST_TIME_OF_ZIP))[:6]
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
-        # Readers that stream want the description first.
-        for name in sorted(contents, key=lambda name: (name != "modelDescription.xml", name)):
+        for name in sorted(contents, key=lambda name: (name != first, name)):
             entry = zipfile.ZipInfo(name, moment)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.create_system = 3

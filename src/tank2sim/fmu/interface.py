@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from tank2sim.dynamics.kinks import kinks
 from tank2sim.dynamics.model import Input, Model, Parameter, Variable
 from tank2sim.units import UNITS
 
@@ -76,6 +77,7 @@ class Block:
 class Interface:
     """All variables of an FMU, in blocks: time, states, inputs, parameters, largest step, rates, other outputs.
 
+    The event indicators (:func:`tank2sim.dynamics.kinks.kinks`) are the last of the other outputs.
     A state or its rate that is an output of the model stands in its own block, with causality output. Boolean inputs
     and parameters are Boolean variables; a Boolean state or quantity is a real one with value 0 or 1, because in
     Model Exchange FMI lets discrete variables change at events only.
@@ -87,13 +89,14 @@ class Interface:
     parameters: Block
     rates: Block
     outputs: Block
+    indicators: Block
     trim_switch: int
     """Value reference of ``initial.trim``; 0 if the model has none or cannot be trimmed."""
 
     @property
     def blocks(self) -> tuple[Block, ...]:
         """The blocks of the model's own variables."""
-        return self.states, self.inputs, self.parameters, self.rates, self.outputs
+        return self.states, self.inputs, self.parameters, self.rates, self.outputs, self.indicators
 
     @property
     def max_step(self) -> int:
@@ -125,7 +128,9 @@ def interface(model: Model) -> Interface:
     inputs = Block("INPUTS", states.end, states.end + counts[1])
     parameters = Block("PARAMETERS", inputs.end, inputs.end + counts[2])
     rates = Block("RATES", parameters.end + 1, parameters.end + 1 + counts[0])
-    outputs = Block("OUTPUTS", rates.end, rates.end + len(others))
+    indicated = kinks(model)
+    outputs = Block("OUTPUTS", rates.end, rates.end + len(others) + len(indicated))
+    indicators = Block("INDICATORS", outputs.end - len(indicated), outputs.end)
     variables = (
         FmuVariable(
             name="time", reference=0, unit="s", description="Time", causality="independent", variability="continuous"
@@ -136,18 +141,21 @@ def interface(model: Model) -> Interface:
         _max_step(model, parameters.end),
         *(_rate(model, name, place, (states, rates)) for place, name in enumerate(rate_names)),
         *(_calculated(model, model[name], outputs.begin + place) for place, name in enumerate(others)),
+        *(_calculated(model, kink, indicators.begin + place) for place, kink in enumerate(indicated)),
     )
     _refuse(variables)
     switch = 0
     if TRIM_SWITCH in model.parameter_names and model.trim_step is not None and model[TRIM_SWITCH].boolean:
         switch = parameters.begin + model.parameter_names.index(TRIM_SWITCH)
-    return Interface(variables, states, inputs, parameters, rates, outputs, switch)
+    return Interface(variables, states, inputs, parameters, rates, outputs, indicators, switch)
 
 
 def other_outputs(model: Model) -> tuple[str, ...]:
     """Outputs that are neither states nor rates of states: those that the FMU evaluates as outputs."""
     described = interface(model)
-    return tuple(variable.name for variable in described.variables[described.outputs.begin : described.outputs.end])
+    return tuple(
+        variable.name for variable in described.variables[described.outputs.begin : described.indicators.begin]
+    )
 
 
 def _rate_names(model: Model) -> list[str]:

@@ -1,4 +1,4 @@
-"""Names of platforms in an FMU."""
+"""Platforms that a library can be built for, and their names in an FMU."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ import sys
 from dataclasses import dataclass
 
 from tank2sim.errors import InputError
+from tank2sim.native.cross import Target
 
 
 @dataclass(frozen=True)
 class Platform:
-    """Where a library runs: its folders under ``binaries/``, and how its file ends."""
+    """Where a library runs: its folders under ``binaries/``, and how it is compiled from another machine."""
 
     fmi2: str
     fmi3: str
-    suffix: str
+    target: Target
 
     def folder(self, fmi: int) -> str:
         """Name of the folder in an FMU of this version of FMI."""
@@ -24,14 +25,20 @@ class Platform:
 
 # FMI 2 names no folder for Linux on ARM; aarch64-linux is the extension that its later releases recommend. On a Mac
 # the same folder serves both processors.
-_PLATFORMS: dict[tuple[str, str], Platform] = {
-    ("linux", "x86_64"): Platform("linux64", "x86_64-linux", ".so"),
-    ("linux", "aarch64"): Platform("aarch64-linux", "aarch64-linux", ".so"),
-    ("win32", "x86_64"): Platform("win64", "x86_64-windows", ".dll"),
-    ("darwin", "x86_64"): Platform("darwin64", "x86_64-darwin", ".dylib"),
-    ("darwin", "aarch64"): Platform("darwin64", "aarch64-darwin", ".dylib"),
-}
+#
+# The oldest systems: glibc 2.17 is that of RHEL 7 and of Python's manylinux2014; macOS 11 is the first on ARM, and
+# 10.13 the oldest that Apple's tools still build for when macOS 11 came.
+PLATFORMS = (
+    Platform("linux64", "x86_64-linux", Target("x86_64-linux-gnu.2.17", ".so")),
+    Platform("aarch64-linux", "aarch64-linux", Target("aarch64-linux-gnu.2.17", ".so")),
+    Platform("win64", "x86_64-windows", Target("x86_64-windows-gnu", ".dll")),
+    Platform("darwin64", "x86_64-darwin", Target("x86_64-macos.10.13", ".dylib")),
+    Platform("darwin64", "aarch64-darwin", Target("aarch64-macos.11.0", ".dylib")),
+)
+"""Every platform, by which ``--platforms all`` is meant."""
+
 _PROCESSORS = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
+_SYSTEMS = {"linux": "linux", "win32": "windows", "darwin": "darwin"}
 
 
 def host_platform() -> Platform:
@@ -43,8 +50,34 @@ def host_platform() -> Platform:
         FMI has no name for it here.
     """
     processor = _PROCESSORS.get(platform.machine().lower(), platform.machine())
-    found = _PLATFORMS.get((sys.platform, processor))
+    name = f"{processor}-{_SYSTEMS.get(sys.platform, sys.platform)}"
+    found = next((each for each in PLATFORMS if each.fmi3 == name), None)
     if found is None:
         remedy = "export on Linux, Windows or macOS with an x86-64 or ARM processor of 64 bits"
         raise InputError("this machine", f"{sys.platform} on {processor}", "is no platform of the exporter", remedy)
     return found
+
+
+def named_platforms(names: str) -> tuple[Platform, ...] | None:
+    """The platforms that ``--platforms`` asks for, in the order of `PLATFORMS`; None for the one of this machine.
+
+    Parameters
+    ----------
+    names : str
+        ``host``, ``all``, or names of folders of FMI 2 or FMI 3 with commas between; ``darwin64`` is both processors.
+
+    Raises
+    ------
+    InputError
+        One of them is no platform.
+    """
+    if names == "host":
+        return None
+    if names == "all":
+        return PLATFORMS
+    asked = {name.strip() for name in names.split(",")}
+    unknown = sorted(asked - {name for each in PLATFORMS for name in (each.fmi2, each.fmi3)})
+    if unknown:
+        remedy = f"choose all, host, or of {', '.join(each.fmi3 for each in PLATFORMS)} with commas between"
+        raise InputError("--platforms", unknown[0] or repr(names), "is no platform of the exporter", remedy)
+    return tuple(each for each in PLATFORMS if asked & {each.fmi2, each.fmi3})

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Mapping
 
 import casadi as ca
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from tank2sim.dynamics.model import Model, Vector
 from tank2sim.fmu.manoeuvre import Manoeuvre
@@ -40,6 +40,8 @@ def exactly(model: Model, run: Manoeuvre) -> Vector:
     Small enough steps are found where the right-hand side has a kink (limits of rate and angle), which a fixed step,
     however short, would straddle. scipy's LSODA, relative tolerance 1e-11 of each state's nominal value.
     """
+    from scipy.integrate import solve_ivp  # takes half a second to load, which an export does not need
+
     nominal = np.array([abs(state.nominal) or 1.0 for state in model.states])
     parameters = model.parameter_values()
     path = np.empty((len(model.states), len(run.times)))
@@ -59,6 +61,36 @@ def exactly(model: Model, run: Manoeuvre) -> Vector:
             raise RuntimeError(f"the reference cannot be integrated: {solution.message}")
         path[:, first + 1 : behind + 1] = solution.y * nominal[:, None]
     return _outputs(model, run, path)
+
+
+def output_errors(model: Model, expected: Vector, found: Mapping[str, Vector]) -> dict[str, float]:
+    """:func:`relative_errors` of a model's outputs, `expected` (K + 1, ny) in their order."""
+    columns = dict(zip(model.outputs, expected.T, strict=True))
+    angles = {name for name in model.outputs if model[name].unit == "rad" and name not in model.state_names}
+    return relative_errors(columns, found, {name: model[name].nominal for name in model.outputs}, angles)
+
+
+def relative_errors(
+    expected: Mapping[str, Vector], found: Mapping[str, Vector], nominals: Mapping[str, float], angles: Collection[str]
+) -> dict[str, float]:
+    """Name to the largest error, relative to the larger of the signal's range in the run and its nominal value.
+
+    Parameters
+    ----------
+    expected, found : mapping
+        Signals (K + 1,) by name.
+    nominals : mapping
+        Their nominal values; 0 counts as 1.
+    angles : collection of str
+        Those (rad) that are calculated anew at each point: they may jump by a full turn, a moment sooner or later.
+    """
+    errors = {}
+    for name, signal in expected.items():
+        difference = np.abs(found[name] - signal)
+        if name in angles:
+            difference = np.minimum(difference, np.abs(difference - 2 * np.pi))
+        errors[name] = float(np.max(difference)) / max(float(np.ptp(signal)), abs(nominals[name]) or 1.0)
+    return errors
 
 
 def _outputs(model: Model, run: Manoeuvre, states: Vector) -> Vector:

@@ -134,10 +134,21 @@ def exchange(fmu: RunningFmu, run: Manoeuvre, inputs: Sequence[str], outputs: Se
             fmu.update()
             solver.reset(run.times[first])
         for begin, end in zip(run.times[first:behind], run.times[first + 1 : behind + 1], strict=True):
-            solver.step(begin, end)
-            fmu.instance.setTime(end)
+            _solve(fmu, solver, begin, end)
             rows.append(fmu.read(outputs))
     return np.array(rows)
+
+
+def _solve(fmu: RunningFmu, solver: Any, begin: float, end: float) -> None:
+    """From `begin` to `end`, anew from each place where an event indicator changes sign."""
+    now = begin
+    while now < end:
+        event, _, now = solver.step(now, end)
+        fmu.instance.setTime(now)
+        if event:
+            fmu.instance.enterEventMode()
+            fmu.update()
+            solver.reset(now)
 
 
 class _NoInputs:

@@ -9,7 +9,9 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from itertools import repeat
 from pathlib import Path
 
 from tank2sim.errors import InputError
@@ -57,7 +59,8 @@ def compile_shared(
     """Compile C sources into a shared library.
 
     The compiler runs in the folder of the first source with names relative to it, so that no path of this machine
-    enters the library and the same sources give the same bytes.
+    enters the library and the same sources give the same bytes; on each source by itself, as many at a time as this
+    machine has processors.
 
     Raises
     ------
@@ -94,23 +97,32 @@ def _trouble(command: tuple[str, ...]) -> str | None:
 
 def _refusal(compiler: list[str], sources: list[Path], library: Path, flags: Iterable[str]) -> str | None:
     """What the compiler said when it made no library; None if it made one."""
-    folder = sources[0].parent
-    command = [
-        *compiler,
-        *FLAGS,
-        *flags,
-        "-shared",
-        *(["-Wl,--build-id=none"] if sys.platform.startswith("linux") else []),
-        "-o",
-        str(library.resolve()),
-        *(os.path.relpath(source, folder) for source in sources),
-        *([] if sys.platform == "win32" else ["-lm"]),
-    ]
+    with tempfile.TemporaryDirectory(prefix="tank2sim-") as name, ThreadPoolExecutor(os.cpu_count()) as pool:
+        command, folder = [*compiler, *FLAGS, *flags], sources[0].parent
+        objects = [Path(name, f"{place}.o") for place in range(len(sources))]
+        compiling = (
+            [*command, "-c", os.path.relpath(source, folder), "-o", str(compiled)]
+            for source, compiled in zip(sources, objects, strict=True)
+        )
+        linking = [
+            *command,
+            "-shared",
+            *(["-Wl,--build-id=none"] if sys.platform.startswith("linux") else []),
+            *("-o", str(library.resolve())),
+            *(compiled.name for compiled in objects),
+            *([] if sys.platform == "win32" else ["-lm"]),
+        ]
+        refusals = list(pool.map(_run, compiling, repeat(folder), objects))
+        return next(filter(None, refusals), None) or _run(linking, Path(name), library)
+
+
+def _run(command: list[str], folder: Path, made: Path) -> str | None:
+    """What a compiler said when it did not make the file that it should; None if it did."""
     try:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
     except OSError as error:
         return f"it cannot be run ({error.strerror})"
-    if done.returncode == 0 and library.exists():
+    if done.returncode == 0 and made.exists():
         return None
     return done.stderr.strip() or f"it ended with code {done.returncode}, without a library or a word"
 

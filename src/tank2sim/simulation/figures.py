@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.dynamics.model import Vector
-from tank2sim.simulation.manoeuvres import PullOut, Spiral, Turn, Zigzag
+from tank2sim.simulation.manoeuvres import PullOut, Spiral, Stop, Turn, Zigzag
 from tank2sim.simulation.trajectory import Trajectory
 
 Figures = dict[str, object]
@@ -20,6 +20,9 @@ Figures = dict[str, object]
 LOOP_HEIGHT = 0.05
 """Two yaw rates at one rudder angle of a spiral are two steady turns if they differ by this share of the largest rate;
 less is what waiting for the steady state leaves."""
+
+AT_REST = 1e-6
+"""A speed that is less than this share of the run's largest is none: a choice of ours, above rounding."""
 
 
 def figures_of(manoeuvre: object, trajectory: Trajectory, length: float) -> Figures:
@@ -43,6 +46,8 @@ def figures_of(manoeuvre: object, trajectory: Trajectory, length: float) -> Figu
             return _pull_out(trajectory, rudder)
         case Spiral(rudders):
             return _spiral(trajectory, rudders)
+        case Stop():
+            return _stop(trajectory, manoeuvre, length)
         case _:
             return _ending(trajectory)
 
@@ -178,5 +183,28 @@ def _spiral(run: Trajectory, rudders: tuple[float, ...]) -> Figures:
     }
 
 
-def _speed_loss(run: Trajectory, speed: float) -> float:
-    return 100 * (1 - speed / float(run["motion.speed"][0]))
+def _stop(run: Trajectory, stop: Stop, length: float) -> Figures:
+    """Track reach along the path, head reach along the initial course, side reach across it, to starboard: all of the
+    origin from the order until the ship is dead in the water (IMO MSC.137(76), ITTC 7.5-04-02-01)."""
+    final = stop.final_speed(float(run["motion.u"][0]))
+    time = _first(run.crossings("motion.u", "motion.udot", final))
+    if time is None and run["motion.u"][-1] <= final + AT_REST * run["motion.speed"][0]:
+        time = float(run.t[-1])  # the run ends on the event itself
+    ahead, side = _Execute(run, 1.0).place(time) if time else (None, None)
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(run["motion.x"]), np.diff(run["motion.y"])))])
+    track = float(np.interp(time, run.t, way)) if time else None
+    return {
+        "track_reach_m": track,
+        "head_reach_m": ahead,
+        "side_reach_m": side,
+        "time_to_stop_s": time,
+        "track_reach_lengths": track and track / length,
+        "head_reach_lengths": ahead and ahead / length,
+        "heading_change_deg": math.degrees(run.at("motion.psi", time) - run["motion.psi"][0]) if time else None,
+    }
+
+
+def _speed_loss(run: Trajectory, speed: float) -> float | None:
+    """Per cent of the speed at the execute; None for a ship that started at rest."""
+    before, largest = float(run["motion.speed"][0]), float(run["motion.speed"].max())
+    return 100 * (1 - speed / before) if before > AT_REST * largest else None

@@ -14,12 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from tank2sim.dynamics.model import Vector
+from tank2sim.dynamics.model import Input, Vector
 from tank2sim.errors import InputError
 from tank2sim.records.csv_table import read_table
 from tank2sim.simulation.running import Running
 
-FORMS = "turn:35, turn:-35, zigzag:20/20, zigzag:-10/10, pullout:20, spiral, spiral:20, file:orders.csv"
+FORMS = (
+    "turn:35, turn:-35, zigzag:20/20, zigzag:-10/10, pullout:20, spiral, spiral:20, stop, stop:-60 (rpm), "
+    "file:orders.csv"
+)
 
 TURN_HEADING = math.radians(540.0)
 """A turning circle is held for one and a half turns, so that its last half turn is steady (ITTC 7.5-04-02-01)."""
@@ -29,6 +32,14 @@ ZIGZAG_EXECUTES = 5
 
 SPIRAL_RUDDERS_DEG = (20, 15, 10, 7, 5, 4, 3, 2, 1, 0, -1, -2, -3, -4, -5, -7, -10, -15, -20)
 """Rudder angles of a direct spiral on its way to port, deg; it comes back through the same ones."""
+
+FULL_ASTERN = 0.7
+"""Full astern, as a share of the nominal revolutions: about what a diesel reaches against the stream. A choice of ours;
+``stop:RPM`` states another."""
+
+COASTING_END = 0.2
+"""A ship whose engine is stopped coasts on without end: her run counts as ended at this share of the approach speed,
+where the rudder has lost most of its hold. A choice of ours."""
 
 LONGEST_RUN_S = 1e7
 """Longest run, s: beyond a hundred days a manoeuvre is a mistake in units."""
@@ -111,6 +122,46 @@ class Spiral:
 
 
 @dataclass(frozen=True)
+class Stop:
+    """Crash stop (full astern stopping test), or coasting with the engine stopped, rudder amidships.
+
+    Parameters
+    ----------
+    revolutions : float, optional
+        Order, rad/s: negative (astern) or 0; by default :data:`FULL_ASTERN` of the nominal ones. They are reached at
+        once, for a card states no time to reverse the engine.
+    """
+
+    revolutions: float | None = None
+
+    def final_speed(self, approach: float) -> float:
+        """Surge velocity (m/s) at which the ship has stopped: 0, or :data:`COASTING_END` of that of the approach."""
+        return COASTING_END * approach if self.revolutions == 0 else 0.0
+
+    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
+        """Run for `duration` s, or until the ship is dead in the water (at most 300 L/u0).
+
+        Raises
+        ------
+        InputError
+            The ship has no propulsion.
+        """
+        if "propeller.speed" not in running.model.input_names:
+            problem = "is missing: the ship's engine cannot be stopped or reversed"
+            raise InputError(running.model.name, "propulsion", problem, "add [propulsion] to the card")
+        nominal = running.model["propeller.speed"]
+        assert isinstance(nominal, Input)
+        running.order(
+            {"propeller.speed": -FULL_ASTERN * nominal.start if self.revolutions is None else self.revolutions}
+        )
+        if duration is not None:
+            running.run(duration)
+            return
+        end = self.final_speed(running.state("motion.u"))
+        running.run_until("motion.u", end, rising=False, at_most=300 * ship_time)
+
+
+@dataclass(frozen=True)
 class Orders:
     """Orders from a file, each held until the next.
 
@@ -148,20 +199,22 @@ class Orders:
         running.run(end - running.time)
 
 
-Manoeuvre = Turn | Zigzag | PullOut | Spiral | Orders
+Manoeuvre = Turn | Zigzag | PullOut | Spiral | Stop | Orders
 
 
 def parse_manoeuvre(text: str) -> Manoeuvre:
-    """The manoeuvre that a command line means: one of :data:`FORMS`, angles in deg, positive to starboard.
+    """The manoeuvre that a command line means: one of :data:`FORMS`, angles in deg, positive to starboard, rpm ahead.
 
     Raises
     ------
     InputError
-        It is none of them, or an angle is out of bounds.
+        It is none of them, or an angle or a number of revolutions is out of bounds.
     """
     kind, _, rest = text.partition(":")
     if kind == "file" and rest:
         return read_orders(Path(rest))
+    if kind == "stop":
+        return _parse_stop(text)
     number = r"([+-]?\d+(?:\.\d+)?)"
     makers: dict[str, tuple[str, Callable[[list[float]], Manoeuvre]]] = {
         "turn": (number, lambda a: Turn(math.radians(a[0]))),
@@ -223,6 +276,19 @@ def _rudder_sign(path: Path, comments: Mapping[str, str]) -> str:
     if sign not in ("port", "starboard"):
         raise InputError(path, "comment rudder_sign", f"is {sign!r}", "port or starboard was expected")
     return sign
+
+
+def _parse_stop(text: str) -> Stop:
+    found = re.fullmatch(r"stop(?::([+-]?\d+(?:\.\d+)?))?", text)
+    if found is None:
+        raise InputError("--manoeuvre", "", f"{text!r} is no manoeuvre", f"one of: {FORMS}")
+    if found[1] is None:
+        return Stop()
+    revolutions = float(found[1]) * math.tau / 60
+    if revolutions > 0:
+        remedy = "revolutions to stop with are negative (astern) or 0, in rpm"
+        raise InputError("--manoeuvre", "", f"{text!r} orders the engine ahead", remedy)
+    return Stop(revolutions)
 
 
 def _spiral_rudders(largest: float) -> tuple[float, ...]:

@@ -21,7 +21,8 @@ def _with_cross_flow_drag(model: Model, given: Symbols, card: ManoeuvringCard) -
     """Y, N = -1/2 rho T C_D integral of (1, x) abs(v + x r) (v + x r) dx from -L/2 to L/2.
 
     Norrbin (1971), Theory and observations on the use of a mathematical model for ship manoeuvring, SSPA 68; Faltinsen
-    (1990), Sea Loads, 6.4; one C_D for all stations. It comes on top of the card's own cubic terms.
+    (1990), Sea Loads, 6.4; one C_D for all stations. It comes on top of the card's own cubic terms, and fades
+    out with them at low speed, where the hull has cross-flow drag of its own.
     """
     model, (draught,) = with_particulars(model, card, "draught_m")
     half = model.symbol("ship.length") / 2
@@ -31,7 +32,8 @@ def _with_cross_flow_drag(model: Model, given: Symbols, card: ManoeuvringCard) -
         across = model.symbol("motion.v") + x * model.symbol("motion.r")
         drag = half * float(weight) * ca.fabs(across) * across
         Y, N = Y + drag, N + x * drag
-    pressure = -0.5 * model.symbol("ship.water_density") * draught * given["drag_coefficient"]
+    kept = 1 - model.symbol("low_speed.share")
+    pressure = -0.5 * model.symbol("ship.water_density") * draught * given["drag_coefficient"] * kept
     return with_forces(model, Y=pressure * Y, N=pressure * N)
 
 

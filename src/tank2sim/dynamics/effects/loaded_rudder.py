@@ -26,9 +26,9 @@ def _in_loaded_slipstream(model: Model, given: Symbols, card: ManoeuvringCard) -
     of the card's Yv, Nv, Yr, Nr, which were measured with the rudder amidships. After the rudder of the MMG model:
     Yasukawa and Yoshimura (2015), J. Mar. Sci. Technol. 20, 37-52, with its slipstream linear in the loading.
     """
-    u, v, r, delta = (model.symbol(name) for name in ("motion.u", "motion.v", "motion.r", "rudder.effective"))
+    v, r, delta = (model.symbol(name) for name in ("motion.v", "motion.r", "rudder.effective"))
     u0, length = model.symbol("ship.speed"), model.symbol("ship.length")
-    speed = ca.sqrt(u * u + v * v)
+    speed = model.symbol("motion.speed")
     driven = u0
     if "propeller.speed" in model:
         driven = u0 * model.symbol("propeller.speed_actual") / model.symbol("propulsion.nominal_speed")

@@ -16,6 +16,10 @@ SIDE_IN_LENGTHS = 0.055
 """Areas above the water over B^2 and L^2, between those of a loaded tanker (0.35 and 0.03) and of a container ship
 (0.95 and 0.1): choices of ours."""
 
+DIAMETER_IN_DRAUGHTS = 0.6
+"""Diameter of the propeller over the draught, between that of full tankers (0.45) and of container ships (0.75): a
+choice of ours."""
+
 AREA_ERROR = 0.4
 """Standard error of such an area, relative: the distance from the middle to those of tanker and container ship."""
 
@@ -42,6 +46,12 @@ _ESTIMATES: dict[str, tuple[str, str, str, Callable[[ManoeuvringCard], float]]] 
     "beam_m": ("beam", "m", "L/7", _beam),
     "draught_m": ("draught", "m", "0.4 of the beam", _draught),
     "block_coefficient": ("block coefficient", "", "from mass, length, beam and draught", _block),
+    "propeller_diameter_m": (
+        "propeller diameter",
+        "m",
+        f"{DIAMETER_IN_DRAUGHTS:g} of the draught",
+        lambda card: DIAMETER_IN_DRAUGHTS * particular(card, "draught_m"),
+    ),
     "projected_area_front_m2": (
         "area above the water seen from ahead",
         "m2",
@@ -64,7 +74,8 @@ def particular(card: ManoeuvringCard, key: str) -> float:
     ----------
     card : ManoeuvringCard
     key : str
-        ``beam_m``, ``draught_m``, ``block_coefficient``, ``projected_area_front_m2`` or ``projected_area_side_m2``.
+        ``beam_m``, ``draught_m``, ``block_coefficient``, ``propeller_diameter_m``, ``projected_area_front_m2`` or
+        ``projected_area_side_m2``.
     """
     value = getattr(card.ship, key)
     return float(_ESTIMATES[key][-1](card) if value is None else value)

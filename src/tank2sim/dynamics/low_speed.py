@@ -1,0 +1,228 @@
+"""The ship at low speed and astern, where the polynomial of (3.5), (3.8) does not hold.
+
+Its prime system divides by U, and its powers of Du' = (u - u0)/U grow without bound as the ship stops. So below the
+lowest speed u_b of the card the forces pass into those of this module, which are regular everywhere, at rest too:
+
+    X = F_p - R_b u (V + e)/(u_b (u_b + e))
+    Y = 1/2 rho L^2 (Y_v (V + e) v + L Y_r u r) - 1/2 rho T C_D integral of (v + x r) abs(v + x r) dx
+    N = 1/2 rho L^3 (N_v u v + L N_r (V + e) r) - 1/2 rho T C_D integral of x (v + x r) abs(v + x r) dx
+
+with the hydrodynamic parts of Y_r and N_r, the inertia of (3.1) and the added masses of the card. V is U, with a slope
+at rest (:func:`regular_speed`), and e is small. Damping of the first order goes with V, so that it resists ahead and
+astern; couplings go with u, as lift and the moment of Munk do: they change sides astern. Asymmetries (Y0, N0) and all
+other terms of the polynomial are left out.
+
+F_p is the thrust at nominal revolutions (to which :func:`tank2sim.dynamics.propulsion.propeller_force` adds what others
+make of it), and the resistance R_b is that of the card at u_b: F_p less the card's X straight ahead at u_b. A card
+without propulsion keeps its revolutions, whatever the speed, unless its X at u_b is a resistance already (a bare hull:
+F_p = 0, and it comes to rest).
+
+The rudder stands in the race of the propeller, with the card's own terms in delta alone, as they are at u0:
+
+    F = (F_delta(u0) (u|u| + J n^2/n0^2) + F_d(u0) gamma sqrt(J) n/n0 (v - r L/2))/(u0^2 + J),
+    J = 2 F_p/(c rho pi D^2/4)
+
+J is what the propeller adds to the square of the speed in its race by momentum theory, at nominal revolutions, where
+c = (1 - t)(1 - w)^2; only a propeller that turns ahead (n > 0) adds it. Astern the first term is weaker. F_d is the
+part linear in delta: a stern that swings meets the race at an angle, and so the rudder damps the swing (what it does in
+the stream of the hull is in Y_v to N_r).
+
+Oltmann and Sharma (1984), Simulation of combined engine and rudder maneuvers using an improved model of
+hull-propeller-rudder interactions, 15th Symposium on Naval Hydrodynamics (the same division: lift, cross-flow drag,
+resistance, rudder in the race); Hooft (1994), The cross flow drag on a manoeuvring ship, Ocean Engineering 21,
+329-342; Faltinsen (1990), Sea Loads, 6.4; Brix (ed.) (1993), Manoeuvring Technical Manual (momentum theory of the
+race). That the card's linear terms are taken as they are is a choice of ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects.particulars import particular
+from tank2sim.dynamics.model import Parameter
+
+Symbols = Mapping[str, ca.SX]
+"""Symbols of the hull's variables, by name."""
+
+Forces = tuple[Any, Any, Any]
+"""X, Y (N) and N (N m)."""
+
+LEAST_BOUND, LARGEST_BOUND = 0.05, 0.9
+"""Bounds of u_b over u0: a card that holds down to rest still divides by U there, and the thrust of a card without
+propulsion is told from how X falls between u_b and u0. Choices of ours."""
+
+BLEND = 0.5
+"""The polynomial's share falls from 1 at u_b to 0 at this share of u_b^2 (0.71 u_b): a choice of ours, narrow because a
+polynomial soon departs from the truth beyond its range, and as wide as the KVLCC2 needs to turn steadily within it. In
+the hull's surge force it is the cube of that: the Mariner's polynomial would drive her on with a stopped engine."""
+
+STILL = 1e-7
+"""Speed over u0 at which the ship counts as at rest: a choice of ours. Above 0.1 u0 it changes U by less than 1e-12 of
+itself."""
+
+LINEAR_DAMPING = 0.05
+"""e over u_b, the speed at which a ship at rest is damped: small beside cross-flow drag at any speed that matters, but
+it brings the ship to rest. A choice of ours."""
+
+LEAST_SHARE, LEAST_RESISTANCE = 0.7, 1e-4
+"""R_b is not taken to be less than this share of (u_b/u0)^2 times the resistance at u0, of which waves, that fall away,
+make up three tenths at most on ships that push no hump; nor than this much of 1/2 rho L^2 u_b^2, a sixth of a usual
+resistance. Both are choices of ours, for cards whose thrust and polynomial disagree."""
+
+DRAG_COEFFICIENT = 1.0
+"""C_D: the largest of 0.6 to 1 for whole hulls (Faltinsen 1990, 6.4), for a turn on the spot works on the ends, which
+are sharp and have more of it than midships."""
+
+RUDDER_ASTERN = 0.5
+"""Rudder force going astern over that ahead at one speed: the flow comes from the trailing edge, with less lift and an
+earlier stall. A choice of ours."""
+
+RACE = 0.4
+"""(1 - t)(1 - w)^2 with a thrust deduction of 0.2 and a wake fraction of 0.3, of usual ships with one screw (Harvald
+1983, Resistance and Propulsion of Ships). Only the ratio of race and wake acts: from 0.3 to 0.6 the rudder's force at
+rest changes by less than a fifth."""
+
+STRAIGHTENING = 0.5
+"""gamma, the share of the stern's cross flow that reaches a rudder in the race: between the 0.40 and 0.64 of the KVLCC2
+(Yasukawa and Yoshimura 2015, J. Mar. Sci. Technol. 20)."""
+
+STATIONS = 4
+"""Gauss-Legendre stations along the hull, taken as the rectangle L T: exact unless the pivot lies within the hull; then
+the moment errs by 1 % and the force by 3 % at most of the largest that the end speed can give."""
+
+
+def low_speed_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
+    """Parameters of the forces at low speed: ``ship.draught``, ``ship.propeller_diameter`` and ``low_speed.*``."""
+
+    def length(key: str, name: str, description: str) -> Parameter:
+        estimated = "" if getattr(card.ship, key) else " (estimated: the card states none)"
+        value = particular(card, key)
+        return Parameter(
+            name=name,
+            unit="m",
+            description=f"{description}, for the forces at low speed{estimated}",
+            nominal=value,
+            minimum=1e-6,
+            start=value,
+            tunable=False,
+        )
+
+    def number(name: str, description: str, start: float) -> Parameter:
+        return Parameter(name=name, unit="1", description=description, minimum=0.0, maximum=3.0, start=start)
+
+    return (
+        length("draught_m", "ship.draught", "Draught"),
+        length("propeller_diameter_m", "ship.propeller_diameter", "Diameter of the propeller"),
+        number("low_speed.drag_coefficient", "Cross-flow drag coefficient of the hull at low speed", DRAG_COEFFICIENT),
+        number("low_speed.rudder_astern", "Rudder force going astern over that ahead at one speed", RUDDER_ASTERN),
+    )
+
+
+def lowest_speed(s: Symbols) -> ca.SX:
+    """u_b, m/s: the lowest speed of the card, within its bounds over u0."""
+    u0 = s["ship.speed"]
+    return ca.fmax(LEAST_BOUND * u0, ca.fmin(s["ship.slowest"], LARGEST_BOUND * u0))
+
+
+def share_of_low_speed(s: Symbols) -> ca.SX:
+    """Share of the forces at low speed: 0 from u_b upwards, to the last digit, 1 at rest and astern.
+
+    3 y^2 - 2 y^3, y from 0 to 1 between 1 and :data:`BLEND` of (u|u| + v^2)/u_b^2, which is U^2/u_b^2 ahead.
+    """
+    u, v = s["motion.u"], s["motion.v"]
+    square = lowest_speed(s) ** 2
+    short = square - (u * ca.fabs(u) + v * v)
+    # The greater of `short` and 0, the lesser of that and 1: with |a|, to which a solver need not step up as to a kink.
+    below = (short + ca.fabs(short)) * (0.5 / ((1 - BLEND) * square))
+    twice = 1 + below - ca.fabs(1 - below)
+    return twice * twice * (0.75 - 0.25 * twice)
+
+
+def regular_speed(s: Symbols) -> ca.SX:
+    """V, m/s: U, but :data:`STILL` u0 at rest, so that it has a slope there and may be divided by."""
+    return ca.sqrt(s["motion.u"] ** 2 + s["motion.v"] ** 2 + (STILL * s["ship.speed"]) ** 2)
+
+
+def nominal_thrust(s: Symbols, X_bound: ca.SX) -> ca.SX:
+    """F_p, N: effective thrust at nominal revolutions, from the card's X straight ahead at u_b (N).
+
+    Without propulsion it is what leaves X_bound over a resistance ~ u^2 at u_b and nothing at u0; zero for a hull whose
+    X_bound is a resistance.
+    """
+    u0, bound = s["ship.speed"], lowest_speed(s)
+    if "propulsion.Xnn" in s:
+        return 0.5 * s["ship.water_density"] * (s["ship.length"] * u0) ** 2 * s["propulsion.Xnn"]
+    return ca.fmax(0, X_bound) * u0**2 / (u0**2 - bound**2)
+
+
+def hull_forces(s: Symbols, V: ca.SX, X_bound: ca.SX, X_u0: ca.SX, linear: Mapping[str, Any]) -> Forces:
+    """X with the thrust at nominal revolutions, Y and N of the hull at low speed, with the inertial terms of (3.1).
+
+    Parameters
+    ----------
+    s : mapping
+        Symbols of the hull.
+    V : casadi.SX
+        :func:`regular_speed`, m/s.
+    X_bound, X_u0 : casadi.SX
+        The card's X straight ahead at u_b and at u0, N.
+    linear : mapping
+        Hydrodynamic parts of Yv, Yr, Nv, Nr, SI at a speed of 1 m/s.
+    """
+    u, v, r = s["motion.u"], s["motion.v"], s["motion.r"]
+    mass, moment, bound = s["ship.mass"], s["ship.mass"] * s["ship.x_G"], lowest_speed(s)
+    damping = LINEAR_DAMPING * bound
+    thrust = nominal_thrust(s, X_bound)
+    least = LEAST_SHARE * (bound / s["ship.speed"]) ** 2 * (thrust - X_u0)
+    least = ca.fmax(least, LEAST_RESISTANCE * 0.5 * s["ship.water_density"] * (s["ship.length"] * bound) ** 2)
+    resistance = ca.fmax(thrust - X_bound, least) / (bound * (bound + damping))
+    Y_drag, N_drag = _cross_flow_drag(s)
+    V, turning = V + damping, u * r
+    return (
+        thrust - resistance * u * V + (mass * v + moment * r) * r,
+        linear["Yv"] * v * V + (linear["Yr"] - mass) * turning + Y_drag,
+        linear["Nv"] * v * u + linear["Nr"] * r * V - moment * turning + N_drag,
+    )
+
+
+def _cross_flow_drag(s: Symbols) -> tuple[ca.SX, ca.SX]:
+    """Y and N of the cross flow, N and N m; stations forward and aft are taken in pairs."""
+    v, r, half = s["motion.v"], s["motion.r"], s["ship.length"] / 2
+    pressure = -0.5 * s["ship.water_density"] * s["ship.draught"] * s["low_speed.drag_coefficient"]
+    Y = N = ca.SX(0)
+    nodes, weights = np.polynomial.legendre.leggauss(STATIONS)
+    for node, weight in zip(nodes[STATIONS // 2 :], weights[STATIONS // 2 :], strict=True):
+        x, strip = float(node) * half, pressure * (float(weight) * half)
+        forward, aft = v + x * r, v - x * r
+        forward, aft = ca.fabs(forward) * forward, ca.fabs(aft) * aft
+        Y, N = Y + strip * (forward + aft), N + (strip * x) * (forward - aft)
+    return Y, N
+
+
+def rudder_flow(s: Symbols, X_bound: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """The flow over the rudder at low speed, m2/s2.
+
+    Returns
+    -------
+    square, square_at_u0 : casadi.SX
+        Square of its speed, negative when it comes from aft; the same at u0 and nominal revolutions.
+    swing : casadi.SX
+        Speed of the race times the share of the stern's speed to starboard that turns the flow.
+    """
+    u, u0, astern = s["motion.u"], s["ship.speed"], s["low_speed.rudder_astern"]
+    disc = ca.pi / 4 * s["ship.propeller_diameter"] ** 2
+    race = 2 * ca.fmax(0, nominal_thrust(s, X_bound)) / (RACE * s["ship.water_density"] * disc)
+    race = race + (STILL * u0) ** 2  # its root has a slope without thrust, too
+    ahead = ca.SX(1)
+    if "propeller.speed" in s:
+        n = s["propeller.speed_actual"] / s["propulsion.nominal_speed"]
+        ahead = (n + ca.fabs(n)) / 2
+    # u|u| ahead, and the stated share of it astern
+    stream = (1 + astern) / 2 * (u * ca.fabs(u)) + (1 - astern) / 2 * (u * u)
+    stern = s["motion.v"] - 0.5 * s["ship.length"] * s["motion.r"]
+    return stream + race * ahead**2, u0**2 + race, STRAIGHTENING * ca.sqrt(race) * ahead * stern

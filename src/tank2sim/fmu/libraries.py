@@ -1,0 +1,109 @@
+"""The libraries of an FMU, a platform each."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+
+from tank2sim.fmu.platforms import Platform, host_platform
+from tank2sim.native.compiler import SHARED_SUFFIX, compile_shared, require_compiler
+from tank2sim.native.cross import cross_compiled, has_compiled, require_cross_compiler
+from tank2sim.native.universal import universal
+
+Told = Callable[[str], None]
+"""Hears, in a few words, what is being done."""
+
+# A choice of ours: the compiler uses the processors itself too, so more at a time bring nothing.
+_AT_A_TIME = 2
+
+# A library bears neither the name of its file nor the time of its making, so that it is the same each time.
+_LINK_FLAGS = {
+    "linux": ("-Wl,--strip-all",),
+    "darwin": ("-Wl,-install_name,@rpath/model.dylib",),
+    "win32": ("-Wl,--no-insert-timestamp",),
+}
+
+
+def require_compilers(platforms: Sequence[Platform] | None) -> None:
+    """Make sure that libraries for `platforms` (None: this machine's) can be made here, before anything else is done.
+
+    Raises
+    ------
+    InputError
+        The compiler is missing, or this machine's platform has no name in FMI.
+    """
+    if platforms is None:
+        require_compiler("exporting an FMU")
+        host_platform()
+    else:
+        require_cross_compiler()
+
+
+def libraries(
+    sources: Mapping[str, str], platforms: Sequence[Platform] | None, fmi: int, told: Told = lambda _: None
+) -> dict[tuple[str, str], bytes]:
+    """The libraries of C sources: folder of the platform and ending of the name, to the library.
+
+    Platforms that share a folder (the two Macs in FMI 2) share one universal library there.
+
+    Parameters
+    ----------
+    sources : mapping
+        Name to text of every C file and header.
+    platforms : sequence of Platform, optional
+        None: this machine's, by its own compiler; others, and this one if it is among them, by the one for all.
+
+    Raises
+    ------
+    InputError
+        As :func:`require_compilers`.
+    """
+    if platforms is None:
+        return {(host_platform().folder(fmi), SHARED_SUFFIX): _of_this_machine(sources)}
+    made = _compiled(sources, platforms, told)
+    shared: dict[tuple[str, str], list[bytes]] = {}
+    for platform in platforms:
+        shared.setdefault((platform.folder(fmi), platform.target.suffix), []).append(made[platform])
+    return {place: parts[0] if len(parts) == 1 else universal(parts) for place, parts in shared.items()}
+
+
+def _of_this_machine(sources: Mapping[str, str]) -> bytes:
+    with tempfile.TemporaryDirectory(prefix="tank2sim-") as name:
+        folder = Path(name)
+        for source, text in sources.items():
+            (folder / source).write_text(text, encoding="utf-8", newline="\n")
+        library = folder / "library"
+        compile_shared(sorted(folder.glob("*.c")), library, flags=_LINK_FLAGS.get(sys.platform, ()))
+        return library.read_bytes()
+
+
+def _compiled(sources: Mapping[str, str], platforms: Sequence[Platform], told: Told) -> dict[Platform, bytes]:
+    waiting = {platform: "" if has_compiled(platform.target) else _patience(platform) for platform in platforms}
+    made: dict[Platform, bytes] = {}
+
+    def tell() -> None:
+        left = ", ".join(f"{platform.fmi3}{note}" for platform, note in waiting.items())
+        told(f"{len(made)} of {len(platforms)} libraries compiled; left: {left or 'none'}")
+
+    with ThreadPoolExecutor(_AT_A_TIME) as pool:
+        # What takes longest first, so that no processor is idle beside it.
+        first = sorted(platforms, key=lambda platform: not waiting[platform])
+        jobs = {pool.submit(cross_compiled, sources, platform.target): platform for platform in first}
+        tell()
+        try:
+            for job in as_completed(jobs):
+                made[jobs[job]] = job.result()
+                del waiting[jobs[job]]
+                tell()
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+    return made
+
+
+def _patience(platform: Platform) -> str:
+    long = "2 to 3 minutes" if platform.target.suffix == ".dll" else "some 10 s"
+    return f" (the first time: {long})"

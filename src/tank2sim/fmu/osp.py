@@ -1,0 +1,94 @@
+"""Variable groups after the interface specification of the Open Simulation Platform, OSP-IS 1.0.1.
+
+Groups of one kind in two FMUs are joined as one connection. The kind (``LinearVelocity``) says what the variables are;
+they stand in the order of the axes, forward and starboard in body axes, north and east in earth axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from tank2sim.fmu.interface import FmuVariable, Interface
+
+
+@dataclass(frozen=True)
+class Group:
+    """A group of variables, or of groups.
+
+    Parameters
+    ----------
+    kind : str
+        Element of OSP-IS, such as ``Generic`` or ``LinearVelocity``.
+    name : str
+        Unique in an FMU.
+    variables : tuple of pair
+        Variable and its axis, ``x``, ``y``, ``z`` or empty.
+    groups : tuple of Group
+        Those within, in the order in which the schema has their kinds.
+    """
+
+    kind: str
+    name: str
+    variables: tuple[tuple[FmuVariable, str], ...] = ()
+    groups: tuple[Group, ...] = ()
+
+
+Parts = tuple[tuple[str, str, dict[str, str]], ...]
+
+# Generic group -> its parts: kind, name, variables with their axes. Names of groups as in OSP's demonstration vessel
+# where that has them. Kinds stand in the order of the schema, which is a sequence.
+_MOTION: dict[str, Parts] = {
+    "ned_position": (
+        ("LinearDisplacement", "ned_position.linear", {"motion.x": "x", "motion.y": "y"}),
+        ("AngularDisplacement", "ned_position.angular", {"motion.psi": "z"}),
+    ),
+    "body_velocity": (
+        ("LinearVelocity", "body_velocity.linear", {"motion.u": "x", "motion.v": "y"}),
+        ("AngularVelocity", "body_velocity.angular", {"motion.r": "z"}),
+    ),
+    "body_acceleration": (
+        ("LinearAcceleration", "body_acceleration.linear", {"motion.udot": "x", "motion.vdot": "y"}),
+        ("AngularAcceleration", "body_acceleration.angular", {"motion.rdot": "z"}),
+    ),
+    "hull_forces": (
+        ("Force", "hull_forces.linear", {"force.X": "x", "force.Y": "y"}),
+        ("Torque", "hull_forces.angular", {"force.N": "z"}),
+    ),
+    "propeller_order": (("ShaftSpeed", "propeller_order.shaft", {"propeller.speed": ""}),),
+    "propeller_feedback": (("ShaftSpeed", "propeller_feedback.shaft", {"propeller.speed_actual": ""}),),
+    "rudder_order": (("AngularDisplacement", "rudder_order.angle", {"rudder.command": "z"}),),
+    "rudder_feedback": (("AngularDisplacement", "rudder_feedback.angle", {"rudder.angle": "z"}),),
+    "heading_order": (("AngularDisplacement", "heading_order.angle", {"heading.command": "z"}),),
+}
+
+
+def osp_groups(interface: Interface) -> tuple[Group, ...]:
+    """Generic groups with all inputs and outputs that OSP-IS has kinds for, then one for each other kind of signal.
+
+    A part that lacks one of its variables is left out. What has no kind (``wind.speed``) stands in a Generic group
+    with the others of its first name and causality (``wind`` for inputs, ``position_output`` for outputs).
+    """
+    found = {one.name: one for one in (*interface.with_causality("input"), *interface.with_causality("output"))}
+    groups = []
+    for name, parts in _MOTION.items():
+        within = tuple(
+            Group(kind, part, tuple((found[variable], axis) for variable, axis in variables.items()))
+            for kind, part, variables in parts
+            if all(variable in found for variable in variables)
+        )
+        if within:
+            groups.append(Group("Generic", name, groups=within))
+    grouped = {variable.name for group in groups for variable in _variables(group)}
+    rest: dict[str, list[FmuVariable]] = {}
+    for one in found.values():
+        if one.name not in grouped:
+            first = one.name.partition(".")[0]
+            rest.setdefault(first if one.causality == "input" else f"{first}_output", []).append(one)
+    return (*groups, *(Group("Generic", name, tuple((one, "") for one in those)) for name, those in rest.items()))
+
+
+def _variables(group: Group) -> Iterator[FmuVariable]:
+    yield from (variable for variable, _ in group.variables)
+    for within in group.groups:
+        yield from _variables(within)

@@ -1,0 +1,118 @@
+"""Where every coefficient of a ship's model comes from, and how sure it is: read off the text of its card."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import tomlkit
+
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, Card, ManoeuvringCard, SurgeBodyCard
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.units import to_si
+
+NOT_STATED = "not stated"
+ASSUMED = f"assumed: {100 * DEFAULT_RELATIVE_ERROR:g} % of the value (the card states none)"
+STATED = "stated in the card"
+ABSENT = "not in the card: the program's default"
+"""Source of a coefficient that the card does not give: a derivative is then zero."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a coefficient comes from.
+
+    Parameters
+    ----------
+    source : str
+        The card's source, with that of the equation for an effect.
+    remark : str
+        What the card says beside the value (``# ESTIMATED: ...``); may be empty.
+    standard_error : float, optional
+        In the unit of the coefficient; None if nothing is known.
+    error_from : str
+        Where the standard error is from: :data:`STATED`, :data:`ASSUMED` or :data:`NOT_STATED`.
+    """
+
+    source: str
+    remark: str = ""
+    standard_error: float | None = None
+    error_from: str = NOT_STATED
+
+
+# Parameter of the model -> section and key (SI) of the card.
+_PLACES = {
+    "ship.length": ("ship", "length_m"),
+    "ship.speed": ("model", "speed_mps"),
+    "ship.mass": ("rigid_body", "mass"),
+    "ship.x_G": ("rigid_body", "x_G"),
+    "ship.yaw_inertia": ("rigid_body", "yaw_inertia"),
+    "ship.water_density": ("environment", "water_density_kgpm3"),
+    "ship.slowest": ("model", "valid_speed_mps"),
+    "ship.fastest": ("model", "valid_speed_mps"),
+    "steering.time_constant": ("steering_gear", "time_constant_s"),
+    "steering.max_rate": ("steering_gear", "max_rate_radps"),
+    "steering.max_angle": ("steering_gear", "max_angle_rad"),
+    "propulsion.nominal_speed": ("propulsion", "nominal_radps"),
+    "propulsion.Xnn": ("propulsion", "Xnn"),
+    "surge.total_mass": ("surge", "total_mass_kg"),
+    "surge.B1": ("surge", "B1_kgs2pm3"),
+    "surge.B2": ("surge", "B2_kgspm2"),
+    "surge.B3": ("surge", "B3_kgpm"),
+}
+
+
+def origins(card: Card) -> dict[str, Origin]:
+    """Name of a parameter or input of the model to its origin; what the card does not give is left out."""
+    document: Mapping[str, Any] = tomlkit.parse(card.text)
+    particulars = {f"ship.{_stem(key)}": ("ship", key) for key in document["ship"] if _stem(key) != "length"}
+    found = {}
+    for variable, (section, key) in (_PLACES | particulars).items():
+        said = _beside(document.get(section), key)
+        if said is not None:
+            error, whence = _surge_error(card, key)
+            found[variable] = Origin(card.ship.source, said, error, whence)
+    if not isinstance(card, ManoeuvringCard):
+        return found
+    for name in card.derivatives:
+        said = _beside(document.get("derivatives"), card.places.get(name, name))
+        whence = STATED if name in card.uncertainty else ASSUMED
+        found[f"derivatives.{name}"] = Origin(card.ship.source, said or "", card.standard_error(name), whence)
+    return found | dict(_of_effects(card, document))
+
+
+def _stem(key: str) -> str:
+    """The name of a particular without its unit: ``draught`` of ``draught_m``."""
+    stem, _, unit = key.rpartition("_")
+    return stem if stem and unit in ("m", "m2", "kg", "mps") else key
+
+
+def _surge_error(card: Card, key: str) -> tuple[float | None, str]:
+    if isinstance(card, SurgeBodyCard) and key in card.uncertainty:
+        return card.uncertainty[key], STATED
+    return None, NOT_STATED
+
+
+def _of_effects(card: ManoeuvringCard, document: Mapping[str, Any]) -> Iterator[tuple[str, Origin]]:
+    for entry, table in zip(card.effects, document.get("effects", ()), strict=True):
+        effect = EFFECTS[entry.name]
+        for name, variable in effect.model_names().items():
+            said = _beside(table.get("parameters"), name)
+            error = entry.uncertainty.get(name)
+            value = "default of the effect" if said is None else card.ship.source
+            whence = NOT_STATED if error is None else STATED
+            source = f"equation of the effect {entry.name}: {effect.source}; value: {value}"
+            yield variable, Origin(source, said or "", error, whence)
+
+
+def _beside(section: Any, key: str) -> str | None:
+    """The comment beside a key, which the file may spell in another unit; None if it has no such key."""
+    if section is None:
+        return None
+    for own in section:
+        if key in (own, to_si(own, 1.0)[0]):
+            # What is an inline table bears no comments on its keys.
+            trivia = getattr(section.item(own) if hasattr(section, "item") else None, "trivia", None)
+            return str(trivia.comment).lstrip("# ").strip() if trivia is not None else ""
+    return None

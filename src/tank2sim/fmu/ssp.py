@@ -1,0 +1,105 @@
+"""A ship and its heading autopilot as one package of System Structure and Parameterization, SSP 1.0."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+
+from tank2sim.analysis.heading_control import DAMPING, SLOWNESS, heading_autopilot
+from tank2sim.analysis.stability import stability
+from tank2sim.dynamics.model import Model
+from tank2sim.fmu.documents import Documents
+from tank2sim.fmu.export import ExportedFmu, make_fmu, zipped
+from tank2sim.fmu.interface import FmuVariable, interface
+from tank2sim.fmu.libraries import Told
+from tank2sim.fmu.platforms import Platform
+from tank2sim.fmu.provenance import Origin
+from tank2sim.fmu.templates import render
+from tank2sim.units import UNITS
+
+_STOP_SHIP_TIMES = 40  # L/u0, in which a change of course has long ended
+
+
+@dataclass(frozen=True)
+class Part:
+    """A component of a system: its FMU's file in ``resources/``, and the connectors that it shows."""
+
+    name: str
+    description: str
+    file: str
+    connectors: tuple[FmuVariable, ...]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A connection between connectors of one name."""
+
+    start: str
+    end: str
+    variable: str
+
+
+def ship_with_autopilot(
+    ship: Model, made: ExportedFmu, *, platforms: Sequence[Platform] | None = None, told: Told = lambda _: None
+) -> bytes:
+    """The package: the ship's FMU as it was made, an autopilot for it for the same version of FMI, and their joints.
+
+    Inputs are joined to outputs of the same name. The others (``heading.command`` of the autopilot, the revolutions)
+    are no connectors: the system would have to hand them in, which the engines of OSP and ecos do not know; but all
+    engines set variables of a component, and where nothing is set the start values hold.
+    Platforms and `told` are those of :func:`tank2sim.fmu.export.make_fmu`.
+
+    Raises
+    ------
+    InputError
+        No autopilot can be designed for the ship, or its FMU cannot be made: see
+        :func:`tank2sim.analysis.heading_control.heading_autopilot` and :func:`tank2sim.fmu.export.make_fmu`.
+    """
+    autopilot = heading_autopilot(ship)
+    steered = make_fmu(autopilot, fmi=made.fmi, documents=_documents(ship, autopilot), platforms=platforms, told=told)
+    parts, joints = _joined({"ship": ship, "autopilot": autopilot})
+    lengths = {one.name: one.start for one in ship.parameters}
+    values = {
+        "name": f"{ship.name} with heading autopilot",
+        "description": "A ship on a heading that its autopilot keeps: heading.command of autopilot, rad",
+        "version": version("tank2sim"),
+        "parts": parts,
+        "connections": joints,
+        "units": [UNITS[name] for name in sorted({one.unit for part in parts for one in part.connectors})],
+        "stop_time": float(round(_STOP_SHIP_TIMES * lengths["ship.length"] / lengths["ship.speed"])),
+    }
+    contents = {
+        "SystemStructure.ssd": render("SystemStructure.ssd.xml", values).encode("utf-8"),
+        f"resources/{parts[0].file}": made.content,
+        f"resources/{parts[1].file}": steered.content,
+    }
+    return zipped(contents, first="SystemStructure.ssd")
+
+
+def _joined(models: Mapping[str, Model]) -> tuple[list[Part], list[Joint]]:
+    """Components and connections: each input that bears the name of another's output is joined to it."""
+    described = {name: interface(model) for name, model in models.items()}
+    parts, joints = [], []
+    for name, model in models.items():
+        taken = []
+        for variable in described[name].with_causality("input"):
+            for other, its in described.items():
+                if other != name and variable.name in {output.name for output in its.with_causality("output")}:
+                    joints.append(Joint(other, name, variable.name))
+                    taken.append(variable)
+        connectors = (*taken, *described[name].with_causality("output"))
+        parts.append(Part(name, model.description, f"{name}.fmu", connectors))
+    return parts, joints
+
+
+def _documents(ship: Model, autopilot: Model) -> Documents:
+    """What the autopilot's FMU says of itself."""
+    found = stability(ship)
+    nomoto = found.nomoto
+    source = (
+        f"Pole placement (relative damping {DAMPING:g}, integral {SLOWNESS:g} of the natural frequency) on Nomoto's "
+        f"model of {ship.name} at {found.speed_mps:.4g} m/s: K = {nomoto.K_per_s:.5g} 1/s, T = {nomoto.T_s:.5g} s"
+    )
+    own = (one.name for one in autopilot.parameters if one.name.startswith("autopilot."))
+    return Documents(source=source, origins={name: Origin(source) for name in own})

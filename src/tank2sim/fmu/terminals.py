@@ -1,0 +1,58 @@
+"""Terminals of an FMU (FMI 3.0, 2.4.9): inputs and outputs that belong together, so that a tool joins them as one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tank2sim.fmu.interface import FmuVariable, Interface
+
+_DESCRIPTIONS = {
+    "motion": "Motion of the ship: position and heading, velocities through the water and over the ground",
+    "position": "Geographic position (WGS 84)",
+    "steering": "Steering gear: rudder order and angle, failure",
+    "propulsion": "Propulsion: ordered and actual revolutions",
+    "force": "Hydrodynamic forces and moment on the ship",
+    "current": "Current of the water over the ground",
+    "wind": "True wind",
+    "water": "Water under the ship",
+    "heading": "Heading order",
+}
+
+_TERMINAL_OF = {"rudder": "steering", "propeller": "propulsion"}
+"""First part of a variable's name to the terminal it belongs to, where that has another name."""
+
+
+@dataclass(frozen=True)
+class Terminal:
+    """A terminal.
+
+    Parameters
+    ----------
+    name, description : str
+        What it is.
+    members : tuple of pair
+        Name of each member in the terminal, and the variable.
+    """
+
+    name: str
+    description: str
+    members: tuple[tuple[str, FmuVariable], ...]
+
+
+def terminals(interface: Interface) -> tuple[Terminal, ...]:
+    """The terminals: inputs and outputs with the same first part of their structured name, in the order of outputs.
+
+    A variable whose name has one part (``validity``) belongs to none. Members are called by the rest of the name; where
+    two groups share a terminal and a member's name, the later keeps its whole name.
+    """
+    grouped: dict[str, dict[str, FmuVariable]] = {}
+    for variable in (*interface.with_causality("output"), *interface.with_causality("input")):
+        first, _, rest = variable.name.partition(".")
+        if not rest:
+            continue
+        members = grouped.setdefault(_TERMINAL_OF.get(first, first), {})
+        members[variable.name if rest in members else rest] = variable
+    return tuple(
+        Terminal(name, _DESCRIPTIONS.get(name, f"Signals {name}.*"), tuple(members.items()))
+        for name, members in grouped.items()
+    )

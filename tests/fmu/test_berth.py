@@ -1,0 +1,86 @@
+"""A driven ship in an FMU: from the berth, at rest, in both kinds of FMI, with derivatives; ahead, astern, trimmed."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+from fmpy.model_description import read_model_description
+
+from tank2sim.dynamics.model import Model
+from tank2sim.fmu.export import write_fmu
+from tank2sim.fmu.running import running
+from tank2sim.fmu.unpacking import Kind, UnpackedFmu
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.running import Running
+
+from ..dynamics.effects.ships import N0, TYPICAL, U0, ship
+
+KINDS = get_args(Kind)
+
+
+@pytest.fixture(scope="module")
+def driven() -> Model:
+    """The Mariner with propulsion, in a current and a wind."""
+    return ship({"current": TYPICAL["current"], "wind": TYPICAL["wind"]})
+
+
+@pytest.fixture(scope="module", params=[2, 3])
+def unpacked_ship(request, driven: Model, tmp_path_factory) -> UnpackedFmu:
+    folder: Path = tmp_path_factory.mktemp("berth")
+    write_fmu(driven, folder / "ship.fmu", fmi=request.param)
+    with zipfile.ZipFile(folder / "ship.fmu") as archive:
+        archive.extractall(folder)
+    return UnpackedFmu(folder, read_model_description(str(folder), validate=False))
+
+
+OUTPUTS = ("motion.u", "motion.v", "motion.r", "motion.psi", "motion.speed", "motion.beta", "motion.sog", "validity")
+AT_REST = {"initial.u": 0.0, "current.speed": 0.0, "wind.speed": 0.0, "propeller.speed": 0.0}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_at_the_berth_all_is_at_rest_and_every_derivative_is_a_number(unpacked_ship, driven, kind: Kind) -> None:
+    with running(unpacked_ship, kind) as fmu:
+        fmu.initialise(AT_REST)
+        if kind == "ModelExchange":
+            fmu.update()
+        assert fmu.read(OUTPUTS) == pytest.approx([0.0] * len(OUTPUTS), abs=1e-6)
+        assert np.isfinite(fmu.read(driven.outputs)).all()
+        names = [*(state.derivative for state in driven.states), *driven.outputs]
+        unknowns = unpacked_ship.references([name for name in names if name not in driven.state_names])
+        knowns = ["rudder.command", "propeller.speed"]
+        knowns += driven.state_names if kind == "ModelExchange" else ["derivatives.Yv"]
+        for known in knowns:
+            slopes = fmu.instance.getDirectionalDerivative(unknowns, unpacked_ship.references([known]), [1.0])
+            assert np.isfinite(slopes).all(), known
+
+
+def test_from_the_berth_ahead_and_then_astern(unpacked_ship) -> None:
+    with running(unpacked_ship, "CoSimulation") as fmu:
+        fmu.initialise(AT_REST)
+        speeds = []
+        for place in range(900):
+            if place in (0, 300):
+                fmu.write({"propeller.speed": N0 if place == 0 else -N0, "rudder.command": 0.2})
+            fmu.instance.doStep(currentCommunicationPoint=float(place), communicationStepSize=1.0)
+            speeds.append(fmu.read(OUTPUTS))
+        motion = np.array(speeds)
+    assert np.isfinite(motion).all()
+    assert 0.3 * U0 < motion[299, 0] < U0 and motion[299, 3] > 0
+    assert motion[-1, 0] < -0.1 * U0 and motion[-1, -1] == 0.0
+
+
+@pytest.mark.parametrize("share", [1.0, 0.3, 0.0])
+def test_a_start_in_steady_motion_is_that_of_the_model(unpacked_ship, driven, share: float) -> None:
+    """With propulsion, current and wind."""
+    start, inputs = {"initial.trim": 1.0, "initial.u": share * U0}, {"propeller.speed": share * N0, "wind.speed": 5.0}
+    expected = Running(Integrator(driven), inputs, start)
+    with running(unpacked_ship, "CoSimulation") as fmu:
+        fmu.initialise({**start, **inputs})
+        assert fmu.read(OUTPUTS[:3]) == pytest.approx([expected.state(name) for name in OUTPUTS[:3]], rel=1e-9)
+        before = fmu.read(OUTPUTS[:1])
+        fmu.instance.doStep(currentCommunicationPoint=0.0, communicationStepSize=0.1)
+        assert fmu.read(OUTPUTS[:1]) == pytest.approx(before, abs=1e-5)
