@@ -18,14 +18,14 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
+from tank2sim.bundled import bundled_cards
 from tank2sim.dynamics import Model
-from tank2sim.fmu import write_fmu
 from tank2sim.fmu.manoeuvre import Manoeuvre
 from tank2sim.fmu.running import co_simulate, running
 from tank2sim.fmu.unpacking import UnpackedFmu, unpack
 from tank2sim.simulation.scheme import runge_kutta_step
 from tests.fmu import engines
-from tests.fmu.test_strict_readers import text_of
+from tests.fmu.test_strict_readers import whole_description
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 STEP, STEPS = 0.1, 1000
@@ -58,28 +58,15 @@ def zigzag() -> list[dict[str, float | bool]]:
 
 
 @pytest.fixture(scope="module")
-def ship_file(mariner: Model, session_folder: Path) -> Callable[[int], Path]:
-    """The FMU of the bundled Mariner in a version of FMI, exported once; whoever needs it first writes it, whole."""
-
-    def file(fmi: int) -> Path:
-        path = session_folder / f"engines-mariner{fmi}.fmu"
-        if not path.exists():
-            write_fmu(mariner, path, fmi=fmi)
-        return path
-
-    return file
-
-
-@pytest.fixture(scope="module")
 def by_fmpy(
-    ship_file: Callable[[int], Path], tmp_path_factory: pytest.TempPathFactory
+    mariner_fmu: Callable[[int], Path], tmp_path_factory: pytest.TempPathFactory
 ) -> Callable[[int], tuple[UnpackedFmu, np.ndarray]]:
     """The FMU unpacked, and its outputs (K, ny) after each step in FMPy."""
     made: dict[int, tuple[UnpackedFmu, np.ndarray]] = {}
 
     def run(fmi: int) -> tuple[UnpackedFmu, np.ndarray]:
         if fmi not in made:
-            unpacked = unpack(ship_file(fmi), tmp_path_factory.mktemp(f"mariner{fmi}"))
+            unpacked = unpack(mariner_fmu(fmi), tmp_path_factory.mktemp(f"mariner{fmi}"))
             inputs = ["rudder.command", "steering.failed"]
             orders = np.array([[order[name] for name in inputs] for order in zigzag()], dtype=float)
             with running(unpacked, "CoSimulation") as fmu:
@@ -91,10 +78,12 @@ def by_fmpy(
     return run
 
 
-def by_the_model(model: Model) -> np.ndarray:
+@pytest.fixture(scope="module")
+def by_the_model(mariner: Model) -> np.ndarray:
     """The same outputs (K, ny) from the model itself, by the same scheme."""
+    model, rows = mariner, []
     step, parameters = runge_kutta_step(model), model.parameter_values(START)
-    state, rows = model.initial(parameters), []
+    state = model.initial(parameters)
     for order in zigzag():
         inputs = model.input_values({name: float(value) for name, value in order.items()})
         state = step(state, inputs, parameters, STEP)
@@ -147,18 +136,21 @@ def run_in(engine: str, unpacked: UnpackedFmu, path: Path, answer: Path) -> tupl
 
 
 @FMI
-def test_the_zigzag_of_fmpy_is_that_of_the_model(fmi: int, mariner: Model, by_fmpy: Callable[[int], Any]) -> None:
+def test_the_zigzag_of_fmpy_is_that_of_the_model(
+    fmi: int, by_the_model: np.ndarray, by_fmpy: Callable[[int], Any]
+) -> None:
     _, rows = by_fmpy(fmi)
-    assert disagreement(rows, by_the_model(mariner)) < AGREEMENT
+    assert disagreement(rows, by_the_model) < AGREEMENT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("engine", "fmi"), RUNS)
 def test_other_engines_come_to_the_same_numbers_without_complaint(
-    engine: str, fmi: int, ship_file: Callable[[int], Path], by_fmpy: Callable[[int], Any], tmp_path: Path
+    engine: str, fmi: int, mariner_fmu: Callable[[int], Path], by_fmpy: Callable[[int], Any], tmp_path: Path
 ) -> None:
     require(engine.removesuffix("_exchange"))
     unpacked, expected = by_fmpy(fmi)
-    rows, said = run_in(engine, unpacked, ship_file(fmi), tmp_path / "rows.json")
+    rows, said = run_in(engine, unpacked, mariner_fmu(fmi), tmp_path / "rows.json")
     assert said == []
     assert disagreement(rows, expected) < AGREEMENT
 
@@ -182,18 +174,20 @@ def described(text: str, path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 @FMI
 def test_the_manipulation_toolbox_finds_nothing(
-    fmi: int, ship_file: Callable[[int], Path], tmp_path: Path, caplog: pytest.LogCaptureFixture
+    fmi: int, mariner_fmu: Callable[[int], Path], tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     require("fmu_manipulation_toolbox")
-    assert found_by_the_toolbox(ship_file(fmi), caplog) == []
-    text = text_of("every effect", fmi)
-    assert found_by_the_toolbox(described(text, tmp_path / "every_effect.fmu"), caplog) == []
+    assert found_by_the_toolbox(mariner_fmu(fmi), caplog) == []
+    for ship in (*bundled_cards(), "autopilot"):
+        text = whole_description(ship, fmi)
+        assert found_by_the_toolbox(described(text, tmp_path / f"{ship}.fmu"), caplog) == []
     spoilt = text.replace('causality="input"', 'causality="output"', 1)
     assert found_by_the_toolbox(described(spoilt, tmp_path / "spoilt.fmu"), caplog) != []
 
 
 @FMI
-def test_fmpy_validates_the_ship(fmi: int, ship_file: Callable[[int], Path]) -> None:
-    assert validate_fmu(str(ship_file(fmi))) == []
+def test_fmpy_validates_the_ship(fmi: int, mariner_fmu: Callable[[int], Path]) -> None:
+    assert validate_fmu(str(mariner_fmu(fmi))) == []

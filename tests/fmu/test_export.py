@@ -37,22 +37,24 @@ _EXPORT = """
 import sys
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
-from conftest import steered_hull
+from conftest import MODELS
 from tank2sim.fmu.export import Documents, write_fmu
-write_fmu(steered_hull(), Path(sys.argv[2]), fmi=int(sys.argv[3]), documents=Documents(card_text="x = 1"))
+write_fmu(MODELS[sys.argv[4]](), Path(sys.argv[2]), fmi=int(sys.argv[3]), documents=Documents(card_text="x = 1"))
 """
 
 
-@FMI
-def test_another_process_in_another_place_writes_the_same_bytes(fmi: int, tmp_path: Path) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize(("model", "fmi"), [("hull", 2), ("body", 3)])
+def test_another_process_in_another_place_writes_the_same_bytes(model: str, fmi: int, tmp_path: Path) -> None:
     contents = []
     for name, seed in (("one", "1"), ("another", "2")):
         folder = tmp_path / name
         folder.mkdir()
-        command = [sys.executable, "-c", _EXPORT, str(Path(__file__).parent), str(folder / f"{name}.fmu"), str(fmi)]
-        environment = os.environ | {"TMPDIR": str(folder), "PYTHONHASHSEED": seed}
+        target = folder / f"{name}.fmu"
+        command = [sys.executable, "-c", _EXPORT, str(Path(__file__).parent), str(target), str(fmi), model]
+        environment = os.environ | {"TMPDIR": str(folder), "XDG_CACHE_HOME": str(folder), "PYTHONHASHSEED": seed}
         subprocess.run(command, check=True, cwd=folder, env=environment)
-        contents.append((folder / f"{name}.fmu").read_bytes())
+        contents.append(target.read_bytes())
     assert contents[0] == contents[1]
 
 
@@ -66,11 +68,12 @@ def test_no_path_of_this_machine_is_in_the_library(fmi: int, unpacked: Callable[
     assert str(Path.cwd()).encode() not in content
 
 
-def test_the_token_tells_contents_apart(hull: Model, tmp_path: Path) -> None:
-    heavier = replace(hull, parameters=replace_start(hull, "derivatives.Yv", -0.13))
+def test_the_token_tells_contents_apart(models: dict[str, Model], tmp_path: Path) -> None:
+    body = models["body"]
+    heavier = replace(body, parameters=replace_start(body, "drag", 0.06))
     tokens = {
         write_fmu(model, tmp_path / "x.fmu", documents=documents).token
-        for model, documents in ((hull, None), (heavier, None), (hull, Documents(card_text="name = 1")))
+        for model, documents in ((body, None), (heavier, None), (body, Documents(card_text="name = 1")))
     }
     assert len(tokens) == 3
 
@@ -84,11 +87,14 @@ def replace_start(model: Model, name: str, start: float) -> tuple[Parameter, ...
     return tuple(changed)
 
 
-def test_times_are_those_of_source_date_epoch(hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_times_are_those_of_source_date_epoch(
+    models: dict[str, Model], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gain = models["gain"]
     monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
-    write_fmu(hull, tmp_path / "plain.fmu")
+    write_fmu(gain, tmp_path / "plain.fmu")
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-    write_fmu(hull, tmp_path / "dated.fmu")
+    write_fmu(gain, tmp_path / "dated.fmu")
     for name, date, moment in (("plain", None, 1980), ("dated", "2023-11-14T22:13:20Z", 2023)):
         with zipfile.ZipFile(tmp_path / f"{name}.fmu") as archive:
             root = etree.fromstring(archive.read("modelDescription.xml"))
@@ -181,10 +187,10 @@ def test_any_name_gives_a_c_identifier(name: str) -> None:
 
 
 @FMI
-def test_names_that_resemble_markup_or_paths_do_no_harm(fmi: int, hull: Model, tmp_path: Path) -> None:
+def test_names_that_resemble_markup_or_paths_do_no_harm(fmi: int, models: dict[str, Model], tmp_path: Path) -> None:
     # All of them at once: an export of each would only take longer.
     everything = " | ".join(NASTY)
-    model = replace(hull, name=everything, description=everything, notices=(everything,))
+    model = replace(models["body"], name=everything, description=everything, notices=(everything,))
     exported = write_fmu(
         model,
         tmp_path / "x.fmu",

@@ -66,6 +66,19 @@ def by_differences(evaluate: Callable[[str, float], list[float]], knowns: list[s
     return np.array(columns).T
 
 
+def by_writing(fmu: RunningFmu, unknowns: list[str], knowns: list[str]) -> Matrix:
+    """The same by writing each known and reading the unknowns."""
+    values = fmu.read(knowns)
+
+    def evaluate(known: str, value: float) -> list[float]:
+        fmu.write({known: value})
+        answer = fmu.read(unknowns)
+        fmu.write({known: values[knowns.index(known)]})
+        return answer
+
+    return by_differences(evaluate, knowns, values)
+
+
 def assert_close(found: Matrix, expected: Matrix) -> None:
     scale = np.maximum(np.abs(expected).max(axis=1, keepdims=True), 1e-3)
     np.testing.assert_allclose(found / scale, expected / scale, atol=2e-7)
@@ -137,17 +150,9 @@ def test_derivatives_at_communication_points_are_by_inputs_and_tunable_parameter
 ) -> None:
     fmu = at_a_communication_point(instantiate("hull", fmi, "CoSimulation"))
     unknowns, knowns = unknown_names(hull), [*REAL_INPUTS, *(p.name for p in hull.parameters if p.tunable)]
-    values = fmu.read(knowns)
-
-    def evaluate(known: str, value: float) -> list[float]:
-        fmu.write({known: value})
-        answer = fmu.read(unknowns)
-        fmu.write({known: values[knowns.index(known)]})
-        return answer
-
     found = directional(fmu, unknowns, knowns)
     assert np.count_nonzero(found) > 8
-    assert_close(found, by_differences(evaluate, knowns, values))
+    assert_close(found, by_writing(fmu, unknowns, knowns))
     if fmi == 3:
         np.testing.assert_allclose(adjoint(fmu, unknowns, knowns), found, rtol=1e-12, atol=1e-12)
 
@@ -181,15 +186,7 @@ def test_derivatives_during_initialisation_go_through_the_initial_states(
     fmu = initialising(instantiate("hull", fmi, kind), trim)
     unknowns = [*unknown_names(hull), "motion.x", "motion.v"]
     knowns = [*REAL_INPUTS, *real_parameters(hull)]
-    values = fmu.read(knowns)
-
-    def evaluate(known: str, value: float) -> list[float]:
-        fmu.write({known: value})
-        answer = fmu.read(unknowns)
-        fmu.write({known: values[knowns.index(known)]})
-        return answer
-
-    expected = by_differences(evaluate, knowns, values)
+    expected = by_writing(fmu, unknowns, knowns)
     found = directional(fmu, unknowns, knowns)
     speed = unknowns.index("motion.speed")
     assert (found[speed, knowns.index("initial.u")] == pytest.approx(1.0)) is not trim

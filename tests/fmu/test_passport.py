@@ -65,6 +65,14 @@ def test_every_coefficient_of_the_card_is_there_with_its_value(
     assert not [name for name in found if name.startswith(("initial.", "origin.", "solver."))]
 
 
+def test_what_low_speed_needs_and_the_card_does_not_state_says_where_it_is_from(told: dict[str, Any]) -> None:
+    found = {one["variable"]: one["source"] for one in told["coefficients"]}
+    assert "Chislett" in found["ship.draught"]  # which the card states
+    assert found["ship.propeller_diameter"] == "not in the card: 0.6 of the draught, typical"
+    assert "Faltinsen" in found["low_speed.drag_coefficient"]
+    assert "choice" in found["low_speed.rudder_astern"]
+
+
 def test_remarks_and_uncertainties_of_a_card_are_told() -> None:
     known = origins(read_card("kvlcc2"))
     assert "Clarke" in known["derivatives.Yr"].remark

@@ -141,6 +141,7 @@ print("heading", observer.last_real_values(names["ship"], [ship])[0])
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("engine", "script"), [("ecospy", _ECOS), ("libcosimpy", _LIBCOSIM)])
 def test_other_engines_come_to_the_same_heading(engine: str, script: str, mariner_ssp: Path, run: np.ndarray) -> None:
     pytest.importorskip(engine, reason=f"{engine} is not installed")

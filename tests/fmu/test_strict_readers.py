@@ -46,6 +46,12 @@ def description(ship: str, fmi: int) -> etree._Element:
     return etree.fromstring(description_text(model_of(ship), fmi=fmi).encode())
 
 
+def whole_description(ship: str, fmi: int) -> str:
+    """The description with a source file, which `description_text` does not know of."""
+    text = description_text(model_of(ship), fmi=fmi)
+    return text.replace("<SourceFiles>", '<SourceFiles><File name="equations.c"/>')
+
+
 def variables(root: etree._Element) -> list[dict[str, str]]:
     """Attributes of each variable with those of its type, whose name is under ``type``, by either version of FMI."""
     found = []
@@ -162,9 +168,7 @@ def test_unknowns_are_complete_and_depend_on_knowns_alone(ship: str, fmi: int) -
 @SHIPS
 def test_fmpy_finds_nothing_to_object_to(ship: str, fmi: int, tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "x.fmu", "w") as archive:
-        text = description_text(model_of(ship), fmi=fmi)  # which does not know the source files
-        text = text.replace("<SourceFiles>", '<SourceFiles><File name="equations.c"/>')
-        archive.writestr("modelDescription.xml", text)
+        archive.writestr("modelDescription.xml", whole_description(ship, fmi))
     assert validate_fmu(str(tmp_path / "x.fmu")) == []
 
 

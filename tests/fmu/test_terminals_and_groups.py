@@ -189,6 +189,7 @@ print("heading", observer.last_real_values(names["ship"], [ship])[0])
 """
 
 
+@pytest.mark.slow
 def test_the_engine_of_osp_joins_ship_and_autopilot_by_their_groups(
     mariner: Model, mariner_ssp: Path, tmp_path: Path
 ) -> None:

@@ -64,7 +64,7 @@ def test_a_compiler_of_no_use_is_told_in_one_line(told: str, tmp_path: Path) -> 
     for use in (
         lambda: require_compiler("a test"),
         lambda: compile_shared([source], tmp_path / "x"),
-        lambda: cached_library("int x;\n"),
+        lambda: cached_library({"model.c": "int x;\n"}),
         lambda: make_fmu(body()),
     ):
         with pytest.raises(InputError, match=told) as caught:

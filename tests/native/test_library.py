@@ -10,16 +10,16 @@ from tank2sim.native.library import cached_library
 
 _TWICE = """
 from tank2sim.native.library import cached_library
-one, another = cached_library("int x;\\n"), cached_library("int y;\\n")
+one, another = cached_library({"model.c": "int x;\\n"}), cached_library({"model.c": "int y;\\n"})
 assert one.parent == another.parent and one.is_file() and another.is_file()
 print(one.parent)
 """
 
 
 def test_a_source_is_compiled_once() -> None:
-    library = cached_library("int once;\n")
+    library = cached_library({"model.c": "int once;\n"})
     written = library.stat().st_mtime_ns
-    assert cached_library("int once;\n") == library and library.stat().st_mtime_ns == written
+    assert cached_library({"model.c": "int once;\n"}) == library and library.stat().st_mtime_ns == written
 
 
 def test_a_cache_that_cannot_be_written_leaves_nothing_behind(tmp_path) -> None:

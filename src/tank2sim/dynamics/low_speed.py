@@ -91,6 +91,12 @@ STRAIGHTENING = 0.5
 """gamma, the share of the stern's cross flow that reaches a rudder in the race: between the 0.40 and 0.64 of the KVLCC2
 (Yasukawa and Yoshimura 2015, J. Mar. Sci. Technol. 20)."""
 
+SOURCES = {
+    "low_speed.drag_coefficient": "the largest of 0.6 to 1 for whole hulls (Faltinsen 1990, Sea Loads, 6.4)",
+    "low_speed.rudder_astern": "a choice of tank2sim's: the flow comes from the trailing edge, with an earlier stall",
+}
+"""Where the values of parameters that no card states are from, in a few words."""
+
 STATIONS = 4
 """Gauss-Legendre stations along the hull, taken as the rectangle L T: exact unless the pivot lies within the hull; then
 the moment errs by 1 % and the force by 3 % at most of the largest that the end speed can give."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import sys
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from pathlib import Path
 
 from tank2sim.fmu.platforms import Platform, host_platform
-from tank2sim.native.compiler import SHARED_SUFFIX, compile_shared, require_compiler
+from tank2sim.fmu.sources import SELDOM
+from tank2sim.native.compiler import SHARED_SUFFIX, require_compiler
 from tank2sim.native.cross import cross_compiled, has_compiled, require_cross_compiler
+from tank2sim.native.library import cached_library
 from tank2sim.native.universal import universal
 
 Told = Callable[[str], None]
@@ -62,22 +62,13 @@ def libraries(
         As :func:`require_compilers`.
     """
     if platforms is None:
-        return {(host_platform().folder(fmi), SHARED_SUFFIX): _of_this_machine(sources)}
+        own = cached_library(sources, flags=_LINK_FLAGS.get(sys.platform, ()), seldom=SELDOM)
+        return {(host_platform().folder(fmi), SHARED_SUFFIX): own.read_bytes()}
     made = _compiled(sources, platforms, told)
     shared: dict[tuple[str, str], list[bytes]] = {}
     for platform in platforms:
         shared.setdefault((platform.folder(fmi), platform.target.suffix), []).append(made[platform])
     return {place: parts[0] if len(parts) == 1 else universal(parts) for place, parts in shared.items()}
-
-
-def _of_this_machine(sources: Mapping[str, str]) -> bytes:
-    with tempfile.TemporaryDirectory(prefix="tank2sim-") as name:
-        folder = Path(name)
-        for source, text in sources.items():
-            (folder / source).write_text(text, encoding="utf-8", newline="\n")
-        library = folder / "library"
-        compile_shared(sorted(folder.glob("*.c")), library, flags=_LINK_FLAGS.get(sys.platform, ()))
-        return library.read_bytes()
 
 
 def _compiled(sources: Mapping[str, str], platforms: Sequence[Platform], told: Told) -> dict[Platform, bytes]:

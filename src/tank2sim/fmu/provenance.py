@@ -10,6 +10,8 @@ import tomlkit
 
 from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, Card, ManoeuvringCard, SurgeBodyCard
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.effects.particulars import estimated_from
+from tank2sim.dynamics.low_speed import SOURCES
 from tank2sim.units import to_si
 
 NOT_STATED = "not stated"
@@ -75,11 +77,18 @@ def origins(card: Card) -> dict[str, Origin]:
             found[variable] = Origin(card.ship.source, said, error, whence)
     if not isinstance(card, ManoeuvringCard):
         return found
+    found = _of_low_speed() | found
     for name in card.derivatives:
         said = _beside(document.get("derivatives"), card.places.get(name, name))
         whence = STATED if name in card.uncertainty else ASSUMED
         found[f"derivatives.{name}"] = Origin(card.ship.source, said or "", card.standard_error(name), whence)
     return found | dict(_of_effects(card, document))
+
+
+def _of_low_speed() -> dict[str, Origin]:
+    """What the forces at low speed need and a card need not state: estimates and choices of the program."""
+    estimates = {f"ship.{_stem(key)}": estimated_from(key) for key in ("draught_m", "propeller_diameter_m")}
+    return {name: Origin(f"not in the card: {source}") for name, source in (estimates | SOURCES).items()}
 
 
 def _stem(key: str) -> str:

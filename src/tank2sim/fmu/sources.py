@@ -21,6 +21,10 @@ _HEADERS = {
     3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
 }
 
+# Three files of about the same length, for a compiler takes longer over them than over all others.
+SELDOM = ("equations_partial.c", "equations_start.c")
+"""Sources that no step needs: partial derivatives, and the start."""
+
 
 def c_sources(model: Model, interface: Interface, fmi: int, token: str) -> dict[str, str]:
     """Name to text of every C file; together they compile alone (``cc -shared -fPIC *.c -lm``)."""
@@ -28,14 +32,18 @@ def c_sources(model: Model, interface: Interface, fmi: int, token: str) -> dict[
     texts |= {name: _header(name) for name in _HEADERS[fmi]}
     texts["variables.c"] = render("variables.c", {"interface": interface})
     functions = equations(model)
-    # Two files of about the same length, for a compiler takes longer over them than over all others.
-    starting = [function for function in functions if "initial" in function.name() or "trim" in function.name()]
-    running = [function for function in functions if function not in starting]
-    texts["equations.c"] = generate_c(running, "equations")
-    texts["equations_start.c"] = generate_c(starting, "equations_start")
+    for name in ("equations.c", *SELDOM):
+        chosen = [function for function in functions if _file_of(function.name()) == name]
+        texts[name] = generate_c(chosen, name.removesuffix(".c"))
     values = {"interface": interface, "functions": functions, "work": work_sizes(functions), "token": token}
     texts["model.h"] = render("model.h", values)
     return texts
+
+
+def _file_of(function: str) -> str:
+    if "initial" in function or "trim" in function:
+        return "equations_start.c"
+    return "equations_partial.c" if function in ("model_forward", "model_reverse") else "equations.c"
 
 
 def headers_notice(fmi: int) -> str:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -15,7 +13,7 @@ from pathlib import Path
 
 from tank2sim.errors import InputError
 from tank2sim.native.compiler import FLAGS
-from tank2sim.native.library import cache_folder
+from tank2sim.native.library import cache_folder, kept
 
 # A library bears neither names of its making nor debugging data, so that it is the same each time.
 _LINK_FLAGS = ("-s", "-shared")
@@ -69,17 +67,14 @@ def cross_compiled(sources: Mapping[str, str], target: Target) -> bytes:
         The compiler refused the sources: a fault of the program, with the compiler's words.
     """
     compiler = _compiler()
-    library = cache_folder() / f"{_key(sources, target)}{target.suffix}"
-    if not library.exists():
-        with tempfile.TemporaryDirectory(dir=library.parent) as name:
-            folder = Path(name)
-            for source, text in sources.items():
-                (folder / source).write_text(text, encoding="utf-8", newline="\n")
-            compiled = folder / f"model{target.suffix}"
-            _compile(compiler, target, compiled)
-            os.replace(compiled, library)  # whole or not at all, also when two processes compile at once
+
+    def make(folder: Path) -> Path:
+        library = folder / f"model{target.suffix}"
+        _compile(compiler, target, library)
         _mark(target).touch()
-    return library.read_bytes()
+        return library
+
+    return kept(sources, [_version(), *target.flags], target.suffix, make).read_bytes()
 
 
 def _compile(compiler: Path, target: Target, library: Path) -> None:
@@ -120,11 +115,6 @@ def _version() -> str:
         return version("ziglang")
     except PackageNotFoundError:  # put there by other means than pip
         return "unknown"
-
-
-def _key(sources: Mapping[str, str], target: Target) -> str:
-    parts = [_version(), *target.flags, *(part for name in sorted(sources) for part in (name, sources[name]))]
-    return hashlib.sha256("\0".join(parts).encode("utf-8")).hexdigest()[:32]
 
 
 def _zig_cache() -> Path:

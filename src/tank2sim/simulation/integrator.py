@@ -111,7 +111,7 @@ class Integrator:
         }
         lengths = {"nx": self._step.size1_in(0), "nu": self._step.size1_in(1), "ny": self.model.output.size1_out(0)}
         source = generate_c(functions, "model") + _LOOP.format(**sizes, **lengths)
-        library = ctypes.CDLL(str(cached_library(source)))
+        library = ctypes.CDLL(str(cached_library({"model.c": source})))
         array = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
         library.rollout.argtypes = [ctypes.c_long, ctypes.c_double, array, array, array]
         library.outputs.argtypes = [ctypes.c_long, array, array, array, array]

@@ -111,6 +111,6 @@ def _compiled(function: ca.Function) -> ctypes.CDLL:
     sizes = {name: max(1, getattr(function, name)()) for name in ("sz_arg", "sz_res", "sz_iw", "sz_w")}
     counts = {"n_in": function.n_in(), "n_out": function.n_out(), "name": function.name()}
     source = generate_c([function], "rows") + _LOOP.format(**sizes, **counts)
-    library = ctypes.CDLL(str(cached_library(source)))
+    library = ctypes.CDLL(str(cached_library({"model.c": source})))
     library.loop.restype = None
     return library

@@ -1,6 +1,7 @@
 /* Random calls of the functions of FMI 3.0; fuzz3_absent.c has those for what the model has none of. */
 #include "fmi3Functions.h"
 
+#include <float.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -125,11 +126,19 @@ static void save_and_restore(Instance *c) {
 
 static size_t nearly(size_t count) { return chance(95) ? count : count + 1 - below(3); }
 
+/* Seeds, at times all of them finite and so large that what comes of them is not. */
+static double *seeds(size_t count) {
+    double *made = reals(count, NULL);
+    const bool large = chance(40);
+    for (size_t i = 0; made && large && i < count; ++i) made[i] = chance(50) ? DBL_MAX : -DBL_MAX;
+    return made;
+}
+
 static void derive(Instance *c) {
     const size_t unknown_count = any_count(), known_count = any_count();
     unsigned *unknown = references(unknown_count), *known = references(known_count);
     int *orders = array(unknown_count, sizeof *orders);
-    double *of_knowns = reals(known_count, NULL), *of_unknowns = reals(unknown_count, NULL);
+    double *of_knowns = seeds(known_count), *of_unknowns = seeds(unknown_count);
     for (size_t i = 0; unknown && i < unknown_count && chance(90); ++i) {
         unknown[i] = RATES_BEGIN + below(OUTPUTS_END - RATES_BEGIN);
     }

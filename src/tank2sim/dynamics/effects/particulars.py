@@ -81,14 +81,19 @@ def particular(card: ManoeuvringCard, key: str) -> float:
     return float(_ESTIMATES[key][-1](card) if value is None else value)
 
 
+def estimated_from(key: str) -> str:
+    """In a few words, what :func:`particular` takes for a number that the card does not state."""
+    return f"{_ESTIMATES[key][2]}, typical"
+
+
 def with_particulars(model: Model, card: ManoeuvringCard, *keys: str) -> tuple[Model, tuple[float, ...]]:
     """Particulars by their keys (SI), and the model with a notice on each that the card does not state."""
     for key in keys:
-        name, unit, source, _ = _ESTIMATES[key]
+        name, unit, *_ = _ESTIMATES[key]
         if getattr(card.ship, key) is not None:
             continue
         told = f"the card states no {key}: a {name} of {particular(card, key):.3g} {unit}".rstrip()
-        notice = f"{told} is taken ({source}, typical)"
+        notice = f"{told} is taken ({estimated_from(key)})"
         if notice not in model.notices:
             model = model.extend(notices=[notice])
     return model, tuple(particular(card, key) for key in keys)
