@@ -283,26 +283,19 @@ def smoothed(
 
 @njit(cache=True)
 def _seen_from_before(N: Array, K: Array, W: Array, reading: Array, known: Truths) -> tuple[Array, Array]:
-    """(I - K H)' N (I - K H) + H' W'W H, and the diagonal of W'W + K' N K."""
+    """(I - K H)' N (I - K H) + H' W'W H, and the diagonal of W'W + K' N K.
+
+    Not multiplied out: the terms would cancel where a sensor is good, and with them the last digits of the slopes.
+    """
     nz, ny = K.shape
-    A = N @ K
-    D = K.T @ A + W.T @ W
-    before = N.copy()
-    AH, DH = np.zeros((nz, nz)), np.zeros((ny, nz))
+    H = np.zeros((ny, nz))
     for i in range(ny):
         if known[i]:
-            for j in range(6):
-                AH[:, j] += A[:, i] * reading[i, j]
-                DH[:, j] += D[:, i] * reading[i, j]
-            AH[:, 9 + i] += A[:, i]
-            DH[:, 9 + i] += D[:, i]
-    before -= AH + AH.T
-    for i in range(ny):
-        if known[i]:
-            for j in range(6):
-                before[j] += reading[i, j] * DH[i]
-            before[9 + i] += DH[i]
-    return before, np.diag(D)
+            H[i, :6] = reading[i]
+            H[i, 9 + i] = 1.0
+    left, WH = np.eye(nz) - K @ H, W @ H
+    D = K.T @ (N @ K) + W.T @ W
+    return left.T @ (N @ left) + WH.T @ WH, np.diag(D)
 
 
 @njit(cache=True)
