@@ -47,8 +47,9 @@ from tank2sim.files import write_whole
 from tank2sim.gap.as_json import NOISE_FLOOR, in_file
 from tank2sim.gap.decide import ENOUGH, decide
 from tank2sim.gap.find import Options, find_gap
+from tank2sim.gap.hiding import could_hide
 from tank2sim.gap.posing import pose
-from tank2sim.gap.residuals import could_hide, estimates
+from tank2sim.gap.residuals import estimates
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE
 from tank2sim.gap.search import search
 from tank2sim.identification.trials.measured import measured
