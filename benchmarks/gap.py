@@ -78,6 +78,9 @@ OUTCOMES = ("right", "undecided", "half", "misnamed", "none", "outside")
 NONE_PER_SEED = 2
 """So many sets of each kind with nothing missing for each seed: five seeds make 70."""
 
+SAME = {"water_depth": "shallow_water"}
+"""Effects that the program names by another's name: it states what a depth does as a magnification."""
+
 FALLING = ("max_rate_degps", "depth_m")
 """Parameters that are the smaller, the stronger the effect."""
 
@@ -104,9 +107,14 @@ class Said:
     held_out: float | None = None
 
     @property
+    def there(self) -> dict[str, dict[str, float]]:
+        """What was hidden, by the names that the program has."""
+        return {SAME.get(name, name): values for name, values in self.truth.items()}
+
+    @property
     def outcome(self) -> str:
         """One of :data:`OUTCOMES`."""
-        truth, named = set(self.truth), set(self.named)
+        truth, named = set(self.there), set(self.named)
         outsider = bool(truth & set(OUTSIDERS))
         if self.verdict == OUTSIDE:
             return "right" if outsider else "outside"
@@ -122,9 +130,10 @@ class Said:
 
     def _hidden(self, effect: str) -> bool:
         """Whether an effect is below the size that could hide."""
-        return effect in self.hides and all(
-            self.truth[effect][name] >= size if name in FALLING else abs(self.truth[effect][name]) <= size
-            for name, size in self.hides[effect].items()
+        values, sizes = self.there[effect], self.hides.get(effect, {})
+        return bool(sizes) and all(
+            name in values and (values[name] >= size if name in FALLING else abs(values[name]) <= size)
+            for name, size in sizes.items()
         )
 
     @property
@@ -294,7 +303,7 @@ def show_confusions(sets: Sequence[Said]) -> None:
 
 def show_reliability(sets: Sequence[Said]) -> None:
     """Confidence claimed for each effect that was named, against how often it was there."""
-    claims = [(own, name in one.truth) for one in sets for name, own in one.confidence.items()]
+    claims = [(own, name in one.there) for one in sets for name, own in one.confidence.items()]
     print("\nconfidence claimed    effects named    mean claimed    there (95 % interval)")
     for low, high in pairwise(BINS):
         inside = [(own, there) for own, there in claims if low <= own < high or own == high == 1.0]

@@ -98,6 +98,13 @@ def of_scores(*fits: Fit) -> module.Decision:
         ([fit(0), fit(-50, 0), fit(-90, 1, 2), fit(-88, 0, 1)], AMBIGUOUS, (SURGE, SWAY), [(YAW, SURGE)]),
         # a pair with one of another single effect is no rival of a single one
         ([fit(0), fit(-50, 0), fit(-54, 0, 1), fit(-52, 1, 2)], MISSING, (YAW,), []),
+        # many that are a little less good are together more probable than the best
+        (
+            [fit(0), fit(-50, 0), *(fit(-50 + ALIKE + 0.5, one) for one in range(1, 7))],
+            AMBIGUOUS,
+            (YAW,),
+            [(name,) for name in NAMES[1:]],
+        ),
         # a pair alone: no single effect stands out, or none is enough
         ([fit(0), fit(-5, 0, sure=1.0), fit(-40, 0, 1)], MISSING, (YAW, SURGE), []),
         ([fit(0), fit(-5, 0), fit(-40, 0, 1)], MISSING, (YAW, SURGE), []),

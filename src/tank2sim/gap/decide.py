@@ -7,6 +7,7 @@ explanation are not noise, a name would be a guess, and is withheld.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +37,11 @@ ALIKE = ENOUGH
 OF_ONE_KIND = {"actuator": 0.25, "force": 0.1}
 """Share of the whole gain that a second effect of the same kind must have (ours): less is what the first one's formula
 may be wrong by, beyond what :data:`.forms.FORM` covers."""
+
+LIKELY = 0.5
+"""A name less probable than this is none (ours): then all that have :data:`RIVAL` of its probability are named."""
+
+RIVAL = 0.1
 
 STANDARD_ERRORS = 3.0
 """An effect is named if its size exceeds so many of its standard errors."""
@@ -75,8 +81,7 @@ class Decision:
 
     def confidence(self, effect: str) -> float:
         """Probability that an effect is among what is missing."""
-        sure = sum(p for effects, p in self.probabilities.items() if effect in effects)
-        return float(min(sure, SUREST))
+        return _confidence(self.probabilities, effect)
 
 
 @dataclass(frozen=True)
@@ -114,22 +119,29 @@ def decide(search: Search) -> Decision:
     if pair is not None:
         worth = max(ENOUGH, _share(pair) * (none.score - pair.score))
         best = pair if pair.score < min(one.score for one in (best, single) if one is not None) - worth else best
+    scores = np.array([fit.score for fit in search.fits]) / TEMPER
+    weights = np.exp(-0.5 * scores - logsumexp(-0.5 * scores))
+    probabilities = {fit.explained.effects: float(w) for fit, w in zip(search.fits, weights, strict=True)}
+    behind = ALIKE
+    if any(_confidence(probabilities, name) < LIKELY for name in best.explained.effects):
+        behind = max(ALIKE, -2 * TEMPER * np.log(RIVAL))
     alike = tuple(
         fit
         for fit in search.fits
         if fit is not best
-        and fit.score < best.score + ALIKE
+        and fit.score < best.score + behind
         and stands_out(fit)
         and not set(fit.explained.effects) > set(best.explained.effects)
         and len(fit.explained.effects) <= max(len(best.explained.effects), 1)
         and best is not none
     )
-    scores = np.array([fit.score for fit in search.fits]) / TEMPER
-    weights = np.exp(-0.5 * scores - logsumexp(-0.5 * scores))
-    probabilities = {fit.explained.effects: float(w) for fit, w in zip(search.fits, weights, strict=True)}
     strange = strangeness(search.likelihood, best)
     verdict = NOTHING if best is none else AMBIGUOUS if alike else MISSING
     return Decision(OUTSIDE if strange else verdict, best, alike, probabilities, strange)
+
+
+def _confidence(probabilities: Mapping[tuple[str, ...], float], effect: str) -> float:
+    return float(min(sum(p for effects, p in probabilities.items() if effect in effects), SUREST))
 
 
 def _share(pair: Fit) -> float:

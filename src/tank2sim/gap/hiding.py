@@ -33,10 +33,10 @@ SURE = float(norm.ppf(0.95))
 """Standard deviations by which a size must be beyond what is enough, to show in 95 of 100 such sets of trials."""
 
 ROUNDS = 2
-"""How often an effect is asked again at the size that was found."""
+"""How often the size is sought at which an effect shows (ours): its force need not grow with it."""
 
 NEAR = 1.2
-"""A size is found where the next round would change it by less than this factor."""
+"""A size that the next round would change by less than this factor is found."""
 
 
 def could_hide(search: Search, best: Fit, enough: float) -> Sizes:
@@ -57,31 +57,29 @@ def could_hide(search: Search, best: Fit, enough: float) -> Sizes:
         furthest from being visible at which it still is not.
     """
     likelihood = search.likelihood
-    noises = (best, *_louder(likelihood, best))
-    found: dict[int, tuple[Variant, Array]] = {}
-    asked = {place: one for place, one in enumerate(search.variants) if one.amplitudes}
-    for _ in range(1 + ROUNDS):
-        hidden = _shares(likelihood, noises, list(asked.values()), enough)
-        again = {}
-        for (place, one), shares in zip(asked.items(), hidden, strict=True):
-            found[place] = one, shares
-            if np.any(np.abs(np.log(shares)) > np.log(NEAR)):
-                again[place] = one, shares
-        asked = {place: resized(likelihood, one, shares) for place, (one, shares) in again.items()}
+    sized = [one for one in search.variants if one.amplitudes and one.effect not in best.explained.effects]
+    for _ in range(ROUNDS):
+        shares = _shares(likelihood, [best], sized, enough)
+        sized = [_at_its_size(likelihood, one, own) for one, own in zip(sized, shares, strict=True)]
+    shares = _shares(likelihood, [best, *_louder(likelihood, best)], sized, enough)
     sizes: Sizes = {}
-    for one, shares in found.values():
-        if one.effect in best.explained.effects:
-            continue
-        for amplitude, share in zip(one.amplitudes, shares, strict=True):
+    for one, own in zip(sized, shares, strict=True):
+        for amplitude, share in zip(one.amplitudes, own, strict=True):
             parameter = one.explained.asked[amplitude].parameter
             size = min(float(abs(one.theta[amplitude]) * share), max(abs(parameter.minimum), abs(parameter.maximum)))
             known = sizes.setdefault(one.effect, {})
             known[parameter.name] = max(size, known.get(parameter.name, 0.0))
-    for one in {v.effect: v for v in search.variants if not v.amplitudes}.values():
-        value = None if one.effect in best.explained.effects else _hidden_value(likelihood, best, one, enough)
+    others = {one.effect: one for one in search.variants if not one.amplitudes}
+    for one in (other for name, other in others.items() if name not in best.explained.effects):
+        value = _hidden_value(likelihood, best, one, enough)
         if value is not None:
             sizes[one.effect] = {one.explained.asked[0].parameter.name: value}
     return sizes
+
+
+def _at_its_size(likelihood: Likelihood, one: Variant, shares: Array) -> Variant:
+    """The variant at the size at which it shows, if that is another one."""
+    return resized(likelihood, one, shares) if np.any(np.abs(np.log(shares)) > np.log(NEAR)) else one
 
 
 def _louder(likelihood: Likelihood, best: Fit) -> Iterator[Fit]:
@@ -96,7 +94,7 @@ def _louder(likelihood: Likelihood, best: Fit) -> Iterator[Fit]:
 
 def _shares(likelihood: Likelihood, noises: Sequence[Fit], every: Sequence[Variant], enough: float) -> list[Array]:
     """Shares of each variant's amplitudes, each alone, at which it would show even at the noise that hides it best."""
-    screens = [Screen(likelihood, one, every, whole=True) for one in noises]
+    screens = [Screen(likelihood, one, every) for one in noises]
     shares = []
     for place, one in enumerate(every):
         priced = int(np.count_nonzero(one.explained.prior[1] == 0))

@@ -153,13 +153,11 @@ class Screen:
     base : Fit
         About which and at whose noise: of "none", or of what is taken as there already.
     every : sequence of Variant
-    whole : bool
-        Keep those whose effect is in `base` already.
     """
 
-    def __init__(self, likelihood: Likelihood, base: Fit, every: Sequence[Variant], *, whole: bool = False):
+    def __init__(self, likelihood: Likelihood, base: Fit, every: Sequence[Variant]):
         self.likelihood, self.base = likelihood, base
-        self.every = tuple(one for one in every if whole or one.effect not in base.explained.effects)
+        self.every = tuple(one for one in every if one.effect not in base.explained.effects)
         there = base.explained
         what = likelihood.linear(there, base.theta) if there.effects else likelihood.base
         seen = observer(what, base.noise)
