@@ -9,7 +9,7 @@ pairs      two effects of different kinds at once
 none       nothing missing: sensor noise alone, every coefficient of the true ship 2 % off the card's (each by itself,
            or in groups), gusts, waves, and both together
 outsiders  what the library does not hold
-process    singles with gusts and coefficients 2 % off, with waves, with coefficients 2 % off in groups
+process    singles with gusts and coefficients 2 % off, with waves, or with coefficients 2 % off in groups, by turns
 
 A set is *right* if exactly the truth is named (none where there is none, outside the library where it is);
 *undecided* if honestly so: the truth is among those that the trials cannot tell apart, or what is not named is below
@@ -155,9 +155,10 @@ def settings(part: str, seeds: Sequence[int]) -> Iterator[tuple[str, Setting]]:
         elif part == "outsiders":
             yield from ((part, Setting((name,), seed)) for name in OUTSIDERS)
         elif part == "process":
-            for process, card in PROCESSES:
+            for place, name in enumerate(EFFECTS):
+                process, card = PROCESSES[(seed + place) % len(PROCESSES)]
                 group = f"process: {_disturbed(process, card)}"
-                yield from ((group, Setting((n,), seed, process=process, coefficients=card)) for n in EFFECTS)
+                yield group, Setting((name,), seed, process=process, coefficients=card)
         else:
             for process, card in NOTHING_MISSING:
                 for own in range(NONE_PER_SEED * (seed - 1) + 1, NONE_PER_SEED * seed + 1):
