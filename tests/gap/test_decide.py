@@ -175,6 +175,15 @@ def test_what_the_card_may_be_wrong_by_is_not_named(effect: str) -> None:
         assert not stands_out(unsure)
 
 
+def test_a_rate_of_the_gear_that_the_card_may_be_wrong_by_is_not_named() -> None:
+    """5 deg/s are stated, and known to 2 %: 4.8 deg/s are no slower gear, 4.6 deg/s are."""
+    stated = made_up_ship.CARD.replace("[steering_gear]", "[steering_gear]\nmax_rate_degps = 5.0")
+    for text, rate, named in ((stated, 4.8, False), (stated, 4.6, True), (made_up_ship.CARD, 4.8, True)):
+        explained = Explained(parse_card(text, "made_up.toml"), "order", ["rudder_rate_limit"])
+        found = Fit(explained, np.array([np.radians(rate)]), np.array([[1e-12]]), LOGS, 0.0, np.zeros(0))
+        assert stands_out(found) == named, rate
+
+
 def test_an_effect_without_amplitude_stands_out_by_its_score_alone() -> None:
     card = parse_card(made_up_ship.CARD, "made_up.toml")
     explained = Explained(card, "order", ["rudder_lag"])

@@ -16,10 +16,11 @@ from scipy.special import logsumexp
 from scipy.stats import chi2, gamma
 
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.add import CHANGING_DERIVATIVES, changed_derivatives
+from tank2sim.gap.add import CHANGING_DERIVATIVES, STATED, changed_derivatives
 from tank2sim.gap.fit import Fit
 from tank2sim.gap.likelihood import Likelihood
 from tank2sim.gap.observer import FORCES
+from tank2sim.gap.posing import GEAR
 from tank2sim.gap.prove import agreement
 from tank2sim.gap.residuals import each_trial, estimates
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE
@@ -159,8 +160,8 @@ def _kind(name: str) -> str:
 def stands_out(fit: Fit) -> bool:
     """Whether each effect has an amplitude that is more than :data:`STANDARD_ERRORS` from its absence.
 
-    One that only changes derivatives of the card must change one of them by as many of *its* standard errors: less is
-    what the card may be wrong by.
+    One that only changes derivatives of the card, or what it states of the steering gear, must change one of them by as
+    many of *its* standard errors: less is what the card may be wrong by.
     """
     errors = np.sqrt(np.diag(fit.covariance))
     for name in fit.explained.effects:
@@ -172,6 +173,8 @@ def stands_out(fit: Fit) -> bool:
         if sizes and max(sizes) < STANDARD_ERRORS:
             return False
         if name in CHANGING_DERIVATIVES and _change(fit, name) < STANDARD_ERRORS:
+            return False
+        if name in STATED and _change_of_gear(fit, name) < STANDARD_ERRORS:
             return False
     return True
 
@@ -185,6 +188,14 @@ def _change(fit: Fit, name: str) -> float:
         for term, after, *_ in changed_derivatives(card, name, values, {})
     ]
     return max(changes, default=0.0)
+
+
+def _change_of_gear(fit: Fit, name: str) -> float:
+    """Change of what the card states of the steering gear, in its standard errors; infinite if it states nothing."""
+    ((_, values, _),) = [one for one in estimates(fit) if one[0] == name]
+    ((parameter, value),) = values.items()
+    stated = getattr(fit.explained.card.steering_gear, parameter, None)
+    return float(np.inf) if stated is None else float(abs(value - stated) / (GEAR * stated))
 
 
 WINDOWS = (6, 12, 24, 48)

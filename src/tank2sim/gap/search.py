@@ -147,12 +147,19 @@ def _explore(fitting: Fitting, every: Sequence[Variant], believed: np.ndarray, m
 def _polish(fitting: Fitting) -> None:
     """The best with its noise well settled; the others at this noise as well; those that are then close once more.
 
-    Scores at noises that are not settled differ by more than explanations do.
+    Scores at noises that are not settled differ by more than explanations do. What shares an effect with the best is
+    tried from the best's parameters too: a search downhill may have stopped elsewhere.
     """
     fitting.fit([Proposal(thetas_of(fitting.best()), [fitting.best().logs], LAST_ROUNDS)])
     best = fitting.best()
-    rest = [one for one in fitting.found.values() if one is not best]
-    fitting.fit([Proposal(thetas_of(one), [one.logs, best.logs], SAME_NOISE) for one in rest])
+    own = thetas_of(best)
+    begins = [{name: own[name]} for name in own if len(own) > 1]
+    for one in fitting.found.values():
+        theirs = thetas_of(one)
+        begins += [theirs] if one is not best else []
+        begins += [theirs | {name: own[name] for name in own if name in theirs}] if len(theirs) > 1 else []
+    fitting.fit([Proposal(thetas, [best.logs], SAME_NOISE) for thetas in begins])
+    best = fitting.best()
     close = [
         fit
         for effects, fit in fitting.found.items()
