@@ -32,7 +32,8 @@ HOPELESS = 100.0
 """Nor those whose gain, or whose score when fitted roughly, is so far behind the best of their kind (ours)."""
 
 FAR = 300.0
-"""An explanation so far behind the best at the noise of the best has its own noise not sought (ours)."""
+"""An explanation so far behind the best at the noise of the best has its own noise not sought, nor is it tried again
+(ours)."""
 
 ROUNDS_OF_NONE, ROUNDS, LAST_ROUNDS = (15,), (0, 10), (20,)
 """Iterations on the noise after each solution for the parameters, see :meth:`.likelihood.Likelihood.at_best`. A score
@@ -154,7 +155,7 @@ def _polish(fitting: Fitting) -> None:
     best = fitting.best()
     own = thetas_of(best)
     begins = [{name: own[name]} for name in own if len(own) > 1]
-    for one in fitting.found.values():
+    for one in (one for one in fitting.found.values() if one.score < best.score + FAR or not one.explained.effects):
         theirs = thetas_of(one)
         begins += [theirs] if one is not best else []
         begins += [theirs | {name: own[name] for name in own if name in theirs}] if len(theirs) > 1 else []
