@@ -9,7 +9,7 @@ pairs      two effects of different kinds at once
 none       nothing missing: sensor noise alone, every coefficient of the true ship 2 % off the card's (each by itself,
            or in groups), gusts, waves, and both together
 outsiders  what the library does not hold
-process    singles with gusts and coefficients 2 % off, with waves, with coefficients 2 % off in groups
+process    singles with gusts and coefficients 2 % off, with waves, or with coefficients 2 % off in groups, by turns
 
 A set is *right* if exactly the truth is named (none where there is none, outside the library where it is);
 *undecided* if honestly so: the truth is among those that the trials cannot tell apart, or what is not named is below
@@ -47,8 +47,9 @@ from tank2sim.files import write_whole
 from tank2sim.gap.as_json import NOISE_FLOOR, in_file
 from tank2sim.gap.decide import ENOUGH, decide
 from tank2sim.gap.find import Options, find_gap
+from tank2sim.gap.hiding import could_hide
 from tank2sim.gap.posing import pose
-from tank2sim.gap.residuals import could_hide, estimates
+from tank2sim.gap.residuals import estimates
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE
 from tank2sim.gap.search import search
 from tank2sim.identification.trials.measured import measured
@@ -77,6 +78,9 @@ OUTCOMES = ("right", "undecided", "half", "misnamed", "none", "outside")
 NONE_PER_SEED = 2
 """So many sets of each kind with nothing missing for each seed: five seeds make 70."""
 
+SAME = {"water_depth": "shallow_water"}
+"""Effects that the program names by another's name: it states what a depth does as a magnification."""
+
 FALLING = ("max_rate_degps", "depth_m")
 """Parameters that are the smaller, the stronger the effect."""
 
@@ -103,9 +107,14 @@ class Said:
     held_out: float | None = None
 
     @property
+    def there(self) -> dict[str, dict[str, float]]:
+        """What was hidden, by the names that the program has."""
+        return {SAME.get(name, name): values for name, values in self.truth.items()}
+
+    @property
     def outcome(self) -> str:
         """One of :data:`OUTCOMES`."""
-        truth, named = set(self.truth), set(self.named)
+        truth, named = set(self.there), set(self.named)
         outsider = bool(truth & set(OUTSIDERS))
         if self.verdict == OUTSIDE:
             return "right" if outsider else "outside"
@@ -121,9 +130,10 @@ class Said:
 
     def _hidden(self, effect: str) -> bool:
         """Whether an effect is below the size that could hide."""
-        return effect in self.hides and all(
-            self.truth[effect][name] >= size if name in FALLING else abs(self.truth[effect][name]) <= size
-            for name, size in self.hides[effect].items()
+        values, sizes = self.there[effect], self.hides.get(effect, {})
+        return bool(sizes) and all(
+            name in values and (values[name] >= size if name in FALLING else abs(values[name]) <= size)
+            for name, size in sizes.items()
         )
 
     @property
@@ -145,9 +155,10 @@ def settings(part: str, seeds: Sequence[int]) -> Iterator[tuple[str, Setting]]:
         elif part == "outsiders":
             yield from ((part, Setting((name,), seed)) for name in OUTSIDERS)
         elif part == "process":
-            for process, card in PROCESSES:
+            for place, name in enumerate(EFFECTS):
+                process, card = PROCESSES[(seed + place) % len(PROCESSES)]
                 group = f"process: {_disturbed(process, card)}"
-                yield from ((group, Setting((n,), seed, process=process, coefficients=card)) for n in EFFECTS)
+                yield group, Setting((name,), seed, process=process, coefficients=card)
         else:
             for process, card in NOTHING_MISSING:
                 for own in range(NONE_PER_SEED * (seed - 1) + 1, NONE_PER_SEED * seed + 1):
@@ -293,7 +304,7 @@ def show_confusions(sets: Sequence[Said]) -> None:
 
 def show_reliability(sets: Sequence[Said]) -> None:
     """Confidence claimed for each effect that was named, against how often it was there."""
-    claims = [(own, name in one.truth) for one in sets for name, own in one.confidence.items()]
+    claims = [(own, name in one.there) for one in sets for name, own in one.confidence.items()]
     print("\nconfidence claimed    effects named    mean claimed    there (95 % interval)")
     for low, high in pairwise(BINS):
         inside = [(own, there) for own, there in claims if low <= own < high or own == high == 1.0]

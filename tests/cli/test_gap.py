@@ -52,7 +52,9 @@ Find = Callable[..., Gap]
 def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[tuple[object, ...]]]:
     """Lets the workflow find this, for what the command makes of it; gives the calls."""
 
-    def found(effects: tuple[Named, ...], verdict: str = MISSING, *, fails: BaseException | None = None):
+    def found(
+        effects: tuple[Named, ...], verdict: str = MISSING, *, fails: BaseException | None = None, test: bool = True
+    ):
         calls: list[tuple[object, ...]] = []
 
         def find_gap(card, fitted, held, options, progress) -> Gap:
@@ -67,7 +69,8 @@ def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[tuple[object,
             improved = added(card, [(one.name, one.parameters, one.standard_errors) for one in effects])
             gap = replace(made_up.missing(), card=card, improved=improved, verdict=verdict, effects=effects)
             where = tuple(replace(one, trial=passed[0].name) for one in gap.where)
-            return replace(gap, passed=passed, where=where, missing_force=None, agreement={}, figures_before=())
+            gap = replace(gap, passed=passed, where=where, missing_force=None, agreement={}, figures_before=())
+            return gap if test else replace(gap, next_test=None)
 
         monkeypatch.setattr("tank2sim.cli.gap.find_gap", find_gap)
         return calls
@@ -131,9 +134,57 @@ def test_a_faulty_sensor_leaves_the_card_and_corrects_the_trials(folder: Path, t
     np.testing.assert_array_equal(new["psi_deg"], old["psi_deg"])
     assert {name: (folder / name).read_bytes() for name in before} == before
 
-    finding((), NOTHING)  # what is left of the last run is told
-    result = tank2sim("gap", "mariner", "turn20.csv", "-o", str(tmp_path), cwd=folder)
-    assert result.returncode == 0 and "corrected/turn20.csv is of an earlier run" in " ".join(result.stdout.split())
+
+def test_what_an_earlier_run_wrote_does_not_lie_there_as_if_it_were_of_this_one(
+    folder: Path, tmp_path: Path, finding
+) -> None:
+    arguments = ("gap", "mariner", "turn20.csv", "-o", str(tmp_path))
+    finding((BIAS,))
+    assert tank2sim(*arguments, cwd=folder).returncode == 0
+    assert json.loads((tmp_path / "gap.json").read_text())["files"] == sorted(written(tmp_path))
+    (tmp_path / "corrected/mine.csv").write_text("t_s\n")
+    finding((), NOTHING, test=False)
+    result = tank2sim(*arguments, cwd=folder)
+    assert result.returncode == 0, result.stderr
+    assert written(tmp_path) == {"gap.json", "improved.toml", "report.html", "corrected/mine.csv"}
+    assert "corrected/turn20.csv was of an earlier run, and was removed" in result.stdout
+    assert "corrected/mine.csv is not of this run, and was left" in result.stdout
+    (tmp_path / "corrected/mine.csv").unlink()
+    assert tank2sim(*arguments, cwd=folder).returncode == 0 and not (tmp_path / "corrected").exists()
+
+
+def test_what_no_earlier_run_says_it_wrote_is_left(folder: Path, tmp_path: Path, finding) -> None:
+    """Without a gap.json that names them, or as an input of this very run."""
+    arguments = ("-o", str(tmp_path))
+    (tmp_path / "next_test.csv").write_text("mine")
+    (tmp_path / "gap.json").write_text('["of another program"]')
+    finding((), NOTHING, test=False)
+    result = tank2sim("gap", "mariner", "turn20.csv", *arguments, cwd=folder)
+    assert result.returncode == 0 and (tmp_path / "next_test.csv").read_text() == "mine"
+    assert "next_test.csv is not of this run, and was left" in result.stdout
+
+    finding((BIAS,))
+    assert tank2sim("gap", "mariner", "turn20.csv", *arguments, cwd=folder).returncode == 0
+    finding((), NOTHING, test=False)
+    result = tank2sim("gap", "mariner", str(tmp_path / "corrected/turn20.csv"), *arguments, cwd=folder)
+    assert result.returncode == 0 and (tmp_path / "corrected/turn20.csv").exists()
+
+
+def test_lines_on_the_screen_are_not_broken_and_what_is_no_number_is_a_dash(
+    folder: Path, tmp_path: Path, finding, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    long = "a_trial_with_a_name_that_is_longer_than_any_narrow_screen_would_take_in_a_table.csv"
+    (tmp_path / long).write_bytes((folder / "turn20.csv").read_bytes())
+    fouling = Named("hull_fouling", {"X_prime": -2e-4}, {"X_prime": math.nan}, 0.9)
+    finding((fouling,))
+    result = tank2sim("gap", "mariner", long, "-o", "out", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert any(long.removesuffix(".csv") in line and "8.00" in line for line in result.stdout.splitlines())
+    (row,) = (line for line in result.stdout.splitlines() if "hull_fouling" in line and "X prime" in line)
+    assert [cell.strip() for cell in row.strip("│ ").split("│")] == ["hull_fouling", "X prime", "-0.0002", "-", "-"]
+    assert "Misfit in units of the noise (1 is noise)" in result.stdout.splitlines()
+    assert "nan" not in result.stdout
 
 
 def test_trials_are_not_corrected_for_what_is_only_possible(folder: Path, tmp_path: Path, finding) -> None:

@@ -119,3 +119,43 @@ def test_every_parameter_of_the_library_is_read_back_as_it_was() -> None:
 def test_directions_alone_go_round_once() -> None:
     assert estimate_in_file("direction_rad", -0.1)[1] == pytest.approx(360 - np.rad2deg(0.1))
     assert estimate_in_file("angle_rad", -0.1)[1] == pytest.approx(-np.rad2deg(0.1))
+
+
+def test_times_are_those_of_the_samples() -> None:
+    """Adding up steps of half a second, or taking them off a later start, leaves the last digits wrong."""
+    gap = made_up.missing()
+    where = (replace(gap.where[0], t_start_s=11.499999999999755, t_end_s=539.4999999999981),)
+    (place,) = written(replace(gap, where=where))["where"]
+    assert (place["t_start_s"], place["t_end_s"]) == (11.5, 539.5)
+
+
+def test_candidates_do_not_hide_and_tell_their_sizes() -> None:
+    gap = made_up.ambiguous()
+    assert gap.next_test is not None
+    sizes = {"wind": ({"direction_rad": -np.pi / 2}, {"direction_rad": 0.1})}
+    told = written(replace(gap, next_test=replace(gap.next_test, sizes=sizes)))
+    assert set(told["could_hide"]) == {"linear_yaw_damping"} == set(told["could_hide_in_words"])
+    (wind,) = told["next_test"]["candidates"].values()
+    assert wind["parameters"] == {"direction_deg": pytest.approx(270.0)}
+
+
+def test_what_could_hide_is_worded_by_what_a_size_means() -> None:
+    sizes = {"rudder_bias": {"angle_rad": np.deg2rad(0.25)}, "rudder_rate_limit": {"max_rate_radps": np.deg2rad(4)}}
+    words = written(replace(made_up.missing(), could_hide=sizes))["could_hide_in_words"]
+    assert words["rudder_bias"] == "angle up to 0.25 deg would not show"
+    assert words["rudder_rate_limit"] == "max rate of 4 deg/s in place of the card's would not show"
+
+
+def test_no_force_is_told_of_where_none_is_missing() -> None:
+    gap = made_up.missing()
+    assert written(gap)["missing_force"] is None
+    assert written(replace(gap, effects=(), equation="sway"))["missing_force"]["equation"] == "Y"
+
+
+def test_cautions_are_among_the_notices() -> None:
+    gap = made_up.missing()
+    poor = replace(gap, passed=(made_up.passed("turn35", 9.0, 5.0),))
+    first, second, *_ = written(poor)["notices"]
+    assert "55 % of the gap of the fitting trials remains" in first and "black box" in second
+    unsure = replace(gap, effects=(replace(gap.effects[0], confidence=0.11),))
+    assert "those without it are likelier together: its probability is 0.11" in written(unsure)["notices"][0]

@@ -98,6 +98,13 @@ def of_scores(*fits: Fit) -> module.Decision:
         ([fit(0), fit(-50, 0), fit(-90, 1, 2), fit(-88, 0, 1)], AMBIGUOUS, (SURGE, SWAY), [(YAW, SURGE)]),
         # a pair with one of another single effect is no rival of a single one
         ([fit(0), fit(-50, 0), fit(-54, 0, 1), fit(-52, 1, 2)], MISSING, (YAW,), []),
+        # many that are a little less good are together more probable than the best
+        (
+            [fit(0), fit(-50, 0), *(fit(-50 + ALIKE + 0.5, one) for one in range(1, 7))],
+            AMBIGUOUS,
+            (YAW,),
+            [(name,) for name in NAMES[1:]],
+        ),
         # a pair alone: no single effect stands out, or none is enough
         ([fit(0), fit(-5, 0, sure=1.0), fit(-40, 0, 1)], MISSING, (YAW, SURGE), []),
         ([fit(0), fit(-5, 0), fit(-40, 0, 1)], MISSING, (YAW, SURGE), []),
@@ -166,6 +173,15 @@ def test_what_the_card_may_be_wrong_by_is_not_named(effect: str) -> None:
         assert stands_out(found) == named, factor
         unsure = replace(found, covariance=np.array([[(abs(factor) / 2.9) ** 2]]))
         assert not stands_out(unsure)
+
+
+def test_a_rate_of_the_gear_that_the_card_may_be_wrong_by_is_not_named() -> None:
+    """5 deg/s are stated, and known to 2 %: 4.8 deg/s are no slower gear, 4.6 deg/s are."""
+    stated = made_up_ship.CARD.replace("[steering_gear]", "[steering_gear]\nmax_rate_degps = 5.0")
+    for text, rate, named in ((stated, 4.8, False), (stated, 4.6, True), (made_up_ship.CARD, 4.8, True)):
+        explained = Explained(parse_card(text, "made_up.toml"), "order", ["rudder_rate_limit"])
+        found = Fit(explained, np.array([np.radians(rate)]), np.array([[1e-12]]), LOGS, 0.0, np.zeros(0))
+        assert stands_out(found) == named, rate
 
 
 def test_an_effect_without_amplitude_stands_out_by_its_score_alone() -> None:

@@ -13,18 +13,14 @@ from gap_truth.lane import lanes_of
 from gap_truth.record import recorded
 
 from tank2sim.cards import ManoeuvringCard, parse_card
-from tank2sim.gap.explained import Explained
 from tank2sim.gap.fit import Fit
-from tank2sim.gap.likelihood import COUNTED, Likelihood
+from tank2sim.gap.likelihood import Likelihood
 from tank2sim.gap.posing import pose
-from tank2sim.gap.residuals import SIZES, could_hide, each_trial, estimates, force_lacking
-from tank2sim.gap.screen import variants
-from tank2sim.gap.search import Search
-from tank2sim.identification.trials.measured import Measured, measured
+from tank2sim.gap.residuals import each_trial, estimates, force_lacking
+from tank2sim.identification.trials.measured import measured
 from tests.gap.dense import Dense
 from tests.gap.test_likelihood import LOGS, NOISE, WIDTH, forms_of, judge
 from tests.gap.toy import Toy, toy_motion
-from tests.identification.trials import made_up_ship
 
 # -- what each trial says ------------------------------------------------------------------------------------------
 
@@ -76,105 +72,6 @@ def test_a_trial_that_tells_nothing_is_left_out() -> None:
     assert list(values) == ["a"]
 
 
-# -- what could hide -----------------------------------------------------------------------------------------------
-
-HIDDEN = ("gyro_bias", "current", "linear_yaw_damping")
-
-
-@pytest.fixture(scope="module")
-def card() -> ManoeuvringCard:
-    read = parse_card(made_up_ship.CARD, "made_up.toml")
-    assert isinstance(read, ManoeuvringCard)
-    return read
-
-
-def judged(card: ManoeuvringCard, *, bias: float = 0.0, noise: float = 1.0, duration: float = 120.0) -> Likelihood:
-    trials = [
-        made_up_ship.trial(made_up_ship.zigzag(20), name="zigzag", duration=duration, step=0.5, noise=noise),
-        made_up_ship.trial(made_up_ship.turn(30), name="turn", duration=duration, step=0.5, noise=noise, seed=2),
-    ]
-    for one in trials:
-        one.signals["r_radps"][:] += bias
-    return pose(card, Measured(tuple(trials), "angle", ()))
-
-
-def none_of(likelihood: Likelihood) -> Fit:
-    return likelihood.at_best(likelihood.none, np.zeros(0), [likelihood.belief.logs], [15])
-
-
-def sizes(likelihood: Likelihood, enough: float = 10.0, names=HIDDEN) -> dict[str, dict[str, float]]:
-    none = likelihood.none
-    explained = [Explained(none.card, none.driven_by, [name]) for name in names]
-    every = tuple(one for each in explained for one in variants(likelihood, each))
-    best = none_of(likelihood)
-    return could_hide(Search(likelihood, (best,), every), best, enough)
-
-
-def test_what_could_hide_goes_with_the_root_of_what_is_enough(card) -> None:
-    likelihood = judged(card)
-    price = np.log(likelihood.count / COUNTED)
-    some, more = sizes(likelihood, 10.0), sizes(likelihood, 50.0)
-    for name, asked in (("gyro_bias", 1), ("linear_yaw_damping", 1), ("current", 2)):
-        for parameter, size in some[name].items():
-            root = np.sqrt((50.0 + asked * price) / (10.0 + asked * price))
-            assert more[name][parameter] == pytest.approx(root * size), name
-    assert set(some["current"]) == {"speed_mps"} and set(some) == set(HIDDEN)
-
-
-def test_what_could_hide_grows_with_the_noise_and_falls_with_the_length(card) -> None:
-    one, loud, long = (sizes(judged(card, **how)) for how in ({}, {"noise": 4.0}, {"duration": 480.0}))
-    # a rate is a mean over the time, half as uncertain over four times as long; a current is a way over the time
-    for name, parameter, least, most in (("gyro_bias", "rate_radps", 0.3, 0.8), ("current", "speed_mps", 0.1, 0.35)):
-        assert 2.5 < loud[name][parameter] / one[name][parameter] < 4.5, name
-        assert least < long[name][parameter] / one[name][parameter] < most, name
-
-
-def test_what_could_hide_is_where_the_score_begins_to_tell(card) -> None:
-    """Four times as much is told by more than is enough, a third is not: by fits of trials that have it.
-
-    In between the noise, that is sought anew without the effect, takes part of it for the sensor's slow error.
-    """
-    size = sizes(judged(card))["gyro_bias"]["rate_radps"]
-    gains = []
-    for share in (1 / 3, 4.0):
-        likelihood = judged(card, bias=share * size)
-        explained = Explained(card, "angle", ["gyro_bias"])
-        none = none_of(likelihood)
-        one = likelihood.at_best(explained, np.array([share * size]), [none.logs, likelihood.belief.logs], [0, 6])
-        gains.append(none.score - one.score)
-    assert gains[0] < 10.0 < gains[1]
-
-
-def test_beside_what_is_named_it_is_not_told_again(card) -> None:
-    likelihood = judged(card, bias=0.002)
-    explained = Explained(card, "angle", ["gyro_bias"])
-    best = likelihood.at_best(explained, np.array([0.002]), [likelihood.belief.logs], [0, 6])
-    every = [one for name in HIDDEN for one in variants(likelihood, Explained(card, "angle", [name]))]
-    assert set(could_hide(Search(likelihood, (best,), tuple(every)), best, 10.0)) == set(HIDDEN) - {"gyro_bias"}
-
-
-def test_of_an_effect_without_amplitude_a_value_is_told_that_does_not_show(card) -> None:
-    """A lag of the gear: the longest that was tried and does not show, and the next longer one would."""
-    trial = made_up_ship.trial(made_up_ship.zigzag(20, rate_degps=1000.0), duration=150, step=0.5)
-    trial.signals["delta_order_rad"] = trial.signals.pop("delta_rad")
-    likelihood = pose(card, Measured((trial,), "order", ()))
-    found = sizes(likelihood, names=("rudder_lag",))["rudder_lag"]
-    explained = Explained(card, "order", ["rudder_lag"])
-    typical = explained.asked[0].parameter.typical_values(card)[0]
-    tried = sorted(share * typical for share in SIZES if share * typical >= explained.bounds[0][0])
-    (value,) = found.values()
-    assert value == pytest.approx(min(tried, key=lambda one: abs(one - value)))
-    best = none_of(likelihood)
-
-    def cost(lag: float) -> float:
-        """What the lag makes worse at the noise of none, nothing but the coefficients given way."""
-        held = replace(best, explained=explained, theta=np.array([lag]))
-        return likelihood._parameters(held, likelihood.base, likelihood.coefficient_columns, 1).score - best.score
-
-    longer = [one for one in tried if one > value]
-    assert not longer or cost(longer[0]) > cost(value)
-
-
 def test_estimates_are_told_by_effect_and_parameter() -> None:
     toy = Toy((None, None))
     fit = Fit(toy, np.array([0.5, -0.3]), np.diag([0.04, 0.09]), LOGS, 0.0, np.zeros(0))
@@ -205,6 +102,10 @@ def short_run(effect: str, parameters: dict[str, float], folder: Path) -> Likeli
     card = parse_card(SHIP_TOML, "ship.toml")
     assert isinstance(card, ManoeuvringCard)
     return pose(card, measured([folder / "straight.csv"], card))
+
+
+def none_of(likelihood: Likelihood) -> Fit:
+    return likelihood.at_best(likelihood.none, np.zeros(0), [likelihood.belief.logs], [15])
 
 
 @pytest.mark.parametrize("equation", PUSHES)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.gap.kinematics import kinematics
 from tank2sim.gap.result import MissingForce, Passed
-from tank2sim.gap.where import equation_of, explained_share, figures, kinematics, missing_force, parity, places
+from tank2sim.gap.where import equation_of, explained_share, figures, missing_force, parity, places
 from tests.identification.trials import made_up_ship
 
 TIME = np.arange(0.0, 400.0, 0.5)
@@ -42,14 +45,59 @@ def test_noise_has_no_places() -> None:
 
 
 def test_places_are_where_the_misfit_was_put_and_their_shares_are_of_all() -> None:
-    one = moved(motion(), "motion.psi", 100.0, 200.0, 8.0)
-    other = moved(motion(seed=2, name="zigzag"), "motion.y", 300.0, 400.0, 4.0)
-    first, second = places([one, other])
-    assert (first.trial, first.signal, second.trial, second.signal) == ("turn", "motion.psi", "zigzag", "motion.y")
+    one = moved(motion(), "motion.u", 100.0, 200.0, 8.0)
+    other = moved(motion(seed=2, name="zigzag"), "motion.v", 300.0, 400.0, 4.0)
+    first, second = places([of_velocities(one), of_velocities(other)])
+    assert (first.trial, first.signal, second.trial, second.signal) == ("turn", "motion.u", "zigzag", "motion.v")
     assert first.t_start_s == pytest.approx(100.0, abs=6.0) and first.t_end_s == pytest.approx(200.0, abs=6.0)
     # 8^2 against 4^2 over 100 s each
     assert first.share == pytest.approx(0.8, abs=0.03) and first.share + second.share == pytest.approx(1.0)
-    assert len(places([one, other], limit=1)) == 1
+    assert len(places([of_velocities(one), of_velocities(other)], limit=1)) == 1
+
+
+def of_velocities(one: Passed) -> Passed:
+    """Without positions, which would contradict them."""
+    kept = {name: sigma for name, sigma in NOISE.items() if name not in ("motion.x", "motion.y")}
+    return replace(one, noise=kept)
+
+
+def test_a_track_is_a_place_while_it_is_left_and_not_for_staying_off() -> None:
+    """For 50 s the model is carried to the side; after that it stays beside the track, and is right again."""
+    one = motion()
+    off = 0.4 * np.clip(TIME - 150.0, 0.0, 50.0)
+    drifted = replace(one, before={**one.before, "motion.y": one.before["motion.y"] + off})
+    (place,) = places([drifted])
+    assert place.signal == "motion.y" and place.share == 1.0
+    assert place.t_start_s == pytest.approx(150.0, abs=8.0) and place.t_end_s == pytest.approx(200.0, abs=8.0)
+
+
+def test_a_wrong_yaw_rate_is_the_place_and_not_the_heading_and_track_that_follow_from_it() -> None:
+    one = motion()
+    r = one.before["motion.r"] + np.where((TIME > 100) & (TIME < 150), 0.002, 0.0)
+    psi = one.before["motion.psi"] + 0.002 * np.clip(TIME - 100, 0.0, 50.0)
+    u, v = one.before["motion.u"], one.before["motion.v"]
+    x = np.cumsum(0.5 * (u * np.cos(psi) - v * np.sin(psi)))
+    y = np.cumsum(0.5 * (u * np.sin(psi) + v * np.cos(psi)))
+    before = {**one.before, "motion.r": r, "motion.psi": psi, "motion.x": x, "motion.y": y}
+    assert replace(one, before=before).misfit("before", "motion.y") > 20
+    (place,) = places([replace(one, before=before)])
+    assert place.signal == "motion.r"
+    assert place.t_start_s == pytest.approx(100.0, abs=6.0) and place.t_end_s == pytest.approx(150.0, abs=6.0)
+
+
+def test_a_force_is_at_work_when_it_was_put_there() -> None:
+    rng = np.random.default_rng(12)
+    count = 400
+    force = rng.standard_normal((count, 3))
+    force[100:150, 2] += 12.0
+    trials = ["a"] * 200 + ["b"] * 200
+    time = np.tile(2.0 * np.arange(200), 2)
+    own = {name: values[:count] for name, values in states().items()}
+    found = missing_force(trials, time, force, np.ones((count, 3)), own)
+    assert found is not None
+    (passage,) = found.passages
+    assert (passage.trial, passage.equation) == ("a", "yaw") and passage.size == pytest.approx(12.0, rel=0.1)
+    assert passage.t_start_s == pytest.approx(200.0, abs=6.0) and passage.t_end_s == pytest.approx(298.0, abs=6.0)
 
 
 def test_a_motion_that_ran_away_is_a_place() -> None:

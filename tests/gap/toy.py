@@ -47,6 +47,7 @@ class Toy:
     directed: bool = False
     which: tuple | None = None
     model = SimpleNamespace(input_names=("rudder.command",))
+    card = SimpleNamespace(steering_gear=None)
 
     @property
     def effects(self):

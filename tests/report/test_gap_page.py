@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE, Rival
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE, Gap, Passed, Rival
 from tank2sim.report.charts import chart_specification
 from tank2sim.report.gap_cause_charts import agreement_chart, binned, rival_chart
 from tank2sim.report.gap_charts import gap_tracks, in_noise, misfit_chart, shown_places, signal_misfit
-from tank2sim.report.gap_page import gap_charts, gap_page, verdict_in_words, with_error
+from tank2sim.report.gap_page import gap_charts, gap_page
+from tank2sim.report.gap_words import verdict_in_words, with_error
 from tank2sim.report.page import Verdict, render_page
 from tests.gap import made_up
 
@@ -74,7 +75,7 @@ def test_nothing_missing_says_how_well_the_card_follows() -> None:
     assert "follows the fitting trials to 1.02 times the noise" in verdict_in_words(gap)
     page = page_of(gap)
     heads = [column.title for column in tables_of(page)["Misfit of each trial, noise units"].columns]
-    assert heads == ["trial", "", "before"]
+    assert heads == ["trial", "set", "before"]
     assert "How well the card follows" in [section.heading for section in page.sections]
     worse = replace(gap, passed=tuple(made_up.passed(one.name, 4.0, 4.0) for one in gap.passed))
     assert "4 times the noise, which is more than noise" in verdict_in_words(worse)
@@ -143,8 +144,8 @@ def test_means_of_bins_err_by_the_spread_between_trials() -> None:
     assert high["f"] == 7.0 and high["low"] is None
 
 
-def test_the_missing_force_is_drawn_over_one_turn_of_the_compass(charts) -> None:
-    rows = rows_of(charts["force"])
+def test_the_missing_force_is_drawn_over_one_turn_of_the_compass() -> None:
+    rows = rows_of(gap_charts(replace(made_up.missing(), effects=(), equation="sway"))["force"])
     means = [row for row in rows if row.get("trials") == 2]
     assert len(means) == 12 and all(0 <= row["s"] < 360 for row in rows if "s" in row)
     assert max(row["f"] for row in means) == pytest.approx(2.0, abs=0.1)  # MN
@@ -210,3 +211,81 @@ def test_what_was_found_but_not_measured_does_not_break_the_page() -> None:
     page = page_of(replace(gap, passed=(blind,), where=(), verdict=NOTHING, effects=()))
     assert len(tables_of(page)["Misfit of each signal, noise units"].rows) == 2
     assert verdict_in_words(replace(gap, verdict=MISSING))
+
+
+def carried() -> Gap:
+    """Trials whose positions run away with 0.5 m/s to the east of what log and heading say."""
+
+    def trial(name: str) -> Passed:
+        time = np.arange(0.0, 400.0, 0.5)
+        psi = 0.02 * time
+        rng = np.random.default_rng(len(name))
+        true = {
+            "motion.u": 5.0 + 0 * time,
+            "motion.v": 0 * time,
+            "motion.psi": psi,
+            "motion.r": 0.02 + 0 * time,
+            "motion.x": 250 * np.sin(psi),
+            "motion.y": -250 * np.cos(psi),
+        }
+        sizes = [0.02, 0.02, 2e-3, 3e-4, 0.5, 0.5]
+        noise = dict(zip(true, sizes, strict=True))
+        seen = {key: values + noise[key] * rng.standard_normal(len(time)) for key, values in true.items()}
+        seen["motion.y"] = seen["motion.y"] + 0.5 * time
+        return Passed(name, False, time, noise, seen, true, true)
+
+    return replace(made_up.missing(), passed=(trial("turn35"), trial("zigzag")))
+
+
+def test_a_fault_of_kinematics_shows_the_missing_velocity_and_no_force() -> None:
+    gap = carried()
+    drawn = gap_charts(gap)
+    assert {"signal", "when_signal"} <= set(drawn) and not {"force", "when_force"} & set(drawn)
+    means = [row["f"] for row in rows_of(drawn["signal"]) if row.get("trials") == 2]
+    assert np.mean(means) == pytest.approx(0.5, abs=0.02)
+    assert "missing velocity to east (m/s)" in json.dumps(drawn["when_signal"].to_dict(validate=False))
+    (where,) = (section for section in page_of(gap).sections if section.heading == "Where the gap is")
+    assert "No force is missing" in where.text and "the motion over the ground" in where.text
+    forced = replace(gap.effects[0], name="rudder_bias", parameters={}, standard_errors={})
+    both = gap_charts(replace(gap, effects=(*gap.effects, forced)))
+    assert {"signal", "force"} <= set(both)
+
+
+def test_each_probability_says_of_what_it_is() -> None:
+    gap = made_up.missing()
+    some = (Rival(("current",), 0.0, 0.55), Rival(("current", "wind"), 3.0, 0.4), Rival((), 50.0, 0.0))
+    page = page_of(replace(gap, rivals=some))
+    text = page.sections[0].text
+    assert "Probability that the effect is there, alone or with another one: current 97 %." in text
+    assert "Probability that current alone is all that is missing, among the explanations compared: 55 %." in text
+    (card,) = (figure for figure in page.figures if figure.label.startswith("Probability"))
+    assert card.note == "alone or with another effect"
+    assert "as a whole" in json.dumps(rival_chart(gap).to_dict(validate=False))
+
+
+def test_what_the_others_would_be_is_told_and_they_do_not_hide() -> None:
+    gap = made_up.ambiguous()
+    test = gap.next_test
+    assert test is not None
+    sizes = {"wind": ({"speed_mps": 11.0}, {"speed_mps": 2.0}), "current": ({"speed_mps": 0.5}, {})}
+    tables = tables_of(page_of(replace(gap, next_test=replace(test, sizes=sizes))))
+    (row,) = tables["What the others would be, ± one standard error"].rows
+    assert row[:4] == ["wind", "speed", "11 ± 2", "m/s"]
+    assert [row[0] for row in tables["Sizes that these data cannot show"].rows] == ["linear yaw damping"]
+
+
+def test_what_replaces_something_of_the_card_has_no_up_to() -> None:
+    gap = replace(made_up.missing(), could_hide={"rudder_lag": {"time_constant_s": 1.04}, "trim": {"by_stern_m": 0.1}})
+    lag, trim = tables_of(page_of(gap))["Sizes that these data cannot show"].rows
+    assert lag[2] == "1 in place of the card's" and trim[2] == "up to 0.1"
+
+
+def test_a_name_that_leaves_much_of_the_gap_is_told_with_caution() -> None:
+    gap = made_up.missing()
+    poor = replace(gap, passed=tuple(made_up.passed(one.name, 9.0, 5.0, held_out=one.held_out) for one in gap.passed))
+    words = verdict_in_words(poor)
+    # sqrt((5^2 - 1)/(9^2 - 1)) = 0.55; a black box of 3 is better
+    assert "Caution: named, but 55 % of the gap of the held-out trials remains" in words
+    assert "a linear black box with as many coefficients follows the held-out trials better" in words
+    assert page_of(poor).figures[0].verdict is Verdict.CAUTION
+    assert "Caution" not in verdict_in_words(gap)

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import json
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import click
+from rich.console import Console
+from rich.markup import escape
+from rich.measure import Measurement
+from rich.table import Table
 
 from tank2sim.cards import Card, ManoeuvringCard, parse_card, read_card
 from tank2sim.cli.progress import showing_stages
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.cli.screen import json_option, json_text, screen, show_notices, shown
 from tank2sim.cli.trials import TakesSeveral, fitted_and_held, trial_files
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.files import writable_folder, write_together
+from tank2sim.gap.acting import acting
 from tank2sim.gap.add import Found, improved_text
 from tank2sim.gap.as_json import (
     NEXT_TEST_FILE,
@@ -29,11 +36,13 @@ from tank2sim.gap.as_json import (
 )
 from tank2sim.gap.correct import LEFT, corrected, corrected_text
 from tank2sim.gap.find import Options, find_gap
-from tank2sim.gap.result import MISSING, Gap, Named
+from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap, Named
 from tank2sim.records.trials import Trial
 from tank2sim.units import in_words
 
-ALWAYS = ("gap.json", "improved.toml", "report.html", NEXT_TEST_FILE)
+GAP = "gap.json"
+
+ALWAYS = (GAP, "improved.toml", "report.html", NEXT_TEST_FILE)
 """Files that are written into the folder, the last one if there is such a test."""
 
 CORRECTED = "corrected"
@@ -81,17 +90,18 @@ def command(
     inputs = [*trial_files(trials), *trial_files(holdout), *([Path(card)] if Path(card).exists() else [])]
     fitted, held = fitted_and_held(trials, holdout, known)
     _refuse_early(output, json_file, inputs)
+    earlier = _of_earlier_run(output)
     with _folder(output), showing_stages("reading") as progress:
         gap = find_gap(known, fitted, held, options, progress)
         progress("writing")
         files, notices = _files(gap, (*fitted.trials, *held.trials), [one.name for one in fitted.trials], output)
         if json_file:
-            files[json_file] = files[output / "gap.json"]
+            files[json_file] = files[output / GAP]
         some_corrected = any(path.parent == output / CORRECTED for path in files)
         with _folder(output / CORRECTED) if some_corrected else contextlib.nullcontext():
             write_together(files, inputs=inputs, outputs=[*files])
     _show(gap)
-    show_notices([*gap.notices, *notices, *_stale(output, files)])
+    show_notices([*gap.notices, *notices, *_tidied(output, earlier, {*files, *map(Path.resolve, inputs)})])
     screen.print(f"{output}: {', '.join(sorted(_told(files, output)))}", soft_wrap=True, markup=False)
 
 
@@ -164,7 +174,6 @@ def _files(
     parse_card(text, str(folder / "improved.toml"))
     names = {trial.name: trial.path.name for trial in trials}
     files: dict[Path, str | bytes] = {
-        folder / "gap.json": json_text(gap_as_json(gap, names)),
         folder / "improved.toml": text,
         folder / "report.html": render_page(gap_page(gap, gap_charts(gap))),
     }
@@ -178,13 +187,41 @@ def _files(
                 files[folder / CORRECTED / f"{trial.name}.csv"] = text_of_trial
             new = corrected(trial, found).notices[len(trial.notices) :]
             notices += [f"{trial.path.name}: {told}" for told in new if told.startswith(LEFT)]
+    own = sorted(path.relative_to(folder).as_posix() for path in (*files, folder / GAP))
+    files[folder / GAP] = json_text({**gap_as_json(gap, names), "files": own})
     return files, notices
 
 
-def _stale(folder: Path, files: dict[Path, str | bytes]) -> list[str]:
-    """What an earlier run left, and this one has no successor of."""
-    old = [folder / NEXT_TEST_FILE, *(folder / CORRECTED).glob("*.csv")]
-    return [f"{path} is of an earlier run" for path in old if path.exists() and path not in files]
+def _of_earlier_run(folder: Path) -> set[Path]:
+    """Orders and corrected trials that an earlier run says in its ``gap.json`` that it wrote."""
+    try:
+        told = json.loads((folder / GAP).read_text(encoding="utf-8"))
+        names = [*told.get("files", ()), (told.get("next_test") or {}).get("orders", "")]
+        paths = [PurePosixPath(name) for name in names]
+    except (OSError, ValueError, AttributeError, TypeError):
+        return set()  # none, or another program's
+    corrected_ones = {folder / path for path in paths if len(path.parts) == 2 and path.match(f"{CORRECTED}/*.csv")}
+    return corrected_ones | ({folder / NEXT_TEST_FILE} if PurePosixPath(NEXT_TEST_FILE) in paths else set())
+
+
+def _tidied(folder: Path, earlier: set[Path], kept: set[Path]) -> list[str]:
+    """Take away what an earlier run wrote and this one has no successor of; tells of it, and of what is not known."""
+    told = []
+    for path in (folder / NEXT_TEST_FILE, *sorted((folder / CORRECTED).glob("*.csv"))):
+        if path in kept or not path.exists():
+            continue
+        if path not in earlier or path.resolve() in kept:
+            told.append(f"{path} is not of this run, and was left")
+            continue
+        try:
+            path.unlink()
+        except OSError:
+            told.append(f"{path} is of an earlier run, and could not be removed")
+        else:
+            told.append(f"{path} was of an earlier run, and was removed")
+    with contextlib.suppress(OSError):  # not there, or not empty
+        (folder / CORRECTED).rmdir()
+    return told
 
 
 def _told(files: dict[Path, str | bytes], folder: Path) -> set[str]:
@@ -193,24 +230,35 @@ def _told(files: dict[Path, str | bytes], folder: Path) -> set[str]:
 
 
 def _show(gap: Gap) -> None:
-    from tank2sim.report.gap_page import verdict_in_words
+    from tank2sim.report.gap_words import probabilities_in_words, sizes_of_candidates, verdict_in_words
 
-    screen.print(f"{gap.card.ship.name}: {verdict_in_words(gap)}", soft_wrap=True, markup=False)
+    _line(f"{gap.card.ship.name}: {verdict_in_words(gap)}")
     if rows := [row for one in gap.effects for row in _parameters(one)]:
-        show_table("What was found", ["effect", "parameter", "value", "standard error", "unit"], rows)
-    for one in gap.effects:
-        screen.print(f"probability that {one.name} is there: {one.confidence:.2g}", soft_wrap=True, markup=False)
+        what = "What the best of the candidates would be" if gap.verdict == AMBIGUOUS else "What was found"
+        _table(what, ["effect", "parameter", "value", "standard error", "unit"], rows)
+    for told in probabilities_in_words(gap):
+        _line(told)
     if gap.alternatives:
-        told = "; ".join(joined(one) for one in gap.alternatives)
-        screen.print(f"these data cannot tell it from: {told}", soft_wrap=True, markup=False)
+        _line(f"these data cannot tell it from: {'; '.join(joined(one) for one in gap.alternatives)}")
+    if rows := [row for one in sizes_of_candidates(gap) for row in _parameters(one)]:
+        _table("What the others would be", ["effect", "parameter", "value", "standard error", "unit"], rows)
     for place in gap.where[:1]:
-        screen.print(
-            f"most of the misfit: {signal_name(place.signal).file} of {place.trial}, {place.t_start_s:.4g} s to "
-            f"{place.t_end_s:.4g} s ({100 * place.share:.0f} %)",
-            soft_wrap=True,
-            markup=False,
+        _line(
+            f"most of the misfit arises in {signal_name(place.signal).file} of {place.trial}, {place.t_start_s:.4g} s "
+            f"to {place.t_end_s:.4g} s ({100 * place.share:.0f} %)"
         )
-    misfits: list[list[object]] = [
+    for one in acting(gap)[:1]:
+        _line(
+            f"the cause acts most in {one.equation} of {one.trial}, {one.t_start_s:.4g} s to {one.t_end_s:.4g} s "
+            f"({one.size:.2g} standard errors)"
+        )
+    _table("Misfit in units of the noise (1 is noise)", ["trial", "set", "before", "after"], _misfits(gap))
+    if gap.next_test:
+        _line(f"next test: {gap.next_test.manoeuvre}. {gap.next_test.why}")
+
+
+def _misfits(gap: Gap) -> list[list[object]]:
+    rows: list[list[object]] = [
         [one.name, "held out" if one.held_out else "fitted", *(_hundredths(one.misfit(w)) for w in ("before", "after"))]
         for one in gap.passed
         if measured_in(one)
@@ -218,21 +266,41 @@ def _show(gap: Gap) -> None:
     for word, held in (("fitted", False), ("held out", True)):
         before, after = (gap.misfit(which, held_out=held) for which in ("before", "after"))
         if before is not None and after is not None:
-            misfits.append(["all", word, _hundredths(before), _hundredths(after)])
-    show_table("Misfit in units of the noise (1 is noise)", ["trial", "", "before", "after"], misfits)
-    if gap.next_test:
-        screen.print(f"next test: {gap.next_test.manoeuvre}. {gap.next_test.why}", soft_wrap=True, markup=False)
+            rows.append(["all", word, _hundredths(before), _hundredths(after)])
+    return rows
 
 
 def _parameters(one: Named) -> list[list[object]]:
     rows: list[list[object]] = []
     for parameter, value in one.parameters.items():
         own, there = estimate_in_file(parameter, value)
-        error = in_file(parameter, one.standard_errors[parameter])[1] if parameter in one.standard_errors else None
+        error = in_file(parameter, one.standard_errors[parameter])[1] if parameter in one.standard_errors else math.nan
         words, unit = in_words(own)
-        rows.append([one.name, words, there, None if error is None else float(f"{error:.2g}"), unit])
+        rows.append([one.name, words, there, float(f"{error:.2g}"), unit or "-"])
     return rows
 
 
 def _hundredths(misfit: float) -> str:
-    return f"{misfit:.2f}"
+    return f"{misfit:.2f}" if math.isfinite(misfit) else "ran away"
+
+
+def _line(text: str) -> None:
+    screen.print(text, soft_wrap=True, markup=False)
+
+
+def _table(title: str, heads: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """A table as wide as it must be: names of trials and effects are never broken; a dash for what is no number."""
+    table = Table(header_style="bold", pad_edge=False)
+    for place, head in enumerate(heads):
+        numeric = all(isinstance(row[place], int | float) for row in rows)
+        table.add_column(head, justify="right" if numeric else "left", no_wrap=True)
+    for row in rows:
+        told = [None if isinstance(value, float) and not math.isfinite(value) else value for value in row]
+        table.add_row(*(escape(shown(value)) for value in told))
+    width = Measurement.get(screen, screen.options.update(width=WIDE), table).maximum
+    screen.print(title, style="italic", soft_wrap=True, markup=False)
+    Console(width=max(width, screen.width), highlight=False).print(table)
+
+
+WIDE = 1000
+"""Characters in which any table of ours has room."""

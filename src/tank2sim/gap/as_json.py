@@ -9,17 +9,22 @@ from typing import NamedTuple
 import numpy as np
 
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.result import Gap, Named, NextTest, Passed
+from tank2sim.gap.acting import acting, contradiction, missing_force
+from tank2sim.gap.prove import cautions
+from tank2sim.gap.result import Gap, MissingForce, MissingSignal, Named, NextTest, Passed
 from tank2sim.identification.trials.evaluation import Figure
 from tank2sim.identification.trials.runs import SEEN
 from tank2sim.records.signals.columns import SignalName
-from tank2sim.units import from_si
+from tank2sim.units import from_si, in_words
 
 NEXT_TEST_FILE = "next_test.csv"
 """File beside ``gap.json`` with the orders of the next test."""
 
 NOISE_FLOOR = 1.0
 """Misfit of a perfect model: it is counted in standard deviations of the measurement noise."""
+
+MOST_PASSAGES = 24
+"""Passages in which the model is wrong that are told, the most telling (ours)."""
 
 _IN_FILE = {"rad": "deg", "radps": "degps"}
 
@@ -42,17 +47,31 @@ def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, o
             {
                 "trial": names.get(place.trial, f"{place.trial}.csv"),
                 "signal": signal_name(place.signal).file,
-                "t_start_s": _finite(place.t_start_s),
-                "t_end_s": _finite(place.t_end_s),
+                "t_start_s": _time(place.t_start_s),
+                "t_end_s": _time(place.t_end_s),
                 "share_of_misfit": _finite(place.share),
             }
             for place in gap.where
+        ],
+        "acting": [
+            {
+                "trial": names.get(one.trial, f"{one.trial}.csv"),
+                "equation": one.equation,
+                "t_start_s": _time(one.t_start_s),
+                "t_end_s": _time(one.t_end_s),
+                "standard_errors": _finite(one.size),
+            }
+            for one in acting(gap)[:MOST_PASSAGES]
         ],
         "equation": gap.equation,
         "misfit": _misfit(gap),
         "could_hide": {
             effect: {in_file(name, size)[0]: _finite(in_file(name, size)[1]) for name, size in sizes.items()}
-            for effect, sizes in gap.could_hide.items()
+            for effect, sizes in hidden(gap).items()
+        },
+        "could_hide_in_words": {
+            effect: "; ".join(hidden_in_words(effect, name, size) for name, size in sizes.items())
+            for effect, sizes in hidden(gap).items()
         },
         "next_test": _next_test(gap.next_test),
         "rivals": [
@@ -71,9 +90,32 @@ def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, o
             for before, now in paired_figures(gap)
         ],
         "agreement": _agreement(gap, names),
-        "missing_force": _missing_force(gap),
-        "notices": list(gap.notices),
+        "missing_force": _missing(missing_force(gap)),
+        "missing_signal": _missing(contradiction(gap)),
+        "notices": [*cautions(gap), *gap.notices],
     }
+
+
+def hidden(gap: Gap) -> dict[str, Mapping[str, float]]:
+    """What could be there without showing; what was named, or may be what is missing, is not among it."""
+    possible = {one.name for one in gap.effects} | {name for names in gap.alternatives for name in names}
+    return {effect: sizes for effect, sizes in gap.could_hide.items() if effect not in possible}
+
+
+def replaces(effect: str, parameter: str) -> bool:
+    """Whether a parameter stands in place of something that the ship has anyway, so that there is no "up to"."""
+    known = EFFECTS[effect].parameters if effect in EFFECTS else ()
+    return any(one.name == parameter and one.absent is None for one in known)
+
+
+def hidden_in_words(effect: str, parameter: str, size: float) -> str:
+    """``angle up to 0.25 deg would not show``, or ``max rate of 5 deg/s in place of the card's would not show``."""
+    own, value = in_file(parameter, size)
+    words, unit = in_words(own)
+    told = f"{value:.2g}{f' {unit}' if unit else ''}"
+    if replaces(effect, parameter):
+        return f"{words} of {told} in place of the card's would not show"
+    return f"{words} up to {told} would not show"
 
 
 def joined(effects: tuple[str, ...]) -> str:
@@ -184,19 +226,32 @@ def _agreement(gap: Gap, names: Mapping[str, str]) -> dict[str, object]:
     return told
 
 
-def _missing_force(gap: Gap) -> dict[str, object] | None:
-    if gap.missing_force is None:
+def _missing(what: MissingForce | MissingSignal | None) -> dict[str, object] | None:
+    if what is None:
         return None
-    force = gap.missing_force
-    explained = {state: _finite(share) for state, share in force.explained.items()}
-    return {"equation": force.equation, "explaining": force.explaining, "explained": explained}
+    key = {"equation": what.equation} if isinstance(what, MissingForce) else {"quantity": what.quantity}
+    explained = {state: _finite(share) for state, share in what.explained.items()}
+    return {**key, "explaining": what.explaining, "explained": explained}
 
 
 def _next_test(test: NextTest | None) -> dict[str, object] | None:
     if test is None:
         return None
     expected = {manoeuvre: _finite(score) for manoeuvre, score in test.expected.items()}
-    return {"manoeuvre": test.manoeuvre, "orders": NEXT_TEST_FILE, "why": test.why, "expected": expected}
+    sizes = {
+        name: {
+            "parameters": {own: _finite(there) for own, there in _each(values, wrapped=True)},
+            "standard_errors": {own: _finite(there) for own, there in _each(errors, wrapped=False)},
+        }
+        for name, (values, errors) in test.sizes.items()
+    }
+    told = {"manoeuvre": test.manoeuvre, "orders": NEXT_TEST_FILE, "why": test.why}
+    return {**told, "expected": expected, "candidates": sizes}
+
+
+def _time(value: float) -> float | None:
+    """To the microsecond, far below any sample's distance: adding up steps leaves errors in the last digits."""
+    return _finite(round(value, 6) + 0.0 if math.isfinite(value) else value)  # + 0.0 turns -0.0 into 0.0
 
 
 def _finite(value: float | None) -> float | None:

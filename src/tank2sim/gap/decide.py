@@ -7,6 +7,7 @@ explanation are not noise, a name would be a guess, and is withheld.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,10 +16,11 @@ from scipy.special import logsumexp
 from scipy.stats import chi2, gamma
 
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.add import CHANGING_DERIVATIVES, changed_derivatives
+from tank2sim.gap.add import CHANGING_DERIVATIVES, STATED, changed_derivatives
 from tank2sim.gap.fit import Fit
 from tank2sim.gap.likelihood import Likelihood
 from tank2sim.gap.observer import FORCES
+from tank2sim.gap.posing import GEAR
 from tank2sim.gap.prove import agreement
 from tank2sim.gap.residuals import each_trial, estimates
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE
@@ -36,6 +38,11 @@ ALIKE = ENOUGH
 OF_ONE_KIND = {"actuator": 0.25, "force": 0.1}
 """Share of the whole gain that a second effect of the same kind must have (ours): less is what the first one's formula
 may be wrong by, beyond what :data:`.forms.FORM` covers."""
+
+LIKELY = 0.5
+"""A name less probable than this is none (ours): then all that have :data:`RIVAL` of its probability are named."""
+
+RIVAL = 0.1
 
 STANDARD_ERRORS = 3.0
 """An effect is named if its size exceeds so many of its standard errors."""
@@ -75,8 +82,7 @@ class Decision:
 
     def confidence(self, effect: str) -> float:
         """Probability that an effect is among what is missing."""
-        sure = sum(p for effects, p in self.probabilities.items() if effect in effects)
-        return float(min(sure, SUREST))
+        return _confidence(self.probabilities, effect)
 
 
 @dataclass(frozen=True)
@@ -114,22 +120,29 @@ def decide(search: Search) -> Decision:
     if pair is not None:
         worth = max(ENOUGH, _share(pair) * (none.score - pair.score))
         best = pair if pair.score < min(one.score for one in (best, single) if one is not None) - worth else best
+    scores = np.array([fit.score for fit in search.fits]) / TEMPER
+    weights = np.exp(-0.5 * scores - logsumexp(-0.5 * scores))
+    probabilities = {fit.explained.effects: float(w) for fit, w in zip(search.fits, weights, strict=True)}
+    behind = ALIKE
+    if any(_confidence(probabilities, name) < LIKELY for name in best.explained.effects):
+        behind = max(ALIKE, -2 * TEMPER * np.log(RIVAL))
     alike = tuple(
         fit
         for fit in search.fits
         if fit is not best
-        and fit.score < best.score + ALIKE
+        and fit.score < best.score + behind
         and stands_out(fit)
         and not set(fit.explained.effects) > set(best.explained.effects)
         and len(fit.explained.effects) <= max(len(best.explained.effects), 1)
         and best is not none
     )
-    scores = np.array([fit.score for fit in search.fits]) / TEMPER
-    weights = np.exp(-0.5 * scores - logsumexp(-0.5 * scores))
-    probabilities = {fit.explained.effects: float(w) for fit, w in zip(search.fits, weights, strict=True)}
     strange = strangeness(search.likelihood, best)
     verdict = NOTHING if best is none else AMBIGUOUS if alike else MISSING
     return Decision(OUTSIDE if strange else verdict, best, alike, probabilities, strange)
+
+
+def _confidence(probabilities: Mapping[tuple[str, ...], float], effect: str) -> float:
+    return float(min(sum(p for effects, p in probabilities.items() if effect in effects), SUREST))
 
 
 def _share(pair: Fit) -> float:
@@ -147,8 +160,8 @@ def _kind(name: str) -> str:
 def stands_out(fit: Fit) -> bool:
     """Whether each effect has an amplitude that is more than :data:`STANDARD_ERRORS` from its absence.
 
-    One that only changes derivatives of the card must change one of them by as many of *its* standard errors: less is
-    what the card may be wrong by.
+    One that only changes derivatives of the card, or what it states of the steering gear, must change one of them by as
+    many of *its* standard errors: less is what the card may be wrong by.
     """
     errors = np.sqrt(np.diag(fit.covariance))
     for name in fit.explained.effects:
@@ -160,6 +173,8 @@ def stands_out(fit: Fit) -> bool:
         if sizes and max(sizes) < STANDARD_ERRORS:
             return False
         if name in CHANGING_DERIVATIVES and _change(fit, name) < STANDARD_ERRORS:
+            return False
+        if name in STATED and _change_of_gear(fit, name) < STANDARD_ERRORS:
             return False
     return True
 
@@ -173,6 +188,14 @@ def _change(fit: Fit, name: str) -> float:
         for term, after, *_ in changed_derivatives(card, name, values, {})
     ]
     return max(changes, default=0.0)
+
+
+def _change_of_gear(fit: Fit, name: str) -> float:
+    """Change of what the card states of the steering gear, in its standard errors; infinite if it states nothing."""
+    ((_, values, _),) = [one for one in estimates(fit) if one[0] == name]
+    ((parameter, value),) = values.items()
+    stated = getattr(fit.explained.card.steering_gear, parameter, None)
+    return float(np.inf) if stated is None else float(abs(value - stated) / (GEAR * stated))
 
 
 WINDOWS = (6, 12, 24, 48)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS, EffectParameter
+from tank2sim.dynamics.model import Model
 from tank2sim.gap.motion import KNOWN, Motion
 from tank2sim.identification.trials.question import driven_model
 from tank2sim.simulation.rows import Chain
@@ -71,6 +72,8 @@ class Explained:
         ``angle`` or ``order``: what of the rudder was recorded.
     effects : sequence of str
         Names of effects that are added.
+    ship : Model, optional
+        The card's model as it is driven so, if it was built already.
 
     Attributes
     ----------
@@ -78,10 +81,10 @@ class Explained:
         The parameters that are estimated, in the order of every `theta`.
     """
 
-    def __init__(self, card: ManoeuvringCard, driven_by: str, effects: Sequence[str] = ()):
+    def __init__(self, card: ManoeuvringCard, driven_by: str, effects: Sequence[str] = (), ship: Model | None = None):
         self.card, self.driven_by = card, driven_by
         self.effects = tuple(effects)
-        model = driven_model(card, driven_by)
+        model = driven_model(card, driven_by) if ship is None else ship
         asked: list[Asked] = []
         for name in self.effects:
             effect = EFFECTS[name]

@@ -22,11 +22,12 @@ from tank2sim.gap.decide import ENOUGH, Decision, Strange, decide
 from tank2sim.gap.explained import CLOCK
 from tank2sim.gap.fit import Fit
 from tank2sim.gap.fitting import Progress
+from tank2sim.gap.hiding import could_hide
 from tank2sim.gap.next_test import Explanation, next_test
 from tank2sim.gap.posing import candidates, pose
 from tank2sim.gap.prove import agreement, black_box, worse
 from tank2sim.gap.replay import passed, with_black_box
-from tank2sim.gap.residuals import could_hide, each_trial, estimates, force_lacking
+from tank2sim.gap.residuals import each_trial, estimates, force_lacking
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE, Gap, Named, NextTest, Passed, Rival
 from tank2sim.gap.search import Search, search
 from tank2sim.gap.where import equation_of, figures, places

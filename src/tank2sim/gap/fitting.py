@@ -60,7 +60,7 @@ class Known:
     def __call__(self, *effects: str) -> Explained:
         """The card with these effects."""
         if effects not in self._made:
-            self._made[effects] = Explained(self.none.card, self.none.driven_by, effects)
+            self._made[effects] = Explained(self.none.card, self.none.driven_by, effects, self.none.model)
         return self._made[effects]
 
 

@@ -132,18 +132,28 @@ def next_test(
     of = _with_headings(candidates(explanations[0].card, length), explanations)
     orders, motion = ships[0].sail(of, length)
     foreseen = [ship.foreseen(of, orders, motion) for ship in ships]
-    scores = np.min([_lost(foreseen[0], other) for other in foreseen[1:]], axis=0)
+    each = [_lost(foreseen[0], other) for other in foreseen[1:]]
+    scores = np.min(each, axis=0)
     if not np.isfinite(scores).any():
         return None
     least = int(np.nanargmin(scores))
     best = int(np.argmax(np.nan_to_num(scores) >= AS_GOOD * np.nanmax(scores)))
-    why = _why(of[best], [one.name for one in explanations], float(scores[best]), (float(scores[least]), of[least]))
+    names, own = [one.name for one in explanations], [float(one[best]) for one in each]
+    why = _why(of[best], names, own, (float(scores[least]), of[least]))
     return NextTest(
         manoeuvre=of[best].manoeuvre or "file:next_test.csv",
         orders=orders_csv(ships[0].step_s, {name: values[best] for name, values in orders.items()}, why),
         why=why,
         expected={one.name: float(score) for one, score in zip(of, scores, strict=True) if np.isfinite(score)},
+        sizes=_sizes(explanations),
     )
+
+
+def _sizes(explanations: Sequence[Explanation]) -> dict[str, tuple[Mapping[str, float], Mapping[str, float]]]:
+    """Each effect to its parameters and standard errors; what all explanations have alike was on the card before."""
+    had = [entry for entry in explanations[0].card.effects if all(entry in one.card.effects for one in explanations)]
+    entries = [entry for one in explanations for entry in one.card.effects if entry not in had]
+    return {entry.name: (entry.parameters, entry.uncertainty) for entry in reversed(entries)}
 
 
 def _lost(one: _Seen, other: _Seen) -> Vector:
@@ -175,15 +185,21 @@ def _with_headings(of: Sequence[Candidate], explanations: Sequence[Explanation])
     return [*of, *(on_heading(one, math.pi / 2) for one in of if one.on_course)] if directed else list(of)
 
 
-def _why(best: Candidate, names: Sequence[str], score: float, least: tuple[float, Candidate]) -> str:
-    rivals = " and ".join(names[1:])
-    if score < DECIDES:
-        told = f"no manoeuvre that was considered would tell {names[0]} from {rivals}; the most telling is {best.name}"
+def _why(best: Candidate, names: Sequence[str], each: Sequence[float], least: tuple[float, Candidate]) -> str:
+    """What a manoeuvre would tell: the root of a score is a difference in standard deviations of the noise."""
+    first, *rivals = names
+    apart = " and ".join(f"{math.sqrt(score):.2g} from {name}" for score, name in zip(each, rivals, strict=True))
+    if min(each) < DECIDES:
+        told = f"No manoeuvre considered would tell {first} from {' and '.join(rivals)} for sure; nearest"
     else:
-        told = f"{best.name} would tell {names[0]} from {rivals} best"
-    told += f": the wrong one would lose {score:.3g} of the score ({least[1].name}: {max(least[0], 0.0):.2g})"
+        told = f"The manoeuvre that would tell {first} from {' and '.join(rivals)} best"
+    told += (
+        f" is {best.name}: what {first} foresees differs there by {apart}, in standard deviations of the noise of all "
+        f"readings together and beyond what uncertain parameters can make up for; {math.sqrt(DECIDES):.2g} would "
+        f"decide. The least telling, {least[1].name}, would give {math.sqrt(max(least[0], 0.0)):.1g}."
+    )
     if best.heading:
-        told += f"; begin on heading {math.degrees(best.heading):.0f} deg (initial.psi), which orders cannot say"
+        told += f" Begin on heading {math.degrees(best.heading):.0f} deg (initial.psi), which orders cannot say."
     return told
 
 

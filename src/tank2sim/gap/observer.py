@@ -20,6 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tank2sim.gap import recursion
+
 Array = NDArray[np.float64]
 Truths = NDArray[np.bool_]
 
@@ -103,7 +105,7 @@ def linear(by_state: Array, reading: Array, known: Truths, block_s: float, wide:
     for _ in range(DOUBLINGS):
         spreading = 0.5 * (spreading + transition @ spreading)
         transition = transition @ transition
-    return Linear(transition, spreading, reading, known, block_s, wide)
+    return Linear(transition, spreading, np.ascontiguousarray(reading), known, block_s, wide)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,10 +116,10 @@ class Observer:
     ----------
     what : Linear
     noise : Noise
-    F : array (R, T, nz, nz)
-        Whole transition from each block to the next; nothing follows the last, whose own is not used.
-    H : array (R, T, ny, nz)
-        Zero rows where nothing was measured.
+    push : array (R, T - 1, 6, 3)
+        Errors of the motion by the accelerations a block before.
+    fading : array (nz - 6,)
+        Share of each acceleration and sensor error that is left a block later.
     gain : array (R, T, nz, ny)
     white : array (R, T, ny, ny)
         Inverse of the lower Cholesky factor of the innovations' covariance.
@@ -129,8 +131,8 @@ class Observer:
 
     what: Linear
     noise: Noise
-    F: Array
-    H: Array
+    push: Array
+    fading: Array
     gain: Array
     white: Array
     filtered: Array
@@ -151,39 +153,32 @@ class Observer:
         array (R, T, ny, C)
             0 where nothing was measured.
         """
-        innovations, _ = self.passed(driving, shown)
-        whitened: Array = self.white @ innovations
-        return whitened
+        return self.passed(driving, shown, keep=False)[0]
 
-    def passed(self, driving: Array, shown: Array) -> tuple[Array, Array]:
-        """Innovations (R, T, ny, C), and states after each measurement (R, T, nz, C), of arguments as above."""
-        runs, blocks, ny, nz = self.H.shape
-        count = shown.shape[-1]
-        shown = np.where(self.what.known[..., None], shown, 0.0)
-        z = np.zeros((runs, nz, count))
-        innovations, after = np.empty((runs, blocks, ny, count)), np.empty((runs, blocks, nz, count))
-        for k in range(blocks):
-            innovations[:, k] = shown[:, k] - self.H[:, k] @ z
-            after[:, k] = z + self.gain[:, k] @ innovations[:, k]
-            if k + 1 < blocks:
-                z = self.F[:, k] @ after[:, k]
-                z[:, :6] += self.what.spreading[:, k] @ driving[:, k]
-        return innovations, after
+    def passed(self, driving: Array, shown: Array, *, keep: bool = True) -> tuple[Array, Array]:
+        """Innovations in units of their standard deviation (R, T, ny, C), and states after each measurement
+        (R, T, nz, C) if they are to be kept; arguments as above."""
+        columns = np.ascontiguousarray(driving), np.ascontiguousarray(shown)
+        whitened, after = recursion.passed(self._seeing, self._moving, (self.gain, self.white), columns, keep)
+        return whitened, after
 
     def smoothed(self, driving: Array, shown: Array) -> Array:
         """States given all measurements (R, T, nz), of one column; arguments as in :meth:`whitened` without C."""
-        runs, blocks, _, nz = self.H.shape
-        innovations, after = self.passed(driving[..., None], shown[..., None])
-        states = np.empty((runs, blocks, nz))
-        r = np.zeros((runs, nz, 1))
-        for k in range(blocks - 1, -1, -1):
-            # r carries what later measurements say of the state after this one
-            later = self.F[:, k].swapaxes(-1, -2) @ r if k + 1 < blocks else r
-            states[:, k] = (after[:, k] + self.filtered[:, k] @ later)[..., 0]
-            weighed = self.white[:, k].swapaxes(-1, -2) @ self.white[:, k] @ innovations[:, k]
-            HT = self.H[:, k].swapaxes(-1, -2)
-            r = later + HT @ (weighed - self.gain[:, k].swapaxes(-1, -2) @ later)
+        after = self.passed(driving[..., None], shown[..., None])
+        states: Array = recursion.smoothed(self._seeing, self._moving, self._filtering, *after)[..., 0]
         return states
+
+    @property
+    def _seeing(self) -> tuple[Array, Truths]:
+        return self.what.reading, self.what.known
+
+    @property
+    def _moving(self) -> tuple[Array, Array, Array, Array]:
+        return self.what.transition, self.what.spreading, self.push, self.fading
+
+    @property
+    def _filtering(self) -> tuple[Array, Array, Array]:
+        return self.gain, self.white, self.filtered
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,44 +220,18 @@ def observer(what: Linear, noise: Noise) -> Observer:
     levels = np.concatenate([noise.force, noise.slow])
     pushed = _pushed(noise, what.block_s)
     B = what.spreading[..., :FORCES]
-    F = np.zeros((runs, blocks, nz, nz))
-    F[:, :-1, :6, :6] = what.transition
-    F[:, :-1, :6, 6:9] = B * pushed.gain
-    F[..., range(6, nz), range(6, nz)] = fading
     Q = np.zeros((runs, blocks - 1, nz, nz))
     Q[..., range(6, nz), range(6, nz)] = levels**2 * (1 - fading**2)
     Q[..., :6, :6] = (B * pushed.way) @ B.swapaxes(-1, -2)
     Q[..., :6, 6:9] = B * pushed.both
     Q[..., 6:9, :6] = Q[..., :6, 6:9].swapaxes(-1, -2)
-    H = np.zeros((runs, blocks, ny, nz))
-    H[..., :6] = what.reading
-    H[..., range(ny), range(9, nz)] = 1.0
-    H = H * what.known[..., None]
-    R = np.where(what.known, noise.white**2, 1.0)
-    P = np.zeros((runs, nz, nz))
-    P[:, range(nz), range(nz)] = np.concatenate([what.wide**2, levels**2])
-    gain = np.empty((runs, blocks, nz, ny))
-    white = np.empty((runs, blocks, ny, ny))
-    filtered = np.empty((runs, blocks, nz, nz))
-    places = np.arange(ny)
-    for k in range(blocks):
-        Hk = H[:, k]
-        PH = P @ Hk.swapaxes(-1, -2)
-        S = Hk @ PH
-        S[:, places, places] += R[:, k]
-        lower = np.linalg.inv(np.linalg.cholesky(S))
-        white[:, k] = lower
-        K = PH @ (lower.swapaxes(-1, -2) @ lower)
-        gain[:, k] = K
-        P = P - K @ PH.swapaxes(-1, -2)
-        filtered[:, k] = P
-        if k + 1 < blocks:
-            Fk = F[:, k]
-            P = Fk @ P @ Fk.swapaxes(-1, -2) + Q[:, k]
-            P = 0.5 * (P + P.swapaxes(-1, -2))
+    push = B * pushed.gain
+    start = np.concatenate([what.wide**2, levels**2])
+    seeing = what.reading, what.known, noise.white**2
+    gain, white, filtered = recursion.covariances(start, what.transition, push, fading, Q, seeing)
     # rows without a measurement have S = 1 on their diagonal and count nothing
-    log_det = float(-2 * np.sum(np.log(white[..., places, places])))
-    return Observer(what, noise, F, H, gain, white, filtered, log_det)
+    log_det = float(-2 * np.sum(np.log(white[..., range(ny), range(ny)])))
+    return Observer(what, noise, push, fading, gain, white, filtered, log_det)
 
 
 def slopes(seen: Observer, driving: Array, shown: Array, whitened: Array) -> Array:
@@ -275,68 +244,17 @@ def slopes(seen: Observer, driving: Array, shown: Array, whitened: Array) -> Arr
     once: r carries V^-1 e back to the states, N its covariance under the model (Durbin and Koopman, 7.3.3).
     """
     noise, block_s = seen.noise, seen.what.block_s
-    sums = _backward(seen, seen.passed(driving, shown)[1], whitened)
+    after = seen.passed(driving, shown)[1]
+    moved = seen._seeing, seen._moving, seen._filtering
+    variance, start, fading_slope, way, both, gain, white = recursion.backward(*moved, whitened, after)
     levels = np.concatenate([noise.force, noise.slow])
     times = np.concatenate([noise.force_s, noise.slow_s])
-    fading = np.exp(-block_s / times)
-    by_level = 2 * levels**2 * ((1 - fading**2) * sums.variance + sums.start)
+    fading = seen.fading
+    by_level = 2 * levels**2 * ((1 - fading**2) * variance + start)
     # d fading/d log time = fading h/time; the driving variance is level^2 (1 - fading^2)
-    by_time = (sums.fading - 2 * fading * levels**2 * sums.variance) * fading * block_s / times
+    by_time = (fading_slope - 2 * fading * levels**2 * variance) * fading * block_s / times
     pushed = _pushed(noise, block_s)
-    by_level[:FORCES] += 2 * (sums.way * pushed.way + sums.both * pushed.both)
-    by_time[:FORCES] += sums.way * pushed.way_slope + sums.both * pushed.both_slope + sums.gain * pushed.gain_slope
-    by_white = 2 * noise.white**2 * sums.white
+    by_level[:FORCES] += 2 * (way * pushed.way + both * pushed.both)
+    by_time[:FORCES] += way * pushed.way_slope + both * pushed.both_slope + gain * pushed.gain_slope
+    by_white = 2 * noise.white**2 * white
     return np.concatenate([by_white, by_level[FORCES:], by_time[FORCES:], by_level[:FORCES], by_time[:FORCES]])
-
-
-class _Sums:
-    """Slopes in what the noise is made of: the variance of each slow process's driving noise and of its beginning, its
-    fading; the variances and the gain of :class:`_Pushed`; the variance of each sensor's white noise."""
-
-    def __init__(self, ny: int):
-        self.variance, self.start, self.fading = (np.zeros(FORCES + ny) for _ in range(3))
-        self.way, self.both, self.gain = (np.zeros(FORCES) for _ in range(3))
-        self.white = np.zeros(ny)
-
-    def take_between(self, r: Array, N: Array, NF: Array, BT: Array, P: Array, smooth: Array) -> None:
-        """Add what a step between two blocks tells; r, N of what follows, P of before."""
-        own = np.arange(6, N.shape[1])
-        self.variance += (N[:, own, own] - (r[:, 6:] ** 2).sum(axis=2)).sum(axis=0)
-        pushing, BN = BT @ r[:, :6], BT @ N[:, :6]
-        self.way += (np.einsum("rjs,rjs->rj", BN[..., :6], BT) - (pushing**2).sum(axis=2)).sum(axis=0)
-        crossed = BN[:, range(FORCES), range(6, 6 + FORCES)] - (pushing * r[:, 6 : 6 + FORCES]).sum(axis=2)
-        self.both += 2 * crossed.sum(axis=0)
-        mixed = np.einsum("rij,rji->ri", NF[:, 6:], P)
-        self.fading += -2 * ((r[:, 6:] * smooth).sum(axis=2) - mixed).sum(axis=0)
-        mixed = np.einsum("rij,rji->ri", BT @ NF[:, :6], P[..., :FORCES])
-        self.gain += -2 * ((pushing * smooth[:, :FORCES]).sum(axis=2) - mixed).sum(axis=0)
-
-
-def _backward(seen: Observer, after: Array, whitened: Array) -> _Sums:
-    """The backward recursion of r and N, and the sums over all blocks."""
-    what = seen.what
-    runs, blocks, ny, nz = seen.H.shape
-    sums = _Sums(ny)
-    r = np.zeros((runs, nz, whitened.shape[-1]))
-    N = np.zeros((runs, nz, nz))
-    diagonal, own = np.arange(ny), np.arange(6, nz)
-    for k in range(blocks - 1, -1, -1):
-        W, K, H = seen.white[:, k], seen.gain[:, k], seen.H[:, k]
-        later = r
-        if k + 1 < blocks:
-            F, filtered = seen.F[:, k], seen.filtered[:, k]
-            FT = F.swapaxes(-1, -2)
-            NF, later = N @ F, FT @ r
-            smooth = after[:, k, 6:] + (filtered @ later)[:, 6:]
-            BT = what.spreading[:, k, :, :FORCES].swapaxes(-1, -2)
-            sums.take_between(r, N, NF, BT, filtered[:, :, 6:], smooth)
-            N = FT @ NF
-        KT, WT = K.swapaxes(-1, -2), W.swapaxes(-1, -2)
-        u = WT @ whitened[:, k] - KT @ later
-        D = WT @ W + KT @ N @ K
-        sums.white += np.where(what.known[:, k], D[:, diagonal, diagonal] - (u**2).sum(axis=2), 0.0).sum(axis=0)
-        left = np.eye(nz) - K @ H
-        r = later + H.swapaxes(-1, -2) @ u
-        N = left.swapaxes(-1, -2) @ N @ left + H.swapaxes(-1, -2) @ (WT @ W) @ H
-    sums.start += (N[:, own, own] - (r[:, 6:] ** 2).sum(axis=2)).sum(axis=0)
-    return sums

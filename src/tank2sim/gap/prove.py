@@ -13,7 +13,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics.model import Vector
 from tank2sim.gap.replayer import Record, Replayer, difference_slopes, downhill, record_of
-from tank2sim.gap.result import Passed
+from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap, Passed
 from tank2sim.identification.trials.measured import Measured
 from tank2sim.identification.trials.runs import SEEN
 
@@ -164,6 +164,57 @@ def worse(passed: Sequence[Passed], tolerance: float = 0.05) -> tuple[str, ...]:
     """
     pairs = [(one.name, one.misfit("before"), one.misfit("after")) for one in passed]
     return tuple(name for name, before, after in pairs if after > before + tolerance * max(before, 1.0))
+
+
+REMAINS = 1.5
+"""Misfit in noise units from which a part of the gap is said to remain (ours): what is left beyond the noise is then as
+large as the noise, sqrt(1.5^2 - 1) = 1.1."""
+
+EVEN = 0.5
+"""A probability below which the opposite is likelier."""
+
+BETTER = 0.05
+"""A black box follows better if its misfit is smaller by this share (ours), as in :func:`worse`."""
+
+
+def cautions(gap: Gap) -> tuple[str, ...]:
+    """What is to be said against a name: how much of the gap remains, and whether a mere refit does better.
+
+    Both are asked of the held-out trials, or of the fitting ones where none was held out. The share that remains is the
+    root of the mean square beyond the noise after, over that before.
+    """
+    held = any(one.held_out for one in gap.passed)
+    before, after, box = (gap.misfit(which, held_out=held) for which in ("before", "after", "black_box"))
+    if gap.verdict not in (MISSING, AMBIGUOUS) or not gap.effects or before is None or after is None:
+        return ()
+    of, told = f"the {'held-out' if held else 'fitting'} trials", []
+    least = min(gap.effects, key=lambda one: one.confidence)
+    if gap.verdict == MISSING and least.confidence < EVEN:
+        told.append(
+            f"{least.name} is named as the simplest explanation, but those without it are likelier together: its "
+            f"probability is {least.confidence:.2g}"
+        )
+    if round(after, 6) > REMAINS:
+        told.append(
+            _what_remains(before, after, of, "named, but" if gap.verdict == MISSING else "with the best of them")
+        )
+    if box is not None and box < (1 - BETTER) * after:
+        told.append(
+            f"a linear black box with as many coefficients follows {of} better (misfit {box:.3g} against {after:.3g}): "
+            "the name explains less than a mere refit does"
+        )
+    return tuple(told)
+
+
+def _what_remains(before: float, after: float, of: str, begin: str) -> str:
+    if not np.isfinite(after):
+        return f"{begin} the simulation of one of {of} runs away: something more is missing, or the form differs"
+    share = np.sqrt((after**2 - 1) / (before**2 - 1)) if before > 1 else np.inf
+    much = f"{100 * share:.0f} % of the gap of {of} remains" if share < 1 else f"the gap of {of} is no smaller"
+    return (
+        f"{begin} {much} (misfit {after:.3g} in noise units, before {before:.3g}): something more is missing, or its "
+        "form differs"
+    )
 
 
 OUTLYING = 3.0

@@ -1,4 +1,4 @@
-"""What a fitted explanation leaves and tells: the missing force, what each trial says, and what could hide."""
+"""What a fitted explanation leaves and tells: the missing force, and what each trial says."""
 
 from __future__ import annotations
 
@@ -13,17 +13,12 @@ from tank2sim.dynamics.model import Parameter
 from tank2sim.gap.add import Found
 from tank2sim.gap.explained import Explained
 from tank2sim.gap.fit import Fit
-from tank2sim.gap.likelihood import COUNTED, Likelihood
+from tank2sim.gap.likelihood import Likelihood
 from tank2sim.gap.observer import FORCES
 from tank2sim.gap.result import MissingForce
-from tank2sim.gap.screen import Screen, Variant, variants_at
-from tank2sim.gap.search import Search
 from tank2sim.gap.where import missing_force
 
 Array = NDArray[np.float64]
-
-SIZES = (1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0)
-"""Shares of its typical value at which an effect without amplitude is asked whether it would show."""
 
 
 def force_lacking(likelihood: Likelihood, fit: Fit) -> MissingForce | None:
@@ -95,43 +90,6 @@ def each_trial(likelihood: Likelihood, fit: Fit) -> dict[str, dict[str, tuple[fl
                 value = float(fit.theta[place] + pull / information)
                 told[one.variable][name] = value, float(1 / np.sqrt(information))
     return told
-
-
-def could_hide(search: Search, best: Fit, enough: float) -> dict[str, dict[str, float]]:
-    """Effect to {parameter: size} below which the trials could not show it, beside what is explained already.
-
-    By the linear screen at the noise of the best explanation; of several shapes the one that hides best. For an effect
-    without amplitude, the value furthest from being visible at which it still is not.
-    """
-    screen = Screen(search.likelihood, best, search.variants)
-    sizes: dict[str, dict[str, float]] = {}
-    for one, places in zip(screen.every, screen.places, strict=True):
-        priced = int(np.count_nonzero(one.explained.prior[1] == 0))
-        least = enough + priced * np.log(search.likelihood.count / COUNTED)
-        for column, amplitude in zip(places, one.amplitudes, strict=False):
-            share = np.sqrt(least / max(screen.gram[column, column], 1e-12))
-            asked = one.explained.asked[amplitude].parameter
-            size = float(abs(one.theta[amplitude]) * share)
-            size = min(size, max(abs(asked.minimum), abs(asked.maximum)))
-            known = sizes.setdefault(one.effect, {})
-            known[asked.name] = max(size, known.get(asked.name, 0.0))
-    for one in {v.effect: v for v in screen.every if not v.amplitudes}.values():
-        value = _hidden_value(search.likelihood, best, one, enough)
-        if value is not None:
-            sizes[one.effect] = {one.explained.asked[0].parameter.name: value}
-    return sizes
-
-
-def _hidden_value(likelihood: Likelihood, best: Fit, one: Variant, enough: float) -> float | None:
-    """For an effect without amplitude: the tried value that comes nearest to being visible and is not."""
-    tried = variants_at(likelihood, one, SIZES)
-    if not tried:
-        return None
-    screen = Screen(likelihood, best, tried)
-    least = enough + len(one.theta) * np.log(likelihood.count / COUNTED)
-    seen = [screen.gram[places[0], places[0]] for places in screen.places]
-    hidden = [(size, float(v.theta[0])) for size, v in zip(seen, screen.every, strict=True) if size < least]
-    return max(hidden)[1] if hidden else None
 
 
 def estimates(fit: Fit) -> list[Found]:

@@ -72,7 +72,8 @@ class Place:
     t_start_s, t_end_s : float
         When, in the trial's own time, s.
     share : float
-        Of the whole misfit (sum of squares of simulated less measured, in noise units, beyond the noise).
+        Of the whole misfit (sum of squares of simulated less measured, in noise units, beyond the noise; of positions
+        and headings that of its growth).
     """
 
     trial: str
@@ -80,6 +81,29 @@ class Place:
     t_start_s: float
     t_end_s: float
     share: float
+
+
+@dataclass(frozen=True)
+class Acting:
+    """When the model itself is wrong, and not only what sums up of it.
+
+    Parameters
+    ----------
+    trial : str
+    equation : str
+        ``surge``, ``sway``, ``yaw`` (a force is missing), ``track`` (positions do not follow from the velocities) or
+        ``heading`` (it does not follow from the yaw rate).
+    t_start_s, t_end_s : float
+        In the trial's own time, s.
+    size : float
+        Root mean square of what is missing, in its own standard errors.
+    """
+
+    trial: str
+    equation: str
+    t_start_s: float
+    t_end_s: float
+    size: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,12 +170,42 @@ class MissingForce:
         The one of `states` that explains most of the force.
     explained : mapping
         Each of `states` to the share of the force's variance that its bins explain.
+    passages : tuple of Acting
+        When the forces of all three equations are at work, the most telling first.
     """
 
     equation: str
     trials: tuple[str, ...]
     time_s: Array
     force: Array
+    states: Mapping[str, Array]
+    explaining: str
+    explained: Mapping[str, float]
+    passages: tuple[Acting, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class MissingSignal:
+    """By how much records contradict each other, whatever the hull does: what a sensor or the water adds.
+
+    Parameters
+    ----------
+    quantity : str
+        ``north``, ``east``, ``ahead``, ``starboard`` (velocity over the ground less that of the log, m/s) or
+        ``turning`` (rate of the heading less the yaw rate, rad/s).
+    trials : tuple of str
+        Name of the trial of each row.
+    time_s, values, errors : array (n,)
+        Rows of all trials together: s, and what is missing with its standard error.
+    states, explaining, explained
+        As of :class:`MissingForce`; shares are of the mean square.
+    """
+
+    quantity: str
+    trials: tuple[str, ...]
+    time_s: Array
+    values: Array
+    errors: Array
     states: Mapping[str, Array]
     explaining: str
     explained: Mapping[str, float]
@@ -171,12 +225,16 @@ class NextTest:
         A sentence: what it would tell apart, and how clearly (expected gain of the score).
     expected : mapping
         Each manoeuvre that was considered to the score by which it would tell the explanations apart.
+    sizes : mapping
+        Each effect of the explanations that are to be told apart to (parameters, standard errors), SI, as the first
+        explanation that has it estimates it.
     """
 
     manoeuvre: str
     orders: str
     why: str
     expected: Mapping[str, float]
+    sizes: Mapping[str, tuple[Mapping[str, float], Mapping[str, float]]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

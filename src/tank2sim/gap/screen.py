@@ -101,6 +101,11 @@ def variants_at(likelihood: Likelihood, one: Variant, shares: Sequence[float]) -
     return tuple(_variant(likelihood, one.explained, theta, one.amplitudes) for theta in inside)
 
 
+def resized(likelihood: Likelihood, one: Variant, shares: Array) -> Variant:
+    """A variant with its amplitudes in shares of what they were (a,), as far as the effect's bounds allow."""
+    return _variant(likelihood, one.explained, one.start(shares), one.amplitudes)
+
+
 def _variant(likelihood: Likelihood, explained: Explained, theta: Array, amplitudes: tuple[int, ...]) -> Variant:
     absent = np.array([one.parameter.absent if one.parameter.absent is not None else np.nan for one in explained.asked])
     columns = []
@@ -137,6 +142,11 @@ class Screened:
 class Screen:
     """What each set of variants would explain, at one noise.
 
+    Attributes
+    ----------
+    cost : float
+        Score of `base` at this noise, but for a constant.
+
     Parameters
     ----------
     likelihood : Likelihood
@@ -165,6 +175,8 @@ class Screen:
         mixed = gram[np.ix_(held, kept)]
         mixed[: own.asked, 0] += there.prior[1] * (base.theta - there.prior[0])
         self.gram = gram[np.ix_(kept, kept)] - mixed.T @ cho_solve(inner, mixed)
+        believed = likelihood.belief.cost(base.logs)[0]
+        self.cost = float(seen.log_det + self.gram[0, 0] + 2 * np.sum(np.log(np.diag(inner[0]))) + believed)
         widths = [one.driving.shape[-1] for one in self.every]
         ends = 1 + np.cumsum(widths)
         self.places = [np.arange(end - width, end) for end, width in zip(ends, widths, strict=True)]

@@ -32,10 +32,15 @@ HOPELESS = 100.0
 """Nor those whose gain, or whose score when fitted roughly, is so far behind the best of their kind (ours)."""
 
 FAR = 300.0
-"""An explanation so far behind the best at the noise of the best has its own noise not sought (ours)."""
+"""An explanation so far behind the best at the noise of the best has its own noise not sought, nor is it tried again
+(ours)."""
 
-ROUNDS_OF_NONE, ROUNDS, LAST_ROUNDS = (15,), (0, 6), (10,)
-"""Iterations on the noise after each solution for the parameters, see :meth:`.likelihood.Likelihood.at_best`."""
+ROUNDS_OF_NONE, ROUNDS, LAST_ROUNDS = (15,), (0, 10), (20,)
+"""Iterations on the noise after each solution for the parameters, see :meth:`.likelihood.Likelihood.at_best`. A score
+is known to some 100 after 6, to 20 after 15, to a few after 25."""
+
+SAME_NOISE = (0,)
+"""Rounds that only ask for the parameters, at the nearest of the noises given."""
 
 CLOSE = 30.0
 """Explanations within this of the best are fitted once more at the end (ours)."""
@@ -63,10 +68,6 @@ class Search:
     def none(self) -> Fit:
         """The card as it is."""
         return next(one for one in self.fits if not one.explained.effects)
-
-    def best_of(self, count: int) -> Fit | None:
-        """The best explanation with so many effects."""
-        return next((one for one in self.fits if len(one.explained.effects) == count), None)
 
 
 def search(
@@ -109,13 +110,7 @@ def search(
         + [Proposal(thetas_of(one), [best.logs, one.logs], ROUNDS) for one in again]
     )
     _explore(fitting, every, believed, most)
-    best = fitting.best()
-    close = [
-        fit
-        for effects, fit in fitting.found.items()
-        if fit.score < best.score + CLOSE or fit is fitting.best(len(effects))
-    ]
-    fitting.fit([Proposal(thetas_of(one), [one.logs, best.logs], LAST_ROUNDS) for one in close])
+    _polish(fitting)
     fits = sorted(fitting.found.values(), key=lambda one: one.score)
     return Search(fitting.likelihood, tuple(fits), every)
 
@@ -148,6 +143,30 @@ def _explore(fitting: Fitting, every: Sequence[Variant], believed: np.ndarray, m
         base = Fit(alone, theta, np.zeros((len(theta), len(theta))), pair.logs, np.inf, pair.change)
         swapped += [Screened({name: theta}, 0.0), *_on_top_of(fitting, base, every)[:SWAPS]]
     fitting.fit(_proposals(fitting, swapped, [pair.logs], limit=pair.score + FAR))
+
+
+def _polish(fitting: Fitting) -> None:
+    """The best with its noise well settled; the others at this noise as well; those that are then close once more.
+
+    Scores at noises that are not settled differ by more than explanations do. What shares an effect with the best is
+    tried from the best's parameters too: a search downhill may have stopped elsewhere.
+    """
+    fitting.fit([Proposal(thetas_of(fitting.best()), [fitting.best().logs], LAST_ROUNDS)])
+    best = fitting.best()
+    own = thetas_of(best)
+    begins = [{name: own[name]} for name in own if len(own) > 1]
+    for one in (one for one in fitting.found.values() if one.score < best.score + FAR or not one.explained.effects):
+        theirs = thetas_of(one)
+        begins += [theirs] if one is not best else []
+        begins += [theirs | {name: own[name] for name in own if name in theirs}] if len(theirs) > 1 else []
+    fitting.fit([Proposal(thetas, [best.logs], SAME_NOISE) for thetas in begins])
+    best = fitting.best()
+    close = [
+        fit
+        for effects, fit in fitting.found.items()
+        if fit is not best and (fit.score < best.score + CLOSE or fit is fitting.best(len(effects)))
+    ]
+    fitting.fit([Proposal(thetas_of(one), [one.logs, best.logs], LAST_ROUNDS) for one in close])
 
 
 def _on_top_of(fitting: Fitting, base: Fit, every: Sequence[Variant]) -> list[Screened]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -16,21 +16,30 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model, Vector
-from tank2sim.gap.result import MissingForce, Passed, Place
+from tank2sim.gap.kinematics import CONTRADICTED, ENDS, earth_velocity, filled, kinematics
+from tank2sim.gap.result import Acting, MissingForce, Passed, Place
+from tank2sim.gap.stretches import WINDOW, stretches
 from tank2sim.identification.trials.evaluation import Figure, predicted_figures
 from tank2sim.records.trials import Trial
 
 Array = NDArray[np.float64]
 
-WINDOW = 21
-"""Instants over which the square of a residual is averaged to tell a stretch of misfit from noise: half of L/u0."""
-
-BEYOND = 4.0
-"""A mean square belongs to a stretch if it exceeds that of noise by this many of its own standard deviations (ours)."""
-
 NOISE_SURE = 1.1
 """A signal of a trial whose misfit is below this has no stretches: its noise is not known better (ours), and slow noise
 has stretches of its own."""
+
+GROWING = 8.0
+"""A difference grows if the mean square of its growth is this much beyond that of white noise: three standard errors
+(ours). Neighbouring values of a growth share their readings, and the noise of positions is slow besides."""
+
+USUAL = 0.5
+"""A force is at work where its square is above this share of its mean square over all trials (ours)."""
+
+CLEAR = 8.0
+"""And where the mean square of the ratio to its standard error is this much above 1: three standard errors (ours)."""
+
+SHORT = 4
+"""Blocks of the smoother over which that mean is taken: half of L/u0."""
 
 BINS = 12
 """Bins of equal count, by which a state explains a force (ours: enough for any of the library's shapes)."""
@@ -40,26 +49,72 @@ EQUATIONS = {"X": "surge", "Y": "sway", "N": "yaw"}
 TURNED = math.pi
 """A trial whose heading changes by more than this is a turn, of which the speed loss is a figure."""
 
-ENDS = 20
-"""The motion at an end of a trial is read off a straight line through this many instants (half of L/u0)."""
+INTEGRATED = ("motion.x", "motion.y", "motion.psi")
+"""Signals that sum up what was wrong before: what counts is when the difference grows, not that it is there."""
 
 
 def places(passed: Sequence[Passed], limit: int = 12) -> tuple[Place, ...]:
-    """The stretches in which the given card's misfit exceeds noise, largest share of the whole excess first.
+    """The stretches in which the given card's misfit arises, largest share of the whole excess first.
 
-    The excess of a stretch is the sum of ((simulated - measured)/noise)^2 - 1; the whole is that of all stretches of
-    all trials. Where the motion had left all bounds the residual counts as the largest before it.
+    The excess of a stretch is the sum of z^2 - 1. Velocities and rates have z = (simulated - measured)/noise; positions
+    and headings the growth of the difference over :data:`WINDOW` instants beyond what wrong velocities make of it,
+    where these are measured too, in its own noise: a track that was left once stays left, and only what leaves it is a
+    place. The whole is that of all stretches of all trials. Where the motion had left all bounds the residual counts
+    as the largest before it.
     """
     found = [
         (excess, Place(one.name, signal, float(one.time_s[begin]), float(one.time_s[end - 1]), 0.0))
         for one in passed
         for signal in one.noise
         if one.misfit("before", signal) > NOISE_SURE
-        for begin, end, excess in _stretches(_in_noise(one, signal))
+        for begin, end, excess in _where_it_arises(one, signal)
     ]
     whole = sum(excess for excess, _ in found)
     found.sort(key=lambda pair: -pair[0])
     return tuple(replace(place, share=excess / whole) for excess, place in found[:limit])
+
+
+def _where_it_arises(one: Passed, signal: str) -> list[tuple[int, int, float]]:
+    z = _in_noise(one, signal)
+    if signal not in INTEGRATED:
+        return stretches(z)
+    known, half = np.isfinite(one.measured[signal]), WINDOW // 2
+    lost = known & np.isnan(one.before[signal])
+    left = np.where(known & ~lost, one.before[signal] - one.measured[signal], np.nan)
+    if np.count_nonzero(np.isfinite(left)) <= WINDOW:
+        return stretches(np.where(lost, z, 0.0))
+    own = filled(left)
+    simulated, measured = _rates(one, one.before), _rates(one, one.measured)
+    rate_noise = 0.0
+    if signal in simulated and signal in measured:
+        wrong = filled(simulated[signal] - measured[signal])
+        own = own - cumulative_trapezoid(wrong, one.time_s, initial=0)
+        rate_noise = _rate_noise(one, signal) * float(np.median(np.diff(one.time_s)))
+    # Means over half a window on both sides: their difference is as good as white over a window.
+    sums = np.concatenate([[0.0], np.cumsum(own)])
+    means = (sums[half:] - sums[:-half]) / half
+    error = math.sqrt(2 / half * one.noise[signal] ** 2 + half * rate_noise**2)
+    growth = np.full(len(z), np.nan)
+    growth[half : len(means)] = (means[half:] - means[:-half]) / error
+    return stretches(np.where(lost, z, growth), limit=GROWING)
+
+
+def _rates(one: Passed, columns: Mapping[str, Vector]) -> dict[str, Vector]:
+    """The rates of positions and heading (n,) that follow from velocities and yaw rate, where all of them are there."""
+    there = {name for name in one.noise if np.isfinite(one.measured[name]).any()}
+    told = {"motion.psi": columns["motion.r"]} if "motion.r" in there else {}
+    if {"motion.u", "motion.v", "motion.psi"} <= there:
+        velocity = earth_velocity(columns["motion.u"], columns["motion.v"], columns["motion.psi"])
+        told |= dict(zip(("motion.x", "motion.y"), velocity, strict=True))
+    return told
+
+
+def _rate_noise(one: Passed, signal: str) -> float:
+    """Standard deviation of a measured rate of :func:`_rates`."""
+    if signal == "motion.psi":
+        return one.noise["motion.r"]
+    speed = float(np.nanmax(np.hypot(one.measured["motion.u"], one.measured["motion.v"])))
+    return math.hypot(one.noise["motion.u"], one.noise["motion.v"], speed * one.noise["motion.psi"])
 
 
 def _in_noise(one: Passed, signal: str) -> Vector:
@@ -67,24 +122,6 @@ def _in_noise(one: Passed, signal: str) -> Vector:
     z: Vector = (one.before[signal] - one.measured[signal]) / one.noise[signal]
     lost = np.isnan(one.before[signal]) & np.isfinite(one.measured[signal])
     return np.where(lost, max(np.nanmax(np.abs(z), initial=0.0), 1e3), z)
-
-
-def _stretches(z: Vector) -> list[tuple[int, int, float]]:
-    """Begin, end and excess of each stretch in which the mean square of z is beyond that of noise."""
-    known = np.isfinite(z)
-    excess = np.where(known, np.nan_to_num(z) ** 2 - 1, 0.0)
-    width = min(WINDOW, len(z))
-    high = uniform_filter1d(excess, width) > BEYOND * math.sqrt(2 / width)  # a squared normal has variance 2
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], high.astype(int), [0]])))
-    pairs = [[int(begin), int(end)] for begin, end in zip(edges[::2], edges[1::2], strict=True)]
-    joined: list[list[int]] = []
-    for pair in pairs:
-        if joined and pair[0] - joined[-1][1] < width:
-            joined[-1][1] = pair[1]
-        else:
-            joined.append(pair)
-    sums = [(begin, end, float(excess[begin:end].sum())) for begin, end in joined]
-    return [one for one in sums if one[2] > 0]
 
 
 def figures(card: ManoeuvringCard, trials: Sequence[Trial], passed: Sequence[Passed], which: str) -> tuple[Figure, ...]:
@@ -177,7 +214,30 @@ def missing_force(
         states=kept,
         explaining=max(explained, key=lambda name: explained[name]),
         explained=explained,
+        passages=_at_work(np.asarray(trials, dtype=object), time_s, force, errors),
     )
+
+
+def _at_work(trials: NDArray[np.object_], time_s: Vector, force: Array, errors: Array) -> tuple[Acting, ...]:
+    """When each of the three forces (n, 3) is at work, the most telling first."""
+    found = []
+    z = np.divide(force, errors, out=np.full(force.shape, np.nan), where=errors > 0)
+    usual = np.nanmean(force**2, axis=0)
+    for trial in dict.fromkeys(trials):
+        rows = np.flatnonzero(trials == trial)
+        for axis, equation in enumerate(EQUATIONS.values()):
+            mean = uniform_filter1d(np.nan_to_num(force[rows, axis]) ** 2, min(SHORT, len(rows)))
+            own = np.where(mean > USUAL * usual[axis], z[rows, axis], 0.0)
+            for begin, end, excess in stretches(own, limit=CLEAR, width=SHORT):
+                size = math.sqrt(1 + excess / (end - begin))
+                times = time_s[rows[[begin, end - 1]]]
+                found.append(Acting(str(trial), equation, float(times[0]), float(times[1]), size))
+    return most_telling(found)
+
+
+def most_telling(found: Sequence[Acting]) -> tuple[Acting, ...]:
+    """Sorted by the sum of squares, the largest first."""
+    return tuple(sorted(found, key=lambda one: -(one.size**2) * (one.t_end_s - one.t_start_s)))
 
 
 def explained_share(state: Vector, force: Vector, weights: Vector) -> float:
@@ -223,67 +283,6 @@ def parity(state: Vector, force: Vector) -> float:
         odd, even = odd + share * (plus - minus) ** 2, even + share * (plus + minus) ** 2
     return (odd - even) / (odd + even) if odd + even > 0 else 0.0
 
-
-@dataclass(frozen=True)
-class Kinematics:
-    """How far records contradict themselves, in standard errors: root mean square over trials, about 1 is none.
-
-    Parameters
-    ----------
-    turning : float
-        Integrated yaw rate against the change of heading.
-    track : float
-        Integrated velocities through the water against the change of position.
-    """
-
-    turning: float
-    track: float
-
-
-def kinematics(passed: Sequence[Passed]) -> Kinematics:
-    """Whether dpsi/dt is r, and whether positions follow from u, v and psi: nothing of the hull is asked.
-
-    Both sides are compared over the whole of each trial; the standard error is that of white noise of the sensors,
-    integrated.
-    """
-    turning, track = [], []
-    for one in passed:
-        seen = {name: _filled(values) for name, values in one.measured.items()}
-        noise = {name.removeprefix("motion."): error for name, error in one.noise.items()}
-        if {"motion.psi", "motion.r"} <= seen.keys():
-            turning.append(_contradiction(one.time_s, seen["motion.psi"], noise["psi"], seen["motion.r"], noise["r"]))
-        if {f"motion.{name}" for name in ("psi", "u", "v", "x", "y")} <= seen.keys():
-            u, v, psi = (seen[f"motion.{name}"] for name in ("u", "v", "psi"))
-            over = math.hypot(noise["u"], noise["v"], float(np.max(np.hypot(u, v))) * noise["psi"])
-            for axis, rate in zip("xy", earth_velocity(u, v, psi), strict=True):
-                track.append(_contradiction(one.time_s, seen[f"motion.{axis}"], noise[axis], rate, over))
-    return Kinematics(*(float(np.sqrt(np.mean(np.square(z)))) if z else 0.0 for z in (turning, track)))
-
-
-def earth_velocity(u: Vector, v: Vector, psi: Vector) -> tuple[Vector, Vector]:
-    """Velocity to north and east (n,) each, m/s."""
-    cos, sin = np.cos(psi), np.sin(psi)
-    return u * cos - v * sin, u * sin + v * cos
-
-
-def _contradiction(time: Vector, signal: Vector, noise: float, rate: Vector, rate_noise: float) -> float:
-    """Change of a signal over a trial less the integral of its measured rate, in standard errors."""
-    ends = min(ENDS, len(time) // 2)
-    left = signal - np.concatenate([[0.0], cumulative_trapezoid(rate, time)])
-    change = float(left[-ends:].mean()) - float(left[:ends].mean())
-    step = float(np.median(np.diff(time)))
-    return change / math.hypot(noise * math.sqrt(2 / ends), rate_noise * step * math.sqrt(len(time)))
-
-
-def _filled(values: Vector) -> Vector:
-    known = np.isfinite(values)
-    places = np.arange(len(values), dtype=float)
-    filled: Vector = np.interp(places, places[known], values[known])
-    return filled
-
-
-CONTRADICTED = 4.0
-"""Records that contradict themselves by more standard errors than this are at fault, not the hull (ours)."""
 
 OF_ACTION = {"kinematics": "kinematics", "sensor": "sensor", "actuator": "actuator", "propulsion": "surge"}
 

@@ -10,9 +10,10 @@ import numpy as np
 
 from tank2sim.dynamics.model import Vector
 from tank2sim.gap.as_json import estimate_in_file, in_file, joined, meant
-from tank2sim.gap.result import Gap, MissingForce, NextTest
+from tank2sim.gap.result import Gap, MissingForce, MissingSignal, NextTest
 from tank2sim.report.chart_parts import NUMBER, Record, data, extent, plain, series_look, shown_unit, with_unit
 from tank2sim.report.gap_charts import SETS, small
+from tank2sim.report.gap_words import as_percent
 from tank2sim.report.numbers import format_number
 from tank2sim.report.thinning import thin_points
 from tank2sim.units import in_words
@@ -35,30 +36,55 @@ TELLS_LITTLE = 10.0
 STATE_UNITS = {"rudder": "rad", "drift": "rad", "yaw rate": "rad/s", "speed": "m/s", "heading": "rad"}
 _STATE_WORDS = {"rudder": "rudder angle", "drift": "drift angle"}
 _FORCES = {"X": ("surge force", "N"), "Y": ("sway force", "N"), "N": ("yaw moment", "N m")}
+_SIGNALS = {
+    "north": ("velocity to north", "m/s"),
+    "east": ("velocity to east", "m/s"),
+    "ahead": ("velocity ahead", "m/s"),
+    "starboard": ("velocity to starboard", "m/s"),
+    "turning": ("turning (rate of heading less yaw rate)", "rad/s"),
+}
+
+Lacking = MissingForce | MissingSignal
+"""What the model lacks, instant by instant."""
+
+STRIPS = 90
+"""Instants of a trial that are drawn beside each other, each the mean of what it covers."""
 _TURN = 2 * math.pi
 
 
-def force_chart(force: MissingForce, *, title: str = "") -> alt.HConcatChart:
-    """The missing force over the state that explains most of it, and how much of it each state explains.
+def _values(lacking: Lacking) -> tuple[Vector, str, str]:
+    """What is missing in a reader's unit (n,), its words, and the unit."""
+    if isinstance(lacking, MissingForce):
+        what, unit = _FORCES[lacking.equation]
+        prefix, scale = _prefix(lacking.force)
+        return lacking.force / scale, what, prefix + unit
+    what, own = _SIGNALS[lacking.quantity]
+    if own != "rad/s":
+        return lacking.values, what, own
+    unit, factor = shown_unit(own)
+    return factor * lacking.values, what, unit
+
+
+def lacking_chart(lacking: Lacking, *, title: str = "") -> alt.HConcatChart:
+    """The missing force or signal over the state that explains most of it, and how much of it each state explains.
 
     Points are single instants of all trials, thinned. Squares are means of bins; their bars are 95 % by the spread
     between the trials in the bin, for instants of one trial do not err independently.
     """
-    unit, factor = shown_unit(STATE_UNITS.get(force.explaining, "1"))
-    words = _STATE_WORDS.get(force.explaining, force.explaining)
-    values = force.states[force.explaining]
-    state = factor * (np.mod(values, _TURN) if force.explaining == "heading" else values)
-    what, force_unit = _FORCES[force.equation]
-    prefix, scale = _prefix(force.force)
-    finite = np.flatnonzero(np.isfinite(state) & np.isfinite(force.force))
-    trials = np.array(force.trials)[finite]
-    state, needed = state[finite], force.force[finite] / scale
+    unit, factor = shown_unit(STATE_UNITS.get(lacking.explaining, "1"))
+    words = _STATE_WORDS.get(lacking.explaining, lacking.explaining)
+    values = lacking.states[lacking.explaining]
+    state = factor * (np.mod(values, _TURN) if lacking.explaining == "heading" else values)
+    every, what, own_unit = _values(lacking)
+    finite = np.flatnonzero(np.isfinite(state) & np.isfinite(every))
+    trials = np.array(lacking.trials)[finite]
+    state, needed = state[finite], every[finite]
     kept = thin_points([state, needed], FORCE_POINTS)
     points = [
         {"s": plain(float(state[row])), "f": plain(float(needed[row])), "trial": str(trials[row])}
         for row in kept.tolist()
     ]
-    across, up = with_unit(words, unit), with_unit(f"missing {what}", prefix + force_unit)
+    across, up = with_unit(words, unit), with_unit(f"missing {what}", own_unit)
     x = alt.X("s:Q", title=across, scale=alt.Scale(zero=False, nice=False, padding=8), axis=alt.Axis(tickCount=6))
     y = alt.Y("f:Q", title=up, axis=alt.Axis(tickCount=6))
     tooltip = [
@@ -70,8 +96,43 @@ def force_chart(force: MissingForce, *, title: str = "") -> alt.HConcatChart:
     zero = alt.Chart(data([{"f": 0.0}])).mark_rule(style="reference", strokeDash=[4, 3]).encode(y="f:Q")
     layers = [zero, cloud.encode(x=x, y=y, tooltip=tooltip), *_means(binned(state, needed, trials), across, up)]
     main = alt.layer(*layers).properties(width=400, height=280)
-    shares = alt.hconcat(main, _explained(force), spacing=24)
+    shares = alt.hconcat(main, _explained(lacking), spacing=24)
     return shares.properties(title=title, description=f"Missing {what} over {words}, and what each state explains.")
+
+
+def when_chart(lacking: Lacking, *, title: str = "") -> alt.LayerChart:
+    """What is missing over time, a strip a trial: the colour is its size to either side."""
+    values, what, unit = _values(lacking)
+    trials = np.array(lacking.trials)
+    rows: list[Record] = []
+    for trial in dict.fromkeys(lacking.trials):
+        there = np.flatnonzero((trials == trial) & np.isfinite(values))
+        for part in np.array_split(there, min(STRIPS, len(there))):
+            begin, end = lacking.time_s[part[0]], lacking.time_s[min(part[-1] + 1, there[-1])]
+            rows.append(
+                {"trial": trial, "f": plain(float(values[part].mean()))} | {"t": plain(begin), "to": plain(end)}
+            )
+    largest = float(np.quantile(np.abs([row["f"] or 0.0 for row in rows]), 0.98)) or 1.0 if rows else 1.0
+    up = with_unit(f"missing {what}", unit)
+    scale = alt.Scale(domain=[-largest, 0, largest], range=list(DIVERGING), type="linear", clamp=True)
+    base = alt.Chart(data(rows)).encode(
+        x=alt.X("t:Q", title="time (s)", scale=alt.Scale(nice=False)),
+        x2="to:Q",
+        y=alt.Y("trial:N", sort=list(dict.fromkeys(lacking.trials)), axis=alt.Axis(title=None, labelLimit=220)),
+        color=alt.Color("f:Q", scale=scale, legend=alt.Legend(title=up, gradientLength=180, titleLimit=420)),
+        tooltip=[
+            alt.Tooltip("trial:N"),
+            alt.Tooltip("t:Q", title="from (s)", format=NUMBER),
+            alt.Tooltip("to:Q", title="to (s)", format=NUMBER),
+            alt.Tooltip("f:Q", title=up, format=NUMBER),
+        ],
+    )
+    chart = alt.layer(base.mark_rect()).properties(width=520, height=20 * max(1, len(set(lacking.trials))))
+    return chart.properties(title=title, description=f"Missing {what} over time, by trial.")
+
+
+DIVERGING = ("#D55E00", "#f7f7f7", "#0072B2")
+"""Colours of a size to either side: two of the palette that any eye tells apart."""
 
 
 def binned(state: Vector, force: Vector, trials: np.ndarray) -> list[Record]:
@@ -111,12 +172,12 @@ def _means(rows: Sequence[Record], across: str, up: str) -> list[alt.Chart]:
     ]
 
 
-def _explained(force: MissingForce) -> alt.LayerChart:
+def _explained(lacking: Lacking) -> alt.LayerChart:
     rows: list[Record] = [
         {"name": _STATE_WORDS.get(name, name), "v": plain(100 * share), "text": f"{100 * share:.0f} %"}
-        for name, share in sorted(force.explained.items(), key=lambda item: -item[1])
+        for name, share in sorted(lacking.explained.items(), key=lambda item: -item[1])
     ]
-    return _bars(rows, "share of the missing force explained (%)", width=150, domain=[0, 100])
+    return _bars(rows, "share of it that each state explains (%)", width=150, domain=[0, 100])
 
 
 def _bars(
@@ -151,22 +212,29 @@ def rival_chart(gap: Gap, *, title: str = "") -> alt.LayerChart | None:
         }
         for one in (*shown, *none)
     ]
-    across = "loss of score to the best explanation (-2 log likelihood, penalised)"
+    across = "how much worse than the best explanation (-2 log likelihood, penalised)"
     kind = "symlog" if max(row["v"] or 0.0 for row in rows) > 100 else "linear"
     return _bars(rows, across, width=430, kind=kind).properties(
-        title=alt.Title(title, subtitle="A longer bar explains the data less well; in brackets the probability."),
+        title=alt.Title(title, subtitle=_COMPARED),
         description="Explanations by their loss of score.",
     )
 
 
+_COMPARED = (
+    "A longer bar explains the data less well; the best has 0. In brackets: probability that the explanation is right "
+    "as a whole, no more and no less being missing. An effect's own probability is the sum over all that contain it."
+)
+
+
 def expected_chart(test: NextTest, *, title: str = "") -> alt.LayerChart | None:
-    """By what score each manoeuvre that was considered would tell the explanations apart; None without any."""
+    """How far apart the explanations would be in each manoeuvre that was considered; None without any."""
     best = sorted(test.expected.items(), key=lambda item: -item[1])[:MOST_RIVALS]
-    rows: list[Record] = [{"name": name, "v": plain(score), "text": format_number(score, 3)} for name, score in best]
+    sizes = [(name, math.sqrt(max(score, 0.0))) for name, score in best]  # of a score: a difference in noise units
+    rows: list[Record] = [{"name": name, "v": plain(size), "text": format_number(size, 2)} for name, size in sizes]
     if not rows:
         return None
-    chart = _bars(rows, "expected difference of score between the explanations", width=430)
-    return chart.properties(title=title, description="Expected score of each manoeuvre.")
+    chart = _bars(rows, "expected difference between the explanations (noise units, all readings together)", width=430)
+    return chart.properties(title=title, description="Expected difference in each manoeuvre.")
 
 
 def agreement_chart(gap: Gap, *, title: str = "") -> alt.HConcatChart | None:
@@ -233,14 +301,6 @@ def _agreement_panel(
         layers = [shade, one.mark_rule(style="reference").encode(x=alt.X("v:Q", scale=scale)), *layers]
     title = small(f"{effect.replace('_', ' ')}: {words}")
     return alt.layer(*layers).properties(title=title, width=230, height=22 * len(names))
-
-
-def as_percent(probability: float) -> str:
-    """A probability in words of %, never 0 or 100: nothing is that sure."""
-    if not math.isfinite(probability):
-        return "unknown"
-    percent = 100 * probability
-    return "< 1 %" if percent < 1 else "> 99 %" if percent > 99 else f"{percent:.0f} %"
 
 
 def _prefix(values: Vector) -> tuple[str, float]:

@@ -168,7 +168,8 @@ def misfit_chart(gap: Gap, *, title: str = "") -> alt.VConcatChart:
         trials = [one for one in gap.passed if one.held_out == held]
         if trials:
             maps = [
-                _misfit_map(trials, signals, which, f"{which} · {word}", head=not rows) for which in shown_models(gap)
+                _misfit_map(trials, signals, which, f"{word} trials, {which}", head=not rows)
+                for which in shown_models(gap)
             ]
             rows.append(alt.hconcat(*maps, spacing=16))
     subtitle = "Number and colour: root mean square of simulated less measured, in standard deviations of the noise."
@@ -198,7 +199,7 @@ def _misfit_map(
     x = alt.X("signal:N", sort=list(words.values()), scale=alt.Scale(domain=list(words.values())))
     x = x.axis(title="signal", orient="bottom", labelAngle=0)
     colours = alt.Scale(type="log", domain=[1, MISFIT_SHOWN], scheme="blues", clamp=True)
-    legend = alt.Legend(gradientLength=180) if named and head else None
+    legend = alt.Legend(title="misfit (noise units)", gradientLength=180) if named and head else None
     tooltip = [alt.Tooltip("trial:N"), alt.Tooltip("signal:N"), alt.Tooltip("text:N", title="misfit (noise units)")]
     base = alt.Chart(data(rows)).encode(x=x, y=y, tooltip=tooltip)
     cells = base.mark_rect().encode(color=alt.Color("misfit:Q", scale=colours, legend=legend))

@@ -8,9 +8,11 @@ from collections.abc import Mapping, Sequence
 import altair as alt
 
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.as_json import NEXT_TEST_FILE, estimate_in_file, in_file, measured_in, paired_figures, signal_name
-from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, Gap, Named
-from tank2sim.report.gap_cause_charts import agreement_chart, as_percent, expected_chart, force_chart, rival_chart
+from tank2sim.gap.acting import acting, contradiction, earth_bound, missing_force
+from tank2sim.gap.as_json import NEXT_TEST_FILE, hidden, in_file, measured_in, paired_figures, replaces, signal_name
+from tank2sim.gap.prove import cautions
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, Gap
+from tank2sim.report.gap_cause_charts import agreement_chart, expected_chart, lacking_chart, rival_chart, when_chart
 from tank2sim.report.gap_charts import (
     MOST_TRIALS,
     SETS,
@@ -21,13 +23,19 @@ from tank2sim.report.gap_charts import (
     shown_models,
     signal_misfit,
 )
-from tank2sim.report.numbers import format_column, format_number
+from tank2sim.report.gap_words import (
+    GOOD,
+    as_percent,
+    beside_verdict,
+    effect_in_words,
+    meaning,
+    parameter_cells,
+    sizes_of_candidates,
+    verdict_in_words,
+)
+from tank2sim.report.numbers import format_number
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
 from tank2sim.units import in_words
-
-GOOD = 1.5
-"""Misfit in noise units up to which a model is said to follow the measurements (ours): its own error is then about as
-large as the noise, sqrt(1.5^2 - 1) = 1.1."""
 
 SURE = 0.9
 """Confidence from which a name is shown without caution (ours)."""
@@ -35,12 +43,14 @@ SURE = 0.9
 
 def gap_charts(gap: Gap) -> dict[str, alt.TopLevelMixin]:
     """File stem to chart; what a gap has nothing for is left out."""
-    force, test = gap.missing_force, gap.next_test
+    test = gap.next_test
+    lacking = {"signal": contradiction(gap), "force": missing_force(gap)}
     made: dict[str, alt.TopLevelMixin | None] = {
         "rivals": rival_chart(gap, title="Explanations compared"),
         "misfit": misfit_chart(gap, title="Misfit by signal and manoeuvre"),
         "places": place_chart(gap, title="Where the misfit is worst"),
-        "force": force_chart(force, title="The missing force over what explains it") if force else None,
+        **{f"when_{what}": when_chart(one, title=_WHEN[what]) for what, one in lacking.items() if one},
+        **{what: lacking_chart(one, title=_OVER[what]) for what, one in lacking.items() if one},
         **{
             f"tracks_{word.replace(' ', '_')}": gap_tracks(gap, held_out=held, title=f"Tracks, trials {_ON[word]}")
             for word, held in SETS.items()
@@ -60,8 +70,8 @@ def gap_page(gap: Gap, charts: Mapping[str, alt.TopLevelMixin]) -> Page:
     sections = [
         Section(
             heading="Verdict",
-            text="\n\n".join([verdict_in_words(gap), *_beside(gap)]),
-            tables=[*_parameters(gap), *_explanations(gap)],
+            text="\n\n".join([verdict_in_words(gap), *beside_verdict(gap)]),
+            tables=[*_parameters(gap), *_candidates(gap), *_explanations(gap)],
             charts=drawn("rivals"),
         ),
         Section(
@@ -71,7 +81,10 @@ def gap_page(gap: Gap, charts: Mapping[str, alt.TopLevelMixin]) -> Page:
             charts=drawn("misfit"),
         ),
         Section(
-            heading="Where the gap is", text=_place_text(gap), tables=_places(gap), charts=drawn("places", "force")
+            heading="Where the gap is",
+            text="\n\n".join([_place_text(gap), _acting_text(gap)]),
+            tables=[*_places(gap), *_passages(gap)],
+            charts=drawn("when_signal", "signal", "when_force", "force", "places"),
         ),
         Section(heading="Tracks", text=_track_text(gap), charts=drawn("tracks_held_out", "tracks_fitting")),
     ]
@@ -93,70 +106,7 @@ def gap_page(gap: Gap, charts: Mapping[str, alt.TopLevelMixin]) -> Page:
     return Page(title=gap.card.ship.name, subtitle=subtitle, figures=_key_figures(gap), sections=shown)
 
 
-def effect_in_words(name: str) -> str:
-    """Name of an effect for a reader: ``rudder_bias`` is "rudder bias"."""
-    return name.replace("_", " ")
-
-
-def verdict_in_words(gap: Gap) -> str:
-    """What was found, in a sentence or two."""
-    after = gap.misfit("after", held_out=False)
-    follows = "" if after is None else f" follows the fitting trials to {_noises(after)}"
-    if gap.verdict == MISSING and gap.effects:
-        names = " and ".join(_with_values(one) for one in gap.effects)
-        told = " ".join(EFFECTS[one.name].description for one in gap.effects if one.name in EFFECTS)
-        if all(one.name in EFFECTS and EFFECTS[one.name].acts_on == "sensor" for one in gap.effects):
-            return f"A sensor is at fault, not the model: {names}. {told}".strip()
-        return f"The model lacks {'an effect' if len(gap.effects) == 1 else 'effects'}: {names}. {told}".strip()
-    if gap.verdict == AMBIGUOUS:
-        candidates = dict.fromkeys(
-            [*([tuple(one.name for one in gap.effects)] if gap.effects else []), *gap.alternatives]
-        )
-        names = ", or ".join(" with ".join(map(effect_in_words, one)) for one in candidates)
-        return f"Something is missing, but these data cannot tell which of several effects it is: {names}."
-    if gap.verdict == NOTHING:
-        good = after is None or after <= GOOD
-        rest = "" if good else ", which is more than noise, but no effect explains the rest better than none"
-        return f"No missing effect shows in these data{': the card as given' + follows + rest if follows else ''}."
-    return (
-        "Something is missing that no effect of the library explains: what is left has a pattern of its own, "
-        "and no name is given although some effect always fits a little."
-    )
-
-
-def _with_values(one: Named) -> str:
-    values = []
-    for name in one.parameters:
-        words, value, unit, _ = _parameter(one, name)
-        values.append(f"{words} {value}{'' if unit == '-' else f' {unit}'}")
-    return f"{effect_in_words(one.name)} ({', '.join(values)})" if values else effect_in_words(one.name)
-
-
-def _beside(gap: Gap) -> list[str]:
-    """Confidence, rivals and place, a paragraph each."""
-    told = []
-    if gap.effects:
-        sure = "; ".join(f"{effect_in_words(one.name)} {as_percent(one.confidence)}" for one in gap.effects)
-        told.append(f"Probability that the effect is there: {sure}.")
-    if gap.alternatives and gap.verdict != AMBIGUOUS:
-        names = "; ".join(" with ".join(map(effect_in_words, one)) for one in gap.alternatives)
-        told.append(f"What else it could be: {names}. These data cannot tell them apart.")
-    elif gap.effects and gap.verdict == MISSING:
-        told.append("What else it could be: none of the explanations without it comes near.")
-    if gap.verdict != NOTHING and gap.equation:
-        told.append(f"The gap is in {_EQUATIONS.get(gap.equation, gap.equation)}.")
-    return told
-
-
 _ON = {"held out": "held out", "fitting": "used for fitting"}
-_EQUATIONS = {
-    "surge": "surge: the force ahead",
-    "sway": "sway: the force to the side",
-    "yaw": "yaw: the turning moment",
-    "actuator": "the steering gear or the propeller: what the orders become",
-    "kinematics": "the motion over the ground",
-    "sensor": "the measurements",
-}
 _BEFORE_AND_AFTER = (
     "Each trial is simulated freely from its beginning to its end with the recorded inputs alone. Misfit is the root "
     "mean square of simulated less measured, in standard deviations of the measurement noise: 1 is the noise floor, "
@@ -175,38 +125,49 @@ _AGREEMENT = (
     "A true effect has the same size in every trial. Where trials want different sizes, the name is wrong or not all."
 )
 _COULD_HIDE = (
-    "Effects up to this size could be there without showing in these data, each beside what was found; for limits and "
-    "time constants of the gear it is the value furthest from the card's that would not show."
+    "Effects up to this size could be there without showing in these data, each beside what was found. Limits and time "
+    "constants of the gear have no such size, for the ship has them anyway: of them the value furthest from the card's "
+    "is told that would not show in its place."
 )
 _NOISE = (
     "By these standard deviations misfits are counted. Stated: by the files; estimated: from the records themselves."
 )
-_TRACKS = (
-    "Points: measured. Lines: before, by the card as given, and with what was found; one upon the other where nothing "
-    "was added."
+_WHEN = {"signal": "When the records contradict each other", "force": "When a force is missing"}
+_OVER = {"signal": "How the records contradict each other", "force": "The missing force over what explains it"}
+_STRIPS = "Blue and orange: to either side, darker where more is missing; white is nothing."
+_MEANS = "Points: instants of all trials; squares: means of bins, with 95 % bars by the spread between trials."
+_LINES = (
+    "Card before: as given. Card found: with what was found, which is called after elsewhere; one upon the other where "
+    "nothing was added."
 )
+_TRACKS = f"Points: measured. Lines: simulated. {_LINES}"
 _CAPTIONS = {
     "rivals": "",
-    "misfit": "The colour scale ends at 100.",
-    "places": "Points: measured. Shaded red: the time of the misfit.",
-    "force": "The force that the given card needs in addition to follow the measurements. Points: instants of all "
-    "trials; squares: means of bins, with 95 % bars by the spread between trials.",
+    "misfit": "u, v: velocity ahead and to starboard; r: yaw rate; psi: heading; x, y: north and east. The colour "
+    "scale ends at 100.",
+    "places": f"Points: measured. Shaded red: the time in which the misfit arises. {_LINES}",
+    "when_signal": _STRIPS,
+    "when_force": f"{_STRIPS} By the given card.",
+    "signal": f"{_MEANS} What is constant goes with every state.",
+    "force": f"The force that the given card needs in addition to follow the measurements. {_MEANS}",
     "tracks_held_out": _TRACKS,
     "tracks_fitting": _TRACKS,
-    "agreement": "Bars: 95 % intervals. Grey: all fitting trials together. Trials that tell little may leave the "
-    "picture.",
-    "expected": "The larger, the clearer the manoeuvre would decide.",
+    "agreement": "Points: each trial's own estimate; bars: 95 % intervals. Grey: all fitting trials together. Trials "
+    "that tell little may leave the picture.",
+    "expected": "The larger, the clearer the manoeuvre would decide; the difference is beyond what uncertain "
+    "parameters can make up for.",
 }
 
 
 def _key_figures(gap: Gap) -> list[Figure]:
     named = ", ".join(effect_in_words(one.name) for one in gap.effects)
-    caution = Verdict.NONE if gap.verdict in (MISSING, NOTHING) else Verdict.CAUTION
+    caution = Verdict.NONE if gap.verdict in (MISSING, NOTHING) and not cautions(gap) else Verdict.CAUTION
     figures = [Figure(label="Verdict", value=gap.verdict, verdict=caution, note=named)]
     if gap.effects:
         least = min(one.confidence for one in gap.effects)
         unsure = Verdict.CAUTION if not least >= SURE else Verdict.NONE
-        figures.append(Figure(label="Probability of the name", value=as_percent(least), verdict=unsure))
+        note = "alone or with another effect" if len(gap.effects) == 1 else "of the less sure one, in any company"
+        figures.append(Figure(label="Probability that it is there", value=as_percent(least), verdict=unsure, note=note))
     for word, held in SETS.items():
         before, after = (gap.misfit(which, held_out=held) for which in ("before", "after"))
         if before is not None and after is not None:
@@ -220,10 +181,22 @@ def _key_figures(gap: Gap) -> list[Figure]:
 
 def _parameters(gap: Gap) -> list[Table]:
     rows: list[list[Cell]] = [
-        [effect_in_words(one.name), *_parameter(one, name)] for one in gap.effects for name in one.parameters
+        [effect_in_words(one.name), *parameter_cells(one, name)] for one in gap.effects for name in one.parameters
     ]
     heads = ("effect", "parameter", "value", "unit", "meaning")
-    return [_table("What was found, ± one standard error", heads, rows)] if rows else []
+    what = "What the best of the candidates would be" if gap.verdict == AMBIGUOUS else "What was found"
+    return [_table(f"{what}, ± one standard error", heads, rows)] if rows else []
+
+
+def _candidates(gap: Gap) -> list[Table]:
+    """The sizes of the other effects that it could be."""
+    rows: list[list[Cell]] = [
+        [effect_in_words(one.name), *parameter_cells(one, name), as_percent(one.confidence)]
+        for one in sizes_of_candidates(gap)
+        for name in one.parameters
+    ]
+    heads = ("effect", "parameter", "value", "unit", "meaning", "probability that it is there")
+    return [_table("What the others would be, ± one standard error", heads, rows)] if rows else []
 
 
 def _explanations(gap: Gap) -> list[Table]:
@@ -234,29 +207,6 @@ def _explanations(gap: Gap) -> list[Table]:
         [effect_in_words(name), EFFECTS[name].description] for name in possible if name in EFFECTS
     ]
     return [_table("Effects that these data cannot tell apart", ("effect", "in words"), rows)] if rows else []
-
-
-def _parameter(one: Named, name: str) -> list[Cell]:
-    own, value = estimate_in_file(name, one.parameters[name])
-    words, unit = in_words(own)
-    error = in_file(name, one.standard_errors[name])[1] if name in one.standard_errors else math.nan
-    meaning = f"{_meaning(one.name, name)}{'' if name in one.standard_errors else ' (held)'}"
-    return [words, with_error(value, error), unit or "-", meaning]
-
-
-def with_error(value: float, error: float) -> str:
-    """A value and its standard error with two figures of the error: ``121.3 ± 2.1``; the value alone without one."""
-    if not (math.isfinite(error) and error > 0):
-        return format_number(value, 4)
-    digits = 2
-    if value and abs(value) > error:
-        digits += math.floor(math.log10(abs(value))) - math.floor(math.log10(error))
-    return " ± ".join(format_column([float(value), float(error)], digits))
-
-
-def _meaning(effect: str, parameter: str) -> str:
-    known = EFFECTS[effect].parameters if effect in EFFECTS else ()
-    return next((one.description for one in known if one.name == parameter), "")
 
 
 def _black_box(gap: Gap) -> bool:
@@ -271,7 +221,7 @@ def _trials(gap: Gap) -> Table:
         for one in gap.passed
         if one.held_out == held and measured_in(one)
     ]
-    heads = ("trial", "", *(which.replace("_", " ") for which in _compared(gap)))
+    heads = ("trial", "set", *(which.replace("_", " ") for which in _compared(gap)))
     return _table("Misfit of each trial, noise units", heads, rows, digits=_ALL)
 
 
@@ -307,9 +257,54 @@ def _place_text(gap: Gap) -> str:
         return "No part of any trial stands out of the noise. The largest misfits are shown all the same."
     first, name = gap.where[0], signal_name(gap.where[0].signal)
     return (
-        f"The largest part of the misfit beyond the noise, {100 * first.share:.0f} %, is in {name.words} "
-        f"({name.file}) of {first.trial}, from {first.t_start_s:.0f} s to {first.t_end_s:.0f} s."
+        f"The largest part of the misfit beyond the noise, {100 * first.share:.0f} %, arises in {name.words} "
+        f"({name.file}) of {first.trial}, from {first.t_start_s:.0f} s to {first.t_end_s:.0f} s. Positions and "
+        "headings count while their difference grows: a track that was left once stays left."
     )
+
+
+def _acting_text(gap: Gap) -> str:
+    """When the model itself is wrong, in a sentence; or why no force is shown."""
+    found = acting(gap)
+    without = _NO_FORCE if earth_bound(gap) and missing_force(gap) is None else ""
+    if not found:
+        none = "the records do not contradict each other" if earth_bound(gap) else "no force stands out of its error"
+        return f"At what moments the cause acts cannot be said: {none}." + without
+    first = found[0]
+    told = (
+        f"The cause acts most in {_ACTING.get(first.equation, first.equation)}, from "
+        f"{first.t_start_s:.0f} s to {first.t_end_s:.0f} s of {first.trial}."
+    )
+    return told + without
+
+
+def _passages(gap: Gap) -> list[Table]:
+    rows: list[list[Cell]] = [
+        [one.trial, _ACTING.get(one.equation, one.equation), one.t_start_s, one.t_end_s, one.size]
+        for one in acting(gap)[:MOST_PASSAGES]
+    ]
+    columns = [
+        *(Column(title=head) for head in ("trial", "equation")),
+        *(Column(title=head, unit="s", digits=3) for head in ("from", "to")),
+        Column(title="size", unit="standard errors", digits=2),
+    ]
+    return [Table(caption="When the cause acts", columns=columns, rows=rows)] if rows else []
+
+
+MOST_PASSAGES = 12
+"""Passages in a table (ours)."""
+
+_ACTING = {
+    "surge": "the force ahead",
+    "sway": "the force to the side",
+    "yaw": "the turning moment",
+    "track": "the motion over the ground",
+    "heading": "heading against yaw rate",
+}
+_NO_FORCE = (
+    " No force is missing, and none is shown: what counts is by how much the records of position, heading and velocity "
+    "contradict each other, whatever the hull does."
+)
 
 
 def _places(gap: Gap) -> list[Table]:
@@ -321,7 +316,7 @@ def _places(gap: Gap) -> list[Table]:
         *(Column(title=head, unit="s", digits=3) for head in ("from", "to")),
         Column(title="share of the misfit", unit="%", digits=2),
     ]
-    return [Table(caption="Where the misfit is, beyond the noise", columns=columns, rows=rows)] if rows else []
+    return [Table(caption="Where the misfit arises, beyond the noise", columns=columns, rows=rows)] if rows else []
 
 
 def _track_text(gap: Gap) -> str:
@@ -342,19 +337,23 @@ def _figures(gap: Gap) -> list[Table]:
         word = "held out" if held.get(now.trial) else "fitting"
         simulated = [before.predicted if before else None, *([now.predicted] if added(gap) else [])]
         groups.setdefault(unit, []).append([now.trial, word, words, now.measured, *simulated])
-    heads = ("trial", "", "figure", "measured", *shown_models(gap))
-    return [_table(f"Figures in {unit}", heads, rows, digits=4) for unit, rows in groups.items()]
+    heads = ("trial", "set", "figure", "measured", *shown_models(gap))
+    return [
+        _table(f"Figures in {unit}" if unit else "Figures without unit", heads, rows, digits=4)
+        for unit, rows in groups.items()
+    ]
 
 
 def _could_hide(gap: Gap) -> Table | None:
     rows: list[list[Cell]] = []
-    for effect, sizes in gap.could_hide.items():
+    for effect, sizes in hidden(gap).items():
         for name, size in sizes.items():
             own, value = in_file(name, size)
             words, unit = in_words(own)
             shown = format_number(value, 2)
-            rows.append([effect_in_words(effect), words, shown, unit or "-", _meaning(effect, name)])
-    heads = ("effect", "parameter", "up to", "unit", "meaning")
+            shown = f"{shown} in place of the card's" if replaces(effect, name) else f"up to {shown}"
+            rows.append([effect_in_words(effect), words, shown, unit or "-", meaning(effect, name)])
+    heads = ("effect", "parameter", "would not show", "unit", "meaning")
     return _table("Sizes that these data cannot show", heads, rows) if rows else None
 
 
@@ -364,7 +363,8 @@ def _next_test(gap: Gap) -> str:
         return "" if gap.verdict in (MISSING, NOTHING) else "No manoeuvre was found that would tell more."
     # The command stands alone: in a line with others it is broken at its hyphens.
     command = f"tank2sim simulate improved.toml --manoeuvre {test.manoeuvre}"
-    return f"{test.why}\n\nIts orders stand in {NEXT_TEST_FILE}. To see it beforehand:\n\n{command}"
+    why = f"{test.why[0].upper()}{test.why[1:].rstrip('.')}."
+    return f"{why}\n\nIts orders stand in {NEXT_TEST_FILE}. To see it beforehand:\n\n{command}"
 
 
 def _noise(gap: Gap) -> Table:
@@ -378,10 +378,6 @@ def _noise(gap: Gap) -> Table:
 
 def _table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[Cell]], *, digits: int = 4) -> Table:
     return Table(caption=caption, columns=[Column(title=head, digits=digits) for head in heads], rows=rows)
-
-
-def _noises(misfit: float) -> str:
-    return f"{format_number(misfit, 3)} times the noise" if math.isfinite(misfit) else "no end: the simulation ran away"
 
 
 def _rounded(value: float) -> float:

@@ -108,7 +108,7 @@ def test_a_hump_is_felt_at_its_speed() -> None:
     for u in (5.0, 6.0, 6.7):
         expected = -2e-4 * 0.5 * RHO * L**2 * u**2 * np.exp(-(((u - 6.0) / 0.5) ** 2) / 2)
         np.testing.assert_allclose(added_forces("hump_resistance", given, state(u, 0, 0))[0], expected, rtol=1e-6)
-    assert ship({"hump_resistance": TYPICAL["hump_resistance"]})["hump_resistance.width"].start == 0.05 * U0
+    assert ship({"hump_resistance": TYPICAL["hump_resistance"]})["hump_resistance.width"].start == 0.08 * U0
 
 
 def test_asymmetric_turning_goes_with_the_square_of_the_rate() -> None:

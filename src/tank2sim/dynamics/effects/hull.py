@@ -111,14 +111,16 @@ HUMP_RESISTANCE = Effect(
             "speed of the hump through the water",
             0.0,
             50.0,
-            typical=speeds(0.8, 0.7, 0.9, 0.6, 1.0),  # what a turn sweeps, at twice the width below (ours)
+            typical=speeds(0.8, 0.7, 0.9, 0.6, 1.0),  # what a turn sweeps, at about the width below (ours)
         ),
         EffectParameter(
             "width_mps",
-            "width of the hump (standard deviation), by default a twentieth of u0",
+            "width of the hump (standard deviation), by default 0.08 u0",
             0.01,
             10.0,
-            lambda card: 0.05 * card.model.speed_mps,
+            # From one hump to the next hollow, at Froude numbers 0.30 and 0.26 (Havelock 1909), are two widths or so.
+            lambda card: 0.08 * card.model.speed_mps,
+            spread=lambda card: 0.04 * card.model.speed_mps,
         ),
     ),
     equations=_with_hump,
