@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -157,20 +155,30 @@ def test_bad_input_is_one_line_and_nothing_is_written(folder: Path) -> None:
     assert not (folder / "n.toml").exists()
 
 
+INTERRUPTED_AT = 8
+"""Of some dozens of evaluations in this search."""
+
+
 def test_an_interrupt_keeps_the_best_card_so_far(folder: Path) -> None:
-    program = "from tank2sim.cli import main; main()"
+    program = f"""
+import signal
+from tank2sim.cli import main
+from tank2sim.identification.trials.output_error import Shooting
+
+normal, calls = Shooting.normal, []
+
+def interrupted(*arguments):
+    calls.append(arguments)
+    if len(calls) == {INTERRUPTED_AT}:
+        signal.raise_signal(signal.SIGINT)  # as Ctrl-C does, in the middle of the search
+    return normal(*arguments)
+
+Shooting.normal = interrupted
+main()
+"""
     command = [sys.executable, "-c", program, "identify", "off.toml", *FITTED, "-o", "stopped.toml", "--json", "s.json"]
-    slow = "import time; from tank2sim.identification.trials import output_error as o; e = o.Shooting.normal\n"
-    slow += "o.Shooting.normal = lambda *a: (print('at it', flush=True), time.sleep(0.1), e(*a))[2]\n"
-    command[2] = slow + program
-    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    for line in process.stdout:
-        if "at it" in line:
-            break
-    time.sleep(1.5)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    process = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
+    out, err = process.stdout, process.stderr
     assert process.returncode == 0, err
     assert "interrupted" in out
     card = parse_card((folder / "stopped.toml").read_text(encoding="utf-8"), "stopped.toml")
