@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
-from tank2sim.gap.prove import agreement, black_box, worse
+from tank2sim.gap.prove import agreement, black_box, closes, worse
 from tank2sim.gap.result import Passed
 from tank2sim.identification.trials.measured import Measured
 from tests.gap.test_replay import NOISE
@@ -45,6 +45,35 @@ def test_trials_that_got_worse_are_named() -> None:
     passed = [trial("better", 5, 1), trial("same", 1.0, 1.02), trial("worse", 1.0, 1.2), trial("far", 9.0, 9.3)]
     assert worse([*passed, trial("lost", 1.0, np.nan)]) == ("worse", "lost")
     assert worse(passed, tolerance=0.01) == ("same", "worse", "far")
+
+
+@pytest.mark.parametrize(
+    ("sizes", "closed"),
+    [
+        ([(90, 1), (80, 2)], True),
+        ([(90, 89), (80, 81)], False),  # nothing is any nearer
+        ([(2.0, 2.0), (1.5, 1.5)], True),  # noise is most of it
+        ([(90, 89), (90, 10), (90, 10)], True),  # one trial has something more
+        ([(90, 10), (90, 89), (90, 91)], False),
+        ([(math.inf, 5), (math.inf, 4)], True),  # a simulation that ran away is caught
+        ([(math.inf, math.inf), (90, 30), (80, 30)], True),
+        ([(90, math.inf), (80, math.inf)], False),
+    ],
+)
+def test_a_name_that_brings_no_simulation_nearer_closes_nothing(sizes, closed: bool) -> None:
+    measured = {"motion.x": np.zeros(50), "motion.psi": np.full(50, np.nan)}  # of which one was not measured
+    passed = [
+        Passed(
+            str(number),
+            False,
+            np.arange(50.0),
+            {"motion.x": 1.0, "motion.psi": 1.0},
+            measured,
+            *({"motion.x": np.full(50, float(size)), "motion.psi": np.zeros(50)} for size in pair),
+        )
+        for number, pair in enumerate(sizes)
+    ]
+    assert closes(passed) == closed
 
 
 def test_a_linear_change_is_found_by_the_black_box_and_counts_no_more_terms_than_asked() -> None:

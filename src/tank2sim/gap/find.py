@@ -25,7 +25,7 @@ from tank2sim.gap.fitting import Progress
 from tank2sim.gap.hiding import could_hide
 from tank2sim.gap.next_test import Explanation, next_test
 from tank2sim.gap.posing import candidates, pose
-from tank2sim.gap.prove import agreement, black_box, worse
+from tank2sim.gap.prove import MUCH, agreement, black_box, closes, worse
 from tank2sim.gap.replay import passed, with_black_box
 from tank2sim.gap.residuals import each_trial, estimates, force_lacking
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE, Gap, Named, NextTest, Passed, Rival
@@ -37,9 +37,6 @@ from tank2sim.records.trials import Trial
 
 RIVALS = 12
 """Explanations that are told of."""
-
-MUCH = 3.0
-"""Misfit in noise units from which a user is told that something is left (ours)."""
 
 DOUBT = 1e-3
 """Probability below which trials that disagree about a parameter are told of."""
@@ -141,17 +138,15 @@ def _told(
     estimated: list[Found] = []
     if decision.verdict in (MISSING, AMBIGUOUS):
         estimated = estimates(found.likelihood.by_formula(decision.best))
-    improved = added(card, estimated)
-    sensors = [one for one in estimated if EFFECTS[one[0]].acts_on == "sensor"]
     noise = _noise(found, decision.best, fitted)
     sigmas = {name: sigma for name, (sigma, _) in noise.items()}
-    results: list[Passed] = []
-    box = black_box(card, fitted, sigmas, max(len(decision.best.theta), 1)) if estimated else None
-    for group, held_out in ((fitted, False), (held, True)):
-        if group.trials:
-            mended = _mended(group, sensors)
-            some = passed(card, improved, group, sigmas, held_out, mended)
-            results += with_black_box(some, box.card, group, sigmas) if box else some
+    improved, results = _followed(card, trials, estimated, sigmas)
+    withheld = ""
+    if estimated and not closes(results):
+        withheld = " and ".join(name for name, *_ in estimated)
+        decision, estimated = replace(decision, verdict=OUTSIDE), []
+        improved, results = _followed(card, trials, estimated, sigmas)
+    sensors = _of_sensors(estimated)
     progress("where and how much")
     force = force_lacking(found.likelihood, found.none)
     every = (*fitted.trials, *held.trials)
@@ -173,8 +168,27 @@ def _told(
         could_hide=could_hide(found, decision.best, ENOUGH),
         agreement=told,
         next_test=_next(card, found, decision, sigmas),
-        notices=_notices(card, decision, results, told, (fitted, held)),
+        notices=_notices(card, decision, results, told, (fitted, held), withheld),
     )
+
+
+def _followed(
+    card: ManoeuvringCard, trials: tuple[Measured, Measured], estimated: list[Found], sigmas: Mapping[str, float]
+) -> tuple[ManoeuvringCard, list[Passed]]:
+    """The card with what was estimated, and all trials as both cards and a black box follow them."""
+    improved = added(card, estimated)
+    count = sum(len(errors) for *_, errors in estimated)
+    box = black_box(card, trials[0], sigmas, max(count, 1)) if estimated else None
+    results: list[Passed] = []
+    for group, held_out in zip(trials, (False, True), strict=True):
+        if group.trials:
+            some = passed(card, improved, group, sigmas, held_out, _mended(group, _of_sensors(estimated)))
+            results += with_black_box(some, box.card, group, sigmas) if box else some
+    return improved, results
+
+
+def _of_sensors(estimated: Sequence[Found]) -> list[Found]:
+    return [one for one in estimated if EFFECTS[one[0]].acts_on == "sensor"]
 
 
 def _mended(group: Measured, sensors: Sequence[Found]) -> Measured | None:
@@ -239,9 +253,14 @@ def _notices(
     results: Sequence[Passed],
     told: Mapping[str, Mapping[str, tuple[float, float]]],
     trials: tuple[Measured, Measured],
+    withheld: str,
 ) -> tuple[str, ...]:
     notices = [*trials[0].notices, *trials[1].notices]
     notices += [_in_words(one) for one in decision.strange]
+    if withheld:
+        notices.append(
+            f"{withheld}: fits best from instant to instant, but a simulation with it is no nearer: not named"
+        )
     if card.effects:
         have = ", ".join(entry.name for entry in card.effects)
         notices.append(f"{have}: held as the card has it, and not sought")

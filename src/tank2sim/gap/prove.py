@@ -28,6 +28,12 @@ STEPS = 4
 TRIED = 3
 """Terms that are fitted to choose one of them (ours: far from the truth the linearised gain errs)."""
 
+MUCH = 3.0
+"""Misfit in noise units beyond which a name must close something of the gap (ours): below, noise is most of it."""
+
+CLOSES = 0.9
+"""Share of the misfit before that may be left after, in the middle of all signals of all trials (ours)."""
+
 REACH = 1e-3
 """Differences by a coefficient are taken over this share of the largest linear one (ours: rounding and curvature are
 both far below the noise)."""
@@ -149,6 +155,21 @@ class _Fit:
         values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
         moved = {f"derivatives.{name}": change for name, change in zip(names, changes, strict=True)}
         return model.parameter_values({name: values[name] + float(change) for name, change in moved.items()})
+
+
+def closes(passed: Sequence[Passed]) -> bool:
+    """Whether the improved card follows the trials any better: a name that closes nothing of the gap is a guess.
+
+    By the middle of the ratios of misfits after and before, over all signals of all trials, for a simulation that runs
+    away in one of them outweighs all others in a mean.
+    """
+    rms = [np.array([one.misfit(which) for one in passed]) for which in ("before", "after")]
+    if min(np.sqrt(np.mean(one**2)) for one in rms) < MUCH:
+        return True
+    shown = [(one, name) for one in passed for name in one.noise if np.isfinite(one.measured[name]).any()]
+    pairs = [(one.misfit("before", name), one.misfit("after", name)) for one, name in shown]
+    ratios = [1.0 if before == after else after / before if np.isfinite(before) else 0.0 for before, after in pairs]
+    return bool(np.median(ratios) < CLOSES)
 
 
 def worse(passed: Sequence[Passed], tolerance: float = 0.05) -> tuple[str, ...]:
