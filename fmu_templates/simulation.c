@@ -159,9 +159,24 @@ static void arrive(Instance *self, const double states[], double time) {
     self->stale |= STALE_RATES | STALE_OUTPUTS;
 }
 
+/* The input or parameter that is furthest beyond its usual size: the likeliest cause of a motion without bounds. */
+static size_t furthest_off(const Instance *self) {
+    size_t found = INPUTS_BEGIN;
+    double most = 0;
+    for (size_t i = INPUTS_BEGIN; i < PARAMETERS_END; ++i) {
+        const double size = fabs(self->value[i]) / fmax(VARIABLES[i].nominal, fabs(VARIABLES[i].start));
+        if (size > most) {
+            most = size;
+            found = i;
+        }
+    }
+    return found;
+}
+
 static Status diverged(const Instance *self, size_t place, double start, double size) {
-    return report(self, DISCARD, "%s is not finite at the end of the step from %g s to %g s", VARIABLES[place].name,
-                  start, start + size);
+    const size_t cause = furthest_off(self);
+    return report(self, DISCARD, "%s is not finite at the end of the step from %g s to %g s, with %s = %g",
+                  VARIABLES[place].name, start, start + size, VARIABLES[cause].name, self->value[cause]);
 }
 
 /* If it fails, nothing has changed. */

@@ -81,6 +81,12 @@ static void mark_stale(Instance *self, unsigned set) {
     if (self->mode & BEFORE_START) self->stale |= STALE_STATES;
 }
 
+/* Parameters keep to their bounds, beyond which the equations mean nothing; what moves the ship may be anything. */
+static bool within_bounds(unsigned reference, double value) {
+    const Variable *variable = &VARIABLES[reference];
+    return !is_parameter(reference) || (value >= variable->minimum && value <= variable->maximum);
+}
+
 /* Sets all of the variables or, if one of them cannot be set, none. */
 Status set_reals(Instance *self, const unsigned references[], size_t count, const double values[]) {
     for (size_t i = 0; i < count; ++i) {
@@ -90,6 +96,11 @@ Status set_reals(Instance *self, const unsigned references[], size_t count, cons
         }
         if (references[i] == MAX_STEP && !(values[i] > 0)) {
             return report(self, DISCARD, "%s must be positive", VARIABLES[MAX_STEP].name);
+        }
+        if (!within_bounds(references[i], values[i])) {
+            return report(self, DISCARD, "%s cannot be set to %g: it lies between %g and %g",
+                          VARIABLES[references[i]].name, values[i], VARIABLES[references[i]].minimum,
+                          VARIABLES[references[i]].maximum);
         }
     }
     for (size_t i = 0; i < count; ++i) {

@@ -46,6 +46,7 @@ def test_the_readme_has_exactly_two_one_line_commands_that_set_up_what_they_need
     assert "tank2sim demo" in setting_up[0] and "pytest" in setting_up[1]
 
 
+@pytest.mark.slow
 def test_every_example_command_runs(folder: Path) -> None:
     assert len(COMMANDS) >= 6
     if not (folder / "campaign").is_dir():

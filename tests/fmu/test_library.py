@@ -207,14 +207,15 @@ def test_a_simulator_that_only_asks_whether_to_go_on_ends(fmi: int, fmu_file: Ca
 def test_a_step_to_states_that_are_not_finite_is_discarded(fmi: int, instantiate: Instantiate, status: Status) -> None:
     fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
     before = steps(fmu, 10)
-    fmu.write({"derivatives.thrust": 1e308, "propeller.speed": 1e3})
+    fmu.write({"propeller.speed": 1e300})
     assert status(fmu.instance.doStep, 1.0, 0.1) == DISCARD
     assert fmu.read(STATES) == before
     assert fmu.read(["time"]) == [1.0]
-    assert any("motion." in line and "not finite" in line for line in fmu.log)
+    (told,) = fmu.log
+    assert "motion." in told and "not finite" in told and "with propeller.speed = 1e+300" in told
     if fmi == 2:  # FMPy does not hand on what fmi3DoStep says of it
         assert fmu.instance.getBooleanStatus(fmpy.fmi2.fmi2Terminated)
-    fmu.write({"derivatives.thrust": 0.1, "propeller.speed": 1.0})
+    fmu.write({"propeller.speed": 1.0})
     undisturbed = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
     assert steps(fmu, 5, begin=1.0) == steps(undisturbed, 15)
 
@@ -225,7 +226,7 @@ def test_an_output_or_a_rate_that_is_not_finite_is_discarded(
 ) -> None:
     fmu = begun(instantiate("hull", fmi, "ModelExchange"))
     fmu.instance.enterEventMode() if fmi == 2 else None
-    fmu.write({"derivatives.thrust": 1e308, "propeller.speed": 1e3})
+    fmu.write({"derivatives.thrust": 1e3, "propeller.speed": 1e308})
     assert status(fmu.read, ["motion.udot"]) == DISCARD
     rates = (ctypes.c_double * 7)()
     get = fmu.instance.getDerivatives if fmi == 2 else fmu.instance.getContinuousStateDerivatives

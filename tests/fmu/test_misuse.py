@@ -13,7 +13,7 @@ import fmpy
 import pytest
 
 from tank2sim.fmu.unpacking import UnpackedFmu
-from tests.fmu.driving import ERROR, STATES, Instantiate, Status, begun, steps, untyped
+from tests.fmu.driving import DISCARD, ERROR, STATES, Instantiate, Status, begun, steps, untyped
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 
@@ -147,12 +147,26 @@ def test_huge_and_tiny_inputs_and_coefficients_do_no_harm(
     before = steps(fmu, 3)
     for name in ("rudder.command", "propeller.speed", "derivatives.Yv", "derivatives.drag"):
         kept = fmu.read([name])[0]
-        fmu.write({name: value})
+        if status(fmu.write, {name: value}) == DISCARD:  # beyond what a parameter may be
+            assert abs(value) > 1 and name in fmu.log[-1] and fmu.read([name]) == [kept]
+            continue
         if status(fmu.instance.doStep, *(fmu.read(["time"])[0], 0.1)) != 0:
             assert fmu.read(STATES) == before
         assert all(math.isfinite(state) for state in fmu.read(STATES))
         before = fmu.read(STATES)
         fmu.write({name: kept})
+
+
+@FMI
+def test_parameters_keep_to_their_bounds(fmi: int, instantiate: Instantiate, status: Status) -> None:
+    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+    (described,) = [v for v in fmu.unpacked.description.modelVariables if v.name == "derivatives.Yv"]
+    low, high, start = (float(text) for text in (described.min, described.max, described.start))
+    for value, taken in ((low, True), (high, True), (1.001 * low, False), (1.001 * high, False)):
+        fmu.write({"derivatives.Yv": start})
+        assert status(fmu.write, {"derivatives.Yv": value}) == (0 if taken else DISCARD)
+        assert fmu.read(["derivatives.Yv"]) == [value if taken else start]
+    assert "derivatives.Yv" in fmu.log[-1] and f"{low:g} and {high:g}" in fmu.log[-1]
 
 
 def test_an_instance_of_no_kind_is_refused(instantiate: Instantiate) -> None:

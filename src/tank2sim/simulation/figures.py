@@ -185,7 +185,8 @@ def _spiral(run: Trajectory, rudders: tuple[float, ...]) -> Figures:
 
 def _stop(run: Trajectory, stop: Stop, length: float) -> Figures:
     """Track reach along the path, head reach along the initial course, side reach across it, to starboard: all of the
-    origin from the order until the ship is dead in the water (IMO MSC.137(76), ITTC 7.5-04-02-01)."""
+    origin from the order until the ship is dead in the water (IMO MSC.137(76), ITTC 7.5-04-02-01), or coasts at the
+    speed that is told."""
     final = stop.final_speed(float(run["motion.u"][0]))
     time = _first(run.crossings("motion.u", "motion.udot", final))
     if time is None and run["motion.u"][-1] <= final + AT_REST * run["motion.speed"][0]:
@@ -198,6 +199,7 @@ def _stop(run: Trajectory, stop: Stop, length: float) -> Figures:
         "head_reach_m": ahead,
         "side_reach_m": side,
         "time_to_stop_s": time,
+        "stopped_at_mps": final if time else None,
         "track_reach_lengths": track and track / length,
         "head_reach_lengths": ahead and ahead / length,
         "heading_change_deg": math.degrees(run.at("motion.psi", time) - run["motion.psi"][0]) if time else None,
