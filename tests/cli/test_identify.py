@@ -161,6 +161,7 @@ import signal
 from tank2sim.cli import main
 from tank2sim.identification.trials import output_error
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a process in the background begins with it ignored
 # As Ctrl-C does, in the middle of the search: a first round is done, others would follow.
 output_error._new_weights = lambda *arguments: signal.raise_signal(signal.SIGINT)
 main()
