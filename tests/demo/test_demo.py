@@ -59,7 +59,7 @@ def test_the_result_is_json_and_the_page_is_there(demo) -> None:
     assert "zigzag:20/20" in page and page.rstrip().endswith("</html>")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_second_run_gives_the_same_files_to_the_bit(demo, tmp_path) -> None:
     folder, result, _ = demo
     run_demo(tmp_path, lambda _: None)

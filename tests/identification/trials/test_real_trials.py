@@ -37,7 +37,7 @@ def test_yaw_rate_is_followed_in_both_basins(result: Identification) -> None:
     assert result.holdout is not None and result.before_holdout is not None
     for basin, most in (("HSVA", 0.07), ("MARIN", 0.12)):
         assert pooled([run for run in result.holdout.following if basin in run.name], "motion.r") < most
-    assert pooled(result.before_holdout.following, "motion.r") > 0.5, "the captive card cannot"
+    assert pooled(result.before_holdout.following, "motion.r") > 0.25, "the captive card cannot"
 
 
 def test_first_overshoots_come_within_a_degree(result: Identification) -> None:
