@@ -40,9 +40,7 @@ def straight_course(model: Model, speed_mps: float | None = None) -> OperatingPo
         The model is no ship, or there is no such course.
     """
     if "rudder.angle" not in model:
-        raise InputError(
-            model.name, "", "has no rudder", "this needs the card of a ship (kind linear or abkowitz)"
-        )
+        raise InputError(model.name, "", "has no rudder", "this needs the card of a ship (kind linear or abkowitz)")
     p, u = model.parameter_values(), model.input_values()
     x = np.array(model.initial(p)).ravel()
     names = model.state_names
