@@ -102,7 +102,7 @@ def test_a_run_too_short_leaves_figures_open_and_says_so(mariner) -> None:
 
 
 def test_a_run_outside_the_range_of_speeds_says_so(mariner_card) -> None:
-    narrow = mariner_card.text.replace("valid_speed_mps = [3.9, 9.3]", "valid_speed_mps = [7.0, 9.3]")
+    narrow = mariner_card.text.replace("valid_speed_mps = [5.4, 9.3]", "valid_speed_mps = [7.0, 9.3]")
     model = build(parse_card(narrow, "ship.toml"))
     assert any("outside the card's range" in n for n in simulate(model, parse_manoeuvre("turn:35")).notices)
     assert not simulate(model, parse_manoeuvre("turn:35"), duration_s=5.0).notices[:0]

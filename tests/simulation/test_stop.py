@@ -28,7 +28,7 @@ def quadratic(mariner_card) -> ManoeuvringCard:
 
     With Du' = (u - u0)/u straight ahead, Xnn (u0^2 - u^2)/u^2 = Xnn (Du'^2 - 2 Du').
     """
-    text = mariner_card.text + f"\n[propulsion]\nnominal_rpm = 84.0\nXnn = {XNN}\n"
+    text = mariner_card.text.replace("[5.4, 9.3]", "[3.9, 9.3]") + f"\n[propulsion]\nnominal_rpm = 84.0\nXnn = {XNN}\n"
     card = parse_card(text, "ship.toml")
     assert isinstance(card, ManoeuvringCard)
     even = {force + end: 0.0 for force in "YN" for end in ("0", "0u", "0uu")}
@@ -56,7 +56,7 @@ def test_a_crash_stop_has_the_reach_and_the_time_of_the_closed_form(ship, quadra
     stop = Stop() if share is None else Stop(-share * N0)
     figures = simulate(ship, stop).figures
     reach, time = closed_form(quadratic, (FULL_ASTERN if share is None else share) ** 2)
-    # The linear damping at low speed, a twentieth of the lower bound of the range, takes off a little.
+    # The linear damping at low speed takes off a little.
     assert figures["head_reach_m"] == pytest.approx(reach * L, rel=5e-3)
     assert figures["track_reach_m"] == pytest.approx(reach * L, rel=5e-3)
     assert figures["time_to_stop_s"] == pytest.approx(time * L / U0, rel=5e-3)

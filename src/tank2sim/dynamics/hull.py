@@ -14,10 +14,11 @@ from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, LINEAR_TERMS, TERMS, 
 from tank2sim.dynamics.low_speed import (
     STILL,
     Forces,
+    RudderAtU0,
     hull_forces,
     lowest_speed,
     regular_speed,
-    rudder_flow,
+    rudder_factors,
     share_of_low_speed,
 )
 from tank2sim.dynamics.model import Quantity
@@ -28,6 +29,10 @@ VALIDITY_MARGIN = 0.2
 """Above the card's range of speeds ``validity`` falls from 1 to 0 over this share of the speed of expansion.
 
 A choice of ours: forces grow with the square of speed, so 20 % of speed is 44 % of force."""
+
+LARGEST_DRIFT, LARGEST_YAW_RATE = 0.5, 1.0
+"""abs(v') (30 deg of drift) and abs(r') (a turn of one length of radius) to which captive tests go at the most: from
+there ``validity`` falls to 0 at twice that. No card states its own: a choice of ours."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +76,7 @@ class Hull:
     @cached_property
     def X_bound(self) -> ca.SX:
         """The card's X straight ahead at the lowest speed at which it holds, N."""
-        return _surge_force_ahead(self, lowest_speed(self.symbols))
+        return _ahead(self, "X", lowest_speed(self.symbols))
 
     def scales(self, speed: ca.SX) -> Scales:
         """Scales at a speed, as expressions."""
@@ -117,14 +122,15 @@ def _polynomials(hull: Hull, with_rudder: bool) -> Forces:
     return force * sums[0], force * sums[1], force * scales.length * sums[2]
 
 
-def _surge_force_ahead(hull: Hull, u: ca.SX) -> ca.SX:
-    """The card's X straight ahead at a speed u, N."""
+def _ahead(hull: Hull, force: str, u: ca.SX, rudder: int = 0) -> ca.SX:
+    """The card's X, Y or N/L straight ahead at a speed u, N: of the terms with that power of the rudder, at 1 rad."""
     u0 = hull["ship.speed"]
     speed = u0 if hull.linear or hull.nominal_scale else u
-    names = [name for name in _terms(hull, "X", with_rudder=False) if known_term(name).v + known_term(name).r == 0]
+    terms = {name: known_term(name) for name in _terms(hull, force, with_rudder=rudder > 0)}
+    names = [name for name, term in terms.items() if (term.v, term.r, term.d) == (0, 0, rudder)]
     coefficients = {name: hull.coefficient(name) for name in names}
-    force: ca.SX = hull.scales(speed).force * polynomial(names, coefficients, 0, 0, 0, (u - u0) / speed)
-    return force
+    value: ca.SX = hull.scales(speed).force * polynomial(names, coefficients, 0, 0, 1, (u - u0) / speed)
+    return value
 
 
 def _with_share(share: Forces, forces: Forces, others: Forces) -> Forces:
@@ -141,16 +147,21 @@ def _of_rudder_alone(name: str) -> bool:
 
 def _rudder_forces(hull: Hull) -> Forces:
     """X, Y, N by the rudder; at low speed its terms in delta alone, as at u0, in the flow that meets it there."""
-    at_u0 = hull.scales(hull["ship.speed"])
-    flow, flow_at_u0, swing = rudder_flow(hull.symbols, hull.X_bound)
-    force = at_u0.force / flow_at_u0
+    u0 = hull["ship.speed"]
+    at_u0 = hull.scales(u0)
+    yaw = _ahead(hull, "N", u0, rudder=1)
+    at_bound = _ahead(hull, "N", lowest_speed(hull.symbols), rudder=1)
+    # A card whose rudder gives no moment has no ratio: the least is taken.
+    ratio = at_bound * yaw / (yaw**2 + (STILL**2 * at_u0.force) ** 2)
+    linear = RudderAtU0(_ahead(hull, "Y", u0, rudder=1), ratio)
+    straight, swinging = rudder_factors(hull.symbols, hull.X_bound, linear)
     low = []
     for name in "XYN":
         names = [name for name in _terms(hull, name, with_rudder=True) if _of_rudder_alone(name)]
         coefficients = {name: hull.coefficient(name) for name in names}
         by_angle = polynomial(names, coefficients, 0, 0, hull["rudder.effective"], 0)
-        by_swing = 0 if name == "X" else hull.coefficient(f"{name}d") * swing
-        low.append(force * (flow * by_angle + by_swing))
+        by_swing = 0 if name == "X" else hull.coefficient(f"{name}d") * swinging
+        low.append(at_u0.force * (straight * by_angle + by_swing))
     share = hull.low_share
     slow = low[0], low[1], at_u0.length * low[2]
     return _with_share((share, share, share), slow, _polynomials(hull, with_rudder=True))
@@ -187,7 +198,7 @@ def _hull_forces(hull: Hull) -> Forces:
         surge, sway, yaw = inertial_forces(hull["ship.mass"], hull["ship.x_G"], forward, v, r)
         # (3.5a) has no m v r: a product of two small quantities.
         X, Y, N = X + (0 if hull.linear else kept * surge), Y + kept * sway, N + kept * yaw
-    X_u0 = _surge_force_ahead(hull, hull["ship.speed"])
+    X_u0 = _ahead(hull, "X", hull["ship.speed"])
     slow = hull_forces(hull.symbols, hull.speed, hull.X_bound, X_u0, _hydrodynamic_linear(hull))
     # In surge sooner, by the cube: the polynomial of a slow ship soon gives thrust for resistance.
     return _with_share((1 - kept**3, low, low), slow, (X * kept**2, Y, N))
@@ -265,6 +276,12 @@ def _acceleration_quantities(motion: tuple[ca.SX, ca.SX, ca.SX]) -> tuple[Quanti
     )
 
 
+def _inside(excess: ca.SX, margin: ca.SX | float) -> ca.SX:
+    """1 without excess, falling smoothly to 0 where it is the margin."""
+    beyond = ca.fmax(0, ca.fmin(1, excess / margin))
+    return 1 - beyond * beyond * (3 - 2 * beyond)
+
+
 def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
     u, v = hull["motion.u"], hull["motion.v"]
     speed = Quantity(
@@ -284,7 +301,13 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
         # asin(v/U) without its division by zero at rest
         value=-ca.atan2(v, ca.sqrt(u**2 + (STILL * hull["ship.speed"]) ** 2)),
     )
-    too_fast = ca.fmax(0, ca.fmin(1, (speed.symbol - hull["ship.fastest"]) / (VALIDITY_MARGIN * hull["ship.speed"])))
+    u0 = hull["ship.speed"]
+    yaw_rate = hull["motion.r"] * hull["ship.length"] / speed.symbol
+    inside = (
+        _inside(speed.symbol - hull["ship.fastest"], VALIDITY_MARGIN * u0)
+        * _inside(ca.fabs(v) / speed.symbol - LARGEST_DRIFT, LARGEST_DRIFT)
+        * _inside(ca.fabs(yaw_rate) - LARGEST_YAW_RATE, LARGEST_YAW_RATE)
+    )
     low = Quantity(
         name="low_speed.share",
         unit="1",
@@ -297,11 +320,12 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
         name="validity",
         unit="1",
         description=(
-            "1 in the range of speeds in which the card holds; below it the share of the card's polynomial in the "
-            "forces, 0 at low speed and astern; above it falling to 0"
+            "1 in the range of speeds in which the card holds, to 30 deg of drift and a yaw rate of U/L; below that "
+            "speed the share of the card's polynomial in the forces, 0 at low speed and astern; falling to 0 above it, "
+            "and towards twice that drift velocity and yaw rate"
         ),
         minimum=0.0,
         maximum=1.0,
-        value=(1 - low.symbol) * (1 - too_fast * too_fast * (3 - 2 * too_fast)),
+        value=(1 - low.symbol) * inside,
     )
     return speed, drift, low, validity

@@ -19,13 +19,16 @@ F_p = 0, and it comes to rest).
 
 The rudder stands in the race of the propeller, with the card's own terms in delta alone, as they are at u0:
 
-    F = (F_delta(u0) (u|u| + J n^2/n0^2) + F_d(u0) gamma sqrt(J) n/n0 (v - r L/2))/(u0^2 + J),
-    J = 2 F_p/(c rho pi D^2/4)
+    F = F_delta(u0) (A u|u| + B n^2/n0^2) + F_d(u0) gamma B/sqrt(J) n/n0 (v - r L/2)
+    A u_b^2 + B = k,    B/A = J, but B abs(Y_d(u0)) <= F_p/(1 - t),    J = 2 F_p/(c rho pi D^2/4)
 
-J is what the propeller adds to the square of the speed in its race by momentum theory, at nominal revolutions, where
-c = (1 - t)(1 - w)^2; only a propeller that turns ahead (n > 0) adds it. Astern the first term is weaker. F_d is the
-part linear in delta: a stern that swings meets the race at an angle, and so the rudder damps the swing (what it does in
-the stream of the hull is in Y_v to N_r).
+k is the slope of the polynomial's yaw moment by rudder at u_b over that at u0 (N_d, N_du, N_duu), so that at nominal
+revolutions the two forms meet at u_b. It is held between :data:`LEAST_RUDDER` (u_b/u0)^2 and 1. J is what the propeller
+adds to the square of the speed in its race by momentum theory, at nominal revolutions, where c = (1 - t)(1 - w)^2; only
+a propeller that turns ahead (n > 0) adds it. The bound on B is that of momentum: a rudder that turns the whole race by
+its own angle gets F_p/(1 - t) sin(delta) from it. Astern the first term is weaker. F_d is the part linear in delta: a
+stern that swings meets the race at an angle, and so the rudder damps the swing (what it does in the stream of the hull
+is in Y_v to N_r).
 
 Oltmann and Sharma (1984), Simulation of combined engine and rudder maneuvers using an improved model of
 hull-propeller-rudder interactions, 15th Symposium on Naval Hydrodynamics (the same division: lift, cross-flow drag,
@@ -37,6 +40,7 @@ race). That the card's linear terms are taken as they are is a choice of ours.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
@@ -65,8 +69,8 @@ STILL = 1e-7
 """Speed over u0 at which the ship counts as at rest: a choice of ours. Above 0.1 u0 it changes U by less than 1e-12 of
 itself."""
 
-LINEAR_DAMPING = 0.05
-"""e over u_b, the speed at which a ship at rest is damped: small beside cross-flow drag at any speed that matters, but
+LINEAR_DAMPING = 0.025
+"""e over u0, the speed at which a ship at rest is damped: small beside cross-flow drag at any speed that matters, but
 it brings the ship to rest. A choice of ours."""
 
 LEAST_SHARE, LEAST_RESISTANCE = 0.7, 1e-4
@@ -82,10 +86,12 @@ RUDDER_ASTERN = 0.5
 """Rudder force going astern over that ahead at one speed: the flow comes from the trailing edge, with less lift and an
 earlier stall. A choice of ours."""
 
-RACE = 0.4
-"""(1 - t)(1 - w)^2 with a thrust deduction of 0.2 and a wake fraction of 0.3, of usual ships with one screw (Harvald
-1983, Resistance and Propulsion of Ships). Only the ratio of race and wake acts: from 0.3 to 0.6 the rudder's force at
-rest changes by less than a fifth."""
+THRUST_DEDUCTION, WAKE = 0.2, 0.3
+"""t and w of usual ships with one screw (Harvald 1983, Resistance and Propulsion of Ships)."""
+
+LEAST_RUDDER = 0.3
+"""k is not taken to be less than this share of (u_b/u0)^2, which a polynomial has whose rudder goes with the square of
+speed: some lose it all at the lower end of their range (the Mariner at u0/2). A choice of ours."""
 
 STRAIGHTENING = 0.5
 """gamma, the share of the stern's cross flow that reaches a rudder in the race: between the 0.40 and 0.64 of the KVLCC2
@@ -182,7 +188,7 @@ def hull_forces(s: Symbols, V: ca.SX, X_bound: ca.SX, X_u0: ca.SX, linear: Mappi
     """
     u, v, r = s["motion.u"], s["motion.v"], s["motion.r"]
     mass, moment, bound = s["ship.mass"], s["ship.mass"] * s["ship.x_G"], lowest_speed(s)
-    damping = LINEAR_DAMPING * bound
+    damping = LINEAR_DAMPING * s["ship.speed"]
     thrust = nominal_thrust(s, X_bound)
     least = LEAST_SHARE * (bound / s["ship.speed"]) ** 2 * (thrust - X_u0)
     least = ca.fmax(least, LEAST_RESISTANCE * 0.5 * s["ship.water_density"] * (s["ship.length"] * bound) ** 2)
@@ -210,20 +216,34 @@ def _cross_flow_drag(s: Symbols) -> tuple[ca.SX, ca.SX]:
     return Y, N
 
 
-def rudder_flow(s: Symbols, X_bound: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """The flow over the rudder at low speed, m2/s2.
+@dataclass(frozen=True)
+class RudderAtU0:
+    """What the polynomial says of the rudder straight ahead, linear in its angle.
 
-    Returns
-    -------
-    square, square_at_u0 : casadi.SX
-        Square of its speed, negative when it comes from aft; the same at u0 and nominal revolutions.
-    swing : casadi.SX
-        Speed of the race times the share of the stern's speed to starboard that turns the flow.
+    Parameters
+    ----------
+    Y_slope : casadi.SX
+        Sway force by rudder angle at u0, N/rad.
+    at_bound : casadi.SX
+        Yaw moment by rudder angle at u_b over that at u0.
     """
-    u, u0, astern = s["motion.u"], s["ship.speed"], s["low_speed.rudder_astern"]
+
+    Y_slope: ca.SX
+    at_bound: ca.SX
+
+
+def rudder_factors(s: Symbols, X_bound: ca.SX, rudder: RudderAtU0) -> tuple[ca.SX, ca.SX]:
+    """What the rudder's force at low speed has for that at u0: its factors of F_delta(u0) and of F_d(u0)."""
+    u, u0, bound, astern = s["motion.u"], s["ship.speed"], lowest_speed(s), s["low_speed.rudder_astern"]
+    thrust = ca.fmax(0, nominal_thrust(s, X_bound)) / (1 - THRUST_DEDUCTION)
     disc = ca.pi / 4 * s["ship.propeller_diameter"] ** 2
-    race = 2 * ca.fmax(0, nominal_thrust(s, X_bound)) / (RACE * s["ship.water_density"] * disc)
-    race = race + (STILL * u0) ** 2  # its root has a slope without thrust, too
+    # its root has a slope without thrust, too
+    race = 2 * thrust / ((1 - WAKE) ** 2 * s["ship.water_density"] * disc) + (STILL * u0) ** 2
+    k = ca.fmax(LEAST_RUDDER * (bound / u0) ** 2, ca.fmin(rudder.at_bound, 1))
+    by_race = k * race / (bound**2 + race)
+    # As a quotient of the two bounds' inverses it is regular for a card without Y_d.
+    by_race = by_race / ca.fmax(1, by_race * ca.fabs(rudder.Y_slope) / (thrust + STILL**2 * ca.fabs(rudder.Y_slope)))
+    by_stream = (k - by_race) / bound**2
     ahead = ca.SX(1)
     if "propeller.speed" in s:
         n = s["propeller.speed_actual"] / s["propulsion.nominal_speed"]
@@ -231,4 +251,4 @@ def rudder_flow(s: Symbols, X_bound: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     # u|u| ahead, and the stated share of it astern
     stream = (1 + astern) / 2 * (u * ca.fabs(u)) + (1 - astern) / 2 * (u * u)
     stern = s["motion.v"] - 0.5 * s["ship.length"] * s["motion.r"]
-    return stream + race * ahead**2, u0**2 + race, STRAIGHTENING * ca.sqrt(race) * ahead * stern
+    return by_stream * stream + by_race * ahead**2, STRAIGHTENING * by_race / ca.sqrt(race) * ahead * stern

@@ -107,6 +107,11 @@ class Quantity(Variable):
     value: ca.SX
 
 
+TRIM_STRIDE = 0.2
+"""Longest Newton step towards steady motion, over the nominal size of a state: longer ones leap over the steady motion
+near the start, above all near rest, where forces have little slope. A choice of ours."""
+
+
 @dataclass(frozen=True, eq=False)
 class Model:
     """States, inputs, parameters and the quantities between them.
@@ -305,7 +310,7 @@ class Model:
         """``trim_step(x, u, p) -> x``: one Newton step towards steady motion; None if the model has no such states.
 
         States with a ``trim`` expression take its value; those marked ``steady`` move by ``-J^-1 f``, f their
-        derivatives; the others stay.
+        derivatives, shortened to :data:`TRIM_STRIDE`; the others stay.
         """
         places = [place for place, state in enumerate(self.states) if state.steady]
         if not places:
@@ -314,6 +319,8 @@ class Model:
         unknown = self.x[places]
         residual = ca.substitute(self.rates[places], self.x, ca.vcat(fixed))
         change = ca.solve(ca.jacobian(residual, unknown), residual)
+        nominal = ca.DM([self.states[place].nominal for place in places])
+        change = change / ca.fmax(1, ca.mmax(ca.fabs(change) / nominal) / TRIM_STRIDE)
         for row, place in enumerate(places):
             fixed[place] = self.states[place].symbol - change[row]
         return ca.Function(

@@ -24,6 +24,7 @@ TYPICAL: dict[str, dict[str, float]] = {
     "propeller_walk": {"Y_prime": -1e-4, "N_prime": 5e-5},
     "loading_side_force": {"Y_prime": -1e-4, "N_prime": 5e-5},
     "engine_droop": {"droop": 0.2},
+    "engine_lag": {"time_constant_s": 15.0},
     "rudder_bias": {"angle_deg": 1.0},
     "rudder_effectiveness": {"factor": 0.1},
     "rudder_slipstream": {"gain": 0.5},
@@ -64,7 +65,11 @@ TYPICAL: dict[str, dict[str, float]] = {
 
 @functools.cache
 def mariner_text(**replaced: str) -> str:
-    """The Mariner's card with every particular that an effect may ask for, and propulsion; lines replaced by key."""
+    """The Mariner's card with every particular that an effect may ask for, and propulsion; lines replaced by key.
+
+    It holds down to 3.9 m/s, where her polynomial has no rudder left: it asks most of the low-speed form.
+    """
+    replaced = {"valid_speed_mps": "valid_speed_mps = [3.9, 9.3]", **replaced}
     text = Path(read_card("mariner").source).read_text()
     more = f"projected_area_front_m2 = {FRONT}\nprojected_area_side_m2 = {SIDE}\nblock_coefficient = {CB}\ndraught_m ="
     text = text.replace("draught_m =", more) + "\n[propulsion]\nnominal_rpm = 84.0\nXnn = 77e-5\n"

@@ -9,6 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tank2sim.errors import InputError
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.running import Running
+
 from .ships import N0, RHO, STATES, TYPICAL, U0, L, T, added_forces, mariner_text, ship, state, values
 
 
@@ -62,6 +66,42 @@ def test_without_propulsion_an_engine_droops_from_a_typical_resistance() -> None
     np.testing.assert_allclose(found, [thrust, 0.0, 0.0], rtol=1e-7, atol=1e-6)
     told = [notice for notice in ship({"engine_droop": {"droop": 0.4}}, text).notices if "engine_droop" in notice]
     assert len(told) == 1 and "0.0006" in told[0]
+
+
+LAGGING = ship({"engine_lag": {"time_constant_s": 15.0}})
+
+
+def test_an_engine_with_a_lag_reaches_its_order_exponentially() -> None:
+    running = Running(Integrator(LAGGING, compiled=False), {"propeller.speed": -0.5 * N0})
+    turned = [running.state("engine_lag.speed")]
+    for _ in range(3):
+        running.run(10.0)
+        turned.append(running.state("engine_lag.speed"))
+    expected = N0 * (-0.5 + 1.5 * np.exp(-np.arange(4) * 10.0 / 15.0))
+    np.testing.assert_allclose(turned, expected, rtol=1e-5)
+
+
+def test_an_engine_with_a_lag_may_start_at_rest_and_trims_at_its_order() -> None:
+    integrator = Integrator(LAGGING, compiled=False)
+    assert Running(integrator, {}, {"initial.propeller_speed": 0.0}).state("engine_lag.speed") == 0.0
+    trimmed = Running(integrator, {"propeller.speed": 0.8 * N0}, {"initial.trim": 1.0})
+    assert trimmed.state("engine_lag.speed") == pytest.approx(0.8 * N0, rel=1e-9)
+    assert 0.5 * U0 < trimmed.state("motion.u") < 0.9 * U0
+
+
+def test_thrust_and_droop_follow_what_the_engine_has_reached() -> None:
+    model = ship({"engine_lag": {"time_constant_s": 15.0}, "engine_droop": {"droop": 0.4}})
+    at = {"motion.u": 0.75 * U0, "engine_lag.speed": 8.0, "propeller.speed": 3.0}
+    np.testing.assert_allclose(values(model, ["propeller.speed_actual"], at), 8.0 * (1 - 0.4 * 0.25))
+    np.testing.assert_allclose(values(LAGGING, ["engine_lag.rate"], at), (3.0 - 8.0) / 15.0)
+    plain = values(ship(), ["force.X"], {**at, "propeller.speed": 8.0})
+    np.testing.assert_allclose(values(LAGGING, ["force.X"], at), plain, rtol=1e-12)
+
+
+def test_an_engine_lag_without_an_engine_is_refused() -> None:
+    text = mariner_text().split("[propulsion]")[0]
+    with pytest.raises(InputError, match="propulsion"):
+        ship({"engine_lag": {"time_constant_s": 15.0}}, text)
 
 
 def closed_cross_flow(v: float, r: float) -> tuple[float, float]:

@@ -98,12 +98,12 @@ def test_an_absent_effect_changes_neither_rates_nor_readings(name: str, share: t
 
 def test_what_never_vanishes_replaces_something_or_needs_depth() -> None:
     never = set(EFFECTS) - set(CAN_VANISH)
-    assert never == {"loaded_rudder", "rudder_rate_limit", "rudder_lag", "telemotor_lag", "water_depth"}
+    assert never == {"loaded_rudder", "rudder_rate_limit", "rudder_lag", "telemotor_lag", "engine_lag", "water_depth"}
 
 
-def test_every_effect_is_tried_and_only_required_parameters_and_those_with_a_spread_are_free() -> None:
+def test_what_trials_show_is_tried_and_only_required_parameters_and_those_with_a_spread_are_free() -> None:
     card = card_with()
-    assert [name for name, effect in EFFECTS.items() if not effect.tried(card)] == ["water_depth"]  # shallow_water is
+    assert [name for name, effect in EFFECTS.items() if not effect.tried(card)] == ["engine_lag", "water_depth"]
     coefficients = ("surge_coefficient", "sway_coefficient", "yaw_coefficient")
     expected = ("speed_mps", "direction_rad", *coefficients, "centroid_forward_m", "still_air")
     assert EFFECTS["wind"].free(card) == expected
@@ -164,7 +164,9 @@ def bare_track() -> np.ndarray:
     return driven(SHIP, 200.0)
 
 
-@pytest.mark.parametrize("name", [name for name in EFFECTS if name not in ("rudder_time_offset", "water_depth")])
+@pytest.mark.parametrize(
+    "name", [name for name in EFFECTS if name not in ("rudder_time_offset", "water_depth", "engine_lag")]
+)
 def test_an_effect_of_usual_size_shows_in_a_manoeuvre_but_is_no_other_ship(name: str) -> None:
     card = card_with()
     nominal = np.array([7.7, 0.77, 0.048, 1.0, 160.0, 160.0, 0.35])

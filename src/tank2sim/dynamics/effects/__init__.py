@@ -24,6 +24,7 @@ EFFECTS: dict[str, Effect] = {
         propeller.PROPELLER_WALK,
         propeller.LOADING_SIDE_FORCE,
         propeller.ENGINE_DROOP,
+        propeller.ENGINE_LAG,
         rudder.RUDDER_BIAS,
         rudder.RUDDER_EFFECTIVENESS,
         rudder.RUDDER_SLIPSTREAM,

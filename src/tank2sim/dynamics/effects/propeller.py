@@ -5,9 +5,9 @@ from __future__ import annotations
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols, with_steps_for
 from tank2sim.dynamics.effects.forces import scales, with_forces
-from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
 from tank2sim.dynamics.propulsion import propeller_force
 
 
@@ -164,4 +164,59 @@ ENGINE_DROOP = Effect(
         ),
     ),
     equations=_with_droop,
+)
+
+
+def _with_engine_lag(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    """dn/dt = (order - n)/T: the engine's gear between telegraph and propeller, of the first order.
+
+    ITTC 7.5-02-06-03 asks for the time constant of the engine beside that of the steering gear. A diesel that must be
+    stopped before it is reversed takes longer still.
+    """
+    if "propeller.speed_actual" not in model:
+        raise card.fault("effects", "engine_lag needs an engine", "give the card [propulsion] nominal_rpm and Xnn")
+    order = model["propeller.speed"]
+    assert isinstance(order, Input)
+    start = Parameter(
+        name="initial.propeller_speed",
+        unit=order.unit,
+        description="Revolutions at the start, positive ahead",
+        display_unit=order.display_unit,
+        nominal=order.nominal,
+        start=order.start,
+        tunable=False,
+    )
+    turning = State(
+        name="engine_lag.speed",
+        unit=order.unit,
+        description="Revolutions that the engine has reached, positive ahead",
+        display_unit=order.display_unit,
+        nominal=order.nominal,
+        derivative="engine_lag.rate",
+        start=start.symbol,
+        steady=True,
+    )
+    rate = Quantity(
+        name="engine_lag.rate",
+        unit="rad/s2",
+        description="Rate of the revolutions",
+        nominal=0.1 * order.nominal,
+        value=ca.SX(0),
+    )
+    # Its rate last: it alone still holds the order, which gives way to what the engine has reached everywhere else.
+    lagging = (
+        model.extend(start, turning, rate)
+        .substitute(order.name, turning.symbol)
+        .redefine(rate.name, lambda _: (order.symbol - turning.symbol) / given["time_constant"])
+    )
+    return with_steps_for(lagging, "engine_lag.time_constant")
+
+
+ENGINE_LAG = Effect(
+    name="engine_lag",
+    acts_on="propulsion",
+    description="The engine reaches its ordered revolutions with this delay.",
+    source="ITTC 7.5-02-06-03, validation of manoeuvring simulation models: time constant of the engine",
+    parameters=(EffectParameter("time_constant_s", "time constant of the engine", 0.01, 600.0),),
+    equations=_with_engine_lag,
 )
