@@ -172,6 +172,9 @@ def shown_at_the_start(fmu: RunningFmu, model: Model, trim: bool) -> set[tuple[s
     return shown
 
 
+GUESSES = ("initial.u", "initial.v", "initial.r")
+
+
 @FMI
 def test_initial_dependencies_are_those_that_a_change_shows(fmi: int, hull: Model, instantiate: Instantiate) -> None:
     fmu = instantiate("hull", fmi, "ModelExchange")
@@ -183,10 +186,15 @@ def test_initial_dependencies_are_those_that_a_change_shows(fmi: int, hull: Mode
         *(state.derivative for state in hull.states),
     }
     stated = {(u.variable.name, d.name) for u in unknowns for d in u.dependencies}
-    # Steady motion hides what its rates, all zero, depend on; so the states are looked at.
-    assert {pair for pair in stated if pair[0] in hull.state_names} == {
-        pair for pair in shown if pair[0] in hull.state_names
+    # Steady motion hides what its rates, all zero, depend on; so the states are looked at. Of the first guess of a
+    # steady motion it keeps rounding errors at most, so that a state is not held against the guess of another.
+    looked_at = {
+        (state, known)
+        for state in hull.state_names
+        for known in (*hull.input_names, *hull.parameter_names)
+        if known not in GUESSES or state.removeprefix("motion.") == known.removeprefix("initial.")
     }
+    assert stated & looked_at == shown & looked_at
 
 
 def test_dependencies_of_the_trimmed_start_include_its_inputs(unpacked: Unpacked) -> None:

@@ -319,8 +319,9 @@ class Model:
         unknown = self.x[places]
         residual = ca.substitute(self.rates[places], self.x, ca.vcat(fixed))
         change = ca.solve(ca.jacobian(residual, unknown), residual)
-        nominal = ca.DM([self.states[place].nominal for place in places])
-        change = change / ca.fmax(1, ca.mmax(ca.fabs(change) / nominal) / TRIM_STRIDE)
+        # Each state by itself, so that none comes to depend on another that it has nothing to do with.
+        stride = TRIM_STRIDE * ca.DM([self.states[place].nominal for place in places])
+        change = ca.fmax(-stride, ca.fmin(stride, change))
         for row, place in enumerate(places):
             fixed[place] = self.states[place].symbol - change[row]
         return ca.Function(

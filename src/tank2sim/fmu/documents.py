@@ -38,6 +38,11 @@ def documents_of(card: Card) -> Documents:
     """Source, validity, the origin of every coefficient and the card itself, to lie in the FMU."""
     speeds = card.model.speed_range_mps if isinstance(card, ManoeuvringCard) else card.model.valid_speed_mps
     validity = f"The card holds for speeds through the water of {speeds[0]:g} to {speeds[1]:g} m/s." if speeds else ""
+    if isinstance(card, ManoeuvringCard) and card.propulsion is None:
+        validity += (
+            " It states no propulsion: the ship holds her revolutions at every speed, so that she leaves rest by herself "
+            "and cannot be stopped."
+        )
     return Documents(
         card_text=card.text,
         source=card.ship.source,
