@@ -40,8 +40,8 @@ def documents_of(card: Card) -> Documents:
     validity = f"The card holds for speeds through the water of {speeds[0]:g} to {speeds[1]:g} m/s." if speeds else ""
     if isinstance(card, ManoeuvringCard) and card.propulsion is None:
         validity += (
-            " It states no propulsion: the ship holds her revolutions at every speed, so that she leaves rest by herself "
-            "and cannot be stopped."
+            " It states no propulsion: the ship holds her revolutions at every speed, so that she leaves rest by "
+            "herself and cannot be stopped."
         )
     return Documents(
         card_text=card.text,
