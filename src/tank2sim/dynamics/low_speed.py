@@ -100,6 +100,9 @@ STRAIGHTENING = 0.5
 SOURCES = {
     "low_speed.drag_coefficient": "the largest of 0.6 to 1 for whole hulls (Faltinsen 1990, Sea Loads, 6.4)",
     "low_speed.rudder_astern": "a choice of tank2sim's: the flow comes from the trailing edge, with an earlier stall",
+    "low_speed.straightening": "between the 0.40 and 0.64 of the KVLCC2 (Yasukawa and Yoshimura 2015)",
+    "low_speed.thrust_deduction": "usual for ships with one screw (Harvald 1983, Resistance and Propulsion of Ships)",
+    "low_speed.wake_fraction": "usual for ships with one screw (Harvald 1983, Resistance and Propulsion of Ships)",
 }
 """Where the values of parameters that no card states are from, in a few words."""
 
@@ -124,14 +127,27 @@ def low_speed_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
             tunable=False,
         )
 
-    def number(name: str, description: str, start: float) -> Parameter:
-        return Parameter(name=name, unit="1", description=description, minimum=0.0, maximum=3.0, start=start)
+    def number(name: str, description: str, start: float, maximum: float = 3.0) -> Parameter:
+        return Parameter(name=name, unit="1", description=description, minimum=0.0, maximum=maximum, start=start)
 
     return (
         length("draught_m", "ship.draught", "Draught"),
         length("propeller_diameter_m", "ship.propeller_diameter", "Diameter of the propeller"),
         number("low_speed.drag_coefficient", "Cross-flow drag coefficient of the hull at low speed", DRAG_COEFFICIENT),
         number("low_speed.rudder_astern", "Rudder force going astern over that ahead at one speed", RUDDER_ASTERN),
+        number(
+            "low_speed.straightening",
+            "Share of the stern's cross flow that reaches a rudder in the race",
+            STRAIGHTENING,
+            maximum=0.95,
+        ),
+        number(
+            "low_speed.thrust_deduction",
+            "Thrust deduction t, for the race at low speed",
+            THRUST_DEDUCTION,
+            maximum=0.95,
+        ),
+        number("low_speed.wake_fraction", "Wake fraction w, for the race at low speed", WAKE, maximum=0.95),
     )
 
 
@@ -235,10 +251,10 @@ class RudderAtU0:
 def rudder_factors(s: Symbols, X_bound: ca.SX, rudder: RudderAtU0) -> tuple[ca.SX, ca.SX]:
     """What the rudder's force at low speed has for that at u0: its factors of F_delta(u0) and of F_d(u0)."""
     u, u0, bound, astern = s["motion.u"], s["ship.speed"], lowest_speed(s), s["low_speed.rudder_astern"]
-    thrust = ca.fmax(0, nominal_thrust(s, X_bound)) / (1 - THRUST_DEDUCTION)
+    thrust = ca.fmax(0, nominal_thrust(s, X_bound)) / (1 - s["low_speed.thrust_deduction"])
     disc = ca.pi / 4 * s["ship.propeller_diameter"] ** 2
     # its root has a slope without thrust, too
-    race = 2 * thrust / ((1 - WAKE) ** 2 * s["ship.water_density"] * disc) + (STILL * u0) ** 2
+    race = 2 * thrust / ((1 - s["low_speed.wake_fraction"]) ** 2 * s["ship.water_density"] * disc) + (STILL * u0) ** 2
     k = ca.fmax(LEAST_RUDDER * (bound / u0) ** 2, ca.fmin(rudder.at_bound, 1))
     by_race = k * race / (bound**2 + race)
     # As a quotient of the two bounds' inverses it is regular for a card without Y_d.
@@ -251,4 +267,6 @@ def rudder_factors(s: Symbols, X_bound: ca.SX, rudder: RudderAtU0) -> tuple[ca.S
     # u|u| ahead, and the stated share of it astern
     stream = (1 + astern) / 2 * (u * ca.fabs(u)) + (1 - astern) / 2 * (u * u)
     stern = s["motion.v"] - 0.5 * s["ship.length"] * s["motion.r"]
-    return by_stream * stream + by_race * ahead**2, STRAIGHTENING * by_race / ca.sqrt(race) * ahead * stern
+    return by_stream * stream + by_race * ahead**2, s["low_speed.straightening"] * by_race / ca.sqrt(
+        race
+    ) * ahead * stern
