@@ -135,6 +135,7 @@ def test_a_faulty_sensor_leaves_the_card_and_corrects_the_trials(folder: Path, t
     assert {name: (folder / name).read_bytes() for name in before} == before
 
 
+@pytest.mark.slow
 def test_what_an_earlier_run_wrote_does_not_lie_there_as_if_it_were_of_this_one(
     folder: Path, tmp_path: Path, finding
 ) -> None:
@@ -153,6 +154,7 @@ def test_what_an_earlier_run_wrote_does_not_lie_there_as_if_it_were_of_this_one(
     assert tank2sim(*arguments, cwd=folder).returncode == 0 and not (tmp_path / "corrected").exists()
 
 
+@pytest.mark.slow
 def test_what_no_earlier_run_says_it_wrote_is_left(folder: Path, tmp_path: Path, finding) -> None:
     """Without a gap.json that names them, or as an input of this very run."""
     arguments = ("-o", str(tmp_path))

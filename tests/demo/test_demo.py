@@ -11,6 +11,8 @@ import pytest
 from tank2sim.cli.screen import json_text
 from tank2sim.demo.run import PAGE, STEPS, run_demo
 
+pytestmark = pytest.mark.slow  # the whole way, which the README's first command goes too
+
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, list[str]]:

@@ -68,6 +68,7 @@ def with_start(model: Model, name: str, start: float) -> Model:
     return replace(model, parameters=tuple(changed(parameter) for parameter in model.parameters))
 
 
+@pytest.mark.slow
 def test_another_coefficient_is_found_and_named(hull: Model, tmp_path: Path) -> None:
     write_fmu(with_start(hull, "derivatives.Yv", -0.1200001), tmp_path / "x.fmu")
     report = check_fmu(tmp_path / "x.fmu", model=hull)

@@ -18,7 +18,7 @@ from fmpy.ssp.ssd import read_ssd
 from fmpy.validation import validate_fmu
 from scipy.integrate import solve_ivp
 
-from tank2sim.analysis.heading_control import heading_autopilot
+from tank2sim.analysis.heading.control import heading_autopilot
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.export import ExportedFmu
 from tank2sim.fmu.ssp import ship_with_autopilot

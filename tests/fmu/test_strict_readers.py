@@ -18,7 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
-from tank2sim.analysis.heading_control import heading_autopilot
+from tank2sim.analysis.heading.control import heading_autopilot
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import read_card
 from tank2sim.dynamics import Model, build

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from tank2sim.analysis.stability import stability
+from tank2sim.analysis.stability.straight_line import stability
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import Model, build
 from tank2sim.dynamics.abkowitz import ALL_TERMS

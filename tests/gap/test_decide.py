@@ -46,7 +46,12 @@ def said(theta) -> module.Decision:
 
 @pytest.mark.parametrize(
     ("theta", "verdict", "effects"),
-    [((), NOTHING, ()), ((0.8,), MISSING, (YAW,)), ((0.0, -0.8), MISSING, (SURGE,)), ((0.9, 0.8), MISSING, NAMES[:2])],
+    [
+        pytest.param((), NOTHING, (), marks=pytest.mark.slow),
+        ((0.8,), MISSING, (YAW,)),
+        ((0.0, -0.8), MISSING, (SURGE,)),
+        ((0.9, 0.8), MISSING, NAMES[:2]),
+    ],
 )
 def test_what_is_hidden_in_the_toy_is_said(theta, verdict, effects) -> None:
     found = said(theta)

@@ -89,6 +89,7 @@ def test_a_current_is_found_and_proved_on_a_trial_held_out(made, tmp_path: Path)
     assert case.gap.equation == "kinematics"
 
 
+@pytest.mark.slow
 def test_where_nothing_is_hidden_nothing_is_named(made, tmp_path: Path) -> None:
     case = sought(tmp_path, made["nothing"], options=FEW)
     assert case.gap.verdict == NOTHING and case.named == set()

@@ -81,3 +81,22 @@ def test_a_tow_without_a_reading_is_refused(write):
 def test_a_file_without_speeds_is_refused(write):
     with pytest.raises(InputError, match="there is no speed; add a column speed_1_mps"):
         read_tows(write("t_s\n0\n1\n2\n3\n4\n"))
+
+
+def test_comments_describe_the_body(tmp_path):
+    path = tmp_path / "tow.csv"
+    rows = "".join(f"{t},{t / 100}\n" for t in range(6))
+    path.write_text(f"# length_m: 3.8\n# water_density_kgpm3: 1000\nt_s,speed_1_mps\n{rows}")
+    assert read_tows(path).body == {"length_m": 3.8, "water_density_kgpm3": 1000.0}
+    path.write_text(f"# length_m: -3.8\nt_s,speed_1_mps\n{rows}")
+    with pytest.raises(InputError, match=r"comment length_m: is -3\.8"):
+        read_tows(path)
+
+
+def test_tows_one_by_one():
+    tows = read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
+    second = tows.only(1)
+    assert second.names == ("speed_2_mps",) and 25.0 not in second.time_s and len(second.time_s) == 10
+    assert second.force_N == tows.force_N and second.speed_mps[2, 0] == 0.023
+    others = tows.without(1)
+    assert len(others.names) == 4 and others.counts.tolist() == [4, 4, 4, 4, 4, 4, 4, 4, 4, 4, 3]

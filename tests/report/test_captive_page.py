@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from tank2sim.identification.captive.findings import findings
 from tank2sim.identification.captive.reduction import Options, reduce_campaign
 from tank2sim.identification.captive.result_card import contents
@@ -11,6 +13,7 @@ from tank2sim.report.captive_results import reduction_charts
 from tank2sim.report.page import render_page
 
 
+@pytest.mark.slow
 def test_every_derivative_and_chart_of_a_campaign_is_on_its_page(data) -> None:
     reduction = reduce_campaign(read_campaign(data / "data" / "pmm_synthetic_11" / "campaign.toml"), Options())
     card, charts = contents(reduction, None), reduction_charts(reduction)

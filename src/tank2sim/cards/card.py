@@ -10,6 +10,9 @@ from tank2sim.cards.form import (
     Body,
     EffectEntry,
     Environment,
+    Glider,
+    GliderModel,
+    Programme,
     Propulsion,
     RigidBody,
     Ship,
@@ -17,6 +20,8 @@ from tank2sim.cards.form import (
     SteeringGear,
     Surge,
     SurgeModel,
+    YawRigModel,
+    YawRigSection,
 )
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
@@ -50,7 +55,7 @@ class Card:
     text: str
     ship: Body
     environment: Environment
-    model: ShipModel | SurgeModel
+    model: ShipModel | SurgeModel | GliderModel | YawRigModel
 
     def write(self, path: Path) -> None:
         """Write the card's text to a file, whole or not at all."""
@@ -117,4 +122,22 @@ class SurgeBodyCard(Card):
 
     model: SurgeModel
     surge: Surge
+    uncertainty: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class GliderCard(Card):
+    """Card of an underwater glider: paper 5 (Kulikovsky and Velikanov 2012), SI."""
+
+    model: GliderModel
+    glider: Glider
+
+
+@dataclass(frozen=True)
+class YawRigCard(Card):
+    """Card of a body on the yaw rig: (3) of paper 3 (Alyshev 2019), SI, and the programme that it runs."""
+
+    model: YawRigModel
+    yaw_rig: YawRigSection
+    programme: Programme | None = None
     uncertainty: Mapping[str, float] = field(default_factory=dict)

@@ -108,6 +108,20 @@ class SurgeModel(Section):
     valid_speed_mps: SpeedRange | None = None
 
 
+class GliderModel(Section):
+    """``[model]`` of an underwater glider."""
+
+    kind: Literal["glider"]
+    valid_speed_mps: SpeedRange | None = None
+
+
+class YawRigModel(Section):
+    """``[model]`` of a body that a motor turns in a tank."""
+
+    kind: Literal["yaw_rig"]
+    valid_speed_mps: SpeedRange | None = None
+
+
 class RigidBody(Section):
     """``[rigid_body]``: mass, yaw inertia about the origin, and position of the centre of gravity."""
 
@@ -140,6 +154,74 @@ class Surge(Section):
     B3_kgpm: float
     force_N: float = 0.0
     dry_mass_kg: Mass | None = None
+
+
+class Glider(Section):
+    """``[glider]``: mass, size and coefficients of an underwater glider, SI, incidence in rad.
+
+    C_L = ``lift_slope`` alpha + ``lift_quadratic`` alpha |alpha|; C_D = ``drag_zero`` + ``drag_quadratic`` alpha^2;
+    both with ``reference_area_m2``. ``mass_kg`` is that of hull and ballast, ``buoyancy_kg`` the size of the net
+    buoyancy (displaced mass less own mass) with which it usually glides.
+    """
+
+    mass_kg: Mass
+    volume_m3: Positive
+    buoyancy_kg: Mass
+    hull_mass_kg: Mass | None = None
+    reference_area_m2: Annotated[float, Field(ge=1e-6, le=1e6)]
+    lift_slope: Annotated[float, Field(ge=1e-3, le=1e4)]
+    lift_quadratic: Annotated[float, Field(ge=0.0, le=1e4)]
+    drag_zero: Annotated[float, Field(ge=1e-6, le=1e3)]
+    drag_quadratic: Annotated[float, Field(ge=1e-3, le=1e4)]
+    added_mass_axial_kg: Annotated[float, Field(ge=0.0, le=1e12)] = 0.0
+    added_mass_normal_kg: Annotated[float, Field(ge=0.0, le=1e12)] = 0.0
+    buoyancy_time_constant_s: TimeConstant = 10.0
+    pitch_time_constant_s: TimeConstant = 5.0
+    roll_time_constant_s: TimeConstant = 5.0
+
+
+class TankWalls(Section):
+    """``[yaw_rig.walls]``: a rectangular tank, where the body stands in it, and what its walls do; SI."""
+
+    length_m: Length = 1.6
+    breadth_m: Length = 1.4
+    x_m: float = 0.0
+    y_m: float = 0.0
+    body_length_m: Length
+    bow_inertia_kgm2: float = 0.0
+    stern_inertia_kgm2: float = 0.0
+    bow_damping_Nms: float = 0.0
+    stern_damping_Nms: float = 0.0
+
+
+class YawRigSection(Section):
+    """``[yaw_rig]``: coefficients of (3) of paper 3, motor, current loop and encoder, SI; as ``dynamics.yaw_rig``."""
+
+    inertia_kgm2: Annotated[float, Field(ge=1e-9, le=1e15)]
+    added_inertia_kgm2: float = 0.0
+    coulomb_Nm: float = 0.0
+    viscous_Nms: float = 0.0
+    quadratic_Nms2: float = 0.0
+    torque_constant_NmpA: Annotated[float, Field(ge=1e-6, le=1e6)]
+    current_lag_s: TimeConstant = 0.055
+    max_current_A: Annotated[float, Field(ge=1e-3, le=1e6)] = 1.0
+    inertia_accelerating_kgm2: float = 0.0
+    inertia_braking_kgm2: float = 0.0
+    braking_quadratic_Nms2: float | None = None
+    gravity_Nm: float = 0.0
+    gravity_angle_rad: float = 0.0
+    pulses_per_turn: Annotated[float, Field(ge=4, le=1e9)] = 3000.0
+    walls: TankWalls | None = None
+
+
+class Programme(Section):
+    """``[programme]`` of the yaw rig: the motion that is run."""
+
+    kind: Literal["unidirectional", "reversing", "full_turn"] = "unidirectional"
+    max_rate_radps: Annotated[float, Field(ge=-100, le=100)]
+    rise_s: Annotated[float, Field(ge=0.01, le=1e5)]
+    settle_s: Annotated[float, Field(ge=0, le=1e4)] = 0.5
+    humps: Annotated[int, Field(ge=1, le=1000)] = 5
 
 
 class EffectEntry(Section):
@@ -176,5 +258,33 @@ class SurgeCard(Section):
     uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
 
 
-FORMS: dict[str, type[ShipCard] | type[SurgeCard]] = {"linear": ShipCard, "abkowitz": ShipCard, "surge": SurgeCard}
+class GliderForm(Section):
+    """The card of an underwater glider, as in its file."""
+
+    format: Literal["tank2sim-ship/1"]
+    ship: Body
+    environment: Environment = Environment()
+    model: GliderModel
+    glider: Glider
+
+
+class YawRigForm(Section):
+    """The card of a body on the yaw rig, as in its file."""
+
+    format: Literal["tank2sim-ship/1"]
+    ship: Body
+    environment: Environment = Environment()
+    model: YawRigModel
+    yaw_rig: YawRigSection
+    programme: Programme | None = None
+    uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
+
+
+FORMS: dict[str, type[ShipCard] | type[SurgeCard] | type[GliderForm] | type[YawRigForm]] = {
+    "linear": ShipCard,
+    "abkowitz": ShipCard,
+    "surge": SurgeCard,
+    "glider": GliderForm,
+    "yaw_rig": YawRigForm,
+}
 """Kind of model to the form of its card."""

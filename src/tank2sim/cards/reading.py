@@ -14,8 +14,8 @@ from pydantic import ValidationError
 from tomlkit.exceptions import TOMLKitError
 
 from tank2sim.bundled import bundled_cards
-from tank2sim.cards.card import Card, ManoeuvringCard, SurgeBodyCard
-from tank2sim.cards.form import FORMS, EffectEntry, Propulsion, RigidBody, ShipCard, SurgeCard
+from tank2sim.cards.card import Card, GliderCard, ManoeuvringCard, SurgeBodyCard, YawRigCard
+from tank2sim.cards.form import FORMS, EffectEntry, GliderForm, Propulsion, RigidBody, ShipCard, SurgeCard, YawRigForm
 from tank2sim.cards.form_faults import form_fault, short, suggestion
 from tank2sim.cards.scaling import Scales, file_factor
 from tank2sim.cards.terms import parse_term
@@ -24,7 +24,7 @@ from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
 from tank2sim.units import to_si
 
 # Sections whose keys may give an angle in degrees or radians.
-_SECTIONS_WITH_ANGLES = ("steering_gear", "propulsion")
+_SECTIONS_WITH_ANGLES = ("steering_gear", "propulsion", "yaw_rig", "programme")
 
 
 def find_card(name: str) -> Path:
@@ -83,6 +83,10 @@ def parse_card(text: str, source: str) -> Card:
         raise form_fault(error, source, spelt, form=FORMS[kind], what="a card") from None
     if isinstance(form, ShipCard):
         return replace(_manoeuvring_card(form, text, source), spelt=spelt)
+    if isinstance(form, GliderForm):
+        return GliderCard(source, text, form.ship, form.environment, form.model, form.glider)
+    if isinstance(form, YawRigForm):
+        return _yaw_rig_card(form, text, source)
     return _surge_card(form, text, source)
 
 
@@ -248,6 +252,23 @@ def _surge_card(form: SurgeCard, text: str, source: str) -> SurgeBodyCard:
         environment=form.environment,
         model=form.model,
         surge=form.surge,
+        uncertainty=form.uncertainty,
+    )
+
+
+def _yaw_rig_card(form: YawRigForm, text: str, source: str) -> YawRigCard:
+    for key in form.uncertainty:
+        if key not in type(form.yaw_rig).model_fields:
+            known = suggestion(key, list(type(form.yaw_rig).model_fields))
+            raise InputError(source, f"uncertainty.{key}", "is no coefficient of [yaw_rig]", known)
+    return YawRigCard(
+        source=source,
+        text=text,
+        ship=form.ship,
+        environment=form.environment,
+        model=form.model,
+        yaw_rig=form.yaw_rig,
+        programme=form.programme,
         uncertainty=form.uncertainty,
     )
 

@@ -61,6 +61,48 @@ def surge_card_text(result: SurgeResult) -> str:
     return tomlkit.dumps(document)
 
 
+@dataclass(frozen=True, kw_only=True)
+class YawRigResult:
+    """What a card of a body on the yaw rig is made of.
+
+    Parameters
+    ----------
+    name, source, notes : str
+        What it is, where the numbers come from, and what a reader should know.
+    values, standard_errors : mapping
+        Keys of ``[yaw_rig]``, SI, to numbers.
+    programme : mapping
+        Keys of ``[programme]``.
+    water_density_kgpm3, length_m : float, optional
+        Where they are known.
+    """
+
+    name: str
+    source: str
+    notes: str
+    values: Mapping[str, float]
+    standard_errors: Mapping[str, float]
+    programme: Mapping[str, float | str]
+    water_density_kgpm3: float | None = None
+    length_m: float | None = None
+
+
+def yaw_rig_card_text(result: YawRigResult) -> str:
+    """TOML text of a card of a body on the yaw rig."""
+    document = tomlkit.document()
+    document["format"] = "tank2sim-ship/1"
+    length = {} if result.length_m is None else {"length_m": result.length_m}
+    notes = {"notes": result.notes} if result.notes else {}
+    document["ship"] = _table({"name": result.name, **length, "source": result.source, **notes})
+    if result.water_density_kgpm3 is not None:
+        document["environment"] = _table({"water_density_kgpm3": result.water_density_kgpm3})
+    document["model"] = _table({"kind": "yaw_rig"})
+    document["yaw_rig"] = _table(result.values)
+    document["programme"] = _table(result.programme)
+    document["uncertainty"] = _table(result.standard_errors)
+    return tomlkit.dumps(document)
+
+
 class DerivativeEntry(NamedTuple):
     """A derivative (prime, rudder positive to starboard), its standard error, and how it was found."""
 

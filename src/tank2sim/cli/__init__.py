@@ -25,6 +25,7 @@ COMMANDS = (
     "simulate",
     "reduce",
     "tow",
+    "yaw",
     "audit",
     "identify",
     "gap",
@@ -32,6 +33,9 @@ COMMANDS = (
     "export",
     "check",
     "stability",
+    "autopilot",
+    "influence",
+    "glide",
 )
 
 

@@ -34,7 +34,7 @@ class TakesSeveral(click.Command):
         taking = ""
         for word, following in pairwise([*args, "-"]):
             if word in self.several and following.startswith("-"):
-                what = "trial" if word == "--holdout" else "effect"
+                what = {"--holdout": "trial", "--figure": "figure", "--tune": "figure"}.get(word, "effect")
                 raise click.UsageError(f"{word} names no {what}", ctx)
             if word.startswith("-"):
                 taking = word if word in self.several else ""

@@ -7,9 +7,9 @@ from pathlib import Path
 import control
 import numpy as np
 
-from tank2sim.analysis.imo import Criterion, imo_criteria
 from tank2sim.analysis.linearisation import state_space, straight_course
-from tank2sim.analysis.stability import Stability, stability
+from tank2sim.analysis.stability.imo import Criterion, imo_criteria
+from tank2sim.analysis.stability.straight_line import Stability, stability
 from tank2sim.cards import linear, read_card
 from tank2sim.demo.workshop import Outcome, Workshop, error_words, largest_error, output_errors
 from tank2sim.dynamics import Model, build

@@ -15,8 +15,8 @@ from tank2sim.dynamics.model import Model, Vector
 from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.manoeuvre import Manoeuvre
 from tank2sim.fmu.replay import replay
-from tank2sim.identification.tow import TowResult, identify_tow
-from tank2sim.identification.tow_card import tow_card_text
+from tank2sim.identification.tow.card import tow_card_text
+from tank2sim.identification.tow.identify import TowResult, identify_tow
 from tank2sim.records.tows import Tows, read_tows
 from tank2sim.report.charts import Tow, chart_png, tow_chart
 from tank2sim.report.page import Column, Figure, Illustration, Section, Table, Verdict

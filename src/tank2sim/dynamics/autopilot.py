@@ -3,16 +3,20 @@
     e      = heading.command - motion.psi, brought within half a turn
     order  = Kp e - Kd r + z
     rudder = order, within the limit
-    dz/dt  = Ki (e, within the band) + (rudder - order)/Tt
+    dz/dt  = Ki (e, within the band) + (rudder - order, within -z and 0)/Tt
 
 The integral takes no more of a heading error than its band, so that a change of course, which is no disturbance, does
 not fill it. The term in Tt empties the integral z while the rudder is at its limit (back-calculation): Astrom &
-Hagglund (2006), Advanced PID Control, 3.5. The yaw rate r takes the place of the derivative of the heading, so that a
-new order gives no kick: Fossen (2011), Handbook of Marine Craft Hydrodynamics and Motion Control, 12.2.
+Hagglund (2006), Advanced PID Control, 3.5. It empties z and no more: a large change of course alone orders far more
+than the limit, and would fill z the other way, so that the ship crept to her new course.
+
+The yaw rate r takes the place of the derivative of the heading, so that a new order gives no kick: Fossen (2011),
+Handbook of Marine Craft Hydrodynamics and Motion Control, 12.2.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -53,6 +57,8 @@ def autopilot_model(name: str, gains: HeadingGains, step_s: float) -> Model:
 
     Its inputs and its output are called as the signals of the ship that they are joined to.
 
+    Without an integral gain it has no state.
+
     Parameters
     ----------
     name : str
@@ -60,28 +66,101 @@ def autopilot_model(name: str, gains: HeadingGains, step_s: float) -> Model:
     step_s : float
         Step of the integration of its one state, s.
     """
-    psi, r, command = inputs = _inputs()
-    Kp, Kd, Ki, tracking, band, limit, start = parameters = _parameters(gains)
-    integral = _integral(start)
-    turned = command.symbol - psi.symbol
-    error = _angle(
-        "heading.error", "Ordered less actual heading, -180 to 180 deg", ca.atan2(ca.sin(turned), ca.cos(turned))
-    )
-    wish = Kp.symbol * error.symbol - Kd.symbol * r.symbol + integral.symbol
-    wanted = _angle("autopilot.demand", "Rudder that the controller would order without its limit", wish)
-    put = _within(wanted.symbol, limit.symbol)
+    psi, r, command = inputs = heading_signals()
+    Kp, Kd, Ki, band = parameters = _parameters(gains)
+    error = heading_error(psi, command)
+    held = HeldRudder(gains.anti_windup_time_s, gains.largest_rudder_rad)
+    demand = Kp.symbol * error.symbol - Kd.symbol * r.symbol
+    if gains.integral == 0:
+        own, described = held.without_integral(demand), "Heading autopilot: PD with limits"
+        return steered_by(name, described, (*inputs, Kp, Kd, error), own, step_s)
+    own = held.variables(demand, Ki.symbol * within(error.symbol, band.symbol))
+    described = "Heading autopilot: PID with limits and anti-windup"
+    return steered_by(name, described, (*inputs, *parameters, error), own, step_s)
+
+
+@dataclass(frozen=True)
+class HeldRudder:
+    """The integral of a controller, its limit and its anti-windup: all that is alike in every design.
+
+    Parameters
+    ----------
+    anti_windup_time_s : float
+        Tt, s.
+    largest_rudder_rad : float
+        The rudder is ordered no further either way.
+    """
+
+    anti_windup_time_s: float
+    largest_rudder_rad: float
+
+    def variables(self, demand: ca.SX, growth: ca.SX) -> tuple[Variable, ...]:
+        """Variables of order = demand + z, within the limit, and dz/dt = growth + (rudder - order, within -z and 0)/Tt.
+
+        Parameters
+        ----------
+        demand : casadi.SX
+            Rudder without the integral, rad.
+        growth : casadi.SX
+            Rate of the integral away from the limit, rad/s.
+        """
+        tracking, start, most = parameters = self._parameters()
+        integral = _integral(start)
+        wanted, order = _limited(demand + integral.symbol, most)
+        z = integral.symbol
+        emptied = ca.fmax(-ca.fmax(z, 0), ca.fmin(-ca.fmin(z, 0), order.symbol - wanted.symbol))
+        rate = Quantity(
+            name="autopilot.integral_rate",
+            unit="rad/s",
+            description="Rate of the integral",
+            display_unit="deg/s",
+            nominal=1e-3,
+            value=growth + emptied / tracking.symbol,
+        )
+        return (*parameters, integral, wanted, order, rate)
+
+    def without_integral(self, demand: ca.SX) -> tuple[Variable, ...]:
+        """Variables of order = demand, within the limit."""
+        most = self._parameters()[-1]
+        return (most, *_limited(demand, most))
+
+    def _parameters(self) -> tuple[Parameter, Parameter, Parameter]:
+        return (
+            Parameter(
+                name="autopilot.anti_windup_time",
+                unit="s",
+                description="Time in which the integral is emptied while the rudder is at its limit",
+                minimum=1e-3,
+                nominal=self.anti_windup_time_s,
+                start=self.anti_windup_time_s,
+            ),
+            Parameter(
+                name="initial.integral",
+                unit="rad",
+                description="Rudder held against steady disturbances at the start, positive to starboard",
+                display_unit="deg",
+                start=0.0,
+                nominal=0.1,
+                tunable=False,
+            ),
+            limit("autopilot.max_rudder", "Largest rudder order either way", self.largest_rudder_rad),
+        )
+
+
+def _limited(demand: ca.SX, most: Parameter) -> tuple[Quantity, Quantity]:
+    wanted = _angle("autopilot.demand", "Rudder that the controller would order without its limit", demand)
+    put = within(wanted.symbol, most.symbol)
     order = _angle("rudder.command", "Rudder order, positive to starboard (turns the ship to starboard)", put)
-    rate = Quantity(
-        name="autopilot.integral_rate",
-        unit="rad/s",
-        description="Rate of the integral",
-        display_unit="deg/s",
-        nominal=1e-3,
-        value=Ki.symbol * _within(error.symbol, band.symbol) + (order.symbol - wanted.symbol) / tracking.symbol,
-    )
+    return wanted, order
+
+
+def steered_by(
+    name: str, description: str, given: Sequence[Variable], held: Sequence[Variable], step_s: float
+) -> Model:
+    """A model of a controller of its variables; outputs ``rudder.command`` and ``heading.error``."""
     empty = Model(
         name=name,
-        description="Heading autopilot: PID with limits and anti-windup",
+        description=description,
         states=(),
         inputs=(),
         parameters=(),
@@ -89,11 +168,19 @@ def autopilot_model(name: str, gains: HeadingGains, step_s: float) -> Model:
         outputs=(),
         step_s=step_s,
     )
-    variables: tuple[Variable, ...] = (*inputs, *parameters, integral, error, wanted, order, rate)
-    return empty.extend(*variables, outputs=(order.name, error.name))
+    return empty.extend(*given, *held, outputs=("rudder.command", "heading.error"))
 
 
-def _inputs() -> tuple[Input, ...]:
+def heading_error(psi: Input, command: Input) -> Quantity:
+    """Ordered less actual heading, the short way round."""
+    turned = command.symbol - psi.symbol
+    return _angle(
+        "heading.error", "Ordered less actual heading, -180 to 180 deg", ca.atan2(ca.sin(turned), ca.cos(turned))
+    )
+
+
+def heading_signals() -> tuple[Input, ...]:
+    """Inputs of every heading autopilot: ``motion.psi``, ``motion.r``, ``heading.command``."""
     described = (
         ("motion.psi", "rad", "Heading of the ship, clockwise from north", "deg", 1.0),
         ("motion.r", "rad/s", "Yaw rate of the ship, positive to starboard", "deg/min", 0.01),
@@ -116,38 +203,14 @@ def _parameters(gains: HeadingGains) -> tuple[Parameter, ...]:
             Parameter(name=name, unit=unit, description=description, start=start, nominal=abs(start) or 1.0)
             for name, unit, description, start in described
         ),
-        Parameter(
-            name="autopilot.anti_windup_time",
-            unit="s",
-            description="Time in which the integral is emptied while the rudder is at its limit",
-            minimum=1e-3,
-            nominal=gains.anti_windup_time_s,
-            start=gains.anti_windup_time_s,
-        ),
-        *(
-            Parameter(
-                name=name,
-                unit="rad",
-                description=description,
-                display_unit="deg",
-                minimum=0.0,
-                nominal=start,
-                start=start,
-            )
-            for name, description, start in (
-                ("autopilot.integral_band", "Most of a heading error that Ki acts on", gains.integral_band_rad),
-                ("autopilot.max_rudder", "Largest rudder order either way", gains.largest_rudder_rad),
-            )
-        ),
-        Parameter(
-            name="initial.integral",
-            unit="rad",
-            description="Rudder held against steady disturbances at the start, positive to starboard",
-            display_unit="deg",
-            start=0.0,
-            nominal=0.1,
-            tunable=False,
-        ),
+        limit("autopilot.integral_band", "Most of a heading error that Ki acts on", gains.integral_band_rad),
+    )
+
+
+def limit(name: str, description: str, start: float) -> Parameter:
+    """A parameter that bounds an angle either way; `start` in rad."""
+    return Parameter(
+        name=name, unit="rad", description=description, display_unit="deg", minimum=0.0, nominal=start, start=start
     )
 
 
@@ -167,5 +230,6 @@ def _angle(name: str, description: str, value: ca.SX) -> Quantity:
     return Quantity(name=name, unit="rad", description=description, display_unit="deg", nominal=0.35, value=value)
 
 
-def _within(value: ca.SX, limit: ca.SX) -> ca.SX:
-    return ca.fmax(-limit, ca.fmin(limit, value))
+def within(value: ca.SX, bound: ca.SX) -> ca.SX:
+    """The value, no further from 0 than the bound."""
+    return ca.fmax(-bound, ca.fmin(bound, value))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import difflib
 
-from tank2sim.cards.card import Card, ManoeuvringCard, SurgeBodyCard
+from tank2sim.cards.card import Card, GliderCard, ManoeuvringCard, SurgeBodyCard, YawRigCard
 from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.glider import glider_model
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import ship_model
 from tank2sim.dynamics.surge import SurgeCoefficients, surge_model
+from tank2sim.dynamics.yaw_rig import rig_of, yaw_rig_model
 from tank2sim.units import from_si
 
 
@@ -31,6 +33,10 @@ def build(card: Card) -> Model:
             B3_kgpm=surge.B3_kgpm,
         )
         return surge_model(card.ship.name, coefficients, surge.force_N, valid_speed_mps=card.model.valid_speed_mps)
+    if isinstance(card, GliderCard):
+        return glider_model(card)
+    if isinstance(card, YawRigCard):
+        return yaw_rig_model(card.ship.name, rig_of(card))
     if not isinstance(card, ManoeuvringCard):
         raise TypeError(f"no model for {type(card).__name__}")
     model = ship_model(card)

@@ -18,13 +18,13 @@ def earth_velocity(u: ca.SX, v: ca.SX, psi: ca.SX) -> tuple[ca.SX, ca.SX]:
     return u * ca.cos(psi) - v * ca.sin(psi), u * ca.sin(psi) + v * ca.cos(psi)
 
 
-def kinematics(body: Mapping[str, State]) -> tuple[Variable, ...]:
+def kinematics(body: Mapping[str, Variable]) -> tuple[Variable, ...]:
     """Variables of position and heading, and what follows from them over the ground.
 
     Parameters
     ----------
     body : mapping
-        The states ``motion.u``, ``motion.v`` (m/s, through the water) and ``motion.r`` (rad/s).
+        ``motion.u``, ``motion.v`` (m/s, through the water) and ``motion.r`` (rad/s).
 
     Returns
     -------

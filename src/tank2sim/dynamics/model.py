@@ -254,6 +254,29 @@ class Model:
             notices=(*self.notices, *notices),
         )
 
+    def with_constant_inputs(self, names: Iterable[str]) -> Model:
+        """A model in which the inputs of these names are parameters, constant at what they start at."""
+        given = set(names)
+        held = [one for one in self.inputs if one.name in given]
+        constants = tuple(
+            _same_symbol(
+                one,
+                Parameter(
+                    name=one.name,
+                    unit=one.unit,
+                    description=one.description,
+                    nominal=one.nominal,
+                    minimum=one.minimum,
+                    maximum=one.maximum,
+                    display_unit=one.display_unit,
+                    start=one.start,
+                ),
+            )
+            for one in held
+        )
+        left = tuple(one for one in self.inputs if one.name not in given)
+        return replace(self, inputs=left, parameters=(*self.parameters, *constants))
+
     # -- what is derived ---------------------------------------------------------------------------------------------
 
     @cached_property
@@ -354,7 +377,7 @@ def _values(variables: tuple[Parameter, ...] | tuple[Input, ...], changed: Mappi
     return np.array([changed.get(variable.name, variable.start) for variable in variables], dtype=float)
 
 
-def _same_symbol(old: Kind, new: Kind) -> Kind:
+def _same_symbol(old: Variable, new: Kind) -> Kind:
     # cached_property stores in __dict__, so this keeps the symbol that other expressions already use.
     new.__dict__["symbol"] = old.symbol
     return new

@@ -62,6 +62,20 @@ _PLACES = {
     "surge.B1": ("surge", "B1_kgs2pm3"),
     "surge.B2": ("surge", "B2_kgspm2"),
     "surge.B3": ("surge", "B3_kgpm"),
+    "glider.mass": ("glider", "mass_kg"),
+    "glider.added_mass_axial": ("glider", "added_mass_axial_kg"),
+    "glider.added_mass_normal": ("glider", "added_mass_normal_kg"),
+    "glider.reference_area": ("glider", "reference_area_m2"),
+    "glider.lift_slope": ("glider", "lift_slope"),
+    "glider.lift_quadratic": ("glider", "lift_quadratic"),
+    "glider.drag_zero": ("glider", "drag_zero"),
+    "glider.drag_quadratic": ("glider", "drag_quadratic"),
+    "glider.water_density": ("environment", "water_density_kgpm3"),
+    "glider.gravity": ("environment", "gravity_mps2"),
+    "buoyancy.command": ("glider", "buoyancy_kg"),
+    "buoyancy.time_constant": ("glider", "buoyancy_time_constant_s"),
+    "pitch.time_constant": ("glider", "pitch_time_constant_s"),
+    "roll.time_constant": ("glider", "roll_time_constant_s"),
 }
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 
-from tank2sim.analysis.heading_control import DAMPING, SLOWNESS, heading_autopilot
-from tank2sim.analysis.stability import stability
+from tank2sim.analysis.heading.control import DAMPING, SLOWNESS, heading_autopilot
+from tank2sim.analysis.stability.straight_line import stability
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.export import ExportedFmu, make_fmu, zipped
@@ -54,7 +54,7 @@ def ship_with_autopilot(
     ------
     InputError
         No autopilot can be designed for the ship, or its FMU cannot be made: see
-        :func:`tank2sim.analysis.heading_control.heading_autopilot` and :func:`tank2sim.fmu.export.make_fmu`.
+        :func:`tank2sim.analysis.heading.control.heading_autopilot` and :func:`tank2sim.fmu.export.make_fmu`.
     """
     autopilot = heading_autopilot(ship)
     steered = make_fmu(autopilot, fmi=made.fmi, documents=_documents(ship, autopilot), platforms=platforms, told=told)

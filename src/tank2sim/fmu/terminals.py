@@ -16,6 +16,9 @@ _DESCRIPTIONS = {
     "wind": "True wind",
     "water": "Water under the ship",
     "heading": "Heading order",
+    "buoyancy": "Net buoyancy: order and actual",
+    "pitch": "Pitch: order and actual",
+    "roll": "Roll: order and actual",
 }
 
 _TERMINAL_OF = {"rudder": "steering", "propeller": "propulsion"}

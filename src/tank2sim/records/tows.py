@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,9 @@ from tank2sim.records.csv_table import Table, Vector, read_table
 _SPEED = re.compile(r"speed_([1-9]\d*)_mps")
 FEWEST_TIMES = 5
 """Times at which a speed must be known: the release, three for a quadratic, and one to show whether that fits."""
+
+BODY_KEYS = ("length_m", "beam_m", "volume_m3", "water_density_kgpm3", "kinematic_viscosity_m2ps")
+"""Comments that describe the body and the water, all positive; they turn drag into coefficients."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,8 @@ class Tows:
         nan where nothing was recorded; each row and each tow has at least one reading.
     force_N, mass_kg : float or None
         Towing force and mass of the body with the water in it, where the file tells them.
+    body : dict
+        What else the file tells of the body and the water, SI: the keys of :data:`BODY_KEYS` to numbers.
     """
 
     path: Path
@@ -41,6 +46,7 @@ class Tows:
     speed_mps: NDArray[np.float64]
     force_N: float | None = None
     mass_kg: float | None = None
+    body: dict[str, float] = field(default_factory=dict)
 
     @property
     def counts(self) -> NDArray[np.int64]:
@@ -59,9 +65,25 @@ class Tows:
         """The highest reading."""
         return float(np.nanmax(self.speed_mps))
 
+    def only(self, number: int) -> Tows:
+        """One of the tows by itself, from 0, at the times when it was read."""
+        return self._of([number])
+
+    def without(self, number: int) -> Tows:
+        """All tows but one."""
+        return self._of([other for other in range(len(self.names)) if other != number])
+
+    def _of(self, numbers: list[int]) -> Tows:
+        speed = self.speed_mps[:, numbers]
+        read = ~np.isnan(speed).all(axis=1)
+        names = tuple(self.names[number] for number in numbers)
+        return replace(self, names=names, time_s=self.time_s[read], speed_mps=speed[read])
+
 
 def read_tows(path: Path | str) -> Tows:
     """Read tows: ``t_s,speed_1_mps,speed_2_mps,...``, with comments ``# force_N: 11.63`` and ``# mass_kg: 2243``.
+
+    The body may be described by further comments (:data:`BODY_KEYS`), as in ``# length_m: 3.8``.
 
     Rows without any reading are left out.
 
@@ -90,7 +112,9 @@ def read_tows(path: Path | str) -> Tows:
     if np.count_nonzero(read) < FEWEST_TIMES:
         problem = f"has readings at {np.count_nonzero(read)} times only"
         raise InputError(table.path, "", problem, f"give readings at {FEWEST_TIMES} times or more")
-    return Tows(table.path, names, time[read], speed[read], _positive(table, "force_N"), _positive(table, "mass_kg"))
+    force, mass = _positive(table, "force_N"), _positive(table, "mass_kg")
+    body = {key: value for key in BODY_KEYS if (value := _positive(table, key)) is not None}
+    return Tows(table.path, names, time[read], speed[read], force, mass, body)
 
 
 def _check_name(table: Table, name: str) -> None:

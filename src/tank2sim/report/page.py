@@ -125,10 +125,10 @@ def render_page(page: Page) -> str:
         figures=[(figure, _shown(figure.value)) for figure in page.figures],
         sections=sections,
         version=__version__,
-        style=Markup(_beside("page.css")),
-        script=Markup(_beside("page.js")),
+        style=Markup(beside("page.css")),
+        script=Markup(beside("page.js")),
         library=Markup(_vega()) if specifications else None,
-        drawings=_json_in_html({"light": LIGHT, "dark": DARK, "locale": LOCALE, "charts": specifications}),
+        drawings=json_in_html({"light": LIGHT, "dark": DARK, "locale": LOCALE, "charts": specifications}),
     )
 
 
@@ -210,13 +210,15 @@ def _paragraphs(text: str) -> Iterable[str]:
     return [part.strip() for part in text.split("\n\n") if part.strip()]
 
 
-def _json_in_html(value: object) -> Markup:
+def json_in_html(value: object) -> Markup:
+    """JSON of a value, to stand in a script element of a page."""
     # Inside <script> the reader of HTML looks for "</script" and "<!--" even within strings of JSON.
     text = json.dumps(value, allow_nan=False, sort_keys=True, separators=(",", ":"))
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
 
 
-def _beside(name: str) -> str:
+def beside(name: str) -> str:
+    """Text of a file that lies beside this one."""
     return importlib.resources.files("tank2sim.report").joinpath(name).read_text(encoding="utf-8")
 
 

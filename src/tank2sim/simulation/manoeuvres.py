@@ -302,7 +302,7 @@ def _until_steady(running: Running, ship_time: float, at_most: float) -> None:
     """Run until the yaw rate has not changed over two ship lengths (:data:`STEADY_CHANGE`)."""
     end = running.time + at_most
     before = math.inf
-    while running.time < end:
+    while end - running.time > 1e-6 * ship_time:  # what rounding leaves is no time to run
         running.run(min(2 * ship_time, end - running.time))
         now = running.state("motion.r")
         if abs(now - before) < STEADY_CHANGE * max(abs(now), 0.01 / ship_time):

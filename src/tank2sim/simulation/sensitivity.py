@@ -72,7 +72,7 @@ class Sensitivity:
         pieces, rows, nx = states.shape
         k = len(self.free)
         flat = inputs[:, :-1].reshape(-1, inputs.shape[2])
-        steps = self._tangents(states[:, :-1].reshape(-1, nx), flat, p, h).reshape(pieces, rows - 1, nx, nx + k)
+        steps = self.tangents(states[:, :-1].reshape(-1, nx), flat, p, h).reshape(pieces, rows - 1, nx, nx + k)
         A, B = steps[..., :nx], steps[..., nx:]
         S = np.zeros((pieces, rows, nx, nx + k))
         S[:, 0, :, :nx] = np.eye(nx)
@@ -86,22 +86,25 @@ class Sensitivity:
         by[..., nx:] += D.reshape(pieces, rows, k, ny).transpose(0, 1, 3, 2)
         return seen.reshape(pieces, rows, ny), by, S[:, -1]
 
-    def _tangents(self, states: Array, inputs: Array, p: Vector, h: float) -> Array:
+    def tangents(self, states: Array, inputs: Array, p: Vector, h: float | Array) -> Array:
         """State after a step from each of `states` (n, nx), derived by it and by the parameters, (n, nx, nx + k).
+
+        Each step takes `h` s, or its own of `h` (n,).
 
         The derivative of the Runge-Kutta step by the chain rule over its four slopes: their Jacobians are small
         functions, which compile many times faster than that of the whole step.
         """
         n, nx = states.shape
         k = len(self.free)
+        h = np.broadcast_to(np.asarray(h, dtype=float), n)[:, None]
         start = np.zeros((n, nx, nx + k))
         start[:, :, :nx] = np.eye(nx)
         total = start.copy()
         at, by = states, start
-        for weight, reach in ((1, h / 2), (2, h / 2), (2, h), (1, 0.0)):
+        for weight, reach in ((1, h / 2), (2, h / 2), (2, h), (1, 0 * h)):
             slope, by_state, by_theta = self._slopes(at, inputs, p)
             tangent = by_state.reshape(n, nx, nx).transpose(0, 2, 1) @ by
             tangent[:, :, nx:] += by_theta.reshape(n, k, nx).transpose(0, 2, 1)
-            total += h / 6 * weight * tangent
-            at, by = states + reach * slope, start + reach * tangent
+            total += (h / 6 * weight)[..., None] * tangent
+            at, by = states + reach * slope, start + reach[..., None] * tangent
         return total

@@ -123,7 +123,9 @@ def test_one_bad_run_among_sound_ones_is_told_and_left_out(sound, name, column, 
     assert {n: d.value for n, d in rest.derivatives.items()} == {n: d.value for n, d in alone.derivatives.items()}
 
 
-@pytest.mark.parametrize("seed", range(30, 60))
+@pytest.mark.parametrize(
+    "seed", [*range(30, 36), *(pytest.param(one, marks=pytest.mark.slow) for one in range(36, 60))]
+)
 def test_no_run_of_a_sound_campaign_is_at_fault(tmp_path, seed):
     kinds = [
         {},

@@ -144,6 +144,7 @@ def test_asymmetry_of_a_single_screw_is_found(tmp_path):
         assert abs(derivative.value) > 3 * derivative.standard_error
 
 
+@pytest.mark.slow
 def test_symmetry_is_tested_when_asked_for(tmp_path):
     written = write(Campaign(seed=4, rate_hz=10.0), tmp_path)
     campaign = read_campaign(written.path)

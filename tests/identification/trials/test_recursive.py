@@ -31,6 +31,7 @@ def test_one_pass_comes_near(problem, found):
     assert abs(once.values[list(TRUTH).index("Nd")] / TRUTH["Nd"] - 1) < 0.1
 
 
+@pytest.mark.slow
 def test_intervals_contain_the_truth_as_often_as_they_say():
     each = [recursive(pushed_problem(seed)[0], settings=Settings(passes=2)) for seed in range(3)]
     scaled = np.array([(one.values - VALUES) / one.standard_errors for one in each])

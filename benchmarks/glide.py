@@ -1,0 +1,124 @@
+"""The underwater glider of Kulikovsky and Velikanov (2012): every figure of the corrected paper beside what is found.
+
+The figures on the left were computed independently from the corrected equations, to the digits shown.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+
+from tank2sim.analysis.glide.design import best_glide, fastest_glide
+from tank2sim.analysis.glide.path import fly
+from tank2sim.analysis.glide.steady import (
+    SteadyGlide,
+    force_residual,
+    glide_as_printed,
+    radius_as_printed,
+    smallest_angle,
+    steady_glide,
+)
+from tank2sim.analysis.glide.swing import swing_errors
+from tank2sim.analysis.glide.transient import compare, equilibrium, quasi_steady_error
+from tank2sim.bundled import bundled
+from tank2sim.cards import GliderCard, read_card
+from tank2sim.dynamics import build
+from tank2sim.simulation.glide_programme import read_programme
+from tank2sim.simulation.integrator import Integrator
+
+GLIDES = {
+    25: (3.2402, 0.6798, 0.3170, 0.2034, 21.760),
+    30: (2.1603, 0.4499, 0.2598, 0.2444, 27.840),
+    35: (1.6578, 0.3441, 0.2410, 0.2718, 33.342),
+    45: (1.0914, 0.2257, 0.2257, 0.3119, 43.909),
+}
+TURNS = {5: (2.1728, 0.2442, 12.034), 10: (2.2114, 0.2434, 5.933), 20: (2.3834, 0.2399, 2.792)}
+PRINTED = {30: (12.75, 0.0972), 45: (23.97, 0.0619)}
+PLACES = {
+    6: (127.018, 0.0, -73.334, 0.0),
+    7: (138.844, 14.266, -85.544, 1.757),
+    12: (119.215, 118.279, -24.432, 1.757),
+}
+
+
+def beside(what: str, expected: tuple[float, ...], found: tuple[float, ...]) -> None:
+    """A line: what it is, the figures expected, those found."""
+    print(f"  {what:30} {'  '.join(f'{x:9.4f}' for x in expected)}   | {'  '.join(f'{x:9.4f}' for x in found)}")
+
+
+def steady(card: GliderCard) -> None:
+    """Steady glides, turns and the printed equations."""
+    least = smallest_angle(card)
+    at_least = steady_glide(card, least)
+    print("expected | found")
+    beside(
+        "smallest angle, its alpha, deg", (23.385, 4.822), (math.degrees(least), -math.degrees(at_least.incidence_rad))
+    )
+    residual = 0.0
+    print("eps: alpha deg, C_L, C_D, v m/s, theta deg")
+    for angle, expected in GLIDES.items():
+        glide = steady_glide(card, math.radians(-angle))
+        residual = max(residual, *map(abs, force_residual(card, glide)))
+        found = (glide.lift_coefficient, glide.drag_coefficient, glide.speed_mps, -math.degrees(glide.pitch_rad))
+        beside(f"{angle}", expected, (math.degrees(glide.incidence_rad), *found))
+    print("turn at eps 30, gamma: alpha deg, v m/s, R m")
+    for roll, expected in TURNS.items():
+        glide = steady_glide(card, math.radians(-30), roll_rad=math.radians(roll))
+        residual = max(residual, *map(abs, force_residual(card, glide)))
+        beside(f"{roll}", expected, (math.degrees(glide.incidence_rad), glide.speed_mps, glide.turning_radius_m))
+    print(f"  largest residual of forces, three axes: {residual:.1e} N (aim: below 1e-10)")
+    print("as printed, (8) and (10), eps: alpha deg, v m/s")
+    for angle, expected in PRINTED.items():
+        glide = glide_as_printed(card, math.radians(-angle))
+        beside(f"{angle}", expected, (math.degrees(glide.incidence_rad), glide.speed_mps))
+    _printed_turn(card, steady_glide(card, math.radians(-30), roll_rad=math.radians(5)))
+    frontal = read_card("kulikovsky-velikanov", {"glider.reference_area_m2": 0.0356})
+    assert isinstance(frontal, GliderCard)
+    ratio = steady_glide(frontal, math.radians(30)).speed_mps / steady_glide(card, math.radians(30)).speed_mps
+    beside("speed with frontal area, ratio", (2.1,), (ratio,))
+
+
+def _printed_turn(card: GliderCard, glide: SteadyGlide) -> None:
+    radius = radius_as_printed(card, glide.lift_coefficient, glide.path_angle_rad, glide.roll_rad)
+    right, printed = math.degrees(100 * glide.turn_rate_radps), math.degrees(100 * glide.speed_mps / radius)
+    beside("R printed by right, eps 30", (1.54,), (radius / glide.turning_radius_m,))
+    beside("deg in 100 s: right, printed", (100.7, 75.5), (right, printed))
+
+
+def main() -> None:
+    card = read_card("kulikovsky-velikanov")
+    assert isinstance(card, GliderCard)
+    steady(card)
+    programme = read_programme(bundled("models", "kulikovsky-velikanov", "programme.csv"))
+    path = fly(card, programme)
+    print("sample path after step: x, lateral, height m, heading rad")
+    for step, expected in PLACES.items():
+        beside(f"{step}", expected, path.places[step][1:])
+    fast = fastest_glide(card)
+    print(f"best glide {1 / math.tan(-best_glide(card).path_angle_rad):.4f} m over the ground per m of depth; fastest")
+    print(f"  at {-math.degrees(fast.path_angle_rad):.3f} deg, {fast.horizontal_speed_mps:.4f} m/s over the ground")
+    model = build(card)
+    integrator = Integrator(model)
+    apart = max(
+        abs(equilibrium(model, glide).speed_mps - glide.speed_mps)
+        for glide in (steady_glide(card, math.radians(angle)) for angle in (-25, -30, 45, 70))
+    )
+    print(f"equilibria of the transient model against the closed form: {apart:.1e} m/s apart")
+    for roll in TURNS:
+        glide = steady_glide(card, math.radians(-30), roll_rad=math.radians(roll))
+        wider = equilibrium(model, glide).turning_radius_m / glide.turning_radius_m - 1
+        print(f"  added mass changes the radius at {roll} deg of roll by {100 * wider:+.3f} %")
+    begin = time.perf_counter()
+    found = compare(integrator, path)
+    print(f"sample path by the transient model: {found.distance_m[-1]:.2f} m from the end, {100 * found.share:.2f} %")
+    print(f"  in {time.perf_counter() - begin:.3f} s for {path.places[-1].time_s:.0f} s")
+    for one in quasi_steady_error(card, integrator):
+        told = ", ".join(f"{t:g} s {100 * e:.3g} %" for t, e in zip(one.duration_s, one.share, strict=True))
+        print(f"quasi-steady path, steps, {one.label}: {told}")
+    for swing in swing_errors(card, integrator):
+        told = ", ".join(f"{t:g} s {100 * e:.3g} %" for t, e in zip(swing.period_s, swing.share, strict=True))
+        print(f"quasi-steady motion, swings, {swing.label}: {told}")
+
+
+if __name__ == "__main__":
+    main()

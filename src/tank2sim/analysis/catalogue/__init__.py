@@ -1,0 +1,1 @@
+"""Published steering models side by side on one ship."""

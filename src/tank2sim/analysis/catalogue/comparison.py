@@ -1,0 +1,170 @@
+"""The models of a steering card beside each other: steady turns, manoeuvres, influence, and what is not known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from tank2sim.analysis.catalogue.tables import (
+    RUDDERS_DEG,
+    CombinedPrediction,
+    InfluenceTable,
+    ModelTurns,
+    combined_prediction,
+    complete,
+    draught_polynomials,
+    form_of,
+    influence_of,
+    model_of,
+    not_given,
+    turns_of,
+)
+from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning, WantedTurn, levers_of_form, tune_to_two_points
+from tank2sim.cards.steering_card import SteeringCard
+from tank2sim.errors import InputError
+from tank2sim.simulation.figures import Figures
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Turn, Zigzag
+from tank2sim.simulation.run import simulate
+from tank2sim.simulation.trajectory import Trajectory
+
+ZIGZAG_DEG = 10.0
+"""Rudder and heading of the zigzag by which the models are compared (MSC.137(76))."""
+
+
+@dataclass(frozen=True)
+class ModelRuns:
+    """Manoeuvres of one model: a turning circle, its figures, and those of the 10/10 zigzag."""
+
+    turn: Trajectory
+    turn_figures: Figures
+    zigzag_figures: Figures
+
+
+@dataclass(frozen=True)
+class SteeringComparison:
+    """The models of a card, compared on its ship.
+
+    Parameters
+    ----------
+    ship : str
+        Name of the ship.
+    main : str
+        The model that printed influence and tuning are about.
+    rudder_deg : float
+        Rudder of the influence and of the turning circle.
+    turns : tuple of ModelTurns
+        Steady turns of every complete model at the rudders of Table 1.
+    influence : tuple of InfluenceTable
+        Of every complete model at the main model's draught.
+    runs : mapping
+        Manoeuvres of the same models, by name.
+    predictions : mapping
+        Table 5 for the other draughts, by model.
+    polynomials : mapping
+        K over the draught, (4): coefficients of 1, T, T^2.
+    tuning : TwoPointTuning, str or None
+        The main model through the first two measured points; a text says why there is none.
+    missing : mapping
+        Model to what is not known of it.
+    """
+
+    ship: str
+    main: str
+    rudder_deg: float
+    turns: tuple[ModelTurns, ...]
+    influence: tuple[InfluenceTable, ...]
+    runs: Mapping[str, ModelRuns]
+    predictions: Mapping[str, CombinedPrediction]
+    polynomials: Mapping[str, tuple[float, ...]]
+    tuning: TwoPointTuning | str | None
+    missing: Mapping[str, tuple[str, ...]]
+
+    def as_json(self) -> dict[str, object]:
+        """All but the trajectories, in m, deg and deg/min."""
+        tuning = self.tuning.as_json() if isinstance(self.tuning, TwoPointTuning) else self.tuning
+        return {
+            "ship": self.ship,
+            "main_model": self.main,
+            "rudder_deg": self.rudder_deg,
+            "steady_turns": {one.model: [turn.as_json() for turn in one.turns] for one in self.turns},
+            "influence": {one.model: vars(one) for one in self.influence},
+            "manoeuvres": {
+                name: {"turn": dict(one.turn_figures), "zigzag": dict(one.zigzag_figures)}
+                for name, one in self.runs.items()
+            },
+            "combined_predictions": {name: vars(one) for name, one in self.predictions.items()},
+            "influence_over_draught": {name: list(values) for name, values in self.polynomials.items()},
+            "two_point_tuning": tuning,
+            "missing": {name: list(words) for name, words in self.missing.items()},
+        }
+
+
+def compare(card: SteeringCard, rudder_deg: float | None = None) -> SteeringComparison:
+    """Compare the models of a card at a rudder angle, by default that of its ``[influence]``, else 20 deg.
+
+    Raises
+    ------
+    InputError
+        No model of the card is complete, or a complete one has no steady turn at a rudder of Table 1.
+    """
+    names = complete(card)
+    if not names:
+        raise InputError(
+            card.source, "models", "none has all its coefficients", "; ".join(missing_of(card).popitem()[1])
+        )
+    printed = card.influence
+    rudder = rudder_deg or (math.degrees(printed.rudder_rad) if printed else 20.0)
+    main = printed.model if printed else names[0]
+    same = [name for name in names if card.models[name].draught_m == card.models[main].draught_m]
+    others = [name for name in names if name not in same and card.models[name].form == card.models[main].form]
+    return SteeringComparison(
+        ship=card.ship.name,
+        main=main,
+        rudder_deg=rudder,
+        turns=tuple(turns_of(card, name, RUDDERS_DEG) for name in names),
+        influence=tuple(influence_of(card, name, rudder) for name in same),
+        runs={name: _runs(card, name, rudder) for name in same},
+        predictions={name: combined_prediction(card, name) for name in others} if printed else {},
+        polynomials=draught_polynomials(card) if printed else {},
+        tuning=tuned(card, main),
+        missing=missing_of(card),
+    )
+
+
+def missing_of(card: SteeringCard) -> dict[str, tuple[str, ...]]:
+    """What is not known of the card's models, by name: coefficients not given, what the source leaves out, notes."""
+    told: dict[str, tuple[str, ...]] = {}
+    forms: set[str] = set()
+    for name, entry in card.models.items():
+        form = form_of(card, name)
+        lacking = not_given(card, name)
+        words: tuple[str, ...] = (f"not given: {', '.join(lacking)}",) if lacking else ()
+        words += () if form.name in forms else form.missing
+        words += (entry.notes,) if entry.notes else ()
+        forms.add(form.name)
+        if words:
+            told[name] = words
+    return told
+
+
+def tuned(card: SteeringCard, name: str) -> TwoPointTuning | str | None:
+    """One of the card's models through its first two measured points; why not, or None if there are no two."""
+    measured = [point for point in card.points if point.measured][:2]
+    if len(measured) < 2:
+        return None
+    first, second = (WantedTurn(one.rudder_rad, one.yaw_rate_radps, one.radius_m) for one in measured)
+    try:
+        return tune_to_two_points(model_of(card, name), levers_of_form(form_of(card, name)), first, second)
+    except InputError as error:
+        return error.problem
+
+
+def _runs(card: SteeringCard, name: str, rudder_deg: float) -> ModelRuns:
+    model = model_of(card, name)
+    angle = math.radians(ZIGZAG_DEG)
+    integrator = Integrator(model)
+    turn = simulate(model, Turn(math.radians(rudder_deg)), integrator=integrator)
+    zigzag = simulate(model, Zigzag(angle, angle), integrator=integrator)
+    return ModelRuns(turn.trajectory, turn.figures, zigzag.figures)

@@ -1,0 +1,251 @@
+"""The tables of paper 4 (Poznyakov and Yudin 2007) from a steering card: turns, influence, agreed variation.
+
+K of a coefficient is the change of the steady radius in per cent when it grows by 10 %; Kc is the change of a
+coefficient in per cent when the draught grows by 1 %, which all of them share. Both are of
+:mod:`tank2sim.analysis.influence.percent`; here they meet the models of the catalogue.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.analysis.influence.percent import change_percent, combined_percent, difference_percent
+from tank2sim.analysis.turning.points import SteadyTurn, TurningPoints
+from tank2sim.cards.steering_card import PrintedInfluence, SteeringCard
+from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.steering_models import STEERING_FORMS, SteeringForm, steering_model
+from tank2sim.errors import InputError
+
+RUDDERS_DEG = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0)
+"""Rudder angles of Table 1."""
+
+
+def form_of(card: SteeringCard, name: str) -> SteeringForm:
+    """The form of one of the card's models.
+
+    Raises
+    ------
+    InputError
+        The card has no such model, or its form is not in the catalogue.
+    """
+    if name not in card.models:
+        raise InputError(card.source, "models", f"none is called {name!r}", f"one of {', '.join(card.models)}")
+    form = STEERING_FORMS.get(card.models[name].form)
+    if form is None:
+        known = f"one of {', '.join(STEERING_FORMS)} was expected"
+        raise InputError(card.source, f"{card.place(name)}.form", f"is {card.models[name].form!r}", known)
+    return form
+
+
+def not_given(card: SteeringCard, name: str) -> tuple[str, ...]:
+    """Coefficients that one of the card's models needs and does not have."""
+    given = card.models[name].coefficients
+    return tuple(one.name for one in form_of(card, name).coefficients if one.default is None and one.name not in given)
+
+
+def complete(card: SteeringCard) -> tuple[str, ...]:
+    """Names of the card's models that have all their coefficients."""
+    return tuple(name for name in card.models if not not_given(card, name))
+
+
+def model_of(card: SteeringCard, name: str) -> Model:
+    """The model of one of a card's entries, parameters ``coefficients.*``.
+
+    Raises
+    ------
+    InputError
+        There is no such model, a coefficient is missing (the message says what the source does not print), or one is
+        given that the form does not have.
+    """
+    form = form_of(card, name)
+    place = f"{card.place(name)}.coefficients"
+    given = card.models[name].coefficients
+    known = [one.name for one in form.coefficients]
+    for key in given:
+        if key not in known:
+            raise InputError(card.source, f"{place}.{key}", f"is no coefficient of {form.name}", ", ".join(known))
+    if missing := not_given(card, name):
+        told = f"{form.title}: {', '.join(missing)} not given"
+        raise InputError(card.source, place, told, "; ".join(form.missing) or "add them")
+    return steering_model(card.ship.name, form, given, card.ship.length_m, card.ship.speed_mps)
+
+
+@dataclass(frozen=True)
+class ModelTurns:
+    """Steady turns of one model over the rudder angle: a part of Table 1."""
+
+    model: str
+    title: str
+    turns: tuple[SteadyTurn, ...]
+
+
+def turns_of(card: SteeringCard, name: str, rudders_deg: Sequence[float] = RUDDERS_DEG) -> ModelTurns:
+    """Steady turns of a model at rudder angles (deg). Raises InputError as :func:`model_of`, or where none exists."""
+    points = TurningPoints(model_of(card, name))
+    turns = tuple(points.turn_at(math.radians(rudder))[0] for rudder in rudders_deg)
+    return ModelTurns(name, card.models[name].title, turns)
+
+
+@dataclass(frozen=True)
+class InfluenceTable:
+    """Influence of coefficients on the steady radius: Tables 2 and 3.
+
+    Parameters
+    ----------
+    model : str
+        Name in the card.
+    rudder_rad, radius_m : float
+        The turn.
+    change_percent : float
+        Change of each coefficient.
+    K_percent, radii_m : mapping
+        By coefficient: change of the radius, and the radius after it.
+    """
+
+    model: str
+    rudder_rad: float
+    radius_m: float
+    change_percent: float
+    K_percent: Mapping[str, float]
+    radii_m: Mapping[str, float]
+
+
+def influence_of(card: SteeringCard, name: str, rudder_deg: float = 20.0, percent: float = 10.0) -> InfluenceTable:
+    """K of every coefficient of a model on its steady radius, by the paper's difference. Raises as :func:`turns_of`.
+
+    The coefficients of Table 4 alone are varied: what had to be fitted (inflow, lever, share) is kept.
+    """
+    model = model_of(card, name)
+    points = TurningPoints(model)
+    turn, y = points.turn_at(math.radians(rudder_deg))
+
+    def radius(values: Mapping[str, float]) -> float:
+        found = points.near(y, {f"coefficients.{key}": value for key, value in values.items()})
+        return found.radius_m if found else math.nan
+
+    given = {key: value for key, value in card.models[name].coefficients.items() if key.startswith("C_")}
+    values = {key: value for key, value in given.items() if not key.startswith("C_y_p")}
+    influence = difference_percent(radius, values, percent)
+    radii = {key: turn.radius_m * (1 + value / 100) for key, value in influence.items()}
+    return InfluenceTable(name, turn.rudder_rad, turn.radius_m, percent, influence, radii)
+
+
+def agreed_variation(card: SteeringCard, base: str, other: str) -> dict[str, float]:
+    """Kc: change of each coefficient from one model to another in per cent; Table 4. What does not change is absent."""
+    values, changed = card.models[base].coefficients, card.models[other].coefficients
+    return {
+        name: change_percent(changed[name], value)
+        for name, value in values.items()
+        if name in changed and changed[name] != value
+    }
+
+
+@dataclass(frozen=True)
+class CombinedPrediction:
+    """The radius after an agreed variation: Table 5, with its slip and without.
+
+    Parameters
+    ----------
+    agreed_percent : mapping
+        Kc by coefficient.
+    radius_m : float
+        Before the variation, computed.
+    percent, predicted_m : float
+        Sum of Kc K / 10 with the printed K of each coefficient, and what it makes of the printed radius.
+    misread_percent, misread_m : float
+        With the K of other coefficients where the source mistook them.
+    own_percent, own_m : float
+        With the K computed here.
+    direct_m : float
+        The model of the other draught itself.
+    direct_misread_m : float
+        That model with the variations themselves put on the mistaken coefficients.
+    """
+
+    agreed_percent: Mapping[str, float]
+    radius_m: float
+    percent: float
+    predicted_m: float
+    misread_percent: float
+    misread_m: float
+    own_percent: float
+    own_m: float
+    direct_m: float
+    direct_misread_m: float
+
+
+def combined_prediction(card: SteeringCard, other: str) -> CombinedPrediction:
+    """Table 5: what the K foretell for another model of the card (another draught), and what that model gives.
+
+    Raises
+    ------
+    InputError
+        The card has no ``[influence]``, or as :func:`turns_of`.
+    """
+    printed = _influence(card)
+    base, rudder = printed.model, math.degrees(printed.rudder_rad)
+    agreed = agreed_variation(card, base, other)
+    table = influence_of(card, base, rudder, printed.change_percent)
+    at = printed.draughts_m.index(_draught(card, base))
+    K = {name: values[at] for name, values in printed.K_percent.items()}
+    swapped = {name: K[printed.misread_as.get(name, name)] for name in K}
+    percents = [combined_percent(one, agreed) for one in (K, swapped, table.K_percent)]
+    radii = (printed.radius_m, printed.radius_m, table.radius_m)
+    foretold = [radius * (1 + percent / 100) for radius, percent in zip(radii, percents, strict=True)]
+    direct = turns_of(card, other, [rudder]).turns[0].radius_m
+    return CombinedPrediction(
+        agreed_percent=agreed,
+        radius_m=table.radius_m,
+        percent=percents[0],
+        predicted_m=foretold[0],
+        misread_percent=percents[1],
+        misread_m=foretold[1],
+        own_percent=percents[2],
+        own_m=foretold[2],
+        direct_m=direct,
+        direct_misread_m=_direct_misread(card, printed, other, agreed),
+    )
+
+
+def _direct_misread(card: SteeringCard, printed: PrintedInfluence, other: str, agreed: Mapping[str, float]) -> float:
+    """Radius of the other model with the larger of two mistaken variations put on the wrong coefficient as well."""
+    values = card.models[printed.model].coefficients
+    largest = max(printed.misread_as, key=lambda name: abs(agreed.get(name, 0.0)), default=None)
+    if largest is None:
+        return turns_of(card, other, [math.degrees(printed.rudder_rad)]).turns[0].radius_m
+    wrong = printed.misread_as[largest]
+    points = TurningPoints(model_of(card, other))
+    changed = {f"coefficients.{wrong}": values[wrong] * (1 + agreed[largest] / 100)}
+    return points.turn_at(printed.rudder_rad, changed)[0].radius_m
+
+
+def draught_polynomials(card: SteeringCard) -> dict[str, tuple[float, ...]]:
+    """K over the draught T in m, through its printed values: (4). Coefficients of 1, T, T^2 by name.
+
+    Raises
+    ------
+    InputError
+        The card has no ``[influence]``.
+    """
+    printed = _influence(card)
+    powers = np.vander(printed.draughts_m, increasing=True)
+    return {name: tuple(np.linalg.solve(powers, values).tolist()) for name, values in printed.K_percent.items()}
+
+
+def _influence(card: SteeringCard) -> PrintedInfluence:
+    if card.influence is None:
+        raise InputError(card.source, "influence", "this section is missing", "add it, or ask for the turns alone")
+    return card.influence
+
+
+def _draught(card: SteeringCard, name: str) -> float:
+    draught = card.models[name].draught_m
+    printed = _influence(card)
+    if draught is None or draught not in printed.draughts_m:
+        place = f"{card.place(name)}.draught_m"
+        raise InputError(card.source, place, f"is {draught}", "it must be one of influence.draughts_m")
+    return draught

@@ -1,0 +1,1 @@
+"""Steady and transient flight of an underwater glider."""

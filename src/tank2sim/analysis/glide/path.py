@@ -1,0 +1,151 @@
+"""Paths of a glider: steady glides strung together, equations (13) to (25) of paper 5, corrected and as printed.
+
+    dphi_i = v_i cos(epsilon_i) t_i / R_i                                                                (13), (14)
+    X_n = X_{n-1} + R_n (sin dphi_n cos phi_{n-1} - (1 - cos dphi_n) sin phi_{n-1})                            (23)
+    Z_n = Z_{n-1} + R_n (sin dphi_n sin phi_{n-1} + (1 - cos dphi_n) cos phi_{n-1})                            (25)
+    Y_n = Y_{n-1} + v_n t_n sin(epsilon_n),          phi_n = phi_{n-1} + dphi_n                          (22), (15)
+
+with R of the sign of the turn, and X += v cos(epsilon) t cos(phi), Z += v cos(epsilon) t sin(phi) without roll. In
+print dphi = v t / R, and R multiplies the first product of (23) and (25) alone. X is north here, Z east, Y the height.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from tank2sim.analysis.glide.steady import SteadyGlide, glide_as_printed, glide_at_pitch, steady_glide
+from tank2sim.cards.card import GliderCard
+from tank2sim.dynamics.model import Vector
+from tank2sim.errors import InputError
+from tank2sim.simulation.glide_programme import Programme, ProgrammeStep
+
+_POINTS_OF_AN_ARC = 60
+
+
+class Place(NamedTuple):
+    """Time (s), north, east, height (m) and heading (rad, clockwise, continuous)."""
+
+    time_s: float
+    north_m: float
+    east_m: float
+    height_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True)
+class GlidePath:
+    """A path of steady glides.
+
+    Parameters
+    ----------
+    glides : tuple of SteadyGlide
+        One for each step.
+    durations_s : tuple of float
+        Of the steps.
+    places : tuple of Place
+        The start, and the end of each step.
+    """
+
+    glides: tuple[SteadyGlide, ...]
+    durations_s: tuple[float, ...]
+    places: tuple[Place, ...]
+
+    @property
+    def length_m(self) -> float:
+        """Length of the path through the water."""
+        return math.fsum(one.speed_mps * time for one, time in zip(self.glides, self.durations_s, strict=True))
+
+    def orders(self) -> list[dict[str, float]]:
+        """The orders with which the transient model flies the same glides."""
+        return [
+            {"buoyancy.command": one.buoyancy_kg, "pitch.command": one.pitch_rad, "roll.command": one.roll_rad}
+            for one in self.glides
+        ]
+
+    def sampled(self) -> Vector:
+        """The path in points close enough to draw it, (n, 5) in the order of :class:`Place`."""
+        rows: list[Place] = [self.places[0]]
+        for glide, duration, begin in zip(self.glides, self.durations_s, self.places, strict=False):
+            parts = _POINTS_OF_AN_ARC if glide.turn_rate_radps else 1
+            rows += [_after(begin, glide, duration * part / parts) for part in range(1, parts + 1)]
+        return np.array(rows)
+
+    def states_as_json(self) -> list[dict[str, object]]:
+        """The glide of each step as JSON has it, with its duration."""
+        return [
+            {"duration_s": duration, **glide.as_json()}
+            for duration, glide in zip(self.durations_s, self.glides, strict=True)
+        ]
+
+    def as_json(self) -> list[dict[str, object]]:
+        """The places as JSON has them; the heading in degrees."""
+        return [
+            {
+                "t_s": place.time_s,
+                "x_m": place.north_m,
+                "y_m": place.east_m,
+                "height_m": place.height_m,
+                "heading_deg": math.degrees(place.heading_rad),
+            }
+            for place in self.places
+        ]
+
+
+def fly(card: GliderCard, programme: Programme, *, as_printed: bool = False) -> GlidePath:
+    """The path of a programme.
+
+    Raises
+    ------
+    InputError
+        A step cannot be flown; the message names its line and what can.
+    """
+    glides = tuple(_glide(card, programme.source, step, as_printed) for step in programme.steps)
+    return path_of(glides, [step.duration_s for step in programme.steps])
+
+
+def path_of(glides: Sequence[SteadyGlide], durations_s: Sequence[float]) -> GlidePath:
+    """The path of glides that last for their durations, from the origin, heading north."""
+    places = [Place(0.0, 0.0, 0.0, 0.0, 0.0)]
+    for glide, duration in zip(glides, durations_s, strict=True):
+        places.append(_after(places[-1], glide, duration))
+    return GlidePath(tuple(glides), tuple(durations_s), tuple(places))
+
+
+def _glide(card: GliderCard, source: str, step: ProgrammeStep, as_printed: bool) -> SteadyGlide:
+    try:
+        if not step.is_pitch:
+            equations = glide_as_printed if as_printed else steady_glide
+            return equations(card, step.angle_rad, roll_rad=step.roll_rad, buoyancy_kg=step.buoyancy_kg)
+        if as_printed:
+            raise InputError(source, "column pitch_deg", "is not in the printed equations", "give path_angle_deg")
+        return glide_at_pitch(card, step.angle_rad, roll_rad=step.roll_rad, buoyancy_kg=step.buoyancy_kg)
+    except InputError as error:
+        place = f"{step.place}, {error.place}" if step.place else error.place
+        raise InputError(source, place, error.problem, error.remedy) from None
+
+
+def _after(begin: Place, glide: SteadyGlide, duration: float) -> Place:
+    change = glide.turn_rate_radps * duration
+    height = begin.height_m + glide.climb_mps * duration
+    cos, sin = math.cos(begin.heading_rad), math.sin(begin.heading_rad)
+    if not glide.turn_rate_radps:
+        # (13) in print has the whole speed along the ground
+        run = (glide.speed_mps if glide.as_printed else glide.horizontal_speed_mps) * duration
+        ahead, aside = run, 0.0
+        across = aside
+    else:
+        radius = math.copysign(glide.turning_radius_m, change)
+        ahead, aside = radius * math.sin(change), radius * (1 - math.cos(change))
+        across = 1 - math.cos(change) if glide.as_printed else aside
+    return Place(
+        begin.time_s + duration,
+        begin.north_m + ahead * cos - across * sin,
+        begin.east_m + ahead * sin + across * cos,
+        height,
+        begin.heading_rad + change,
+    )

@@ -1,0 +1,322 @@
+"""Steady glides of an underwater glider in closed form: paper 5 (Kulikovsky and Velikanov 2012), also as printed.
+
+It stands with the steady turning of ships: what solves the equations of :mod:`tank2sim.dynamics.glider` without time.
+With epsilon the angle of the path (+ up), theta the pitch, alpha the incidence, gamma the roll (+ starboard side down),
+m0 the net buoyancy (kg, + light) and S the reference area:
+
+    (2)     epsilon = theta - alpha                                     alpha > 0 diving, < 0 climbing
+    (3),(9) D cos epsilon + L cos gamma sin epsilon = 0,   m0 g + L cos gamma cos epsilon - D sin epsilon = 0
+    (8)     with tau = |tan epsilon| cos gamma:   (C_D - C_L tau) alpha^2 - C_L0 tau |alpha| + C_D0 = 0, the small root
+    (10)    v^2 = 2 |m0| g / (rho S (C_D(alpha) sin|epsilon| + C_L(|alpha|) cos gamma cos epsilon))
+    (11)    m (v cos epsilon)^2 / R = L sin gamma
+    (12)    R = 2 m cos^2 epsilon / (rho S C_L(|alpha|) sin|gamma|)
+
+The print loses the constant drag in (8), puts a stray alpha before the drag in (10), and has cos epsilon at the wrong
+places of (11); its added mass is neglected throughout. A positive roll turns a dive to starboard, where the lift is up,
+and a climb to port, where it is down.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from scipy.optimize import brentq
+
+from tank2sim.cards.card import GliderCard
+from tank2sim.dynamics.glider_forces import drag_coefficient, lift_coefficient
+from tank2sim.errors import InputError
+
+_STEEPEST = math.radians(89.9)
+"""Search for a path angle ends here; straight down there is no incidence and no turn."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SteadyGlide:
+    """A steady glide: angles in rad, SI.
+
+    Parameters
+    ----------
+    path_angle_rad, pitch_rad : float
+        epsilon and theta, + up.
+    incidence_rad : float
+        alpha, + when the flow comes from below.
+    roll_rad : float
+        gamma, + starboard side down.
+    buoyancy_kg : float
+        Net buoyancy m0, + light.
+    speed_mps : float
+        Speed v along the path.
+    lift_coefficient, drag_coefficient : float
+        C_L has the sign of the incidence.
+    lift_N, drag_N : float
+        With the sign of their coefficients.
+    turning_radius_m : float
+        R, without sign; inf without roll.
+    turn_rate_radps : float
+        Rate of the course, + to starboard.
+    as_printed : bool
+        True if from the equations as the paper prints them.
+    """
+
+    path_angle_rad: float
+    pitch_rad: float
+    incidence_rad: float
+    roll_rad: float
+    buoyancy_kg: float
+    speed_mps: float
+    lift_coefficient: float
+    drag_coefficient: float
+    lift_N: float
+    drag_N: float
+    turning_radius_m: float
+    turn_rate_radps: float
+    as_printed: bool = False
+
+    @property
+    def horizontal_speed_mps(self) -> float:
+        """v cos(epsilon)."""
+        return self.speed_mps * math.cos(self.path_angle_rad)
+
+    @property
+    def climb_mps(self) -> float:
+        """v sin(epsilon), + up."""
+        return self.speed_mps * math.sin(self.path_angle_rad)
+
+    def as_json(self) -> dict[str, object]:
+        """As JSON has it: angles in degrees; a radius that is infinite is null."""
+        return {
+            "path_angle_deg": math.degrees(self.path_angle_rad),
+            "pitch_deg": math.degrees(self.pitch_rad),
+            "incidence_deg": math.degrees(self.incidence_rad),
+            "roll_deg": math.degrees(self.roll_rad),
+            "buoyancy_kg": self.buoyancy_kg,
+            "speed_mps": self.speed_mps,
+            "horizontal_speed_mps": self.horizontal_speed_mps,
+            "climb_mps": self.climb_mps,
+            "lift_coefficient": self.lift_coefficient,
+            "drag_coefficient": self.drag_coefficient,
+            "lift_N": self.lift_N,
+            "drag_N": self.drag_N,
+            "turning_radius_m": self.turning_radius_m if math.isfinite(self.turning_radius_m) else None,
+            "turn_rate_degps": math.degrees(self.turn_rate_radps),
+            "as_printed": self.as_printed,
+        }
+
+
+def ballast_kg(card: GliderCard, buoyancy_kg: float) -> float | None:
+    """m_b of (1), m0 = m - (m_h + m_b), kg; None if the card does not state the mass m_h of the hull.
+
+    Raises
+    ------
+    InputError
+        It would have to be negative.
+    """
+    hull = card.glider.hull_mass_kg
+    if hull is None:
+        return None
+    displaced = card.environment.water_density_kgpm3 * card.glider.volume_m3
+    ballast = displaced - hull - buoyancy_kg
+    if ballast < 0:
+        problem = f"leaves {ballast:.4g} kg of ballast: {displaced:.5g} kg displaced, net buoyancy {buoyancy_kg:+g} kg"
+        raise card.fault("glider.hull_mass_kg", problem, "mend the volume or the mass of the hull")
+    return ballast
+
+
+def smallest_angle(card: GliderCard, roll_rad: float = 0.0) -> float:
+    """The smallest |epsilon| (rad) that can be flown with a roll: where the discriminant of (8) vanishes.
+
+    There the ratio of lift to drag is at its greatest, so that without roll this is also the best glide.
+    """
+    own = card.glider
+    part = own.lift_quadratic * own.drag_zero
+    root = math.sqrt(part**2 + own.lift_slope**2 * own.drag_quadratic * own.drag_zero)
+    # 2 (root - part) / C_L0^2 without the difference of two almost equal numbers
+    tau = 2 * own.drag_quadratic * own.drag_zero / (root + part)
+    return math.atan2(tau, math.cos(roll_rad))
+
+
+def steady_glide(
+    card: GliderCard, path_angle_rad: float, *, roll_rad: float = 0.0, buoyancy_kg: float | None = None
+) -> SteadyGlide:
+    """The steady glide on a path.
+
+    Parameters
+    ----------
+    path_angle_rad : float
+        epsilon, + up.
+    roll_rad : float
+        gamma, + starboard side down.
+    buoyancy_kg : float, optional
+        Net buoyancy m0, + light; by default that of the card, light to climb and heavy to dive. 0 gives speed 0.
+
+    Raises
+    ------
+    InputError
+        The angle cannot be flown (the message names the smallest that can), is no glide or the roll none, or the
+        glider is light and is to dive, or heavy and is to climb.
+    """
+    buoyancy = _buoyancy(card, path_angle_rad, buoyancy_kg)
+    _check(path_angle_rad, roll_rad)
+    least = smallest_angle(card, roll_rad)
+    steep = abs(path_angle_rad)
+    if steep < least * (1 - 1e-12):
+        with_roll = f" with {math.degrees(roll_rad):g} deg of roll" if roll_rad else ""
+        raise InputError(
+            card.ship.name,
+            "path angle",
+            f"{math.degrees(path_angle_rad):g} deg cannot be flown{with_roll}: the drag is too large for the lift",
+            f"the smallest that can is {math.degrees(least):.3f} deg",
+        )
+    own = card.glider
+    tau = math.tan(steep) * math.cos(roll_rad)
+    slope = own.lift_slope * tau
+    under = slope**2 - 4 * (own.drag_quadratic - own.lift_quadratic * tau) * own.drag_zero
+    # The small root, written so that nothing cancels and that it also holds where C_D = C_L tau.
+    size = 2 * own.drag_zero / (slope + math.sqrt(max(0.0, under)))
+    lift = lift_coefficient(size, own.lift_slope, own.lift_quadratic)
+    drag = drag_coefficient(size, own.drag_zero, own.drag_quadratic)
+    half = 0.5 * card.environment.water_density_kgpm3 * own.reference_area_m2
+    share = drag * math.sin(steep) + lift * math.cos(roll_rad) * math.cos(steep)
+    speed = math.sqrt(abs(buoyancy) * card.environment.gravity_mps2 / (half * share))
+    aside = half * lift * abs(math.sin(roll_rad))
+    radius = own.mass_kg * math.cos(steep) ** 2 / aside if aside else math.inf
+    return _made(_Found(path_angle_rad, roll_rad, buoyancy, size, speed, radius, lift, drag), half)
+
+
+def glide_at_pitch(
+    card: GliderCard, pitch_rad: float, *, roll_rad: float = 0.0, buoyancy_kg: float | None = None
+) -> SteadyGlide:
+    """The steady glide at a pitch theta (rad, + up) in place of a path angle: (2) and (8) together.
+
+    Raises
+    ------
+    InputError
+        As :func:`steady_glide`; the message names the smallest pitch.
+    """
+    _check(pitch_rad, roll_rad)
+    buoyancy = _buoyancy(card, pitch_rad, buoyancy_kg)
+    sign = math.copysign(1.0, pitch_rad)
+
+    def beyond(steep: float) -> float:
+        return abs(steady_glide(card, sign * steep, roll_rad=roll_rad).pitch_rad) - abs(pitch_rad)
+
+    least = smallest_angle(card, roll_rad)
+    if beyond(least) > 0:
+        smallest = beyond(least) + abs(pitch_rad)
+        raise InputError(
+            card.ship.name,
+            "pitch",
+            f"at {math.degrees(pitch_rad):g} deg there is no glide of small incidence",
+            f"the smallest pitch is {math.degrees(smallest):.3f} deg, on a path of {math.degrees(least):.3f} deg",
+        )
+    if beyond(_STEEPEST) < 0:
+        raise InputError(card.ship.name, "pitch", f"{math.degrees(pitch_rad):g} deg is a fall", "give less than 89 deg")
+    steep = float(brentq(beyond, least, _STEEPEST, xtol=1e-15, rtol=1e-14))
+    return steady_glide(card, sign * steep, roll_rad=roll_rad, buoyancy_kg=buoyancy)
+
+
+def glide_as_printed(
+    card: GliderCard, path_angle_rad: float, *, roll_rad: float = 0.0, buoyancy_kg: float | None = None
+) -> SteadyGlide:
+    """The glide by (8), (10), (12) and (13) as the paper prints them, for comparison.
+
+    They balance a drag alpha (C_D0 + C_D alpha), which vanishes without incidence and is not that of (7); what comes
+    out lies near the large root of the corrected (8), a slow glide at ten times the incidence. Parameters and what is
+    raised as :func:`steady_glide`, but that the print knows no smallest angle above that of no incidence.
+    """
+    buoyancy = _buoyancy(card, path_angle_rad, buoyancy_kg)
+    _check(path_angle_rad, roll_rad)
+    own = card.glider
+    steep, upright = abs(path_angle_rad), math.cos(roll_rad)
+    tau = math.tan(steep) * upright
+    under = own.drag_quadratic - own.lift_quadratic * tau
+    size = (own.lift_slope * tau - own.drag_zero) / under if under > 0 else -1.0
+    if size <= 0:
+        problem = f"{math.degrees(path_angle_rad):g} deg gives no incidence by (8) as printed"
+        raise InputError(card.ship.name, "path angle", problem, "give another angle, or leave --as-printed out")
+    drag = size * (own.drag_zero + own.drag_quadratic * size)
+    lift = lift_coefficient(size, own.lift_slope, own.lift_quadratic)
+    half = 0.5 * card.environment.water_density_kgpm3 * own.reference_area_m2
+    share = drag * math.sin(steep) + lift * upright * math.cos(steep)
+    speed = math.sqrt(abs(buoyancy) * card.environment.gravity_mps2 / (half * share))
+    radius = radius_as_printed(card, lift, path_angle_rad, roll_rad)
+    found = _Found(path_angle_rad, roll_rad, buoyancy, size, speed, radius, lift, drag)
+    return _made(found, half, as_printed=True)
+
+
+def radius_as_printed(card: GliderCard, lift: float, path_angle_rad: float, roll_rad: float) -> float:
+    """R of (12) as printed (m), 1/cos^3(epsilon) times the right one; `lift` is the size of C_L. inf without roll."""
+    half = 0.5 * card.environment.water_density_kgpm3 * card.glider.reference_area_m2
+    aside = half * lift * abs(math.sin(roll_rad)) * math.cos(path_angle_rad)
+    return card.glider.mass_kg / aside if aside else math.inf
+
+
+def force_residual(card: GliderCard, glide: SteadyGlide) -> tuple[float, float, float]:
+    """What is left of the forces along the course, to starboard and up, less the centripetal force, N: 0 in balance."""
+    along, up = math.cos(glide.path_angle_rad), math.sin(glide.path_angle_rad)
+    upright, aside = math.cos(glide.roll_rad), math.sin(glide.roll_rad)
+    lift, drag = glide.lift_N, glide.drag_N
+    centripetal = card.glider.mass_kg * glide.horizontal_speed_mps * glide.turn_rate_radps
+    return (
+        -drag * along - lift * upright * up,
+        lift * aside - centripetal,
+        glide.buoyancy_kg * card.environment.gravity_mps2 + lift * upright * along - drag * up,
+    )
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What the equations give; sizes without sign."""
+
+    path_angle: float
+    roll: float
+    buoyancy: float
+    incidence: float
+    speed: float
+    radius: float
+    lift: float
+    drag: float
+
+
+def _made(found: _Found, half: float, *, as_printed: bool = False) -> SteadyGlide:
+    upward = math.copysign(1.0, found.path_angle)
+    incidence = -upward * found.incidence
+    along = found.speed * (1.0 if as_printed else math.cos(found.path_angle))  # (13): v t = R dphi in print
+    turn = -upward * math.copysign(1.0, found.roll) * along / found.radius if math.isfinite(found.radius) else 0.0
+    force = half * found.speed**2
+    return SteadyGlide(
+        path_angle_rad=found.path_angle,
+        pitch_rad=found.path_angle + incidence,
+        incidence_rad=incidence,
+        roll_rad=found.roll,
+        buoyancy_kg=found.buoyancy,
+        speed_mps=found.speed,
+        lift_coefficient=-upward * found.lift,
+        drag_coefficient=found.drag,
+        lift_N=-upward * force * found.lift,
+        drag_N=force * found.drag,
+        turning_radius_m=found.radius,
+        turn_rate_radps=turn,
+        as_printed=as_printed,
+    )
+
+
+def _check(angle: float, roll: float) -> None:
+    if not 0 < abs(angle) < math.pi / 2:
+        remedy = "an angle between 0 and 90 deg was expected, + to climb and - to dive"
+        raise InputError("glide", "path angle", f"{math.degrees(angle):g} deg is no glide", remedy)
+    if not abs(roll) < math.pi / 2:
+        raise InputError("glide", "roll", f"{math.degrees(roll):g} deg is no roll to fly with", "give less than 90 deg")
+
+
+def _buoyancy(card: GliderCard, path_angle: float, given: float | None) -> float:
+    if given is None:
+        return math.copysign(card.glider.buoyancy_kg, path_angle)
+    if given * path_angle < 0:
+        light, goes = ("light", "dive") if given > 0 else ("heavy", "climb")
+        problem = f"{given:+g} kg is {light}, and the glider is to {goes} at {math.degrees(path_angle):g} deg"
+        raise InputError(card.ship.name, "buoyancy", problem, "a light glider climbs (+), a heavy one dives (-)")
+    if not math.isfinite(given):
+        raise InputError(card.ship.name, "buoyancy", f"{given} kg is no number", "give kilograms")
+    return given

@@ -1,0 +1,184 @@
+"""What the steady glides of paper 5 leave out: the model's own equilibria, and the path while it goes between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.analysis.glide.path import GlidePath, path_of
+from tank2sim.analysis.glide.steady import SteadyGlide, smallest_angle, steady_glide
+from tank2sim.analysis.linearisation import OperatingPoint
+from tank2sim.cards.card import GliderCard
+from tank2sim.dynamics.model import Model, Vector
+from tank2sim.errors import InputError
+from tank2sim.simulation.glide_programme import follow
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.trajectory import Trajectory
+
+SWEEP_DURATIONS_S = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+"""Lengths of a step for :func:`quasi_steady_error`; the paper's period is 100 s."""
+
+_ACCURACY = 1e-12  # m/s2, of the accelerations at an equilibrium
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A steady glide of the transient model.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+        Where it is, for :func:`tank2sim.analysis.linearisation.state_space`.
+    speed_mps, path_angle_rad, incidence_rad, turn_rate_radps : float
+        As in :class:`tank2sim.analysis.glide.steady.SteadyGlide`.
+    turning_radius_m : float
+        Without sign; inf where it does not turn.
+    """
+
+    point: OperatingPoint
+    speed_mps: float
+    path_angle_rad: float
+    incidence_rad: float
+    turn_rate_radps: float
+    turning_radius_m: float
+
+
+def equilibrium(model: Model, glide: SteadyGlide) -> Equilibrium:
+    """The equilibrium of the transient model under the pitch, roll and buoyancy of a glide, by CasADi's Newton solver.
+
+    `glide` is the first guess. Its u and w come to rest; on a straight path it is the same glide, in a turn the added
+    mass, which the closed form has not, changes it.
+
+    Raises
+    ------
+    InputError
+        There is no equilibrium near the glide.
+    """
+    p = model.parameter_values()
+    u = model.input_values(
+        {
+            "buoyancy.command": glide.buoyancy_kg,
+            "pitch.command": glide.pitch_rad,
+            "roll.command": glide.roll_rad,
+        }
+    )
+    names = model.state_names
+    x = np.zeros(len(names))
+    for name, value in {
+        "motion.u": glide.speed_mps * math.cos(glide.incidence_rad),
+        "motion.w": glide.speed_mps * math.sin(glide.incidence_rad),
+        "buoyancy.mass": glide.buoyancy_kg,
+        "pitch.angle": glide.pitch_rad,
+        "roll.angle": glide.roll_rad,
+    }.items():
+        x[names.index(name)] = value
+    places = [names.index("motion.u"), names.index("motion.w")]
+    residual = ca.substitute(ca.substitute(model.rates[places], model.u, ca.DM(u)), model.p, ca.DM(p))
+    others = [place for place in range(len(names)) if place not in places]
+    residual = ca.substitute(residual, model.x[others], ca.DM(x[others]))
+    problem = {"x": model.x[places], "g": residual}
+    solver = ca.rootfinder("equilibrium", "newton", problem, {"abstol": _ACCURACY, "error_on_fail": False})
+    x[places] = np.array(solver(x[places], [])).ravel()
+    left = np.abs(np.array(model.rhs(x, u, p)).ravel()[places])
+    if not np.all(left < 1e3 * _ACCURACY):
+        raise InputError(model.name, "", "the transient model has no equilibrium near this glide", "give another angle")
+    y = dict(zip(model.outputs, np.array(model.output(x, u, p)).ravel().tolist(), strict=True))
+    turn = y["motion.psidot"]
+    ground = y["motion.speed"] * math.cos(y["motion.path_angle"])
+    radius = abs(ground / turn) if abs(turn) > 1e-15 else math.inf
+    return Equilibrium(
+        OperatingPoint(x, u, p), y["motion.speed"], y["motion.path_angle"], y["motion.incidence"], turn, radius
+    )
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A path of steady glides, the motion of the transient model under the same orders, and what is between them.
+
+    Parameters
+    ----------
+    path : GlidePath
+        Quasi-steady.
+    motion : Trajectory
+        Transient.
+    distance_m : array (steps + 1,)
+        Between the two at the start and at the end of each step.
+    """
+
+    path: GlidePath
+    motion: Trajectory
+    distance_m: Vector
+
+    @property
+    def share(self) -> float:
+        """The largest distance, as a share of the length of the path."""
+        return float(self.distance_m.max()) / self.path.length_m if self.path.length_m else math.nan
+
+    def as_json(self) -> dict[str, object]:
+        """As JSON has it: the transient places at the ends of steps, and the distances."""
+        times = [place.time_s for place in self.path.places]
+        named = {"x_m": "motion.x", "y_m": "motion.y", "depth_m": "motion.z", "speed_mps": "motion.speed"}
+        rows = [{"t_s": time} | {key: self.motion.at(name, time) for key, name in named.items()} for time in times]
+        return {"path": rows, "distance_m": self.distance_m, "distance_by_length": self.share}
+
+
+def compare(integrator: Integrator, path: GlidePath) -> Compared:
+    """Fly the glides of a path with the transient model. Raises as :func:`follow`."""
+    motion = follow(integrator, path.orders(), path.durations_s)
+    distance = []
+    for place in path.places:
+        flown = [motion.at(name, place.time_s) for name in ("motion.x", "motion.y", "motion.z")]
+        distance.append(math.dist(flown, (place.north_m, place.east_m, -place.height_m)))
+    return Compared(path, motion, np.array(distance))
+
+
+@dataclass(frozen=True)
+class ProgrammeError:
+    """The quasi-steady error of one kind of programme.
+
+    Parameters
+    ----------
+    label : str
+        What the steps alternate between.
+    duration_s : array (n,)
+        Of one step.
+    distance_m, share : arrays (n,)
+        Largest distance of the two paths at the end of a step, and as a share of the length of the path.
+    """
+
+    label: str
+    duration_s: Vector
+    distance_m: Vector
+    share: Vector
+
+    def as_json(self) -> dict[str, object]:
+        """As JSON has it."""
+        return dict(vars(self))
+
+
+def quasi_steady_error(
+    card: GliderCard, integrator: Integrator, durations_s: Sequence[float] = SWEEP_DURATIONS_S
+) -> tuple[ProgrammeError, ...]:
+    """How far the paper's assumption leads from the transient model, against the length of the steps.
+
+    Four steps, from a steady glide, of three kinds (a choice of ours): from dive to climb and back, from a shallow to a
+    steep dive and back, and with roll to starboard and to port; all from 6 deg above the smallest angle.
+    """
+    shallow = math.radians(math.ceil(math.degrees(smallest_angle(card)) + 6))
+    steep, roll = min(shallow + math.radians(15), math.radians(80)), math.radians(2.0)
+    kinds = {
+        f"dive and climb at {math.degrees(shallow):.0f} deg": ((-shallow, 0.0), (shallow, 0.0)),
+        f"dive at {math.degrees(shallow):.0f} and {math.degrees(steep):.0f} deg": ((-shallow, 0.0), (-steep, 0.0)),
+        "roll of 2 deg to and fro": ((-shallow, roll), (-shallow, -roll)),
+    }
+    errors = []
+    for label, pair in kinds.items():
+        glides = [steady_glide(card, angle, roll_rad=rolled) for angle, rolled in (*pair, *pair)]
+        found = [compare(integrator, path_of(glides, [duration] * len(glides))) for duration in durations_s]
+        distance = np.array([float(one.distance_m.max()) for one in found])
+        errors.append(ProgrammeError(label, np.array(durations_s), distance, np.array([one.share for one in found])))
+    return tuple(errors)

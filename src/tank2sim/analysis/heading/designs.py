@@ -1,0 +1,251 @@
+"""Heading controllers for a ship by four ways of design, each a model that simulates, joins and becomes an FMU."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import control
+import numpy as np
+
+from tank2sim.analysis.heading.control import (
+    DAMPING,
+    INTEGRAL_BAND_RAD,
+    LARGEST_RUDDER_RAD,
+    SLOWNESS,
+    heading_gains,
+)
+from tank2sim.analysis.linearisation import state_space, straight_course
+from tank2sim.analysis.stability.straight_line import Stability, stability
+from tank2sim.dynamics.autopilot import HeadingGains, autopilot_model
+from tank2sim.dynamics.autopilot_linear import LinearLaw, linear_autopilot_model
+from tank2sim.dynamics.model import Model, Vector
+from tank2sim.errors import InputError
+
+NOTCH_DAMPING = 0.1
+"""Share of waves at the frequency of a wave filter that passes: a choice of ours, as narrow as their own band."""
+
+DESIGNS = ("pd", "pid", "lqr", "robust")
+"""Ways of design, by the names of ``--design``."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weights:
+    """What the LQR weighs against each other (Bryson & Ho, 1975): errors that are equally bad, rad.
+
+    Equal ones make a heading error worth as much rudder, as in the design by pole placement (a choice of ours).
+    """
+
+    heading_rad: float = math.radians(5.0)
+    rudder_rad: float = math.radians(5.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeadingDesign:
+    """A controller of heading.
+
+    Parameters
+    ----------
+    kind : str
+        One of :data:`DESIGNS`.
+    found : Stability
+        The ship at the speed of the design.
+    gains : mapping
+        Figures of the controller by name with their unit; of the robust one, of its synthesis.
+    source : str
+        How it was found, in a sentence.
+    autopilot : Model
+        Inputs ``motion.psi``, ``motion.r``, ``heading.command``; outputs ``rudder.command``, ``heading.error``.
+    """
+
+    kind: str
+    found: Stability
+    gains: Mapping[str, float]
+    source: str
+    autopilot: Model
+
+
+@dataclass(frozen=True, eq=False)
+class SteeringPlant:
+    """What is steered: the ship at the speed of design with its gear, and the limit of its rudder.
+
+    Parameters
+    ----------
+    found : Stability
+    frequency_radps : float
+        w = sqrt(K/T), the frequency of the design by pole placement, by which the others are scaled.
+    A, B : arrays (4, 4), (4, 1)
+        Rates of sway velocity (m/s), yaw rate (rad/s), heading (rad) and rudder (rad), by these and by the order (rad).
+    largest_rudder_rad, step_s : float
+    """
+
+    found: Stability
+    frequency_radps: float
+    A: Vector
+    B: Vector
+    largest_rudder_rad: float
+    step_s: float
+
+
+def design_heading(
+    ship: Model,
+    kind: str = "pid",
+    *,
+    speed_mps: float | None = None,
+    weights: Weights | None = None,
+    wave_filter_radps: float | None = None,
+) -> HeadingDesign:
+    """Design a heading controller.
+
+    Parameters
+    ----------
+    ship : Model
+    kind : str
+        ``pd`` and ``pid``: poles placed on Nomoto's model; ``lqr``: the linear quadratic regulator of sway, yaw,
+        heading, rudder and integral, the two that no compass shows observed; ``robust``: mixed sensitivity.
+    speed_mps : float, optional
+        Speed of the design; by default that of expansion.
+    weights : Weights, optional
+        Of the LQR.
+    wave_filter_radps : float, optional
+        Of the PID: frequency of encounter of waves at which the rudder shall rest (:func:`_filtered`).
+
+    Raises
+    ------
+    InputError
+        The model is no ship or holds no straight course, the speed is outside the card's range, the rudder turns the
+        ship the wrong way or not at all, or the robust design lacks its library.
+    """
+    plant = steering_plant(ship, speed_mps)
+    name = f"Autopilot of {ship.name}"
+    if wave_filter_radps is not None:
+        if kind != "pid":
+            raise InputError("--wave-filter", "", f"is no part of the design {kind!r}", "leave it out, or choose pid")
+        return _filtered(plant, name, wave_filter_radps)
+    match kind:
+        case "pd" | "pid":
+            return _placed(plant, name, integral=kind == "pid")
+        case "lqr":
+            return _quadratic(plant, name, weights or Weights())
+        case "robust":
+            from tank2sim.analysis.heading.robust import robust_design
+
+            return robust_design(plant, name)
+        case _:
+            raise InputError("--design", "", f"there is no design {kind!r}", f"choose one of {', '.join(DESIGNS)}")
+
+
+def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant:
+    """The ship with its gear at a speed, for design. Raises as :func:`design_heading`."""
+    if "rudder.angle" not in ship:
+        raise InputError(ship.name, "", "has no rudder", "an autopilot needs the card of a ship (linear or abkowitz)")
+    values = dict(zip(ship.parameter_names, ship.parameter_values().tolist(), strict=True))
+    slowest, fastest = values["ship.slowest"], values["ship.fastest"]
+    if speed_mps is not None and not slowest <= speed_mps <= fastest:
+        remedy = f"the card holds from {slowest:g} to {fastest:g} m/s"
+        raise InputError("--speed", "", f"{speed_mps:g} m/s is outside the range of {ship.name}", remedy)
+    point = straight_course(ship, speed_mps)
+    hull = state_space(ship, point, states=["motion.v", "motion.r"], inputs=["rudder.angle"], outputs=["motion.r"])
+    remedy = "check Yd and Nd of the card, and its rudder_sign"
+    if not abs(hull.B[1, 0]) > 0:
+        raise InputError(ship.name, "", "its rudder has no effect on yaw", remedy)
+    found = stability(ship, speed_mps)
+    K, T = found.nomoto.K_per_s, found.nomoto.T_s
+    if not K / T > 0:
+        raise InputError(ship.name, "", "the rudder turns the ship the wrong way", remedy)
+    lag = values.get("rudder_lag.time_constant", values["steering.time_constant"])
+    A = np.zeros((4, 4))
+    A[:2, :2], A[:2, 3:], A[2, 1], A[3, 3] = hull.A, hull.B, 1.0, -1 / lag
+    B = np.array([[0.0], [0.0], [0.0], [1 / lag]])
+    largest = min(values.get("steering.max_angle", LARGEST_RUDDER_RAD), LARGEST_RUDDER_RAD)
+    return SteeringPlant(found, math.sqrt(K / T), A, B, largest, ship.step_s)
+
+
+def _placed(plant: SteeringPlant, name: str, *, integral: bool) -> HeadingDesign:
+    gains = heading_gains(plant.found.nomoto, plant.largest_rudder_rad)
+    told = f"integral {SLOWNESS:g} of the natural frequency"
+    if not integral:
+        gains, told = _without_integral(plant, gains), "no integral"
+    source = (
+        f"Pole placement (relative damping {DAMPING:g}, {told}) on Nomoto's model of {plant.found.name} at "
+        f"{plant.found.speed_mps:.4g} m/s"
+    )
+    return HeadingDesign(
+        kind="pid" if integral else "pd",
+        found=plant.found,
+        gains={"Kp": gains.proportional, "Kd_s": gains.derivative, "Ki_per_s": gains.integral},
+        source=source,
+        autopilot=autopilot_model(name, gains, plant.step_s),
+    )
+
+
+def _filtered(plant: SteeringPlant, name: str, frequency: float) -> HeadingDesign:
+    """The PID with a notch (s^2 + 2 z w s + w^2)/(s + w)^2 on its proportional and derivative parts, w of the waves.
+
+    Fossen (2011), 11.1.2; z is :data:`NOTCH_DAMPING`. With p = Kp e - Kd r the notch is p + 2 w (z - 1) x2,
+    dx1/dt = x2, dx2/dt = -w^2 x1 - 2 w x2 + p.
+    """
+    plain = _placed(plant, name, integral=True)
+    Kp, Kd, Ki = plain.gains.values()
+    law = LinearLaw(
+        rates=np.array([[0.0, 1.0, 0.0, 0.0, 0.0], [-(frequency**2), -2 * frequency, Kp, -Kd, 0.0]]),
+        demand=np.array([0.0, 2 * frequency * (NOTCH_DAMPING - 1), Kp, -Kd]),
+        growth=np.array([0.0, 0.0, Ki, 0.0]),
+        growth_limit_radps=Ki * INTEGRAL_BAND_RAD,
+        anti_windup_time_s=1 / plant.frequency_radps,
+        largest_rudder_rad=plant.largest_rudder_rad,
+    )
+    description = "Heading autopilot: PID with wave filter, limits and anti-windup"
+    return replace(
+        plain,
+        gains={**plain.gains, "wave_filter_radps": frequency},
+        source=f"{plain.source}; waves filtered at {frequency:.3g} rad/s",
+        autopilot=linear_autopilot_model(name, description, law, plant.step_s),
+    )
+
+
+def _without_integral(plant: SteeringPlant, gains: HeadingGains) -> HeadingGains:
+    """PD gains for T s^2 + (1 + K Kd) s + K Kp = T (s^2 + 2 z w s + w^2), on the states heading and yaw rate."""
+    K, T, w = plant.found.nomoto.K_per_s, plant.found.nomoto.T_s, plant.frequency_radps
+    poles = np.roots([1, 2 * DAMPING * w, w**2])
+    Kp, Kd = np.asarray(control.place([[0, 1], [0, -1 / T]], [[0], [K / T]], poles)).ravel()
+    return replace(gains, proportional=float(Kp), derivative=float(Kd), integral=0.0)
+
+
+def _quadratic(plant: SteeringPlant, name: str, weights: Weights) -> HeadingDesign:
+    """LQR of [sway, yaw rate, heading, rudder, integral of heading]; sway and rudder by a model that runs along.
+
+    Least integral of (psi/psi0)^2 + (r/(w psi0))^2 + (z/(psi0/(a w)))^2 + (order/delta0)^2, psi0 and delta0 the
+    weights, z the integral of psi, a the :data:`SLOWNESS` of the integral. The observer is the ship's own sway equation
+    with the yaw rate as measured, and the gear's lag: both settle by themselves.
+    """
+    w, bad = plant.frequency_radps, weights.heading_rad
+    A = np.zeros((5, 5))
+    A[:4, :4], A[4, 2] = plant.A, 1.0
+    B = np.vstack([plant.B, [[0.0]]])
+    Q = np.diag([0.0, 1 / (w * bad) ** 2, 1 / bad**2, 0.0, (SLOWNESS * w / bad) ** 2])
+    gain, _, _ = control.lqr(A, B, Q, [[1 / weights.rudder_rad**2]])
+    Kv, Kd, Kp, Kdelta, Ki = (float(value) for value in np.asarray(gain).ravel())
+    rates = np.array(
+        [
+            [plant.A[0, 0], plant.A[0, 3], 0.0, plant.A[0, 1], 0.0],
+            [0.0, plant.A[3, 3], 0.0, 0.0, plant.B[3, 0]],
+        ]
+    )
+    law = LinearLaw(
+        rates=rates,
+        demand=np.array([-Kv, -Kdelta, Kp, -Kd]),
+        growth=np.array([0.0, 0.0, Ki, 0.0]),
+        growth_limit_radps=Ki * INTEGRAL_BAND_RAD,
+        anti_windup_time_s=1 / w,
+        largest_rudder_rad=plant.largest_rudder_rad,
+    )
+    source = (
+        f"LQR on {plant.found.name} with its steering gear at {plant.found.speed_mps:.4g} m/s, "
+        f"{math.degrees(bad):g} deg of heading as bad as {math.degrees(weights.rudder_rad):g} deg of rudder"
+    )
+    gains = {"Kp": Kp, "Kd_s": Kd, "Ki_per_s": Ki, "Kv_radpmps": Kv, "Kdelta": Kdelta}
+    description = "Heading autopilot: LQR with observed sway and rudder, limits and anti-windup"
+    model = linear_autopilot_model(name, description, law, plant.step_s)
+    return HeadingDesign(kind="lqr", found=plant.found, gains=gains, source=source, autopilot=model)

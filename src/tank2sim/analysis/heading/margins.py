@@ -1,0 +1,168 @@
+"""How much a heading loop bears: margins and poles of the ship with its gear and its autopilot, linearised."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import control
+import numpy as np
+
+from tank2sim.analysis.linearisation import OperatingPoint, state_space, straight_course
+from tank2sim.dynamics.autopilot_loop import closed_loop_model
+from tank2sim.dynamics.model import Model, Vector
+
+_HELD = ("motion.x", "motion.y", "motion.u")
+"""States that no course change of small size moves: position, and the speed to first order."""
+
+_OFF_THE_KINK = 1e-6
+"""rad: far below any rudder angle that matters."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopMargins:
+    """Margins of a heading loop at one speed, broken at the rudder order.
+
+    Parameters
+    ----------
+    speed_mps : float
+    gain_margin_up, gain_margin_down : float
+        By how much the loop gain may grow, and to what share it may fall; inf and 0 if by any amount. A ship that is
+        unstable by herself has the second one above 0: she needs her helmsman.
+    phase_margin_deg : float
+        The least of all crossovers.
+    delay_margin_s : float
+        Delay in the loop that it bears.
+    sensitivity_peak : float
+        Ms, the largest \\|1/(1 + L)\\|: 1/Ms is how near the Nyquist curve comes to -1.
+    crossover_radps, bandwidth_radps : float
+        Last crossover of the loop gain; and where the heading answers its order by 3 dB less than slow ones.
+    poles : tuple of complex
+        Of the closed loop, 1/s, slowest first.
+    """
+
+    speed_mps: float
+    gain_margin_up: float
+    gain_margin_down: float
+    phase_margin_deg: float
+    delay_margin_s: float
+    sensitivity_peak: float
+    crossover_radps: float
+    bandwidth_radps: float
+    poles: tuple[complex, ...]
+
+    @property
+    def stable(self) -> bool:
+        """True if every mode of the closed loop decays."""
+        return all(pole.real < 0 for pole in self.poles)
+
+    def as_json(self) -> dict[str, object]:
+        """The result as JSON has it; poles as [real, imaginary], what is unbounded as null."""
+        own = {key: value for key, value in vars(self).items() if key != "poles"}
+        decibel = 20 * math.log10(self.gain_margin_up) if math.isfinite(self.gain_margin_up) else None
+        poles = [[pole.real, pole.imag] for pole in self.poles]
+        return {**own, "gain_margin_dB": decibel, "stable": self.stable, "poles": poles}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LargestSteps:
+    """Largest change of course that stays linear, rad: without the gear's rate limit, and without its angle limit.
+
+    inf where there is no such limit. The linear answer to a step in ``heading.command`` is scaled until it meets it.
+    """
+
+    within_rate_rad: float
+    within_angle_rad: float
+
+
+def loop_transfer(ship: Model, autopilot: Model, speed_mps: float | None = None) -> control.StateSpace:
+    """Loop L from the rudder order round to the rudder order, sign reversed: the closed loop has 1 + L."""
+    point = straight_course(ship, speed_mps)
+    states = [name for name in ship.state_names if name not in _HELD]
+    seen = ["motion.psi", "motion.r"]
+    plant = state_space(ship, point, states=states, inputs=["rudder.command"], outputs=seen)
+    pilot = _at_rest(autopilot, seen)
+    return -control.ss(pilot.A, pilot.B, pilot.C, pilot.D) * control.ss(plant.A, plant.B, plant.C, plant.D)
+
+
+def _at_rest(autopilot: Model, inputs: list[str]) -> control.StateSpace:
+    rest = OperatingPoint(_states(autopilot, 0.0), autopilot.input_values(), autopilot.parameter_values())
+    return state_space(autopilot, rest, inputs=inputs, outputs=["rudder.command"])
+
+
+def _states(autopilot: Model, held: float) -> Vector:
+    """States of an autopilot that holds a rudder (rad) by its integral."""
+    # At exactly 0 two limits of the anti-windup meet, and no slope is right.
+    integral = held if abs(held) > _OFF_THE_KINK else _OFF_THE_KINK
+    return np.array([integral if name == "autopilot.integral" else 0.0 for name in autopilot.state_names])
+
+
+def closed_loop_transfer(ship: Model, autopilot: Model, speed_mps: float | None = None) -> control.StateSpace:
+    """From the ordered heading to heading, rudder order and rudder rate, of the two models joined."""
+    course = straight_course(ship, speed_mps)
+    joint = closed_loop_model(ship, autopilot)
+    held = float(course.x[ship.state_names.index("rudder.angle")])
+    own = _states(autopilot, held)
+    u = joint.input_values()
+    if "autopilot.integral" not in autopilot:  # a heading error holds the rudder that keeps the course
+        u[joint.input_names.index("heading.command")] = held / float(_at_rest(autopilot, ["heading.command"]).D.item())
+    point = OperatingPoint(np.concatenate([course.x, own]), u, joint.parameter_values())
+    states = [name for name in joint.state_names if name not in _HELD]
+    outputs = ["motion.psi", "rudder.command", "rudder.rate"]
+    return state_space(joint, point, states=states, inputs=["heading.command"], outputs=outputs)
+
+
+def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) -> LoopMargins:
+    """Margins at a speed, by default that of expansion.
+
+    Raises
+    ------
+    InputError
+        The model is no ship, or holds no straight course.
+    """
+    loop = loop_transfer(ship, autopilot, speed_mps)
+    whole = closed_loop_transfer(ship, autopilot, speed_mps)
+    omega = frequencies(loop)
+    gain, phase, nearest, _, crossover, _ = control.stability_margins(
+        control.frd(loop, omega, smooth=True), returnall=True
+    )
+    up, down = gain[gain > 1], gain[(gain < 1) & (gain > 0)]
+    delays = np.radians(np.mod(phase, 360.0)) / crossover
+    heading = np.abs(whole(1j * omega))[0]
+    below = np.flatnonzero(heading < math.sqrt(0.5))
+    poles = sorted((complex(pole) for pole in whole.poles()), key=lambda pole: -pole.real)
+    values = dict(zip(ship.parameter_names, ship.parameter_values().tolist(), strict=True))
+    return LoopMargins(
+        speed_mps=values["ship.speed"] if speed_mps is None else speed_mps,
+        gain_margin_up=float(up.min()) if up.size else math.inf,
+        gain_margin_down=float(down.max()) if down.size else 0.0,
+        phase_margin_deg=float(min(phase, key=abs)) if phase.size else math.inf,
+        delay_margin_s=float(delays.min()) if delays.size else math.inf,
+        sensitivity_peak=float(1 / nearest.min()),
+        crossover_radps=float(crossover.max()) if crossover.size else math.nan,
+        bandwidth_radps=float(omega[below[0]]) if below.size else math.inf,
+        poles=tuple(poles),
+    )
+
+
+def frequencies(loop: control.StateSpace) -> Vector:
+    """Frequencies (4000,) in rad/s that show all of a loop: two decades beyond its crossover either way."""
+    coarse = np.logspace(-6, 3, 2000)
+    above = np.flatnonzero(np.abs(loop(1j * coarse)) > 1)
+    middle = coarse[above[-1]] if above.size else 1.0
+    return np.asarray(middle * np.logspace(-3, 2.5, 4000))
+
+
+def largest_steps(ship: Model, autopilot: Model, speed_mps: float | None = None) -> LargestSteps:
+    """Largest change of course whose linear answer keeps to the limits of the gear."""
+    values = dict(zip(ship.parameter_names, ship.parameter_values().tolist(), strict=True))
+    limits = dict(zip(autopilot.parameter_names, autopilot.parameter_values().tolist(), strict=True))
+    rate = values.get("rudder_rate_limit.max_rate", values.get("steering.max_rate", math.inf))
+    whole = closed_loop_transfer(ship, autopilot, speed_mps)
+    sizes = np.abs(whole.poles())
+    peaks = np.zeros(3)
+    for duration in (20 / sizes.max(), 10 / sizes.min()):  # the gear's own answer, and that of the ship
+        answer = control.step_response(whole, np.linspace(0, duration, 2000)).outputs
+        peaks = np.maximum(peaks, np.abs(answer).max(axis=-1).ravel())
+    order, moved = (float(peak) for peak in peaks[1:])
+    return LargestSteps(within_rate_rad=rate / moved, within_angle_rad=limits["autopilot.max_rudder"] / order)

@@ -1,0 +1,100 @@
+"""A robust heading controller: mixed sensitivity, H-infinity (extra ``robust``: slycot).
+
+Least largest gain of [W1 S; W2 K S], S = 1/(1 + G K): W1 asks for a fast loop with a low peak of S, W2 for little
+rudder at high frequency (waves, gear): Skogestad & Postlethwaite (2005), Multivariable Feedback Control, 9.3.
+
+All on an axis of frequency shifted by a: G(s - a) is designed for, and the controller shifted back. Then every mode of
+the loop decays faster than a, and the controller cannot cancel the slow mode of the hull, which would leave the ship
+slow to come back from a gust: Chiang & Safonov (1992), J. Guidance, Control, and Dynamics 15. The integral is put
+before the ship as (s + b)/s and belongs to the controller afterwards.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import warnings
+
+import control
+import numpy as np
+
+from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
+from tank2sim.analysis.heading.designs import HeadingDesign, SteeringPlant
+from tank2sim.dynamics.autopilot_linear import LinearLaw, linear_autopilot_model
+from tank2sim.errors import InputError
+
+# All in w = sqrt(K/T) of the ship: choices of ours, tried on stable and unstable ships (Ms 1.4 to 1.7).
+SHIFT = 0.2
+"""Every mode of the loop decays faster."""
+INTEGRAL = 0.3
+"""Zero b of the integral; above the shift, so that it can be moved."""
+BANDWIDTH = 0.8
+"""Where W1 wants the sensitivity below 1."""
+PEAK = 1.5
+"""What W1 allows as its peak."""
+RUDDER_FREQUENCY = 20.0
+"""Above it W2 allows the rudder less than the heading error; far below 5 times as much."""
+LEAST_ERROR = 0.01
+"""Share of BANDWIDTH at which W1 becomes flat: its pole has to be stable."""
+
+
+def robust_design(plant: SteeringPlant, name: str) -> HeadingDesign:
+    """The mixed-sensitivity controller.
+
+    Raises
+    ------
+    InputError
+        slycot is not installed, or there is no such controller.
+    """
+    if importlib.util.find_spec("slycot") is None:
+        raise InputError("--design", "robust", "needs slycot", "pip install 'tank2sim[robust]'")
+    w = plant.frequency_radps
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)  # of a name inside python-control
+        core, gamma = _synthesis(plant)
+    core = _without_fast_modes(core, 1 / plant.step_s / w)
+    A, B, C, D = core.A * w, core.B * w, core.C, core.D  # time back from 1/w to s
+    n = len(A)
+    rates = np.hstack([A, B, np.zeros((n, 2))])
+    demand = np.concatenate([C.ravel(), D.ravel(), [0.0]])
+    steady = float(np.real(core.dcgain()).item())
+    law = LinearLaw(
+        rates=rates,
+        demand=demand,
+        growth=INTEGRAL * w * demand,
+        growth_limit_radps=INTEGRAL * w * abs(steady) * INTEGRAL_BAND_RAD,
+        anti_windup_time_s=1 / w,
+        largest_rudder_rad=plant.largest_rudder_rad,
+    )
+    source = (
+        f"Mixed sensitivity on {plant.found.name} with its steering gear at {plant.found.speed_mps:.4g} m/s: "
+        f"gamma {gamma:.3g}, order {n + 1}"
+    )
+    gains = {"gamma": gamma, "order": float(n + 1), "steady_gain": steady, "integral_radps": INTEGRAL * w}
+    description = "Heading autopilot: mixed sensitivity (H-infinity) on the heading error, limits and anti-windup"
+    model = linear_autopilot_model(name, description, law, plant.step_s)
+    return HeadingDesign(kind="robust", found=plant.found, gains=gains, source=source, autopilot=model)
+
+
+def _synthesis(plant: SteeringPlant) -> tuple[control.StateSpace, float]:
+    """Controller without its integral (time in 1/w), and the gain reached."""
+    w = plant.frequency_radps
+    ship = control.ss(plant.A / w, plant.B / w, [[0, 0, 1, 0]], [[0]])
+    integral = control.ss([[0]], [[1]], [[INTEGRAL]], [[1]])
+    together = control.series(integral, ship)
+    shifted = control.ss(together.A + SHIFT * np.eye(together.nstates), together.B, together.C, together.D)
+    W1 = control.tf([1 / PEAK, BANDWIDTH], [1, LEAST_ERROR * BANDWIDTH])
+    W2 = control.tf([1, 0.2 * RUDDER_FREQUENCY], [0.01, RUDDER_FREQUENCY])
+    try:
+        found, _, reached = control.mixsyn(shifted, control.ss(W1), control.ss(W2), None)
+    except (control.ControlArgument, ArithmeticError, ValueError) as error:
+        remedy = "choose another design"
+        raise InputError(plant.found.name, "", f"no robust controller was found ({error})", remedy) from None
+    back = control.ss(found.A - SHIFT * np.eye(found.nstates), found.B, found.C, found.D)
+    return back, float(reached[0])
+
+
+def _without_fast_modes(system: control.StateSpace, fastest: float) -> control.StateSpace:
+    """Modes that decay faster than the integration can follow, replaced by what they settle at."""
+    modal, _ = control.modal_form(system)
+    fast = [place for place in range(modal.nstates) if -modal.A[place, place] > fastest]
+    return control.model_reduction(modal, elim_states=fast, method="matchdc") if fast else modal

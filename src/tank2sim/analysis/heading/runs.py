@@ -1,0 +1,199 @@
+"""Course changes and course keeping of a ship under autopilot, on the nonlinear model, and their figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
+from tank2sim.dynamics.autopilot_loop import closed_loop_model
+from tank2sim.dynamics.model import Model, Vector
+from tank2sim.errors import InputError
+from tank2sim.simulation.rows import Chain, Rows
+from tank2sim.simulation.scheme import runge_kutta_step
+from tank2sim.simulation.trajectory import Trajectory
+
+SETTLED = 0.02
+"""Share of a course change within which it is settled, as in textbooks."""
+
+
+class HeadingLoop:
+    """A ship and its autopilot as one model, ready to run.
+
+    Parameters
+    ----------
+    ship : Model
+    autopilot : Model
+        Input ``heading.command`` stays free.
+    """
+
+    def __init__(self, ship: Model, autopilot: Model):
+        self.model = closed_loop_model(ship, autopilot)
+        self._chain = Chain(runge_kutta_step(self.model))
+        self._outputs = Rows(self.model.output)
+
+    def start(self, parameters: Mapping[str, float] | None = None) -> Vector:
+        """State (nx,) at the beginning."""
+        return np.asarray(self.model.initial(self.model.parameter_values(parameters)), dtype=float).ravel()
+
+    def advance(
+        self, state: Vector, inputs: Mapping[str, float | Vector], steps: int, parameters: Mapping[str, float] | None
+    ) -> tuple[Vector, Vector]:
+        """States (steps + 1, nx) and inputs (steps, nu); an input is held, or (steps,) gives one for each step."""
+        u = np.tile(self.model.input_values(), (steps, 1))
+        for name, values in inputs.items():
+            u[:, self.model.input_names.index(name)] = values
+        p = self.model.parameter_values(parameters)
+        return self._chain.run(state, u, p, np.array([self.model.step_s])), u
+
+    def run(
+        self,
+        inputs: Mapping[str, float | Vector],
+        duration_s: float,
+        *,
+        parameters: Mapping[str, float] | None = None,
+    ) -> Trajectory:
+        """Simulate from the model's start, classical Runge-Kutta at the model's step.
+
+        Raises
+        ------
+        InputError
+            The motion leaves all bounds.
+        """
+        steps = round(duration_s / self.model.step_s)
+        x, u = self.advance(self.start(parameters), inputs, steps, parameters)
+        return self.trajectory(x, u, parameters)
+
+    def trajectory(self, x: Vector, u: Vector, parameters: Mapping[str, float] | None = None) -> Trajectory:
+        """States (n + 1, nx) and inputs (n, nu) with their times and outputs. Raises as :meth:`run`."""
+        u = np.vstack([u, u[-1]])
+        (y,) = self._outputs(x, u, self.model.parameter_values(parameters))
+        time = np.asarray(self.model.step_s * np.arange(len(x)), dtype=np.float64)
+        made = Trajectory(self.model, time, x, u, y)
+        if not made.is_finite():
+            remedy = "choose another design, or a smaller course change"
+            raise InputError(self.model.name, "", "the motion leaves all bounds", remedy)
+        return made
+
+
+@dataclass(frozen=True, kw_only=True)
+class CourseChange:
+    """Figures of a change of course.
+
+    Parameters
+    ----------
+    ordered_deg : float
+    rise_time_s : float or None
+        From 10 to 90 % of the change; None if it does not come so far.
+    overshoot_deg : float
+    settling_time_s : float or None
+        After which it stays within :data:`SETTLED` of the change; None if it does not.
+    largest_rudder_deg : float
+    rate_limited_s : float
+        Time that the rudder moves as fast as it can.
+    """
+
+    ordered_deg: float
+    rise_time_s: float | None
+    overshoot_deg: float
+    settling_time_s: float | None
+    largest_rudder_deg: float
+    rate_limited_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class CourseKeeping:
+    """Figures of keeping a course, over `duration_s`.
+
+    Parameters
+    ----------
+    duration_s : float
+    heading_error_deg2s, rudder_deg2s : float
+        Integrals of the square of the heading error and of the rudder angle about its mean.
+    heading_error_rms_deg, heading_error_mean_deg, rudder_rms_deg : float
+        The same as root mean squares (the rudder about its mean), and what error stays.
+    rudder_travel_degps : float
+        Mean of the size of the rudder's rate: the wear of the gear.
+    rate_limited_percent : float
+        Share of the time that the rudder moves as fast as it can.
+    """
+
+    duration_s: float
+    heading_error_deg2s: float
+    rudder_deg2s: float
+    heading_error_rms_deg: float
+    heading_error_mean_deg: float
+    rudder_rms_deg: float
+    rudder_travel_degps: float
+    rate_limited_percent: float
+
+
+def without_anti_windup(autopilot: Model) -> dict[str, float]:
+    """Parameters with which the integral goes on at the limit, and takes the whole of a course change; none of a PD."""
+    starts = {one.name: one.start for one in autopilot.parameters}
+    if "autopilot.anti_windup_time" not in starts:
+        return {}
+    changed = {"autopilot.anti_windup_time": 1e6, "autopilot.integral_band": math.pi}
+    if "autopilot.integral_limit" in starts:
+        changed["autopilot.integral_limit"] = starts["autopilot.integral_limit"] * math.pi / INTEGRAL_BAND_RAD
+    return {name: value for name, value in changed.items() if name in starts}
+
+
+def course_change(run: Trajectory, ordered_rad: float) -> CourseChange:
+    """Figures of a run in which ``heading.command`` steps from the heading at the start by `ordered_rad` at t = 0."""
+    heading = (run["motion.psi"] - run["motion.psi"][0]) / ordered_rad
+    outside = np.flatnonzero(np.abs(heading - 1) > SETTLED)
+    settled = len(outside) and outside[-1] + 1 < len(heading)
+    first = _reached(run.t, heading, 0.1)
+    last = _reached(run.t, heading, 0.9)
+    return CourseChange(
+        ordered_deg=math.degrees(ordered_rad),
+        rise_time_s=None if first is None or last is None else last - first,
+        overshoot_deg=math.degrees(abs(ordered_rad) * max(0.0, float(heading.max()) - 1)),
+        settling_time_s=float(run.t[outside[-1] + 1]) if settled else None,
+        largest_rudder_deg=float(np.degrees(np.abs(run["rudder.angle"]).max())),
+        rate_limited_s=float(_rate_limited(run).sum() * run.model.step_s),
+    )
+
+
+def course_keeping(run: Trajectory, course_rad: float, from_s: float) -> CourseKeeping:
+    """Figures of a run on a constant course, of its part after `from_s`, when what the start did has decayed."""
+    part = run.t >= from_s
+    error = np.degrees(run["motion.psi"][part] - course_rad)
+    rudder = np.degrees(run["rudder.angle"][part])
+    rudder = rudder - rudder.mean()
+    duration = float(run.t[-1] - run.t[part][0])
+    moved = np.abs(np.diff(rudder)).sum()
+    return CourseKeeping(
+        duration_s=duration,
+        heading_error_deg2s=float(np.mean(error**2) * duration),
+        rudder_deg2s=float(np.mean(rudder**2) * duration),
+        heading_error_rms_deg=float(np.sqrt(np.mean(error**2))),
+        heading_error_mean_deg=float(error.mean()),
+        rudder_rms_deg=float(np.sqrt(np.mean(rudder**2))),
+        rudder_travel_degps=float(moved / duration),
+        rate_limited_percent=float(100 * _rate_limited(run)[part[1:]].mean()),
+    )
+
+
+def _reached(time: Vector, values: Vector, level: float) -> float | None:
+    """Time at which a signal first reaches a level, linear between samples."""
+    over = np.flatnonzero(values >= level)
+    if not over.size or over[0] == 0:
+        return None
+    k = int(over[0])
+    share = (level - values[k - 1]) / (values[k] - values[k - 1])
+    return float(time[k - 1] + share * (time[k] - time[k - 1]))
+
+
+def _rate_limited(run: Trajectory) -> Vector:
+    """For each step (n - 1,), whether the rudder moved at its largest rate."""
+    limits = [one.start for one in run.model.parameters if one.name in _RATE_LIMITS]
+    moved = np.abs(np.diff(run["rudder.angle"])) / run.model.step_s
+    return np.asarray(moved > 0.999 * min(limits, default=math.inf))
+
+
+_RATE_LIMITS = ("steering.max_rate", "rudder_rate_limit.max_rate")

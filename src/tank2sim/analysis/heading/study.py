@@ -1,0 +1,245 @@
+"""All that is asked of a heading controller of a ship: gains, margins at several speeds, course changes, weather."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+
+from tank2sim.analysis.heading.designs import HeadingDesign, Weights, design_heading
+from tank2sim.analysis.heading.margins import LargestSteps, LoopMargins, largest_steps, loop_margins
+from tank2sim.analysis.heading.runs import (
+    CourseChange,
+    CourseKeeping,
+    HeadingLoop,
+    course_change,
+    course_keeping,
+    without_anti_windup,
+)
+from tank2sim.analysis.heading.track_keeping import Guidance, TrackRun, keep_track
+from tank2sim.analysis.heading.weather import Weather, in_weather, wave_yaw_acceleration, weather_for
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
+from tank2sim.dynamics.model import Model, Vector
+from tank2sim.errors import InputError
+from tank2sim.simulation.trajectory import Trajectory
+
+INTEGRAL_SHARE = 0.25
+"""Of the integral line of sight: critically damped (:class:`tank2sim.analysis.heading.track_keeping.Guidance`)."""
+
+_CHANGE_TIMES = 60
+"""Length of a course change in 1/w, w = sqrt(K/T): six times the slowest mode that is placed (choice of ours)."""
+_KEEPING_TIMES = 120
+"""Length of course keeping in 1/w; figures are those of its later half."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudySettings:
+    """What is asked.
+
+    Parameters
+    ----------
+    kind : str
+        One of :data:`tank2sim.analysis.heading.designs.DESIGNS`.
+    speed_mps : float, optional
+        Of the design; by default that of expansion.
+    weights : Weights
+        Of the LQR.
+    wave_filter_radps : float, optional
+        Of the PID.
+    course_change_rad : float
+        Of the ordinary change of course, to starboard if positive.
+    large_change_rad : float
+        Of the one that takes the rudder to its limit, with which anti-windup is shown.
+    weather : mapping
+        Fields of :class:`Weather` in place of the defaults; None: the default.
+    waypoints : array (n, 2), optional
+        A track to keep, m.
+    """
+
+    kind: str = "pid"
+    speed_mps: float | None = None
+    weights: Weights = field(default_factory=Weights)
+    wave_filter_radps: float | None = None
+    course_change_rad: float = math.radians(20.0)
+    large_change_rad: float = math.radians(90.0)
+    weather: Mapping[str, float | None] = field(default_factory=dict)
+    waypoints: Vector | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AutopilotStudy:
+    """What was found.
+
+    Parameters
+    ----------
+    design : HeadingDesign
+    margins : tuple of LoopMargins
+        At the speed of the design, then at others, all with the gains of the design.
+    steps : LargestSteps
+        At the speed of the design.
+    weather : Weather
+    runs : mapping
+        Name to motion: ``change``, ``large``, ``large without anti-windup`` (if there is an integral), ``keeping``.
+    changes : mapping
+        Figures of the changes of course, by the same names.
+    keeping : CourseKeeping
+    tracks : mapping
+        ``line of sight`` and ``with integral``, if a track was given.
+    waypoints : array (n, 2), optional
+    notices : tuple of str
+    """
+
+    design: HeadingDesign
+    margins: tuple[LoopMargins, ...]
+    steps: LargestSteps
+    weather: Weather
+    runs: Mapping[str, Trajectory]
+    changes: Mapping[str, CourseChange]
+    keeping: CourseKeeping
+    tracks: Mapping[str, TrackRun]
+    waypoints: Vector | None
+    notices: tuple[str, ...]
+
+    def as_json(self) -> dict[str, object]:
+        """The result as JSON has it."""
+        first = self.margins[0]
+        return {
+            "ship": self.design.found.name,
+            "design": self.design.kind,
+            "source": self.design.source,
+            "gains": dict(self.design.gains),
+            "margins": {"at_design": first.as_json(), "at_speeds": [one.as_json() for one in self.margins]},
+            "closed_loop": {
+                "poles": [[pole.real, pole.imag] for pole in first.poles],
+                "bandwidth_radps": first.bandwidth_radps,
+                "largest_step_within_rate_limit_deg": math.degrees(self.steps.within_rate_rad),
+                "largest_step_within_angle_limit_deg": math.degrees(self.steps.within_angle_rad),
+                "course_changes": {name: asdict(one) for name, one in self.changes.items()},
+                "course_keeping": asdict(self.keeping),
+            },
+            "weather": _in_degrees(asdict(self.weather)),
+            "track": {name: asdict(one.figures) for name, one in self.tracks.items()},
+            "notices": list(self.notices),
+        }
+
+
+def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings) -> AutopilotStudy:
+    """Design a heading controller and try it.
+
+    Parameters
+    ----------
+    card, ship : ManoeuvringCard, Model
+        The card, and the model built of it.
+    settings : StudySettings
+
+    Raises
+    ------
+    InputError
+        As :func:`design_heading`, :func:`keep_track` and :meth:`HeadingLoop.run`; or the loop is not stable.
+    """
+    design = _design(ship, settings)
+    margins, told = _margins(ship, design, settings.speed_mps)
+    if not margins[0].stable:
+        remedy = "choose another design, or check the steering gear of the card"
+        raise InputError(ship.name, "", f"the loop of the {design.kind} design is not stable", remedy)
+    values = {one.name: one.start for one in ship.parameters}
+    weather = weather_for(values["ship.length"], **settings.weather)
+    outside, inputs = in_weather(ship, card, weather)
+    loop = HeadingLoop(outside, design.autopilot)
+    start = {} if settings.speed_mps is None else {"initial.u": settings.speed_mps}
+    ahead = {"current.speed": 0.0, "wind.speed": 0.0}
+    unit = math.sqrt(design.found.nomoto.T_s / design.found.nomoto.K_per_s)
+    runs, changes = _changes(loop, design, settings, ahead, start, _CHANGE_TIMES * unit)
+    steps = round(_KEEPING_TIMES * unit / loop.model.step_s)
+    waves = wave_yaw_acceleration(weather, loop.model.step_s, steps)
+    weathered: dict[str, float | Vector] = {**inputs, YAW_DISTURBANCE: waves, "heading.command": 0.0}
+    runs["keeping"] = loop.run(weathered, steps * loop.model.step_s, parameters=start)
+    tracks = {}
+    if settings.waypoints is not None:
+        for name, share in (("line of sight", 0.0), ("with integral", INTEGRAL_SHARE)):
+            tracks[name] = keep_track(loop, settings.waypoints, Guidance(integral_share=share), inputs)
+    return AutopilotStudy(
+        design=design,
+        margins=margins,
+        steps=largest_steps(ship, design.autopilot, settings.speed_mps),
+        weather=weather,
+        runs=runs,
+        changes=changes,
+        keeping=course_keeping(runs["keeping"], 0.0, runs["keeping"].t[-1] / 2),
+        tracks=tracks,
+        waypoints=settings.waypoints,
+        notices=(*outside.notices, *told, *_begun_at(settings.speed_mps), *_notices(margins, runs, changes, tracks)),
+    )
+
+
+def _design(ship: Model, settings: StudySettings) -> HeadingDesign:
+    return design_heading(
+        ship,
+        settings.kind,
+        speed_mps=settings.speed_mps,
+        weights=settings.weights,
+        wave_filter_radps=settings.wave_filter_radps,
+    )
+
+
+def _margins(ship: Model, design: HeadingDesign, speed: float | None) -> tuple[tuple[LoopMargins, ...], list[str]]:
+    """At the speed of the design and at five across the card's range; and what is to be told of those without."""
+    values = {one.name: one.start for one in ship.parameters}
+    own = values["ship.speed"] if speed is None else speed
+    found, told = [loop_margins(ship, design.autopilot, own)], []
+    for other in np.linspace(values["ship.slowest"], values["ship.fastest"], 5).tolist():
+        if abs(other / own - 1) < 1e-6:
+            continue
+        try:
+            found.append(loop_margins(ship, design.autopilot, other))
+        except InputError as error:  # the polynomial of a card may lose its rudder at an end of its range
+            told.append(f"no margins at {other:.4g} m/s: {error.problem}")
+    return tuple(found), told
+
+
+def _changes(
+    loop: HeadingLoop,
+    design: HeadingDesign,
+    settings: StudySettings,
+    inputs: Mapping[str, float],
+    start: Mapping[str, float],
+    duration: float,
+) -> tuple[dict[str, Trajectory], dict[str, CourseChange]]:
+    asked = {"change": (settings.course_change_rad, dict(start)), "large": (settings.large_change_rad, dict(start))}
+    if bare := without_anti_windup(design.autopilot):
+        asked["large without anti-windup"] = (settings.large_change_rad, {**start, **bare})
+    runs = {
+        name: loop.run({**inputs, "heading.command": order}, duration, parameters=values)
+        for name, (order, values) in asked.items()
+    }
+    return runs, {name: course_change(run, asked[name][0]) for name, run in runs.items()}
+
+
+def _notices(
+    margins: tuple[LoopMargins, ...],
+    runs: Mapping[str, Trajectory],
+    changes: Mapping[str, CourseChange],
+    tracks: Mapping[str, TrackRun],
+) -> list[str]:
+    told = [f"the loop is not stable at {one.speed_mps:.4g} m/s" for one in margins if not one.stable]
+    told += [
+        f"the course change {name!r} is not settled after {runs[name].t[-1]:.0f} s"
+        for name, one in changes.items()
+        if one.settling_time_s is None
+    ]
+    return told + [f"the track is not finished, {name}" for name, one in tracks.items() if not one.figures.finished]
+
+
+def _begun_at(speed: float | None) -> list[str]:
+    return [] if speed is None else [f"the runs begin at {speed:g} m/s, with the engine as it is at the card's speed"]
+
+
+def _in_degrees(values: Mapping[str, float]) -> dict[str, float]:
+    told: dict[str, float] = {}
+    for name, value in values.items():
+        stem, _, unit = name.rpartition("_")
+        told |= {f"{stem}_deg": math.degrees(value)} if unit == "rad" else {name: value}
+    return told

@@ -1,0 +1,228 @@
+"""Keeping a track: waypoints, line of sight with lookahead and integral, cross-track errors.
+
+    heading = a - atan((e + s z)/D),    dz/dt = D e/(D^2 + (e + s z)^2)
+
+a is the direction of the leg, e the cross-track error (positive to its right), D the lookahead distance, z the integral
+with its gain s: with s = 0 the lookahead-based line of sight of Fossen (2011), Handbook of Marine Craft Hydrodynamics
+and Motion Control, 10.3.2; with it the integral one of Borhaug, Pavlov & Pettersen (2008), 47th IEEE CDC, by
+which a current leaves no error. A leg ends within the circle of acceptance about its waypoint, or abeam of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.analysis.heading.runs import HeadingLoop
+from tank2sim.dynamics.model import Vector
+from tank2sim.errors import InputError
+from tank2sim.records.csv_table import read_table
+from tank2sim.simulation.trajectory import Trajectory
+
+GUIDANCE_STEP_S = 1.0
+"""Interval at which a new heading is ordered: as often as a receiver of satellite navigation gives positions."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Guidance:
+    """How a track is steered for, in lengths of the ship.
+
+    Parameters
+    ----------
+    lookahead_lengths : float
+        D: a choice of ours; shorter ones come to the track sooner, and swing across it.
+    acceptance_lengths : float
+        Radius about a waypoint in which the next leg begins; 2 by Fossen (2011), 10.3.2.
+    integral_share : float
+        s over the speed u0 of the ship; 0: no integral. A quarter damps the error critically: with small errors
+        de/dt = -U (e + s z)/D and dz/dt = e/D, thus s^2 + U/D s + U s/D^2 has one double root for s = U/4.
+    """
+
+    lookahead_lengths: float = 3.0
+    acceptance_lengths: float = 2.0
+    integral_share: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrackKeeping:
+    """Figures of a track.
+
+    Parameters
+    ----------
+    length_m : float
+        Of all its legs.
+    duration_s : float
+        Until the end of the last leg, or of the run.
+    finished : bool
+    largest_error_m, rms_error_m : float
+        Cross-track errors, corners in between.
+    largest_error_on_legs_m : float
+        The largest after half of each leg: what is left when the corner is behind.
+    mean_error_at_end_m : float
+        Mean over the last quarter of the last leg sailed, positive to starboard of the track: what stays.
+    """
+
+    length_m: float
+    duration_s: float
+    finished: bool
+    largest_error_m: float
+    rms_error_m: float
+    largest_error_on_legs_m: float
+    mean_error_at_end_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class TrackRun:
+    """A track as it was sailed: the motion, and at each guidance step (n,) the leg (from 0) and cross-track error."""
+
+    trajectory: Trajectory
+    time_s: Vector
+    leg: Vector
+    along_share: Vector
+    error_m: Vector
+    figures: TrackKeeping
+
+
+def read_waypoints(path: Path | str) -> Vector:
+    """Waypoints (n, 2), x north and y east in m, from a CSV with columns ``x_m`` and ``y_m``.
+
+    Raises
+    ------
+    InputError
+        The file is no such table, a cell is empty, there are fewer than two, or two that follow are one place.
+    """
+    table = read_table(path)
+    points = np.column_stack([table.column("x_m"), table.column("y_m")])
+    empty = np.argwhere(np.isnan(points))
+    if empty.size:
+        row, column = (int(place) for place in empty[0])
+        raise InputError(path, table.place(row, ("x_m", "y_m")[column]), "is empty", "give each waypoint both numbers")
+    if len(points) < 2:
+        raise InputError(path, "", "has one waypoint", "give two or more: a track begins at the first")
+    same = np.flatnonzero(np.hypot(*np.diff(points, axis=0).T) < 1e-6)
+    if same.size:
+        row = int(same[0]) + 1
+        raise InputError(path, f"line {table.lines[row]}", "is the same place as the row before", "delete one of them")
+    return np.asarray(points)
+
+
+def line_of_sight(error: float, integral: float, lookahead: float, gain: float = 0.0) -> tuple[float, float]:
+    """Heading relative to the leg (rad) and rate of the integral (1, a second) for a cross-track error.
+
+    Parameters
+    ----------
+    error, integral : float
+        m; and s, so that the gain times it is a length.
+    lookahead : float
+        m.
+    gain : float
+        m/s; 0: no integral.
+    """
+    whole = error + gain * integral
+    return -math.atan2(whole, lookahead), lookahead * error / (lookahead**2 + whole**2)
+
+
+def keep_track(
+    loop: HeadingLoop, waypoints: Vector, guidance: Guidance, inputs: Mapping[str, float | Vector] | None = None
+) -> TrackRun:
+    """Sail along waypoints from the first, on the course of the first leg at the start.
+
+    Parameters
+    ----------
+    loop : HeadingLoop
+    waypoints : array (n, 2)
+    guidance : Guidance
+    inputs : mapping, optional
+        Of the model, by name (current, wind); held.
+
+    Raises
+    ------
+    InputError
+        A leg is shorter than the circle of acceptance, or the motion leaves all bounds.
+    """
+    values = {one.name: one.start for one in loop.model.parameters}
+    length, speed = values["ship.length"], values["ship.speed"]
+    _refuse_short_legs(waypoints, guidance.acceptance_lengths * length)
+    first = waypoints[1] - waypoints[0]
+    course = math.atan2(first[1], first[0])
+    start = {"initial.x": waypoints[0, 0], "initial.y": waypoints[0, 1], "initial.psi": course}
+    sailed = _Sailed(waypoints, guidance, length, speed)
+    steps = max(1, round(GUIDANCE_STEP_S / loop.model.step_s))
+    total = float(np.hypot(*np.diff(waypoints, axis=0).T).sum())
+    most = 3 * total / speed + 20 * length / speed
+    x, states, us = loop.start(start), [], []
+    place = [loop.model.state_names.index(f"motion.{name}") for name in "xy"]
+    while not sailed.finished and sailed.time < most and np.isfinite(x).all():
+        heading = sailed.heading(x[place], steps * loop.model.step_s)
+        part, u = loop.advance(x, {**(inputs or {}), "heading.command": heading}, steps, start)
+        states.append(part[:-1])
+        us.append(u)
+        x = part[-1]
+    trajectory = loop.trajectory(np.vstack([*states, x[None, :]]), np.vstack(us), start)
+    return sailed.run(trajectory, total)
+
+
+def _refuse_short_legs(waypoints: Vector, radius: float) -> None:
+    legs = np.hypot(*np.diff(waypoints, axis=0).T)
+    short = np.flatnonzero(legs <= radius)
+    if short.size:
+        where = f"leg {short[0] + 1}"
+        problem = f"is {legs[short[0]]:.4g} m, and the next begins {radius:.4g} m before its end"
+        raise InputError("--track", where, problem, "place its waypoints further apart")
+
+
+class _Sailed:
+    """A track on the way: which leg, the integral, and what was met at each guidance step."""
+
+    def __init__(self, waypoints: Vector, guidance: Guidance, length: float, speed: float):
+        self._points = waypoints
+        self._lookahead = guidance.lookahead_lengths * length
+        self._radius = guidance.acceptance_lengths * length
+        self._gain = guidance.integral_share * speed
+        self._integral = 0.0
+        self._leg = 0
+        self._met: list[tuple[float, int, float, float]] = []
+        self.time = 0.0
+        self.finished = False
+
+    def heading(self, position: Vector, step: float) -> float:
+        """Heading to order at a position (2,), to be held for `step` s."""
+        along, error, size, course = self._on_leg(position)
+        while along >= size or math.hypot(size - along, error) < self._radius:
+            if self._leg + 2 >= len(self._points):
+                self.finished = bool(along >= size)
+                break
+            self._leg += 1
+            along, error, size, course = self._on_leg(position)
+        self._met.append((self.time, self._leg, along / size, error))
+        turned, growth = line_of_sight(error, self._integral, self._lookahead, self._gain)
+        self._integral += growth * step
+        self.time += step
+        return course + turned
+
+    def _on_leg(self, position: Vector) -> tuple[float, float, float, float]:
+        begin, end = self._points[self._leg], self._points[self._leg + 1]
+        size, course = math.hypot(*(end - begin)), math.atan2(end[1] - begin[1], end[0] - begin[0])
+        north, east = position - begin
+        along = north * math.cos(course) + east * math.sin(course)
+        return along, -north * math.sin(course) + east * math.cos(course), size, course
+
+    def run(self, trajectory: Trajectory, total: float) -> TrackRun:
+        """What was sailed, with its figures."""
+        time, leg, along, error = np.array(self._met).T
+        later = np.abs(error[along > 0.5]) if (along > 0.5).any() else np.abs(error)
+        last = (leg == leg[-1]) & (along > along[-1] - 0.25)
+        figures = TrackKeeping(
+            length_m=total,
+            duration_s=self.time,
+            finished=self.finished,
+            largest_error_m=float(np.abs(error).max()),
+            rms_error_m=float(np.sqrt(np.mean(error**2))),
+            largest_error_on_legs_m=float(later.max()),
+            mean_error_at_end_m=float(error[last].mean()),
+        )
+        return TrackRun(trajectory, time, leg, along, error, figures)

@@ -1,0 +1,1 @@
+"""Influence coefficients: how much each number on a card moves a manoeuvring figure."""

@@ -1,0 +1,198 @@
+"""What of a ship's card has an influence: its numbers as parameters of the model, their errors, their keys in the file.
+
+These are the derivatives, the rigid body, the steering gear, the effect of revolutions and the parameters of the card's
+effects. Particulars (length, speed of expansion, density) only scale them, and sensors do not move the ship.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, ManoeuvringCard
+from tank2sim.cards.scaling import file_factor
+from tank2sim.cards.terms import known_term
+from tank2sim.dynamics import build
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.units import from_si
+
+
+@dataclass(frozen=True)
+class CardParameter:
+    """A number of a card.
+
+    Parameters
+    ----------
+    name : str
+        Of the model's parameter, ``derivatives.Yv``.
+    value : float
+        As the model has it: prime or SI, rudder positive to starboard.
+    standard_error : float
+        In the same unit; 0 where the number is taken as exact.
+    assumed : bool
+        The card states no standard error: :data:`DEFAULT_RELATIVE_ERROR` of the value is taken.
+    key : str
+        Dotted key in the card's file.
+    factor : float
+        What the value is multiplied by to stand in the file.
+    bounds : tuple
+        Values that the number cannot leave, in the unit of `value`; None is no bound.
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    assumed: bool
+    key: str
+    factor: float
+    bounds: tuple[float | None, float | None] = (None, None)
+
+    @property
+    def short(self) -> str:
+        """The name as the card has it: ``Yv``, ``mass``, ``current.speed``."""
+        return self.name.removeprefix("derivatives.").removeprefix("ship.")
+
+
+def study_model(card: ManoeuvringCard) -> Model:
+    """The model of a card in which what its effects take as inputs (a current) are constants, which can be varied."""
+    model = build(card)
+    names = [name for entry in card.effects for name in EFFECTS[entry.name].model_names().values()]
+    return model.with_constant_inputs(names)
+
+
+def card_parameters(card: ManoeuvringCard, model: Model) -> tuple[CardParameter, ...]:
+    """Parameters of a card that are in its model, but for those that are zero without a standard error."""
+    found = (*_derivatives(card, model), *_rigid_body(card), *_gear(card), *_propulsion(card), *_effects(card, model))
+    known = set(model.parameter_names)
+    return tuple(one for one in found if one.name in known and (one.value != 0 or one.standard_error > 0))
+
+
+def find_parameter(parameters: Sequence[CardParameter], name: str, option: str) -> CardParameter:
+    """The parameter that a user means, by its whole name or by that in the card.
+
+    Raises
+    ------
+    InputError
+        The card has no such parameter, or it is zero and known to be so.
+    """
+    by_name = {key: one for one in parameters for key in (one.key, one.short, one.name)}
+    if name in by_name:
+        return by_name[name]
+    close = difflib.get_close_matches(name, by_name, n=1)
+    remedy = f"did you mean {close[0]}?" if close else f"there are: {', '.join(one.short for one in parameters)}"
+    raise InputError(option, name, "is no parameter of this card that is not zero", remedy)
+
+
+def _derivatives(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
+    scales = card.scales if card.model.scaling == "dimensional" else None
+    to_port = card.model.rudder_sign == "port"
+    stated = {*card.derivatives, *card.uncertainty}
+    return [
+        CardParameter(
+            name=f"derivatives.{name}",
+            value=card.derivatives.get(name, 0.0),
+            standard_error=card.standard_error(name),
+            assumed=name not in card.uncertainty,
+            key=f"derivatives.{card.places.get(name, name)}",
+            factor=file_factor(known_term(name), scales, rudder_to_port=to_port),
+        )
+        for name in (one.removeprefix("derivatives.") for one in model.parameter_names)
+        if name in stated
+    ]
+
+
+def _rigid_body(card: ManoeuvringCard) -> list[CardParameter]:
+    scales, body = card.scales, card.rigid_body
+    dimensional = card.model.scaling == "dimensional"
+    described = (
+        ("ship.mass", "mass", body.mass, scales.mass),
+        ("ship.yaw_inertia", "yaw_inertia", body.yaw_inertia, scales.inertia),
+        ("ship.x_G", "x_G", body.x_G, scales.length),
+    )
+    return [
+        CardParameter(name, value * scale, 0.0, False, f"rigid_body.{key}", 1.0 if dimensional else 1 / scale)
+        for name, key, value, scale in described
+    ]
+
+
+def _gear(card: ManoeuvringCard) -> list[CardParameter]:
+    gear = card.steering_gear
+    if gear is None:
+        return []
+    described = (
+        ("steering.time_constant", "time_constant_s", gear.time_constant_s),
+        ("steering.max_rate", "max_rate_radps", gear.max_rate_radps),
+        ("steering.max_angle", "max_angle_rad", gear.max_angle_rad),
+    )
+    return [_exact(card, name, f"steering_gear.{key}", value) for name, key, value in described if value is not None]
+
+
+def _exact(card: ManoeuvringCard, name: str, place: str, value: float) -> CardParameter:
+    key, factor = card.in_file(place, 1.0)
+    return CardParameter(name, value, 0.0, False, key, factor)
+
+
+def _propulsion(card: ManoeuvringCard) -> list[CardParameter]:
+    """Xnn; the nominal revolutions are those of the order, too, and without influence."""
+    if card.propulsion is None:
+        return []
+    factor = float(card.scales.force) if card.model.scaling == "dimensional" else 1.0
+    value = card.propulsion.Xnn
+    error = DEFAULT_RELATIVE_ERROR * abs(value)
+    return [CardParameter("propulsion.Xnn", value, error, True, "propulsion.Xnn", factor)]
+
+
+def _effects(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
+    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    found = []
+    for number, entry in enumerate(card.effects):
+        effect = EFFECTS[entry.name]
+        if effect.acts_on == "sensor":
+            continue
+        places = effect.model_names()
+        for parameter in effect.parameters:
+            name = places[parameter.name]
+            if name not in values:
+                continue
+            key = card.spelt.get(f"effects.{number}.parameters.{parameter.name}")
+            key = key or f"effects.{number}.parameters.{parameter.name}"
+            stated = parameter.name in entry.uncertainty
+            error = entry.uncertainty.get(parameter.name, DEFAULT_RELATIVE_ERROR * abs(values[name]))
+            bounds = (parameter.minimum, parameter.maximum)
+            found.append(CardParameter(name, values[name], error, not stated, key, from_si(key, 1.0), bounds))
+    return found
+
+
+def standard_errors_in_words(parameters: Sequence[CardParameter]) -> list[str]:
+    """What a user should be told of the standard errors that are taken."""
+    assumed = [one.short for one in parameters if one.assumed and one.standard_error > 0]
+    exact = [one.short for one in parameters if one.standard_error == 0]
+    told = []
+    if assumed:
+        which = "any number" if len(assumed) + len(exact) == len(parameters) else ", ".join(assumed)
+        told.append(f"the card states no standard error of {which}: 2 % of the value is taken")
+    if exact:
+        told.append(f"taken as exact, for a card states no standard error of them: {', '.join(exact)}")
+    return told
+
+
+def agreed_by_name(
+    agreed: Mapping[str, float], parameters: Sequence[CardParameter], option: str = "--agreed"
+) -> dict[str, float]:
+    """An agreed variation (Kc %, by names as a user writes them) by the names of parameters.
+
+    Raises
+    ------
+    InputError
+        A name is none of the card's, or stands twice.
+    """
+    found: dict[str, float] = {}
+    for name, percent in agreed.items():
+        own = find_parameter(parameters, name, option).name
+        if own in found:
+            raise InputError(option, name, "is given twice", "give each parameter once")
+        found[own] = percent
+    return found

@@ -1,0 +1,214 @@
+"""A ship with figures asked of her: their values and exact slopes at any values of her parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.analysis.influence.equilibria import (
+    Equilibrium,
+    steady_turns,
+    straight_courses,
+    turn_figures,
+    turning_states,
+)
+from tank2sim.analysis.influence.figures import OPTION, STEADY, STRAIGHT, Figure
+from tank2sim.analysis.influence.motion import HALF_TURN, MotionSlopes, overshoots_in
+from tank2sim.analysis.influence.parameters import CardParameter, card_parameters, study_model
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.model import Vector
+from tank2sim.errors import InputError
+from tank2sim.simulation.figures import Figures
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Turn, Zigzag
+from tank2sim.simulation.run import Run, simulate
+
+Array = NDArray[np.float64]
+
+NO_TURN = 1e-4
+"""A ship whose steady yaw rate is less than this share of u0/L goes straight: a circle of 10 000 lengths (ours)."""
+
+PLACE_FELT = 1e-20
+"""Squared slopes of the scaled accelerations by place and heading from which no turn is steady: rounding is below."""
+
+SPARE = 1.5
+"""A manoeuvre is run this many times as long as the ship of the card needs for its figures, and whole where that is too
+short."""
+
+
+class Study:
+    """A ship with figures asked of it: their values and exact slopes at any values of its parameters.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        The ship.
+    figures : sequence of Figure
+        What is asked.
+
+    Raises
+    ------
+    InputError
+        The card is at fault, or does not show one of the figures.
+    """
+
+    def __init__(self, card: ManoeuvringCard, figures: Sequence[Figure]):
+        self.card, self.figures = card, tuple(figures)
+        self.model = study_model(card)
+        self.parameters: tuple[CardParameter, ...] = card_parameters(card, self.model)
+        self.values: Array = np.array([one.value for one in self.parameters])
+        self._integrator = Integrator(self.model)
+        own = dict(zip(self.model.parameter_names, self.model.parameter_values().tolist(), strict=True))
+        self._length, self._speed = own["ship.length"], own["ship.speed"]
+        self._places = [self.model.parameter_names.index(one.name) for one in self.parameters]
+        self._rest_near: dict[float, Array] = {}
+        self._long_enough: dict[Turn | Zigzag, float] = {}
+        self._told: dict[str, None] = dict.fromkeys(self.model.notices)
+        self._known = False  # whether the figures of the card itself have been found: others tell nothing of it
+        self.base: Array = self.figures_at(self.values)
+        self._known = True
+        for figure, value in zip(self.figures, self.base, strict=True):
+            if not math.isfinite(value):
+                remedy = "ask for another, or for another rudder"
+                raise InputError(OPTION, figure.text, f"{card.ship.name} does not show this figure", remedy)
+
+    @cached_property
+    def _motion(self) -> MotionSlopes:
+        return MotionSlopes(self._integrator, [one.name for one in self.parameters])
+
+    @cached_property
+    def _turning(self) -> Equilibrium:
+        return steady_turns(self.model)
+
+    @cached_property
+    def _straight(self) -> tuple[Equilibrium, Array]:
+        return straight_courses(self.model)
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What a user should be told of the ship of the card and of her manoeuvres."""
+        return tuple(self._told)
+
+    def figures_at(self, values: Array) -> Array:
+        """Figures (nf,) of the ship with parameters `values` (k,); nan for those that she does not show."""
+        return self._evaluated(values, sloped=False)[0]
+
+    def slopes_at(self, values: Array) -> tuple[Array, Array]:
+        """Figures (nf,) and their slopes (nf, k) by the parameters."""
+        return self._evaluated(values, sloped=True)
+
+    def _evaluated(self, values: Array, *, sloped: bool) -> tuple[Array, Array]:
+        found, slopes = np.full(len(self.figures), np.nan), np.full((len(self.figures), len(values)), np.nan)
+        for family, angles in dict.fromkeys((one.kind.family, one.angles) for one in self.figures):
+            rows = [n for n, one in enumerate(self.figures) if (one.kind.family, one.angles) == (family, angles)]
+            named = self._family(self.figures[rows[0]], values, sloped)
+            for row in rows:
+                if self.figures[row].kind.name in named:
+                    found[row], slope = named[self.figures[row].kind.name]
+                    slopes[row] = slope if slope is not None else np.nan
+        return found, slopes
+
+    def _family(self, figure: Figure, values: Array, sloped: bool) -> dict[str, tuple[float, Array | None]]:
+        """All figures that are read off where this one is, with their slopes if asked."""
+        p = self.model.parameter_values()
+        p[self._places] = values
+        if figure.kind.family == STRAIGHT:
+            return self._linear(p, sloped)
+        manoeuvre = figure.manoeuvre
+        assert manoeuvre is not None
+        if figure.kind.family == STEADY:
+            assert isinstance(manoeuvre, Turn)
+            return self._steady(manoeuvre, figure.text, p, sloped)
+        return self._simulated(manoeuvre, p, sloped)
+
+    def _linear(self, p: Vector, sloped: bool) -> dict[str, tuple[float, Array | None]]:
+        course, near = self._straight
+        found = course.at(near, {}, p)
+        if found is None:
+            return {}
+        z, shown = found
+        slopes = course.slopes(z, {}, p)[:, self._places] if sloped else [None] * len(shown)
+        return {name: (float(v), by) for name, v, by in zip(course.names, shown, slopes, strict=True)}
+
+    def _steady(self, turn: Turn, text: str, p: Vector, sloped: bool) -> dict[str, tuple[float, Array | None]]:
+        if turn.rudder not in self._rest_near:
+            self._rest_near[turn.rudder] = self._first_turn(turn, text, p)
+        side = math.copysign(1.0, turn.rudder)
+        order = {"rudder.command": turn.rudder}
+        found = self._turning.at(self._rest_near[turn.rudder], order, p)
+        if found is None:
+            return {}
+        z, (u, v, r, _) = found
+        if not side * r > NO_TURN * self._speed / self._length:
+            return {}
+        named, by_motion = turn_figures(u, v, r, side, self._speed)
+        if not sloped:
+            return {name: (value, None) for name, value in named.items()}
+        slopes = by_motion @ self._turning.slopes(z, order, p)[:3, self._places]
+        return {name: (value, by) for (name, value), by in zip(named.items(), slopes, strict=True)}
+
+    def _first_turn(self, turn: Turn, text: str, p: Vector) -> Array:
+        """The steady turn to which a turning circle leads, which is refined and followed from there on."""
+        run = self._run(turn, p).trajectory
+        names = turning_states(self.model)
+        scale = np.array([self.model[name].nominal for name in names])
+        near = run.x[-1][[self.model.state_names.index(name) for name in names]] / scale
+        side = math.copysign(1.0, turn.rudder)
+        found = self._turning.at(near, {"rudder.command": turn.rudder}, p)
+        rate = 0.0 if found is None else side * float(found[1][2])
+        if found is None or not rate > NO_TURN * self._speed / self._length:
+            degrees = f"{math.degrees(turn.rudder):.4g} deg of rudder"
+            problem = f"{self.card.ship.name} does not turn steadily to the side of {degrees}"
+            raise InputError(OPTION, text, problem, "ask at more rudder")
+        if found[1][3] > PLACE_FELT:
+            problem = f"{self.card.ship.name} feels where she is or heads (wind or waves): no turn is steady"
+            raise InputError(OPTION, text, problem, "take that effect off the card, or ask for advance_m@35")
+        return found[0]
+
+    def _simulated(self, manoeuvre: Turn | Zigzag, p: Vector, sloped: bool) -> dict[str, tuple[float, Array | None]]:
+        names = {one.kind.name for one in self.figures if one.manoeuvre == manoeuvre and one.kind.family != STEADY}
+        run = self._run(manoeuvre, p, self._long_enough.get(manoeuvre))
+        found = named_figures(run.figures)
+        if manoeuvre in self._long_enough and not names <= set(found):
+            run = self._run(manoeuvre, p)
+            found = named_figures(run.figures)
+        if manoeuvre not in self._long_enough and names <= set(found):
+            self._long_enough[manoeuvre] = SPARE * last_event(run.figures, names)
+        if sloped:
+            return dict(self._motion.figures(run.trajectory, manoeuvre, p, self._length, names))
+        return {name: (value, None) for name, value in found.items()}
+
+    def _run(self, manoeuvre: Turn | Zigzag, p: Vector, duration_s: float | None = None) -> Run:
+        values = dict(zip(self.model.parameter_names, p.tolist(), strict=True))
+        model, integrator = self.model, self._integrator
+        run = simulate(model, manoeuvre, parameters=values, integrator=integrator, duration_s=duration_s)
+        if not self._known:
+            self._told |= dict.fromkeys(run.notices)
+        return run
+
+
+def named_figures(given: Figures) -> dict[str, float]:
+    """Figures of a manoeuvre by the names of :mod:`tank2sim.analysis.influence.figures`, as far as it shows them."""
+    overshoots = given.get("overshoots_deg", [])
+    assert isinstance(overshoots, list)
+    spelt = {
+        "initial_turning_m": given.get("initial_turning_distance_m"),
+        "initial_turning_s": given.get("initial_turning_time_s"),
+        **{f"overshoot{number}_deg": value for number, value in enumerate(overshoots, start=1)},
+    }
+    return {name: value for name, value in {**given, **spelt}.items() if isinstance(value, float)}
+
+
+def last_event(given: Figures, names: Collection[str]) -> float:
+    """Time (s) at which the last of the named figures has been shown."""
+    if "time_90_s" in given:
+        half = any(name.startswith(HALF_TURN) for name in names)
+        return float(str(given["time_180_s" if half else "time_90_s"]))
+    executes, peaks = given["execute_times_s"], given["overshoot_times_s"]
+    assert isinstance(executes, list) and isinstance(peaks, list)
+    count = overshoots_in(names)
+    return float(executes[count - 1] + peaks[count - 1] if count else executes[0])

@@ -1,0 +1,1 @@
+"""Straight-line stability, manoeuvrability and the IMO criteria of a ship."""

@@ -1,0 +1,269 @@
+"""How far a ship is from neutral straight-line stability, and what moves her: derivatives, speed, trim.
+
+    C' = Y'_v (N'_r - m' x'_G u') - N'_v (Y'_r - m' u')
+
+of :mod:`tank2sim.analysis.stability.straight_line`. The same as a distance: the yaw damping lever
+(N_r - m x_G u)/(Y_r - m u) lies ahead of the sway lever N_v/Y_v by the margin (in L) if C' > 0. Sensitivities are exact
+(CasADi): that by a derivative is the total one: the straight course (drift and rudder of an asymmetric ship) goes with
+it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.analysis.linearisation import OperatingPoint, straight_course
+from tank2sim.analysis.turning.diagram import hull_states
+from tank2sim.dynamics.model import Model, Parameter, Vector
+from tank2sim.errors import InputError
+
+SPEEDS = 25
+"""Speeds at which C' is told, evenly over the card's range."""
+
+CHANGE = 0.1
+"""Change of a derivative whose effect is told: 10 %, as influence coefficients are (Poznyakov and Yudin, paper 4)."""
+
+_NOTHING = 0.1
+"""Per cent of C' below which an influence is none: what an asymmetry of the straight course leaves."""
+
+_BODY = ("ship.mass", "ship.x_G")
+
+
+@dataclass(frozen=True)
+class Influence:
+    """What one coefficient does to C'.
+
+    Parameters
+    ----------
+    name : str
+        Parameter of the model: ``derivatives.Nr``.
+    value : float
+        As the model has it (prime for derivatives, SI for ``ship.*``).
+    slope : float
+        dC'/d(value).
+    percent : float
+        Change of C' when the value is multiplied by 1.1 (its magnitude grows by 10 %), in per cent of |C'|.
+    neutral_value : float or None
+        The value at which C' = 0, all else unchanged; None if there is none within ten times its magnitude.
+    """
+
+    name: str
+    value: float
+    slope: float
+    percent: float
+    neutral_value: float | None
+
+    @property
+    def short_name(self) -> str:
+        """``Nr``, ``mass``: the name without its group."""
+        return self.name.rpartition(".")[2]
+
+    @property
+    def neutral_percent(self) -> float | None:
+        """Change that makes the ship neutral, in per cent of the value: negative if its magnitude is to fall."""
+        return None if self.neutral_value is None else 100 * (self.neutral_value / self.value - 1)
+
+    def as_json(self) -> dict[str, object]:
+        """All of it."""
+        return {**vars(self), "neutral_percent": self.neutral_percent}
+
+
+@dataclass(frozen=True)
+class Margin:
+    """The criterion of straight-line stability and its margin, by what they move.
+
+    Parameters
+    ----------
+    criterion : float
+        C'.
+    damping_lever, sway_lever : float
+        (N'_r - m' x'_G)/(Y'_r - m') and N'_v/Y'_v, in ship lengths forward of midships.
+    percent : float
+        C' in per cent of |Y'_v (N'_r - m' x'_G)|, its stabilising part.
+    slopes : array (2, 2)
+        Of Y' and N' by v' and r', the inertia of (3.1) included.
+    influences : tuple of Influence
+        The strongest first.
+    speeds_mps, criteria, speed_slopes : arrays (k,)
+        C' over speed and dC'/du (s/m); nan where there is no straight course.
+    """
+
+    criterion: float
+    damping_lever: float
+    sway_lever: float
+    percent: float
+    slopes: Vector
+    influences: tuple[Influence, ...]
+    speeds_mps: Vector
+    criteria: Vector
+    speed_slopes: Vector
+
+    @property
+    def lever(self) -> float:
+        """Margin of the levers, L: positive on a stable ship (whose Y_v and Y_r - m are negative)."""
+        return self.damping_lever - self.sway_lever
+
+    def as_json(self) -> dict[str, object]:
+        """Margins, sensitivities and the curve over speed."""
+        return {
+            "C_prime": self.criterion,
+            "damping_lever_lengths": self.damping_lever,
+            "sway_lever_lengths": self.sway_lever,
+            "lever_margin_lengths": self.lever,
+            "margin_percent": self.percent,
+            "derivatives": [one.as_json() for one in self.influences],
+            "speed": {
+                "speed_mps": self.speeds_mps,
+                "C_prime": self.criteria,
+                "slope_s_per_m": self.speed_slopes,
+            },
+        }
+
+
+class Criterion:
+    """C' of a model as a function of speed and parameters, with its exact total derivatives."""
+
+    def __init__(self, model: Model):
+        self.model = model
+        self._places = [model.state_names.index(name) for name in ("motion.v", "rudder.angle")]
+        self._speed = model.state_names.index("motion.u")
+        unknown, x, p = model.x[self._places], model.x, model.p
+        slopes = _prime_slopes(model)
+        value = ca.det(slopes)
+        residual = model.expand(ca.vcat([model.symbol(name) for name in ("motion.vdot", "motion.rdot")]))
+        by = ca.vertcat(p, x[self._speed])
+        # implicit function: on the straight course residual(unknown, by) = 0
+        follow = -ca.solve(ca.densify(ca.jacobian(residual, unknown)), ca.densify(ca.jacobian(residual, by)))
+        total = ca.jacobian(value, by) + ca.jacobian(value, unknown) @ follow
+        arguments = [x, model.u, p]
+        self._value = ca.Function("criterion", arguments, [value, ca.densify(total), ca.densify(slopes)], {"cse": True})
+        newton = [residual, ca.densify(ca.jacobian(residual, unknown))]
+        self._course = ca.Function("course", arguments, newton, {"cse": True})
+
+    def at(self, point: OperatingPoint) -> tuple[float, Vector, Vector]:
+        """C', its total derivative by the parameters and at last by the speed (np + 1,), and the slopes (2, 2)."""
+        value, total, slopes = self._value(point.x, point.u, point.p)
+        return float(value), np.array(total).ravel(), np.array(slopes)
+
+    def moved(
+        self, point: OperatingPoint, *, speed: float | None = None, p: Vector | None = None
+    ) -> OperatingPoint | None:
+        """The straight course near another one, at another speed or with other parameters; None if there is none."""
+        x, p = point.x.copy(), point.p if p is None else p
+        if speed is not None:
+            x[self._speed] = speed
+        for _ in range(20):
+            residual, jacobian = (np.array(one) for one in self._course(x, point.u, p))
+            if not np.isfinite(jacobian).all() or np.linalg.matrix_rank(jacobian) < 2:
+                return None
+            change = np.linalg.solve(jacobian, -residual.ravel())
+            x[self._places] += change
+            if np.max(np.abs(change)) < 1e-12 * max(1.0, abs(x[self._speed])):
+                return OperatingPoint(x, point.u, p) if abs(x[self._places[1]]) < np.pi / 4 else None
+        return None
+
+
+def _prime_slopes(model: Model) -> ca.SX:
+    """Slopes (2, 2) of Y' and N' by v' and r' with V = U; states of effects follow at once."""
+    forces = model.expand(ca.vcat([model.symbol("force.Y"), model.symbol("force.N")]))
+    motion = ca.vcat([model.symbol("motion.v"), model.symbol("motion.r")])
+    slopes = ca.jacobian(forces, motion)
+    derivative = {state.name: state.derivative for state in model.states}
+    settled = [name for name in hull_states(model) if name not in ("motion.u", "motion.v", "motion.r")]
+    if settled:
+        own = ca.vcat([model.symbol(name) for name in settled])
+        rates = model.expand(ca.vcat([model.symbol(derivative[name]) for name in settled]))
+        follow = ca.solve(ca.densify(ca.jacobian(rates, own)), ca.densify(ca.jacobian(rates, motion)))
+        slopes -= ca.jacobian(forces, own) @ follow
+    length, density = model.symbol("ship.length"), model.symbol("ship.water_density")
+    speed = ca.sqrt(model.symbol("motion.u") ** 2 + model.symbol("motion.v") ** 2)
+    unit = 0.5 * density * length**2 * speed
+    scale = ca.vertcat(ca.horzcat(unit, unit * length), ca.horzcat(unit * length, unit * length**2))
+    return ca.densify(slopes) / scale
+
+
+def stability_margin(model: Model, speed_mps: float | None = None) -> Margin:
+    """Margin of straight-line stability and all that moves it, by default at the speed of expansion.
+
+    Raises
+    ------
+    InputError
+        The model is no ship, or holds no straight course.
+    """
+    point = straight_course(model, speed_mps)
+    criterion = Criterion(model)
+    value, total, slopes = criterion.at(point)
+    if not np.isfinite(value):
+        raise InputError(model.name, "", "the slopes of its forces are no numbers", "check the derivatives of the card")
+    names = model.parameter_names
+    influences = [
+        _influence(criterion, point, name, float(total[names.index(name)]))
+        for name in names
+        if (name.startswith("derivatives.") or name in _BODY) and point.p[names.index(name)] != 0
+    ]
+    moving = [one for one in influences if abs(one.percent) > _NOTHING]
+    speeds, criteria, by_speed = _over_speed(criterion, point)
+    return Margin(
+        criterion=value,
+        damping_lever=_ratio(slopes[1, 1], slopes[0, 1]),
+        sway_lever=_ratio(slopes[1, 0], slopes[0, 0]),
+        percent=100 * _ratio(value, abs(slopes[0, 0] * slopes[1, 1])),
+        slopes=slopes,
+        influences=tuple(sorted(moving, key=lambda one: -abs(one.percent))),
+        speeds_mps=speeds,
+        criteria=criteria,
+        speed_slopes=by_speed,
+    )
+
+
+def _ratio(upper: float, lower: float) -> float:
+    return float(upper / lower) if lower else float("nan")
+
+
+def _influence(criterion: Criterion, point: OperatingPoint, name: str, slope: float) -> Influence:
+    place = criterion.model.parameter_names.index(name)
+    value, present = float(point.p[place]), criterion.at(point)[0]
+    percent = 100 * CHANGE * slope * value / abs(present) if present else float("nan")
+    strong = abs(percent) > _NOTHING
+    return Influence(name, value, slope, percent, _neutral(criterion, point, place) if strong else None)
+
+
+def _neutral(criterion: Criterion, point: OperatingPoint, place: int) -> float | None:
+    """The value of a parameter at which C' = 0, by Newton's method along the straight course."""
+    value = float(point.p[place])
+    size, now = abs(value), point
+    for _ in range(30):
+        found, total, _ = criterion.at(now)
+        if not total[place]:
+            return None
+        change = -found / total[place]
+        p = now.p.copy()
+        p[place] += change
+        if not abs(p[place] - value) < 10 * size:
+            return None
+        following = criterion.moved(now, p=p)
+        if following is None:
+            return None
+        now = following
+        if abs(change) < 1e-12 * size:
+            return float(p[place])
+    return None
+
+
+def _over_speed(criterion: Criterion, point: OperatingPoint) -> tuple[Vector, Vector, Vector]:
+    model = criterion.model
+    start = {one.name: one.start for one in model.parameters if isinstance(one, Parameter)}
+    speeds = np.linspace(start["ship.slowest"], start["ship.fastest"], SPEEDS)
+    rows = []
+    for speed in speeds:
+        there = criterion.moved(point, speed=float(speed))
+        if there is None:
+            rows.append((np.nan, np.nan))
+            continue
+        value, total, _ = criterion.at(there)
+        rows.append((value, float(total[-1])))
+    criteria, slopes = np.array(rows).T
+    return speeds, criteria, slopes

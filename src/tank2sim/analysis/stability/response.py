@@ -1,0 +1,113 @@
+"""The linear response of the yaw rate to the rudder about the straight course: poles, zeros, Bode, step.
+
+Of three systems, all by python-control: sway and yaw with the rudder angle as input, the same behind the steering gear
+(input the order; its rate limit is not linear and left out), and Nomoto's first-order model K/(1 + T s).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import control
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.analysis.linearisation import OperatingPoint, state_space
+from tank2sim.analysis.stability.straight_line import Nomoto, settled_states
+from tank2sim.dynamics.model import Model
+
+HULL, GEAR, FIRST_ORDER = "rudder angle to yaw rate", "rudder order to yaw rate", "Nomoto, first order"
+
+_FREQUENCIES = 121
+_TIMES = 201
+_STABLE_STEP, _UNSTABLE_STEP = 5.0, 2.5
+"""Length of the step response in slowest time constants: to 99 % of the end, or to twelve times the beginning."""
+
+
+@dataclass(frozen=True)
+class SteeringResponse:
+    """Response of the yaw rate (rad/s) to the rudder (rad), + to starboard.
+
+    Parameters
+    ----------
+    label : str
+        Of what.
+    poles, zeros : arrays of complex
+        1/s.
+    gain_per_s : float
+        r/delta at rest, 1/s; of an unstable ship it is that of a steady turn that does not last.
+    omega_radps, response : arrays (n,)
+        Frequency, and r/delta (complex, 1/s).
+    time_s, step_per_s : arrays (m,)
+        Yaw rate after a step of the rudder, per rad of it.
+    """
+
+    label: str
+    poles: NDArray[np.complex128]
+    zeros: NDArray[np.complex128]
+    gain_per_s: float
+    omega_radps: NDArray[np.float64]
+    response: NDArray[np.complex128]
+    time_s: NDArray[np.float64]
+    step_per_s: NDArray[np.float64]
+
+    def as_json(self) -> dict[str, object]:
+        """Complex numbers as [real, imaginary]; gain in dB of 1/s, phase in deg."""
+        return {
+            "system": self.label,
+            "poles": [[one.real, one.imag] for one in self.poles],
+            "zeros": [[one.real, one.imag] for one in self.zeros],
+            "gain_per_s": self.gain_per_s,
+            "bode": {
+                "omega_radps": self.omega_radps,
+                "magnitude_dB": 20 * np.log10(np.abs(self.response)),
+                "phase_deg": np.degrees(np.unwrap(np.angle(self.response))),
+            },
+            "step": {"time_s": self.time_s, "yaw_rate_per_rudder_per_s": self.step_per_s},
+        }
+
+
+def steering_responses(model: Model, point: OperatingPoint, nomoto: Nomoto) -> tuple[SteeringResponse, ...]:
+    """The three systems about a straight course; those that do not respond at all (a play that is not taken up) not."""
+    settled = settled_states(model)
+    motion = ["motion.v", "motion.r"]
+    hull = state_space(model, point, states=motion, inputs=["rudder.angle"], outputs=["motion.r"], settled=settled)
+    systems = {HULL: hull}
+    systems[GEAR] = state_space(
+        model,
+        point,
+        states=[*motion, "rudder.angle"],
+        inputs=["rudder.command"],
+        outputs=["motion.r"],
+        settled=settled,
+    )
+    if math.isfinite(nomoto.K_per_s) and math.isfinite(nomoto.T_s):
+        systems[FIRST_ORDER] = control.tf2ss(control.tf([nomoto.K_per_s], [nomoto.T_s, 1.0]))
+    rates = np.abs(hull.poles())
+    rates = rates[rates > 1e-12]
+    if not len(rates):
+        return ()
+    slowest, fastest = float(rates.min()), float(rates.max())
+    omega = np.geomspace(slowest / 20, fastest * 20, _FREQUENCIES)
+    stable = bool(np.all(hull.poles().real < 0))
+    time = np.linspace(0.0, (_STABLE_STEP if stable else _UNSTABLE_STEP) / slowest, _TIMES)
+    found = [_response(label, system, omega, time) for label, system in systems.items()]
+    return tuple(one for one in found if np.all(np.abs(one.response) > 0))
+
+
+def _response(
+    label: str, system: control.StateSpace, omega: NDArray[np.float64], time: NDArray[np.float64]
+) -> SteeringResponse:
+    response = np.asarray(system(1j * omega), dtype=complex).ravel()
+    step = np.asarray(control.step_response(system, T=time).outputs, dtype=float).ravel()
+    return SteeringResponse(
+        label=label,
+        poles=np.asarray(system.poles(), dtype=complex),
+        zeros=np.asarray(system.zeros(), dtype=complex),
+        gain_per_s=float(np.real(control.dcgain(system))),
+        omega_radps=omega,
+        response=response,
+        time_s=time,
+        step_per_s=step,
+    )

@@ -1,0 +1,153 @@
+"""All of a ship's stability and manoeuvrability in one result: what ``tank2sim stability`` tells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.analysis.linearisation import straight_course
+from tank2sim.analysis.stability.imo import Criterion, imo_criteria
+from tank2sim.analysis.stability.margin import Margin, stability_margin
+from tank2sim.analysis.stability.response import SteeringResponse, steering_responses
+from tank2sim.analysis.stability.straight_line import Stability, stability
+from tank2sim.analysis.stability.trim import TrimEffect, trim_effect
+from tank2sim.analysis.turning.characteristic import SteeringCharacteristic, steering_characteristic
+from tank2sim.analysis.turning.diagram import SteadyTurning, steady_turning
+from tank2sim.analysis.turning.spirals import SpiralPoints, direct_spiral, reverse_spiral
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+
+FAR = 0.05
+"""A steady point of a spiral that lies further from the diagram than this share of its largest yaw rate is told."""
+
+SAME_SPEED = 0.01
+"""Speeds that differ by less than this share are one (ours)."""
+
+
+@dataclass(frozen=True)
+class StabilityStudy:
+    """Stability and manoeuvrability of a ship.
+
+    Parameters
+    ----------
+    stability, margin, trim, responses
+        Of the straight course at the speed asked for.
+    turning, characteristic : optional
+        At the speed of expansion; None where the ship has no steady motion, which `notices` tell.
+    direct, reverse : SpiralPoints, optional
+        Simulated spirals; None if not asked for or not possible.
+    imo : tuple of Criterion
+        At the speed of expansion.
+    notices : tuple of str
+        What the reader should know.
+    """
+
+    stability: Stability
+    margin: Margin
+    trim: TrimEffect
+    responses: tuple[SteeringResponse, ...]
+    turning: SteadyTurning | None
+    characteristic: SteeringCharacteristic | None
+    direct: SpiralPoints | None
+    reverse: SpiralPoints | None
+    imo: tuple[Criterion, ...]
+    notices: tuple[str, ...]
+
+    def as_json(self) -> dict[str, object]:
+        """The result as JSON has it."""
+        return {
+            **self.stability.as_json(),
+            "margins": self.margin.as_json(),
+            "trim": self.trim.as_json(),
+            "responses": [one.as_json() for one in self.responses],
+            "steady_turning": self.turning and self.turning.as_json(),
+            "characteristic": self.characteristic and self.characteristic.as_json(),
+            "spirals": {
+                "direct": self.direct and self.direct.as_json(),
+                "reverse": self.reverse and self.reverse.as_json(),
+            },
+            "imo": [one.as_json() for one in self.imo],
+            "notices": list(self.notices),
+        }
+
+
+def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bool = True) -> StabilityStudy:
+    """Stability and manoeuvrability of a ship, the straight course by default at her speed of expansion.
+
+    What a ship does not have (a steady turn, a trial that ends) is left out and told; only a straight course is needed.
+
+    Raises
+    ------
+    InputError
+        The model is no ship, or holds no straight course.
+    """
+    found = stability(model, speed_mps)
+    margin = stability_margin(model, speed_mps)
+    notices = list(_about_speed(model, found))
+    turning, direct, reverse = None, None, None
+    try:
+        turning = steady_turning(model)
+        notices += turning.notices
+    except InputError as error:
+        notices.append(f"no steady-turning diagram: {_reason(error)}")
+    if turning is not None and spirals:
+        direct, reverse, told = _spirals(model, turning)
+        notices += told
+    return StabilityStudy(
+        stability=found,
+        margin=margin,
+        trim=trim_effect(model, margin),
+        responses=steering_responses(model, straight_course(model, speed_mps), found.nomoto),
+        turning=turning,
+        characteristic=steering_characteristic(turning) if turning else None,
+        direct=direct,
+        reverse=reverse,
+        imo=imo_criteria(model),
+        notices=tuple(notices),
+    )
+
+
+def _reason(error: InputError) -> str:
+    return f"{error.place}: {error.problem}" if error.place else error.problem
+
+
+def _about_speed(model: Model, found: Stability) -> list[str]:
+    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    slowest, fastest, own = values["ship.slowest"], values["ship.fastest"], values["ship.speed"]
+    told = []
+    if not slowest <= found.speed_mps <= fastest:
+        told.append(f"{found.speed_mps:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
+    if abs(found.speed_mps / own - 1) > SAME_SPEED:
+        told.append(f"steady turns, spirals and the IMO criteria are those at the card's speed, {own:.4g} m/s")
+    return told
+
+
+def _spirals(model: Model, turning: SteadyTurning) -> tuple[SpiralPoints | None, SpiralPoints | None, list[str]]:
+    """The two spirals, and what is to be told of them."""
+    told: list[str] = []
+    direct = reverse = None
+    try:
+        if turning.stable.any():
+            direct = direct_spiral(model, turning)
+        else:
+            told.append("no spiral: no steady turn is stable with the rudder held")
+    except InputError as error:
+        told.append(f"no spiral: {_reason(error)}")
+    try:
+        reverse = reverse_spiral(model, turning, stability(model).nomoto)
+        if reverse is None:
+            told.append("no reverse spiral: the rudder turns the ship the wrong way, or not at all")
+    except InputError as error:
+        told.append(f"no reverse spiral: {_reason(error)}")
+    most = float(np.max(np.abs(turning.yaw_rate_radps)))
+    for name, points in (("spiral", direct), ("reverse spiral", reverse)):
+        if points is None:
+            continue
+        off = int(np.sum(points.steady & ~(points.distance_radps < FAR * most)))
+        if off:
+            told.append(
+                f"{off} steady points of the {name} lie on no branch of the diagram: the ship has turns that are not "
+                "joined to her straight course, or the diagram ends before them"
+            )
+    return direct, reverse, told

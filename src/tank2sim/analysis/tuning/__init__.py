@@ -1,0 +1,1 @@
+"""Tuning a card to measured figures or to a standard."""

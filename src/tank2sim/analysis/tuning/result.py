@@ -1,0 +1,118 @@
+"""How a card may be tuned, and what came of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.analysis.influence.parameters import CardParameter
+from tank2sim.analysis.tuning.wishes import Wish
+
+Array = NDArray[np.float64]
+
+FEWEST, UNCERTAIN = "fewest", "uncertain"
+
+WITHIN = 3.0
+"""Bounds of the moves, standard errors: 99.7 % of a normal distribution."""
+
+
+@dataclass(frozen=True)
+class Means:
+    """How a card may be changed.
+
+    Parameters
+    ----------
+    by : str
+        :data:`FEWEST` or :data:`UNCERTAIN`.
+    within : float
+        Bounds of each move, standard errors; the agreed variation may go as many times either way.
+    hold : sequence of str
+        Parameters that stay, by names as a user writes them.
+    bounds : mapping
+        Name to lowest and highest value as they stand in the card's file; they take the place of `within`.
+    agreed : mapping
+        Kc % by name of parameters that move together only.
+    """
+
+    by: str = UNCERTAIN
+    within: float = WITHIN
+    hold: Sequence[str] = ()
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    agreed: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Move:
+    """A parameter that changed: values as the model has them."""
+
+    parameter: CardParameter
+    before: float
+    after: float
+
+    @property
+    def in_standard_errors(self) -> float | None:
+        """The move over the standard error of the card, with the sign that it has in the file; None if exact."""
+        error, sign = self.parameter.standard_error, math.copysign(1.0, self.parameter.factor)
+        return sign * (self.after - self.before) / error if error > 0 else None
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """A card tuned to wishes, or how near it came.
+
+    Parameters
+    ----------
+    wishes : tuple of Wish
+    means : Means
+    values : array (k,)
+        Of all parameters of the study, tuned.
+    before, after : array
+        The figures of the wishes.
+    moves : tuple of Move
+        Parameters that changed, the largest move first.
+    agreed_times : float or None
+        How many times the agreed variation was taken.
+    contradiction : tuple of Wish
+        Wishes that contradict each other within the bounds (one alone cannot be reached); empty if all are reached.
+    """
+
+    wishes: tuple[Wish, ...]
+    means: Means
+    values: Array
+    before: Array
+    after: Array
+    moves: tuple[Move, ...]
+    agreed_times: float | None
+    contradiction: tuple[Wish, ...] = ()
+
+    @property
+    def reached(self) -> bool:
+        """True if all wishes are met."""
+        return not self.contradiction
+
+    def as_json(self) -> dict[str, object]:
+        """``tuned`` of the command: figures before and after, moves, and the contradiction if there is one."""
+        pairs = zip(self.wishes, self.before, self.after, strict=True)
+        return {
+            "reached": self.reached,
+            "by": self.means.by,
+            "within_standard_errors": self.means.within,
+            "wishes": {
+                wish.text: {"figure": wish.figure.text, "wanted": wish.value, "before": float(a), "after": float(b)}
+                for wish, a, b in pairs
+            },
+            "parameters": {
+                move.parameter.key: {
+                    "before": move.before * move.parameter.factor,
+                    "after": move.after * move.parameter.factor,
+                    "standard_errors": move.in_standard_errors,
+                }
+                for move in self.moves
+            },
+            "agreed_times": self.agreed_times,
+            "contradiction": [wish.text for wish in self.contradiction],
+        }

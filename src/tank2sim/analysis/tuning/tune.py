@@ -1,0 +1,311 @@
+"""Tuning a card to a trial or a standard: the fewest or the most uncertain numbers change until figures are reached.
+
+Unknowns are the moves z of the card's parameters in standard errors, and as one more unknown the multiple of an agreed
+variation (Kc). Figures F are nonlinear in them with exact slopes (:mod:`tank2sim.analysis.influence.study`).
+
+- ``uncertain``: min sum z^2 with F(z) as wished and |z| within bounds (sequential quadratic programming, SLSQP).
+- ``fewest``: the smallest set of unknowns that reaches the wishes to first order, by mixed-integer programming (HiGHS),
+  with least sum |z| among equals; then the nonlinear problem in that set, anew from there if it fails.
+
+Wishes that cannot all be reached: the smallest set of them that contradicts itself, found by leaving out one after the
+other (deletion filter, Chinneck and Dravnieks 1991), and the nearest that can be reached, in least squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, LinearConstraint, least_squares, milp, minimize
+
+from tank2sim.analysis.influence.parameters import CardParameter, agreed_by_name, find_parameter
+from tank2sim.analysis.influence.study import Study
+from tank2sim.analysis.tuning.result import FEWEST, Means, Move, Tuned
+from tank2sim.analysis.tuning.wishes import AT_LEAST, AT_MOST, EQUAL, Wish
+from tank2sim.errors import InputError
+
+Array = NDArray[np.float64]
+Slice = NDArray[np.int64]
+
+REACHED = 1e-5
+"""A wish is reached to this share of its value: far below what a trial tells."""
+
+_MOVED = 1e-6  # standard errors below which a parameter has not moved
+_NOT_SHOWN = 10.0  # what is missing, in shares of the wish, where the ship does not show the figure any more
+_ROUNDING = 1e-9  # of the largest slope
+_ROUNDS = 8  # sets of parameters that are tried
+_LONGEST_SEARCH_S = 20.0  # of one set; the best so far is taken then
+
+
+def tune(study: Study, wishes: Sequence[Wish], means: Means) -> Tuned:
+    """Change a card until its figures are as wished.
+
+    Parameters
+    ----------
+    study : Study
+        Of the figures of the wishes, at least.
+    wishes : sequence of Wish
+    means : Means
+
+    Raises
+    ------
+    InputError
+        `means` names what is no parameter, or leaves nothing to change.
+    """
+    problem = _Problem(study, wishes, means)
+    z, contradiction = problem.start(), tuple[Wish, ...]()
+    everything = np.arange(len(z))
+    if problem.largest(z) > REACHED:
+        nearest = problem.nearest(z, everything)
+        if problem.largest(nearest) > REACHED:
+            z, contradiction = nearest, problem.contradiction()
+        else:
+            z = problem.fewest(nearest) if means.by == FEWEST else problem.least(nearest, everything)
+    return problem.result(z, contradiction)
+
+
+class _Problem:
+    """The wishes as functions of the moves z (m,)."""
+
+    def __init__(self, study: Study, wishes: Sequence[Wish], means: Means):
+        self.study, self.wishes, self.means = study, tuple(wishes), means
+        self._rows = [study.figures.index(wish.figure) for wish in wishes]
+        self._targets = np.array([wish.value for wish in wishes])
+        base = study.base[self._rows]
+        # A wish of zero is measured by the value before.
+        self._scale = np.where(self._targets != 0, np.abs(self._targets), np.maximum(np.abs(base), 1e-12))
+        self._agreed = agreed_by_name(means.agreed, study.parameters)
+        self._matrix, self._lowest, self._highest = self._unknowns()
+        # Searches ask for the same moves again: by wish, by constraint.
+        self._figures = lru_cache(maxsize=16)(self._computed_figures)
+        self._slopes_known = lru_cache(maxsize=16)(self._computed_slopes)
+
+    def _unknowns(self) -> tuple[Array, Array, Array]:
+        """Change of the parameters by the unknowns (k, m), and the bounds of these (m,)."""
+        parameters, means = self.study.parameters, self.means
+        held = {find_parameter(parameters, name, "--hold").name for name in means.hold}
+        stated = {find_parameter(parameters, name, "--bound").name: pair for name, pair in means.bounds.items()}
+        for one in (one for one in parameters if one.name in stated and one.name in self._agreed):
+            remedy = "leave out the bound, or take the parameter out of --agreed"
+            raise InputError("--bound", one.short, "moves with the agreed variation alone", remedy)
+        columns, ends = [], []
+        for place, one in enumerate(parameters):
+            size = one.standard_error
+            if one.name in stated and not size:  # what is taken as exact moves only where it is allowed to
+                size = abs(stated[one.name][1] - stated[one.name][0]) / abs(one.factor) / (2 * means.within)
+            if one.name in held or one.name in self._agreed or not size:
+                continue
+            columns.append(size * np.eye(len(parameters))[place])
+            ends.append(_ends(one, size, means.within, stated.get(one.name)))
+        if self._agreed:
+            columns.append(np.array([one.value * self._agreed.get(one.name, 0.0) / 100 for one in parameters]))
+            ends.append((-means.within, means.within))
+        if not columns:
+            raise InputError("--tune", "", "nothing is left to change", "hold fewer parameters, or state --bound")
+        lowest, highest = np.array(ends).T
+        return np.array(columns).T, lowest, highest
+
+    def start(self) -> Array:
+        """No move, or the nearest within the bounds."""
+        return np.clip(np.zeros(len(self._lowest)), self._lowest, self._highest)
+
+    def values(self, z: Array) -> Array:
+        """Parameters (k,) after the moves."""
+        return self.study.values + self._matrix @ z
+
+    def figures(self, z: Array) -> Array:
+        """Figures (n,) of the wishes after moves z; nan for those that the ship does not show then."""
+        return self._figures(z.tobytes())
+
+    def _computed_figures(self, z: bytes) -> Array:
+        try:
+            return self.study.figures_at(self.values(np.frombuffer(z)))[self._rows]
+        except InputError:  # the motion leaves all bounds
+            return np.full(len(self._rows), np.nan)
+
+    def _off(self, z: Array) -> Array:
+        """Figures less their wishes (n,), in shares of these."""
+        off = (self.figures(z) - self._targets) / self._scale
+        return np.where(np.isfinite(off), off, _NOT_SHOWN)
+
+    def _slopes(self, z: Array) -> Array:
+        """Slopes (n, m) of that by the moves."""
+        return self._slopes_known(z.tobytes())
+
+    def _computed_slopes(self, z: bytes) -> Array:
+        try:
+            _, slopes = self.study.slopes_at(self.values(np.frombuffer(z)))
+        except InputError:  # the motion leaves all bounds
+            return np.zeros((len(self._rows), len(self._lowest)))
+        found: Array = np.nan_to_num(slopes[self._rows] @ self._matrix / self._scale[:, None])
+        # What has no influence but by rounding shall not move.
+        return np.where(np.abs(found) > _ROUNDING * np.max(np.abs(found), axis=1, keepdims=True), found, 0.0)
+
+    def missing(self, z: Array) -> Array:
+        """What is missing (n,) to each wish, in shares of it."""
+        off = self._off(z)
+        least = [0.0 if wish.relation == AT_MOST else -np.inf for wish in self.wishes]
+        most = [0.0 if wish.relation == AT_LEAST else np.inf for wish in self.wishes]
+        return np.clip(off, least, most)
+
+    def largest(self, z: Array) -> float:
+        """The largest share of a wish that is missing."""
+        return float(np.max(np.abs(self.missing(z))))
+
+    def nearest(self, z: Array, free: Slice, rows: Sequence[int] | None = None) -> Array:
+        """Moves that miss the wishes (of `rows`) least, in least squares; only those of `free` change."""
+        kept = list(range(len(self.wishes))) if rows is None else list(rows)
+
+        def slopes(part: Array) -> Array:
+            own = _with(z, free, part)
+            unmet = (self.missing(own) != 0)[kept]
+            found: Array = self._slopes(own)[kept][:, free] * unmet[:, None]
+            return found
+
+        inner = 1e-9 * (self._highest - self._lowest)
+        begin = np.clip(z, self._lowest + inner, self._highest - inner)[free]
+        solved = least_squares(
+            lambda part: self.missing(_with(z, free, part))[kept],
+            begin,
+            jac=slopes,
+            bounds=(self._lowest[free], self._highest[free]),
+            xtol=1e-10,
+            ftol=1e-6,  # of the squares: what is reached goes to zero, what is not comes to rest
+            gtol=1e-14,
+            max_nfev=40,
+        )
+        return _with(z, free, solved.x)
+
+    def least(self, z: Array, free: Slice) -> Array:
+        """The smallest moves (sum of squares) of `free` that reach the wishes, from moves `z` that do."""
+        constraints = []
+        for row, wish in enumerate(self.wishes):
+            sign = -1.0 if wish.relation == AT_MOST else 1.0
+
+            def value(part: Array, row: int = row, sign: float = sign) -> float:
+                return sign * float(self._off(_with(z, free, part))[row])
+
+            def slope(part: Array, row: int = row, sign: float = sign) -> Array:
+                return np.asarray(sign * self._slopes(_with(z, free, part))[row, free])
+
+            kind = "eq" if wish.relation == EQUAL else "ineq"
+            constraints.append({"type": kind, "fun": value, "jac": slope})
+        solved = minimize(
+            lambda part: 0.5 * float(part @ part),
+            z[free],
+            jac=lambda part: part,
+            method="SLSQP",
+            bounds=list(zip(self._lowest[free], self._highest[free], strict=True)),
+            constraints=constraints,
+            options={"ftol": 1e-9, "maxiter": 30},
+        )
+        found = _with(z, free, np.clip(solved.x, self._lowest[free], self._highest[free]))
+        # What the search leaves (it stops by its own measure) one more refinement takes away.
+        return found if self.largest(found) <= REACHED else self._refined(found, z, free)
+
+    def _refined(self, found: Array, fallback: Array, free: Slice) -> Array:
+        refined = self.nearest(found, free)
+        return refined if self.largest(refined) <= REACHED else fallback
+
+    def fewest(self, whole: Array) -> Array:
+        """Moves of as few unknowns as possible that reach the wishes; `whole`, with all of them, if no set does."""
+        at, tried = self.start(), list[Slice]()
+        for _ in range(_ROUNDS):
+            free = self._smallest_set(at, tried)
+            if free is None:
+                break
+            at = self.nearest(self.start(), free)
+            if self.largest(at) <= REACHED:
+                return self.least(at, free)
+            tried.append(free)  # to first order it was enough: next time from where it came to
+        return whole
+
+    def _smallest_set(self, at: Array, tried: Sequence[Slice]) -> Slice | None:
+        """The fewest unknowns, but not those `tried`, with which the wishes are reached to first order about `at`."""
+        off, slopes = self._off(at), self._slopes(at)
+        m = len(at)
+        aim = slopes @ at - off
+        lower, upper = aim - REACHED, aim + REACHED
+        lower[[wish.relation == AT_MOST for wish in self.wishes]] = -np.inf
+        upper[[wish.relation == AT_LEAST for wish in self.wishes]] = np.inf
+        one, none = np.eye(m), np.zeros((m, m))
+        # unknowns: moves z, whether each is used b, and its size t >= |z|
+        constraints = [
+            LinearConstraint(np.hstack([slopes, np.zeros((len(off), 2 * m))]), lower, upper),
+            LinearConstraint(np.hstack([one, -np.diag(self._highest), none]), -np.inf, 0.0),
+            LinearConstraint(np.hstack([one, -np.diag(self._lowest), none]), 0.0, np.inf),
+            LinearConstraint(np.hstack([one, none, -one]), -np.inf, 0.0),
+            LinearConstraint(np.hstack([one, none, one]), 0.0, np.inf),
+        ]
+        for free in tried:
+            row = -np.ones(m)
+            row[free] = 1.0
+            cut = np.concatenate([np.zeros(m), row, np.zeros(m)])
+            constraints.append(LinearConstraint(cut[None], -np.inf, len(free) - 1.0))
+        widest = float(np.sum(np.maximum(np.abs(self._lowest), np.abs(self._highest))))
+        solved = milp(
+            np.concatenate([np.zeros(m), np.ones(m), np.full(m, 0.5 / widest)]),
+            integrality=np.concatenate([np.zeros(m), np.ones(m), np.zeros(m)]),
+            bounds=Bounds(
+                np.concatenate([np.minimum(self._lowest, 0), np.zeros(2 * m)]),
+                np.concatenate([np.maximum(self._highest, 0), np.ones(m), np.full(m, np.inf)]),
+            ),
+            constraints=constraints,
+            options={"time_limit": _LONGEST_SEARCH_S},
+        )
+        return None if solved.x is None else np.flatnonzero(solved.x[m : 2 * m] > 0.5)
+
+    def contradiction(self) -> tuple[Wish, ...]:
+        """Wishes that cannot be reached together, none of which can be left out of that."""
+        kept = list(range(len(self.wishes)))
+        everything = np.arange(len(self._lowest))
+        for row in list(kept):
+            rest = [one for one in kept if one != row]
+            if not rest:
+                break
+            z = self.nearest(self.start(), everything, rest)
+            if np.max(np.abs(self.missing(z)[rest])) > REACHED:
+                kept = rest
+        return tuple(self.wishes[row] for row in kept)
+
+    def result(self, z: Array, contradiction: tuple[Wish, ...]) -> Tuned:
+        """What came of moves `z`."""
+        z = np.where(np.abs(z) < _MOVED, 0.0, z)
+        values = self.values(z)
+        moves = [
+            Move(one, one.value, float(after))
+            for one, after in zip(self.study.parameters, values, strict=True)
+            if after != one.value
+        ]
+        moves.sort(key=lambda move: -abs(move.in_standard_errors or np.inf))
+        return Tuned(
+            wishes=self.wishes,
+            means=self.means,
+            values=values,
+            before=self.study.base[self._rows],
+            after=self.figures(z),
+            moves=tuple(moves),
+            agreed_times=float(z[-1]) if self._agreed else None,
+            contradiction=contradiction,
+        )
+
+
+def _with(z: Array, free: Slice, part: Array) -> Array:
+    whole = z.copy()
+    whole[free] = part
+    return whole
+
+
+def _ends(one: CardParameter, size: float, within: float, stated: tuple[float, float] | None) -> tuple[float, float]:
+    """Lowest and highest move of a parameter: as stated in the file's unit, or `within` standard errors; and never
+    beyond what the parameter can be."""
+    low, high = one.value - within * size, one.value + within * size
+    if stated is not None:
+        low, high = sorted(end / one.factor for end in stated)
+    least, most = one.bounds
+    low, high = max(low, -np.inf if least is None else least), min(high, np.inf if most is None else most)
+    if not low < high:
+        raise InputError("--bound", one.short, "leaves no room", "give LOW..HIGH with LOW below HIGH")
+    return (low - one.value) / size, (high - one.value) / size

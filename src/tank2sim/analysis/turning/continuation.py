@@ -1,0 +1,135 @@
+"""Following a curve of solutions of n equations in n + 1 unknowns, by pseudo-arclength, through its folds.
+
+    F(y) = 0,   y = (z, lambda)
+
+Each step goes along the tangent and comes back to the curve at right angles to it (Keller 1977, Numerical solution of
+bifurcation and nonlinear eigenvalue problems), so that a fold, where lambda turns back, is a point like any other. The
+unknowns should be scaled to about one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Equations = Callable[[Array], tuple[Array, Array]]
+"""Residual (n,) and its Jacobian (n, n + 1) at a point (n + 1,)."""
+
+LARGEST_STEP = 0.04
+"""Arc length of a step, in the scaled unknowns. A choice of ours: half a turn of the diagram takes some fifty."""
+
+LEAST_STEP = 1e-7
+LARGEST_BEND = 0.1
+"""Largest angle between neighbouring tangents, rad: what keeps the curve smooth in a chart. A choice of ours."""
+
+_ACCURACY = 1e-11
+_ITERATIONS = 8
+
+EDGE, OUTSIDE, STALLED, LONG = "edge", "outside", "stalled", "long"
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Points (k, n + 1) of a curve and its unit tangents (k, n + 1), in order.
+
+    `ended` says why it ends: `edge`, lambda reached its limit (the last point lies on it); `outside`, an unknown left
+    its bounds; `stalled`, no further point was found; `long`, the steps ran out.
+    """
+
+    points: Array
+    tangents: Array
+    ended: str
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Where a curve is followed: `least` and `most` (n + 1,), the last entry that of lambda, and a number of steps."""
+
+    least: Array
+    most: Array
+    steps: int = 3000
+
+
+def corrected(equations: Equations, guess: Array, row: Array) -> tuple[Array, Array, int] | None:
+    """The solution near `guess` in the plane through it whose normal is `row` (n + 1,): point, Jacobian, iterations.
+
+    None if Newton's method does not come to one.
+    """
+    point = guess.copy()
+    for iteration in range(_ITERATIONS):
+        residual, jacobian = equations(point)
+        whole = np.vstack([jacobian, row])
+        if not np.isfinite(whole).all() or not np.isfinite(residual).all():
+            return None
+        try:
+            change = np.linalg.solve(whole, np.append(-residual, row @ (guess - point)))
+        except np.linalg.LinAlgError:
+            return None
+        point = point + change
+        if np.max(np.abs(change)) < _ACCURACY:
+            return point, jacobian, iteration
+    return None
+
+
+def tangent(jacobian: Array, along: Array) -> Array | None:
+    """Unit tangent (n + 1,) of the curve, to the side of `along`; None where the curve has none."""
+    try:
+        direction = np.linalg.solve(np.vstack([jacobian, along]), np.eye(len(along))[-1])
+    except np.linalg.LinAlgError:
+        return None
+    direction /= np.linalg.norm(direction)
+    return direction if np.isfinite(direction).all() else None
+
+
+def follow(equations: Equations, start: Array, direction: Array, bounds: Bounds) -> Curve:
+    """The curve from a point on it (n + 1,), to the side of `direction` (n + 1,)."""
+    found = tangent(equations(start)[1], direction)
+    if found is None:
+        return Curve(start[None, :], direction[None, :] / np.linalg.norm(direction), STALLED)
+    points, tangents, ended = [start], [found], LONG
+    step = LARGEST_STEP / 8
+    for _ in range(bounds.steps):
+        there, step = _next(equations, points[-1], tangents[-1], step)
+        if there is None:
+            ended = STALLED
+            break
+        point, direction = there
+        if not bounds.least[-1] < point[-1] < bounds.most[-1]:
+            last = _on_edge(equations, points[-1], point, direction, bounds)
+            points, tangents = points + last[:1], tangents + last[1:]
+            ended = EDGE if last else STALLED
+            break
+        if np.any(point < bounds.least) or np.any(point > bounds.most):
+            ended = OUTSIDE
+            break
+        points.append(point)
+        tangents.append(direction)
+    return Curve(np.array(points), np.array(tangents), ended)
+
+
+def _next(
+    equations: Equations, point: Array, direction: Array, step: float
+) -> tuple[tuple[Array, Array] | None, float]:
+    """Point and tangent a step further, and the length of the step to try after it."""
+    while step > LEAST_STEP:
+        found = corrected(equations, point + step * direction, direction)
+        further = tangent(found[1], direction) if found else None
+        if found and further is not None and np.arccos(np.clip(further @ direction, -1, 1)) < LARGEST_BEND:
+            return (found[0], further), min(LARGEST_STEP, step * (1.6 if found[2] <= 3 else 1.0))
+        step /= 2
+    return None, step
+
+
+def _on_edge(equations: Equations, before: Array, after: Array, direction: Array, bounds: Bounds) -> list[Array]:
+    """Point and tangent where lambda is at its limit, between two points; nothing if there is none."""
+    edge = bounds.most[-1] if after[-1] >= bounds.most[-1] else bounds.least[-1]
+    share = (edge - before[-1]) / (after[-1] - before[-1])
+    guess = before + share * (after - before)
+    guess[-1] = edge
+    found = corrected(equations, guess, np.eye(len(before))[-1])
+    further = tangent(found[1], direction) if found else None
+    return [found[0], further] if found and further is not None else []

@@ -1,0 +1,353 @@
+"""The steady-turning diagram of a ship: yaw rate, speed, drift and heel against the rudder angle, unstable turns too.
+
+Every steady turn of the nonlinear model solves
+
+    du/dt = dv/dt = dr/dt = 0   (and the states of effects that act on the hull: roll, the memory of the flow)
+
+at constant revolutions in calm water. From the straight course the curve of solutions is followed both ways by
+pseudo-arclength (:mod:`tank2sim.analysis.turning.continuation`) with the exact Jacobian, so that it goes on through
+the folds of a ship that is unstable on a straight course. A turn is stable if all eigenvalues of that Jacobian with the
+rudder held have a negative real part. Folds are solved for, not read off (Moore and Spence 1980): F = 0, F_z phi = 0.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+from tank2sim.analysis.linearisation import straight_course
+from tank2sim.analysis.turning import continuation
+from tank2sim.analysis.turning.continuation import Array, Bounds, Curve, corrected, follow
+from tank2sim.dynamics.model import Model, Vector
+from tank2sim.errors import InputError
+
+LARGEST_RUDDER = math.radians(35.0)
+"""The diagram goes to 35 deg of rudder (MSC.137(76)), or as far as the gear allows."""
+
+_MOTION = ("motion.u", "motion.v", "motion.r")
+_PLACE = ("motion.x", "motion.y", "motion.psi")
+_FASTEST, _MOST_YAW, _MOST_ELSE = 2.5, 12.0, 50.0
+"""Bounds of u/u0 and v/u0, of r L/u0, and of other states over their nominal size. No ship turns in a circle of a
+sixth of her length: what goes beyond has left every ship's range. A choice of ours."""
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Where the diagram turns back: beyond this rudder (rad) the ship leaves the branch. `place` is its row."""
+
+    place: int
+    rudder_rad: float
+    yaw_rate_radps: float
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The hysteresis loop of a ship that is unstable on a straight course.
+
+    `width_rad` is the rudder between the two folds around the straight course; `height_radps` the difference of the
+    two stable yaw rates at the rudder of the straight course, None if the curve does not reach both.
+    """
+
+    width_rad: float
+    height_radps: float | None
+
+
+@dataclass(frozen=True)
+class SteadyTurning:
+    """Steady turns in the order of the curve, from port to starboard turn; rudder, yaw and drift + to starboard.
+
+    Parameters
+    ----------
+    rudder_rad, yaw_rate_radps, speed_mps, drift_rad : arrays (k,)
+    heel_rad : array (k,) or None
+        None if the ship has no roll.
+    growth_per_s : array (k,)
+        Largest real part of the eigenvalues with the rudder held, 1/s: a stable turn has it negative.
+    slope : array (k, 2)
+        Of rudder and yaw rate by arc length.
+    arc : array (k,)
+    straight : int
+        Row of the straight course.
+    folds : tuple of Fold
+    loop : Loop or None
+    ended : pair of str
+        Why the curve ends to port and to starboard (:class:`tank2sim.analysis.turning.continuation.Curve`).
+    notices : tuple of str
+        What the reader should know.
+    """
+
+    rudder_rad: Array
+    yaw_rate_radps: Array
+    speed_mps: Array
+    drift_rad: Array
+    heel_rad: Array | None
+    growth_per_s: Array
+    slope: Array
+    arc: Array
+    straight: int
+    folds: tuple[Fold, ...]
+    loop: Loop | None
+    ended: tuple[str, str]
+    notices: tuple[str, ...]
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """True (k,) where the turn is stable with the rudder held; on a fold it is not."""
+        return np.asarray(self.growth_per_s < -1e-9 * np.max(np.abs(self.growth_per_s)))
+
+    @cached_property
+    def _along(self) -> CubicHermiteSpline:
+        return CubicHermiteSpline(self.arc, np.column_stack([self.rudder_rad, self.yaw_rate_radps]), self.slope)
+
+    def turns_at(self, rudder_rad: float) -> list[tuple[float, bool]]:
+        """Yaw rate (rad/s) and stability of every steady turn of the curve at a rudder angle, along the curve."""
+        rudder = CubicHermiteSpline(self.arc, self.rudder_rad, self.slope[:, 0])
+        places = np.unique(np.round(rudder.solve(rudder_rad, extrapolate=False), 12))
+        before = np.clip(np.searchsorted(self.arc, places, side="right") - 1, 0, len(self.arc) - 2)
+        stable = self.stable
+        # Between a fold and its neighbour the neighbour's word holds.
+        return [
+            (float(self._along(place)[1]), bool(stable[row] or stable[row + 1]))
+            for place, row in zip(places, before, strict=True)
+        ]
+
+    def as_json(self) -> dict[str, object]:
+        """The diagram in SI and in degrees, as JSON has it."""
+        points: dict[str, object] = {
+            "rudder_deg": np.degrees(self.rudder_rad),
+            "yaw_rate_degps": np.degrees(self.yaw_rate_radps),
+            "speed_mps": self.speed_mps,
+            "drift_deg": np.degrees(self.drift_rad),
+            "growth_per_s": self.growth_per_s,
+            "stable": self.stable,
+        }
+        if self.heel_rad is not None:
+            points["heel_deg"] = np.degrees(self.heel_rad)
+        loop = self.loop and {
+            "width_deg": math.degrees(self.loop.width_rad),
+            "height_degps": None if self.loop.height_radps is None else math.degrees(self.loop.height_radps),
+        }
+        folds = [
+            {"rudder_deg": math.degrees(one.rudder_rad), "yaw_rate_degps": math.degrees(one.yaw_rate_radps)}
+            for one in self.folds
+        ]
+        return {
+            "points": points,
+            "folds": folds,
+            "loop": loop,
+            "ended": {"port": self.ended[0], "starboard": self.ended[1]},
+        }
+
+
+def hull_states(model: Model) -> tuple[str, ...]:
+    """States that move with the hull at a held rudder: u, v, r, and those of effects on which their rates depend."""
+    derivative = {state.name: state.derivative for state in model.states}
+    found = list(_MOTION)
+    for name in found:  # grows on the way
+        rate = model.expand(model.symbol(derivative[name]))
+        held = (*_PLACE, "rudder.angle", *found)
+        found += [one for one in model.state_names if one not in held and ca.depends_on(rate, model.symbol(one))]
+    return tuple(found)
+
+
+def calm_inputs(model: Model) -> Vector:
+    """Inputs (nu,) in calm water: no current, no wind, revolutions as they start."""
+    return model.input_values({name: 0.0 for name in model.input_names if name in ("current.speed", "wind.speed")})
+
+
+class TurningEquations:
+    """The equations of steady turning in scaled unknowns y = (states of the hull, rudder)."""
+
+    def __init__(self, model: Model):
+        self.model, self.names = model, hull_states(model)
+        nominal = {state.name: state.nominal for state in model.states}
+        values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+        speed = float(values["ship.speed"])
+        self.ship_time = float(values["ship.length"]) / speed
+        own = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
+        self.scale: Array = np.array([*(own.get(name, nominal[name]) for name in self.names), 1.0])
+        self._symbol = ca.SX.sym("y", len(self.scale))
+        self._rates = self._scaled_rates()
+        # what stays where it is: inputs and parameters are numbers here, and the functions short
+        jacobian = ca.densify(ca.jacobian(self._rates, self._symbol))
+        self._function = ca.Function("steady", [self._symbol], [self._rates, jacobian], {"cse": True})
+
+    def _scaled_rates(self) -> ca.SX:
+        model, n = self.model, len(self.names)
+        derivative = {state.name: state.derivative for state in model.states}
+        p = model.parameter_values()
+        states = ca.SX(model.initial(p))
+        for row, name in enumerate((*self.names, "rudder.angle")):
+            states[model.state_names.index(name)] = self._symbol[row] * self.scale[row]
+        rates = model.expand(ca.vcat([model.symbol(derivative[name]) for name in self.names]))
+        arguments = [model.x, model.u, model.p]
+        rates = ca.substitute([rates], arguments, [states, ca.SX(calm_inputs(model)), ca.SX(p)])[0]
+        scaled: ca.SX = rates * self.ship_time / self.scale[:n]
+        return scaled
+
+    def __call__(self, y: Array) -> tuple[Array, Array]:
+        """Residual (n,) and Jacobian (n, n + 1)."""
+        residual, jacobian = self._function(y)
+        return np.array(residual).ravel(), np.array(jacobian)
+
+    def growth(self, y: Array) -> float:
+        """Largest real part of the eigenvalues with the rudder held, 1/s."""
+        return float(np.linalg.eigvals(self(y)[1][:, :-1]).real.max()) / self.ship_time
+
+    def fold(self, near: Array, direction: Array) -> Array | None:
+        """The fold next to a point with its tangent: F = 0, F_z phi = 0, c phi = 1; None if Newton finds none."""
+        n = len(self.names)
+        null = direction[:n] / np.linalg.norm(direction[:n])
+        phi = ca.SX.sym("phi", n)
+        slopes = ca.jacobian(self._rates, self._symbol)[:, :n]
+        unknown = ca.vertcat(self._symbol, phi)
+        system = ca.vertcat(self._rates, slopes @ phi, ca.dot(ca.SX(null), phi) - 1)
+        newton = ca.Function("fold", [unknown], [system, ca.densify(ca.jacobian(system, unknown))], {"cse": True})
+        value = np.concatenate([near, null])
+        for _ in range(12):
+            residual, jacobian = (np.array(one) for one in newton(value))
+            if not np.isfinite(jacobian).all() or np.linalg.cond(jacobian) > 1e14:
+                return None
+            change = np.linalg.solve(jacobian, -residual.ravel())
+            value = value + change
+            if np.max(np.abs(change)) < 1e-11:
+                found: Array = value[: n + 1]
+                return found
+        return None
+
+
+def steady_turning(model: Model) -> SteadyTurning:
+    """The steady-turning diagram of a ship, by continuation from her straight course at constant revolutions.
+
+    Raises
+    ------
+    InputError
+        The model is no ship, holds no straight course, or keeps no steady speed on it.
+    """
+    point = straight_course(model)
+    equations = TurningEquations(model)
+    at = dict(zip(model.state_names, point.x.tolist(), strict=True))
+    guess = np.array([at[name] for name in (*equations.names, "rudder.angle")]) / equations.scale
+    yaw = np.eye(len(guess))[equations.names.index("motion.r")]
+    straight = corrected(equations, guess, yaw)
+    if straight is None or not straight[0][0] > 0:
+        remedy = "check X0, Xu, Xuu and Xuuu of the card: resistance and thrust balance at no speed near u0"
+        raise InputError(model.name, "", "keeps no steady speed on a straight course", remedy)
+    largest = largest_rudder(model)
+    if not abs(straight[0][-1]) < largest:
+        problem = f"needs {math.degrees(straight[0][-1]):.3g} deg of rudder to go straight: more than the gear has"
+        raise InputError(model.name, "", problem, "check Y0 and N0 of the card")
+    most = np.full(len(guess), _MOST_ELSE)
+    most[:3] = _FASTEST, _FASTEST, _MOST_YAW
+    most[-1] = largest
+    bounds = Bounds(-most, most)
+    curves = [follow(equations, straight[0], side * yaw, bounds) for side in (-1.0, 1.0)]
+    return _diagram(equations, curves[0], curves[1])
+
+
+def largest_rudder(model: Model) -> float:
+    """:data:`LARGEST_RUDDER`, or the largest that the gear allows, rad."""
+    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    return min(LARGEST_RUDDER, float(values.get("steering.max_angle", LARGEST_RUDDER)))
+
+
+def _diagram(equations: TurningEquations, port: Curve, starboard: Curve) -> SteadyTurning:
+    y = np.concatenate([port.points[:0:-1], starboard.points])
+    tangents = np.concatenate([-port.tangents[:0:-1], starboard.tangents])
+    straight = len(port.points) - 1
+    y, tangents, straight, places = _with_folds(equations, y, tangents, straight)
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(y, axis=0), axis=1))])
+    states = dict(zip((*equations.names, "rudder.angle"), (y * equations.scale).T, strict=True))
+    slopes = dict(zip((*equations.names, "rudder.angle"), (tangents * equations.scale).T, strict=True))
+    speed = np.hypot(states["motion.u"], states["motion.v"])
+    growth = np.array([equations.growth(one) for one in y])
+    growth[places] = 0.0
+    rudder, rate = states["rudder.angle"], states["motion.r"]
+    heel = next((values for name, values in states.items() if name.endswith(".phi")), None)
+    folds = tuple(Fold(place, float(rudder[place]), float(rate[place])) for place in places)
+    found = SteadyTurning(
+        rudder_rad=rudder,
+        yaw_rate_radps=rate,
+        speed_mps=speed,
+        drift_rad=-np.arcsin(states["motion.v"] / speed),
+        heel_rad=heel,
+        growth_per_s=growth,
+        slope=np.column_stack([slopes["rudder.angle"], slopes["motion.r"]]),
+        arc=arc,
+        straight=straight,
+        folds=folds,
+        loop=None,
+        ended=(port.ended, starboard.ended),
+        notices=(),
+    )
+    return _judged(equations.model, found)
+
+
+def _with_folds(
+    equations: TurningEquations, y: Array, tangents: Array, straight: int
+) -> tuple[Array, Array, int, list[int]]:
+    """The curve with its folds put in, the row of the straight course, and the rows of the folds."""
+    turns = np.flatnonzero(np.diff(np.sign(tangents[:, -1])) != 0)
+    places: list[int] = []
+    for turn in turns.tolist():
+        row = int(turn) + len(places)
+        nearer = row if abs(tangents[row, -1]) < abs(tangents[row + 1, -1]) else row + 1
+        fold = equations.fold(y[nearer], tangents[nearer])
+        if fold is None or np.linalg.norm(fold - y[nearer]) > 2 * continuation.LARGEST_STEP:
+            continue
+        direction = continuation.tangent(equations(fold)[1], tangents[nearer])
+        if direction is None:
+            continue
+        y = np.insert(y, row + 1, fold, axis=0)
+        tangents = np.insert(tangents, row + 1, direction, axis=0)
+        straight += row + 1 <= straight
+        places.append(row + 1)
+    return y, tangents, straight, places
+
+
+def _judged(model: Model, found: SteadyTurning) -> SteadyTurning:
+    """With its loop and what is to be told of it."""
+    before = [fold for fold in found.folds if fold.place <= found.straight]
+    after = [fold for fold in found.folds if fold.place > found.straight]
+    loop = None
+    # rudder to port for more yaw to starboard: unstable in yaw, not in surge alone
+    if not found.stable[found.straight] and found.slope[found.straight, 0] < 0 and before and after:
+        rates = [rate for rate, stable in found.turns_at(float(found.rudder_rad[found.straight])) if stable]
+        height = max(rates) - min(rates) if len(rates) > 1 else None
+        loop = Loop(abs(before[-1].rudder_rad - after[0].rudder_rad), height)
+    return replace(found, loop=loop, notices=(*_how_it_ends(found), *_out_of_range(model, found)))
+
+
+def _how_it_ends(found: SteadyTurning) -> list[str]:
+    words = {
+        continuation.OUTSIDE: "runs away: the polynomial holds no steady turn beyond",
+        continuation.STALLED: "breaks off: no steady turn was found beyond",
+        continuation.LONG: "goes on beyond the steps allowed, from",
+    }
+    told = []
+    for side, row, ended in (("port", 0, found.ended[0]), ("starboard", -1, found.ended[1])):
+        if ended in words:
+            rudder, rate = np.degrees([found.rudder_rad[row], found.yaw_rate_radps[row]])
+            told.append(
+                f"the steady-turning diagram {words[ended]} {rudder:.3g} deg of rudder and {rate:.3g} deg/s (to {side})"
+            )
+    return told
+
+
+def _out_of_range(model: Model, found: SteadyTurning) -> list[str]:
+    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    slowest, fastest = values["ship.slowest"], values["ship.fastest"]
+    outside = (found.speed_mps < slowest) | (found.speed_mps > fastest)
+    if not outside.any():
+        return []
+    least = float(np.min(np.abs(found.rudder_rad[outside])))
+    return [
+        f"steady turns from {math.degrees(least):.3g} deg of rudder are at {found.speed_mps[outside].min():.3g} to "
+        f"{found.speed_mps[outside].max():.3g} m/s, outside the card's range of {slowest:.3g} to {fastest:.3g} m/s"
+    ]

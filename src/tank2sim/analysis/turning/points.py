@@ -1,0 +1,179 @@
+"""Single points of the steering diagram: the steady turn at a rudder angle, of a ship or of a steering model.
+
+The turn is the end of the smooth branch of steady turns that starts on the straight course and is followed towards the
+side of the turn (:mod:`tank2sim.analysis.turning.continuation`), through the folds of a ship that is unstable there. So
+the physical root is found where the equations have others.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.analysis.turning.continuation import EDGE, Array, Bounds, corrected, follow
+from tank2sim.analysis.turning.diagram import calm_inputs, hull_states
+from tank2sim.dynamics.model import Model, Vector
+from tank2sim.errors import InputError
+
+_MOST, _MOST_YAW = 10.0, 12.0
+"""Bounds of the scaled unknowns, and of r L/u0: no ship turns in a circle of a sixth of her length. Ours."""
+
+_LEAST_YAW = 1e-6
+"""r L/u0 below which a ship goes straight. Ours."""
+
+
+@dataclass(frozen=True)
+class SteadyTurn:
+    """A steady turn; rudder, yaw rate and drift positive to starboard (drift -asin(v/U))."""
+
+    rudder_rad: float
+    yaw_rate_radps: float
+    drift_rad: float
+    speed_mps: float
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of the origin's circle, m, positive."""
+        return self.speed_mps / abs(self.yaw_rate_radps)
+
+    def as_json(self) -> dict[str, float]:
+        """The turn in m, deg and deg/min."""
+        return {
+            "rudder_deg": math.degrees(self.rudder_rad),
+            "radius_m": self.radius_m,
+            "yaw_rate_degpmin": 60 * math.degrees(self.yaw_rate_radps),
+            "drift_deg": math.degrees(self.drift_rad),
+            "speed_mps": self.speed_mps,
+        }
+
+
+class TurningPoints:
+    """Steady turns of a model in calm water at any values of its parameters.
+
+    The unknowns y (n + 1,) are the states that move with the hull, over their sizes, and the rudder (rad).
+    """
+
+    def __init__(self, model: Model):
+        self.model = model
+        steering = "motion.beta" in model.state_names
+        self.names = ("motion.beta", "motion.r") if steering else hull_states(model)
+        nominal = {state.name: state.nominal for state in model.states}
+        start = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+        speed = start["ship.speed"]
+        self.ship_time = start["ship.length"] / speed
+        own = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
+        self.scale: Array = np.array([*(own.get(name, nominal[name]) for name in self.names), 1.0])
+        self.yaw: Array = np.eye(len(self.scale))[self.names.index("motion.r")]
+        self.y = ca.SX.sym("y", len(self.scale))
+        self.rates, self.shown = self._expressions()
+        slopes = ca.densify(ca.jacobian(self.rates, self.y))
+        self._function = ca.Function("steady", [self.y, model.p], [self.rates, slopes], {"cse": True})
+        self._shown = ca.Function("shown", [self.y, model.p], [self.shown], {"cse": True})
+
+    def _expressions(self) -> tuple[ca.SX, ca.SX]:
+        """Scaled rates (n, 1) and what is shown, yaw rate, speed and drift, of y and p."""
+        model = self.model
+        derivative = {state.name: state.derivative for state in model.states}
+        places = [model.state_names.index(name) for name in (*self.names, "rudder.angle")]
+        states = ca.vcat([ca.SX(state.start) for state in model.states])
+        for row, place in enumerate(places):
+            states[place] = self.y[row] * self.scale[row]
+        rates = model.expand(ca.vcat([model.symbol(derivative[name]) for name in self.names]))
+        rates = rates * self.ship_time / self.scale[:-1]
+        u, v, r = (model.symbol(f"motion.{name}") for name in "uvr")
+        shown = model.expand(ca.vertcat(r, ca.sqrt(u**2 + v**2), -ca.atan2(v, u)))
+        found = ca.substitute([rates, shown], [model.x, model.u], [states, ca.SX(calm_inputs(model))])
+        return found[0], found[1]
+
+    def turn_at(self, rudder_rad: float, parameters: Mapping[str, float] | None = None) -> tuple[SteadyTurn, Array]:
+        """The steady turn to the side of a rudder angle, and its unknowns y (n + 1,).
+
+        With the rudder amidships it is the turn to starboard that an unstable ship makes by herself.
+
+        Parameters
+        ----------
+        rudder_rad : float
+            Rudder, positive to starboard.
+        parameters : mapping, optional
+            Values in place of the model's, by name.
+
+        Raises
+        ------
+        InputError
+            The ship does not turn at that rudder, or no steady turn was found.
+        """
+        p = self.model.parameter_values(parameters)
+        straight = self._straight(p)
+        side = -1.0 if rudder_rad < 0 else 1.0
+        most = np.full(len(self.scale), _MOST)
+        most[self.names.index("motion.r")] = _MOST_YAW
+        least = -most
+        # Before a fold the rudder lies beyond the straight course's: only the side of the turn has a limit.
+        most[-1], least[-1] = (rudder_rad, -math.pi) if side > 0 else (math.pi, rudder_rad)
+        if side * straight[-1] > side * rudder_rad + 1e-9:
+            raise self._fault(rudder_rad, "holds the ship on the other side of her straight course")
+        curve = follow(self._equations(p), straight, side * self.yaw, Bounds(least, most))
+        last: Array = curve.points[-1]
+        if curve.ended != EDGE or abs(last[-1] - rudder_rad) > 1e-9:  # the far edge is none of the turn's
+            raise self._fault(rudder_rad, "makes no steady turn that follows from the straight course")
+        if side * last @ self.yaw < _LEAST_YAW:
+            raise self._fault(rudder_rad, "does not turn the ship")
+        return self._turn(last, p), last
+
+    def near(self, y: Array, parameters: Mapping[str, float]) -> SteadyTurn | None:
+        """The steady turn next to one with unknowns y, at the same rudder and other parameters, or None."""
+        p = self.model.parameter_values(parameters)
+        found = corrected(self._equations(p), y, np.eye(len(y))[-1])
+        return None if found is None else self._turn(found[0], p)
+
+    def diagram(self, largest_rad: float, parameters: Mapping[str, float] | None = None) -> list[SteadyTurn]:
+        """The branch from the straight course to a rudder angle, as :meth:`turn_at` follows it (without its start)."""
+        p = self.model.parameter_values(parameters)
+        side = -1.0 if largest_rad < 0 else 1.0
+        most = np.full(len(self.scale), _MOST)
+        least = -most
+        most[-1], least[-1] = (largest_rad, -math.pi) if side > 0 else (math.pi, largest_rad)
+        curve = follow(self._equations(p), self._straight(p), side * self.yaw, Bounds(least, most))
+        return [self._turn(y, p) for y in curve.points if abs(y @ self.yaw) > _LEAST_YAW]
+
+    def holds_course(self, parameters: Mapping[str, float] | None = None) -> bool:
+        """True if the straight course is stable with the rudder held: all motions of the hull decay."""
+        p = self.model.parameter_values(parameters)
+        slopes = self._equations(p)(self._straight(p))[1][:, :-1]
+        return bool(np.linalg.eigvals(slopes).real.max() < 0)
+
+    def _equations(self, p: Vector) -> _At:
+        return _At(self._function, p)
+
+    def _straight(self, p: Vector) -> Array:
+        """The straight course: steady, with a yaw rate of zero."""
+        start = np.array(self.model.initial(p)).ravel()
+        places = [self.model.state_names.index(name) for name in (*self.names, "rudder.angle")]
+        found = corrected(self._equations(p), start[places] / self.scale * (1 - self.yaw), self.yaw)
+        if found is None:
+            raise InputError(self.model.name, "", "keeps no straight course", "check the card's coefficients")
+        return found[0]
+
+    def _turn(self, y: Array, p: Vector) -> SteadyTurn:
+        rate, speed, drift = np.array(self._shown(y, p)).ravel().tolist()
+        return SteadyTurn(float(y[-1]), rate, drift, speed)
+
+    def _fault(self, rudder_rad: float, problem: str) -> InputError:
+        place = f"rudder {math.degrees(rudder_rad):.4g} deg"
+        return InputError(self.model.name, place, problem, "give another rudder angle, or check the card")
+
+
+@dataclass(frozen=True)
+class _At:
+    """The equations at given parameters, as the continuation takes them."""
+
+    function: ca.Function
+    p: Vector
+
+    def __call__(self, y: Array) -> tuple[Array, Array]:
+        residual, jacobian = self.function(y, self.p)
+        return np.array(residual).ravel(), np.array(jacobian)

@@ -1,0 +1,169 @@
+"""The covariance of a card's numbers: a JSON file beside the card, to which a comment line of the card refers.
+
+``# covariance: ship.covariance.json`` names the file, relative to the card's folder. It has ``format``
+(:data:`FORMAT`), ``names`` (dotted keys of the card, ``derivatives.Yv``) and ``covariance``, a row for each name, in
+the conventions of the card's own text: scaling, units, sign of the rudder. What it does not name is independent, with
+the standard error of the card.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.cards.card import Card
+from tank2sim.errors import InputError
+from tank2sim.files import BYTE_ORDER_MARK, read_text
+
+Array = NDArray[np.float64]
+
+FORMAT = "tank2sim-covariance/1"
+
+ROUNDING = 0.006
+"""Share by which a standard error of the card, three figures, may differ from that of the covariance."""
+
+NEGATIVE = 1e-8
+"""Share of the largest eigenvalue of the correlations by which rounding may make one negative (ours)."""
+
+_LINE = re.compile(r"^#[ \t]*covariance:[ \t]*(\S[^\r\n]*?)[ \t]*\r?$", re.MULTILINE)
+
+
+@dataclass(frozen=True, eq=False)
+class Covariance:
+    """Covariance of numbers of a card.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Their k dotted keys in the card's file.
+    matrix : array (k, k)
+        In the conventions of that file.
+    """
+
+    names: tuple[str, ...]
+    matrix: Array
+
+    def as_text(self) -> str:
+        """The JSON of the file: a row of the matrix a line, every figure kept."""
+        rows = ",\n  ".join(json.dumps(row) for row in self.matrix.tolist())
+        names = json.dumps(list(self.names))
+        return f'{{\n "format": "{FORMAT}",\n "names": {names},\n "covariance": [\n  {rows}\n ]\n}}\n'
+
+
+def covariance_file(card: Path) -> Path:
+    """Where the covariance of a card lies: ``ship.covariance.json`` beside ``ship.toml``."""
+    return card.with_name(f"{card.stem}.covariance.json")
+
+
+def referring(text: str, card: Path) -> str:
+    """A card's text with the line that refers to the file beside `card`, in place of any that it had."""
+    mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
+    kept = re.sub(_LINE.pattern + r"\n?", "", text.removeprefix(mark), flags=re.MULTILINE)
+    return f"{mark}# covariance: {covariance_file(card).name}\n{kept}"
+
+
+def read_covariance(card: Card) -> Covariance | None:
+    """The covariance to which a card refers; None if it refers to none.
+
+    Raises
+    ------
+    InputError
+        The file is missing or no covariance (shape, names of the card, symmetric, positive semidefinite up to
+        rounding), or its standard errors are not those of the card.
+    """
+    found = _LINE.search(card.text)
+    if found is None:
+        return None
+    path = Path(card.source).parent / found[1]
+    if not path.is_file():
+        remedy = f"put it beside the card, or take the line '# covariance: {found[1]}' out"
+        raise InputError(path, "", f"is missing, and {card.source} refers to it", remedy)
+    names, rows = _form(path)
+    matrix = _matrix(path, names, rows)
+    _check_names(card, path, names)
+    _check_errors(card, path, names, matrix)
+    return Covariance(tuple(names), matrix)
+
+
+def _form(path: Path) -> tuple[list[str], object]:
+    try:
+        content = json.loads(read_text(path))
+    except (ValueError, RecursionError) as error:
+        raise InputError(path, "", f"is no JSON ({error})", "write it anew with reduce or identify") from None
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise InputError(path, "format", f"is not {FORMAT!r}", "give a file that reduce or identify wrote")
+    names = content.get("names")
+    if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
+        raise InputError(path, "names", "is no list of keys of the card", 'give names such as "derivatives.Yv"')
+    if len(set(names)) < len(names):
+        raise InputError(path, "names", "has a name twice", "give each number once")
+    return names, content.get("covariance")
+
+
+def _matrix(path: Path, names: Sequence[str], rows: object) -> Array:
+    try:
+        matrix = np.array(rows, dtype=float)
+    except (TypeError, ValueError):
+        matrix = np.zeros(0)
+    if matrix.shape != (len(names), len(names)) or not np.isfinite(matrix).all():
+        problem = f"is no matrix of {len(names)} rows of {len(names)} finite numbers"
+        raise InputError(path, "covariance", problem, "give a row for each of the names")
+    errors = np.sqrt(np.maximum(np.diag(matrix), 0.0))
+    size = np.outer(errors, errors)
+    if np.any(np.diag(matrix) < 0) or np.any(np.abs(matrix - matrix.T) > 1e-9 * size):
+        raise InputError(path, "covariance", "is not symmetric with variances on its diagonal", "write it anew")
+    correlation = np.divide(matrix, size, out=np.zeros_like(matrix), where=size > 0)
+    if np.any(matrix[size == 0] != 0):
+        raise InputError(path, "covariance", "has a number that is exact and yet varies with others", "write it anew")
+    values = np.linalg.eigvalsh(correlation)
+    if values[0] < -NEGATIVE * max(values[-1], 1.0):
+        problem = "is not positive semidefinite: no numbers vary like that"
+        raise InputError(path, "covariance", problem, "write it anew")
+    return matrix
+
+
+def _check_names(card: Card, path: Path, names: Sequence[str]) -> None:
+    content = tomllib.loads(card.text.removeprefix(BYTE_ORDER_MARK))
+    for name in names:
+        value = _at(content, name)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InputError(path, f"names: {name}", f"is no number of {card.source}", "give dotted keys of the card")
+
+
+def _check_errors(card: Card, path: Path, names: Sequence[str], matrix: Array) -> None:
+    content = tomllib.loads(card.text.removeprefix(BYTE_ORDER_MARK))
+    for name, variance in zip(names, np.diag(matrix), strict=True):
+        key = _uncertainty_of(name)
+        stated = _at(content, key)
+        error = math.sqrt(variance)
+        if isinstance(stated, int | float) and abs(stated - error) > ROUNDING * max(abs(stated), error):
+            problem = f"is {stated:.4g}, and {path.name} says {error:.4g}"
+            raise InputError(card.source, key, problem, "make them agree, or take the line '# covariance: ...' out")
+
+
+def _uncertainty_of(name: str) -> str:
+    """Key of the standard error that belongs to a key: of an effect its own, else in ``[uncertainty]``."""
+    if name.startswith("effects."):
+        return name.replace(".parameters.", ".uncertainty.")
+    return f"uncertainty.{name.partition('.')[2]}" if name.startswith("derivatives.") else ""
+
+
+def _at(content: Any, key: str) -> object:
+    """What stands at a dotted key of a TOML document; None if nothing does."""
+    for part in key.split("."):
+        if isinstance(content, list) and part.isdigit() and int(part) < len(content):
+            content = content[int(part)]
+        elif isinstance(content, dict) and part in content:
+            content = content[part]
+        else:
+            return None
+    return content

@@ -1,0 +1,256 @@
+"""``tank2sim influence``: influence coefficients of a card, and tuning it to a trial or a standard."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import click
+import numpy as np
+from rich.markup import escape
+
+from tank2sim.analysis.influence.figures import Figure, forms, parse_figure
+from tank2sim.analysis.influence.of_card import Influence, influence
+from tank2sim.analysis.influence.study import Study
+from tank2sim.analysis.tuning.card import tuned_text
+from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, WITHIN, Means, Tuned
+from tank2sim.analysis.tuning.tune import tune
+from tank2sim.analysis.tuning.wishes import OPTION, Wish, parse_wish
+from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.cards.steering_card import find_steering_card
+from tank2sim.cli.agreed import parse_agreed, parse_bounds
+from tank2sim.cli.changes import parse_changes
+from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.cli.steering_card import refuse_options, show_steering_card
+from tank2sim.cli.trials import TakesSeveral
+from tank2sim.cli.two_points import Files, tune_through
+from tank2sim.errors import InputError
+from tank2sim.files import write_together
+from tank2sim.native.compiler import find_compiler
+from tank2sim.simulation.integrator import NO_COMPILER
+
+DEFAULT_FIGURES = (
+    "criterion_C",
+    "steady_radius_m@20",
+    "advance_m@35",
+    "tactical_diameter_m@35",
+    "overshoot1_deg@20/20",
+)
+"""Figures where none is asked: one of each kind that is most looked at (a choice of ours)."""
+
+ROWS = 15
+"""Parameters in the table on the screen: the most influential; JSON and page have all."""
+
+
+@click.command("influence", cls=TakesSeveral, several=("--figure", "--tune", "--agreed", "--through"))
+@click.argument("card")
+@click.option(
+    "--figure",
+    "figures",
+    multiple=True,
+    metavar="F ...",
+    help=f"Figures, FIGURE@ARGUMENT. {forms()}. Several may follow.",
+)
+@click.option(
+    "--tune",
+    "wishes",
+    multiple=True,
+    metavar="FIGURE=VALUE ...",
+    help="Change the card until a figure has a value: steady_radius_m=424@20, 'overshoot1_deg@20/20<=25' (also >=).",
+)
+@click.option(
+    "--by",
+    type=click.Choice((FEWEST, UNCERTAIN)),
+    default=UNCERTAIN,
+    show_default=True,
+    help="Tune with the fewest parameters, or the most uncertain: the least squared moves in standard errors.",
+)
+@click.option(
+    "--within",
+    type=click.FloatRange(min=0, min_open=True, max=100),
+    default=WITHIN,
+    show_default=True,
+    help="Bounds of tuning, standard errors of the card.",
+)
+@click.option("--hold", multiple=True, metavar="NAME", help="Do not tune this parameter.")
+@click.option(
+    "--bound",
+    "bounds",
+    multiple=True,
+    metavar="NAME=LOW..HIGH",
+    help="Bounds of a parameter, in the card's conventions.",
+)
+@click.option(
+    "--agreed",
+    multiple=True,
+    metavar="NAME=PERCENT ...",
+    help="An agreed variation (Kc), as with 1 % of draught: by how much each changes with the others; or a TOML file "
+    "of such. Tuning moves these together only.",
+)
+@click.option(
+    "--through",
+    multiple=True,
+    metavar="RATE@RUDDER ...",
+    help="Scale the hull's balance of moment and damping, and the rudder, until the steady turns meet two points: "
+    "deg/min at deg of rudder (0 for an unstable ship), or a radius, 424m@20.",
+)
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="A value in place of the card's.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the tuned card.")
+@click.option("--page", type=click.Path(path_type=Path), metavar="PAGE.html", help="Write a page with the charts.")
+@json_option
+def command(
+    card: str,
+    figures: tuple[str, ...],
+    wishes: tuple[str, ...],
+    settings: tuple[str, ...],
+    **more: object,
+) -> None:
+    """How much each number on CARD (a file, or a bundled ship) moves the figures of the ship.
+
+    CARD may be a steering card (poznyakov-yudin): then the models on it are compared.
+
+    K % is the change of a figure for 10 % more of one number, by exact slopes and by a 10 % difference. Wishes that
+    contradict each other within the bounds are told, with the nearest that can be reached; with -o that is an error.
+    """
+    if steering := find_steering_card(card):
+        refuse_options("a steering card", {"--figure": figures, "--tune": wishes, "--set": settings, **_options(more)})
+        show_steering_card(steering, _file(more["json_file"]), _file(more["page"]))
+        return
+    ship = read_card(card, parse_changes(settings))
+    if not isinstance(ship, ManoeuvringCard):
+        raise InputError(ship.source, "model.kind", "is no ship that manoeuvres", "give a linear or abkowitz card")
+    output, page, json_file = (_file(more[key]) for key in ("output", "page", "json_file"))
+    if through := _texts(more, "through"):
+        refuse_options("--through", {"--figure": figures, "--tune": wishes, "--page": page})
+        tune_through(ship, through, Files(output, json_file))
+        return
+    if output and not wishes:
+        raise InputError("-o", "", "has nothing to write without --tune", "give --tune FIGURE=VALUE")
+    wanted = [parse_wish(text) for text in wishes]
+    study = Study(ship, _asked(figures, wanted))
+    means = _means(more)
+    tuned = tune(study, wanted, means) if wanted else None
+    if output and tuned and not tuned.reached:
+        raise InputError(OPTION, "", _contradiction(tuned), "widen --within or state --bound, or wish for less")
+    result = influence(study, means.agreed)
+    notices = list(dict.fromkeys([*result.notices, *([] if find_compiler() else [NO_COMPILER])]))
+    contents: dict[Path, str | bytes] = {}
+    if json_file:
+        told = {**result.as_json(), "notices": notices, **({"tuned": tuned.as_json()} if tuned else {})}
+        contents[json_file] = json_text(told)
+    if output and tuned:
+        contents[output] = tuned_text(ship, tuned)
+    if page:
+        contents[page] = _page(study, result, tuned)
+    write_together(contents, inputs=[Path(ship.source)], outputs=[json_file, output, page])
+    _show(result)
+    if tuned:
+        _show_tuned(tuned)
+    show_notices(notices)
+
+
+def _file(given: object) -> Path | None:
+    return given if isinstance(given, Path) else None
+
+
+def _asked(figures: tuple[str, ...], wanted: list[Wish]) -> list[Figure]:
+    """Figures asked for, and those of the wishes; each once."""
+    named = figures or (() if wanted else DEFAULT_FIGURES)
+    return list(dict.fromkeys([*(parse_figure(text) for text in named), *(wish.figure for wish in wanted)]))
+
+
+def _texts(more: dict[str, object], key: str) -> tuple[str, ...]:
+    given = more[key]
+    return tuple(str(one) for one in given) if isinstance(given, tuple) else ()
+
+
+def _options(more: dict[str, object]) -> dict[str, object]:
+    """Options of ship cards alone, with what was given for them."""
+    return {f"--{key}": more[key] for key in ("hold", "agreed", "through")} | {
+        "--bound": more["bounds"],
+        "-o": more["output"],
+    }
+
+
+def _means(more: dict[str, object]) -> Means:
+    return Means(
+        by=str(more["by"]),
+        within=float(str(more["within"])),
+        hold=_texts(more, "hold"),
+        bounds=parse_bounds(_texts(more, "bounds")),
+        agreed=parse_agreed(_texts(more, "agreed")),
+    )
+
+
+def _page(study: Study, result: Influence, tuned: Tuned | None) -> str:
+    from tank2sim.report.influence_page import influence_page
+    from tank2sim.report.page import render_page
+
+    return render_page(influence_page(result, tuned, None if tuned is None else study.figures_at(tuned.values)))
+
+
+def _contradiction(tuned: Tuned) -> str:
+    names = [wish.text for wish in tuned.contradiction]
+    pairs = zip(tuned.wishes, tuned.after, strict=True)
+    nearest = ", ".join(f"{wish.figure.text} {value:.5g}" for wish, value in pairs)
+    what = f"{names[0]} cannot be reached" if len(names) == 1 else f"{' and '.join(names)} contradict each other"
+    return f"{what} within the bounds; the nearest is {nearest}"
+
+
+def _show(result: Influence) -> None:
+    screen.print(f"[bold]{escape(result.ship)}[/bold]: {len(result.parameters)} parameters", soft_wrap=True)
+    show_table(
+        "Figures",
+        ["figure", "value", "standard error", "most of it from"],
+        [
+            [one.text, float(result.values[row]), float(result.standard_errors[row]), _largest_shares(result, row)]
+            for row, one in enumerate(result.figures)
+        ],
+    )
+    exact, difference = result.exact, result.difference
+    largest = np.nan_to_num(np.abs(exact)).max(axis=0)
+    order = [place for place in np.argsort(-largest, kind="stable") if largest[place] > 0][:ROWS]
+    heads = ["", *(f"{one.text}" for one in result.figures)]
+    rows = [
+        [result.parameters[k].short, *(_pair(exact[row, k], difference[row, k]) for row in range(len(result.figures)))]
+        for k in order
+    ]
+    show_table("K %: change for 10 % more, by exact slopes | by the 10 % difference", heads, rows)
+    if result.agreed:
+        agreed = result.agreed
+        columns = zip(agreed.foretold, agreed.foretold_by_difference, agreed.direct, strict=True)
+        show_table(
+            "Agreed variation, change in %",
+            ["figure", "sum of Kc K, exact", "by differences", "direct"],
+            [[figure.text, *row] for figure, row in zip(result.figures, columns, strict=True)],
+        )
+
+
+def _pair(exact: float, difference: float) -> str:
+    return " | ".join(f"{round(value, 2) + 0.0:+.2f}" if math.isfinite(value) else "-" for value in (exact, difference))
+
+
+def _largest_shares(result: Influence, row: int) -> str:
+    shares = result.shares[row]
+    return ", ".join(
+        f"{result.parameters[k].short} {100 * shares[k]:.0f} %" for k in np.argsort(-shares)[:3] if shares[k]
+    )
+
+
+def _show_tuned(tuned: Tuned) -> None:
+    rows = [[w.text, float(a), float(b)] for w, a, b in zip(tuned.wishes, tuned.before, tuned.after, strict=True)]
+    show_table("Tuning" if tuned.reached else "Nearest that can be reached", ["wish", "before", "after"], rows)
+    heads = ["", "before", "after", "standard errors"]
+    moves = [
+        [
+            move.parameter.short,
+            *(value * move.parameter.factor for value in (move.before, move.after)),
+            move.in_standard_errors,
+        ]
+        for move in tuned.moves
+    ]
+    show_table(f"Parameters changed ({tuned.means.by}): {len(moves)}", heads, moves[:ROWS])
+    if tuned.agreed_times is not None:
+        screen.print(f"the agreed variation {tuned.agreed_times:+.3g} times")
+    if not tuned.reached:
+        screen.print(f"[bold]{escape(_contradiction(tuned))}[/bold]", soft_wrap=True)

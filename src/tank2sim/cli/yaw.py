@@ -1,0 +1,205 @@
+"""``tank2sim yaw``: added yaw inertia and dissipation of a body that a motor turns in a tank."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+from rich.markup import escape
+
+from tank2sim.cards import ManoeuvringCard, YawRigCard, parse_card, read_card
+from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.dynamics.yaw_rig import YawRig, rig_of
+from tank2sim.errors import InputError
+from tank2sim.files import write_together
+from tank2sim.identification.yaw.card import (
+    BEST,
+    body_length,
+    known_added_inertia,
+    nrdot_prime,
+    rig_card_text,
+    tank_density,
+    with_nrdot,
+)
+from tank2sim.identification.yaw.identify import (
+    METHODS,
+    YawOptions,
+    YawResult,
+    identify_yaw,
+    parse_yaw_terms,
+    torque_constant,
+)
+from tank2sim.records.yaw import read_yaw_record, yaw_record_text
+
+_POSITIVE = click.FloatRange(min=0, min_open=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Asked:
+    """The options beside the records."""
+
+    inertia_kgm2: float | None
+    inertia_error: float | None
+    torque_constant: float | None
+    reference: Path | None
+    reference_inertia: float | None
+    rig: str | None
+    terms: str | None
+    mirror_percent: float
+    method: str
+    card: str | None
+    length_m: float | None
+    output: Path | None
+    page: Path | None
+    json_file: Path | None
+
+
+@click.command("yaw")
+@click.argument("records", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORD.csv...")
+@click.option("--simulate", metavar="CARD", help="First write the one RECORD, as the rig of this card would (alyshev).")
+@click.option("--noise", "noise_A", type=click.FloatRange(min=0), default=0.0, help="Of the simulated current, A.")
+@click.option("--inertia-kgm2", type=_POSITIVE, metavar="J", help="J_zz of body and rotor; else from records in air.")
+@click.option("--inertia-error-kgm2", "inertia_error", type=click.FloatRange(min=0), help="Its standard error.")
+@click.option("--torque-constant", type=_POSITIVE, metavar="KT", help="k_t, N m/A; else as the records say.")
+@click.option("--reference", type=click.Path(path_type=Path), metavar="AIR.csv", help="Take k_t from a body in air ...")
+@click.option("--reference-inertia-kgm2", "reference_inertia", type=_POSITIVE, help="... of this known inertia.")
+@click.option("--rig", metavar="CARD", help="Card of the rig: its walls, gravity, accelerating and braking count.")
+@click.option("--terms", metavar="LIST", help="Terms beside the inertia; coulomb,viscous,quadratic in water.")
+@click.option("--mirror-percent", type=click.FloatRange(0, 1000), default=25.0, show_default=True,
+              help="Largest difference of mirror images, % of the largest rate.")  # fmt: skip
+@click.option(
+    "--method", type=click.Choice(METHODS), default=BEST, show_default=True, help="Whose numbers a card gets."
+)
+@click.option("--card", metavar="SHIP", help="Put N_rdot into this ship's card; else -o writes a card of the rig.")
+@click.option("--length-m", type=_POSITIVE, metavar="L", help="Length of the model; else as the records say.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the card.")
+@click.option("--page", type=click.Path(path_type=Path), metavar="PAGE.html", help="Write a page with charts.")
+@json_option
+def command(records: tuple[Path, ...], *, simulate: str | None, noise_A: float, **options: object) -> None:
+    """Estimate added yaw inertia and dissipation from each RECORD (t_s,phi_rad,current_A) of the yaw rig.
+
+    Records in air ('# medium: air') give J_zz; the programme stands in comments of the file.
+    """
+    asked = _Asked(**options)  # type: ignore[arg-type]  # click has checked them
+    if asked.card and not asked.output:
+        raise InputError("--card", "", "has no file to be written to", "say which with -o CARD.toml")
+    if simulate:
+        _simulate(simulate, records, noise_A)
+    known = _known(asked.rig)
+    result = identify_yaw([read_yaw_record(path) for path in records], _options(asked, known))
+    contents: dict[Path, str | bytes] = {}
+    told = _card(result, asked, known, contents)
+    if asked.json_file:
+        contents[asked.json_file] = json_text(result.as_json())
+    if asked.page:
+        from tank2sim.report.page import render_page
+        from tank2sim.report.yaw_page import yaw_page
+
+        contents[asked.page] = render_page(yaw_page(result))
+    inputs = [*records, *([asked.reference] if asked.reference else [])]
+    write_together(contents, inputs=inputs, outputs=[asked.output, asked.page, asked.json_file])
+    _show(result)
+    show_notices(result.notes)
+    if told:
+        screen.print(escape(told), soft_wrap=True)
+
+
+def _simulate(name: str, records: tuple[Path, ...], noise_A: float) -> None:
+    from tank2sim.simulation.yaw_record import simulated_record
+
+    if len(records) != 1:
+        raise InputError("--simulate", "", f"has {len(records)} records to write", "give the name of one")
+    if records[0].exists():
+        raise InputError(records[0], "", "is there already, and may be a measurement", "give --simulate a new name")
+    card = _rig_card(name, "--simulate")
+    record = simulated_record(card, records[0], noise_A)
+    write_together({records[0]: yaw_record_text(record)}, inputs=[Path(card.source)])
+
+
+def _rig_card(name: str, option: str) -> YawRigCard:
+    card = read_card(name)
+    if not isinstance(card, YawRigCard):
+        raise card.fault("model.kind", f"is {card.model.kind!r}", f"give {option} a card of the yaw rig")
+    return card
+
+
+def _known(rig: str | None) -> YawRig | None:
+    return None if rig is None else rig_of(_rig_card(rig, "--rig"))
+
+
+def _options(asked: _Asked, known: YawRig | None) -> YawOptions:
+    constant, error = asked.torque_constant, 0.0
+    if (asked.reference is None) != (asked.reference_inertia is None):
+        raise InputError("--reference", "", "goes with --reference-inertia-kgm2", "give both, or neither")
+    if asked.reference and asked.reference_inertia:
+        constant, error = torque_constant(identify_yaw([read_yaw_record(asked.reference)]), asked.reference_inertia)
+    return YawOptions(
+        inertia_kgm2=asked.inertia_kgm2,
+        inertia_error_kgm2=asked.inertia_error,
+        torque_constant_NmpA=constant,
+        torque_constant_error=error,
+        known=known,
+        terms=parse_yaw_terms(asked.terms) if asked.terms else None,
+        mirror_limit=asked.mirror_percent / 100,
+    )
+
+
+def _card(result: YawResult, asked: _Asked, known: YawRig | None, contents: dict[Path, str | bytes]) -> str:
+    """Put the card asked for among the contents; what to say of it."""
+    if asked.output is None:
+        return ""
+    if asked.card is None:
+        source = f"tank2sim yaw {' '.join(record.path.name for record in result.records)}, method {asked.method}"
+        text = rig_card_text(result, asked.method, name=asked.output.stem, source=source, known=known)
+        parse_card(text, str(asked.output))
+        contents[asked.output] = text
+        return f"{asked.output}: the rig's card has the numbers of {asked.method}"
+    ship = read_card(asked.card)
+    if not isinstance(ship, ManoeuvringCard):
+        raise ship.fault("model.kind", f"is {ship.model.kind!r}, which has no N_rdot", "give --card a ship's card")
+    known_added_inertia(result, asked.method)  # the first thing to be told, if it is not known
+    length = body_length(result, asked.length_m)
+    new = with_nrdot(ship, result, asked.method, length)
+    contents[asked.output] = new.text
+    value, error = nrdot_prime(result, asked.method, length, tank_density(result))
+    spread = "" if error is None else f" ± {error:.2g}"
+    before = ship.derivatives.get("Nrdot")
+    was = "not in the card before" if before is None else f"{before:.4g} before"
+    return (
+        f"{asked.output}: N_rdot' = {value:.4g}{spread} ({was}), from a model of {length:g} m to "
+        f"{ship.ship.name} of {ship.ship.length_m:g} m, by {asked.method}"
+    )
+
+
+def _show(result: YawResult) -> None:
+    rows = []
+    for method, estimate in result.estimates.items():
+        added = result.added_inertia(method)
+        rows.append(
+            [
+                method.replace("_", " "),
+                _with_error(*(added or (None, None))),
+                _with_error(estimate.total_inertia_kgm2, estimate.inertia_error_kgm2),
+                _with_error(estimate.dissipation_J, estimate.dissipation_error_J),
+            ]
+        )
+    names = ", ".join(record.path.name for record in result.records)
+    body = f"; J_zz = {1e4 * result.body.value_kgm2:.5g}e-4 kg m2 ({result.body.source})" if result.body else ""
+    title = f"{names}: in {result.medium}, k_t = {result.torque_constant_NmpA:.4g} N m/A{body}"
+    heads = ["", "added inertia, 1e-4 kg m2", "total, 1e-4 kg m2", "B + D, 1e-4 J"]
+    show_table(title, heads, rows)
+    friction = next(iter(result.estimates.values())).friction
+    show_table(
+        "Friction and water, by energy least squares",
+        ["", "1e-4 SI"],
+        [[term.replace("_", " "), _with_error(*own)] for term, own in friction.items()],
+    )
+
+
+def _with_error(value: float | None, error: float | None) -> str:
+    """A value and its standard error, in units of 1e-4."""
+    if value is None:
+        return "-"
+    spread = "" if error is None else f" ± {float(f'{1e4 * error:.2g}'):g}"
+    return f"{1e4 * value:.5g}{spread}"

@@ -1,0 +1,64 @@
+"""A ship and its autopilot in one model, and the yaw that waves put upon it."""
+
+from __future__ import annotations
+
+from tank2sim.dynamics.model import Input, Model, Quantity, Variable
+
+YAW_DISTURBANCE = "waves.yaw_acceleration"
+"""Input of :func:`with_yaw_disturbance`, rad/s2."""
+
+
+def closed_loop_model(ship: Model, autopilot: Model) -> Model:
+    """One model of both: each input of the one that bears the name of the other's state or quantity is joined to it.
+
+    ``heading.command`` stays an input; outputs are those of both. The equations are those of the two models as they
+    are: an input that is joined becomes a quantity ``joint.<name>`` whose value is the signal itself.
+
+    Raises
+    ------
+    ValueError
+        The two have a variable of one name that is no joint.
+    """
+    joints: list[Quantity] = []
+    for receiver, sender in ((ship, autopilot), (autopilot, ship)):
+        sent = {one.name: one for one in (*sender.states, *sender.quantities)}
+        joints += [_joint(one, sent[one.name]) for one in receiver.inputs if one.name in sent]
+    joined = {joint.name.removeprefix("joint.") for joint in joints}
+    return Model(
+        name=f"{ship.name} with {autopilot.name}",
+        description=f"{ship.description}; {autopilot.description}",
+        states=(*ship.states, *autopilot.states),
+        inputs=tuple(one for one in (*ship.inputs, *autopilot.inputs) if one.name not in joined),
+        parameters=(*ship.parameters, *autopilot.parameters),
+        quantities=(*ship.quantities, *autopilot.quantities, *joints),
+        outputs=(*ship.outputs, *autopilot.outputs),
+        step_s=min(ship.step_s, autopilot.step_s),
+        notices=(*ship.notices, *autopilot.notices),
+    )
+
+
+def _joint(receiver: Input, sender: Variable) -> Quantity:
+    joint = Quantity(
+        name=f"joint.{receiver.name}",
+        unit=receiver.unit,
+        description=f"What is received of: {receiver.description}",
+        value=sender.symbol,
+    )
+    # The equations of the receiver hold the symbol of its input: cached_property keeps it in __dict__.
+    joint.__dict__["symbol"] = receiver.symbol
+    return joint
+
+
+def with_yaw_disturbance(ship: Model) -> Model:
+    """The ship with an input ``waves.yaw_acceleration``: the first-order yaw moment of waves over the yaw inertia.
+
+    The moment is that of wave frequency, to which hull damping adds little: its coupling into sway is left out.
+    """
+    waves = Input(
+        name=YAW_DISTURBANCE,
+        unit="rad/s2",
+        description="Yaw acceleration by waves, positive to starboard",
+        display_unit="deg/s2",
+        nominal=1e-3,
+    )
+    return ship.extend(waves).redefine("motion.rdot", lambda acceleration: acceleration + waves.symbol)

@@ -1,0 +1,63 @@
+"""The base model of Poznyakov & Yudin: equation (1) of paper 4, and the further terms that its Table 2 names.
+
+    Y = -C_y^b beta - C_y^bb beta |beta| + C_y^w r + C_y^d delta
+    N =  C_m^b beta - (C_m^w + C_m^bbw beta^2) r + C_m^d delta
+
+Table 2 varies three more coefficients of N. Their terms are not printed; read after their superscripts, and with the
+signs that their influence has in Table 2, they are -C_m^ww r |r| and -C_m^wwb beta r^2. A term in C_m^bb has no
+influence there (K = 0) and is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import casadi as ca
+
+from tank2sim.dynamics.steering_models.form import Coefficient, SteeringForm
+
+PAPER = "Poznyakov, S. I. and Yudin, Yu. I. (2007), Vestnik MGTU, on comparing ship models by influence coefficients"
+
+EQUATION_1 = (
+    Coefficient(name="C_y_b", description="Coefficient of -beta in Y"),
+    Coefficient(name="C_y_w", description="Coefficient of r in Y"),
+    Coefficient(name="C_y_bb", description="Coefficient of -beta |beta| in Y"),
+    Coefficient(name="C_y_d", description="Coefficient of the rudder angle in Y"),
+    Coefficient(name="C_m_b", description="Coefficient of beta in N: the static yaw moment"),
+    Coefficient(name="C_m_w", description="Coefficient of -r in N: the yaw damping"),
+    Coefficient(name="C_m_bbw", description="Coefficient of -beta^2 r in N"),
+    Coefficient(name="C_m_d", description="Coefficient of the rudder angle in N"),
+)
+"""The coefficients of (1)."""
+
+_OF_TABLE_2 = (
+    Coefficient(name="C_m_ww", description="Coefficient of -r |r| in N, a term read out of Table 2", default=0.0),
+    Coefficient(name="C_m_wwb", description="Coefficient of -beta r^2 in N, a term read out of Table 2", default=0.0),
+)
+
+
+def equation_1(c: Mapping[str, ca.SX], beta: ca.SX, r: ca.SX, delta: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Y and N of (1), as printed."""
+    sway = -c["C_y_b"] * beta - c["C_y_bb"] * beta * ca.fabs(beta) + c["C_y_w"] * r + c["C_y_d"] * delta
+    yaw = c["C_m_b"] * beta - (c["C_m_w"] + c["C_m_bbw"] * beta**2) * r + c["C_m_d"] * delta
+    return sway, yaw
+
+
+def _rates(c: Mapping[str, ca.SX], beta: ca.SX, r: ca.SX, delta: ca.SX) -> tuple[ca.SX, ca.SX]:
+    sway, yaw = equation_1(c, beta, r, delta)
+    return sway, yaw - c["C_m_ww"] * r * ca.fabs(r) - c["C_m_wwb"] * beta * r**2
+
+
+BASE = SteeringForm(
+    name="base",
+    title="base model",
+    source=f"{PAPER}, eq. (1); Yudin and Poznyakov (2006), Vestnik MGTU 9(2), 234-240",
+    coefficients=(*EQUATION_1, *_OF_TABLE_2),
+    rates=_rates,
+    missing=(
+        "its coefficients are not printed but for C_m_b = 0.4 and C_m_w = 0.46, so that its Tables 1 and 2 cannot be "
+        "computed from the paper",
+        "the terms of C_m_bb, C_m_ww and C_m_wwb, which Table 2 varies, are not printed",
+    ),
+)
+"""The base model."""

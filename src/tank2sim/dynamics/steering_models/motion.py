@@ -1,0 +1,143 @@
+"""A steering model as a ship that moves: the form's two equations with kinematics and a rudder that follows orders."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import casadi as ca
+
+from tank2sim.dynamics.kinematics import kinematics
+from tank2sim.dynamics.model import Model, Parameter, Quantity, State, Variable
+from tank2sim.dynamics.steering_gear import steering_gear
+from tank2sim.dynamics.steering_models.form import SteeringForm
+
+STEPS_PER_LENGTH = 200
+"""Integration steps while the ship covers its own length, as of the other ships."""
+
+OUTPUTS = (
+    *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "motion.speed", "motion.beta"),
+    *("motion.rdot", "motion.betadot", "rudder.angle"),
+)
+
+
+def steering_model(
+    name: str, form: SteeringForm, coefficients: Mapping[str, float], length_m: float, speed_mps: float
+) -> Model:
+    """The model of a ship at a constant speed, (1) of paper 4 with the terms of `form`.
+
+    Its variables are named as those of every ship (``motion.beta`` is a state here, and ``motion.u``, ``motion.v``
+    follow from it), so that manoeuvres, figures and steady turns work on it alike.
+
+    Parameters
+    ----------
+    name : str
+        The ship.
+    form : SteeringForm
+        The equations.
+    coefficients : mapping
+        Values by name, parameters ``coefficients.*``; those with a default may be left out.
+    length_m, speed_mps : float
+        L and v.
+
+    Raises
+    ------
+    ValueError
+        A coefficient without default is not given, or one is given that the form does not have.
+    """
+    known = {one.name: one.default for one in form.coefficients}
+    values = known | dict(coefficients)
+    wrong = [name for name, value in values.items() if value is None or name not in known]
+    if wrong:
+        raise ValueError(f"{form.name}: missing or unknown: {', '.join(wrong)}")
+    constants = (*_ship(length_m, speed_mps), *_coefficients(form, {k: float(v or 0.0) for k, v in values.items()}))
+    gear, notices = steering_gear(None, length_m / speed_mps)
+    motion = _motion(form, {variable.name: variable.symbol for variable in (*constants, *gear)})
+    position = kinematics({variable.name: variable for variable in motion})
+    empty = Model(
+        name=name,
+        description=f"{name}: {form.title}, steering at a constant speed",
+        states=(),
+        inputs=(),
+        parameters=(),
+        quantities=(),
+        outputs=(),
+        step_s=length_m / speed_mps / STEPS_PER_LENGTH,
+        notices=(*notices, "the speed of a steering model does not fall in a turn"),
+    )
+    return empty.extend(*position, *motion, *gear, *constants, outputs=OUTPUTS)
+
+
+def _ship(length_m: float, speed_mps: float) -> tuple[Parameter, ...]:
+    def speed(name: str, description: str) -> Parameter:
+        return Parameter(name=name, unit="m/s", description=description, start=speed_mps, nominal=speed_mps)
+
+    return (
+        Parameter(name="ship.length", unit="m", description="Length L", start=length_m, nominal=length_m),
+        speed("ship.speed", "Speed v, which stays constant"),
+        speed("ship.slowest", "Lowest speed at which the model holds"),
+        speed("ship.fastest", "Highest speed at which the model holds"),
+        Parameter(
+            name="initial.beta",
+            unit="rad",
+            description="Drift angle at the start",
+            display_unit="deg",
+            start=0.0,
+            tunable=False,
+        ),
+        Parameter(
+            name="initial.r",
+            unit="rad/s",
+            description="Yaw rate at the start, positive to starboard",
+            display_unit="deg/min",
+            start=0.0,
+            tunable=False,
+        ),
+    )
+
+
+def _coefficients(form: SteeringForm, values: Mapping[str, float]) -> tuple[Parameter, ...]:
+    return tuple(
+        Parameter(name=f"coefficients.{one.name}", unit="1", description=one.description, start=values[one.name])
+        for one in form.coefficients
+    )
+
+
+def _motion(form: SteeringForm, symbols: Mapping[str, ca.SX]) -> tuple[Variable, ...]:
+    """States ``motion.beta``, ``motion.r`` with their rates, and the velocities in the ship's axes."""
+    beta = State(
+        name="motion.beta",
+        unit="rad",
+        description="Drift angle, positive when the water meets the port bow: v = -speed sin(beta)",
+        display_unit="deg",
+        nominal=0.2,
+        derivative="motion.betadot",
+        start=symbols["initial.beta"],
+        steady=True,
+    )
+    r = State(
+        name="motion.r",
+        unit="rad/s",
+        description="Yaw rate (rate of turn), positive to starboard",
+        display_unit="deg/min",
+        nominal=0.01,
+        derivative="motion.rdot",
+        start=symbols["initial.r"],
+        steady=True,
+    )
+    per_second = symbols["ship.speed"] / symbols["ship.length"]
+    own = {one.name: symbols[f"coefficients.{one.name}"] for one in form.coefficients}
+    sway, yaw = form.rates(own, beta.symbol, r.symbol / per_second, symbols["rudder.effective"])
+    speed = symbols["ship.speed"]
+
+    def quantity(name: str, unit: str, description: str, value: ca.SX) -> Quantity:
+        return Quantity(name=name, unit=unit, description=description, value=value)
+
+    return (
+        beta,
+        r,
+        quantity("motion.betadot", "rad/s", "Rate of the drift angle", sway * per_second),
+        quantity("motion.rdot", "rad/s2", "Yaw acceleration, positive to starboard", yaw * per_second**2),
+        quantity("motion.u", "m/s", "Surge velocity, positive forward", speed * ca.cos(beta.symbol)),
+        quantity("motion.v", "m/s", "Sway velocity, positive to starboard", -speed * ca.sin(beta.symbol)),
+        quantity("motion.speed", "m/s", "Speed through the water", speed),
+    )

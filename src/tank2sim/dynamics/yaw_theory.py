@@ -1,0 +1,149 @@
+"""Added yaw inertia from the form of a body: (7), (8), (9) of paper 3 (Alyshev 2019, after Palagushkin 1996).
+
+All values are in kg m2, about the vertical axis through midships, of the body floating at rest.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from scipy.special import ellipeinc, ellipkinc
+
+from tank2sim.dynamics.ellipsoid import lamb_coefficients
+
+Stage = Literal["accelerating", "braking"]
+
+WATER_KGPM3 = 1000.0
+"""Density that the paper calculates with."""
+GRAVITY_MPS2 = 9.80665
+
+_SPEED_FACTORS: dict[Stage, tuple[float, float]] = {"accelerating": (0.986, 8.63), "braking": (1.23, 10.1)}
+"""a and b of (8); the print calls both a_d and b_d."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FloatingBody:
+    """Dimensions of a body and its tank, SI: waterline length and beam, draught, depth of the water, and for a ship
+    the block coefficient."""
+
+    length_m: float
+    beam_m: float
+    draught_m: float
+    depth_m: float
+    block_coefficient: float | None = None
+    density_kgpm3: float = WATER_KGPM3
+
+    @property
+    def block(self) -> float:
+        """The block coefficient; raises ValueError if there is none."""
+        if self.block_coefficient is None:
+            raise ValueError("(8) and (9) need a block coefficient")
+        return self.block_coefficient
+
+
+ELLIPSOID = FloatingBody(length_m=0.67, beam_m=0.20, draught_m=0.08, depth_m=0.22)
+"""The paper's ellipsoid at its draught T1."""
+SHIP_T1 = FloatingBody(length_m=0.67, beam_m=0.20, draught_m=0.08, depth_m=0.22, block_coefficient=0.47)
+SHIP_T2 = FloatingBody(length_m=0.685, beam_m=0.20, draught_m=0.10, depth_m=0.24, block_coefficient=0.49)
+"""The paper's ship model at its two draughts."""
+
+
+def depth_factor(draught_over_depth: float) -> float:
+    """k66h, by which shallow water magnifies the added yaw inertia: 0.997 + 0.358 x + 0.814 x^2 + 2.27 x^3, x = T/h."""
+    x = draught_over_depth
+    return 0.997 + x * (0.358 + x * (0.814 + x * 2.27))
+
+
+def ellipsoid_water_inertia(body: FloatingBody) -> float:
+    """J* of (7): yaw inertia of the water that a half ellipsoid displaces, pi/120 rho L B T (L^2 + B^2)."""
+    size = body.density_kgpm3 * body.length_m * body.beam_m * body.draught_m
+    return math.pi / 120 * size * (body.length_m**2 + body.beam_m**2)
+
+
+def ratio_by_7(length_over_beam: float, draught_ratio: float, *, as_printed: bool = False) -> float:
+    """Added over displaced inertia of a triaxial ellipsoid by (7), p = L/B > 1 and q = 2T/B < 1.
+
+    The print has (p^2 - 1) in the numerator where (p^2 - 1)^2 belongs, and the letter E for both elliptic integrals;
+    with the square and F for the second it is Lamb's value (k66). `as_printed` leaves the square out.
+
+    Raises
+    ------
+    ValueError
+        The axes are not in the order L > B > 2T > 0 that (7) is written for.
+    """
+    p, q = length_over_beam, draught_ratio
+    if not p > 1 > q > 0:
+        raise ValueError(f"(7) is for L > B > 2T, not L/B = {p:g} and 2T/B = {q:g}; take lamb_coefficients")
+    s = math.sqrt(p * p - q * q)
+    # The integrals have sin(alpha) = s/p; the complement is exact where s/p is near 1.
+    alpha, m = math.atan2(s, q), (p * p - 1) / (p * p - q * q)
+    first, second = float(ellipkinc(alpha, m)), float(ellipeinc(alpha, m))
+    g2 = p * second * (p * p - 2 * q * q + 1) - 2 * p * (1 - q * q) * first - q * (p * p - 1) * s
+    below = (p * p + 1) * ((p * p - 1) ** 2 * (1 - q * q) * s - q * (p * p + 1) * g2)
+    return q * (p * p - 1) * (1.0 if as_printed else p * p - 1) * g2 / below
+
+
+def added_inertia_by_7(body: FloatingBody, *, as_printed: bool = False) -> float:
+    """lambda66 of a half ellipsoid by (7), with the factor of depth."""
+    ratio = ratio_by_7(body.length_m / body.beam_m, 2 * body.draught_m / body.beam_m, as_printed=as_printed)
+    return depth_factor(body.draught_m / body.depth_m) * ellipsoid_water_inertia(body) * ratio
+
+
+def added_inertia_of_ellipsoid(body: FloatingBody) -> float:
+    """lambda66 of a half ellipsoid with any order of axes: Lamb's k66, with the factor of depth."""
+    k66 = lamb_coefficients(body.length_m / 2, body.beam_m / 2, body.draught_m).k66
+    return depth_factor(body.draught_m / body.depth_m) * ellipsoid_water_inertia(body) * k66
+
+
+def rotational_froude_number(body: FloatingBody, rate_radps: float, gravity_mps2: float = GRAVITY_MPS2) -> float:
+    """|Fr| = L |w| / sqrt(g B), of the speed of the ends and the beam."""
+    return body.length_m * abs(rate_radps) / math.sqrt(gravity_mps2 * body.beam_m)
+
+
+def added_inertia_by_8(body: FloatingBody, rate_radps: float, stage: Stage, *, bracket: float = 0.088) -> float:
+    """lambda66 of a ship by (8), as printed: a regression over models turned in a circulating tank.
+
+    Parameters
+    ----------
+    rate_radps : float
+        Yaw rate, rad/s.
+    stage : str
+        The water is being set in motion, or overtakes the body.
+    bracket : float
+        Second factor of the last bracket; 0.088 in the print, 0.08 (with a rate 3/4 as large) comes nearest to the
+        paper's own table.
+
+    Raises
+    ------
+    ValueError
+        The body has no block coefficient.
+    """
+    a, b = _SPEED_FACTORS[stage]
+    length, beam, draught, block = body.length_m, body.beam_m, body.draught_m, body.block
+    finite = 1 - (beam / length - 0.0502) * (0.965 + 0.86 * 2 * draught / beam)
+    size = finite * math.pi / 2 * body.density_kgpm3 * draught**2 * length**3
+    at_rest = (0.60 * block - 0.258) * (0.962 + 0.0127 * beam / (2 * draught))
+    fineness = a * (0.066 - 0.08 * (1 - block) ** 0.8)
+    shallow = b * (draught / body.depth_m) ** 2 * (0.066 - bracket * (1 - block) ** 0.81)
+    waves = rotational_froude_number(body, rate_radps) ** 1.5 * (beam / draught) ** 0.73 * (fineness + shallow)
+    return float(size * (at_rest + waves))
+
+
+def sensitivity_of_8(body: FloatingBody, rate_radps: float, stage: Stage, change: float = 0.01) -> float:
+    """What `change` in the block coefficient does to (8), kg m2."""
+    fuller = FloatingBody(**{**vars(body), "block_coefficient": body.block + change})
+    return added_inertia_by_8(fuller, rate_radps, stage) - added_inertia_by_8(body, rate_radps, stage)
+
+
+def ship_water_inertia(body: FloatingBody) -> float:
+    """J* of (9): yaw inertia of the water that a ship displaces, rho delta B T L^3 / 12.4 (delta^1.6 + (B/L)^2)."""
+    slender = float(body.block**1.6) + (body.beam_m / body.length_m) ** 2
+    return body.density_kgpm3 * body.block * body.beam_m * body.draught_m * body.length_m**3 / 12.4 * slender
+
+
+def added_inertia_by_9(body: FloatingBody) -> float:
+    """lambda66 of a ship by (9): that of the spheroid with its length and beam, with the inertia J* of the ship."""
+    k66 = lamb_coefficients(body.length_m / 2, body.beam_m / 2, body.beam_m / 2).k66
+    return depth_factor(body.draught_m / body.depth_m) * ship_water_inertia(body) * k66

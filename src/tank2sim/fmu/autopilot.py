@@ -1,0 +1,170 @@
+"""The FMU of a heading autopilot, and a ship's FMU steered by it: the smallest master that joins the two."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.analysis.heading.designs import HeadingDesign
+from tank2sim.analysis.heading.runs import HeadingLoop
+from tank2sim.dynamics.model import Model, Vector
+from tank2sim.errors import InputError
+from tank2sim.fmu.documents import Documents
+from tank2sim.fmu.export import ExportedFmu, make_fmu
+from tank2sim.fmu.libraries import Told
+from tank2sim.fmu.platforms import Platform
+from tank2sim.fmu.provenance import Origin
+from tank2sim.fmu.running import RunningFmu, running
+from tank2sim.fmu.unpacking import unpack
+
+_SEEN = ("motion.psi", "motion.r")
+
+
+@dataclass(frozen=True, eq=False)
+class SteeredRun:
+    """Two FMUs together, at their communication points (n,): s, and rad."""
+
+    time_s: Vector
+    heading_rad: Vector
+    order_rad: Vector
+
+
+def make_autopilot_fmu(
+    design: HeadingDesign,
+    *,
+    fmi: int = 2,
+    platforms: Sequence[Platform] | None = None,
+    told: Told = lambda _: None,
+) -> ExportedFmu:
+    """The FMU of a controller, which says how it was found.
+
+    Inputs ``motion.psi``, ``motion.r`` (as the ship's FMU has them among its outputs) and ``heading.command``, output
+    ``rudder.command``. Parameters and errors are those of :func:`tank2sim.fmu.export.make_fmu`.
+    """
+    own = (one.name for one in design.autopilot.parameters if one.name.startswith("autopilot."))
+    documents = Documents(source=design.source, origins={name: Origin(design.source) for name in own})
+    return make_fmu(design.autopilot, fmi=fmi, documents=documents, platforms=platforms, told=told)
+
+
+def co_simulate_heading(
+    ship: Path, autopilot: Path, heading_rad: float, *, step_s: float, duration_s: float
+) -> SteeredRun:
+    """Co-simulate a ship and an autopilot through FMPy: one change of the ordered heading at t = 0.
+
+    At each communication point the autopilot hears heading and yaw rate, and the ship its rudder order, which she holds
+    for the step; then both go on. The order is half a step old on average, so that the error falls in proportion to the
+    step. Both may be of FMI 2.0 or 3.0.
+
+    Parameters
+    ----------
+    ship, autopilot : Path
+        FMUs.
+    step_s, duration_s : float
+        Communication step, and length of the run, a whole number of steps.
+
+    Raises
+    ------
+    InputError
+        A file is no FMU that runs here, offers no Co-Simulation, or lacks a signal of the two.
+    """
+    count = round(duration_s / step_s)
+    time = np.asarray(step_s * np.arange(count + 1), dtype=np.float64)
+    heading, order = np.empty(count + 1), np.empty(count + 1)
+    with ExitStack() as stack:
+        hull, pilot = (_opened(stack, path, names) for path, names in ((ship, _HULL), (autopilot, _PILOT)))
+        hull.initialise({})
+        pilot.initialise({"heading.command": heading_rad})
+        for place, now in enumerate(time):
+            seen = hull.read(_SEEN)
+            pilot.write(dict(zip(_SEEN, seen, strict=True)))
+            heading[place], order[place] = seen[0], pilot.read(["rudder.command"])[0]
+            if place == count:
+                break
+            pilot.instance.doStep(currentCommunicationPoint=now, communicationStepSize=step_s)
+            hull.write({"rudder.command": order[place]})
+            hull.instance.doStep(currentCommunicationPoint=now, communicationStepSize=step_s)
+    return SteeredRun(time, heading, order)
+
+
+_HULL = (*_SEEN, "rudder.command")
+_PILOT = (*_SEEN, "rudder.command", "heading.command")
+
+
+def _opened(stack: ExitStack, path: Path, names: Sequence[str]) -> RunningFmu:
+    folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tank2sim-")))
+    unpacked = unpack(path, folder)
+    known = {variable.name for variable in unpacked.description.modelVariables}
+    missing = [name for name in names if name not in known]
+    if missing or "CoSimulation" not in unpacked.kinds:
+        problem = f"has no {missing[0]}" if missing else "offers no Co-Simulation"
+        raise InputError(path, "", problem, "give the FMU of a ship, and that of an autopilot for it")
+    return stack.enter_context(running(unpacked, "CoSimulation"))
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Largest difference of heading (deg) from the closed loop in one model, by communication step (s)."""
+
+    error_deg: Mapping[float, float]
+
+    @property
+    def order(self) -> float:
+        """Power of the step by which the difference falls, between the longest step and the shortest."""
+        steps = sorted(self.error_deg)
+        ratio = self.error_deg[steps[-1]] / self.error_deg[steps[0]]
+        return float(np.log(ratio) / np.log(steps[-1] / steps[0]))
+
+    def as_json(self) -> dict[str, object]:
+        """The result as JSON has it."""
+        rows = [{"step_s": step, "error_deg": error} for step, error in sorted(self.error_deg.items())]
+        return {"steps": rows, "order": self.order}
+
+
+def agreement(
+    ship: Model, design: HeadingDesign, fmus: tuple[Path, Path], heading_rad: float, *, steps_s: Sequence[float]
+) -> Agreement:
+    """Hold the co-simulation of two FMUs against the closed loop simulated as one model.
+
+    Parameters
+    ----------
+    ship, design : Model, HeadingDesign
+        What the FMUs are of.
+    fmus : (Path, Path)
+        Of the ship and of the autopilot.
+    heading_rad : float
+        Change of course.
+    steps_s : sequence of float
+        Communication steps to try, whole numbers of the models' steps, two at least.
+    """
+    values = {one.name: one.start for one in ship.parameters}
+    longest = max(steps_s)
+    duration = longest * round(20 * values["ship.length"] / values["ship.speed"] / longest)
+    direct = HeadingLoop(ship, design.autopilot).run({"heading.command": heading_rad}, duration)
+    errors = {}
+    for step in steps_s:
+        run = co_simulate_heading(*fmus, heading_rad, step_s=step, duration_s=duration)
+        errors[step] = _difference(run, direct.t, direct["motion.psi"])
+    return Agreement(errors)
+
+
+def _difference(run: SteeredRun, time: Vector, heading: Vector) -> float:
+    return float(np.degrees(np.abs(run.heading_rad - np.interp(run.time_s, time, heading)).max()))
+
+
+def verify_together(ship: Model, design: HeadingDesign, made: ExportedFmu) -> Agreement:
+    """The agreement of an autopilot's FMU with a ship's of the same version of FMI, on a change of course by 20 deg.
+
+    Communication steps are 2, 4, 10 and 20 steps of the ship's integration. Raises as :func:`agreement`.
+    """
+    steps = [count * ship.step_s for count in (20, 10, 4, 2)]
+    with tempfile.TemporaryDirectory(prefix="tank2sim-") as folder:
+        paths = Path(folder) / "ship.fmu", Path(folder) / "autopilot.fmu"
+        paths[0].write_bytes(make_fmu(ship, fmi=made.fmi).content)
+        paths[1].write_bytes(made.content)
+        return agreement(ship, design, paths, math.radians(20.0), steps_s=steps)

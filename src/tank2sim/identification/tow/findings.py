@@ -1,0 +1,169 @@
+"""What a user should know before using what was identified from tows: each finding is one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from scipy import stats
+
+from tank2sim.identification.conditioning import COLLINEAR, Vector, scaled_condition
+from tank2sim.identification.tow.fit import TowFit
+from tank2sim.identification.tow.output_error import simulated_speeds
+from tank2sim.records.tows import Tows
+
+_CORRELATED = 0.99
+_TWO_SIDED_95 = 1.96
+_SIGNIFICANCE = 0.05
+
+
+def findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping[str, TowFit]) -> Iterator[str]:
+    """Sentences on terms that are not identifiable, values that cannot be, and misfits beyond the scatter.
+
+    Parameters
+    ----------
+    tows : Tows
+        The readings.
+    force : Polynomial
+        Towing force, N over s.
+    speed : Polynomial
+        v*(t) of the equation error, m/s over s.
+    fits : mapping
+        Method to its fit. The method of the paper is left out where QR, with the same estimates, is there.
+    """
+    told = [fit for name, fit in fits.items() if name != "paper" or "qr" not in fits]
+    yield from _identifiability(told)
+    for fit in told:
+        yield from _plausibility(fit, tows.top_speed_mps)
+    if any(fit.method != "output_error" for fit in told):
+        yield from _polynomial_findings(tows, speed, told[0])
+    if "output_error" in fits:
+        fit = fits["output_error"]
+        speeds = simulated_speeds(fit.coefficients, force, tows.time_s, fit.start_delay_s)
+        row = _worst_misfit(tows, speeds, len(fit.free))
+        if row is not None:
+            fast = speeds[row] - tows.mean_speed_mps[row]
+            yield (
+                f"output_error: (1.5) does not follow the tows within their scatter: at {tows.time_s[row]:g} s it is "
+                f"{abs(fast):.3g} m/s too {'fast' if fast > 0 else 'slow'}; "
+                f"{'' if fit.start_delay_s else 'a late start or '}a force that (1.5) lacks is likely."
+            )
+    yield from _disagreement(told)
+
+
+def identifiable_terms(fits: Sequence[TowFit]) -> tuple[str, ...]:
+    """The most drag terms that every one of the fits (of one model) can tell apart from M and each other.
+
+    Where there is a choice, the lower powers of the speed are taken.
+    """
+    terms = fits[0].terms
+    for count in range(len(terms), 0, -1):
+        for chosen in combinations(reversed(terms), count):
+            columns = [
+                [place for place, name in enumerate(fit.free) if name in chosen or name not in terms] for fit in fits
+            ]
+            if all(scaled_condition(fit.design[:, own]) <= COLLINEAR for fit, own in zip(fits, columns, strict=True)):
+                return chosen
+    return ()
+
+
+def _identifiability(fits: Sequence[TowFit]) -> Iterator[str]:
+    collinear = [fit for fit in fits if fit.condition_scaled > COLLINEAR**2]
+    if collinear:
+        numbers = " and ".join(f"{fit.condition_scaled:.2g} ({fit.method})" for fit in collinear)
+        yield (
+            f"{', '.join(collinear[-1].free)} cannot all be identified from these tows: the scaled condition number is "
+            f"{numbers}, and {COLLINEAR**2:g} can be borne; take fewer terms "
+            f"(--terms {','.join(identifiable_terms(fits)) or 'none'})."
+        )
+    for fit in fits:
+        if fit.covariance is None or fit.correlation is None:
+            continue
+        pairs = [
+            f"{fit.unknowns[i]} and {fit.unknowns[j]} ({fit.correlation[i, j]:+.4f})"
+            for i, j in combinations(range(len(fit.unknowns)), 2)
+            if abs(fit.correlation[i, j]) > _CORRELATED
+        ]
+        if pairs:
+            yield f"{fit.method}: almost fully correlated are {', '.join(pairs)}; only their combination is known."
+        errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+        uncertain = [
+            f"{name} ({value:.3g}, standard error {error:.2g})"
+            for name, value, error in zip(fit.unknowns, fit.values, errors, strict=True)
+            if _TWO_SIDED_95 * error > abs(value)
+        ]
+        if uncertain:
+            yield f"{fit.method}: not to be told from zero at 95 %: {', '.join(uncertain)}."
+
+
+def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[str]:
+    if fit.values[0] <= 0:
+        yield f"{fit.method}: the mass M is negative ({fit.values[0]:.4g} kg), which no body has; do not use this fit."
+    elif fit.added_mass_kg < 0:
+        yield (
+            f"{fit.method}: the added mass is negative ({fit.added_mass_kg:.4g} kg); check the force and the mass of "
+            "the body with the water in it."
+        )
+    if not np.isfinite(fit.largest_speed_error_mps):
+        yield f"{fit.method}: the speed of (1.5) with these values grows without bound; do not use this fit."
+    speeds = np.linspace(0.0, top_speed_mps, 401)[1:]
+    drags = fit.drag_N(speeds)
+    if drags.min() < 0:
+        yield (
+            f"{fit.method}: the drag is negative over {100 * np.mean(drags < 0):.0f} % of the speeds up to "
+            f"{top_speed_mps:.3g} m/s that were reached, down to {drags.min():.2g} N at {speeds[drags.argmin()]:.2g} "
+            "m/s; no hull has that."
+        )
+    minus = ", ".join(term for term, value in fit.drag_terms.items() if value < 0)
+    if minus and drags.min() >= 0:
+        yield f"{fit.method}: the drag terms have opposite signs ({minus} negative) and largely cancel each other."
+
+
+def _polynomial_findings(tows: Tows, speed: Polynomial, fit: TowFit) -> Iterator[str]:
+    if len(fit.free) > len(speed.coef):
+        yield (
+            f"{fit.method}: {len(fit.free)} unknowns are drawn from the {len(speed.coef)} coefficients of a speed "
+            f"polynomial of degree {speed.degree()}; the standard errors are then those of the arithmetic, not of "
+            "the drag."
+        )
+    speeds = speed(tows.time_s)
+    row = _worst_misfit(tows, speeds, len(speed.coef))
+    if row is not None:
+        yield (
+            f"{fit.method}: a speed polynomial of degree {speed.degree()} does not follow the tows within their "
+            f"scatter: at {tows.time_s[row]:g} s it is off by {abs(speeds[row] - tows.mean_speed_mps[row]):.3g} m/s; "
+            "prefer output_error, which needs no polynomial."
+        )
+
+
+def _worst_misfit(tows: Tows, speeds: Vector, estimates: int) -> int | None:
+    """Row at which speeds (times,) leave the mean of the tows most, if they leave it more than scatter explains.
+
+    The test is the F test of lack of fit, the scatter of the tows about their mean being the pure error. None also
+    where there is too little repetition to say.
+    """
+    moving = tows.time_s > 0
+    counts, mean = tows.counts[moving], tows.mean_speed_mps[moving]
+    pure = float(np.nansum((tows.speed_mps[moving] - mean[:, None]) ** 2))
+    lack = counts * (mean - speeds[moving]) ** 2
+    lack_freedom, pure_freedom = len(mean) - estimates, int(np.sum(counts - 1))
+    if lack_freedom < 1 or pure_freedom < 1 or pure == 0:
+        return None
+    ratio = float(np.sum(lack)) / lack_freedom / (pure / pure_freedom)
+    if stats.f.sf(ratio, lack_freedom, pure_freedom) > _SIGNIFICANCE:
+        return None
+    return int(np.flatnonzero(moving)[np.argmax(lack)])
+
+
+def _disagreement(fits: Sequence[TowFit]) -> Iterator[str]:
+    for one, other in combinations(fits, 2):
+        if one.covariance is None or other.covariance is None:
+            continue
+        apart = abs(one.values[0] - other.values[0])
+        if apart > _TWO_SIDED_95 * np.sqrt(one.covariance[0, 0] + other.covariance[0, 0]):
+            yield (
+                f"{one.method} and {other.method} differ in M by {apart:.3g} kg, more than their standard errors "
+                f"explain; the mass is known no better than that."
+            )

@@ -1,0 +1,228 @@
+"""All that tows tell of a body: the estimates asked for, and what other models make of the same readings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from tank2sim.dynamics.surge_theory import (
+    VISCOSITY_M2PS,
+    WATER_KGPM3,
+    DragPolynomial,
+    MassByTheory,
+    TowedBody,
+    drag_polynomial,
+    masses_by_theory,
+)
+from tank2sim.errors import InputError
+from tank2sim.identification.conditioning import COLLINEAR, Vector
+from tank2sim.identification.tow.equation_error import fit_mean_speed
+from tank2sim.identification.tow.identify import TowResult
+from tank2sim.identification.tow.models import (
+    SIMPLE,
+    SIMPLE_LATE,
+    FittedModel,
+    TowByTow,
+    compare_models,
+    mass_range,
+    tow_by_tow,
+)
+from tank2sim.records.tows import Tows
+
+_LEVEL = 0.95
+_DEGREES = range(4)
+
+
+class SpeedPolynomial(NamedTuple):
+    """A row of Table 2: the least-squares polynomial through the mean speeds.
+
+    `coefficients` are in rising powers of t, m/s over s; `rms_mps` is the root mean square of its errors at the means,
+    by the number n of times, which is the measure of Table 2, and `rms_less_one_mps` by n - 1.
+    """
+
+    degree: int
+    coefficients: tuple[float, ...]
+    rms_mps: float
+    rms_less_one_mps: float
+
+
+class Ellipse(NamedTuple):
+    """Joint 95 % region of M and B3, linearised: centre and outline, kg and kg/m."""
+
+    label: str
+    centre: tuple[float, float]
+    mass_kg: Vector
+    B3_kgpm: Vector
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TowStudy:
+    """What tows tell, and what they cannot.
+
+    Parameters
+    ----------
+    result : TowResult
+        The estimates asked for.
+    polynomials : tuple of SpeedPolynomial
+        Degrees 0 to 3 through the mean speeds, as far as the readings test them.
+    models : tuple of FittedModel
+        Models of different size, by output error.
+    by_tow : tuple of TowByTow
+        Each tow by itself, and one left out in turn; empty for less than three tows.
+    body : TowedBody or None
+        Size of the body, where it is known.
+    drags : dict
+        Method to C(v) referred to L^2; empty where the size is not known.
+    theory : tuple of MassByTheory
+        (2.5); empty where the size is not known.
+    """
+
+    result: TowResult
+    polynomials: tuple[SpeedPolynomial, ...]
+    models: tuple[FittedModel, ...]
+    by_tow: tuple[TowByTow, ...]
+    body: TowedBody | None
+    drags: dict[str, DragPolynomial]
+    theory: tuple[MassByTheory, ...]
+
+    @property
+    def mass_range_kg(self) -> tuple[float, float] | None:
+        """What these tows fix of M; None if no model of those compared is of use."""
+        return mass_range(self.models)
+
+    @property
+    def best(self) -> FittedModel | None:
+        """The model of the lowest AIC among those that these tows determine and a hull can have."""
+        usable = [one for one in self.models if one.plausible and one.determined]
+        return min(usable, key=lambda one: one.fit.aic, default=None)
+
+    @property
+    def ellipses(self) -> tuple[Ellipse, ...]:
+        """Of M and B3, without and with a start delay."""
+        found = [confidence_ellipse(one) for one in self.models if one.model in (SIMPLE, SIMPLE_LATE)]
+        return tuple(found)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user should know before using the estimates: the warnings, and what the models tell together."""
+        return (*self.result.warnings, *_notes(self))
+
+    def as_json(self) -> dict[str, Any]:
+        """The study as plain data: that of the result, and more."""
+        more: dict[str, Any] = {
+            "speed_polynomials": [one._asdict() for one in self.polynomials],
+            "models": [one.as_json() for one in self.models],
+            "mass_range_kg": self.mass_range_kg,
+            "tow_by_tow": {one.label: one.as_json() for one in self.by_tow},
+            "confidence_ellipses": [one._asdict() for one in self.ellipses],
+            "mass_by_theory": [one.as_json() for one in self.theory],
+        }
+        if self.body is not None:
+            factor = self.body.area_ratio
+            more["body"] = dict(vars(self.body))
+            more["drag_coefficients"] = {
+                name: {"by_length_squared": one.as_json(), "by_volume_two_thirds": one.times(factor).as_json()}
+                for name, one in self.drags.items()
+            }
+        return {**self.result.as_json(), **more, "warnings": list(self.notes)}
+
+
+def study_tows(result: TowResult, body: TowedBody | None = None) -> TowStudy:
+    """The study that goes with a result; with the size of the body also its drag coefficients and the theory."""
+    tows, force = result.tows, result.force
+    fits = result.fits.items()
+    return TowStudy(
+        result=result,
+        polynomials=tuple(speed_polynomials(tows)),
+        models=compare_models(tows, force),
+        by_tow=tow_by_tow(tows, force, result.terms, len(result.speed_polynomial) - 1),
+        body=body,
+        drags={name: drag_polynomial(fit.coefficients, body) for name, fit in fits} if body else {},
+        theory=masses_by_theory(body) if body else (),
+    )
+
+
+def towed_body(tows: Tows, mass_kg: float, given: Mapping[str, float | None]) -> TowedBody | None:
+    """The body from what is given and, failing that, from the file of the tows; None if its length is not known.
+
+    The volume is by default that of the water that the body with the water inside weighs: it floats in equilibrium.
+
+    Parameters
+    ----------
+    mass_kg : float
+        m, with the water inside.
+    given : mapping
+        Keys of :data:`tank2sim.records.tows.BODY_KEYS` to values, None for what is not given.
+
+    Raises
+    ------
+    InputError
+        A value that is given is not positive.
+    """
+    for key, value in given.items():
+        if value is not None and not (np.isfinite(value) and value > 0):
+            raise InputError("--" + key.replace("_", "-"), "", f"is {value:g}", "a positive number was expected")
+    known = {**tows.body, **{key: value for key, value in given.items() if value is not None}}
+    if "length_m" not in known:
+        return None
+    density = known.get("water_density_kgpm3", WATER_KGPM3)
+    return TowedBody(
+        length_m=known["length_m"],
+        beam_m=known.get("beam_m"),
+        volume_m3=known.get("volume_m3", mass_kg / density),
+        density_kgpm3=density,
+        viscosity_m2ps=known.get("kinematic_viscosity_m2ps", VISCOSITY_M2PS),
+    )
+
+
+def speed_polynomials(tows: Tows, degrees: Sequence[int] = _DEGREES) -> Iterator[SpeedPolynomial]:
+    """Rows of Table 2, as far as there are more readings than coefficients."""
+    for degree in degrees:
+        try:
+            fitted = fit_mean_speed(tows, degree).polynomial
+        except InputError:
+            return
+        square = float(np.sum((fitted(tows.time_s) - tows.mean_speed_mps) ** 2))
+        count = len(tows.time_s)
+        coefficients = tuple(float(value) for value in fitted.coef)
+        yield SpeedPolynomial(degree, coefficients, (square / count) ** 0.5, (square / (count - 1)) ** 0.5)
+
+
+def confidence_ellipse(fitted: FittedModel, points: int = 121) -> Ellipse:
+    """Joint 95 % region of M and B3 of a model that has them first, from the linearised covariance and Fisher's F."""
+    fit = fitted.fit
+    radius = np.sqrt(2 * stats.f.ppf(_LEVEL, 2, fit.freedom))
+    angle = np.linspace(0, 2 * np.pi, points)
+    circle = radius * np.vstack([np.cos(angle), np.sin(angle)])
+    # By the eigenvectors, which also bear a region without width.
+    squares, axes = np.linalg.eigh(fit.covariance[:2, :2])
+    outline = axes * np.sqrt(np.maximum(squares, 0.0)) @ circle + fit.estimates[:2, None]
+    return Ellipse(fitted.model.label, (float(fit.estimates[0]), float(fit.estimates[1])), outline[0], outline[1])
+
+
+def _notes(study: TowStudy) -> Iterator[str]:
+    result = study.result
+    span = study.mass_range_kg
+    if span is not None:
+        low, high = span
+        yield (
+            f"These tows fix M no better than {low:.0f} to {high:.0f} kg (added mass {low - result.mass_kg:.0f} to "
+            f"{high - result.mass_kg:.0f} kg): 95 % intervals of models that they determine and a hull can have."
+        )
+    best = min(study.models, key=lambda one: one.fit.aic, default=None)
+    if best is not None and not (best.plausible and best.determined):
+        yield (
+            f"The lowest AIC has the model {best.model.label}, with "
+            + ("a drag that is negative at some speeds" if not best.plausible else "unknowns that cannot be told apart")
+            + "; a better fit is no better model."
+        )
+    late = {one.model: one.fit.aic for one in study.models}
+    if not result.options.start_delay and late.get(SIMPLE_LATE, 0.0) < late.get(SIMPLE, 0.0) - 4:
+        yield "A start delay explains these tows much better than none (--start-delay)."
+    if any(fit.condition_scaled > COLLINEAR**2 for fit in result.fits.values()):
+        known = f"{study.theory[0].near_surface_kg:.0f} by (2.5)" if study.theory else "by theory"
+        yield f"Take the drag as B3 v^2 alone (--terms B3), or hold M at a known value (--total-mass-kg, {known})."

@@ -1,0 +1,1 @@
+"""Added yaw inertia and dissipation from records of a yaw rig (Alyshev 2019)."""

@@ -1,0 +1,155 @@
+"""The added yaw inertia found, as N_rdot of a ship's card or as a card of the rig itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields
+
+import tomlkit
+
+from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.cards.reading import changed_text
+from tank2sim.cards.scaling import Scales, file_factor
+from tank2sim.cards.terms import known_term
+from tank2sim.cards.writing import YawRigResult, yaw_rig_card_text
+from tank2sim.dynamics.yaw_rig import YawRig
+from tank2sim.errors import InputError
+from tank2sim.files import BYTE_ORDER_MARK
+from tank2sim.identification.yaw.identify import METHODS, YawResult
+
+TANK_WATER_KGPM3 = 1000.0
+"""Density of the tank's water where no record tells it; fresh water, as the paper calculates with."""
+
+
+def nrdot_prime(result: YawResult, method: str, length_m: float, density_kgpm3: float) -> tuple[float, float | None]:
+    """N_rdot' = -lambda661 / (1/2 rho L^5) of the body in the tank, and its standard error.
+
+    At equal Froude number the ship's is the same: an added inertia has no viscosity in it. Raises as
+    :func:`known_added_inertia`.
+    """
+    value, error = known_added_inertia(result, method)
+    scale = float(Scales(density_kgpm3, length_m, 1.0).inertia)
+    return -value / scale, None if error is None else error / scale
+
+
+def known_added_inertia(result: YawResult, method: str) -> tuple[float, float | None]:
+    """lambda661 and its standard error, kg m2.
+
+    Raises
+    ------
+    InputError
+        It is not known: the records are of air, or J_zz is not known; or it is negative, which no body's is.
+    """
+    source = result.records[0].path
+    found = result.added_inertia(method)
+    if found is None:
+        remedy = "give records in water, and in air or --inertia-kgm2"
+        raise InputError(source, "", "does not tell the added inertia apart from the body's own", remedy)
+    if found[0] <= 0:
+        raise InputError(source, "", "gives a negative added inertia, which no body has", "check J_zz and k_t")
+    return found
+
+
+def body_length(result: YawResult, given_m: float | None) -> float:
+    """The body's length by which N_rdot is made non-dimensional.
+
+    Raises
+    ------
+    InputError
+        Neither the option nor a record tells it.
+    """
+    for value in (given_m, *(record.constants.get("length_m") for record in result.records)):
+        if value is not None:
+            return value
+    remedy = "give --length-m, the model's length between perpendiculars, or a line '# length_m: 0.67'"
+    raise InputError(result.records[0].path, "", "does not tell the length of the model", remedy)
+
+
+def tank_density(result: YawResult) -> float:
+    """Density of the tank's water, kg/m3."""
+    told = [record.constants.get("water_density_kgpm3") for record in result.records]
+    return next((value for value in told if value is not None), TANK_WATER_KGPM3)
+
+
+def with_nrdot(card: ManoeuvringCard, result: YawResult, method: str, length_m: float) -> ManoeuvringCard:
+    """The ship's card with N_rdot of the model on the rig; the old values stand in comments.
+
+    Raises
+    ------
+    InputError
+        As :func:`known_added_inertia`.
+    """
+    value, error = nrdot_prime(result, method, length_m, tank_density(result))
+    scales = card.scales if card.model.scaling == "dimensional" else None
+    factor = file_factor(known_term("Nrdot"), scales, rudder_to_port=False)
+    key = card.places.get("Nrdot", "Nrdot")
+    text = _replaced(card.text, card.source, f"derivatives.{key}", value * factor, f"yaw rig, {method}")
+    if error is not None:
+        spelt = next((own for own in _section(text, "uncertainty") if own.lower() == "nrdot"), key)
+        text = _replaced(text, card.source, f"uncertainty.{spelt}", error * abs(factor), f"yaw rig, {method}")
+    new = parse_card(text, card.source)
+    assert isinstance(new, ManoeuvringCard)
+    return new
+
+
+def _section(text: str, section: str) -> tomlkit.items.Table | dict[str, object]:
+    found = tomlkit.parse(text.removeprefix(BYTE_ORDER_MARK)).get(section, {})
+    return found if isinstance(found, tomlkit.items.Table) else {}
+
+
+def _replaced(text: str, source: str, key: str, value: float, origin: str) -> str:
+    section, _, own = key.partition(".")
+    old = _section(text, section)
+    was = f"was {old[own].as_string()}" if own in old else "not stated before"  # type: ignore[union-attr]
+    return changed_text(text, source, {key: float(f"{value:.6g}")}, comment=f"{origin}; {was}")
+
+
+def rig_card_text(result: YawResult, method: str, *, name: str, source: str, known: YawRig | None) -> str:
+    """TOML text of a rig card with the numbers of one method; the notes are those of the result.
+
+    Raises
+    ------
+    InputError
+        The method tells no friction, or as :func:`known_added_inertia`.
+    """
+    estimate = result.estimates[method]
+    if not estimate.friction:
+        remedy = "take --method energy_least_squares, as_many_equations or output_error"
+        raise InputError("--method", "", f"{method} tells no friction, and a rig card needs it", remedy)
+    added = known_added_inertia(result, method) if result.medium == "water" else None
+    base = known or YawRig(inertia_kgm2=1.0)
+    kept = ("current_lag_s", "max_current_A", "inertia_accelerating_kgm2", "inertia_braking_kgm2", "gravity_Nm",
+            "gravity_angle_rad", "pulses_per_turn")  # fmt: skip
+    values = {field.name: getattr(base, field.name) for field in fields(base) if field.name in kept}
+    errors: dict[str, float] = {}
+    inertia = [("inertia_kgm2", estimate.total_inertia_kgm2, estimate.inertia_error_kgm2)]
+    if added and result.body:
+        inertia = [("inertia_kgm2", result.body.value_kgm2, result.body.error_kgm2)]
+        inertia.append(("added_inertia_kgm2", *added))
+    units = {"coulomb": "coulomb_Nm", "viscous": "viscous_Nms", "quadratic": "quadratic_Nms2"}
+    friction = [(key, *estimate.friction[term]) for term, key in units.items() if term in estimate.friction]
+    for key, value, error in [*inertia, *friction]:
+        values[key] = float(f"{value:.6g}")
+        if error:
+            errors[key] = float(f"{error:.3g}")
+    values["torque_constant_NmpA"] = result.torque_constant_NmpA
+    programme = result.records[0].programme
+    told = {"kind": programme.kind, "max_rate_degps": float(f"{math.degrees(programme.max_rate_radps):.9g}")}
+    return yaw_rig_card_text(
+        YawRigResult(
+            name=name,
+            source=source,
+            notes=" ".join(result.notes),
+            values=values,
+            standard_errors=errors,
+            programme={**told, "rise_s": programme.rise_s, "settle_s": programme.settle_s, "humps": programme.humps},
+            water_density_kgpm3=tank_density(result) if result.medium == "water" else None,
+            length_m=next(
+                (record.constants["length_m"] for record in result.records if "length_m" in record.constants), None
+            ),
+        )
+    )
+
+
+BEST = METHODS[0]
+"""The method whose numbers a card gets unless another is asked for."""

@@ -1,0 +1,218 @@
+"""The energy method on records of the yaw rig: two intervals, (1) and (2), and several subintervals.
+
+Over any stretch of time the work of the motor is that against each term of (3):
+
+    k_t int w I dt = (J + lambda661) D(w^2)/2 + f_c int |w| dt + f_1 int w^2 dt + f_662 int |w|^3 dt
+
+The least squares over subintervals need no mirror images. The two-interval formulas take the dissipation of both
+intervals for the same; a loop that follows the programme with a lag does not make it so, and they are biased by it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.dynamics.yaw_energy import dissipation_from_work, inertia_from_work
+from tank2sim.dynamics.yaw_rig import YawRig
+from tank2sim.errors import InputError
+from tank2sim.identification.conditioning import column_norms, scaled_condition
+from tank2sim.identification.yaw.estimate import YawEstimate
+from tank2sim.identification.yaw.intervals import Interval, motor_work, work_rows
+from tank2sim.records.yaw import YawRecord
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+Pair = tuple[Interval, Interval]
+
+PARTS = 6
+"""Subintervals of an interval: with six, each of some 0.3 s in the paper's programme, the four terms of (3) are well
+apart; more are shorter than the spline of the rate can resolve."""
+
+_HOPELESS = 1e7
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Balance:
+    """The energy balance of every subinterval.
+
+    Parameters
+    ----------
+    terms : tuple of str
+    rows : array, (n, terms)
+        Work per unit of each term.
+    work_J : array, (n,)
+        Of the motor, less what is known.
+    pairs : tuple
+        The intervals; row ``((pair * 2 + braking) * parts + part)``.
+    parts : int
+    """
+
+    terms: tuple[str, ...]
+    rows: Matrix
+    work_J: Vector
+    pairs: tuple[Pair, ...]
+    parts: int
+
+    def whole(self, values: Vector) -> Matrix:
+        """Sums over the parts of each interval of one number a subinterval, (pairs, 2)."""
+        sums: Matrix = values.reshape(len(self.pairs), 2, self.parts).sum(axis=2)
+        return sums
+
+
+class EnergyFit(NamedTuple):
+    """Coefficients of the terms with their covariance, what is left (J, (n,)), and the balance they are of."""
+
+    coefficients: Vector
+    covariance: Matrix
+    residuals_J: Vector
+    balance: Balance
+
+
+def energy_balance(
+    pairs: Sequence[Pair], terms: tuple[str, ...], torque_constant_NmpA: float, rig: YawRig | None, parts: int = PARTS
+) -> Balance:
+    """The balance of every subinterval of mirror pairs; `rig` tells what is known beyond (3)."""
+    rows, work = [], []
+    for pair in pairs:
+        for own in pair:
+            rows += work_rows(own, terms, parts)
+            work += [motor_work(own.part(place, parts), torque_constant_NmpA, rig) for place in range(parts)]
+    return Balance(terms=terms, rows=np.array(rows), work_J=np.array(work), pairs=tuple(pairs), parts=parts)
+
+
+def fit_energy(balance: Balance, record: YawRecord) -> EnergyFit:
+    """Least squares over all subintervals.
+
+    Raises
+    ------
+    InputError
+        The subintervals do not tell the terms apart.
+    """
+    rows, work = balance.rows, balance.work_J
+    freedom = len(rows) - len(balance.terms)
+    if freedom < 1 or not scaled_condition(rows) < _HOPELESS:
+        unknowns = ", ".join(balance.terms)
+        raise InputError(record.path, "", f"does not tell {unknowns} apart", "give more records, or take fewer --terms")
+    norms = column_norms(rows)
+    inverse = np.linalg.pinv(rows / norms) / norms[:, None]
+    coefficients = inverse @ work
+    residuals = work - rows @ coefficients
+    # Errors of neighbouring parts hang together: the speed at which one ends is that at which the next begins. The
+    # covariance is therefore taken from what each whole interval leaves, where that is the larger.
+    variance = float(residuals @ residuals) / freedom
+    spread = np.diag(np.full(len(rows), variance))
+    covariance = inverse @ spread @ inverse.T
+    clustered = _clustered(inverse, residuals, balance)
+    scale = np.maximum(1.0, np.sqrt(np.diag(clustered) / np.diag(covariance)))
+    return EnergyFit(coefficients, covariance * np.outer(scale, scale), residuals, balance)
+
+
+def _clustered(inverse: Matrix, residuals: Vector, balance: Balance) -> Matrix:
+    """Covariance from the scatter of whole intervals, each taken as one draw (Liang & Zeger 1986)."""
+    count = 2 * len(balance.pairs)
+    each = (inverse * residuals).reshape(len(balance.terms), count, balance.parts).sum(axis=2)
+    more = count / max(1, count - 1)
+    covariance: Matrix = more * each @ each.T
+    return covariance
+
+
+def least_squares_estimate(method: str, fit: EnergyFit, ideal: Interval) -> YawEstimate:
+    """The estimate of a fit; the dissipation is that of the `ideal` interval of the programme."""
+    return estimate_from(
+        method,
+        fit.balance.terms,
+        fit.coefficients,
+        fit.covariance,
+        ideal,
+        math.sqrt(float(np.mean(fit.residuals_J**2))),
+    )
+
+
+def estimate_from(
+    method: str,
+    terms: tuple[str, ...],
+    values: Vector,
+    covariance: Matrix,
+    ideal: Interval,
+    misfit: float | None = None,
+) -> YawEstimate:
+    """An estimate from coefficients of terms, the first of them the inertia, and their covariance."""
+    errors = np.sqrt(np.diag(covariance))
+    conserved = np.array([term == "inertia" or term.startswith("gravity") for term in terms])
+    against = np.where(conserved, 0.0, work_rows(ideal, terms, 1)[0])
+    return YawEstimate(
+        method=method,
+        total_inertia_kgm2=float(values[0]),
+        inertia_error_kgm2=float(errors[0]),
+        dissipation_J=float(against @ values),
+        dissipation_error_J=float(math.sqrt(against @ covariance @ against)),
+        friction={term: (float(values[n]), float(errors[n])) for n, term in enumerate(terms) if n},
+        misfit=misfit,
+    )
+
+
+def as_many_equations(method: str, fit: EnergyFit, ideal: Interval) -> YawEstimate:
+    """As the paper describes it: as many equations as unknowns.
+
+    One is the difference (1) of the whole intervals, the others are sums (2) of mirrored parts, one for each term of
+    friction; each is the mean over the pairs. The standard errors are those of the least squares' scatter carried
+    through these equations.
+    """
+    balance = fit.balance
+    unknowns, pairs, parts = len(balance.terms), len(balance.pairs), balance.parts
+    sign = np.array([1.0, -1.0])
+    combine = np.zeros((unknowns, pairs, 2, parts))
+    combine[0] = sign[:, None] / pairs
+    for equation, chosen in enumerate(np.array_split(np.arange(parts), unknowns - 1), start=1):
+        for part in chosen:
+            combine[equation, :, :, part] = 1.0 / pairs
+    flat = combine.reshape(unknowns, -1)
+    solved = np.linalg.solve(flat @ balance.rows, flat)
+    variance = float(fit.residuals_J @ fit.residuals_J) / (len(balance.rows) - unknowns)
+    return estimate_from(method, balance.terms, solved @ balance.work_J, variance * solved @ solved.T, ideal)
+
+
+def two_intervals(method: str, balance: Balance, fit: EnergyFit) -> YawEstimate:
+    """(1) and (2), the mean over the pairs, with its bias against the least squares `fit` of actual speeds.
+
+    The standard error is the scatter of the pairs: a bias that is the same in each is not in it.
+    """
+    work = balance.whole(balance.work_J)
+    inertia, lost = [], []
+    for pair, (one, other) in zip(balance.pairs, work, strict=True):
+        w1, w2 = float(pair[0].rate_radps[0]), float(pair[0].rate_radps[-1])
+        inertia.append(inertia_from_work(float(one), float(other), w1, w2))
+        lost.append(dissipation_from_work(float(one), float(other)))
+    total = float(np.mean(inertia))
+    return YawEstimate(
+        method=method,
+        total_inertia_kgm2=total,
+        inertia_error_kgm2=_mean_error(inertia),
+        dissipation_J=float(np.mean(lost)),
+        dissipation_error_J=_mean_error(lost),
+        bias_kgm2=total - float(fit.coefficients[0]),
+        bias_from=_bias_parts(fit),
+    )
+
+
+def _mean_error(values: list[float]) -> float | None:
+    return float(np.std(values, ddof=1) / math.sqrt(len(values))) if len(values) > 1 else None
+
+
+def _bias_parts(fit: EnergyFit) -> dict[str, float]:
+    """Why (1) with actual speeds is off: with D the work against friction and S the change of w^2 in an interval,
+    (D12 - D56)/S12 and (J + lambda)(-S56 - S12)/(2 S12), each the mean over the pairs."""
+    balance = fit.balance
+    square = balance.whole(2 * balance.rows[:, 0])
+    lost = balance.whole(balance.rows[:, 1:] @ fit.coefficients[1:])
+    speeding, braking = square[:, 0], -square[:, 1]
+    return {
+        "dissipation": float(np.mean((lost[:, 0] - lost[:, 1]) / speeding)),
+        "speeds": float(np.mean(fit.coefficients[0] * (braking - speeding) / (2 * speeding))),
+    }

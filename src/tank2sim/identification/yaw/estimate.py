@@ -1,0 +1,57 @@
+"""What one method makes of records of the yaw rig: inertia, dissipation, friction, and how sure they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from tank2sim.identification.yaw.intervals import TERMS
+
+
+@dataclass(frozen=True, kw_only=True)
+class YawEstimate:
+    """Estimates by one method, SI.
+
+    Parameters
+    ----------
+    method : str
+    total_inertia_kgm2, inertia_error_kgm2 : float
+        J_zz + lambda661 (in air J_zz) and its standard error; None where the data do not tell.
+    dissipation_J, dissipation_error_J : float
+        B + D over one interval.
+    friction : mapping
+        Other terms of :data:`tank2sim.identification.yaw.intervals.TERMS` to (value, standard error), in SI.
+    misfit : float or None
+        Root mean square of what is left: J for methods of energy, rad for those of the angle.
+    bias_kgm2 : float or None
+        How far a two-interval formula lies from the energy least squares of the same records.
+    bias_from : mapping
+        Parts of that: ``dissipation`` (not the same in both intervals) and ``speeds`` (w1, w2 not those of w6, w5).
+    """
+
+    method: str
+    total_inertia_kgm2: float
+    inertia_error_kgm2: float | None
+    dissipation_J: float
+    dissipation_error_J: float | None
+    friction: Mapping[str, tuple[float, float | None]] = field(default_factory=dict)
+    misfit: float | None = None
+    bias_kgm2: float | None = None
+    bias_from: Mapping[str, float] = field(default_factory=dict)
+
+    def as_json(self) -> dict[str, Any]:
+        """As plain data; the unit of a number stands in its key."""
+        told: dict[str, Any] = {
+            "total_inertia_kgm2": self.total_inertia_kgm2,
+            "total_inertia_standard_error_kgm2": self.inertia_error_kgm2,
+            "dissipation_J": self.dissipation_J,
+            "dissipation_standard_error_J": self.dissipation_error_J,
+        }
+        for term, (value, error) in self.friction.items():
+            unit = TERMS[term][1]
+            told[f"{term}_{unit}"], told[f"{term}_standard_error_{unit}"] = value, error
+        if self.bias_kgm2 is not None:
+            told["bias_against_least_squares_kgm2"] = self.bias_kgm2
+            told["bias_from_kgm2"] = dict(self.bias_from)
+        return told

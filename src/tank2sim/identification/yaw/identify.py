@@ -1,0 +1,387 @@
+"""Added yaw inertia and dissipation of a body from records of the yaw rig (paper 3, Alyshev 2019), method by method."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from tank2sim.dynamics.yaw_rig import YawRig
+from tank2sim.errors import InputError
+from tank2sim.identification.yaw.energy import (
+    EnergyFit,
+    as_many_equations,
+    energy_balance,
+    fit_energy,
+    least_squares_estimate,
+    two_intervals,
+)
+from tank2sim.identification.yaw.estimate import YawEstimate
+from tank2sim.identification.yaw.intervals import TERMS, Interval, intervals, mirror_difference
+from tank2sim.identification.yaw.output_error import AngleFit, fit_angle
+from tank2sim.records.yaw import Medium, YawRecord
+
+METHODS = (
+    "energy_least_squares",
+    "as_many_equations",
+    "two_intervals",
+    "output_error",
+    "energy_least_squares_reference",
+    "two_intervals_reference",
+)
+"""The first is the one whose numbers go into a card; ``_reference`` takes the programme's speeds for the body's."""
+
+AIR_TERMS = ("inertia", "coulomb", "viscous")
+WATER_TERMS = ("inertia", "coulomb", "viscous", "quadratic")
+TORQUE_CONSTANT_NMPA = 0.051
+"""k_t of the paper's motor."""
+_NOT_QUITE_MIRRORED = 0.03
+_FULL = 0.995
+"""Share of the largest current from which the motor is taken for saturated."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class YawOptions:
+    """What is known besides the records, and how to go about them.
+
+    Parameters
+    ----------
+    inertia_kgm2, inertia_error_kgm2 : float, optional
+        J_zz, and its standard error; by default from records in air, or as the file says.
+    torque_constant_NmpA, torque_constant_error : float, optional
+        k_t, and its relative standard error.
+    known : YawRig, optional
+        Walls, gravity, and differences between accelerating and braking that are known.
+    terms : tuple of str, optional
+        Terms to estimate, by default those of (3) for the medium.
+    mirror_limit : float
+        Largest difference of the rates of two mirror images, over the largest rate, that is accepted.
+    """
+
+    inertia_kgm2: float | None = None
+    inertia_error_kgm2: float | None = None
+    torque_constant_NmpA: float | None = None
+    torque_constant_error: float = 0.0
+    known: YawRig | None = None
+    terms: tuple[str, ...] | None = None
+    mirror_limit: float = 0.25
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyInertia:
+    """J_zz in kg m2, its standard error (None if unknown), and where it is from."""
+
+    value_kgm2: float
+    error_kgm2: float | None
+    source: str
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class YawResult:
+    """What records of the rig tell of a body.
+
+    Parameters
+    ----------
+    records : tuple of YawRecord
+        Those of the medium.
+    medium : str
+        ``water``, or ``air`` if no record is of water.
+    torque_constant_NmpA, torque_constant_error : float
+        k_t and its relative standard error.
+    body : BodyInertia or None
+        J_zz; None in air, where it is what is estimated, and where nothing tells it.
+    estimates : dict
+        Method to estimate.
+    fit : EnergyFit
+        The energy least squares with actual speeds.
+    ideal : Interval
+        The programme's accelerating interval.
+    angle : AngleFit or None
+        Of the nonlinear least squares, where it converged.
+    mirror : tuple of float
+        Difference of the rates of each pair, over the largest.
+    notes : tuple of str
+        What the user should know, in whole sentences.
+    """
+
+    records: tuple[YawRecord, ...]
+    medium: Medium
+    torque_constant_NmpA: float
+    torque_constant_error: float
+    body: BodyInertia | None
+    estimates: dict[str, YawEstimate]
+    fit: EnergyFit
+    ideal: Interval
+    angle: AngleFit | None
+    mirror: tuple[float, ...]
+    notes: tuple[str, ...]
+    air: YawResult | None = field(default=None)
+
+    def added_inertia(self, method: str) -> tuple[float, float | None] | None:
+        """lambda661 by a method and its standard error, kg m2; None where J_zz is not known.
+
+        The errors of the total, of J_zz and of k_t count; the last acts on the total in proportion.
+        """
+        if self.body is None:
+            return None
+        own = self.estimates[method]
+        parts = [own.inertia_error_kgm2, self.body.error_kgm2, self.torque_constant_error * own.total_inertia_kgm2]
+        known = [part for part in parts if part is not None]
+        error = math.hypot(*known) if own.inertia_error_kgm2 is not None else None
+        return own.total_inertia_kgm2 - self.body.value_kgm2, error
+
+    def as_json(self) -> dict[str, Any]:
+        """The result as plain data; ``added_inertia_kgm2`` and ``dissipation_J`` by method, the rest in ``methods``."""
+        added = {method: self.added_inertia(method) for method in self.estimates}
+        methods = {}
+        for method, estimate in self.estimates.items():
+            own = added[method]
+            methods[method] = {
+                "added_inertia_kgm2": own[0] if own else None,
+                "added_inertia_standard_error_kgm2": own[1] if own else None,
+                **estimate.as_json(),
+            }
+        return {
+            "records": [str(record.path) for record in self.records],
+            "medium": self.medium,
+            "torque_constant_NmpA": self.torque_constant_NmpA,
+            "body_inertia_kgm2": self.body.value_kgm2 if self.body else None,
+            "body_inertia_standard_error_kgm2": self.body.error_kgm2 if self.body else None,
+            "body_inertia_source": self.body.source if self.body else None,
+            "added_inertia_kgm2": {method: own[0] if own else None for method, own in added.items()},
+            "dissipation_J": {method: own.dissipation_J for method, own in self.estimates.items()},
+            "methods": methods,
+            "mirror_difference": list(self.mirror),
+            "air": self.air.as_json() if self.air else None,
+            "notes": list(self.notes),
+        }
+
+
+def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None) -> YawResult:
+    """Estimate the added yaw inertia and the dissipation of one body.
+
+    Records in air give J_zz, if there are any beside those in water; alone, they are themselves what is looked at.
+
+    Raises
+    ------
+    InputError
+        The intervals of a record are no mirror images, the motor saturates in one, the encoder steps too rarely, or
+        the records do not tell the terms apart.
+    """
+    options = options or YawOptions()
+    wet = tuple(record for record in records if record.medium == "water")
+    dry = tuple(record for record in records if record.medium == "air")
+    if not records:
+        raise InputError("tank2sim yaw", "", "no record was given", "give one or more CSV files")
+    if not wet:
+        return _result(dry, "air", options, None)
+    air = _result(dry, "air", replace(options, terms=None), None) if dry else None
+    return _result(wet, "water", options, air)
+
+
+def torque_constant(reference: YawResult, known_inertia_kgm2: float) -> tuple[float, float]:
+    """k_t (N m/A) and its relative standard error, from records in air of a body whose inertia is known.
+
+    All terms of (3) are proportional to k_t: the records give J/k_t, whatever k_t they were evaluated with.
+
+    Raises
+    ------
+    InputError
+        The records are of water, where the added inertia is unknown too.
+    """
+    if reference.medium != "air":
+        path = reference.records[0].path
+        raise InputError(path, "", "is of a body in water", "give a record in air ('# medium: air')")
+    best = reference.estimates[METHODS[0]]
+    error = (best.inertia_error_kgm2 or 0.0) / best.total_inertia_kgm2
+    return reference.torque_constant_NmpA * known_inertia_kgm2 / best.total_inertia_kgm2, error
+
+
+def parse_yaw_terms(text: str) -> tuple[str, ...]:
+    """Terms from an option's text, ``"coulomb,viscous,quadratic"``; the inertia is always among them.
+
+    Raises
+    ------
+    InputError
+        A term is unknown or stands twice.
+    """
+    words = [word.strip() for word in text.split(",") if word.strip() not in ("", "inertia")]
+    for word in words:
+        if word not in TERMS or words.count(word) > 1:
+            known = ", ".join(term for term in TERMS if term != "inertia")
+            raise InputError("--terms", "", f"{word!r} is no term, or stands twice", f"take any of {known}, once each")
+    return ("inertia", *(term for term in TERMS if term in words))
+
+
+def _result(records: tuple[YawRecord, ...], medium: Medium, options: YawOptions, air: YawResult | None) -> YawResult:
+    constant, notes = _torque_constant(records, options)
+    notes += _check_current(records)
+    pairs = [pair for record in records for pair in intervals(record)]
+    mirror = tuple(mirror_difference(pair) for pair in pairs)
+    notes += _check_mirror(records, mirror, options.mirror_limit)
+    terms = options.terms or (AIR_TERMS if medium == "air" else WATER_TERMS)
+    rig = options.known
+    fit = fit_energy(energy_balance(pairs, terms, constant, rig), records[0])
+    programmed = [pair for record in records for pair in intervals(record, "reference")]
+    reference = fit_energy(energy_balance(programmed, terms, constant, rig), records[0])
+    ideal = programmed[0][0]
+    estimates = {
+        "energy_least_squares": least_squares_estimate("energy_least_squares", fit, ideal),
+        "as_many_equations": as_many_equations("as_many_equations", fit, ideal),
+        "two_intervals": two_intervals("two_intervals", fit.balance, fit),
+        "energy_least_squares_reference": least_squares_estimate("energy_least_squares_reference", reference, ideal),
+        "two_intervals_reference": two_intervals("two_intervals_reference", reference.balance, fit),
+    }
+    angle, left_out = _angle(records, _rig(constant, rig), estimates["energy_least_squares"], ideal)
+    notes += left_out
+    if angle:
+        estimates["output_error"] = angle.estimate
+    body, told = _body(records, medium, options, air)
+    result = YawResult(
+        records=records,
+        medium=medium,
+        torque_constant_NmpA=constant,
+        torque_constant_error=options.torque_constant_error,
+        body=body,
+        estimates={name: estimates[name] for name in METHODS if name in estimates},
+        fit=fit,
+        ideal=ideal,
+        angle=angle,
+        mirror=mirror,
+        notes=(*notes, *told, *_judged(fit, estimates)),
+        air=air,
+    )
+    return result
+
+
+def _angle(
+    records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, ideal: Interval
+) -> tuple[AngleFit | None, list[str]]:
+    """The nonlinear least squares, and why they are left out."""
+    beyond = [term for term in first.friction if term not in WATER_TERMS]
+    if beyond:
+        return None, [
+            f"output_error fits the terms of (3) alone and is left out, for {', '.join(beyond)} is asked for."
+        ]
+    angle = fit_angle(records, rig, first, ideal)
+    return angle, [] if angle else ["output_error: the fit of the angle did not converge and is left out."]
+
+
+def _rig(constant: float, known: YawRig | None) -> YawRig:
+    """The rig that the nonlinear least squares integrate: its own terms are theirs to find."""
+    return replace(known or YawRig(inertia_kgm2=0.0), torque_constant_NmpA=constant)
+
+
+def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tuple[float, list[str]]:
+    told = {record.constants.get("torque_constant_NmpA") for record in records}
+    if options.torque_constant_NmpA is not None:
+        return options.torque_constant_NmpA, []
+    if len(told) > 1:
+        raise InputError(
+            records[0].path, "comment torque_constant_NmpA", "is not the same in all records", "give --torque-constant"
+        )
+    (stated,) = told
+    if stated is not None:
+        return stated, []
+    note = f"No record tells the torque constant: that of the paper's motor, {TORQUE_CONSTANT_NMPA:g} N m/A, is taken."
+    return TORQUE_CONSTANT_NMPA, [note]
+
+
+def _check_current(records: tuple[YawRecord, ...]) -> list[str]:
+    notes = []
+    for record in records:
+        if not record.stated:
+            notes.append(
+                f"{record.path.name}: the file does not tell the programme (max_rate_degps, rise_s); the paper's is "
+                "taken."
+            )
+        limit = record.constants.get("max_current_A")
+        if limit is None:
+            continue
+        full = np.abs(record.current_A) >= _FULL * limit
+        for pair in record.programme.pairs():
+            for begin, end in pair:
+                bad = full & (record.time_s >= begin) & (record.time_s <= end)
+                if bad.any():
+                    row = int(np.flatnonzero(bad)[0])
+                    problem = f"reaches the motor's {limit:g} A at {record.time_s[row]:.3f} s, where it is evaluated"
+                    raise InputError(record.path, "column current_A", problem, "run a slower programme, or lower gains")
+        if full.any():
+            first = record.time_s[int(np.flatnonzero(full)[0])]
+            notes.append(
+                f"{record.path.name}: the motor is saturated at {first:.3f} s, outside the intervals that are "
+                "evaluated."
+            )
+    return notes
+
+
+def _check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limit: float) -> list[str]:
+    place = 0
+    for record in records:
+        for number in range(record.programme.humps):
+            if mirror[place] > limit:
+                pair = record.programme.pairs()[number]
+                problem = (
+                    f"the intervals {_span(pair.accelerating_s)} and {_span(pair.braking_s)} are no mirror images: "
+                    f"their rates differ by up to {100 * mirror[place]:.1f} % of the largest, and {100 * limit:g} % is "
+                    "allowed"
+                )
+                remedy = "check start_s and rise_s, tune the controller, leave the hump out, or raise --mirror-percent"
+                raise InputError(record.path, "", problem, remedy)
+            place += 1
+    worst = max(mirror)
+    if worst > _NOT_QUITE_MIRRORED:
+        return [
+            f"The accelerating and braking intervals are mirror images to {100 * worst:.1f} % of the largest rate: the "
+            "two-interval formulas are biased by what that does to the dissipation."
+        ]
+    return []
+
+
+def _span(ends: tuple[float, float]) -> str:
+    return f"{ends[0]:.2f}-{ends[1]:.2f} s"
+
+
+def _body(
+    records: tuple[YawRecord, ...], medium: Medium, options: YawOptions, air: YawResult | None
+) -> tuple[BodyInertia | None, list[str]]:
+    if medium == "air":
+        return None, []
+    if options.inertia_kgm2 is not None:
+        return BodyInertia(
+            value_kgm2=options.inertia_kgm2, error_kgm2=options.inertia_error_kgm2, source="as given"
+        ), []
+    if air is not None:
+        best = air.estimates[METHODS[0]]
+        names = ", ".join(record.path.name for record in air.records)
+        return BodyInertia(
+            value_kgm2=best.total_inertia_kgm2, error_kgm2=best.inertia_error_kgm2, source=f"in air, {names}"
+        ), []
+    for record in records:
+        if (stated := record.constants.get("inertia_kgm2")) is not None:
+            return BodyInertia(value_kgm2=stated, error_kgm2=None, source=f"comment of {record.path.name}"), []
+    return None, [
+        "J_zz is not known, so that the added inertia cannot be told from the total: give a record in air as well, or "
+        "--inertia-kgm2."
+    ]
+
+
+def _judged(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[str]:
+    best, two = estimates["energy_least_squares"], estimates["two_intervals"]
+    notes = []
+    if two.bias_kgm2 is not None:
+        share = 100 * two.bias_kgm2 / best.total_inertia_kgm2
+        parts = two.bias_from
+        notes.append(
+            f"The two-interval formula (1) lies {1e4 * two.bias_kgm2:+.3g}e-4 kg m2 ({share:+.2g} % of the total) from "
+            f"the least squares: {1e4 * parts['dissipation']:+.3g}e-4 because the intervals do not dissipate alike, "
+            f"{1e4 * parts['speeds']:+.3g}e-4 because their end speeds differ. Its standard error does not "
+            "contain that."
+        )
+    for term, (value, error) in best.friction.items():
+        if error is not None and abs(value) < 2 * error:
+            notes.append(f"{term} does not differ from zero: {value:.3g} ± {error:.2g} {TERMS[term][1]}.")
+    return notes

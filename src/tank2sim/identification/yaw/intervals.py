@@ -1,0 +1,244 @@
+"""The intervals of a yaw record as the energy method needs them: rate, work, and what each term of (3) does.
+
+The rate of the body is not measured: the encoder counts pulses. A spline is laid through the moments at which the
+count changes, where the angle is known to the time of one sample, and not through the counts between, which are off by
+up to a pulse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_lsq_spline
+
+from tank2sim.dynamics.yaw_rig import YawRig, wall_terms
+from tank2sim.errors import InputError
+from tank2sim.records.yaw import YawRecord
+
+Vector = NDArray[np.float64]
+Speeds = Literal["actual", "reference"]
+
+KNOTS_S = (0.1, 0.17, 0.25, 0.35, 0.5)
+"""Distances of the knots of the spline to choose from: the shortest follows the swings of a closed loop of some 0.1 s,
+the longest smooths away more of an encoder's noise. Each interval takes that of the least generalised cross-validation
+(Craven & Wahba 1979)."""
+_MARGIN_S = 0.35
+"""How far the spline reaches beyond an interval, as far as the body moves there: its ends are its worst places."""
+_DEGREE = 5
+STEPS_PER_COEFFICIENT = 2
+"""Encoder steps that a coefficient of the spline must have at least."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Interval:
+    """Motion in one interval, at rising times; arrays (n,).
+
+    Parameters
+    ----------
+    time_s, angle_rad, rate_radps, acceleration_radps2, current_A : array
+    braking : bool
+    number : int
+        Of the pair it belongs to.
+    """
+
+    time_s: Vector
+    angle_rad: Vector
+    rate_radps: Vector
+    acceleration_radps2: Vector
+    current_A: Vector
+    braking: bool
+    number: int
+
+    def integral(self, values: Vector) -> float:
+        """Integral over the interval by the trapezoidal rule."""
+        return float(np.trapezoid(values, self.time_s))
+
+    def part(self, place: int, parts: int) -> Interval:
+        """One of `parts` equal parts in time; a braking interval's are counted from its end, as mirror images."""
+        if self.braking:
+            place = parts - 1 - place
+        length = (self.time_s[-1] - self.time_s[0]) / parts
+        low = self.time_s[0] + place * length
+        inside = (self.time_s > low + 1e-9) & (self.time_s < low + length - 1e-9)
+        time = np.concatenate([[low], self.time_s[inside], [low + length]])
+
+        def cut(values: Vector) -> Vector:
+            at_times: Vector = np.interp(time, self.time_s, values)
+            return at_times
+
+        return replace(
+            self,
+            time_s=time,
+            angle_rad=cut(self.angle_rad),
+            rate_radps=cut(self.rate_radps),
+            acceleration_radps2=cut(self.acceleration_radps2),
+            current_A=cut(self.current_A),
+        )
+
+
+Work = Callable[[Interval], float]
+
+
+def _change_of_square(own: Interval) -> float:
+    return float(own.rate_radps[-1] ** 2 - own.rate_radps[0] ** 2) / 2
+
+
+def _swept(power: int) -> Work:
+    return lambda own: own.integral(np.abs(own.rate_radps) ** power)
+
+
+TERMS: dict[str, tuple[Work, str]] = {
+    "inertia": (_change_of_square, "kgm2"),
+    "coulomb": (_swept(1), "Nm"),
+    "viscous": (_swept(2), "Nms"),
+    "quadratic": (_swept(3), "Nms2"),
+    "braking_quadratic": (lambda own: own.integral(np.abs(own.rate_radps) ** 3) if own.braking else 0.0, "Nms2"),
+    "gravity_sine": (lambda own: float(np.cos(own.angle_rad[0]) - np.cos(own.angle_rad[-1])), "Nm"),
+    "gravity_cosine": (lambda own: float(np.sin(own.angle_rad[-1]) - np.sin(own.angle_rad[0])), "Nm"),
+}
+"""Term to the work (per unit of its coefficient) that the motor does against it over an interval, and its unit:
+inertia is J + lambda661, braking_quadratic f_662d - f_662a; the moment of gravity is -sine sin(psi) - cosine cos(psi).
+"""
+
+
+def intervals(record: YawRecord, speeds: Speeds = "actual") -> tuple[tuple[Interval, Interval], ...]:
+    """Accelerating and braking interval of each pair of a record's programme.
+
+    Parameters
+    ----------
+    speeds : str
+        ``actual``, as measured, or ``reference``, the programme's in their place.
+
+    Raises
+    ------
+    InputError
+        There are too few steps of the encoder in an interval.
+    """
+    return tuple(
+        (
+            _interval(record, pair.accelerating_s, speeds, braking=False, number=number),
+            _interval(record, pair.braking_s, speeds, braking=True, number=number),
+        )
+        for number, pair in enumerate(record.programme.pairs())
+    )
+
+
+def _interval(record: YawRecord, ends: tuple[float, float], speeds: Speeds, *, braking: bool, number: int) -> Interval:
+    begin, end = ends
+    time = record.time_s
+    inside = (time > begin + 1e-9) & (time < end - 1e-9)
+    own = np.concatenate([[begin], time[inside], [end]])
+    if speeds == "reference":
+        angle, rate, acceleration = record.programme.at(own)
+    else:
+        spline = smooth_angle(record, ends)
+        angle, rate, acceleration = (spline(own, nu) for nu in (0, 1, 2))
+    return Interval(
+        time_s=own,
+        angle_rad=angle,
+        rate_radps=rate,
+        acceleration_radps2=acceleration,
+        current_A=np.interp(own, time, record.current_A),
+        braking=braking,
+        number=number,
+    )
+
+
+def smooth_angle(record: YawRecord, ends: tuple[float, float]) -> BSpline:
+    """Spline of the angle over an interval, whose derivatives are rate and acceleration.
+
+    Raises
+    ------
+    InputError
+        The encoder steps too rarely there.
+    """
+    begin, end = ends[0] - _MARGIN_S, ends[1] + _MARGIN_S
+    time, angle = record.time_s, record.angle_rad
+    within = (time >= begin) & (time <= end)
+    time, angle = time[within], angle[within]
+    changed = np.diff(angle) != 0
+    # Between two samples of different counts the angle passed their middle, at about the middle of the two times.
+    middle, value = (time[1:] + time[:-1])[changed] / 2, (angle[1:] + angle[:-1])[changed] / 2
+    fewest = max(1, round((end - begin) / KNOTS_S[-1])) + _DEGREE
+    if len(middle) < STEPS_PER_COEFFICIENT * fewest:
+        problem = (
+            f"has {len(middle)} steps of the encoder from {begin:.3g} to {end:.3g} s, and "
+            f"{STEPS_PER_COEFFICIENT * fewest} are needed"
+        )
+        remedy = "take an encoder with more pulses, a faster programme, or sample more often"
+        raise InputError(record.path, "column phi_rad", problem, remedy)
+    splines = [spline for knot in KNOTS_S if (spline := _spline(middle, value, knot)) is not None]
+    if not splines:
+        problem = f"stands still for a while between {begin:.3g} and {end:.3g} s, where the programme moves"
+        raise InputError(record.path, "column phi_rad", problem, "check start_s, rise_s and the encoder")
+    return min(splines, key=lambda spline: _cross_validation(spline, middle, value))
+
+
+def _spline(time: Vector, angle: Vector, knot_s: float) -> BSpline | None:
+    """Least-squares spline with knots so far apart; None if the points are too few, or leave out a piece."""
+    pieces = max(1, round((time[-1] - time[0]) / knot_s))
+    if len(time) < STEPS_PER_COEFFICIENT * (pieces + _DEGREE):
+        return None
+    inner = np.linspace(time[0], time[-1], pieces + 1)[1:-1]
+    knots = np.concatenate([np.full(_DEGREE + 1, time[0]), inner, np.full(_DEGREE + 1, time[-1])])
+    try:
+        return make_lsq_spline(time, angle, knots, k=_DEGREE)
+    except (ValueError, np.linalg.LinAlgError):
+        return None
+
+
+def _cross_validation(spline: BSpline, time: Vector, angle: Vector) -> float:
+    """n RSS / (n - m)^2."""
+    left = angle - spline(time)
+    return float(len(time) * (left @ left) / (len(time) - len(spline.c)) ** 2)
+
+
+def known_work(own: Interval, rig: YawRig) -> float:
+    """Work (J) against what is known beyond (3): walls, gravity, and what differs between accelerating and braking.
+
+    Of the pair f_662a, f_662d the difference is counted, when braking; lambda_662 |w|^1.5 and the walls' added inertia
+    take part with the acceleration.
+    """
+    rate, acceleration = own.rate_radps, own.acceleration_radps2
+    inertia, damping = np.zeros_like(rate), np.zeros_like(rate)
+    if rig.walls:
+        heading = ca.SX.sym("psi")
+        walls = ca.Function("walls", [heading], list(wall_terms(heading, rig.walls)))
+        inertia, damping = (np.asarray(value).ravel() for value in walls(own.angle_rad[None, :]))
+    more = rig.inertia_braking_kgm2 if own.braking else rig.inertia_accelerating_kgm2
+    inertia = inertia + more * np.abs(rate) ** 1.5
+    rougher = rig.quadratic_braking - rig.quadratic_Nms2 if own.braking else 0.0
+    gravity = rig.gravity_Nm * np.sin(own.angle_rad - rig.gravity_angle_rad)
+    return own.integral(
+        inertia * rate * acceleration + damping * rate**2 + rougher * np.abs(rate) ** 3 + gravity * rate
+    )
+
+
+def motor_work(own: Interval, torque_constant_NmpA: float, rig: YawRig | None = None) -> float:
+    """k_t int w I dt less the work against what is known, J."""
+    work = torque_constant_NmpA * own.integral(own.rate_radps * own.current_A)
+    return work - known_work(own, rig) if rig else work
+
+
+def mirror_difference(pair: tuple[Interval, Interval]) -> float:
+    """Largest difference of the rates of two intervals run against each other, over the largest rate in them."""
+    speeding, braking = pair
+    x = np.linspace(0, 1, 101)
+
+    def at(own: Interval, share: Vector) -> Vector:
+        time = own.time_s[0] + share * (own.time_s[-1] - own.time_s[0])
+        rate: Vector = np.abs(np.interp(time, own.time_s, own.rate_radps))
+        return rate
+
+    one, other = at(speeding, x), at(braking, 1 - x)
+    return float(np.max(np.abs(one - other)) / max(one.max(), other.max()))
+
+
+def work_rows(own: Interval, terms: Mapping[str, float] | tuple[str, ...], parts: int) -> list[list[float]]:
+    """Work per unit of each term in each part of an interval."""
+    return [[TERMS[term][0](own.part(place, parts)) for term in terms] for place in range(parts)]

@@ -1,0 +1,167 @@
+"""Records of the yaw rig: angle and motor current of a body that is turned to a programme."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+
+from tank2sim.dynamics.yaw_programme import KINDS, PAPER, YawProgramme, full_turns
+from tank2sim.errors import InputError
+from tank2sim.records.csv_table import Table, Vector, read_table
+from tank2sim.units import to_si
+
+Medium = Literal["air", "water"]
+
+_PLAIN = ("torque_constant_NmpA", "inertia_kgm2", "max_current_A", "current_lag_s", "length_m", "water_density_kgpm3")
+"""Comments that are numbers and no part of the programme."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class YawRecord:
+    """One record, SI; arrays (rows,).
+
+    Parameters
+    ----------
+    path : Path
+        The file it comes from.
+    time_s : array
+        Rising.
+    angle_rad : array
+        Yaw angle as the encoder counts it, + clockwise.
+    current_A : array
+        Of the motor, + turns clockwise.
+    medium : str
+        ``air`` or ``water``.
+    programme : YawProgramme
+        What was to be run.
+    stated : bool
+        The file tells of the programme; else it is the paper's.
+    constants : dict
+        What else the comments state: ``torque_constant_NmpA``, ``inertia_kgm2`` (J_zz of the body with the rotor),
+        ``max_current_A``, ``current_lag_s``, ``length_m``, ``water_density_kgpm3``.
+    """
+
+    path: Path
+    time_s: Vector
+    angle_rad: Vector
+    current_A: Vector
+    medium: Medium
+    programme: YawProgramme
+    stated: bool
+    constants: dict[str, float]
+
+
+def read_yaw_record(path: Path | str) -> YawRecord:
+    """Read ``t_s,phi_rad,current_A`` (or phi_deg), with the programme in comments.
+
+    ``# medium: air``, ``# programme: reversing`` (or unidirectional, full_turn), ``# max_rate_degps: 15``, ``# rise_s:
+    4.444``, ``# settle_s: 0.5``, ``# start_s: 0``, ``# humps: 5``, ``# torque_constant_NmpA: 0.051``, ``# inertia_kgm2:
+    0.0204``, ``# max_current_A: 1``. What is not told of the programme is as in the paper, and as many humps as the
+    record has time for.
+
+    Raises
+    ------
+    InputError
+        The table is at fault, a column is missing, a cell is empty, the time does not rise, a comment is none of
+        these values, or the record is shorter than the programme.
+    """
+    table = read_table(path).si()
+    time = table.increasing("t_s")
+    angle, current = _complete(table, "phi_rad"), _complete(table, "current_A")
+    medium = table.comments.get("medium", "water").strip().lower()
+    if medium not in get_args(Medium):
+        raise InputError(table.path, "comment medium", f"is {medium!r}", "write '# medium: air' or '# medium: water'")
+    programme, stated = _programme(table, time)
+    constants = {key: value for key in _PLAIN if (value := _positive(table, key)) is not None}
+    return YawRecord(
+        path=table.path,
+        time_s=time,
+        angle_rad=angle,
+        current_A=current,
+        medium="air" if medium == "air" else "water",
+        programme=programme,
+        stated=stated,
+        constants=constants,
+    )
+
+
+def yaw_record_text(record: YawRecord) -> str:
+    """The record as the CSV file that :func:`read_yaw_record` reads."""
+    own = record.programme
+    head = [f"# medium: {record.medium}", f"# programme: {own.kind}"]
+    head += [f"# max_rate_degps: {math.degrees(own.max_rate_radps):.12g}", f"# rise_s: {own.rise_s:.12g}"]
+    head += [f"# settle_s: {own.settle_s:g}", f"# start_s: {own.start_s:g}", f"# humps: {own.humps}"]
+    head += [f"# {key}: {value:g}" for key, value in record.constants.items()]
+    rows = zip(record.time_s.tolist(), record.angle_rad.tolist(), record.current_A.tolist(), strict=True)
+    body = [f"{t:.9g},{angle:.9g},{current:.6g}" for t, angle, current in rows]
+    return "\n".join([*head, "t_s,phi_rad,current_A", *body]) + "\n"
+
+
+def _complete(table: Table, name: str) -> Vector:
+    values = table.column(name)
+    empty = np.flatnonzero(np.isnan(values))
+    if empty.size:
+        raise InputError(table.path, table.place(int(empty[0]), name), "is empty", "delete the row")
+    return values
+
+
+def _positive(table: Table, key: str) -> float | None:
+    value = table.comment_number(key)
+    if value is not None and value <= 0:
+        raise InputError(table.path, f"comment {key}", f"is {value:g}", "a positive number was expected")
+    return value
+
+
+def _programme(table: Table, time: Vector) -> tuple[YawProgramme, bool]:
+    kind = table.comments.get("programme", "unidirectional").strip().lower()
+    if kind not in (*KINDS, "full_turn"):
+        expected = ", ".join((*KINDS, "full_turn"))
+        raise InputError(table.path, "comment programme", f"is {kind!r}", f"one of {expected} was expected")
+    rate = _rate(table)
+    start = table.comment_number("start_s") or 0.0
+    settle, rise = table.comment_number("settle_s"), _positive(table, "rise_s")
+    stated = rate is not None and (rise is not None or kind == "full_turn")
+    try:
+        programme = YawProgramme(
+            max_rate_radps=PAPER.max_rate_radps if rate is None else rate,
+            rise_s=PAPER.rise_s if rise is None else rise,
+            settle_s=PAPER.settle_s if settle is None else settle,
+            start_s=start,
+            humps=1,
+        )
+        programme = full_turns(programme) if kind == "full_turn" else programme
+        humps = _humps(table, time, programme, kind)
+        whole = replace(programme, humps=humps, kind="reversing" if kind == "reversing" else "unidirectional")
+    except ValueError as error:
+        raise InputError(table.path, "programme", str(error), "mend the comments that tell of it") from None
+    return whole, stated
+
+
+def _rate(table: Table) -> float | None:
+    """The programme's rate in rad/s, from whichever unit it is told in; its sign is that of the turn."""
+    for key in ("max_rate_degps", "max_rate_radps"):
+        value = table.comment_number(key)
+        if value is not None:
+            if value == 0:
+                raise InputError(table.path, f"comment {key}", "is 0", "give the rate that is held")
+            return to_si(key, value)[1]
+    return None
+
+
+def _humps(table: Table, time: Vector, programme: YawProgramme, kind: str) -> int:
+    """How many humps the file has, told or counted; their last braking interval is within it."""
+    length = programme.pairs()[0].braking_s[1] - programme.start_s
+    fit = math.floor((time[-1] - programme.start_s - length) / programme.period_s + 1e-9) + 1
+    told = table.comment_number("humps")
+    humps = fit - fit % 2 if told is None and kind == "reversing" else fit if told is None else int(told)
+    if humps < 1 or humps > fit or time[0] > programme.pairs()[0].accelerating_s[0]:
+        problem = (
+            f"lasts from {time[0]:g} to {time[-1]:g} s, and {max(humps, 1)} humps of the programme take from "
+            f"{programme.start_s:g} s to {programme.start_s + (max(humps, 1) - 1) * programme.period_s + length:g} s"
+        )
+        raise InputError(table.path, "", problem, "give the whole record, or mend start_s, rise_s or humps")
+    return humps

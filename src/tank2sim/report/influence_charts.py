@@ -1,0 +1,155 @@
+"""Charts of influence coefficients: K % by exact slopes beside the 10 % difference, variances, and tuning."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import altair as alt
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.analysis.influence.of_card import Influence
+from tank2sim.analysis.tuning.result import Tuned
+from tank2sim.report.chart_parts import NUMBER, Record, data, plain, series_look
+
+Array = NDArray[np.float64]
+
+EXACT, DIFFERENCE = "exact slope", "10 % difference"
+
+MOST_ROWS = 24
+"""Parameters in a chart: those that move some figure most. The table has all."""
+
+PANELS = 4
+"""Figures side by side in one chart: as many as leave their bars readable on a sheet of paper."""
+
+_WIDTH = 600
+
+
+def most_influential(result: Influence, limit: int = MOST_ROWS) -> list[int]:
+    """Places of the parameters with the largest K % on any figure, each figure measured by its own largest."""
+    sizes = np.nan_to_num(np.abs(result.exact))
+    largest = sizes.max(axis=1, keepdims=True)
+    relative = np.divide(sizes, largest, out=np.zeros_like(sizes), where=largest > 0).max(axis=0)
+    order = [int(place) for place in np.argsort(-relative, kind="stable") if relative[place] > 1e-6]
+    return order[:limit]
+
+
+def influence_charts(result: Influence) -> list[alt.HConcatChart]:
+    """K % of the most influential parameters: bars by exact slopes, points by the 10 % difference; figures beside
+    each other, :data:`PANELS` to a chart."""
+    order, rows = most_influential(result), range(len(result.figures))
+    each = -(-len(rows) // -(-len(rows) // PANELS))  # as even as it goes
+    return [_bars(result, order, [*rows[first : first + each]]) for first in range(0, len(rows), each)]
+
+
+def _bars(result: Influence, order: Sequence[int], rows: Sequence[int]) -> alt.HConcatChart:
+    names = [result.parameters[place].short for place in order]
+    panels = [_panel(result, order, names, row, first=row == rows[0], width=_WIDTH // len(rows)) for row in rows]
+    shown = ", ".join(result.figures[row].text for row in rows)
+    return alt.hconcat(*panels, spacing=12).properties(
+        title=f"Influence on {shown}",
+        description=f"K per cent of {len(names)} parameters on {shown}, by exact slopes and by a 10 % difference.",
+    )
+
+
+def _panel(
+    result: Influence, order: Sequence[int], names: list[str], row: int, *, first: bool, width: int
+) -> alt.LayerChart:
+    exact, difference = result.exact[row], result.difference[row]
+    bars = [_record(result, place, EXACT, exact[place], difference[place]) for place in order]
+    points = [record | {"run": DIFFERENCE, "k": record["step"]} for record in bars if record["step"] is not None]
+    look = series_look([EXACT, DIFFERENCE], as_points=[EXACT, DIFFERENCE])
+    axis = alt.Axis(title=None, grid=True, labelLimit=170) if first else alt.Axis(title=None, labels=False, ticks=False)
+    y = alt.Y("name:N", sort=names, scale=alt.Scale(domain=names), axis=axis)
+    x = alt.X("k:Q", title="K (%)", axis=alt.Axis(tickCount=4))
+    tooltip = [
+        alt.Tooltip("name:N", title="parameter"),
+        alt.Tooltip("exact:Q", title=f"K, {EXACT} (%)", format=NUMBER),
+        alt.Tooltip("step:Q", title=f"K, {DIFFERENCE} (%)", format=NUMBER),
+    ]
+    zero = alt.Chart(data([{"k": 0.0}])).mark_rule(style="reference").encode(x=x)
+    drawn = alt.Chart(data(bars)).mark_bar(height=9, opacity=0.65).encode(x=x, y=y, color=look.colour, tooltip=tooltip)
+    marks = alt.Chart(data(points)).mark_point(size=34, strokeWidth=1.6)
+    marked = marks.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
+    return alt.layer(drawn, zero, marked).properties(
+        width=width, height=19 * len(names), title=alt.Title(result.figures[row].text, fontSize=12, anchor="middle")
+    )
+
+
+def _record(result: Influence, place: int, run: str, exact: float, difference: float) -> Record:
+    return {
+        "run": run,
+        "name": result.parameters[place].short,
+        "k": plain(exact) if math.isfinite(exact) else None,
+        "exact": plain(exact),
+        "step": plain(difference),
+    }
+
+
+def variance_chart(result: Influence) -> alt.Chart:
+    """Share of each parameter in the variance of each figure, as a heat map of those with 1 % of any."""
+    shares = 100 * result.shares
+    order = [int(k) for k in np.argsort(-shares.max(axis=0), kind="stable") if shares[:, k].max() >= 1][:MOST_ROWS]
+    names = [result.parameters[place].short for place in order]
+    figures = [figure.text for figure in result.figures]
+    rows: list[Record] = [
+        {"figure": figures[row], "name": result.parameters[place].short, "share": plain(float(shares[row, place]))}
+        for row in range(len(figures))
+        for place in order
+    ]
+    tooltip = [
+        alt.Tooltip("figure:N"),
+        alt.Tooltip("name:N", title="parameter"),
+        alt.Tooltip("share:Q", title="share (%)", format=".1f"),
+    ]
+    axis = alt.Axis(title=None, labelLimit=200, ticks=False)
+    scale = alt.Scale(domain=[0, max(10.0, float(shares.max(initial=0.0)))], scheme="blues")
+    return (
+        alt.Chart(data(rows))
+        .mark_rect()
+        .encode(
+            x=alt.X("name:N", sort=names, axis=alt.Axis(title=None, labelAngle=-60, ticks=False)),
+            y=alt.Y("figure:N", sort=figures, axis=axis),
+            color=alt.Color("share:Q", scale=scale, legend=alt.Legend(title="share of the variance (%)")),
+            tooltip=tooltip,
+        )
+        .properties(
+            width=_WIDTH,
+            height=28 * len(figures),
+            title="Which standard errors make those of the figures",
+            description=f"Shares of {len(names)} parameters in the variances of {len(figures)} figures.",
+        )
+    )
+
+
+def moves_chart(tuned: Tuned) -> alt.LayerChart:
+    """What tuning changed, in standard errors of the card, with the bounds."""
+    moves = [move for move in tuned.moves if move.in_standard_errors is not None][:MOST_ROWS]
+    names = [move.parameter.short for move in moves]
+    rows: list[Record] = [
+        {
+            "name": move.parameter.short,
+            "z": plain(move.in_standard_errors or 0.0),
+            "before": plain(move.before * move.parameter.factor),
+            "after": plain(move.after * move.parameter.factor),
+        }
+        for move in moves
+    ]
+    x = alt.X("z:Q", title="move (standard errors of the card)")
+    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, grid=True, labelLimit=170))
+    tooltip = [
+        alt.Tooltip("name:N", title="parameter"),
+        *(alt.Tooltip(f"{key}:Q", title=key, format=".6~g") for key in ("before", "after")),
+        alt.Tooltip("z:Q", title="standard errors", format=".3f"),
+    ]
+    within = tuned.means.within
+    bounds = alt.Chart(data([{"z": -within}, {"z": within}])).mark_rule(style="limit", strokeDash=[5, 3]).encode(x=x)
+    zero = alt.Chart(data([{"z": 0.0}])).mark_rule(style="reference").encode(x=x)
+    bars = alt.Chart(data(rows)).mark_bar(height=10, opacity=0.75).encode(x=x, y=y, tooltip=tooltip)
+    return alt.layer(bars, zero, bounds).properties(
+        width=_WIDTH,
+        height=max(60, 20 * len(names)),
+        title="What tuning changed",
+        description=f"Moves of {len(names)} parameters in standard errors; the bounds are at {within:g}.",
+    )

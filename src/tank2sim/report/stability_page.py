@@ -1,0 +1,278 @@
+"""The page of a ship's stability and manoeuvrability."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from tank2sim.analysis.stability.imo import Criterion
+from tank2sim.analysis.stability.study import StabilityStudy
+from tank2sim.analysis.turning.characteristic import SteeringCharacteristic
+from tank2sim.analysis.turning.diagram import SteadyTurning
+from tank2sim.report.numbers import format_number
+from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
+from tank2sim.report.stability_charts import (
+    characteristic_chart,
+    influence_chart,
+    speed_chart,
+    steering_bode,
+    steering_diagram,
+    steering_poles,
+    step_chart,
+    trim_chart,
+)
+
+_VERDICTS = {True: Verdict.PASSED, False: Verdict.FAILED, None: Verdict.NONE}
+
+_CRITERION = (
+    "C′ = Y′v (N′r − m′x′G) − N′v (Y′r − m′), from the slopes of the full forces on the straight course. Its sign is "
+    "that of the margin between two levers: the yaw damping lever (N′r − m′x′G)/(Y′r − m′) lies ahead of the sway "
+    "lever N′v/Y′v on a ship that is stable. The margin in per cent is C′ over |Y′v (N′r − m′x′G)|, its stabilising "
+    "part."
+)
+_TRIM = (
+    "A card holds for one trim; this is an estimate. Paper 2 (Krezelewski and Misiag) says that 1 % of trim changes "
+    "one of Y_r and N_r by 7.5 %; its print does not show which, nor which way and 1 % of what: both readings are "
+    "drawn, as growing with trim by the stern over length. Beside them stand the corrections of Inoue, Hirano and "
+    "Kijima (1981) to Y_v, Y_r, N_v and N_r. All act on the hydrodynamic part, without the inertia."
+)
+_RESPONSE = (
+    "Of the linear equations about the straight course, yaw rate by rudder. The gear acts with its lag; its rate "
+    "limit is not linear and left out. The poles of an unstable ship lie in the tinted half, and her Bode diagram is "
+    "what a controller works with, not what a ship with a fixed rudder does."
+)
+_TURNING = (
+    "All steady turns that are joined to the straight course, at constant revolutions in calm water, followed by "
+    "continuation through the folds. Solid: stable with the rudder held (all eigenvalues decay). Dashed: the ship "
+    "leaves the turn by herself, and only a rudder at work holds her there."
+)
+_SPIRALS = (
+    "The spiral holds each rudder until the turn is steady, so its points lie on the stable branches and jump at the "
+    "folds; the reverse spiral holds each yaw rate by the rudder and reaches the unstable branch, too. Both are "
+    "simulated on the nonlinear model with its gear."
+)
+_CHARACTERISTIC = (
+    "Bech: H(r) = δ is the diagram itself, here with the nearest cubic. Norrbin: n3 r³ + n2 r² + n1 r + n0 = K δ "
+    "keeps place and slope of the straight course, so that n1 is 1 or −1. Both are fitted in rudder angle up to 20 "
+    "deg; the error beyond is told."
+)
+_IMO = (
+    "The worse of starboard and port, at the card's speed in calm water. A margin is what is left to the limit; "
+    "below zero the criterion is not met."
+)
+
+
+def stability_page(study: StabilityStudy, notices: Sequence[str]) -> Page:
+    """The page; `notices` stand under the criteria."""
+    found = study.stability
+    sections = [_straight(study), _moving(study), _response(study)]
+    if study.turning is not None:
+        sections.append(_turning(study, study.turning))
+    if study.characteristic is not None:
+        sections.append(_characteristic(study.characteristic))
+    sections.append(Section(heading="IMO criteria", text=_IMO, tables=[_imo(study.imo)]))
+    if notices:
+        rows: list[list[Cell]] = [[one] for one in notices]
+        table = Table(caption="What the reader should know.", columns=[Column(title="")], rows=rows)
+        sections.append(Section(heading="Notices", tables=[table]))
+    subtitle = f"Stability and manoeuvrability, {found.speed_mps:.4g} m/s"
+    return Page(title=found.name, subtitle=subtitle, figures=_figures(study), sections=sections)
+
+
+def _figures(study: StabilityStudy) -> list[Figure]:
+    found, margin = study.stability, study.margin
+    met = [one.passed for one in study.imo]
+    failed, unknown = met.count(False), met.count(None)
+    verdict = Verdict.FAILED if failed else Verdict.CAUTION if unknown else Verdict.PASSED
+    shown = [
+        Figure(
+            label="Straight course",
+            value="stable" if found.stable else "unstable",
+            verdict=Verdict.PASSED if found.stable else Verdict.CAUTION,
+            note=f"C′ = {found.criterion:.4g}",
+        ),
+        Figure(label="Margin", value=margin.percent, unit="%", note=f"levers {margin.lever:.3g} L apart"),
+        Figure(label="Nomoto K′", value=found.nomoto_prime.K_per_s, note=f"T′ = {found.nomoto_prime.T_s:.3g}"),
+        Figure(
+            label="IMO criteria met",
+            value=f"{met.count(True)} of {len(met)}",
+            verdict=verdict,
+            note=f"{unknown} open" if unknown else "",
+        ),
+    ]
+    if study.turning is not None and study.turning.loop is not None:
+        width = math.degrees(study.turning.loop.width_rad)
+        shown.insert(3, Figure(label="Hysteresis loop", value=width, unit="deg", note="of rudder, between the folds"))
+    return shown
+
+
+def _straight(study: StabilityStudy) -> Section:
+    found, margin = study.stability, study.margin
+    modes = [[one.real, one.imag, -1 / one.real if one.real else None] for one in found.eigenvalues]
+    eigenvalues = Table(
+        caption="Eigenvalues of surge, sway and yaw.",
+        columns=[
+            Column(title="real part", unit="1/s"),
+            Column(title="imaginary part", unit="1/s"),
+            Column(title="time constant", unit="s"),
+        ],
+        rows=modes,
+    )
+    heads = [Column(title=""), *(Column(title=name) for name in ("K", "T", "T1", "T2", "T3"))]
+    nomoto = [
+        [scaling, *vars(one).values()]
+        for scaling, one in (("1/s and s", found.nomoto), ("prime (L/U)", found.nomoto_prime))
+    ]
+    levers: list[list[Cell]] = [
+        ["yaw damping lever", format_number(margin.damping_lever), "L"],
+        ["sway lever", format_number(margin.sway_lever), "L"],
+        ["levers apart", format_number(margin.lever), "L"],
+        ["margin", format_number(margin.percent), "%"],
+    ]
+    return Section(
+        heading="Straight-line stability",
+        text=_CRITERION,
+        tables=[
+            Table(
+                caption="The margin of stability.",
+                columns=[Column(title=""), Column(title="value"), Column(title="unit")],
+                rows=levers,
+            ),
+            eigenvalues,
+            Table(caption="Nomoto's coefficients, yaw rate by rudder.", columns=heads, rows=nomoto),
+        ],
+    )
+
+
+def _moving(study: StabilityStudy) -> Section:
+    margin = study.margin
+    rows: list[list[Cell]] = [
+        [one.short_name, one.value, one.percent, one.neutral_value, one.neutral_percent] for one in margin.influences
+    ]
+    table = Table(
+        caption="Exact sensitivity of C′, and the value at which the ship is neutral, all else unchanged.",
+        columns=[
+            Column(title="coefficient"),
+            Column(title="value"),
+            Column(title="C′ for 10 % more", unit="%"),
+            Column(title="neutral at"),
+            Column(title="change to neutral", unit="%"),
+        ],
+        rows=rows,
+    )
+    changes = ", ".join(f"{name} {change:+.3g} %" for name, change in study.trim.changes.items())
+    caption = f"After Inoue, 1 % of length of trim by the stern changes {changes}."
+    return Section(
+        heading="What moves the margin",
+        text=f"Derivatives are prime, mass in kg and x_G in m. {_TRIM}",
+        tables=[table],
+        charts=[
+            *([Illustration(chart=influence_chart(margin, title="Influence on C′"))] if margin.influences else []),
+            Illustration(chart=speed_chart(margin, title="Speed"), caption="Over the card's range of speeds."),
+            Illustration(chart=trim_chart(study.trim, title="Trim (estimate)"), caption=caption),
+        ],
+    )
+
+
+def _response(study: StabilityStudy) -> Section:
+    responses = study.responses
+    if not responses:
+        return Section(heading="Response to the rudder", text="The yaw rate does not answer to the rudder.")
+    return Section(
+        heading="Response to the rudder",
+        text=_RESPONSE,
+        charts=[
+            Illustration(chart=steering_poles(responses, title="Poles and zeros")),
+            Illustration(chart=steering_bode(responses, title="Bode diagram")),
+            Illustration(chart=step_chart(responses, title="Step of the rudder")),
+        ],
+    )
+
+
+def _turning(study: StabilityStudy, turning: SteadyTurning) -> Section:
+    rows: list[list[Cell]] = []
+    for angle in (-35, -20, -10, -5, 0, 5, 10, 20, 35):
+        for rate, stable in turning.turns_at(math.copysign(max(0.0, abs(math.radians(angle)) - 1e-9), angle)):
+            rows.append([angle, math.degrees(rate), "stable" if stable else "unstable"])
+    tables = [
+        Table(
+            caption="Steady turns.",
+            columns=[Column(title="rudder", unit="deg"), Column(title="yaw rate", unit="deg/s"), Column(title="")],
+            rows=rows,
+        )
+    ]
+    if turning.folds:
+        folds: list[list[Cell]] = [
+            [math.degrees(one.rudder_rad), math.degrees(one.yaw_rate_radps)] for one in turning.folds
+        ]
+        heads = [Column(title="rudder", unit="deg"), Column(title="yaw rate", unit="deg/s")]
+        tables.append(Table(caption="Folds, where the ship leaves her branch.", columns=heads, rows=folds))
+    spirals = study.direct is not None or study.reverse is not None
+    chart = steering_diagram(turning, study.direct, study.reverse, title="Steady turns against the rudder")
+    return Section(
+        heading="Steady turning",
+        text=f"{_TURNING}\n\n{_SPIRALS}" if spirals else _TURNING,
+        tables=tables,
+        charts=[Illustration(chart=chart)],
+    )
+
+
+def _characteristic(found: SteeringCharacteristic) -> Section:
+    n, b = found.n, found.bech.coefficients
+    rows: list[list[Cell]] = [
+        [
+            "Bech",
+            *(float(one) for one in b),
+            *_errors(found.bech.rms_rad, found.bech.largest_rad, found.bech.beyond_rad),
+        ],
+        [
+            f"Norrbin, K = {found.K_per_s:.4g} 1/s",
+            *(float(one) for one in n),
+            *_errors(found.norrbin.rms_rad, found.norrbin.largest_rad, found.norrbin.beyond_rad),
+        ],
+    ]
+    heads = [
+        Column(title=""),
+        *(Column(title=f"r{power}") for power in ("⁰", "¹", "²", "³")),
+        Column(title="rms error", unit="deg", digits=3),
+        Column(title="largest", unit="deg", digits=3),
+        Column(title="beyond the fit", unit="deg", digits=3),
+    ]
+    caption = "Coefficients by powers of the yaw rate, rad and s: Bech's of δ, Norrbin's of K δ."
+    return Section(
+        heading="Nonlinear steering characteristic",
+        text=_CHARACTERISTIC,
+        tables=[Table(caption=caption, columns=heads, rows=rows)],
+        charts=[Illustration(chart=characteristic_chart(found, title="Rudder that holds a yaw rate"))],
+    )
+
+
+def _errors(*values: float) -> list[float]:
+    return [math.degrees(value) for value in values]
+
+
+def _imo(criteria: Sequence[Criterion]) -> Table:
+    rows: list[list[Cell]] = [
+        [
+            one.name,
+            one.found,
+            one.allowed,
+            one.unit,
+            _VERDICTS[one.passed] if one.passed is not None else "open",
+            one.margin,
+            one.margin_percent,
+            one.remark,
+        ]
+        for one in criteria
+    ]
+    columns = [
+        Column(title="criterion"),
+        Column(title="found"),
+        Column(title="allowed"),
+        Column(title="unit"),
+        Column(title="verdict"),
+        Column(title="margin", digits=3),
+        Column(title="margin", unit="%", digits=3),
+        Column(title="remark"),
+    ]
+    return Table(caption="IMO resolution MSC.137(76), 5.3.1 to 5.3.4.", columns=columns, rows=rows)

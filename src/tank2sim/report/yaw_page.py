@@ -1,0 +1,152 @@
+"""The page of the yaw rig: record and programme, energy balance, estimates by method, residuals."""
+
+from __future__ import annotations
+
+from tank2sim.identification.yaw.identify import METHODS, YawResult
+from tank2sim.identification.yaw.intervals import TERMS
+from tank2sim.report.numbers import format_number
+from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
+from tank2sim.report.yaw_charts import (
+    angle_residual_chart,
+    balance_chart,
+    energy_residual_chart,
+    estimates_chart,
+    record_chart,
+)
+
+_HOW = {
+    "energy_least_squares": "all subintervals, measured speeds",
+    "as_many_equations": "(1) and sums (2) of three parts",
+    "two_intervals": "(1) and (2), measured speeds",
+    "output_error": "(3) integrated, fitted to the angle",
+    "energy_least_squares_reference": "all subintervals, the programme's speeds",
+    "two_intervals_reference": "(1) and (2), the programme's speeds",
+}
+
+
+def yaw_page(result: YawResult) -> Page:
+    """The page of a result."""
+    names = ", ".join(record.path.name for record in result.records)
+    return Page(
+        title="Added yaw inertia by the energy method",
+        subtitle=f"{names}, in {result.medium}",
+        figures=_figures(result),
+        sections=[
+            Section(
+                heading="Estimates by method",
+                text="Inertia and dissipation of one accelerating interval. Bars are 95 % intervals of scatter; a bias "
+                "that is the same in every pair of intervals is not in them.",
+                tables=[_estimates(result)],
+                charts=[Illustration(chart=estimates_chart(result), caption="Dashed: the energy least squares.")],
+                notes=result.notes,
+            ),
+            Section(
+                heading="Energy balance",
+                text="Over each part of the intervals the work of the motor is kinetic energy plus what friction and "
+                "water take.",
+                tables=[_friction(result)],
+                charts=[
+                    Illustration(chart=balance_chart(result), caption="The mean over all pairs of intervals."),
+                    Illustration(chart=energy_residual_chart(result)),
+                ],
+            ),
+            Section(
+                heading="Record and programme",
+                text="The rate is shown where it is evaluated.",
+                charts=[Illustration(chart=record_chart(result, record)) for record in result.records],
+            ),
+            *_angle(result),
+        ],
+    )
+
+
+def _figures(result: YawResult) -> list[Figure]:
+    best = result.estimates[METHODS[0]]
+    added = result.added_inertia(METHODS[0])
+    value, error = added or (best.total_inertia_kgm2, best.inertia_error_kgm2)
+    worst = 100 * max(result.mirror)
+    two = result.estimates["two_intervals"]
+    bias = 100 * (two.bias_kgm2 or 0.0) / best.total_inertia_kgm2
+    return [
+        Figure(
+            label="Added yaw inertia" if added else "Yaw inertia",
+            value=float(f"{1e4 * value:.5g}"),
+            unit="10⁻⁴ kg m²",
+            note="energy least squares" + (f", ± {1e4 * error:.2g}" if error is not None else ""),
+        ),
+        Figure(
+            label="Dissipation B + D",
+            value=float(f"{1e4 * best.dissipation_J:.4g}"),
+            unit="10⁻⁴ J",
+            note=f"± {1e4 * (best.dissipation_error_J or 0):.2g}",
+        ),
+        Figure(
+            label="Bias of the two-interval formula",
+            value=float(f"{bias:.2g}"),
+            unit="%",
+            note="of the total inertia",
+            verdict=Verdict.CAUTION if abs(bias) > 1 else Verdict.NONE,
+        ),
+        Figure(
+            label="Mirror images differ by",
+            value=float(f"{worst:.3g}"),
+            unit="%",
+            note="of the largest rate, in the worst pair",
+        ),
+    ]
+
+
+def _estimates(result: YawResult) -> Table:
+    rows: list[list[Cell]] = []
+    for method, estimate in result.estimates.items():
+        added, error = result.added_inertia(method) or (None, None)
+        bias = estimate.bias_kgm2
+        numbers = (
+            added,
+            error,
+            estimate.total_inertia_kgm2,
+            estimate.dissipation_J,
+            estimate.dissipation_error_J,
+            bias,
+        )
+        scaled = [None if number is None else 1e4 * number for number in numbers]
+        rows.append([method.replace("_", " "), _HOW[method], *scaled])
+    heads = ("method", "how", "added inertia", "±", "total inertia", "B + D", "±", "bias")
+    units = ("", "", "10⁻⁴ kg m²", "", "10⁻⁴ kg m²", "10⁻⁴ J", "", "10⁻⁴ kg m²")
+    digits = (4, 4, 5, 3, 5, 4, 3, 3)
+    columns = [
+        Column(title=head, unit=unit, digits=count) for head, unit, count in zip(heads, units, digits, strict=True)
+    ]
+    return Table(caption="Estimates with standard errors", columns=columns, rows=rows)
+
+
+def _friction(result: YawResult) -> Table:
+    """A row for each term, a column for each method that tells it."""
+    methods = [method for method, estimate in result.estimates.items() if estimate.friction]
+    rows: list[list[Cell]] = []
+    for term in result.fit.balance.terms[1:]:
+        row: list[Cell] = [term.replace("_", " "), _UNITS[TERMS[term][1]]]
+        for method in methods:
+            value, error = result.estimates[method].friction.get(term, (None, None))
+            shown = None if value is None else format_number(1e4 * value)
+            row.append(shown if error is None else f"{shown} ± {format_number(1e4 * error, 2)}")
+        rows.append(row)
+    columns = [Column(title="term"), Column(title="unit"), *(Column(title=name.replace("_", " ")) for name in methods)]
+    return Table(caption="Friction and water, times 10⁴", columns=columns, rows=rows)
+
+
+_UNITS = {"Nm": "N m", "Nms": "N m s", "Nms2": "N m s²", "kgm2": "kg m²"}
+
+
+def _angle(result: YawResult) -> list[Section]:
+    if result.angle is None:
+        return []
+    chart = angle_residual_chart(list(result.angle.time_s), list(result.angle.residual_rad))
+    return [
+        Section(
+            heading="Nonlinear least squares",
+            text="Equation (3) integrated under the recorded current from a start of its own for each hump, less the "
+            "recorded angle.",
+            charts=[Illustration(chart=chart)],
+        )
+    ]

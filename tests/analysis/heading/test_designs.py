@@ -1,0 +1,139 @@
+"""The designs: poles where they were placed, the regulator of Riccati's equation, mixed sensitivity."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import solve_continuous_are
+
+from tank2sim.analysis.heading.control import DAMPING, SLOWNESS, heading_gains
+from tank2sim.analysis.heading.designs import (
+    SteeringPlant,
+    Weights,
+    _without_integral,
+    design_heading,
+    steering_plant,
+)
+from tank2sim.analysis.heading.margins import loop_margins
+from tank2sim.analysis.linearisation import OperatingPoint, state_space
+from tank2sim.analysis.stability.straight_line import Nomoto, stability
+from tank2sim.cards import read_card
+from tank2sim.dynamics import build
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+
+NO_SLYCOT = "slycot is not installed"
+
+
+@pytest.fixture(scope="module")
+def kvlcc2() -> Model:
+    return build(read_card("kvlcc2"))
+
+
+@settings(max_examples=20, deadline=None)
+@given(K=st.floats(0.01, 1.0), T=st.floats(5.0, 500.0), unstable=st.booleans())
+def test_the_poles_of_a_pd_are_where_they_were_placed(mariner: Model, K: float, T: float, unstable: bool) -> None:
+    K, T = (-K, -T) if unstable else (K, T)
+    found, w = stability(mariner), math.sqrt(K / T)
+    object.__setattr__(found, "nomoto", Nomoto(K, T, None, None, 0.0))
+    plant = SteeringPlant(found, w, np.zeros((4, 4)), np.zeros((4, 1)), 0.6, 0.1)
+    gains = _without_integral(plant, heading_gains(found.nomoto))
+    # psi' = r, T r' = -r - K (Kp psi + Kd r)
+    loop = [[0, 1], [-K * gains.proportional / T, -(1 + K * gains.derivative) / T]]
+    wanted = np.roots([1, 2 * DAMPING * w, w**2])
+    np.testing.assert_allclose(np.sort_complex(np.linalg.eigvals(loop)), np.sort_complex(wanted), rtol=1e-6)
+    assert gains.integral == 0.0
+
+
+@pytest.mark.parametrize("heading_deg", [5.0, 2.0])
+def test_the_regulator_is_that_of_riccati_s_equation(mariner: Model, heading_deg: float) -> None:
+    weights = Weights(heading_rad=math.radians(heading_deg), rudder_rad=math.radians(10.0))
+    gains = design_heading(mariner, "lqr", weights=weights).gains
+    plant = steering_plant(mariner)
+    w, bad = plant.frequency_radps, weights.heading_rad
+    A = np.block([[plant.A, np.zeros((4, 1))], [np.array([[0, 0, 1.0, 0, 0]])]])
+    B = np.append(plant.B, [[0.0]], axis=0)
+    Q = np.diag([0, (1 / (w * bad)) ** 2, bad**-2, 0, (SLOWNESS * w / bad) ** 2])
+    R = np.array([[weights.rudder_rad**-2]])
+    wanted = np.linalg.solve(R, B.T @ solve_continuous_are(A, B, Q, R)).ravel()
+    named = [gains[name] for name in ("Kv_radpmps", "Kd_s", "Kp", "Kdelta", "Ki_per_s")]
+    np.testing.assert_allclose(named, wanted, rtol=1e-6)
+
+
+def test_the_loop_of_the_regulator_has_the_poles_of_the_regulator_and_of_its_observer(mariner: Model) -> None:
+    design, plant = design_heading(mariner, "lqr"), steering_plant(mariner)
+    order = ("Kv_radpmps", "Kd_s", "Kp", "Kdelta", "Ki_per_s")
+    gain = np.array([[design.gains[name] for name in order]])
+    A = np.block([[plant.A, np.zeros((4, 1))], [np.array([[0, 0, 1.0, 0, 0]])]])
+    B = np.append(plant.B, [[0.0]], axis=0)
+    # The observed sway is the ship's own equation with the yaw rate as measured: its error decays as the sway does.
+    wanted = [*np.linalg.eigvals(A - B @ gain), plant.A[0, 0], plant.A[3, 3]]
+    found = loop_margins(mariner, design.autopilot).poles
+    np.testing.assert_allclose(np.sort_complex(np.array(found)), np.sort_complex(wanted), rtol=1e-5, atol=1e-8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["pd", "pid", "lqr"])
+def test_a_ship_that_is_unstable_is_held_on_her_course(kvlcc2: Model, kind: str) -> None:
+    design = design_heading(kvlcc2, kind)
+    assert not design.found.stable
+    margins = loop_margins(kvlcc2, design.autopilot)
+    assert margins.stable
+    assert 0 < margins.gain_margin_down < 0.5  # with too little gain she goes her own way
+
+
+@pytest.mark.skipif(importlib.util.find_spec("slycot") is None, reason=NO_SLYCOT)
+@pytest.mark.parametrize("name", ["mariner", "kvlcc2"])
+def test_the_robust_loop_is_robust_and_no_mode_of_it_is_slower_than_asked(name: str) -> None:
+    from tank2sim.analysis.heading.robust import SHIFT
+
+    ship = build(read_card(name))
+    design = design_heading(ship, "robust")
+    margins = loop_margins(ship, design.autopilot)
+    assert margins.sensitivity_peak < 1.7
+    assert margins.phase_margin_deg > 38
+    w = math.sqrt(design.found.nomoto.K_per_s / design.found.nomoto.T_s)
+    assert max(pole.real for pole in margins.poles) < -0.99 * SHIFT * w
+
+
+@pytest.mark.skipif(importlib.util.find_spec("slycot") is not None, reason="slycot is installed")
+def test_without_its_library_the_robust_design_is_refused_with_what_to_install(mariner: Model) -> None:
+    with pytest.raises(InputError, match=r"pip install 'tank2sim\[robust\]'"):
+        design_heading(mariner, "robust")
+
+
+def test_a_wave_filter_lets_a_tenth_of_the_waves_through_and_leaves_slow_motions_alone(mariner: Model) -> None:
+    frequency = 0.6
+    plain = design_heading(mariner).autopilot
+    filtered = design_heading(mariner, wave_filter_radps=frequency).autopilot
+    seen = {}
+    for name, pilot in (("plain", plain), ("filtered", filtered)):
+        states = [1e-6 if state == "autopilot.integral" else 0.0 for state in pilot.state_names]
+        rest = OperatingPoint(np.array(states), pilot.input_values(), pilot.parameter_values())
+        seen[name] = state_space(pilot, rest, inputs=["motion.r"], outputs=["rudder.command"])
+    waves, slow = (abs(seen["filtered"](w) / seen["plain"](w)) for w in (1j * frequency, 1e-3j * frequency))
+    assert waves == pytest.approx(0.1, rel=1e-6)
+    assert slow == pytest.approx(1.0, abs=3e-3)
+    assert loop_margins(mariner, filtered).stable
+    with pytest.raises(InputError, match="no part of the design"):
+        design_heading(mariner, "lqr", wave_filter_radps=frequency)
+
+
+def test_what_cannot_be_steered_is_told(mariner: Model) -> None:
+    with pytest.raises(InputError, match="outside the range"):
+        design_heading(mariner, speed_mps=20.0)
+    with pytest.raises(InputError, match="has no rudder"):
+        design_heading(build(read_card("wilinski-zellman")))
+    with pytest.raises(InputError, match="there is no design"):
+        design_heading(mariner, "fuzzy")
+    dead = mariner
+    for term in ("d", "ddd", "vvd", "du", "duu", "0", "0u", "0uu"):
+        for force in "YN":
+            dead = dead.substitute(f"derivatives.{force}{term}", 0 * mariner.symbol("ship.length"))
+    with pytest.raises(InputError, match=r"no effect|straight course"):
+        design_heading(dead)

@@ -1,0 +1,77 @@
+"""Response to the rudder, nonlinear characteristic and simulated spirals."""
+
+from __future__ import annotations
+
+import math
+
+import control
+import numpy as np
+import pytest
+
+from tank2sim.analysis.linearisation import straight_course
+from tank2sim.analysis.stability.response import FIRST_ORDER, GEAR, HULL, steering_responses
+from tank2sim.analysis.stability.straight_line import stability
+from tank2sim.analysis.turning.characteristic import steering_characteristic
+from tank2sim.analysis.turning.diagram import steady_turning
+from tank2sim.analysis.turning.spirals import direct_spiral, reverse_spiral
+from tests.analysis.turning.cubic_ship import LENGTH_M, N_D, N_RRR, SPEED_MPS, STABLE, UNSTABLE, cubic_ship, rudder_rad
+
+
+def responses(model):
+    found = steering_responses(model, straight_course(model), stability(model).nomoto)
+    return {one.label: one for one in found}
+
+
+def test_the_response_is_that_of_nomotos_transfer_function(mariner) -> None:
+    found, nomoto = responses(mariner), stability(mariner).nomoto
+    s = control.tf("s")
+    system = nomoto.K_per_s * (1 + nomoto.T3_s * s) / ((1 + nomoto.T1_s * s) * (1 + nomoto.T2_s * s))
+    hull = found[HULL]
+    np.testing.assert_allclose(hull.response, system(1j * hull.omega_radps), rtol=1e-8)
+    with_gear = system / (1 + 1.0 * s)  # the gear of the card lags by 1 s
+    np.testing.assert_allclose(found[GEAR].response, with_gear(1j * hull.omega_radps), rtol=1e-8)
+    first = nomoto.K_per_s / (1 + 1j * hull.omega_radps * nomoto.T_s)
+    np.testing.assert_allclose(found[FIRST_ORDER].response, first, rtol=1e-8)
+
+
+def test_a_step_comes_to_the_gain_of_a_stable_ship_and_leaves_that_of_an_unstable_one(mariner) -> None:
+    hull = responses(mariner)[HULL]
+    assert hull.step_per_s[-1] == pytest.approx(hull.gain_per_s, rel=0.01)
+    unstable = responses(cubic_ship(UNSTABLE))[HULL]
+    assert max(unstable.poles.real) > 0 > unstable.gain_per_s and unstable.step_per_s[-1] > 0
+
+
+@pytest.mark.parametrize("N_r", [STABLE, UNSTABLE])
+def test_norrbin_and_bech_of_a_cubic_ship_are_her_own_coefficients(N_r: float) -> None:
+    model = cubic_ship(N_r)
+    found = steering_characteristic(steady_turning(model))
+    assert found is not None
+    time = LENGTH_M / SPEED_MPS
+    b1, b3 = -N_r / N_D * time, -N_RRR / N_D * time**3
+    np.testing.assert_allclose(found.bech.coefficients, [0, b1, 0, b3], rtol=1e-5, atol=1e-5 * abs(b1))
+    np.testing.assert_allclose(found.n, [0, math.copysign(1, b1), 0, b3 / abs(b1)], rtol=1e-5, atol=1e-5)
+    assert found.bech.largest_rad < 1e-5 and found.norrbin.beyond_rad < 1e-5
+    assert found.K_per_s == pytest.approx(abs(stability(model).nomoto.K_per_s), rel=1e-6)
+
+
+def test_the_error_of_a_cubic_is_told_where_a_ship_is_none(mariner) -> None:
+    found = steering_characteristic(steady_turning(mariner))
+    assert found is not None
+    assert found.n[1] == 1.0 and 0.1 < math.degrees(found.bech.rms_rad) < math.degrees(found.norrbin.rms_rad) < 2
+    assert found.bech.beyond_rad > found.bech.largest_rad
+
+
+@pytest.mark.slow
+def test_spirals_lie_on_the_diagram_the_reverse_one_on_its_unstable_branch_too() -> None:
+    model = cubic_ship(UNSTABLE)
+    turning = steady_turning(model)
+    direct, reverse = direct_spiral(model, turning), reverse_spiral(model, turning, stability(model).nomoto)
+    assert reverse is not None and turning.loop is not None
+    rate = abs(turning.folds[0].yaw_rate_radps)
+    assert direct.steady.mean() > 0.8 and reverse.steady.mean() > 0.8
+    assert np.all(np.abs(direct.yaw_rate_radps) > rate)
+    assert np.all(direct.distance_radps[direct.steady] < 0.05 * rate)
+    held = np.abs(reverse.yaw_rate_radps) < rate
+    assert held.sum() >= 2 and reverse.steady[held].all()
+    expected = [rudder_rad(UNSTABLE, one) for one in reverse.yaw_rate_radps[held]]
+    np.testing.assert_allclose(reverse.rudder_rad[held], expected, atol=math.radians(0.02))

@@ -1,0 +1,77 @@
+"""``tank2sim influence`` as a user gives it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tank2sim.cards import read_card
+from tests.cli.command_line import refused, tank2sim
+
+
+def test_influence_tells_both_coefficients_of_every_parameter(tmp_path) -> None:
+    result = tank2sim(
+        *("influence", "mariner", "--figure", "criterion_C", "steady_radius_m@20", "--agreed", "Yv=0.62", "Nv=1.7"),
+        *("--json", "i.json", "--page", "i.html"),
+        cwd=tmp_path,
+    )
+    assert result.returncode == 0, result.stderr
+    found = json.loads((tmp_path / "i.json").read_text())
+    K = found["influence_percent"]["steady_radius_m@20"]["derivatives.Nd"]
+    assert K["exact"] == pytest.approx(-7.60, abs=0.01) and K["difference"] == pytest.approx(-7.11, abs=0.01)
+    assert found["figures"]["criterion_C"]["standard_error"] > 0
+    assert found["agreed"]["figures"]["criterion_C"]["direct"] == pytest.approx(-1.7, abs=0.2)
+    assert (tmp_path / "i.html").read_text().startswith("<!doctype html>")
+
+
+def test_a_tuned_card_is_written_and_read_again(tmp_path) -> None:
+    result = tank2sim(
+        *("influence", "mariner", "--tune", "steady_radius_m=640@20", "--by", "fewest", "-o", "new.toml"),
+        *("--json", "t.json"),
+        cwd=tmp_path,
+    )
+    assert result.returncode == 0, result.stderr
+    tuned = json.loads((tmp_path / "t.json").read_text())["tuned"]
+    assert tuned["reached"] is True and list(tuned["parameters"]) == ["derivatives.Nd"]
+    assert tuned["parameters"]["derivatives.Nd"]["before"] == pytest.approx(-139e-5)
+    assert read_card(tmp_path / "new.toml").derivatives["Nd"] == pytest.approx(
+        -tuned["parameters"]["derivatives.Nd"]["after"], rel=1e-9
+    )
+
+
+def test_wishes_that_contradict_each_other_are_a_finding_unless_a_card_was_asked_for(tmp_path) -> None:
+    wishes = ("influence", "mariner", "--tune", "steady_radius_m@20=640", "steady_diameter_m@20=1200")
+    told = tank2sim(*wishes, "--json", "t.json", cwd=tmp_path)
+    assert told.returncode == 0 and "contradict" in told.stdout
+    assert json.loads((tmp_path / "t.json").read_text())["tuned"]["contradiction"]
+    refused(tank2sim(*wishes, "-o", "new.toml", cwd=tmp_path), "contradict", "nearest")
+    assert not (tmp_path / "new.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["mariner", "--figure", "steady_radius"], ["steady_radius_m"]),
+        (["mariner", "--figure", "criterion_C", "--agreed", "Yq=1"], ["--agreed", "Yq"]),
+        (["mariner", "--figure", "criterion_C", "--agreed", "Yv=much"], ["--agreed", "much"]),
+        (["mariner", "--figure", "criterion_C", "--agreed", "none.toml"], ["none.toml"]),
+        (["mariner", "--tune", "criterion_C=5e-6", "--bound", "Yv=1"], ["--bound", "LOW..HIGH"]),
+        (["mariner", "--figure", "criterion_C", "-o", "x.toml"], ["--tune"]),
+        (["wilinski-zellman", "--figure", "criterion_C"], ["linear or abkowitz"]),
+        (["mariner", "--set", "derivatives.Nd=0", "--set", "derivatives.Yd=0", "--figure", "T_s"], ["straight course"]),
+    ],
+)
+def test_bad_input_ends_in_one_line_and_nothing_is_written(tmp_path, arguments, words) -> None:
+    refused(tank2sim("influence", *arguments, cwd=tmp_path), *words)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_agreed_variation_can_stand_in_a_file(tmp_path) -> None:
+    (tmp_path / "kc.toml").write_text("mass = 1.0\n[derivatives]\nYv = 0.62\nNr = 1.36\n")
+    result = tank2sim(
+        *("influence", "mariner", "--figure", "criterion_C", "--agreed", "kc.toml", "--json", "a.json"), cwd=tmp_path
+    )
+    assert result.returncode == 0, result.stderr
+    percent = json.loads((tmp_path / "a.json").read_text())["agreed"]["percent"]
+    assert percent == {"rigid_body.mass": 1.0, "derivatives.Yv": 0.62, "derivatives.Nr": 1.36}

@@ -1,0 +1,102 @@
+"""``tank2sim yaw`` as a user gives it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tank2sim.cards import ManoeuvringCard, YawRigCard, read_card
+from tests.cli.command_line import refused, tank2sim
+from tests.yaw_truth import Truth, record, written
+
+AIR = Truth(total=0.0204, coulomb=10.9e-4, viscous=7.6e-4, quadratic=0.0, stiffness=8.0, damping=12.0, humps=1)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rig")
+    truth = Truth(humps=1)
+    written(folder / "water.csv", truth, record(truth), length_m=0.67, max_current_A=1.0)
+    written(folder / "air.csv", AIR, record(AIR), medium="air")
+    return folder
+
+
+def test_json_has_the_figures_by_method(folder):
+    ended = tank2sim("yaw", "water.csv", "air.csv", "--json", "y.json", cwd=folder)
+    assert ended.returncode == 0 and "J_zz" in ended.stdout, ended.stderr
+    found = json.loads((folder / "y.json").read_text())
+    assert found["added_inertia_kgm2"]["energy_least_squares"] == pytest.approx(0.03, rel=0.01)
+    assert found["dissipation_J"]["output_error"] == pytest.approx(8.497e-4, rel=0.01)
+    assert found["added_inertia_kgm2"].keys() == found["dissipation_J"].keys() == found["methods"].keys()
+    assert found["methods"]["two_intervals"]["bias_against_least_squares_kgm2"] < -1e-4
+
+
+def test_a_ships_card_gets_nrdot_with_its_uncertainty_and_the_old_value_in_a_comment(folder):
+    ended = tank2sim("yaw", "water.csv", "air.csv", "--card", "mariner", "-o", "ship.toml", cwd=folder)
+    assert ended.returncode == 0, ended.stderr
+    new, old = read_card(folder / "ship.toml"), read_card("mariner")
+    assert isinstance(new, ManoeuvringCard) and isinstance(old, ManoeuvringCard)
+    assert new.derivatives["Nrdot"] == pytest.approx(-0.03 / (500 * 0.67**5), rel=0.01)
+    assert 0 < new.uncertainty["Nrdot"] < 0.05 * abs(new.derivatives["Nrdot"])
+    assert {**new.derivatives, "Nrdot": 0} == {**old.derivatives, "Nrdot": 0}
+    (line,) = [line for line in new.text.splitlines() if line.startswith("Nrdot") and "was" in line]
+    assert "was -43.8e-5" in line
+
+
+def test_without_a_ship_the_rig_gets_a_card(folder):
+    ended = tank2sim("yaw", "water.csv", "--inertia-kgm2", "0.0204", "-o", "rig.toml", cwd=folder)
+    assert ended.returncode == 0, ended.stderr
+    card = read_card(folder / "rig.toml")
+    assert isinstance(card, YawRigCard)
+    assert card.yaw_rig.added_inertia_kgm2 == pytest.approx(0.03, rel=0.01)
+    assert card.yaw_rig.quadratic_Nms2 == pytest.approx(0.0381, rel=0.05)
+    again = tank2sim("yaw", "water.csv", "air.csv", "--rig", "rig.toml", cwd=folder)
+    assert again.returncode == 0, again.stderr
+
+
+def test_k_t_comes_from_a_body_of_known_inertia(folder):
+    ended = tank2sim(
+        *("yaw", "water.csv", "--inertia-kgm2", "0.0204", "--json", "k.json"),
+        *("--reference", "air.csv", "--reference-inertia-kgm2", "0.0408"),
+        cwd=folder,
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert json.loads((folder / "k.json").read_text())["torque_constant_NmpA"] == pytest.approx(0.102, rel=0.005)
+
+
+@pytest.mark.slow
+def test_the_page_stands_alone(folder):
+    ended = tank2sim("yaw", "water.csv", "air.csv", "--page", "yaw.html", cwd=folder)
+    assert ended.returncode == 0, ended.stderr
+    page = (folder / "yaw.html").read_text()
+    for words in ("Energy balance", "Estimates by method", "Residuals", "two intervals", "water.csv"):
+        assert words in page
+    assert "http://" not in page.split("<script")[0]
+
+
+def test_a_record_can_be_simulated_from_a_card_and_gives_its_inertia(folder):
+    ended = tank2sim("yaw", "rig.csv", "--simulate", "alyshev", "--noise", "0.003", "--json", "s.json", cwd=folder)
+    assert ended.returncode == 0, ended.stderr
+    found = json.loads((folder / "s.json").read_text())
+    assert found["added_inertia_kgm2"]["energy_least_squares"] == pytest.approx(302.0e-4, rel=0.01)
+    assert found["added_inertia_kgm2"]["two_intervals_reference"] < 275e-4  # biased, and told
+    assert any("two-interval" in note for note in found["notes"])
+    refused(tank2sim("yaw", "rig.csv", "--simulate", "alyshev", cwd=folder), "rig.csv", "already")
+    refused(tank2sim("yaw", "a.csv", "b.csv", "--simulate", "alyshev", cwd=folder), "--simulate", "2 records")
+    refused(tank2sim("yaw", "a.csv", "--simulate", "mariner", cwd=folder), "model.kind", "yaw rig")
+
+
+def test_bad_input_is_one_line(folder):
+    refused(tank2sim("yaw", "none.csv", cwd=folder), "none.csv", "no such file")
+    refused(tank2sim("yaw", "water.csv", "--card", "mariner", cwd=folder), "--card", "-o")
+    refused(tank2sim("yaw", "water.csv", "--mirror-percent", "0.1", cwd=folder), "no mirror images", "%")
+    refused(tank2sim("yaw", "water.csv", "-o", "x.toml", "--card", "mariner", cwd=folder), "--inertia-kgm2")
+    refused(tank2sim("yaw", "air.csv", "-o", "x.toml", "--card", "mariner", cwd=folder), "records in water")
+    refused(tank2sim("yaw", "water.csv", "--reference", "air.csv", cwd=folder), "--reference-inertia-kgm2")
+    refused(tank2sim("yaw", "water.csv", "--rig", "mariner", cwd=folder), "model.kind")
+    asked = ("--inertia-kgm2", "0.0204", "-o", "x.toml", "--card", "wilinski-zellman")
+    refused(tank2sim("yaw", "water.csv", *asked, cwd=folder), "N_rdot")
+    refused(tank2sim("yaw", "water.csv", "--inertia-kgm2", "0.9", "-o", "x.toml", "--card", "mariner", cwd=folder),
+            "negative")  # fmt: skip
+    assert not (folder / "x.toml").exists()

@@ -1,0 +1,99 @@
+"""The equations of the steering models against the paper's own, written out by hand, and their motion in time."""
+
+from __future__ import annotations
+
+import math
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from tank2sim.dynamics.steering_models import STEERING_FORMS, steering_model
+from tank2sim.simulation.manoeuvres import Turn
+from tank2sim.simulation.run import simulate
+
+BETA, R, DELTA = 0.3, 0.4, 0.35
+C = {
+    "C_y_b": 1.0,
+    "C_y_w": 2.0,
+    "C_y_bb": 3.0,
+    "C_y_d": 5.0,
+    "C_m_b": 7.0,
+    "C_m_w": 11.0,
+    "C_m_bbw": 13.0,
+    "C_m_d": 17.0,
+}
+
+
+def _rates(name: str, values: dict[str, float], beta: float, r: float, delta: float) -> tuple[float, float]:
+    found = STEERING_FORMS[name].rates({k: ca.SX(v) for k, v in values.items()}, ca.SX(beta), ca.SX(r), ca.SX(delta))
+    return float(found[0]), float(found[1])
+
+
+@pytest.mark.parametrize("name", ["base", "pavlenko", "sobolev"])
+def test_equation_1_is_that_of_the_paper(name: str) -> None:
+    """Signs of (1): -(C_y^b beta + C_y^bb beta |beta|) + C_y^w r + C_y^d delta, and its second line."""
+    values = {**C, "C_m_ww": 0.0, "C_m_wwb": 0.0}
+    sway, yaw = _rates(name, values, BETA, R, DELTA)
+    assert sway == pytest.approx(-(1 * 0.3 + 3 * 0.09) + 2 * 0.4 + 5 * 0.35)
+    assert yaw == pytest.approx(-(11 + 13 * 0.09) * 0.4 + 7 * 0.3 + 17 * 0.35)
+
+
+@pytest.mark.parametrize("name", list(STEERING_FORMS))
+def test_a_model_turns_alike_to_both_sides(name: str) -> None:
+    values = {one.name: 0.5 + 0.1 * n for n, one in enumerate(STEERING_FORMS[name].coefficients)}
+    here, there = _rates(name, values, BETA, R, DELTA), _rates(name, values, -BETA, -R, -DELTA)
+    assert here == pytest.approx([-one for one in there])
+
+
+@pytest.mark.parametrize("name", list(STEERING_FORMS))
+def test_every_coefficient_of_a_form_acts(name: str) -> None:
+    form = STEERING_FORMS[name]
+    values = {one.name: 0.5 + 0.1 * n for n, one in enumerate(form.coefficients)}
+    base = _rates(name, values, BETA, R, DELTA)
+    for one in form.coefficients:
+        assert _rates(name, {**values, one.name: 7.0}, BETA, R, DELTA) != pytest.approx(base), one.name
+    assert set(form.rudder) | set(form.static_moment) | set(form.damping) <= {one.name for one in form.coefficients}
+
+
+def test_the_transient_is_that_of_an_independent_integrator() -> None:
+    """beta' = Y v/L, omega' = N (v/L)^2 by scipy, beta and heading after 200 s of 20 deg."""
+    length, speed, rudder = 150.0, 7.5, math.radians(20)
+    values = {"C_y_b": 0.42, "C_y_w": 0.33, "C_y_bb": 0.5, "C_y_d": 0.16}
+    values |= {"C_m_b": 3.2, "C_m_w": 2.8, "C_m_bbw": 7.5, "C_m_d": 1.6}
+    per = speed / length
+
+    def rates(_: float, state: np.ndarray) -> list[float]:
+        beta, omega, psi, _x, _y = state
+        r = omega / per
+        sway = -0.42 * beta - 0.5 * beta * abs(beta) + 0.33 * r + 0.16 * rudder
+        yaw = 3.2 * beta - (2.8 + 7.5 * beta**2) * r + 1.6 * rudder
+        course = psi - beta  # the bow points into the turn
+        return [sway * per, yaw * per**2, omega, speed * math.cos(course), speed * math.sin(course)]
+
+    truth = solve_ivp(rates, (0, 200), [0.0] * 5, rtol=1e-10, atol=1e-12).y[:, -1]
+    run = simulate(
+        steering_model("made up", STEERING_FORMS["base"], values, length, speed),
+        Turn(rudder),
+        duration_s=200,
+        parameters={"initial.rudder_angle": rudder},
+    ).trajectory
+    for name, value in zip(("motion.beta", "motion.r", "motion.psi"), truth, strict=False):
+        assert run[name][-1] == pytest.approx(value, rel=1e-6), name
+    assert (run["motion.x"][-1], run["motion.y"][-1]) == pytest.approx(tuple(truth[3:]), abs=0.01)
+    assert run["motion.v"][-1] < 0 < run["motion.r"][-1]
+
+
+def test_a_coefficient_that_is_missing_or_unknown_is_named() -> None:
+    with pytest.raises(ValueError, match="C_m_d"):
+        steering_model("ship", STEERING_FORMS["base"], {k: v for k, v in C.items() if k != "C_m_d"}, 100, 5)
+    with pytest.raises(ValueError, match="C_q"):
+        steering_model("ship", STEERING_FORMS["base"], {**C, "C_q": 1.0}, 100, 5)
+
+
+def test_the_catalogue_says_what_is_not_published() -> None:
+    assert set(STEERING_FORMS) == {"base", "inoue-hirano", "pavlenko", "sobolev"}
+    assert all(form.missing and form.source for form in STEERING_FORMS.values())
+    assert any("Table" in words for words in STEERING_FORMS["base"].missing)
+    assert any("curve 3" in words for words in STEERING_FORMS["inoue-hirano"].missing)

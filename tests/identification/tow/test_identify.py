@@ -1,0 +1,207 @@
+"""The whole identification from tows: results, what is warned of, what is refused."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tank2sim.bundled import bundled
+from tank2sim.cards import read_card
+from tank2sim.dynamics.surge import SurgeCoefficients
+from tank2sim.errors import InputError
+from tank2sim.identification.tow.identify import identify_tow, parse_terms
+from tank2sim.identification.tow.output_error import simulated_speeds
+from tank2sim.records.tows import Tows, read_tows
+
+# what the paper prints as its solution, which is none of its own equations (papers.md 1.5)
+PRINTED = np.array([2550.0, 92418.0, -26096.0, 2015.0])
+
+
+@pytest.fixture(scope="module")
+def table_1():
+    return read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
+
+
+@pytest.fixture(scope="module")
+def four_unknowns(table_1):
+    return identify_tow(table_1)
+
+
+@pytest.fixture(scope="module")
+def two_unknowns(table_1):
+    return identify_tow(table_1, terms=("B3",))
+
+
+def synthetic(coefficients, times, *, tows=5, scatter=0.0, force=11.63):
+    rng = np.random.default_rng(11)
+    readings = simulated_speeds(coefficients, force, times)[:, None] + scatter * rng.standard_normal((len(times), tows))
+    readings[times == 0] = 0
+    names = tuple(f"speed_{k}_mps" for k in range(1, tows + 1))
+    return Tows(Path("synthetic.csv"), names, times, readings)
+
+
+def test_the_paper_and_qr_agree_and_differ_from_the_printed_solution(four_unknowns):
+    paper, qr = four_unknowns.fits["paper"], four_unknowns.fits["qr"]
+    np.testing.assert_allclose(paper.values, qr.values, rtol=1e-8)
+    assert paper.values[0] == pytest.approx(2857, abs=0.5)  # papers.md 1.7, true means
+    assert np.all(np.abs(qr.values / PRINTED - 1) > 0.1)
+
+
+def test_added_mass_is_total_mass_less_that_of_the_body(two_unknowns):
+    for fit in two_unknowns.fits.values():
+        assert fit.added_mass_kg == fit.coefficients.total_mass_kg - 2243.0
+        assert fit.estimates["added_mass_kg"] == fit.added_mass_kg
+
+
+def test_terms_left_out_are_zero_in_the_coefficients(two_unknowns):
+    coefficients = two_unknowns.fits["output_error"].coefficients
+    assert coefficients.B1_kgs2pm3 == 0
+    assert coefficients.B2_kgspm2 == 0
+    assert coefficients.B3_kgpm == pytest.approx(97, abs=0.5)
+    assert set(two_unknowns.fits["qr"].estimates) == {"total_mass_kg", "B3_kgpm", "added_mass_kg"}
+
+
+def test_warnings_on_table_1_with_four_unknowns(four_unknowns):
+    text = "\n".join(four_unknowns.warnings)
+    expected = [
+        r"M, B1, B2, B3 cannot all be identified from these tows: .* 2.2e\+04 \(qr\) and 5.8e\+05 \(output_error\)",
+        r"take fewer terms \(--terms B3\)",
+        r"qr: almost fully correlated are B1 and B2",
+        r"qr: the drag terms have opposite signs \(B2 negative\)",
+        r"output_error: the drag is negative over \d+ % of the speeds up to 0.176 m/s",
+        r"qr: 4 unknowns are drawn from the 3 coefficients of a speed polynomial of degree 2",
+        r"qr and output_error differ in M by 1.19e\+03 kg",
+    ]
+    for sentence in expected:
+        assert re.search(sentence, text), sentence
+    assert all(warning.endswith(".") for warning in four_unknowns.warnings)
+
+
+def test_three_unknowns_are_still_too_many(table_1):
+    text = "\n".join(identify_tow(table_1, terms=("B3", "B2")).warnings)
+    assert "M, B2, B3 cannot all be identified" in text
+    assert "output_error: not to be told from zero at 95 %: B2" in text
+
+
+def test_two_unknowns_only_show_the_late_start(two_unknowns):
+    (warning,) = two_unknowns.warnings
+    assert warning.startswith("output_error: (1.5) does not follow the tows within their scatter: at 10 s it is")
+    assert "too fast; a late start" in warning
+
+
+def test_tows_that_follow_the_model_give_no_warning_and_their_coefficients():
+    truth = SurgeCoefficients(total_mass_kg=3000.0, B3_kgpm=150.0)
+    tows = synthetic(truth, np.arange(0, 81, 5.0), scatter=0.001)
+    result = identify_tow(tows, 11.63, 2243.0, terms=("B3",), speed_degree=4)
+    assert result.warnings == ()
+    for name in ("qr", "output_error"):
+        fit = result.fits[name]
+        errors = fit.standard_errors
+        assert abs(fit.values[0] - 3000) < 3 * errors["total_mass_kg"] < 150
+        assert abs(fit.values[1] - 150) < 3 * errors["B3_kgpm"] < 45
+
+
+def test_a_polynomial_that_cannot_follow_the_speed_is_told():
+    truth = SurgeCoefficients(total_mass_kg=3000.0, B3_kgpm=150.0)
+    tows = synthetic(truth, np.arange(0, 401, 5.0), scatter=0.001)
+    warnings = identify_tow(tows, 11.63, 2243.0, terms=("B3",)).warnings
+    assert any("a speed polynomial of degree 2 does not follow the tows" in warning for warning in warnings)
+
+
+def test_a_body_lighter_than_said_has_negative_added_mass(table_1):
+    warnings = identify_tow(table_1, mass_kg=4000.0, terms=("B3",)).warnings
+    assert any("the added mass is negative" in warning for warning in warnings)
+
+
+def test_what_is_given_comes_before_the_file_and_is_told(table_1):
+    result = identify_tow(table_1, 2 * 11.63, terms=("B3",))
+    # (1.5) is linear in the force: twice the force with the same speeds gives twice of everything
+    reference = identify_tow(table_1, terms=("B3",))
+    for name, fit in result.fits.items():
+        np.testing.assert_allclose(fit.values, 2 * reference.fits[name].values, rtol=1e-6)
+    assert "The file of the tows says force_N 11.63, and 23.26 was given and used." in result.warnings
+
+
+def test_largest_speed_error_is_that_of_the_integrated_model(two_unknowns, table_1):
+    fit = two_unknowns.fits["output_error"]
+    mass, b3 = fit.values
+    closed = np.sqrt(11.63 / b3) * np.tanh(table_1.time_s * np.sqrt(11.63 * b3) / mass)
+    expected = np.max(np.abs(closed - table_1.mean_speed_mps))
+    assert fit.largest_speed_error_mps == pytest.approx(expected, rel=1e-9)
+
+
+def test_json_has_methods_with_units_in_names_and_warnings(four_unknowns):
+    content = json.loads(json.dumps(four_unknowns.as_json(), allow_nan=False))
+    assert set(content["methods"]) == {"paper", "qr", "output_error"}
+    paper = content["methods"]["paper"]
+    assert list(paper["estimates"]) == ["total_mass_kg", "B1_kgs2pm3", "B2_kgspm2", "B3_kgpm", "added_mass_kg"]
+    assert paper["standard_errors"] == {}
+    assert content["methods"]["qr"]["standard_errors"].keys() == paper["estimates"].keys()
+    assert paper["condition"] > paper["condition_scaled"] > 1e4
+    assert paper["J"] == pytest.approx(0.444, abs=5e-4)
+    assert content["warnings"] == list(four_unknowns.warnings)
+    assert content["readings"] == 53
+
+
+def test_the_bundled_card_holds_the_output_error_fit(two_unknowns):
+    card = read_card("wilinski-zellman")
+    fit = two_unknowns.fits["output_error"]
+    assert card.surge.total_mass_kg == pytest.approx(fit.coefficients.total_mass_kg, abs=0.5)
+    assert card.surge.B3_kgpm == pytest.approx(fit.coefficients.B3_kgpm, abs=0.05)
+    assert (card.surge.B1_kgs2pm3, card.surge.B2_kgspm2) == (0, 0)
+    assert card.uncertainty["total_mass_kg"] == pytest.approx(fit.standard_errors["total_mass_kg"], abs=0.05)
+    assert card.uncertainty["B3_kgpm"] == pytest.approx(fit.standard_errors["B3_kgpm"], abs=0.05)
+    assert card.surge.force_N == two_unknowns.force_N
+    assert card.surge.dry_mass_kg == two_unknowns.mass_kg
+    assert card.model.valid_speed_mps == (0.0, two_unknowns.tows.top_speed_mps)
+
+
+def test_terms_from_text():
+    assert parse_terms("B3,B2,B1") == ("B1", "B2", "B3")
+    assert parse_terms(" B3 ") == ("B3",)
+    assert parse_terms("none") == ()
+    with pytest.raises(InputError, match="--terms: there is no drag term 'B4'; take any of"):
+        parse_terms("B3,B4")
+    with pytest.raises(InputError, match="--terms: B3 stands twice"):
+        parse_terms("B3,B3")
+
+
+@pytest.mark.parametrize(
+    ("force", "mass", "said"),
+    [
+        (None, 1.0, "does not tell force_N; give --force-N, or add a line '# force_N: VALUE'"),
+        (1.0, None, "does not tell mass_kg; give --mass-kg"),
+        (0.0, 1.0, "--force-N: is 0; a positive number was expected"),
+        (1.0, float("nan"), "--mass-kg: is nan; a positive number was expected"),
+    ],
+)
+def test_force_and_mass_must_be_known_and_positive(table_1, force, mass, said):
+    with pytest.raises(InputError, match=re.escape(said)):
+        identify_tow(replace(table_1, force_N=None, mass_kg=None), force, mass)
+
+
+def speeds_of(function):
+    times = np.arange(0, 51, 5.0)
+    return Tows(Path("tow.csv"), ("speed_1_mps",), times, np.array([[function(t)] for t in times]))
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        (lambda t: 0.0, "tow.csv: no tow has a speed above zero"),
+        (lambda t: -0.01 * t, "tow.csv: no tow has a speed above zero"),
+        (lambda t: 0.3, "tow.csv: the speed does not change"),
+    ],
+)
+def test_tows_that_tell_nothing_are_refused(function, said):
+    with pytest.raises(InputError, match=re.escape(said)):
+        identify_tow(speeds_of(function), 11.63, 2243.0)
+
+
+def test_too_few_readings_are_refused():
+    tows = synthetic(SurgeCoefficients(total_mass_kg=3000.0), np.arange(0, 20, 5.0), tows=1)
+    with pytest.raises(InputError, match=r"3 readings after the release do not test .*; give more readings"):
+        identify_tow(tows, 11.63, 2243.0)

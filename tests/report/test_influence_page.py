@@ -1,0 +1,33 @@
+from __future__ import annotations
+
+import re
+
+from tank2sim.analysis.influence.figures import parse_figure
+from tank2sim.analysis.influence.of_card import influence
+from tank2sim.analysis.influence.study import Study
+from tank2sim.analysis.tuning.result import Means
+from tank2sim.analysis.tuning.tune import tune
+from tank2sim.analysis.tuning.wishes import parse_wish
+from tank2sim.cards import read_card
+from tank2sim.report.influence_charts import influence_charts, most_influential
+from tank2sim.report.influence_page import influence_page
+from tank2sim.report.page import render_page
+
+TEXTS = ("criterion_C", "steady_radius_m@20", "steady_drift_deg@20", "K_prime", "T_prime")
+
+
+def test_the_page_has_every_parameter_both_coefficients_and_the_tuning() -> None:
+    wish = parse_wish("steady_radius_m@20=640")
+    study = Study(read_card("mariner"), [parse_figure(text) for text in TEXTS])
+    result = influence(study, {"Yv": 1.0, "Nr": 2.0})
+    tuned = tune(study, [wish], Means())
+    page = influence_page(result, tuned, study.figures_at(tuned.values))
+    html = render_page(page)
+    assert html == render_page(page)
+    text = re.sub(r"<script.*?</script>", "", html, flags=re.DOTALL)
+    assert all(one.short in text for one in study.parameters)
+    assert "Agreed variation" in text and "640" in text and "passed" in text
+    charts = influence_charts(result)
+    assert [len(chart.hconcat) for chart in charts] == [3, 2]
+    # Nr has the largest K on the criterion with Yv, Nd that on the radius: they stand at the top.
+    assert {result.parameters[place].short for place in most_influential(result)[:4]} >= {"Nd", "Nr", "Yv"}
