@@ -42,11 +42,22 @@ def from_si(name: str, value: float) -> float:
     return value / factor
 
 
-_WORDS = {"m": "m", "s": "s", "deg": "deg", "degps": "deg/s", "mps": "m/s", "percent": "%", "lengths": "L"}
+_WORDS = {
+    "m": "m",
+    "s": "s",
+    "deg": "deg",
+    "degps": "deg/s",
+    "degpmin": "deg/min",
+    "mps": "m/s",
+    "percent": "%",
+    "lengths": "L",
+}
 
 
 def in_words(name: str) -> tuple[str, str]:
     """Words and unit of a figure's name for a reader: ``("steady_rate_degps")`` is ``("steady rate", "deg/s")``."""
+    if name.endswith("_per_s"):
+        return name.removesuffix("_per_s").replace("_", " "), "1/s"
     stem, _, suffix = name.rpartition("_")
     words, unit = (stem, _WORDS[suffix]) if stem and suffix in _WORDS else (name, "")
     return words.replace("_", " "), unit

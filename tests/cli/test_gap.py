@@ -57,7 +57,7 @@ def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[tuple[object,
     ):
         calls: list[tuple[object, ...]] = []
 
-        def find_gap(card, fitted, held, options, progress) -> Gap:
+        def find_gap(card, fitted, held, options, progress, executor=None) -> Gap:
             calls.append((card, fitted, held, options))
             progress("looking")
             if fails is not None:
@@ -120,6 +120,7 @@ def test_a_current_is_written_into_a_card_a_page_and_json(folder: Path, tmp_path
     assert again.returncode == 0, again.stderr
 
 
+@pytest.mark.slow
 def test_a_faulty_sensor_leaves_the_card_and_corrects_the_trials(folder: Path, tmp_path: Path, finding) -> None:
     finding((BIAS,))
     before = {name: (folder / name).read_bytes() for name in ("turn20.csv", "turn-35.csv")}

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
+from tank2sim.cards.covariance import read_covariance
 from tests.identification.trials.made_up_ship import CARD, TRUTH, trial, turn, zigzag
 
 from .command_line import refused, tank2sim
@@ -116,6 +117,8 @@ def test_a_term_that_is_held_stays_as_the_card_has_it(folder: Path) -> None:
     assert after.derivatives["Nr"] != before.derivatives["Nr"]
     assert after.model.valid_speed_mps is not None and after.model.valid_speed_mps[1] > 4.9
     assert "# Identified by tank2sim" in after.text.splitlines()[0]
+    beside = read_covariance(after)  # which it refuses if its standard errors are not those of the card
+    assert beside is not None and "derivatives.Nr" in beside.names
     refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--hold", "Nope", cwd=folder), "--hold", "Nope")
 
 

@@ -12,12 +12,14 @@ from tests.cli.command_line import refused, tank2sim
 
 def test_influence_tells_both_coefficients_of_every_parameter(tmp_path) -> None:
     result = tank2sim(
-        *("influence", "mariner", "--figure", "criterion_C", "steady_radius_m@20", "--agreed", "Yv=0.62", "Nv=1.7"),
+        *("influence", "mariner", "--figure", "criterion_C", "steady_radius_m@20", "K_per_s", "T_s", "K_prime"),
+        *("--agreed", "Yv=0.62", "Nv=1.7"),
         *("--json", "i.json", "--page", "i.html"),
         cwd=tmp_path,
     )
     assert result.returncode == 0, result.stderr
     found = json.loads((tmp_path / "i.json").read_text())
+    assert "…" not in result.stdout and result.stdout.count("K %") == 2  # no digits are cut
     K = found["influence_percent"]["steady_radius_m@20"]["derivatives.Nd"]
     assert K["exact"] == pytest.approx(-7.60, abs=0.01) and K["difference"] == pytest.approx(-7.11, abs=0.01)
     assert found["figures"]["criterion_C"]["standard_error"] > 0
@@ -58,6 +60,15 @@ def test_wishes_that_contradict_each_other_are_a_finding_unless_a_card_was_asked
         (["mariner", "--figure", "criterion_C", "--agreed", "none.toml"], ["none.toml"]),
         (["mariner", "--tune", "criterion_C=5e-6", "--bound", "Yv=1"], ["--bound", "LOW..HIGH"]),
         (["mariner", "--figure", "criterion_C", "-o", "x.toml"], ["--tune"]),
+        (["mariner", "--figure", "criterion_C", "--hold", "Foo"], ["--hold", "--tune"]),
+        (["mariner", "--figure", "criterion_C", "--bound", "Nr=0..1"], ["--bound", "--tune"]),
+        (["mariner", "--tune", "K_per_s=0.2", "--bound", "Nr=1..0"], ["--bound", "LOW below HIGH"]),
+        (["mariner", "--tune", "steady_radius_m=-5@20"], ["--tune", "no ship has"]),
+        (["mariner", "--through", "35@35", "20@-3", "--hold", "Nr"], ["--hold", "--through"]),
+        (
+            ["mariner", "--through", "35@35", "20@-3"],
+            ["35 deg/min to starboard", "20 deg/min to port at 3 deg to port"],
+        ),
         (["wilinski-zellman", "--figure", "criterion_C"], ["linear or abkowitz"]),
         (["mariner", "--set", "derivatives.Nd=0", "--set", "derivatives.Yd=0", "--figure", "T_s"], ["straight course"]),
     ],

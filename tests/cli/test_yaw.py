@@ -79,12 +79,37 @@ def test_a_record_can_be_simulated_from_a_card_and_gives_its_inertia(folder):
     ended = tank2sim("yaw", "rig.csv", "--simulate", "alyshev", "--noise", "0.003", "--json", "s.json", cwd=folder)
     assert ended.returncode == 0, ended.stderr
     found = json.loads((folder / "s.json").read_text())
+    assert found["body_inertia_standard_error_kgm2"] == pytest.approx(9.2e-4)  # the card's
     assert found["added_inertia_kgm2"]["energy_least_squares"] == pytest.approx(302.0e-4, rel=0.01)
     assert found["added_inertia_kgm2"]["two_intervals_reference"] < 275e-4  # biased, and told
     assert any("two-interval" in note for note in found["notes"])
     refused(tank2sim("yaw", "rig.csv", "--simulate", "alyshev", cwd=folder), "rig.csv", "already")
     refused(tank2sim("yaw", "a.csv", "b.csv", "--simulate", "alyshev", cwd=folder), "--simulate", "2 records")
     refused(tank2sim("yaw", "a.csv", "--simulate", "mariner", cwd=folder), "model.kind", "yaw rig")
+
+
+def test_a_run_in_air_can_be_simulated_and_gives_j(folder):
+    asked = ("--simulate", "alyshev", "--medium", "air", "--json", "air.json")
+    ended = tank2sim("yaw", "dry.csv", *asked, cwd=folder)
+    assert ended.returncode == 0, ended.stderr
+    found = json.loads((folder / "air.json").read_text())
+    assert found["medium"] == "air" and found["body_inertia_kgm2"] is None
+    total = found["methods"]["energy_least_squares"]
+    assert total["total_inertia_kgm2"] == pytest.approx(179.6e-4, rel=0.01)
+    # The one run by the adaptive controller saturates the motor, and that is said.
+    refused(tank2sim("yaw", "six.csv", "--simulate", "alyshev", "--controller", "adaptive", cwd=folder), "saturates")
+    refused(tank2sim("yaw", "dry.csv", "--medium", "air", cwd=folder), "--simulate")
+
+
+def test_theory_stands_beside_the_record(folder):
+    ended = tank2sim("yaw", "water.csv", "--theory", "0.685,0.2,0.1,0.24,0.49", "--json", "t.json", cwd=folder)
+    assert ended.returncode == 0 and "reproduces" in ended.stdout, ended.stderr
+    rows = {row["formula"]: row for row in json.loads((folder / "t.json").read_text())["theory"]}
+    assert rows["(9)"]["value_kgm2"] == pytest.approx(797.1e-4, rel=1e-3)  # papers.md 3.3
+    assert rows["(8) accelerating"]["value_kgm2"] == pytest.approx(1078.9e-4, rel=1e-3)
+    assert rows["(9)"]["printed_kgm2"] == pytest.approx(797.6e-4)
+    for text in ("0.67,0.2", "0.67,0.2,0.08,x", "0.67,0.2,0.08,0.22,47", "mariner"):
+        refused(tank2sim("yaw", "water.csv", "--theory", text, cwd=folder), "--theory")
 
 
 def test_bad_input_is_one_line(folder):

@@ -67,3 +67,13 @@ def test_7_outside_its_axes_and_8_without_block_are_refused():
         theory.ratio_by_7(3.35, 1.0)
     with pytest.raises(ValueError, match="block coefficient"):
         theory.added_inertia_by_8(theory.ELLIPSOID, TOP, "braking")
+
+
+def test_the_table_of_theory_tells_what_reproduces():
+    rows = {own.formula: own for own in theory.theory_values(theory.SHIP_T2, 0.2618)}
+    assert rows["(9)"].remark.startswith("the paper's number reproduces")
+    assert rows["(8) braking"].remark.startswith("the paper's number does not")
+    (only,) = theory.theory_values(theory.ELLIPSOID, 0.2618)
+    assert only.value_kgm2 == pytest.approx(812.7e-4, rel=1e-3) and only.printed_kgm2 == pytest.approx(509.7e-4)
+    deep = theory.FloatingBody(length_m=0.67, beam_m=0.1, draught_m=0.08, depth_m=0.22)
+    assert theory.theory_values(deep, 0.2618)[0].formula == "Lamb"

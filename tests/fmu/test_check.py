@@ -123,6 +123,7 @@ def test_an_fmu_of_another_ship_is_told_by_its_variables(
     assert "parameter drag of the FMU is not in the model" in report.differences
 
 
+@pytest.mark.slow
 def test_a_library_that_fails_is_a_failed_check(hull: Model, tmp_path: Path) -> None:
     weak = with_start(hull, "derivatives.thrust", 1e308)
     write_fmu(with_start(weak, "derivatives.drag", -1e308), tmp_path / "x.fmu")
@@ -235,6 +236,7 @@ def test_a_library_that_cannot_be_used_is_a_failed_check(
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("end", "told"), [("abort()", "SIGABRT"), ("exit(0)", "exit code 0")])
 def test_a_library_that_ends_its_process_is_a_failed_check(
     end: str, told: str, hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -68,6 +68,7 @@ def test_no_path_of_this_machine_is_in_the_library(fmi: int, unpacked: Callable[
     assert str(Path.cwd()).encode() not in content
 
 
+@pytest.mark.slow
 def test_the_token_tells_contents_apart(models: dict[str, Model], tmp_path: Path) -> None:
     body = models["body"]
     heavier = replace(body, parameters=replace_start(body, "drag", 0.06))
@@ -87,6 +88,7 @@ def replace_start(model: Model, name: str, start: float) -> tuple[Parameter, ...
     return tuple(changed)
 
 
+@pytest.mark.slow
 def test_times_are_those_of_source_date_epoch(
     models: dict[str, Model], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

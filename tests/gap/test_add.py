@@ -136,6 +136,7 @@ def test_several_have_the_model_that_was_fitted_in_either_order(other: str) -> N
         assert len(improved.effects) == (4 if names[-1] in BUILT_ON_DERIVATIVES else 1)
 
 
+@pytest.mark.slow
 def test_the_list_of_effects_built_on_derivatives_is_complete() -> None:
     """An effect that does another thing when derivatives are changed before it is on the list."""
     card = read(CARDS["total"])

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 
 from tank2sim.records.audit import audit, estimated_noise, mended
+from tank2sim.records.audit.rudder import rudder_response
 from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import select_rows
+from tank2sim.simulation.manoeuvres import parse_manoeuvre
+from tank2sim.simulation.run import simulate
 from tests.records.motions import NOISE, NONE, motion, trial
 
 DEG = np.pi / 180
@@ -327,3 +330,14 @@ def test_velocities_of_the_opposite_sign_are_a_fault():
     signals = {**right.signals, "u_mps": -right.signals["u_mps"], "v_mps": -right.signals["v_mps"]}
     found = [one for one in audit(replace(right, signals=signals)) if one.kind == "fault"]
     assert [one.likely_truth for one in found] == ["both are of the opposite sign"]
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("every", [5, 10, 20])
+def test_the_side_of_the_rudder_is_told_by_a_turn_recorded_from_its_execute(every, sign, mariner) -> None:
+    run = simulate(mariner, parse_manoeuvre("turn:35"), duration_s=300.0).trajectory
+    names = {"delta_rad": "rudder.angle", "u_mps": "motion.u", "r_radps": "motion.r", "psi_rad": "motion.psi"}
+    signals = {"t_s": run.t[::every], **{name: np.asarray(run[of])[::every] for name, of in names.items()}}
+    noise = {"u_mps": 0.03, "r_radps": np.radians(0.01), "psi_rad": np.radians(0.1)}
+    record = trial({**signals, "delta_rad": sign * signals["delta_rad"]}, noise=noise)
+    assert np.sign(rudder_response(record)) == sign

@@ -13,7 +13,7 @@ from tank2sim.report.influence_charts import influence_charts, most_influential
 from tank2sim.report.influence_page import influence_page
 from tank2sim.report.page import render_page
 
-TEXTS = ("criterion_C", "steady_radius_m@20", "steady_drift_deg@20", "K_prime", "T_prime")
+TEXTS = ("criterion_C", "steady_radius_m@20", "steady_rate_degpmin@20", "K_per_s", "T_prime")
 
 
 def test_the_page_has_every_parameter_both_coefficients_and_the_tuning() -> None:
@@ -27,6 +27,9 @@ def test_the_page_has_every_parameter_both_coefficients_and_the_tuning() -> None
     text = re.sub(r"<script.*?</script>", "", html, flags=re.DOTALL)
     assert all(one.short in text for one in study.parameters)
     assert "Agreed variation" in text and "640" in text and "passed" in text
+    assert [(one.label, one.unit) for one in page.figures][2:4] == [("steady rate, 20 deg", "deg/min"), ("K", "1/s")]
+    tables = [table for section in page.sections for table in section.tables if "K by the" in table.caption]
+    assert [len(table.columns) for table in tables] == [4, 3]  # all that is as wide as the page
     charts = influence_charts(result)
     assert [len(chart.hconcat) for chart in charts] == [3, 2]
     # Nr has the largest K on the criterion with Yv, Nd that on the radius: they stand at the top.

@@ -116,3 +116,17 @@ def test_trim_leaves_a_failed_rudder_where_it_is(integrator) -> None:
     running = Running(integrator, {"rudder.command": np.radians(20.0), "steering.failed": 1.0}, start)
     assert running.state("rudder.angle") == pytest.approx(np.radians(5.0))
     assert running.state("motion.r") > 0
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_of_many_steps_every_tenth_and_the_last_are_kept(mariner, compiled: bool) -> None:
+    whole, thin = Integrator(mariner, compiled), Integrator(mariner, compiled, every=10)
+    p, u = mariner.parameter_values(), mariner.input_values({"rudder.command": 0.3})
+    x = np.array(mariner.initial(p)).ravel()
+    each = whole.rollout(x, u, p, 0.1, 123)
+    kept = thin.rollout(x, u, p, 0.1, 123, every=10)
+    np.testing.assert_array_equal(kept, each[[*range(0, 123, 10), 123]])
+    heavier = mariner.parameter_values({"ship.mass": 1.1 * p[mariner.parameter_names.index("ship.mass")]})
+    both = thin.rollouts(np.array([x, x]), u, np.array([p, heavier]), (0.1, 123))
+    np.testing.assert_array_equal(both[0], kept)
+    np.testing.assert_array_equal(both[1], thin.rollout(x, u, heavier, 0.1, 123, every=10))

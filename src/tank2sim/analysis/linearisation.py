@@ -65,11 +65,21 @@ def straight_course(model: Model, speed_mps: float | None = None) -> OperatingPo
     )
     left = np.abs(np.array(residual(with_unknown(solution.x), u, p)).ravel())
     if not np.all(left < 1e-9) or abs(solution.x[1]) > np.pi / 4:
-        remedy = "check Yd, Nd, Y0 and N0 of the card"
-        raise InputError(model.name, "", "no rudder angle below 45 deg holds a straight course", remedy)
+        problem = "no rudder angle below 45 deg holds a straight course"
+        raise InputError(model.name, "", problem, _cause(np.array(slope(x, u, p))[:, unknown]))
     x = with_unknown(solution.x)
     u[model.input_names.index("rudder.command")] = solution.x[1]
     return OperatingPoint(x, u, p)
+
+
+def _cause(slopes: Vector) -> str:
+    """Why there is no straight course, from the slopes (2, 2) of sway and yaw acceleration by v and by the rudder."""
+    by_sway, by_rudder = np.abs(slopes).max(axis=0)
+    if not by_sway:
+        return "sway moves neither Y nor N: check Yv and Nv of the card"
+    if not by_rudder:
+        return "the rudder moves neither Y nor N: check Yd and Nd of the card"
+    return "check Yd, Nd, Y0 and N0 of the card"
 
 
 def jacobians(

@@ -35,6 +35,7 @@ NEGATIVE = 1e-8
 """Share of the largest eigenvalue of the correlations by which rounding may make one negative (ours)."""
 
 _LINE = re.compile(r"^#[ \t]*covariance:[ \t]*(\S[^\r\n]*?)[ \t]*\r?$", re.MULTILINE)
+_WHOLE_LINE = re.compile(_LINE.pattern + r"\n?", re.MULTILINE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +66,15 @@ def covariance_file(card: Path) -> Path:
 
 
 def referring(text: str, card: Path) -> str:
-    """A card's text with the line that refers to the file beside `card`, in place of any that it had."""
+    """A card's text with the line that refers to the file beside `card`, in place of any that it had.
+
+    It stands after the comment with which the card begins.
+    """
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
-    kept = re.sub(_LINE.pattern + r"\n?", "", text.removeprefix(mark), flags=re.MULTILINE)
-    return f"{mark}# covariance: {covariance_file(card).name}\n{kept}"
+    kept = _WHOLE_LINE.sub("", text.removeprefix(mark))
+    lines = kept.splitlines(keepends=True)
+    head = next((place for place, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    return mark + "".join([*lines[:head], f"# covariance: {covariance_file(card).name}\n", *lines[head:]])
 
 
 def read_covariance(card: Card) -> Covariance | None:

@@ -19,24 +19,31 @@ import click
 from tank2sim import __version__
 from tank2sim.errors import InputError
 
-COMMANDS = (
-    "demo",
-    "ships",
-    "simulate",
-    "reduce",
-    "tow",
-    "yaw",
-    "audit",
-    "identify",
-    "gap",
-    "signals",
-    "export",
-    "check",
-    "stability",
-    "autopilot",
-    "influence",
-    "glide",
-)
+COMMANDS = {
+    "demo": "the whole way on bundled data: tows to an FMU, the Mariner to an FMU",
+    "ships": "the bundled ships, by the names that CARD takes",
+    "simulate": "a manoeuvre of a ship: turn, zigzag, pull-out, spiral, stop, orders of a file",
+    "reduce": "captive tests to derivatives",
+    "tow": "surge mass and drag from accelerating tows",
+    "yaw": "added yaw inertia and dissipation from records of a yaw rig",
+    "audit": "what is wrong with the data of a trial",
+    "identify": "coefficients from free-running trials",
+    "gap": "the physical effect that a card lacks",
+    "signals": "statistics, spectra and filters of a record",
+    "export": "the FMU, Model Exchange and Co-Simulation",
+    "check": "an FMU validated, and held against its reference",
+    "stability": "stability, steady turning, IMO criteria",
+    "autopilot": "heading controllers, designed, tried and exported",
+    "influence": "what moves a manoeuvring figure; tuning",
+    "glide": "an underwater glider: glides, paths, range",
+    "compare": "cards of one ship side by side",
+    "validate": "a validation report in the manner of ITTC 7.5-02-06-03",
+    "poster": "a wheelhouse poster (A3)",
+    "pilotcard": "a pilot card (A4)",
+    "steer": "a page in which the ship is steered",
+    "report": "one page of any result",
+}
+"""Commands, with a few words on each: told without importing them, which takes seconds."""
 
 
 class _Commands(click.Group):
@@ -44,6 +51,10 @@ class _Commands(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:

@@ -38,7 +38,7 @@ def parse_bounds(given: Iterable[str]) -> dict[str, tuple[float, float]]:
     Raises
     ------
     InputError
-        A bound cannot be read.
+        A bound cannot be read, or its ends are the wrong way round.
     """
     found = {}
     for text in given:
@@ -46,7 +46,10 @@ def parse_bounds(given: Iterable[str]) -> dict[str, tuple[float, float]]:
         low, dots, high = ends.partition("..")
         if not dots or not name.strip():
             raise InputError(BOUND, text, "is no NAME=LOW..HIGH", "give, for example, --bound Yv=-0.013..-0.010")
-        found[name.strip()] = (_number(BOUND, text, low), _number(BOUND, text, high))
+        pair = (_number(BOUND, text, low), _number(BOUND, text, high))
+        if not pair[0] < pair[1]:
+            raise InputError(BOUND, text, "leaves no room", "give LOW..HIGH with LOW below HIGH")
+        found[name.strip()] = pair
     return found
 
 

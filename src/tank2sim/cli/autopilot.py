@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 from rich.markup import escape
 
+from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
 from tank2sim.analysis.heading.designs import DESIGNS, Weights
 from tank2sim.analysis.heading.study import AutopilotStudy, StudySettings, study_autopilot
 from tank2sim.analysis.heading.track_keeping import read_waypoints
@@ -127,16 +129,22 @@ def _exported(model: Model, study: AutopilotStudy, fmi: str, verify: bool) -> tu
 def _show(study: AutopilotStudy) -> None:
     screen.print(escape(study.design.source), soft_wrap=True)
     show_table("Controller", ["figure", "value"], [[name, value] for name, value in study.design.gains.items()])
+    screen.print(_limits(study.limits), soft_wrap=True)
     heads = ["speed (m/s)", "gain up", "gain down to", "phase (deg)", "delay (s)", "Ms", "-3 dB (rad/s)", "stable"]
     rows = [
         [
             one.speed_mps,
-            one.gain_margin_up,
-            one.gain_margin_down,
-            one.phase_margin_deg,
-            one.delay_margin_s,
-            one.sensitivity_peak,
-            one.bandwidth_radps,
+            *(
+                float(f"{value:.3g}")  # more digits do not go beside each other, and mean nothing
+                for value in (
+                    one.gain_margin_up,
+                    one.gain_margin_down,
+                    one.phase_margin_deg,
+                    one.delay_margin_s,
+                    one.sensitivity_peak,
+                    one.bandwidth_radps,
+                )
+            ),
             one.stable,
         ]
         for one in study.margins
@@ -158,6 +166,13 @@ def _show(study: AutopilotStudy) -> None:
         heads = ["guidance", "length (m)", "time (s)", "finished", "largest (m)", "rms (m)", "on legs (m)", "stays (m)"]
         tracks = [[name, *vars(one.figures).values()] for name, one in study.tracks.items()]
         show_table("Cross-track error", heads, tracks)
+
+
+def _limits(limits: Mapping[str, float]) -> str:
+    told = f"Rudder ordered up to {limits['largest_rudder_deg']:.3g} deg"
+    if "anti_windup_time_s" in limits:
+        told += f"; the integral takes up to {math.degrees(INTEGRAL_BAND_RAD):.3g} deg of a heading error"
+    return told
 
 
 def _show_export(path: Path, told: object) -> None:

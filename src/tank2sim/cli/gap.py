@@ -7,6 +7,7 @@ import difflib
 import json
 import math
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
@@ -17,11 +18,13 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from tank2sim.cards import Card, ManoeuvringCard, parse_card, read_card
+from tank2sim.cli.ensemble import executor_option
 from tank2sim.cli.progress import showing_stages
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices, shown
 from tank2sim.cli.trials import TakesSeveral, fitted_and_held, trial_files
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
+from tank2sim.executors import PROCESSES, check_executor, executing
 from tank2sim.files import writable_folder, write_together
 from tank2sim.gap.acting import acting
 from tank2sim.gap.add import Found, improved_text
@@ -68,6 +71,7 @@ CORRECTED = "corrected"
     help="Folder for gap.json, improved.toml, report.html, next_test.csv and corrected/.",
 )
 @click.option("--workers", type=click.IntRange(1), metavar="N", help="Processes; by default one for each core.")
+@executor_option
 @click.option("--effects", multiple=True, metavar="NAME...", help="Look for these alone.")
 @click.option("--without", multiple=True, metavar="NAME...", help="Do not look for these.")
 @click.option("--max-effects", type=click.IntRange(1, 2), default=2, show_default=True, help="Effects at a time.")
@@ -92,7 +96,8 @@ def command(
     _refuse_early(output, json_file, inputs)
     earlier = _of_earlier_run(output)
     with _folder(output), showing_stages("reading") as progress:
-        gap = find_gap(known, fitted, held, options, progress)
+        with _cluster(str(more["executor"])) as executor:
+            gap = find_gap(known, fitted, held, options, progress, executor)
         progress("writing")
         files, notices = _files(gap, (*fitted.trials, *held.trials), [one.name for one in fitted.trials], output)
         if json_file:
@@ -103,6 +108,16 @@ def command(
     _show(gap)
     show_notices([*gap.notices, *notices, *_tidied(output, earlier, {*files, *map(Path.resolve, inputs)})])
     screen.print(f"{output}: {', '.join(sorted(_told(files, output)))}", soft_wrap=True, markup=False)
+
+
+@contextmanager
+def _cluster(text: str) -> Iterator[Executor | None]:
+    """The cluster asked for; None for processes of this machine, which the search begins itself if it needs them."""
+    if check_executor(text) == PROCESSES:
+        yield None
+        return
+    with executing(text) as executor:
+        yield executor
 
 
 def _ship(card: Card) -> ManoeuvringCard:

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
-import signal
 from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
 
 import click
 
+from tank2sim.analysis.ensemble.draws import in_file
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
+from tank2sim.cli.ensemble import executor_option, with_covariance
 from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
 from tank2sim.cli.trials import TakesSeveral, fitted_and_held, trial_files
 from tank2sim.errors import InputError
+from tank2sim.executors import check_executor, executing
 from tank2sim.files import writable_folder, write_together
 from tank2sim.identification.trials.as_json import (
     estimate_rows,
@@ -56,6 +56,7 @@ from tank2sim.units import in_words
 @click.option("--inertia", is_flag=True, help="Estimate acceleration derivatives, too.")
 @click.option("--piece", type=float, metavar="S", help="Length of the pieces of output error, s; by default 5 L/u0.")
 @click.option("--workers", type=click.IntRange(1), metavar="N", help="Processes for cross-validation and bootstrap.")
+@executor_option
 @click.option(
     "--members",
     type=click.IntRange(0),
@@ -90,14 +91,15 @@ def command(
         raise InputError(known.source, "model.kind", "is no ship that manoeuvres", "give a linear or abkowitz card")
     options = _options(more)
     fitted, held = fitted_and_held(trials, holdout, known)
-    with showing_progress("fitting") as progress, _executor(options, more["workers"]) as executor:
+    with showing_progress("fitting") as progress, _executor(options, more) as executor:
         result = identify(known, fitted, held, options, progress, executor)
     told = remarks(result)
     text = improved_text(result, [trial.name for trial in fitted.trials])
     parse_card(text, str(output or "the card found"))
     files: dict[Path, str | bytes] = {}
     if output:
-        files[output] = text
+        found = in_file(result.card, result.estimate.free, result.estimate.covariance)
+        files |= with_covariance(text, output, found)
     if isinstance(json_file, Path):
         files[json_file] = json_text(identification_as_json(result, told))
     if plots:
@@ -114,15 +116,13 @@ def command(
 
 
 @contextmanager
-def _executor(options: Options, workers: object) -> Iterator[Executor | None]:
-    """Processes for cross-validation and bootstrap; they begin anew, as threads are at work in this one."""
+def _executor(options: Options, given: dict[str, object]) -> Iterator[Executor | None]:
+    """For cross-validation and bootstrap."""
+    text, workers = check_executor(str(given["executor"])), given["workers"]
     if options.structure != AUTO and not options.bootstrap:
         yield None
         return
-    count = workers if isinstance(workers, int) else os.cpu_count()
-    context = multiprocessing.get_context("spawn")
-    # An interrupt is for this process alone: workers that were told of it, too, would each say so.
-    with ProcessPoolExecutor(count, context, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as executor:
+    with executing(text, workers if isinstance(workers, int) else None) as executor:
         yield executor
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import click
 import numpy as np
 from rich.markup import escape
 
+from tank2sim.analysis.ensemble.results import FigureBands, named_bands
 from tank2sim.analysis.influence.figures import Figure, forms, parse_figure
 from tank2sim.analysis.influence.of_card import Influence, influence
 from tank2sim.analysis.influence.study import Study
@@ -20,6 +22,7 @@ from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.cli.agreed import parse_agreed, parse_bounds
 from tank2sim.cli.changes import parse_changes
+from tank2sim.cli.ensemble import asked_of, computing, ensemble_options, show_bands
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
 from tank2sim.cli.steering_card import refuse_options, show_steering_card
 from tank2sim.cli.trials import TakesSeveral
@@ -40,6 +43,9 @@ DEFAULT_FIGURES = (
 
 ROWS = 15
 """Parameters in the table on the screen: the most influential; JSON and page have all."""
+
+_PAIR, _MARGINS = 17, 3
+"""Characters of two coefficients, -123.45 | -123.45, and of what stands between columns."""
 
 
 @click.command("influence", cls=TakesSeveral, several=("--figure", "--tune", "--agreed", "--through"))
@@ -92,11 +98,13 @@ ROWS = 15
     multiple=True,
     metavar="RATE@RUDDER ...",
     help="Scale the hull's balance of moment and damping, and the rudder, until the steady turns meet two points: "
-    "deg/min at deg of rudder (0 for an unstable ship), or a radius, 424m@20.",
+    "deg/min to the side of the rudder, without a sign, at deg of rudder, + to starboard (20@-3: 20 deg/min to port at "
+    "3 deg to port; at 0, of an unstable ship: to starboard), or a radius, 424m@20.",
 )
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="A value in place of the card's.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the tuned card.")
 @click.option("--page", type=click.Path(path_type=Path), metavar="PAGE.html", help="Write a page with the charts.")
+@ensemble_options
 @json_option
 def command(
     card: str,
@@ -112,6 +120,7 @@ def command(
     K % is the change of a figure for 10 % more of one number, by exact slopes and by a 10 % difference. Wishes that
     contradict each other within the bounds are told, with the nearest that can be reached; with -o that is an error.
     """
+    asked = asked_of(more)
     if steering := find_steering_card(card):
         refuse_options("a steering card", {"--figure": figures, "--tune": wishes, "--set": settings, **_options(more)})
         show_steering_card(steering, _file(more["json_file"]), _file(more["page"]))
@@ -121,11 +130,15 @@ def command(
         raise InputError(ship.source, "model.kind", "is no ship that manoeuvres", "give a linear or abkowitz card")
     output, page, json_file = (_file(more[key]) for key in ("output", "page", "json_file"))
     if through := _texts(more, "through"):
-        refuse_options("--through", {"--figure": figures, "--tune": wishes, "--page": page})
+        refuse_options(
+            "--through",
+            {"--figure": figures, "--tune": wishes, "--page": page, "--ensemble": more["ensemble"]}
+            | {"--hold": more["hold"], "--bound": more["bounds"], "--agreed": more["agreed"]},
+        )
         tune_through(ship, through, Files(output, json_file))
         return
-    if output and not wishes:
-        raise InputError("-o", "", "has nothing to write without --tune", "give --tune FIGURE=VALUE")
+    if not wishes:
+        _refuse_without_wishes({"-o": output, "--hold": more["hold"], "--bound": more["bounds"]})
     wanted = [parse_wish(text) for text in wishes]
     study = Study(ship, _asked(figures, wanted))
     means = _means(more)
@@ -133,20 +146,27 @@ def command(
     if output and tuned and not tuned.reached:
         raise InputError(OPTION, "", _contradiction(tuned), "widen --within or state --bound, or wish for less")
     result = influence(study, means.agreed)
+    bands = None
+    if asked:
+        with computing(asked, more["executor"]) as pool:
+            bands = named_bands(ship, [one.text for one in study.figures], asked, pool)
     notices = list(dict.fromkeys([*result.notices, *([] if find_compiler() else [NO_COMPILER])]))
     contents: dict[Path, str | bytes] = {}
     if json_file:
         told = {**result.as_json(), "notices": notices, **({"tuned": tuned.as_json()} if tuned else {})}
+        told |= {"ensemble": bands.as_json()} if bands else {}
         contents[json_file] = json_text(told)
     if output and tuned:
         contents[output] = tuned_text(ship, tuned)
     if page:
-        contents[page] = _page(study, result, tuned)
+        contents[page] = _page(study, result, tuned, bands)
     write_together(contents, inputs=[Path(ship.source)], outputs=[json_file, output, page])
     _show(result)
     if tuned:
         _show_tuned(tuned)
     show_notices(notices)
+    if bands:
+        show_bands(bands.figures, bands.asked)
 
 
 def _file(given: object) -> Path | None:
@@ -166,10 +186,16 @@ def _texts(more: dict[str, object], key: str) -> tuple[str, ...]:
 
 def _options(more: dict[str, object]) -> dict[str, object]:
     """Options of ship cards alone, with what was given for them."""
-    return {f"--{key}": more[key] for key in ("hold", "agreed", "through")} | {
+    return {f"--{key}": more[key] for key in ("hold", "agreed", "through", "ensemble")} | {
         "--bound": more["bounds"],
         "-o": more["output"],
     }
+
+
+def _refuse_without_wishes(given: dict[str, object]) -> None:
+    for option, value in given.items():
+        if value:
+            raise InputError(option, "", "has no meaning without --tune", "give --tune FIGURE=VALUE, too")
 
 
 def _means(more: dict[str, object]) -> Means:
@@ -182,11 +208,13 @@ def _means(more: dict[str, object]) -> Means:
     )
 
 
-def _page(study: Study, result: Influence, tuned: Tuned | None) -> str:
+def _page(study: Study, result: Influence, tuned: Tuned | None, bands: FigureBands | None) -> str:
+    from tank2sim.report.ensemble import figures_section
     from tank2sim.report.influence_page import influence_page
     from tank2sim.report.page import render_page
 
-    return render_page(influence_page(result, tuned, None if tuned is None else study.figures_at(tuned.values)))
+    page = influence_page(result, tuned, None if tuned is None else study.figures_at(tuned.values))
+    return render_page(replace(page, sections=[*page.sections, figures_section(bands)]) if bands else page)
 
 
 def _contradiction(tuned: Tuned) -> str:
@@ -210,12 +238,14 @@ def _show(result: Influence) -> None:
     exact, difference = result.exact, result.difference
     largest = np.nan_to_num(np.abs(exact)).max(axis=0)
     order = [place for place in np.argsort(-largest, kind="stable") if largest[place] > 0][:ROWS]
-    heads = ["", *(f"{one.text}" for one in result.figures)]
-    rows = [
-        [result.parameters[k].short, *(_pair(exact[row, k], difference[row, k]) for row in range(len(result.figures)))]
-        for k in order
-    ]
-    show_table("K %: change for 10 % more, by exact slopes | by the 10 % difference", heads, rows)
+    names = [result.parameters[k].short for k in order]
+    for first in _parts(len(result.figures), screen.width - max(map(len, names), default=0)):
+        heads = ["", *(result.figures[row].text.replace("@", "\n@") for row in first)]
+        rows = [
+            [name, *(_pair(exact[row, k], difference[row, k]) for row in first)]
+            for name, k in zip(names, order, strict=True)
+        ]
+        show_table("K %: change for 10 % more, by exact slopes | by the 10 % difference", heads, rows)
     if result.agreed:
         agreed = result.agreed
         columns = zip(agreed.foretold, agreed.foretold_by_difference, agreed.direct, strict=True)
@@ -224,6 +254,13 @@ def _show(result: Influence) -> None:
             ["figure", "sum of Kc K, exact", "by differences", "direct"],
             [[figure.text, *row] for figure, row in zip(result.figures, columns, strict=True)],
         )
+
+
+def _parts(count: int, width: int) -> list[range]:
+    """Figures in tables as wide as the screen at most, as even as it goes: digits are not to be cut."""
+    most = max(1, (width - _MARGINS) // (_PAIR + _MARGINS))
+    each = -(-count // -(-count // most))
+    return [range(first, min(first + each, count)) for first in range(0, count, each)]
 
 
 def _pair(exact: float, difference: float) -> str:

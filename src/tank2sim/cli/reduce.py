@@ -9,10 +9,13 @@ import click
 from rich.markup import escape
 
 from tank2sim.cards import parse_card
+from tank2sim.cards.covariance import Covariance
+from tank2sim.cli.ensemble import with_covariance
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
 from tank2sim.errors import InputError
 from tank2sim.files import writable_folder, write_together
 from tank2sim.identification.captive.as_json import reduction_as_json
+from tank2sim.identification.captive.covariance import reduction_covariance
 from tank2sim.identification.captive.findings import findings, implausible
 from tank2sim.identification.captive.reduction import Options, Reduction, reduce_campaign
 from tank2sim.identification.captive.result_card import FILLS, Contents, card_text, contents, reynolds_ratio
@@ -59,7 +62,7 @@ def command(
     if output:
         text = card_text(reduction, card, ratio or 1.0)
         parse_card(text, str(output))  # refuses what is no ship here, before anything is written
-        files[output] = text
+        files |= with_covariance(text, output, _covariance(reduction, card))
     if isinstance(json_file, Path):
         files[json_file] = json_text(reduction_as_json(reduction, card, warnings))
     if plots:
@@ -74,6 +77,12 @@ def command(
     show_notices(warning for warning in warnings if warning not in grave)
     if output:
         screen.print(f"{output}: {len(card.entries)} derivatives", soft_wrap=True, markup=False)
+
+
+def _covariance(reduction: Reduction, card: Contents) -> Covariance:
+    """Of what was measured; what is estimated is independent of it."""
+    names = [name for name in card.entries if name in reduction.derivatives and name not in card.estimated]
+    return Covariance(tuple(f"derivatives.{name}" for name in names), reduction_covariance(reduction, names))
 
 
 def scale_of(campaign: Campaign, given: str | None) -> float | None:

@@ -29,7 +29,7 @@ def show_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]
     rows = [list(row) for row in rows]
     for place, head in enumerate(heads):
         numeric = all(isinstance(row[place], int | float) or row[place] is None for row in rows)
-        table.add_column(escape(head), justify="right" if numeric else "left")
+        table.add_column(escape(head), justify="right" if numeric else "left", overflow="fold")
     for row in rows:
         table.add_row(*(escape(shown(value)) for value in row))
     screen.print(table)

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import click
 
+from tank2sim.analysis.ensemble.results import ManoeuvreBands, manoeuvre_bands
 from tank2sim.cards import read_card
 from tank2sim.cli.changes import parse_changes
+from tank2sim.cli.ensemble import asked_of, computing, ensemble_options, show_bands, uncertain_ship
 from tank2sim.cli.screen import json_option, json_text, show_notices, show_table
 from tank2sim.dynamics import build
 from tank2sim.files import write_together
@@ -30,30 +32,41 @@ from tank2sim.units import in_words
 )
 @click.option("--out", type=click.Path(path_type=Path), metavar="run.csv", help="Write the motion as a trial CSV.")
 @click.option("--plot", type=click.Path(path_type=Path), metavar="run.png", help="Draw track and time histories.")
+@ensemble_options
 @json_option
-def command(card: str, manoeuvre: str, duration: float | None, settings: tuple[str, ...], **files: Path | None) -> None:
+def command(card: str, manoeuvre: str, duration: float | None, settings: tuple[str, ...], **more: object) -> None:
     """Simulate a manoeuvre of CARD (a file, or the name of a bundled ship) and read off its figures."""
+    asked, executor = asked_of(more), more["executor"]
+    files = {name: path if isinstance(path := more[name], Path) else None for name in ("out", "plot", "json_file")}
     ship = read_card(card, parse_changes(settings))
-    model = build(ship)
-    run = simulate(model, parse_manoeuvre(manoeuvre), duration_s=duration)
+    model, steered = build(ship), parse_manoeuvre(manoeuvre)
+    run = simulate(model, steered, duration_s=duration)
+    bands = None
+    if asked:
+        length = duration, float(run.trajectory.t[-1])
+        with computing(asked, executor) as pool:
+            bands = manoeuvre_bands(uncertain_ship(ship), steered, length, asked, pool)
     contents: dict[Path, str | bytes] = {}
     if out := files["out"]:
         contents[out] = trial_csv(run.trajectory, f"tank2sim simulation of {ship.ship.name}: {manoeuvre}")
     if plot := files["plot"]:
-        contents[plot] = _picture(run, f"{ship.ship.name}, {manoeuvre}")
+        contents[plot] = _picture(run, f"{ship.ship.name}, {manoeuvre}", bands)
     if json_file := files["json_file"]:
         result = {"ship": ship.ship.name, "manoeuvre": manoeuvre, "figures": run.figures, "notices": run.notices}
-        contents[json_file] = json_text(result)
+        contents[json_file] = json_text(result | ({"ensemble": bands.as_json()} if bands else {}))
     orders = Path(manoeuvre.removeprefix("file:"))
     write_together(contents, inputs=[Path(ship.source), orders], outputs=files.values())
     rows = [[*in_words(name), value] for name, value in run.figures.items()]
     show_table(f"{ship.ship.name}, {manoeuvre}", ["figure", "unit", "value"], rows)
     show_notices(run.notices)
+    if bands:
+        show_bands(bands.figures, bands.asked)
 
 
-def _picture(run: Run, title: str) -> bytes:
+def _picture(run: Run, title: str, bands: ManoeuvreBands | None) -> bytes:
     # Drawing is asked for seldom, and its library is slow to load.
     from tank2sim.report.charts import chart_png
+    from tank2sim.report.ensemble import banded_chart
     from tank2sim.report.runs import run_chart
 
-    return chart_png(run_chart(title, run.trajectory))
+    return chart_png(banded_chart(title, run.trajectory, bands) if bands else run_chart(title, run.trajectory))

@@ -116,7 +116,11 @@ def show_tuning(tuning: TwoPointTuning) -> None:
         for before, after in zip(tuning.before, tuning.after, strict=True)
     ]
     heads = ["rudder (deg)", "rate before (deg/min)", "after", "radius before (m)", "after"]
-    show_table(f"Two points met: hull factor {tuning.hull:.4g}, rudder factor {tuning.rudder:.4g}", heads, rows)
+    show_table(
+        f"Two points met (+ to starboard): hull factor {tuning.hull:.4g}, rudder factor {tuning.rudder:.4g}",
+        heads,
+        rows,
+    )
     if tuning.stable_before != tuning.stable_after:
         words = "stable" if tuning.stable_after else "unstable"
         screen.print(f"With these factors the ship becomes [bold]{words}[/bold] on a straight course.", soft_wrap=True)

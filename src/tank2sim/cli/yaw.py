@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any, get_args
 
 import click
 from rich.markup import escape
@@ -11,6 +13,7 @@ from rich.markup import escape
 from tank2sim.cards import ManoeuvringCard, YawRigCard, parse_card, read_card
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
 from tank2sim.dynamics.yaw_rig import YawRig, rig_of
+from tank2sim.dynamics.yaw_theory import FloatingBody, TheoryValue, theory_values
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.identification.yaw.card import (
@@ -30,8 +33,12 @@ from tank2sim.identification.yaw.identify import (
     parse_yaw_terms,
     torque_constant,
 )
-from tank2sim.records.yaw import read_yaw_record, yaw_record_text
+from tank2sim.identification.yaw.intervals import TERMS
+from tank2sim.records.yaw import Medium, read_yaw_record, yaw_record_text
+from tank2sim.simulation.yaw_rig_control import AdaptiveController, Controller
 
+CONTROLLERS: dict[str, Controller | None] = {"tuned": None, "adaptive": AdaptiveController()}
+"""Names of the controllers (4), from the right inertia, and (6)."""
 _POSITIVE = click.FloatRange(min=0, min_open=True)
 
 
@@ -53,11 +60,20 @@ class _Asked:
     output: Path | None
     page: Path | None
     json_file: Path | None
+    theory: str | None
 
 
 @click.command("yaw")
 @click.argument("records", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RECORD.csv...")
 @click.option("--simulate", metavar="CARD", help="First write the one RECORD, as the rig of this card would (alyshev).")
+@click.option(
+    "--medium",
+    type=click.Choice(get_args(Medium)),
+    help="Of the simulated body; in air with the card's friction f_c, f_1.",
+)
+@click.option(
+    "--controller", type=click.Choice(list(CONTROLLERS)), help="Of the simulated rig: (4), by default, or (6)."
+)
 @click.option("--noise", "noise_A", type=click.FloatRange(min=0), default=0.0, help="Of the simulated current, A.")
 @click.option("--inertia-kgm2", type=_POSITIVE, metavar="J", help="J_zz of body and rotor; else from records in air.")
 @click.option("--inertia-error-kgm2", "inertia_error", type=click.FloatRange(min=0), help="Its standard error.")
@@ -65,47 +81,55 @@ class _Asked:
 @click.option("--reference", type=click.Path(path_type=Path), metavar="AIR.csv", help="Take k_t from a body in air ...")
 @click.option("--reference-inertia-kgm2", "reference_inertia", type=_POSITIVE, help="... of this known inertia.")
 @click.option("--rig", metavar="CARD", help="Card of the rig: its walls, gravity, accelerating and braking count.")
-@click.option("--terms", metavar="LIST", help="Terms beside the inertia; coulomb,viscous,quadratic in water.")
+@click.option("--terms", metavar="LIST", help=f"Terms beside the inertia, of {', '.join(list(TERMS)[1:])}.")
 @click.option("--mirror-percent", type=click.FloatRange(0, 1000), default=25.0, show_default=True,
               help="Largest difference of mirror images, % of the largest rate.")  # fmt: skip
 @click.option(
     "--method", type=click.Choice(METHODS), default=BEST, show_default=True, help="Whose numbers a card gets."
 )
 @click.option("--card", metavar="SHIP", help="Put N_rdot into this ship's card; else -o writes a card of the rig.")
+@click.option("--theory", metavar="L,B,T,H[,CB]",
+              help="Also (7)-(9) for length, beam, draught, depth in m, block coefficient; or a CARD.")  # fmt: skip
 @click.option("--length-m", type=_POSITIVE, metavar="L", help="Length of the model; else as the records say.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the card.")
 @click.option("--page", type=click.Path(path_type=Path), metavar="PAGE.html", help="Write a page with charts.")
 @json_option
-def command(records: tuple[Path, ...], *, simulate: str | None, noise_A: float, **options: object) -> None:
+def command(records: tuple[Path, ...], *, simulate: str | None, **options: object) -> None:
     """Estimate added yaw inertia and dissipation from each RECORD (t_s,phi_rad,current_A) of the yaw rig.
 
     Records in air ('# medium: air') give J_zz; the programme stands in comments of the file.
     """
+    driven = {key: options.pop(key) for key in ("noise_A", "medium", "controller")}
     asked = _Asked(**options)  # type: ignore[arg-type]  # click has checked them
     if asked.card and not asked.output:
         raise InputError("--card", "", "has no file to be written to", "say which with -o CARD.toml")
     if simulate:
-        _simulate(simulate, records, noise_A)
+        _simulate(simulate, records, driven)
+    elif driven["medium"] or driven["controller"]:
+        raise InputError("--medium, --controller", "", "are of a simulated rig", "give --simulate CARD as well")
     known = _known(asked.rig)
     result = identify_yaw([read_yaw_record(path) for path in records], _options(asked, known))
+    body = _floating_body(asked.theory) if asked.theory else None
+    theory = theory_values(body, result.records[0].programme.max_rate_radps) if body else ()
     contents: dict[Path, str | bytes] = {}
     told = _card(result, asked, known, contents)
     if asked.json_file:
-        contents[asked.json_file] = json_text(result.as_json())
+        contents[asked.json_file] = json_text({**result.as_json(), "theory": [asdict(own) for own in theory]})
     if asked.page:
         from tank2sim.report.page import render_page
         from tank2sim.report.yaw_page import yaw_page
 
-        contents[asked.page] = render_page(yaw_page(result))
+        contents[asked.page] = render_page(yaw_page(result, theory))
     inputs = [*records, *([asked.reference] if asked.reference else [])]
     write_together(contents, inputs=inputs, outputs=[asked.output, asked.page, asked.json_file])
     _show(result)
+    _show_theory(theory)
     show_notices(result.notes)
     if told:
         screen.print(escape(told), soft_wrap=True)
 
 
-def _simulate(name: str, records: tuple[Path, ...], noise_A: float) -> None:
+def _simulate(name: str, records: tuple[Path, ...], driven: Mapping[str, Any]) -> None:
     from tank2sim.simulation.yaw_record import simulated_record
 
     if len(records) != 1:
@@ -113,8 +137,51 @@ def _simulate(name: str, records: tuple[Path, ...], noise_A: float) -> None:
     if records[0].exists():
         raise InputError(records[0], "", "is there already, and may be a measurement", "give --simulate a new name")
     card = _rig_card(name, "--simulate")
-    record = simulated_record(card, records[0], noise_A)
+    record = simulated_record(
+        card,
+        records[0],
+        driven["noise_A"],
+        medium=driven["medium"] or "water",
+        controller=CONTROLLERS[driven["controller"] or "tuned"],
+    )
     write_together({records[0]: yaw_record_text(record)}, inputs=[Path(card.source)])
+
+
+def _floating_body(text: str) -> FloatingBody:
+    """From ``L,B,T,H`` or ``L,B,T,H,CB``, or from a card that tells these."""
+    if "," not in text:
+        ship = read_card(text).ship
+        sizes = [ship.length_m, ship.beam_m, ship.draught_m, ship.water_depth_m, ship.block_coefficient]
+    else:
+        try:
+            sizes = [float(word) for word in text.split(",")]
+        except ValueError:
+            sizes = []
+    missing = len(sizes) not in (4, 5) or any(size is None or not size > 0 for size in sizes[:4])
+    if missing or (sizes[4:] and sizes[4] is not None and not 0 < sizes[4] <= 1):
+        problem = f"{text!r} does not tell length, beam, draught and depth of water"
+        raise InputError(
+            "--theory", "", problem, "write for example 0.67,0.20,0.08,0.22,0.47, or name a card with them"
+        )
+    length, beam, draught, depth = (size or 0.0 for size in sizes[:4])
+    block = sizes[4] if len(sizes) > 4 else None
+    return FloatingBody(length_m=length, beam_m=beam, draught_m=draught, depth_m=depth, block_coefficient=block)
+
+
+def _show_theory(theory: Sequence[TheoryValue]) -> None:
+    if not theory:
+        return
+    heads = ["", "added inertia, 1e-4 kg m2", "paper's Table 1", "remark"]
+    rows = [
+        [
+            own.formula,
+            1e4 * own.value_kgm2,
+            None if own.printed_kgm2 is None else 1e4 * own.printed_kgm2,
+            own.remark,
+        ]
+        for own in theory
+    ]
+    show_table("From the form, by (7), (8) and (9) of Alyshev (2019)", heads, rows)
 
 
 def _rig_card(name: str, option: str) -> YawRigCard:

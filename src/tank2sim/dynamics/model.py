@@ -181,17 +181,17 @@ class Model:
     def _by_name(self) -> dict[str, Variable]:
         return {variable.name: variable for variable in self.variables}
 
-    @property
+    @cached_property
     def state_names(self) -> tuple[str, ...]:
         """Names of the states in the order of the vector x."""
         return tuple(variable.name for variable in self.states)
 
-    @property
+    @cached_property
     def input_names(self) -> tuple[str, ...]:
         """Names of the inputs in the order of the vector u."""
         return tuple(variable.name for variable in self.inputs)
 
-    @property
+    @cached_property
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the parameters in the order of the vector p."""
         return tuple(variable.name for variable in self.parameters)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.scaling import Scales
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS, geographic
@@ -13,8 +15,11 @@ from tank2sim.dynamics.kinematics import kinematics
 from tank2sim.dynamics.low_speed import low_speed_parameters
 from tank2sim.dynamics.model import Model, Parameter, State, Variable
 from tank2sim.dynamics.propulsion import propulsion
-from tank2sim.dynamics.rigid_body import inertia
+from tank2sim.dynamics.rigid_body import Inertia, inertia
 from tank2sim.dynamics.steering_gear import steering_gear
+
+SINGULAR = "the mass matrix of sway and yaw is singular (f4 = 0)"
+NOT_POSITIVE = "mass with added mass is not positive (m - Xudot, m - Yvdot, J_z - Nrdot, f4)"
 
 STEPS_PER_LENGTH = 200
 """Integration steps while the ship covers its own length (benchmarks/accuracy.py prints what halving them changes)."""
@@ -90,14 +95,33 @@ def _refuse_singular_mass(card: ManoeuvringCard) -> None:
     body = card.rigid_body
     added = {name: card.derivatives.get(name, 0.0) for name in ACCELERATION_TERMS}
     matrix = inertia(body.mass, body.x_G, body.yaw_inertia, added)
+    if _is_singular(matrix):
+        remedy = "check mass, yaw_inertia, x_G, Yvdot, Nrdot, Yrdot and Nvdot"
+        raise card.fault("rigid_body", SINGULAR, remedy)
+    if not _is_positive(matrix):
+        remedy = "acceleration derivatives are negative: check their signs"
+        raise card.fault("derivatives", NOT_POSITIVE, remedy)
+
+
+def mass_fault(p: Mapping[str, float]) -> str:
+    """Why a ship with the parameters `p` (all, by name) has no mass matrix that can be used; empty if it has one."""
+    scales = Scales(p["ship.water_density"], p["ship.length"], p["ship.speed"])
+    added = {name: p[f"derivatives.{name}"] for name in ACCELERATION_TERMS}
+    mass, yaw_inertia = p["ship.mass"] / scales.mass, p["ship.yaw_inertia"] / scales.inertia
+    matrix = inertia(mass, p["ship.x_G"] / p["ship.length"], yaw_inertia, added)
+    if _is_singular(matrix):
+        return SINGULAR
+    return "" if _is_positive(matrix) else NOT_POSITIVE
+
+
+def _is_singular(matrix: Inertia) -> bool:
     scale = abs(matrix.sway * matrix.yaw) + abs(matrix.sway_yaw * matrix.yaw_sway)
     rounding = 1e-12  # of the two products whose difference f4 is
-    if abs(matrix.determinant) <= rounding * scale:
-        remedy = "check mass, yaw_inertia, x_G, Yvdot, Nrdot, Yrdot and Nvdot"
-        raise card.fault("rigid_body", "the mass matrix of sway and yaw is singular (f4 = 0)", remedy)
-    if matrix.surge <= 0 or matrix.sway <= 0 or matrix.yaw <= 0 or matrix.determinant < 0:
-        problem = "mass with added mass is not positive (m - Xudot, m - Yvdot, J_z - Nrdot, f4)"
-        raise card.fault("derivatives", problem, "acceleration derivatives are negative: check their signs")
+    return bool(abs(matrix.determinant) <= rounding * scale)
+
+
+def _is_positive(matrix: Inertia) -> bool:
+    return bool(matrix.surge > 0 and matrix.sway > 0 and matrix.yaw > 0 and matrix.determinant > 0)
 
 
 def _step(card: ManoeuvringCard) -> float:

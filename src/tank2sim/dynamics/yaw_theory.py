@@ -147,3 +147,49 @@ def added_inertia_by_9(body: FloatingBody) -> float:
     """lambda66 of a ship by (9): that of the spheroid with its length and beam, with the inertia J* of the ship."""
     k66 = lamb_coefficients(body.length_m / 2, body.beam_m / 2, body.beam_m / 2).k66
     return depth_factor(body.draught_m / body.depth_m) * ship_water_inertia(body) * k66
+
+
+@dataclass(frozen=True, kw_only=True)
+class TheoryValue:
+    """An added yaw inertia from the form: by what, kg m2, the paper's own number where it has one, and a remark."""
+
+    formula: str
+    value_kgm2: float
+    printed_kgm2: float | None = None
+    remark: str = ""
+
+
+_PRINTED: dict[FloatingBody, dict[str, float]] = {
+    ELLIPSOID: {"(7)": 509.7e-4},
+    SHIP_T1: {"(9)": 263.0e-4, "(8) accelerating": 456.6e-4, "(8) braking": 464.4e-4},
+    SHIP_T2: {"(9)": 797.6e-4, "(8) accelerating": 1056.8e-4, "(8) braking": 1070.3e-4},
+}
+"""Table 1 of the paper, of its own bodies."""
+_SAME = 0.002
+"""Two numbers that differ by so little, relatively, are the same but for the print's rounding."""
+
+
+def theory_values(body: FloatingBody, rate_radps: float) -> tuple[TheoryValue, ...]:
+    """(7), or Lamb where its axes are in another order, and for a ship (8) and (9), at the rate `rate_radps`."""
+    printed = _PRINTED.get(body, {})
+
+    def row(formula: str, value: float, remark: str) -> TheoryValue:
+        own = printed.get(formula)
+        if own is not None:
+            same = "reproduces" if abs(value / own - 1) < _SAME else "does not reproduce"
+            remark = f"the paper's number {same}; {remark}"
+        return TheoryValue(formula=formula, value_kgm2=value, printed_kgm2=own, remark=remark)
+
+    try:
+        values = [row("(7)", added_inertia_by_7(body), "half ellipsoid, corrected, times the factor of depth")]
+    except ValueError:
+        values = [row("Lamb", added_inertia_of_ellipsoid(body), "half ellipsoid, times the factor of depth")]
+    if body.block_coefficient is None:
+        return tuple(values)
+    stages: tuple[Stage, ...] = ("accelerating", "braking")
+    for stage in stages:
+        more = 1e4 * sensitivity_of_8(body, rate_radps, stage)
+        remark = f"block coefficient + 0.01 changes it by {more:+.3g}e-4"
+        values.append(row(f"(8) {stage}", added_inertia_by_8(body, rate_radps, stage), remark))
+    values.append(row("(9)", added_inertia_by_9(body), "spheroid's ratio with the ship's inertia of water"))
+    return tuple(values)

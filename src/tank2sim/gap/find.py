@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
-import signal
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -16,6 +14,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
+from tank2sim.executors import executing
 from tank2sim.gap.add import Found, added
 from tank2sim.gap.correct import corrected
 from tank2sim.gap.decide import ENOUGH, Decision, Strange, decide
@@ -120,14 +119,8 @@ def _processes(options: Options, executor: Executor | None) -> Iterator[Executor
     if executor is not None or count == 1:
         yield executor
         return
-    context = multiprocessing.get_context("spawn")
-    # An interrupt is for this process alone: workers that were told of it, too, would each say so.
-    with ProcessPoolExecutor(count, context, signal.signal, (signal.SIGINT, signal.SIG_IGN)) as pool:
-        try:
-            yield pool
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    with executing(workers=count) as pool:
+        yield pool
 
 
 def _told(

@@ -16,7 +16,15 @@ from tank2sim.units import to_si
 
 Medium = Literal["air", "water"]
 
-_PLAIN = ("torque_constant_NmpA", "inertia_kgm2", "max_current_A", "current_lag_s", "length_m", "water_density_kgpm3")
+_PLAIN = (
+    "torque_constant_NmpA",
+    "inertia_kgm2",
+    "inertia_error_kgm2",
+    "max_current_A",
+    "current_lag_s",
+    "length_m",
+    "water_density_kgpm3",
+)
 """Comments that are numbers and no part of the programme."""
 
 
@@ -42,7 +50,10 @@ class YawRecord:
         The file tells of the programme; else it is the paper's.
     constants : dict
         What else the comments state: ``torque_constant_NmpA``, ``inertia_kgm2`` (J_zz of the body with the rotor),
-        ``max_current_A``, ``current_lag_s``, ``length_m``, ``water_density_kgpm3``.
+        its standard error ``inertia_error_kgm2``, ``max_current_A``, ``current_lag_s``, ``length_m``,
+        ``water_density_kgpm3``.
+    notes : tuple of str
+        What the user should know of the file.
     """
 
     path: Path
@@ -53,6 +64,7 @@ class YawRecord:
     programme: YawProgramme
     stated: bool
     constants: dict[str, float]
+    notes: tuple[str, ...] = ()
 
 
 def read_yaw_record(path: Path | str) -> YawRecord:
@@ -60,8 +72,8 @@ def read_yaw_record(path: Path | str) -> YawRecord:
 
     ``# medium: air``, ``# programme: reversing`` (or unidirectional, full_turn), ``# max_rate_degps: 15``, ``# rise_s:
     4.444``, ``# settle_s: 0.5``, ``# start_s: 0``, ``# humps: 5``, ``# torque_constant_NmpA: 0.051``, ``# inertia_kgm2:
-    0.0204``, ``# max_current_A: 1``. What is not told of the programme is as in the paper, and as many humps as the
-    record has time for.
+    0.0204``, ``# inertia_error_kgm2: 0.0002``, ``# max_current_A: 1``. What is not told of the programme is as in the
+    paper, and as many humps as the record has time for. An angle that is counted within one turn is put together.
 
     Raises
     ------
@@ -75,17 +87,25 @@ def read_yaw_record(path: Path | str) -> YawRecord:
     medium = table.comments.get("medium", "water").strip().lower()
     if medium not in get_args(Medium):
         raise InputError(table.path, "comment medium", f"is {medium!r}", "write '# medium: air' or '# medium: water'")
-    programme, stated = _programme(table, time)
+    programme, missing = _programme(table, time)
+    notes = (
+        [f"the file does not tell {' and '.join(missing)} of the programme; the paper's is taken."] if missing else []
+    )
+    whole = np.unwrap(angle)
+    turns = int(np.count_nonzero(np.abs(np.diff(angle)) > math.pi))
+    if turns:
+        notes.append(f"the angle jumps by a whole turn {turns} times and is put together again.")
     constants = {key: value for key in _PLAIN if (value := _positive(table, key)) is not None}
     return YawRecord(
         path=table.path,
         time_s=time,
-        angle_rad=angle,
+        angle_rad=whole if turns else angle,
         current_A=current,
         medium="air" if medium == "air" else "water",
         programme=programme,
-        stated=stated,
+        stated=not missing,
         constants=constants,
+        notes=tuple(notes),
     )
 
 
@@ -116,7 +136,8 @@ def _positive(table: Table, key: str) -> float | None:
     return value
 
 
-def _programme(table: Table, time: Vector) -> tuple[YawProgramme, bool]:
+def _programme(table: Table, time: Vector) -> tuple[YawProgramme, list[str]]:
+    """The programme, and what the file does not tell of it."""
     kind = table.comments.get("programme", "unidirectional").strip().lower()
     if kind not in (*KINDS, "full_turn"):
         expected = ", ".join((*KINDS, "full_turn"))
@@ -124,7 +145,8 @@ def _programme(table: Table, time: Vector) -> tuple[YawProgramme, bool]:
     rate = _rate(table)
     start = table.comment_number("start_s") or 0.0
     settle, rise = table.comment_number("settle_s"), _positive(table, "rise_s")
-    stated = rate is not None and (rise is not None or kind == "full_turn")
+    missing = ["max_rate_degps"] if rate is None else []
+    missing += ["rise_s"] if rise is None and kind != "full_turn" else []
     try:
         programme = YawProgramme(
             max_rate_radps=PAPER.max_rate_radps if rate is None else rate,
@@ -138,7 +160,7 @@ def _programme(table: Table, time: Vector) -> tuple[YawProgramme, bool]:
         whole = replace(programme, humps=humps, kind="reversing" if kind == "reversing" else "unidirectional")
     except ValueError as error:
         raise InputError(table.path, "programme", str(error), "mend the comments that tell of it") from None
-    return whole, stated
+    return whole, missing
 
 
 def _rate(table: Table) -> float | None:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
 from tank2sim.analysis.heading.margins import LoopMargins, closed_loop_transfer, loop_transfer
 from tank2sim.analysis.heading.study import AutopilotStudy
 from tank2sim.dynamics.model import Model, Vector
@@ -72,7 +73,7 @@ def _figures(study: AutopilotStudy) -> list[Figure]:
             label="Stable",
             value=f"{sum(one.stable for one in study.margins)} of {len(study.margins)}",
             verdict=Verdict.PASSED if stable else Verdict.FAILED,
-            note="speeds",
+            note="speeds" if len(study.margins) > 1 else "speed of the design",
         ),
         Figure(
             label="Overshoot",
@@ -91,6 +92,15 @@ def _controller(study: AutopilotStudy) -> Section:
         f"The ship at {study.design.found.speed_mps:.4g} m/s: K = {nomoto.K_per_s:.4g} 1/s, T = {nomoto.T_s:.4g} s, "
         f"{'stable' if study.design.found.stable else 'unstable'} on a straight course by herself."
     )
+    limits = study.limits
+    text += f"\n\nThe rudder is ordered no further than {limits['largest_rudder_deg']:.3g} deg either way."
+    if "anti_windup_time_s" in limits:
+        text += (
+            f" The integral takes no more than {math.degrees(INTEGRAL_BAND_RAD):.3g} deg of a heading error: what is "
+            "larger is a change of course, no disturbance, and would fill it and make the ship swing past. While the "
+            f"rudder is at its limit the integral is emptied, with a time constant of "
+            f"{limits['anti_windup_time_s']:.3g} s."
+        )
     return Section(
         heading="Controller",
         text=text,
@@ -219,7 +229,10 @@ def _calm(study: AutopilotStudy) -> Section:
             caption="Without anti-windup the integral fills while the rudder is at its limit: the ship swings past.",
         ),
     ]
-    text = "On the nonlinear model with the limits of the gear, in calm water."
+    text = (
+        "On the nonlinear model with the limits of the gear, in calm water, from a course that the autopilot has kept: "
+        f"it holds the {study.design.found.rudder_deg:.3g} deg of rudder that the ship needs for it."
+    )
     return Section(
         heading="Course changes",
         text=text,

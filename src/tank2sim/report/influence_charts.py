@@ -38,9 +38,14 @@ def most_influential(result: Influence, limit: int = MOST_ROWS) -> list[int]:
 def influence_charts(result: Influence) -> list[alt.HConcatChart]:
     """K % of the most influential parameters: bars by exact slopes, points by the 10 % difference; figures beside
     each other, :data:`PANELS` to a chart."""
-    order, rows = most_influential(result), range(len(result.figures))
-    each = -(-len(rows) // -(-len(rows) // PANELS))  # as even as it goes
-    return [_bars(result, order, [*rows[first : first + each]]) for first in range(0, len(rows), each)]
+    order = most_influential(result)
+    return [_bars(result, order, rows) for rows in side_by_side(len(result.figures), PANELS)]
+
+
+def side_by_side(count: int, most: int) -> list[range]:
+    """Places of `count` figures in groups of `most` at most, as even as it goes."""
+    each = -(-count // -(-count // most))
+    return [range(first, min(first + each, count)) for first in range(0, count, each)]
 
 
 def _bars(result: Influence, order: Sequence[int], rows: Sequence[int]) -> alt.HConcatChart:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tank2sim.analysis.influence.of_card import Influence
 from tank2sim.analysis.tuning.result import Tuned
-from tank2sim.report.influence_charts import influence_charts, moves_chart, variance_chart
+from tank2sim.report.influence_charts import PANELS, influence_charts, moves_chart, side_by_side, variance_chart
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
 from tank2sim.units import in_words
 
@@ -80,16 +80,21 @@ def _coefficients(result: Influence) -> Section:
 
 
 def _all_coefficients(result: Influence) -> Section:
-    columns = [Column(title="parameter"), *(Column(title=one.text, unit="%", digits=3) for one in result.figures)]
     tables = [
-        Table(
-            caption=caption,
-            columns=columns,
-            rows=[[one.short, *map(_cell, K[:, place])] for place, one in enumerate(result.parameters)],
-        )
+        _table(caption, result, K, rows)
         for caption, K in (("K by exact slopes", result.exact), ("K by the 10 % difference", result.difference))
+        for rows in side_by_side(len(result.figures), PANELS)
     ]
     return Section(heading="Coefficients of all parameters", tables=tables)
+
+
+def _table(caption: str, result: Influence, K: Array, rows: Sequence[int]) -> Table:
+    """K of some figures, as many as are as wide as the page at most."""
+    return Table(
+        caption=caption,
+        columns=[Column(title="parameter"), *(Column(title=result.figures[n].text, unit="%", digits=3) for n in rows)],
+        rows=[[one.short, *(_cell(K[n, place]) for n in rows)] for place, one in enumerate(result.parameters)],
+    )
 
 
 def _cell(value: float) -> float | None:

@@ -201,7 +201,7 @@ def _chart(illustration: Illustration, number: int) -> dict[str, Any]:
         "heading": heading,
         "caption": " ".join(text for text in (subtitle, illustration.caption) if text),
         "description": specification.get("description", heading),
-        "moves": "params" in specification,
+        "moves": any("select" in parameter for parameter in specification.get("params", ())),
         "specification": specification,
     }
 

@@ -142,7 +142,7 @@ def steering_bode(responses: Sequence[SteeringResponse], *, title: str = "") -> 
 
 
 def steering_poles(responses: Sequence[SteeringResponse], *, title: str = "") -> alt.LayerChart:
-    """Poles and zeros of sway and yaw, and of Nomoto's first order; those of the gear lie far out and are left out."""
+    """Poles and zeros of the hull, and of Nomoto's first order; those of the gear lie far out and are left out."""
     shown = [one for one in responses if one.label == responses[0].label or one.label == FIRST_ORDER]
     systems = [PolesZeros(label=one.label, poles=one.poles, zeros=one.zeros) for one in shown]
     return pole_zero_chart(systems, title=title)

@@ -80,10 +80,13 @@ def stability_page(study: StabilityStudy, notices: Sequence[str]) -> Page:
 
 
 def _figures(study: StabilityStudy) -> list[Figure]:
-    found, margin = study.stability, study.margin
+    found = study.stability
     met = [one.passed for one in study.imo]
     failed, unknown = met.count(False), met.count(None)
-    verdict = Verdict.FAILED if failed else Verdict.CAUTION if unknown else Verdict.PASSED
+    beyond = sum(one.beyond_card and one.found is not None for one in study.imo)
+    verdict = Verdict.FAILED if failed else Verdict.CAUTION if unknown or beyond else Verdict.PASSED
+    open_ones = [f"{unknown} open"] if unknown else []
+    notes = [*open_ones, *([f"{beyond} judged beyond the card's validity"] if beyond else [])]
     shown = [
         Figure(
             label="Straight course",
@@ -91,13 +94,13 @@ def _figures(study: StabilityStudy) -> list[Figure]:
             verdict=Verdict.PASSED if found.stable else Verdict.CAUTION,
             note=f"C′ = {found.criterion:.4g}",
         ),
-        Figure(label="Margin", value=margin.percent, unit="%", note=f"levers {margin.lever:.3g} L apart"),
+        _margin_figure(study),
         Figure(label="Nomoto K′", value=found.nomoto_prime.K_per_s, note=f"T′ = {found.nomoto_prime.T_s:.3g}"),
         Figure(
             label="IMO criteria met",
             value=f"{met.count(True)} of {len(met)}",
             verdict=verdict,
-            note=f"{unknown} open" if unknown else "",
+            note=", ".join(notes),
         ),
     ]
     if study.turning is not None and study.turning.loop is not None:
@@ -106,11 +109,20 @@ def _figures(study: StabilityStudy) -> list[Figure]:
     return shown
 
 
+def _margin_figure(study: StabilityStudy) -> Figure:
+    found, margin = study.stability, study.margin
+    if not found.criterion_decides:
+        note = f"a mode grows at {found.growth_per_s:.3g} 1/s that C′ does not see"
+        return Figure(label="Margin", value="none", verdict=Verdict.CAUTION, note=note)
+    return Figure(label="Margin", value=margin.percent, unit="%", note=f"levers {margin.lever:.3g} L apart")
+
+
 def _straight(study: StabilityStudy) -> Section:
     found, margin = study.stability, study.margin
+    with_effects = "".join(f", {name}" for name in found.effect_states)
     modes = [[one.real, one.imag, -1 / one.real if one.real else None] for one in found.eigenvalues]
     eigenvalues = Table(
-        caption="Eigenvalues of surge, sway and yaw.",
+        caption=f"Eigenvalues of surge, sway and yaw{with_effects}.",
         columns=[
             Column(title="real part", unit="1/s"),
             Column(title="imaginary part", unit="1/s"),
@@ -118,6 +130,7 @@ def _straight(study: StabilityStudy) -> Section:
         ],
         rows=modes,
     )
+    slow = f", in slow motions ({', '.join(found.effect_states)} at rest)" if found.effect_states else ""
     heads = [Column(title=""), *(Column(title=name) for name in ("K", "T", "T1", "T2", "T3"))]
     nomoto = [
         [scaling, *vars(one).values()]
@@ -127,7 +140,7 @@ def _straight(study: StabilityStudy) -> Section:
         ["yaw damping lever", format_number(margin.damping_lever), "L"],
         ["sway lever", format_number(margin.sway_lever), "L"],
         ["levers apart", format_number(margin.lever), "L"],
-        ["margin", format_number(margin.percent), "%"],
+        ["margin" if found.criterion_decides else "margin of C′ alone", format_number(margin.percent), "%"],
     ]
     return Section(
         heading="Straight-line stability",
@@ -139,7 +152,7 @@ def _straight(study: StabilityStudy) -> Section:
                 rows=levers,
             ),
             eigenvalues,
-            Table(caption="Nomoto's coefficients, yaw rate by rudder.", columns=heads, rows=nomoto),
+            Table(caption=f"Nomoto's coefficients, yaw rate by rudder{slow}.", columns=heads, rows=nomoto),
         ],
     )
 
@@ -168,7 +181,11 @@ def _moving(study: StabilityStudy) -> Section:
         tables=[table],
         charts=[
             *([Illustration(chart=influence_chart(margin, title="Influence on C′"))] if margin.influences else []),
-            Illustration(chart=speed_chart(margin, title="Speed"), caption="Over the card's range of speeds."),
+            *(
+                [Illustration(chart=speed_chart(margin, title="Speed"), caption="Over the card's range of speeds.")]
+                if len(margin.speeds_mps)
+                else []
+            ),
             Illustration(chart=trim_chart(study.trim, title="Trim (estimate)"), caption=caption),
         ],
     )
@@ -247,8 +264,8 @@ def _characteristic(found: SteeringCharacteristic) -> Section:
     )
 
 
-def _errors(*values: float) -> list[float]:
-    return [math.degrees(value) for value in values]
+def _errors(*values: float | None) -> list[float | None]:
+    return [None if value is None else math.degrees(value) for value in values]
 
 
 def _imo(criteria: Sequence[Criterion]) -> Table:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from tank2sim.dynamics.yaw_theory import TheoryValue
 from tank2sim.identification.yaw.identify import METHODS, YawResult
 from tank2sim.identification.yaw.intervals import TERMS
 from tank2sim.report.numbers import format_number
@@ -15,7 +18,7 @@ from tank2sim.report.yaw_charts import (
 )
 
 _HOW = {
-    "energy_least_squares": "all subintervals, measured speeds",
+    "energy_least_squares": "all subintervals, measured speeds, the programme for instruments",
     "as_many_equations": "(1) and sums (2) of three parts",
     "two_intervals": "(1) and (2), measured speeds",
     "output_error": "(3) integrated, fitted to the angle",
@@ -24,8 +27,8 @@ _HOW = {
 }
 
 
-def yaw_page(result: YawResult) -> Page:
-    """The page of a result."""
+def yaw_page(result: YawResult, theory: Sequence[TheoryValue] = ()) -> Page:
+    """The page of a result, and beside it what `theory` gives for the body's form."""
     names = ", ".join(record.path.name for record in result.records)
     return Page(
         title="Added yaw inertia by the energy method",
@@ -56,8 +59,31 @@ def yaw_page(result: YawResult) -> Page:
                 charts=[Illustration(chart=record_chart(result, record)) for record in result.records],
             ),
             *_angle(result),
+            *_theory(theory),
         ],
     )
+
+
+def _theory(values: Sequence[TheoryValue]) -> list[Section]:
+    if not values:
+        return []
+    columns = [
+        Column(title="formula"),
+        Column(title="added inertia", unit="10⁻⁴ kg m²", digits=5),
+        Column(title="paper's Table 1", unit="10⁻⁴ kg m²", digits=5),
+        Column(title="remark"),
+    ]
+    rows: list[list[Cell]] = [
+        [
+            own.formula,
+            1e4 * own.value_kgm2,
+            None if own.printed_kgm2 is None else 1e4 * own.printed_kgm2,
+            own.remark,
+        ]
+        for own in values
+    ]
+    text = "Added yaw inertia from the body's form, by the formulas (7), (8) and (9) of Alyshev (2019)."
+    return [Section(heading="Theory", text=text, tables=[Table(caption="From the form", columns=columns, rows=rows)])]
 
 
 def _figures(result: YawResult) -> list[Figure]:

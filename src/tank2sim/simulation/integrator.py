@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from tank2sim.dynamics.model import Model, Vector
 from tank2sim.errors import InputError
@@ -26,17 +27,34 @@ __declspec(dllexport)
 #else
 __attribute__((visibility("default")))
 #endif
-void rollout(long n, double h, const double* u, const double* p, double* x) {{
+void rollout(long n, long every, double h, const double* u, const double* p, double* x) {{
   const double* arg[{sz_arg}];
   double* res[{sz_res}];
   casadi_int iw[{sz_iw}];
   double w[{sz_w}];
-  long k;
-  for (k = 0; k < n; ++k, x += {nx}) {{
-    arg[0] = x; arg[1] = u; arg[2] = p; arg[3] = &h;
-    res[0] = x + {nx};
-    step(arg, res, iw, w, 0);
+  double between[2][{nx}];
+  long k, j;
+  for (k = 0; k < n; k += every, x += {nx}) {{
+    const long last = every < n - k ? every : n - k;
+    const double* from = x;
+    for (j = 1; j <= last; ++j) {{
+      double* to = j == last ? x + {nx} : between[j & 1];
+      arg[0] = from; arg[1] = u; arg[2] = p; arg[3] = &h;
+      res[0] = to;
+      step(arg, res, iw, w, 0);
+      from = to;
+    }}
   }}
+}}
+#ifdef _WIN32
+__declspec(dllexport)
+#else
+__attribute__((visibility("default")))
+#endif
+void rollouts(long members, long n, long every, double h, const double* u, const double* p, double* x) {{
+  const long rows = (n + every - 1) / every + 1;
+  long k;
+  for (k = 0; k < members; ++k, p += {np}, x += rows * {nx}) rollout(n, every, h, u, p, x);
 }}
 #ifdef _WIN32
 __declspec(dllexport)
@@ -57,6 +75,9 @@ void outputs(long n, const double* u, const double* p, const double* x, double* 
 }}
 """
 
+Array = NDArray[np.float64]
+Loop = Callable[..., None]
+
 NO_COMPILER = "no C compiler that works was found: CasADi evaluates the model itself, many times slower"
 
 
@@ -70,27 +91,44 @@ class Integrator:
     compiled : bool, optional
         True or False to ask for machine code or for CasADi's own evaluation; by default machine code where a C compiler
         is found and works.
+    every : int
+        Of how many steps one is kept in a trajectory. What is read off it is interpolated to the third order: the ten
+        of an ensemble, a twentieth of a ship length, move no figure by more than 2e-4 of itself.
     """
 
-    def __init__(self, model: Model, compiled: bool | None = None):
-        self.model = model
+    def __init__(self, model: Model, compiled: bool | None = None, every: int = 1):
+        self.model, self.every = model, every
         self.compiled = find_compiler() is not None if compiled is None else compiled
         self._step = runge_kutta_step(model)
         if self.compiled:
             try:
-                self._rollout, self._outputs = self._in_machine_code()
+                self._rollout, self._rollouts, self._outputs = self._in_machine_code()
                 return
             except (InputError, OSError):  # a compiler that does not work, or compiles for another machine
                 if compiled:
                     raise
                 self.compiled = False
-        self._rollout, self._outputs = self._in_casadi()
+        self._rollout, self._rollouts, self._outputs = self._in_casadi()
 
-    def rollout(self, x: Vector, u: Vector, p: Vector, h: float, n: int) -> Vector:
-        """States (n + 1, nx) at the beginning `x` (nx,) and after each of `n` steps of `h` s, inputs `u` (nu,) held."""
-        states = np.empty((n + 1, len(x)))
+    def rollout(self, x: Vector, u: Vector, p: Vector, h: float, n: int, *, every: int = 1) -> Vector:
+        """States (ceil(n / every) + 1, nx) at the beginning `x` (nx,), then after each `every` steps, and the last.
+
+        `n` steps of `h` s with the inputs `u` (nu,) held.
+        """
+        states = np.empty((-(-n // every) + 1, len(x)))
         states[0] = x
-        self._rollout(n, h, u, p, states)
+        self._rollout(n, every, h, u, p, states)
+        return states
+
+    def rollouts(self, starts: Array, u: Vector, p: Array, steps: tuple[float, int]) -> Array:
+        """States (m, ceil(n / every) + 1, nx) of m ships from `starts` (m, nx), each with its parameters `p` (m, np).
+
+        `steps` are their length, s, and their number n; the inputs `u` (nu,) are held. Each is as in :meth:`rollout`.
+        """
+        h, n = steps
+        states = np.empty((len(starts), -(-n // self.every) + 1, starts.shape[1]))
+        states[:, 0] = starts
+        self._rollouts(len(starts), n, self.every, h, u, np.ascontiguousarray(p), states)
         return states
 
     def step(self, x: Vector, u: Vector, p: Vector, h: float) -> Vector:
@@ -104,25 +142,32 @@ class Integrator:
         self._outputs(len(x), np.ascontiguousarray(u), p, np.ascontiguousarray(x), y)
         return y
 
-    def _in_machine_code(self) -> tuple[Callable[..., None], Callable[..., None]]:
+    def _in_machine_code(self) -> tuple[Loop, Loop, Loop]:
         functions = (self._step, self.model.output)
         sizes = {
             name: max(1, *(getattr(f, name)() for f in functions)) for name in ("sz_arg", "sz_res", "sz_iw", "sz_w")
         }
-        lengths = {"nx": self._step.size1_in(0), "nu": self._step.size1_in(1), "ny": self.model.output.size1_out(0)}
+        lengths = {
+            "np": self._step.size1_in(2),
+            "nx": self._step.size1_in(0),
+            "nu": self._step.size1_in(1),
+            "ny": self.model.output.size1_out(0),
+        }
         source = generate_c(functions, "model") + _LOOP.format(**sizes, **lengths)
         library = ctypes.CDLL(str(cached_library({"model.c": source})))
         array = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
-        library.rollout.argtypes = [ctypes.c_long, ctypes.c_double, array, array, array]
+        library.rollout.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_double, array, array, array]
         library.outputs.argtypes = [ctypes.c_long, array, array, array, array]
-        library.rollout.restype = library.outputs.restype = None
-        return library.rollout, library.outputs
+        library.rollouts.argtypes = [*[ctypes.c_long] * 3, ctypes.c_double, array, array, array]
+        library.rollout.restype = library.rollouts.restype = library.outputs.restype = None
+        return library.rollout, library.rollouts, library.outputs
 
-    def _in_casadi(self) -> tuple[Callable[..., None], Callable[..., None]]:
+    def _in_casadi(self) -> tuple[Loop, Loop, Loop]:
         loops: dict[int, ca.Function] = {}
 
-        def rollout(n: int, h: float, u: Vector, p: Vector, x: Vector) -> None:
-            done = 0
+        def rollout(n: int, every: int, h: float, u: Vector, p: Vector, kept: Vector) -> None:
+            done, x = 0, np.empty((n + 1, kept.shape[1]))
+            x[0] = kept[0]
             while done < n:  # loops of 1, 2, 4, ... steps, so that few different ones are ever made
                 length = 1 << ((n - done).bit_length() - 1)
                 if length not in loops:
@@ -130,8 +175,14 @@ class Integrator:
                 part = loops[length](x[done], ca.repmat(u, 1, length), ca.repmat(p, 1, length), ca.repmat(h, 1, length))
                 x[done + 1 : done + 1 + length] = np.array(part).T
                 done += length
+            kept[:] = x[np.minimum(np.arange(len(kept)) * every, n)]
+
+        def rollouts(members: int, n: int, every: int, h: float, *arrays: Array) -> None:
+            u, parameters, states = arrays
+            for p, kept in zip(parameters, states, strict=True):
+                rollout(n, every, h, u, p, kept)
 
         def outputs(n: int, u: Vector, p: Vector, x: Vector, y: Vector) -> None:
             y[:] = np.array(self.model.output(x.T, u.T, ca.repmat(p, 1, n))).T
 
-        return rollout, outputs
+        return rollout, rollouts, outputs

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 
 import numpy as np
 from scipy.optimize import brentq
@@ -11,6 +12,9 @@ from tank2sim.dynamics.model import Vector
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.trajectory import Trajectory
+
+RUNAWAY = "the motion leaves all bounds"
+"""What is told of a motion that is not finite."""
 
 _CHUNK = 256  # steps taken between looks for an event: long enough for machine code to pay, short against a manoeuvre
 _TRIM_STEPS = 50
@@ -48,6 +52,7 @@ class Running:
         self._u = self.model.input_values(inputs)
         self._time = 0.0
         self._steps_done = 0
+        self._every = integrator.every
         self._x: Vector = np.array(self.model.initial(self._p)).ravel()
         if "initial.trim" in self.model and self._p[self.model.parameter_names.index("initial.trim")]:
             self._trim()
@@ -102,6 +107,12 @@ class Running:
             if not len(over):
                 continue
             last = int(over[0]) - 1
+            if self._every > 1:  # to the last sample before it, and on from there step by step
+                del self._t_parts[parts:], self._x_parts[parts:], self._u_parts[parts:]
+                self._time, self._x, self._steps_done = begin_time, begin_x, steps
+                self._advance_to(float(times[last]))
+                with self._step_by_step():
+                    return self.run_until(state, level, rising=rising, at_most=end - self._time)
             gap = float(times[last + 1] - times[last])
             h = brentq(self._after_step_from(states[last], beyond), 0.0, gap, xtol=1e-13)
             # Take the chunk back, and go to the event instead.
@@ -128,7 +139,7 @@ class Running:
             bad = ~(np.isfinite(x).all(axis=1) & np.isfinite(result.y).all(axis=1))
             when = f"t = {t[int(np.argmax(bad))]:.1f} s"
             remedy = "check the card's derivatives, or order less rudder: the model does not hold there"
-            raise InputError(self.model.name, when, "the motion leaves all bounds", remedy)
+            raise InputError(self.model.name, when, RUNAWAY, remedy)
         return result
 
     def _after_step_from(self, x: Vector, measure: Callable[[Vector], float]) -> Callable[[float], float]:
@@ -145,8 +156,8 @@ class Running:
         if self._time <= self._steps_done * h + tolerance:
             whole = int(np.floor((end - self._time) / h + 1e-9))
         if whole > 0:
-            states = self._integrator.rollout(self._x, self._u, self._p, h, whole)
-            times: Vector = np.asarray((self._steps_done + np.arange(whole)) * h, dtype=float)
+            states = self._integrator.rollout(self._x, self._u, self._p, h, whole, every=self._every)
+            times: Vector = np.asarray((self._steps_done + np.arange(0, whole, self._every)) * h, dtype=float)
             times[0] = self._time
             self._keep(times, states[:-1])
             self._x = states[-1]
@@ -154,6 +165,15 @@ class Running:
             self._time = self._steps_done * h
         if end - self._time > tolerance:
             self._partial(end - self._time)
+
+    @contextmanager
+    def _step_by_step(self) -> Iterator[None]:
+        """Keep each step for a while."""
+        every, self._every = self._every, 1
+        try:
+            yield
+        finally:
+            self._every = every
 
     def _partial(self, h: float) -> None:
         """One step of a length of its own."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline, krogh_interpolate
 from scipy.optimize import brentq
 
 from tank2sim.dynamics.model import Model, Vector
@@ -37,20 +38,20 @@ class Trajectory:
 
     def __getitem__(self, name: str) -> Vector:
         """A state, output or input (n,), by its name."""
-        for names, values in (
-            (self.model.outputs, self.y),
-            (self.model.state_names, self.x),
-            (self.model.input_names, self.u),
-        ):
-            if name in names:
-                column: Vector = values[:, names.index(name)]
-                return column
-        raise KeyError(name)
+        return self._columns[name]
+
+    @cached_property
+    def _columns(self) -> dict[str, Vector]:
+        model = self.model
+        # Of one name an output comes before a state, and that before an input.
+        parts = (model.input_names, self.u), (model.state_names, self.x), (model.outputs, self.y)
+        return {name: values[:, place] for names, values in parts for place, name in enumerate(names)}
 
     def at(self, name: str, time: float) -> float:
         """A signal at a time between samples: a cubic through the four around it."""
-        near = np.unique(np.clip(np.searchsorted(self.t, time) + np.arange(-2, 2), 0, len(self.t) - 1))
-        return float(krogh_interpolate(self.t[near], self[name][near], time))
+        after = int(np.searchsorted(self.t, time))
+        near = slice(max(after - 2, 0), min(after, len(self.t) - 2) + 2)
+        return _through(self.t[near].tolist(), self[name][near].tolist(), time)
 
     def crossings(self, name: str, rate: str, level: float) -> Vector:
         """Times at which a signal crosses a level, from its values and those of its time derivative `rate`.
@@ -60,7 +61,7 @@ class Trajectory:
         offset, slope = self[name] - level, self[rate]
         before = np.flatnonzero((offset[:-1] < 0) != (offset[1:] < 0))
         times = [
-            brentq(CubicHermiteSpline(self.t[k : k + 2], offset[k : k + 2], slope[k : k + 2]), *self.t[k : k + 2])
+            brentq(_hermite(*(part[k : k + 2].tolist() for part in (self.t, offset, slope))), self.t[k], self.t[k + 1])
             for k in before
         ]
         return np.array(times)
@@ -74,3 +75,27 @@ class Trajectory:
     def is_finite(self) -> bool:
         """True if no state or output is infinite or not a number."""
         return bool(np.isfinite(self.x).all() and np.isfinite(self.y).all())
+
+
+def _through(times: list[float], values: list[float], time: float) -> float:
+    """The polynomial through a few points, at a time (Neville)."""
+    for order in range(1, len(times)):
+        for k in range(len(times) - order):
+            before, after = time - times[k], times[k + order] - time
+            values[k] = (after * values[k] + before * values[k + 1]) / (before + after)
+    return values[0]
+
+
+def _hermite(times: list[float], values: list[float], slopes: list[float]) -> Callable[[float], float]:
+    """The cubic with these values and slopes at two times."""
+    length = times[1] - times[0]
+    rise = (values[1] - values[0]) / length
+    square = (3 * rise - 2 * slopes[0] - slopes[1]) / length
+    cube = (slopes[0] + slopes[1] - 2 * rise) / length**2
+
+    def cubic(time: float) -> float:
+        s = time - times[0]
+        # Exact at the far end, too: what is sought lies between values of different signs.
+        return values[1] if time == times[1] else values[0] + s * (slopes[0] + s * (square + s * cube))
+
+    return cubic

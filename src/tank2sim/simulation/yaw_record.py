@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from tank2sim.cards.card import YawRigCard
@@ -10,7 +11,7 @@ from tank2sim.dynamics.yaw_programme import programme_of
 from tank2sim.dynamics.yaw_rig import YawRig, rig_of
 from tank2sim.records.yaw import Medium, YawRecord
 from tank2sim.simulation.yaw_rig import Measuring, YawRun, run_yaw_rig
-from tank2sim.simulation.yaw_rig_control import TunedController
+from tank2sim.simulation.yaw_rig_control import Controller, TunedController
 
 
 def record_of(
@@ -33,18 +34,59 @@ def record_of(
     )
 
 
-def simulated_record(card: YawRigCard, path: Path, current_noise_A: float = 0.0) -> YawRecord:
-    """The record of the card's programme on the card's rig: controller (4) from the right inertia, encoder and all.
+def simulated_record(
+    card: YawRigCard,
+    path: Path,
+    current_noise_A: float = 0.0,
+    *,
+    medium: Medium = "water",
+    controller: Controller | None = None,
+) -> YawRecord:
+    """The record of the card's programme on the card's rig, encoder and all.
+
+    Parameters
+    ----------
+    card : YawRigCard
+    path : Path
+        The file that the record is for.
+    current_noise_A : float
+        Standard deviation of the recorded current.
+    medium : str
+        In ``air`` the rig is that of :func:`rig_in_air`.
+    controller : optional
+        By default (4), from the right inertia.
 
     Raises
     ------
     InputError
         The motor saturates, or the card's rig or programme is none.
     """
-    rig, programme = rig_of(card), programme_of(card)
-    controller = TunedController(inertia_kgm2=rig.inertia_kgm2 + rig.added_inertia_kgm2)
+    wet, programme = rig_of(card), programme_of(card)
+    rig = rig_in_air(wet) if medium == "air" else wet
+    controller = controller or TunedController(inertia_kgm2=rig.inertia_kgm2 + rig.added_inertia_kgm2)
     run = run_yaw_rig(rig, programme, controller, Measuring(current_noise_A=current_noise_A))
-    told = {"inertia_kgm2": rig.inertia_kgm2, "water_density_kgpm3": card.environment.water_density_kgpm3}
+    told = {}
+    if medium == "water":
+        told = {"inertia_kgm2": rig.inertia_kgm2, "water_density_kgpm3": card.environment.water_density_kgpm3}
+        if error := card.uncertainty.get("inertia_kgm2"):
+            told["inertia_error_kgm2"] = error
     if card.ship.length_m is not None:
         told["length_m"] = card.ship.length_m
-    return record_of(run, rig, path, told)
+    return record_of(run, rig, path, told, medium=medium)
+
+
+def rig_in_air(rig: YawRig) -> YawRig:
+    """The rig with its body in air: no added inertia, no f_662, no walls.
+
+    Dry and viscous friction are those of the card: it does not tell the water's part of them. The inertia, which is
+    what a run in air is for, does not depend on that.
+    """
+    return replace(
+        rig,
+        added_inertia_kgm2=0.0,
+        quadratic_Nms2=0.0,
+        braking_quadratic_Nms2=None,
+        inertia_accelerating_kgm2=0.0,
+        inertia_braking_kgm2=0.0,
+        walls=None,
+    )

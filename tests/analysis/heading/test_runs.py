@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from scipy.signal import StateSpace, lsim, welch
 from tank2sim.analysis.heading.designs import design_heading, steering_plant
 from tank2sim.analysis.heading.runs import HeadingLoop, course_change, course_keeping, without_anti_windup
 from tank2sim.analysis.heading.weather import Weather, in_weather, wave_yaw_acceleration, weather_for
-from tank2sim.cards import ManoeuvringCard
+from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
 from tank2sim.dynamics.model import Model
 
@@ -47,6 +49,59 @@ def test_the_closed_loop_is_that_of_an_independent_integration(loop: HeadingLoop
     truth = solve_ivp(rate, (0, 400), start, "LSODA", t_eval=run.t[::100], rtol=1e-8, atol=1e-10, max_step=1.0)
     difference = np.degrees(np.abs(run["motion.psi"][::100] - truth.y[psi])).max()
     assert difference < 2e-3  # RK4 across the kinks of limits
+
+
+def change_by_hand(band_deg: float, *, trimmed: bool) -> tuple[float, float]:
+    """Overshoot and largest rudder (deg) of the Mariner in a change by 20 deg, with nothing of the program but gains.
+
+    Her polynomial and her gear are written down anew from the printed coefficients.
+    """
+    card = tomllib.loads(Path(read_card("mariner").source).read_text(encoding="utf-8"))
+    d, body, L, u0 = card["derivatives"], card["rigid_body"], card["ship"]["length_m"], card["model"]["speed_mps"]
+    mass = [
+        [body["mass"] - d["Yvdot"], body["mass"] * body["x_G"] - d["Yrdot"]],
+        [body["mass"] * body["x_G"] - d["Nvdot"], body["yaw_inertia"] - d["Nrdot"]],
+    ]
+    inverse = np.linalg.inv(mass)
+    terms = [(name[0], name[1:].replace("0", ""), value) for name, value in d.items() if "dot" not in name]
+
+    Kp, Kd, Ki, band = 1.18, 40.34057, 0.004153122, math.radians(band_deg)
+
+    def rate(_: float, x: np.ndarray) -> list[float]:
+        u, v, r, heading, rudder, z = x
+        U = math.hypot(u, v)
+        prime = {"u": (u - u0) / U, "v": v / U, "r": r * L / U, "d": -rudder}
+        force = {"X": 0.0, "Y": 0.0, "N": 0.0}
+        for axis, factors, value in terms:
+            force[axis] += value * math.prod(prime[one] for one in factors)
+        sway, yaw = inverse @ [force["Y"], force["N"]]
+        surge = force["X"] / (body["mass"] - d["Xudot"])
+        order = Kp * (COURSE - heading) - Kd * r + z  # far from the limit: no anti-windup
+        moved = min(max(order - rudder, -math.radians(5)), math.radians(5))  # lag of 1 s, 5 deg/s
+        grown = Ki * min(max(COURSE - heading, -band), band)
+        return [surge * U**2 / L, sway * U**2 / L, yaw * U**2 / L**2, r, moved, grown]
+
+    sway, trim = (0.009144, math.radians(-1.1078)) if trimmed else (0.0, 0.0)  # of her straight course
+    run = solve_ivp(rate, (0, 250), [u0, sway, 0, 0, trim, trim], "LSODA", np.arange(0, 250, 0.1), rtol=1e-7, atol=1e-9)
+    return math.degrees(run.y[3].max()) - 20.0, math.degrees(run.y[4].max())
+
+
+def test_the_overshoot_is_that_of_a_ship_written_down_anew_and_the_band_of_the_integral_makes_it(
+    loop: HeadingLoop,
+) -> None:
+    found = course_change(loop.run({"heading.command": COURSE}, 250.0), COURSE)
+    overshoot, rudder = change_by_hand(2.0, trimmed=False)
+    assert found.overshoot_deg == pytest.approx(overshoot, abs=2e-3)
+    assert found.largest_rudder_deg == pytest.approx(rudder, abs=5e-3)
+    # An integral that takes the whole of a course change swings the ship past, and so does one without her trim.
+    begin = loop.kept_course({}, 1400.0)
+    for band in (180.0, 2.0):
+        taken = {"autopilot.integral_band": math.radians(band)}
+        run = loop.run({"heading.command": COURSE}, 250.0, parameters=taken, begin=begin)
+        found = course_change(run, COURSE)
+        overshoot, rudder = change_by_hand(band, trimmed=True)
+        assert (found.overshoot_deg, found.largest_rudder_deg) == pytest.approx((overshoot, rudder), abs=0.02)
+    assert change_by_hand(180.0, trimmed=True)[0] == pytest.approx(2.60, abs=0.02)
 
 
 def test_a_course_change_ends_on_the_new_course(loop: HeadingLoop) -> None:

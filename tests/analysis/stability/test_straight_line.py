@@ -6,6 +6,8 @@ import pytest
 
 from tank2sim.analysis.linearisation import jacobians, state_space, straight_course
 from tank2sim.analysis.stability.imo import imo_criteria
+from tank2sim.analysis.stability.margin import stability_margin
+from tank2sim.analysis.stability.response import steering_responses
 from tank2sim.analysis.stability.straight_line import nomoto, stability
 from tank2sim.cards import linear, parse_card, read_card
 from tank2sim.dynamics import build
@@ -197,3 +199,91 @@ def test_settled_states_are_those_of_the_slow_limit() -> None:
     assert control.dcgain(small) == pytest.approx(control.dcgain(whole), rel=1e-9)
     frozen = state_space(model, point, states=motion, inputs=["rudder.angle"], outputs=["motion.r"])
     assert abs(control.dcgain(frozen) / control.dcgain(whole) - 1) > 1e-3
+
+
+def with_effect(name: str, parameters: dict[str, float], changed: dict[str, object] | None = None):
+    return build(read_card("mariner", {"effects": [{"name": name, "parameters": parameters}], **(changed or {})}))
+
+
+@pytest.fixture(scope="module")
+def rolling():
+    """Slow motions decay, and the roll grows."""
+    return with_effect("roll_coupling", {"Yphi": 0.001, "Nphi": 0.02})
+
+
+def test_a_ship_whose_roll_grows_is_unstable_whatever_her_slow_motions_say(rolling) -> None:
+    found = stability(rolling)
+    point = straight_course(rolling)
+    motion = [f"motion.{one}" for one in ("u", "v", "r", "phi", "p")]
+    truth = np.linalg.eigvals(state_space(rolling, point, states=motion).A)
+    np.testing.assert_allclose(np.sort_complex(found.eigenvalues), np.sort_complex(truth), rtol=1e-9)
+    assert found.growth_per_s == pytest.approx(0.0171, abs=1e-4)
+    assert found.criterion > 0 and not found.stable and not found.criterion_decides
+    assert found.effect_states == ("motion.phi", "motion.p")
+
+
+def test_the_step_of_the_whole_system_grows_with_the_roll(rolling) -> None:
+    found = stability(rolling)
+    hull, gear, _ = steering_responses(rolling, straight_course(rolling), found.nomoto)
+    assert hull.poles.real.max() == pytest.approx(found.growth_per_s, rel=1e-2) and len(hull.poles) == 4
+    assert len(gear.poles) == 5  # the gear besides
+    crossings = np.diff(np.sign(np.diff(hull.step_per_s)))
+    # at least eight samples from one turn of the curve to the next
+    assert np.diff(np.flatnonzero(crossings)).min() >= 6
+    _, second, _, last = np.array_split(np.abs(np.diff(hull.step_per_s, 2)), 4)
+    assert last.max() > 2 * second.max()
+
+
+def test_the_flows_memory_is_among_the_modes() -> None:
+    """Eigenvalues of the matrix written by hand: v in Y_v v and N_v v is v - share (v - z), dz/dt = (v - z)/tau."""
+    share, tau = 0.5, 20.0
+    linear_ship = {"model.kind": "linear", **SYMMETRIC}
+    found = stability(with_effect("flow_memory", {"share": share, "time_constant_s": tau}, linear_ship))
+    bare = build(read_card("mariner", linear_ship))
+    A = state_space(bare, straight_course(bare), states=["motion.v", "motion.r"]).A
+    late = share * A[:, :1]
+    whole = np.block([[A - np.hstack([late, np.zeros((2, 1))]), late], [np.array([[1 / tau, 0.0, -1 / tau]])]])
+    np.testing.assert_allclose(np.sort(np.real(found.steering_modes)), np.sort(np.linalg.eigvals(whole)), rtol=1e-9)
+    assert found.stable and found.criterion == pytest.approx(stability(bare).criterion)
+
+
+def test_an_engine_that_lags_is_no_state_that_answers_to_sway_and_yaw() -> None:
+    card = read_card("esso-osaka", {"effects": [{"name": "engine_lag", "parameters": {"time_constant_s": 2.0}}]})
+    assert stability(build(card)).effect_states == ()
+
+
+def test_a_linear_card_is_that_of_its_own_speed_alone() -> None:
+    model = build(read_card("mariner", {"model.kind": "linear", **SYMMETRIC}))
+    own, other = stability(model), stability(model, 5.4)
+    assert own.criterion == pytest.approx(1160e-5 * 166e-5 - 264e-5 * 499e-5, rel=1e-9)
+    assert other.criterion == pytest.approx(own.criterion) and other.nomoto_prime == own.nomoto_prime
+    margin = stability_margin(model, 5.4)
+    assert margin.criterion == pytest.approx(own.criterion) and margin.as_json()["speed"] is None
+    third = build(read_card("mariner", SYMMETRIC))
+    assert stability(third, 5.4).criterion < 0.5 * stability(third).criterion
+
+
+def test_prime_numbers_bear_no_seconds(mariner) -> None:
+    nomoto_json = stability(mariner).as_json()["nomoto"]
+    assert list(nomoto_json["prime"]) == ["K_prime", "T_prime", "T1_prime", "T2_prime", "T3_prime"]
+    assert list(nomoto_json["dimensional"]) == ["K_per_s", "T_s", "T1_s", "T2_s", "T3_s"]
+
+
+def test_a_ship_that_sway_does_not_push_is_told_so() -> None:
+    with pytest.raises(InputError, match="Yv and Nv"):
+        stability(build(read_card("mariner", {"derivatives.Yv": 0.0, "derivatives.Nv": 0.0})))
+    with pytest.raises(InputError, match="Yd and Nd"):
+        stability(build(read_card("mariner", {"derivatives.Yd": 0.0, "derivatives.Nd": 0.0})))
+
+
+def test_a_trial_that_leaves_what_the_card_holds_for_says_so() -> None:
+    criteria = {one.name: one for one in imo_criteria(build(read_card("kvlcc2")))}
+    advance, zigzag = criteria["advance"], criteria["20/20 zigzag, first overshoot"]
+    assert advance.beyond_card and "yaw rate" in advance.remark and "3.99" in advance.remark
+    assert not zigzag.beyond_card and not zigzag.remark
+
+
+def test_a_rudder_that_turns_the_wrong_way_is_the_reason_of_what_is_not_shown() -> None:
+    changed = {"derivatives.Yd": -278e-5, "derivatives.Nd": 139e-5}
+    criteria = imo_criteria(build(read_card("mariner", changed)))
+    assert all(one.found is None and "against her rudder" in one.remark for one in criteria[:-1])

@@ -109,6 +109,31 @@ def test_wishes_that_contradict_each_other_are_named_without_the_innocent_one(ca
     assert study.figures_at(found.values)[1] == pytest.approx(nearest, rel=1e-4)
 
 
+@pytest.mark.parametrize("texts", [["600", "700"], ["640", "640"]], ids=["opposed", "one twice"])
+def test_what_has_no_influence_stays_and_the_rest_moves_as_little_as_it_can(card, texts) -> None:
+    """With one figure the least moves go along its slopes (Lagrange), whether the wishes are met or only approached."""
+    study, found = tuned_to(card, [f"steady_radius_m@20={text}" for text in texts])
+    assert found.reached is (texts[0] == texts[1])
+    assert not {"Xudot", "Yvdot", "Nrdot"} & {move.parameter.short for move in found.moves}
+    _, slopes = study.slopes_at(found.values)
+    errors = np.array([one.standard_error for one in study.parameters])
+    moves = np.divide(found.values - study.values, errors, out=np.zeros_like(errors), where=errors > 0)
+    gradient = slopes[0] * errors
+    assert gradient @ moves / np.linalg.norm(gradient) / np.linalg.norm(moves) == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("steady_radius_m@20=-5", "steady_diameter_m@20<=0", "advance_m@35=-1", "time_90_s@35=0"),
+        *("speed_loss_percent@20=120", "speed_loss_percent@20=-1", "overshoot1_deg@20/20=-2", "steady_drift_deg@20=95"),
+    ],
+)
+def test_a_wish_that_no_ship_can_meet_is_refused(text) -> None:
+    with pytest.raises(InputError, match="no ship has"):
+        parse_wish(text)
+
+
 def test_a_wish_beyond_the_bounds_is_told_alone_and_wider_bounds_reach_it(card) -> None:
     _, found = tuned_to(card, ["steady_radius_m@20=900"])
     assert [wish.figure.text for wish in found.contradiction] == ["steady_radius_m@20"]

@@ -49,7 +49,7 @@ def test_an_estimate_is_told_with_its_number_and_acts_as_if_stated(name: str, st
     assert len(told) == len(stated)
     for notice, (key, value) in zip(told, stated.items(), strict=True):
         assert key in notice and "typical" in notice
-        assert float(re.search(r" of ([\d.e+]+)", notice)[1]) == pytest.approx(value, rel=5e-3)
+        assert float(re.search(r" as ([\d.e+]+)", notice)[1]) == pytest.approx(value, rel=5e-3)
 
 
 def test_an_estimate_is_told_once() -> None:

@@ -101,6 +101,7 @@ def test_a_fault_of_a_sensor_is_no_business_of_the_ship(name: str) -> None:
     assert not [one for one in declared if one.startswith("sensor.")]
 
 
+@pytest.mark.slow
 def test_a_second_fault_acts_on_what_the_first_shows() -> None:
     pairs = itertools.permutations([one for one in SENSORS if one != "rudder_time_offset"], 2)
     for first, second in pairs:

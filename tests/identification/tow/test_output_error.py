@@ -93,6 +93,7 @@ def test_the_truth_comes_back_from_exact_tows(truth, force, end_s):
     np.testing.assert_allclose(fit.estimates, list(truth.values()), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_standard_errors_are_the_spread_of_repeated_tows():
     rng = np.random.default_rng(3)
     coefficients = SurgeCoefficients(total_mass_kg=3000.0, B3_kgpm=150.0)

@@ -9,6 +9,7 @@ import control
 import numpy as np
 
 from tank2sim.analysis.linearisation import OperatingPoint, state_space, straight_course
+from tank2sim.analysis.stability.straight_line import settled_states
 from tank2sim.dynamics.autopilot_loop import closed_loop_model
 from tank2sim.dynamics.model import Model, Vector
 
@@ -17,6 +18,9 @@ _HELD = ("motion.x", "motion.y", "motion.u")
 
 _OFF_THE_KINK = 1e-6
 """rad: far below any rudder angle that matters."""
+
+_TAKES_PART = 0.1
+"""Participation in a mode from which a state is named (a choice of ours)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,6 +147,24 @@ def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) 
         bandwidth_radps=float(omega[below[0]]) if below.size else math.inf,
         poles=tuple(poles),
     )
+
+
+def growing_effects(ship: Model, speed_mps: float | None = None) -> tuple[str, ...]:
+    """States of the ship's effects (roll, memory of the flow) whose own modes grow with the rudder fixed.
+
+    A design on sway and yaw takes such states as settled, and does not see them. A mode is theirs if their
+    participation in it is more than half: \\|w_i v_i\\|, w and v its left and right eigenvectors (Perez-Arriaga,
+    Verghese and Schweppe 1982).
+    """
+    own = settled_states(ship)
+    states = [name for name in ship.state_names if name not in (*_HELD, "motion.psi")]
+    found = state_space(ship, straight_course(ship, speed_mps), states=states, inputs=["rudder.command"])
+    modes, right = np.linalg.eig(found.A)
+    shares = np.abs(right * np.linalg.inv(right).T)  # (states, modes)
+    shares /= shares.sum(axis=0)
+    theirs = [states.index(name) for name in own]
+    growing = (modes.real > 0) & (shares[theirs].sum(axis=0) > 0.5)
+    return tuple(name for name, place in zip(own, theirs, strict=True) if np.any(shares[place, growing] > _TAKES_PART))
 
 
 def frequencies(loop: control.StateSpace) -> Vector:

@@ -55,8 +55,9 @@ class HeadingLoop:
         duration_s: float,
         *,
         parameters: Mapping[str, float] | None = None,
+        begin: Vector | None = None,
     ) -> Trajectory:
-        """Simulate from the model's start, classical Runge-Kutta at the model's step.
+        """Simulate from the model's start, or from the state `begin` (nx,), classical Runge-Kutta at the model's step.
 
         Raises
         ------
@@ -64,8 +65,24 @@ class HeadingLoop:
             The motion leaves all bounds.
         """
         steps = round(duration_s / self.model.step_s)
-        x, u = self.advance(self.start(parameters), inputs, steps, parameters)
+        x, u = self.advance(self.start(parameters) if begin is None else begin, inputs, steps, parameters)
         return self.trajectory(x, u, parameters)
+
+    def kept_course(
+        self, inputs: Mapping[str, float | Vector], duration_s: float, parameters: Mapping[str, float] | None = None
+    ) -> Vector:
+        """State (nx,) of a ship that has kept the course 0 for a time, at the speed and place of the model's start.
+
+        An asymmetric ship needs rudder for it, which the controller has found by then: it is no part of what follows.
+        """
+        start = self.start(parameters)
+        x, _ = self.advance(
+            start, {**inputs, "heading.command": 0.0}, round(duration_s / self.model.step_s), parameters
+        )
+        again = [self.model.state_names.index(f"motion.{name}") for name in ("u", "x", "y")]
+        state: Vector = x[-1].copy()
+        state[again] = start[again]
+        return state
 
     def trajectory(self, x: Vector, u: Vector, parameters: Mapping[str, float] | None = None) -> Trajectory:
         """States (n + 1, nx) and inputs (n, nu) with their times and outputs. Raises as :meth:`run`."""

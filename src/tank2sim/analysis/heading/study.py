@@ -8,8 +8,15 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
+from tank2sim.analysis.heading.control import LARGEST_RUDDER_RAD
 from tank2sim.analysis.heading.designs import HeadingDesign, Weights, design_heading
-from tank2sim.analysis.heading.margins import LargestSteps, LoopMargins, largest_steps, loop_margins
+from tank2sim.analysis.heading.margins import (
+    LargestSteps,
+    LoopMargins,
+    growing_effects,
+    largest_steps,
+    loop_margins,
+)
 from tank2sim.analysis.heading.runs import (
     CourseChange,
     CourseKeeping,
@@ -33,6 +40,9 @@ _CHANGE_TIMES = 60
 """Length of a course change in 1/w, w = sqrt(K/T): six times the slowest mode that is placed (choice of ours)."""
 _KEEPING_TIMES = 120
 """Length of course keeping in 1/w; figures are those of its later half."""
+
+_BUSY_PERCENT = 10.0
+"""Share of the time at full rate from which a gear is said to be overworked by waves (a choice of ours)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,6 +113,21 @@ class AutopilotStudy:
     waypoints: Vector | None
     notices: tuple[str, ...]
 
+    @property
+    def limits(self) -> dict[str, float]:
+        """What bounds the controller: ``largest_rudder_deg``, and of one with an integral ``anti_windup_time_s`` and
+        ``integral_band_deg`` (of those with states of their own ``integral_limit_radps``, the band times its gain)."""
+        names = {
+            "autopilot.max_rudder": "largest_rudder_rad",
+            "autopilot.anti_windup_time": "anti_windup_time_s",
+            "autopilot.integral_band": "integral_band_rad",
+            "autopilot.integral_limit": "integral_limit_radps",
+        }
+        found = {names[one.name]: one.start for one in self.design.autopilot.parameters if one.name in names}
+        if "autopilot.integral" not in self.design.autopilot:
+            found.pop("anti_windup_time_s", None)
+        return _in_degrees(found)
+
     def as_json(self) -> dict[str, object]:
         """The result as JSON has it."""
         first = self.margins[0]
@@ -111,6 +136,7 @@ class AutopilotStudy:
             "design": self.design.kind,
             "source": self.design.source,
             "gains": dict(self.design.gains),
+            "limits": self.limits,
             "margins": {"at_design": first.as_json(), "at_speeds": [one.as_json() for one in self.margins]},
             "closed_loop": {
                 "poles": [[pole.real, pole.imag] for pole in first.poles],
@@ -140,11 +166,12 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     InputError
         As :func:`design_heading`, :func:`keep_track` and :meth:`HeadingLoop.run`; or the loop is not stable.
     """
+    only = card.model.kind == "linear"
+    _refuse_other_speed(card, settings.speed_mps if only else None)
     design = _design(ship, settings)
-    margins, told = _margins(ship, design, settings.speed_mps)
+    margins, told = _margins(ship, design, settings.speed_mps, only_own=only)
     if not margins[0].stable:
-        remedy = "choose another design, or check the steering gear of the card"
-        raise InputError(ship.name, "", f"the loop of the {design.kind} design is not stable", remedy)
+        raise _not_stable(ship, design, settings.speed_mps)
     values = {one.name: one.start for one in ship.parameters}
     weather = weather_for(values["ship.length"], **settings.weather)
     outside, inputs = in_weather(ship, card, weather)
@@ -157,6 +184,7 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     waves = wave_yaw_acceleration(weather, loop.model.step_s, steps)
     weathered: dict[str, float | Vector] = {**inputs, YAW_DISTURBANCE: waves, "heading.command": 0.0}
     runs["keeping"] = loop.run(weathered, steps * loop.model.step_s, parameters=start)
+    kept = course_keeping(runs["keeping"], 0.0, runs["keeping"].t[-1] / 2)
     tracks = {}
     if settings.waypoints is not None:
         for name, share in (("line of sight", 0.0), ("with integral", INTEGRAL_SHARE)):
@@ -168,11 +196,32 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
         weather=weather,
         runs=runs,
         changes=changes,
-        keeping=course_keeping(runs["keeping"], 0.0, runs["keeping"].t[-1] / 2),
+        keeping=kept,
         tracks=tracks,
         waypoints=settings.waypoints,
-        notices=(*outside.notices, *told, *_begun_at(settings.speed_mps), *_notices(margins, runs, changes, tracks)),
+        notices=(
+            *outside.notices,
+            *told,
+            *_begun_at(settings.speed_mps),
+            *_notices(margins, runs, changes, tracks),
+            *_of_the_gear(ship, design, kept, weather),
+        ),
     )
+
+
+def _refuse_other_speed(card: ManoeuvringCard, speed: float | None) -> None:
+    own = card.model.speed_mps
+    if speed is not None and abs(speed / own - 1) > 1e-6:
+        problem = f"{speed:g} m/s is not the speed of {card.ship.name}, whose forces are linear"
+        raise InputError("--speed", "", problem, f"leave it out: a linear card holds at {own:g} m/s alone")
+
+
+def _not_stable(ship: Model, design: HeadingDesign, speed: float | None) -> InputError:
+    problem = f"the loop of the {design.kind} design is not stable"
+    if growing := growing_effects(ship, speed):
+        problem += f": the ship's own motion in {', '.join(growing)} grows, with the rudder fixed, too"
+        return InputError(ship.name, "effects", problem, "check the parameters of the effect that it belongs to")
+    return InputError(ship.name, "", problem, "choose another design, or check the steering gear of the card")
 
 
 def _design(ship: Model, settings: StudySettings) -> HeadingDesign:
@@ -185,11 +234,18 @@ def _design(ship: Model, settings: StudySettings) -> HeadingDesign:
     )
 
 
-def _margins(ship: Model, design: HeadingDesign, speed: float | None) -> tuple[tuple[LoopMargins, ...], list[str]]:
-    """At the speed of the design and at five across the card's range; and what is to be told of those without."""
+def _margins(
+    ship: Model, design: HeadingDesign, speed: float | None, *, only_own: bool
+) -> tuple[tuple[LoopMargins, ...], list[str]]:
+    """At the speed of the design and at five across the card's range; and what is to be told of those without.
+
+    The forces of a linear card are those at its own speed by definition: others would repeat its margins.
+    """
     values = {one.name: one.start for one in ship.parameters}
     own = values["ship.speed"] if speed is None else speed
     found, told = [loop_margins(ship, design.autopilot, own)], []
+    if only_own:
+        return tuple(found), [f"margins at {own:.4g} m/s alone: a linear card tells nothing of other speeds"]
     for other in np.linspace(values["ship.slowest"], values["ship.fastest"], 5).tolist():
         if abs(other / own - 1) < 1e-6:
             continue
@@ -211,8 +267,9 @@ def _changes(
     asked = {"change": (settings.course_change_rad, dict(start)), "large": (settings.large_change_rad, dict(start))}
     if bare := without_anti_windup(design.autopilot):
         asked["large without anti-windup"] = (settings.large_change_rad, {**start, **bare})
+    begin = loop.kept_course(inputs, duration, start)
     runs = {
-        name: loop.run({**inputs, "heading.command": order}, duration, parameters=values)
+        name: loop.run({**inputs, "heading.command": order}, duration, parameters=values, begin=begin)
         for name, (order, values) in asked.items()
     }
     return runs, {name: course_change(run, asked[name][0]) for name, run in runs.items()}
@@ -231,6 +288,25 @@ def _notices(
         if one.settling_time_s is None
     ]
     return told + [f"the track is not finished, {name}" for name, one in tracks.items() if not one.figures.finished]
+
+
+def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weather: Weather) -> list[str]:
+    """What is asked of the gear in waves, and where the autopilot stops short of it."""
+    told = []
+    if kept.rate_limited_percent > _BUSY_PERCENT:
+        remedy = f"--wave-filter {weather.wave_radps:.3g}" if design.kind == "pid" else "--design pid --wave-filter"
+        filtered = "wave_filter_radps" in design.gains
+        told.append(
+            f"keeping a course in waves the rudder is at full rate {kept.rate_limited_percent:.0f} % of the time: "
+            + ("the waves are more than this gear can follow" if filtered else f"{remedy} lets it rest")
+        )
+    limit = {one.name: one.start for one in ship.parameters}.get("steering.max_angle", 0.0)
+    if limit > LARGEST_RUDDER_RAD * (1 + 1e-9):
+        told.append(
+            f"the autopilot orders no more than {math.degrees(LARGEST_RUDDER_RAD):.0f} deg of rudder, the angle that "
+            f"SOLAS II-1, regulation 29, asks a gear for; this gear goes to {math.degrees(limit):.3g} deg"
+        )
+    return told
 
 
 def _begun_at(speed: float | None) -> list[str]:

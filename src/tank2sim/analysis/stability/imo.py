@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from tank2sim.dynamics.hull import LARGEST_DRIFT, LARGEST_YAW_RATE
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import FULL_ASTERN, Manoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.run import simulate
+from tank2sim.simulation.trajectory import Trajectory
 
 TRIAL_RUDDER = math.radians(35.0)
 """Rudder of the turning circle trials: 35 deg, or the largest the gear allows."""
@@ -25,15 +29,25 @@ SHORTEST_SHIP_M = 100.0
 
 _SCALE = (
     "MSC.137(76) is for ships of 100 m and more: its limits of the 10/10 overshoots go with L/V in seconds, which a "
-    "model does not keep, so scale the ship up for them"
+    "model does not keep, and the card tells no scale: judge the overshoots of the ship she stands for"
 )
+
+_HOLDS = 1 - 1e-6
+"""``validity`` below this has left 1: above what rounding leaves."""
+
+_STILL = 0.05
+"""Share of u0 below which drift and yaw rate over speed are not told: a ship at rest has none. Ours."""
+
+_TURNED = math.radians(90.0)
+"""A ship that has turned so far against her rudder does not answer late, but the wrong way. A choice of ours."""
 
 
 @dataclass(frozen=True)
 class Criterion:
     """One criterion: what was found, what is allowed, in `unit`; `found` is None where the trial did not show it.
 
-    `remark` says why nothing was found, or what the reader of the verdict should know.
+    `remark` says why nothing was found, or what the reader of the verdict should know; `beyond_card` is true if a trial
+    left what the card holds for, so that the verdict is an extrapolation.
     """
 
     name: str
@@ -41,6 +55,7 @@ class Criterion:
     allowed: float
     unit: str
     remark: str = ""
+    beyond_card: bool = False
 
     @property
     def passed(self) -> bool | None:
@@ -68,36 +83,100 @@ class _Trials:
 
     model: Model
     integrator: Integrator
+    parameters: Mapping[str, float]
 
-    def run(self, manoeuvre: Manoeuvre) -> tuple[Figures, str]:
-        """Figures of a trial, and why there are none."""
+    def run(self, manoeuvre: Manoeuvre) -> _Trial:
+        """A trial, or why there is none."""
         # MSC.137(76) asks for calm water: a current on the card is part of one place, not of the ship.
         calm = {name: 0.0 for name in self.model.input_names if name in ("current.speed", "wind.speed")}
+        own, integrator = self.parameters, self.integrator
         try:
-            return simulate(self.model, manoeuvre, inputs=calm, integrator=self.integrator).figures, ""
+            run = simulate(self.model, manoeuvre, inputs=calm, parameters=own, integrator=integrator)
         except InputError as error:
-            return {}, f"{error.place}: {error.problem}" if error.place else error.problem
+            return _Trial({}, f"{error.place}: {error.problem}" if error.place else error.problem, "")
+        return _Trial(run.figures, _wrong_way(manoeuvre, run.trajectory), self._outside(run.trajectory))
 
-    def worst(self, manoeuvres: Sequence[Manoeuvre], *places: tuple[str, int | None]) -> list[tuple[float | None, str]]:
-        """The larger of each figure over the trials, and why there is none."""
+    def _outside(self, run: Trajectory) -> str:
+        """How a trial leaves what the card holds for (its ``validity``); empty if it does not."""
+        if "validity" not in self.model.outputs or not run["validity"].min() < _HOLDS:
+            return ""
+        values = dict(
+            zip(self.model.parameter_names, self.model.parameter_values(self.parameters).tolist(), strict=True)
+        )
+        slowest, fastest, speed = values["ship.slowest"], values["ship.fastest"], run["motion.speed"]
+        moving = np.maximum(speed, _STILL * values["ship.speed"])
+        drift = float(np.max(np.abs(run["motion.v"]) / moving))
+        rate = float(np.max(np.abs(run["motion.r"]) * values["ship.length"] / moving))
+        parts = []
+        if speed.min() < slowest or speed.max() > fastest:
+            parts.append(f"{speed.min():.2f} to {speed.max():.2f} m/s, card {slowest:.2f} to {fastest:.2f} m/s")
+        if rate > LARGEST_YAW_RATE:
+            parts.append(f"yaw rate {rate:.3g} U/L")
+        if drift > LARGEST_DRIFT:
+            parts.append(f"drift {math.degrees(math.asin(min(drift, 1.0))):.3g} deg")
+        return f"leaves the card's validity (down to {run['validity'].min():.2g}): {'; '.join(parts)}"
+
+    def worst(self, manoeuvres: Sequence[Manoeuvre], *places: tuple[str, int | None]) -> list[_Worse]:
+        """The larger of each figure over the trials, and why there is none or what to know of it."""
         runs = [self.run(one) for one in manoeuvres]
-        trouble = next((reason for _, reason in runs if reason), "")
-        found: list[tuple[float | None, str]] = []
+        trouble = next((one.trouble for one in runs if one.trouble), "")
+        outside = next((one.outside for one in runs if one.outside), "")
+        found: list[_Worse] = []
         for name, number in places:
-            values = [_number(figures.get(name), number) for figures, _ in runs]
+            values = [_number(one.figures.get(name), number) for one in runs]
             shown = [value for value in values if value is not None]
             whole = len(shown) == len(values)
-            found.append((max(shown), "") if whole else (None, trouble or "the run does not show it"))
+            missing = trouble or "; ".join(one for one in ("the run does not show it", outside) if one)
+            found.append(_Worse(max(shown), outside, bool(outside)) if whole else _Worse(None, missing, bool(outside)))
         return found
 
 
-def imo_criteria(model: Model) -> tuple[Criterion, ...]:
+@dataclass(frozen=True)
+class _Trial:
+    """Figures of a trial, why there are none, and how it leaves what the card holds for."""
+
+    figures: Figures
+    trouble: str
+    outside: str
+
+
+@dataclass(frozen=True)
+class _Worse:
+    """The worse figure of trials, None if they do not show it; a remark, and whether they left the card's range."""
+
+    value: float | None
+    remark: str
+    beyond: bool
+
+
+def _wrong_way(manoeuvre: Manoeuvre, run: Trajectory) -> str:
+    """A cause that shows nothing else: a ship that turns against her rudder."""
+    if not isinstance(manoeuvre, Turn | Zigzag):
+        return ""
+    turned = float(run["motion.psi"][-1] - run["motion.psi"][0])
+    # A zigzag that is carried out ends on either side, yet never goes far.
+    against = turned * manoeuvre.rudder < 0 and abs(turned) > _TURNED
+    return "the ship turns against her rudder: see the signs of Yd and Nd and the card's rudder_sign" if against else ""
+
+
+def imo_criteria(
+    model: Model, changed: Mapping[str, float] | None = None, integrator: Integrator | None = None
+) -> tuple[Criterion, ...]:
     """Turning, initial turning, yaw checking and stopping of a ship at her speed of expansion (5.3.1 to 5.3.4).
 
     The worse of starboard and port is taken. A trial that cannot be run leaves its criteria open, with the reason.
+
+    Parameters
+    ----------
+    model : Model
+        The ship.
+    changed : mapping, optional
+        Parameters in place of the model's, by name.
+    integrator : Integrator, optional
+        One made earlier for this model, to save its preparation.
     """
-    trials = _Trials(model, Integrator(model))
-    parameters = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    trials = _Trials(model, integrator or Integrator(model), changed or {})
+    parameters = dict(zip(model.parameter_names, model.parameter_values(changed).tolist(), strict=True))
     time = parameters["ship.length"] / parameters["ship.speed"]
     scale = _SCALE if parameters["ship.length"] < SHORTEST_SHIP_M else ""
     rudder = min(TRIAL_RUDDER, parameters.get("steering.max_angle", TRIAL_RUDDER))
@@ -113,8 +192,9 @@ def imo_criteria(model: Model) -> tuple[Criterion, ...]:
     )
     (of_twenty,) = trials.worst([Zigzag(twenty, twenty), Zigzag(-twenty, twenty)], ("overshoots_deg", 0))
 
-    def criterion(name: str, found: tuple[float | None, str], allowed: float, unit: str, remark: str = "") -> Criterion:
-        return Criterion(name, found[0], allowed, unit, found[1] or remark)
+    def criterion(name: str, found: _Worse, allowed: float, unit: str, remark: str = "") -> Criterion:
+        told = "; ".join(one for one in (found.remark, remark) if one)
+        return Criterion(name, found.value, allowed, unit, told, found.beyond)
 
     return (
         criterion("advance", advance, 4.5, "L"),
@@ -133,11 +213,13 @@ def _stopping(trials: _Trials) -> Criterion:
     if "propeller.speed" not in trials.model.input_names:
         remark = "the card has no [propulsion]: its engine cannot be reversed"
         return Criterion(name, None, STOPPING, "L", remark)
-    ((found, reason),) = trials.worst([Stop()], ("track_reach_lengths", None))
+    (worse,) = trials.worst([Stop()], ("track_reach_lengths", None))
+    found = worse.value
     remark = f"at {FULL_ASTERN:.0%} of the nominal revolutions astern, reached at once: an assumption of the simulation"
     if found is not None and STOPPING < found <= STOPPING_OF_LARGE_SHIPS:
         remark += "; up to 20 L may be allowed to a ship of large displacement"
-    return Criterion(name, found, STOPPING, "L", reason or remark)
+    remark = "; ".join(one for one in (worse.remark, remark if found is not None else "") if one)
+    return Criterion(name, found, STOPPING, "L", remark, worse.beyond)
 
 
 def _number(figure: object, place: int | None) -> float | None:

@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.analysis.linearisation import OperatingPoint, straight_course
+from tank2sim.analysis.stability.straight_line import speed_acts
 from tank2sim.analysis.turning.diagram import hull_states
 from tank2sim.dynamics.model import Model, Parameter, Vector
 from tank2sim.errors import InputError
@@ -88,7 +89,8 @@ class Margin:
     influences : tuple of Influence
         The strongest first.
     speeds_mps, criteria, speed_slopes : arrays (k,)
-        C' over speed and dC'/du (s/m); nan where there is no straight course.
+        C' over speed and dC'/du (s/m); nan where there is no straight course. Without elements where forces do not
+        change with speed: a linear card is that of its own speed.
     """
 
     criterion: float
@@ -119,7 +121,9 @@ class Margin:
                 "speed_mps": self.speeds_mps,
                 "C_prime": self.criteria,
                 "slope_s_per_m": self.speed_slopes,
-            },
+            }
+            if len(self.speeds_mps)
+            else None,
         }
 
 
@@ -131,7 +135,8 @@ class Criterion:
         self._places = [model.state_names.index(name) for name in ("motion.v", "rudder.angle")]
         self._speed = model.state_names.index("motion.u")
         unknown, x, p = model.x[self._places], model.x, model.p
-        slopes = _prime_slopes(model)
+        self.by_speed = speed_acts(model, straight_course(model))
+        slopes = _prime_slopes(model, self.by_speed)
         value = ca.det(slopes)
         residual = model.expand(ca.vcat([model.symbol(name) for name in ("motion.vdot", "motion.rdot")]))
         by = ca.vertcat(p, x[self._speed])
@@ -166,8 +171,8 @@ class Criterion:
         return None
 
 
-def _prime_slopes(model: Model) -> ca.SX:
-    """Slopes (2, 2) of Y' and N' by v' and r' with V = U; states of effects follow at once."""
+def _prime_slopes(model: Model, by_speed: bool) -> ca.SX:
+    """Slopes (2, 2) of Y' and N' by v' and r' with V = U, or u0 of a linear card; states of effects follow at once."""
     forces = model.expand(ca.vcat([model.symbol("force.Y"), model.symbol("force.N")]))
     motion = ca.vcat([model.symbol("motion.v"), model.symbol("motion.r")])
     slopes = ca.jacobian(forces, motion)
@@ -179,7 +184,9 @@ def _prime_slopes(model: Model) -> ca.SX:
         follow = ca.solve(ca.densify(ca.jacobian(rates, own)), ca.densify(ca.jacobian(rates, motion)))
         slopes -= ca.jacobian(forces, own) @ follow
     length, density = model.symbol("ship.length"), model.symbol("ship.water_density")
-    speed = ca.sqrt(model.symbol("motion.u") ** 2 + model.symbol("motion.v") ** 2)
+    speed = model.symbol("ship.speed")
+    if by_speed:
+        speed = ca.sqrt(model.symbol("motion.u") ** 2 + model.symbol("motion.v") ** 2)
     unit = 0.5 * density * length**2 * speed
     scale = ca.vertcat(ca.horzcat(unit, unit * length), ca.horzcat(unit * length, unit * length**2))
     return ca.densify(slopes) / scale
@@ -255,6 +262,8 @@ def _neutral(criterion: Criterion, point: OperatingPoint, place: int) -> float |
 
 def _over_speed(criterion: Criterion, point: OperatingPoint) -> tuple[Vector, Vector, Vector]:
     model = criterion.model
+    if not criterion.by_speed:
+        return np.zeros(0), np.zeros(0), np.zeros(0)
     start = {one.name: one.start for one in model.parameters if isinstance(one, Parameter)}
     speeds = np.linspace(start["ship.slowest"], start["ship.fastest"], SPEEDS)
     rows = []

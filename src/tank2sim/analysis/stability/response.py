@@ -1,7 +1,8 @@
 """The linear response of the yaw rate to the rudder about the straight course: poles, zeros, Bode, step.
 
-Of three systems, all by python-control: sway and yaw with the rudder angle as input, the same behind the steering gear
-(input the order; its rate limit is not linear and left out), and Nomoto's first-order model K/(1 + T s).
+Of three systems, all by python-control: sway and yaw (with the states of effects that act on them: roll, the memory of
+the flow) with the rudder angle as input, the same behind the steering gear (input the order; its rate limit is not
+linear and left out), and Nomoto's first-order model K/(1 + T s), that of slow motion.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.analysis.linearisation import OperatingPoint, state_space
-from tank2sim.analysis.stability.straight_line import Nomoto, settled_states
+from tank2sim.analysis.stability.straight_line import Nomoto, steering_states
 from tank2sim.dynamics.model import Model
 
 HULL, GEAR, FIRST_ORDER = "rudder angle to yaw rate", "rudder order to yaw rate", "Nomoto, first order"
 
 _FREQUENCIES = 121
-_TIMES = 201
+_FEWEST, _MOST, _IN_A_PERIOD = 201, 1601, 16
+"""Times of a step response: in each period of the fastest mode that oscillates, within a fewest and a most."""
 _STABLE_STEP, _UNSTABLE_STEP = 5.0, 2.5
 """Length of the step response in slowest time constants: to 99 % of the end, or to twelve times the beginning."""
 
@@ -70,17 +72,12 @@ class SteeringResponse:
 
 def steering_responses(model: Model, point: OperatingPoint, nomoto: Nomoto) -> tuple[SteeringResponse, ...]:
     """The three systems about a straight course; those that do not respond at all (a play that is not taken up) not."""
-    settled = settled_states(model)
-    motion = ["motion.v", "motion.r"]
-    hull = state_space(model, point, states=motion, inputs=["rudder.angle"], outputs=["motion.r"], settled=settled)
+    steering = steering_states(model)
+    hull = state_space(model, point, states=steering, inputs=["rudder.angle"], outputs=["motion.r"])
     systems = {HULL: hull}
+    gear = [name for name in model.state_names if not name.startswith("motion.") and name not in steering]
     systems[GEAR] = state_space(
-        model,
-        point,
-        states=[*motion, "rudder.angle"],
-        inputs=["rudder.command"],
-        outputs=["motion.r"],
-        settled=settled,
+        model, point, states=[*steering, *gear], inputs=["rudder.command"], outputs=["motion.r"]
     )
     if math.isfinite(nomoto.K_per_s) and math.isfinite(nomoto.T_s):
         systems[FIRST_ORDER] = control.tf2ss(control.tf([nomoto.K_per_s], [nomoto.T_s, 1.0]))
@@ -90,10 +87,19 @@ def steering_responses(model: Model, point: OperatingPoint, nomoto: Nomoto) -> t
         return ()
     slowest, fastest = float(rates.min()), float(rates.max())
     omega = np.geomspace(slowest / 20, fastest * 20, _FREQUENCIES)
-    stable = bool(np.all(hull.poles().real < 0))
-    time = np.linspace(0.0, (_STABLE_STEP if stable else _UNSTABLE_STEP) / slowest, _TIMES)
+    time = _times(hull.poles(), slowest)
     found = [_response(label, system, omega, time) for label, system in systems.items()]
     return tuple(one for one in found if np.all(np.abs(one.response) > 0))
+
+
+def _times(poles: NDArray[np.complex128], slowest: float) -> NDArray[np.float64]:
+    """Times (m,) that show a step response: to its end, or until it has grown."""
+    growth = float(poles.real.max())
+    length = _STABLE_STEP / slowest
+    if growth >= 0:
+        length = min(length, _UNSTABLE_STEP / max(growth, 0.5 * slowest))
+    cycles = length * float(np.abs(poles.imag).max()) / (2 * math.pi)
+    return np.linspace(0.0, length, int(min(max(_FEWEST, math.ceil(_IN_A_PERIOD * cycles) + 1), _MOST)))
 
 
 def _response(

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import casadi as ca
 import control
 import numpy as np
 
-from tank2sim.analysis.linearisation import jacobians, state_space, straight_course
+from tank2sim.analysis.linearisation import OperatingPoint, jacobians, state_space, straight_course
+from tank2sim.analysis.turning.diagram import hull_states
 from tank2sim.dynamics.model import Model
+
+_ROUNDING = 1e-9
+"""Relative size of what rounding leaves of a mode that is neutral, or of slopes that are equal."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +34,10 @@ class Nomoto:
     T2_s: float | None
     T3_s: float
 
+    def prime_json(self) -> dict[str, float | None]:
+        """Of the prime system: without units."""
+        return {f"{name.partition('_')[0]}_prime": value for name, value in vars(self).items()}
+
 
 @dataclass(frozen=True)
 class Stability:
@@ -40,14 +50,18 @@ class Stability:
     speed_mps, drift_deg, rudder_deg : float
         The straight course about which it was linearised (beta and rudder, starboard positive).
     eigenvalues : tuple of complex
-        Of surge, sway and yaw, 1/s, slowest first.
+        Of surge, sway and yaw with the states of effects that act on the hull (roll, the memory of the flow), rudder
+        and heading held, 1/s, least damped first.
     criterion : float
         C' = Y'_v (N'_r - m' x'_G u') - N'_v (Y'_r - m' u'): a ship that is stable on a straight course has it positive.
-        Prime system; the slopes are those of the full forces at the operating point.
+        Prime system; the slopes are those of the full forces at the operating point, in slow motion: states of effects
+        follow at once (:func:`settled_states`).
     steering_modes : tuple of complex
-        Eigenvalues of sway and yaw alone, 1/s.
+        The same at a held speed: of sway and yaw with the states of effects, 1/s.
     nomoto, nomoto_prime : Nomoto
-        In SI; and with K L/U, T U/L.
+        In SI; and with K L/U, T U/L. Of slow motion, as C' is.
+    effect_states : tuple of str
+        States of effects that answer to sway and yaw and act on them: C' and Nomoto's models know them at rest alone.
     """
 
     name: str
@@ -59,14 +73,26 @@ class Stability:
     steering_modes: tuple[complex, ...]
     nomoto: Nomoto
     nomoto_prime: Nomoto
+    effect_states: tuple[str, ...] = ()
+
+    @property
+    def growth_per_s(self) -> float:
+        """Real part of the mode that decays least or grows most, 1/s."""
+        return max(mode.real for mode in (*self.eigenvalues, *self.steering_modes))
 
     @property
     def stable(self) -> bool:
-        """True if the ship holds a straight course with the rudder fixed: both modes of sway and yaw decay.
+        """True if the ship holds a straight course with the rudder fixed: all modes of steering decay, and none grows.
 
-        C' > 0 alone is not enough: two modes that both grow have it, too.
+        C' > 0 alone is not enough: two modes that both grow have it, too, and so has a roll that grows.
         """
-        return all(mode.real < 0 for mode in self.steering_modes)
+        nothing = _ROUNDING * max(abs(mode) for mode in self.eigenvalues)
+        return all(mode.real < 0 for mode in self.steering_modes) and self.growth_per_s <= nothing
+
+    @property
+    def criterion_decides(self) -> bool:
+        """True if the sign of C' tells what the modes do; if not, it is no margin of stability."""
+        return self.stable == (self.criterion > 0)
 
     def as_json(self) -> dict[str, object]:
         """The result as JSON has it; eigenvalues as [real, imaginary]."""
@@ -78,8 +104,14 @@ class Stability:
                 "rudder_deg": self.rudder_deg,
             },
             "eigenvalues": [[value.real, value.imag] for value in self.eigenvalues],
-            "stability_criterion": {"C_prime": self.criterion, "stable": self.stable},
-            "nomoto": {"dimensional": vars(self.nomoto), "prime": vars(self.nomoto_prime)},
+            "stability_criterion": {
+                "C_prime": self.criterion,
+                "stable": self.stable,
+                "C_prime_decides": self.criterion_decides,
+                "growth_per_s": self.growth_per_s,
+                "settled_states": list(self.effect_states),
+            },
+            "nomoto": {"dimensional": vars(self.nomoto), "prime": self.nomoto_prime.prime_json()},
         }
 
 
@@ -96,18 +128,18 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
     at = dict(zip(model.state_names, point.x.tolist(), strict=True))
     speed = float(np.hypot(at["motion.u"], at["motion.v"]))
     length, density = values["ship.length"], values["ship.water_density"]
+    scaling = speed if speed_acts(model, point) else values["ship.speed"]
 
     settled = settled_states(model)
-    whole = state_space(model, point, states=["motion.u", "motion.v", "motion.r"], settled=settled)
-    eigenvalues = sorted((complex(value) for value in whole.poles()), key=lambda value: -value.real)
+    eigenvalues = sorted(_modes(model, point, hull_states(model)), key=lambda value: -value.real)
     slopes, _ = jacobians(model, point, ["force.Y", "force.N"], ["motion.v", "motion.r"], [], settled=settled)
     # Y_v N_r and N_v Y_r are both in (1/2 rho)^2 L^6 V^2.
-    criterion = float(np.linalg.det(slopes)) / (0.25 * density**2 * length**6 * speed**2)
+    criterion = float(np.linalg.det(slopes)) / (0.25 * density**2 * length**6 * scaling**2)
     steering = state_space(
         model, point, states=["motion.v", "motion.r"], inputs=["rudder.angle"], outputs=["motion.r"], settled=settled
     )
     own = nomoto(steering)
-    time = length / speed
+    time = length / scaling
     return Stability(
         name=model.name,
         speed_mps=speed,
@@ -115,7 +147,7 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
         rudder_deg=float(np.degrees(at["rudder.angle"])),
         eigenvalues=tuple(eigenvalues),
         criterion=criterion,
-        steering_modes=tuple(complex(value) for value in steering.poles()),
+        steering_modes=_modes(model, point, steering_states(model)),
         nomoto=own,
         nomoto_prime=Nomoto(
             own.K_per_s * time,
@@ -124,11 +156,51 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
             own.T2_s and own.T2_s / time,
             own.T3_s / time,
         ),
+        effect_states=answering_states(model),
     )
 
 
+def _modes(model: Model, point: OperatingPoint, states: Sequence[str]) -> tuple[complex, ...]:
+    return tuple(complex(value) for value in state_space(model, point, states=states, inputs=[], outputs=[]).poles())
+
+
+def steering_states(model: Model) -> tuple[str, ...]:
+    """Sway, yaw and the states of effects that act on them, at a held speed and rudder."""
+    return hull_states(model, ("motion.v", "motion.r"))
+
+
+def answering_states(model: Model) -> tuple[str, ...]:
+    """The steering states of effects that answer to sway, yaw or each other: not the lag of an engine."""
+    derivative = {state.name: state.derivative for state in model.states}
+    states = steering_states(model)
+
+    def answers(name: str) -> bool:
+        rate = model.expand(model.symbol(derivative[name]))
+        return any(ca.depends_on(rate, model.symbol(other)) for other in states if other != name)
+
+    return tuple(name for name in states[2:] if answers(name))
+
+
+def speed_acts(model: Model, point: OperatingPoint) -> bool:
+    """Do the slopes of Y and N change with speed? Not of a linear card, whose forces are those at u0: (3.5).
+
+    There V = u0 by definition, and C' and prime numbers are made with it, whatever the speed asked for.
+    """
+    motion = ["motion.v", "motion.r", "rudder.angle"]
+    place = model.state_names.index("motion.u")
+    own = float(point.p[model.parameter_names.index("ship.speed")])
+    fastest = float(point.p[model.parameter_names.index("ship.fastest")])
+    found = []
+    # both where the card holds: below her slowest speed a linear card, too, goes over to the forces at low speed
+    for speed in (own, 0.5 * (own + fastest) if fastest > own else 1.01 * own):
+        x = point.x.copy()
+        x[place] = speed
+        found.append(jacobians(model, OperatingPoint(x, point.u, point.p), ["force.Y", "force.N"], motion, [])[0])
+    return not np.allclose(found[0], found[1], rtol=_ROUNDING, atol=0.0)
+
+
 def settled_states(model: Model) -> list[str]:
-    """States of effects (the memory of the flow, roll): stability on a straight course is that of slow motions."""
+    """States of effects (the memory of the flow, roll) that follow at once in the slow motions of C' and Nomoto."""
     own = {f"motion.{name}" for name in ("u", "v", "r", "psi", "x", "y")}
     return [name for name in model.state_names if name not in own and not name.startswith("rudder.")]
 

@@ -84,7 +84,11 @@ def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bo
     """
     found = stability(model, speed_mps)
     margin = stability_margin(model, speed_mps)
-    notices = list(_about_speed(model, found))
+    notices = [
+        *_about_speed(model, found, by_speed=len(margin.speeds_mps) > 0),
+        *_about_effects(found),
+        *_about_weather(model),
+    ]
     turning, direct, reverse = None, None, None
     try:
         turning = steady_turning(model)
@@ -112,15 +116,48 @@ def _reason(error: InputError) -> str:
     return f"{error.place}: {error.problem}" if error.place else error.problem
 
 
-def _about_speed(model: Model, found: Stability) -> list[str]:
+def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[str]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     slowest, fastest, own = values["ship.slowest"], values["ship.fastest"], values["ship.speed"]
     told = []
+    if not by_speed:
+        told.append(
+            f"the forces of this card do not change with speed: a linear card is that of {own:.4g} m/s alone, C' and "
+            "the prime numbers are made with that speed, and there is no curve over speed"
+        )
     if not slowest <= found.speed_mps <= fastest:
         told.append(f"{found.speed_mps:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
     if abs(found.speed_mps / own - 1) > SAME_SPEED:
         told.append(f"steady turns, spirals and the IMO criteria are those at the card's speed, {own:.4g} m/s")
     return told
+
+
+def _about_effects(found: Stability) -> list[str]:
+    """What C' and Nomoto's models leave out, and where the modes say something else."""
+    told = []
+    if found.effect_states:
+        told.append(
+            f"C', its margin and Nomoto's K and T are those of slow motions, which {', '.join(found.effect_states)} "
+            "follow at once; T1 and T2 are then no time constants of the whole ship: her eigenvalues, the word stable "
+            "or unstable, and the response to the rudder are with these states"
+        )
+    if not found.criterion_decides and found.criterion > 0:
+        told.append(
+            f"C' > 0, and yet a mode grows at {found.growth_per_s:.3g} 1/s: she is unstable, and the margin of C' says "
+            "nothing of that"
+        )
+    return told
+
+
+def _about_weather(model: Model) -> list[str]:
+    values = dict(zip(model.input_names, model.input_values().tolist(), strict=True))
+    blowing = [name.partition(".")[0] for name in ("current.speed", "wind.speed") if values.get(name)]
+    if not blowing:
+        return []
+    return [
+        f"the straight course is that in the card's {' and '.join(blowing)}, and so are its eigenvalues, C' and "
+        "Nomoto's numbers; steady turns, spirals and the IMO criteria are those of calm water"
+    ]
 
 
 def _spirals(model: Model, turning: SteadyTurning) -> tuple[SpiralPoints | None, SpiralPoints | None, list[str]]:

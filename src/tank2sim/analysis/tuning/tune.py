@@ -8,7 +8,8 @@ variation (Kc). Figures F are nonlinear in them with exact slopes (:mod:`tank2si
   with least sum |z| among equals; then the nonlinear problem in that set, anew from there if it fails.
 
 Wishes that cannot all be reached: the smallest set of them that contradicts itself, found by leaving out one after the
-other (deletion filter, Chinneck and Dravnieks 1991), and the nearest that can be reached, in least squares.
+other (deletion filter, Chinneck and Dravnieks 1991), and the nearest that can be reached, in least squares; of all
+moves that come so near, the least.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import qr
 from scipy.optimize import Bounds, LinearConstraint, least_squares, milp, minimize
 
 from tank2sim.analysis.influence.parameters import CardParameter, agreed_by_name, find_parameter
@@ -35,6 +37,7 @@ REACHED = 1e-5
 _MOVED = 1e-6  # standard errors below which a parameter has not moved
 _NOT_SHOWN = 10.0  # what is missing, in shares of the wish, where the ship does not show the figure any more
 _ROUNDING = 1e-9  # of the largest slope
+_DEPENDENT = 1e-6  # of the largest slope: what is left of a row after the others, and is none of its own
 _ROUNDS = 8  # sets of parameters that are tried
 _LONGEST_SEARCH_S = 20.0  # of one set; the best so far is taken then
 
@@ -56,13 +59,13 @@ def tune(study: Study, wishes: Sequence[Wish], means: Means) -> Tuned:
     """
     problem = _Problem(study, wishes, means)
     z, contradiction = problem.start(), tuple[Wish, ...]()
-    everything = np.arange(len(z))
     if problem.largest(z) > REACHED:
-        nearest = problem.nearest(z, everything)
+        free = problem.influential(z)
+        nearest = problem.nearest(z, free)
         if problem.largest(nearest) > REACHED:
-            z, contradiction = nearest, problem.contradiction()
+            z, contradiction = problem.least_as_near(nearest, free), problem.contradiction()
         else:
-            z = problem.fewest(nearest) if means.by == FEWEST else problem.least(nearest, everything)
+            z = problem.fewest(nearest) if means.by == FEWEST else problem.least_as_near(nearest, free)
     return problem.result(z, contradiction)
 
 
@@ -110,6 +113,12 @@ class _Problem:
     def start(self) -> Array:
         """No move, or the nearest within the bounds."""
         return np.clip(np.zeros(len(self._lowest)), self._lowest, self._highest)
+
+    def influential(self, z: Array) -> Slice:
+        """Unknowns that move a figure of the wishes; all of them where one is not shown at `z`."""
+        if not np.all(np.isfinite(self.figures(z))):
+            return np.arange(len(z))
+        return np.flatnonzero(np.any(self._slopes(z) != 0, axis=0))
 
     def values(self, z: Array) -> Array:
         """Parameters (k,) after the moves."""
@@ -205,6 +214,24 @@ class _Problem:
         # What the search leaves (it stops by its own measure) one more refinement takes away.
         return found if self.largest(found) <= REACHED else self._refined(found, z, free)
 
+    def least_as_near(self, z: Array, free: Slice) -> Array:
+        """The smallest moves of `free` that come as near to the wishes as moves `z` do.
+
+        What is not reached is held at what is; of figures that hang together (a radius and its diameter, a wish that
+        is given twice) one is enough, and more would leave the search without a solution.
+        """
+        figures, missed = self.figures(z), np.abs(self.missing(z)) > REACHED
+        if not np.all(np.isfinite(figures)):
+            return z
+        loose = [row for row, wish in enumerate(self.wishes) if wish.relation != EQUAL and not missed[row]]
+        tight = [row for row in range(len(self.wishes)) if row not in loose]
+        kept = [tight[one] for one in _independent(self._slopes(z)[tight][:, free])] if tight else []
+        held = [
+            Wish(self.wishes[row].figure, EQUAL, float(figures[row] if missed[row] else self._targets[row]))
+            for row in kept
+        ]
+        return _Problem(self.study, [*held, *(self.wishes[row] for row in loose)], self.means).least(z, free)
+
     def _refined(self, found: Array, fallback: Array, free: Slice) -> Array:
         refined = self.nearest(found, free)
         return refined if self.largest(refined) <= REACHED else fallback
@@ -290,6 +317,13 @@ class _Problem:
             agreed_times=float(z[-1]) if self._agreed else None,
             contradiction=contradiction,
         )
+
+
+def _independent(slopes: Array) -> list[int]:
+    """Rows of slopes (n, m) of which none follows from the others."""
+    _, R, order = qr(slopes.T, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(R))
+    return sorted(int(row) for row in order[: len(sizes)][sizes > _DEPENDENT * sizes.max(initial=0.0)])
 
 
 def _with(z: Array, free: Slice, part: Array) -> Array:

@@ -6,7 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from tank2sim.analysis.influence.figures import Figure, parse_figure
+from tank2sim.analysis.influence.figures import STRAIGHT, Figure, Kind, parse_figure
 from tank2sim.errors import InputError
 
 OPTION = "--tune"
@@ -36,7 +36,7 @@ def parse_wish(text: str) -> Wish:
     Raises
     ------
     InputError
-        It is none, its figure does not exist, or its value is no finite number.
+        It is none, its figure does not exist, or its value is no finite number or one that no ship can have.
     """
     found = _WISH.fullmatch(text.strip())
     if found is None or (found["at"] and found["behind"]):
@@ -49,4 +49,19 @@ def parse_wish(text: str) -> Wish:
     if not math.isfinite(value):
         raise InputError(OPTION, text, f"{found['value'].strip()} is no number", "give a value in the figure's unit")
     figure = parse_figure(found["name"].strip() + (found["at"] or found["behind"] or "").strip(), OPTION)
+    if not _possible(figure.kind, value):
+        problem = f"no ship has {figure.kind.description} of {value:g}"
+        raise InputError(OPTION, text, problem, "give a value that a ship can have")
     return Wish(figure, found["relation"], value)
+
+
+def _possible(kind: Kind, value: float) -> bool:
+    """Whether a ship can have a figure: sizes, times and rates of a manoeuvre are positive; a ship that loses all of
+    her speed turns no more."""
+    if kind.family == STRAIGHT or kind.name == "transfer_m":
+        return True
+    if kind.name == "steady_drift_deg":
+        return abs(value) < 90
+    if kind.name == "speed_loss_percent":
+        return 0 <= value < 100
+    return value >= 0 if kind.name.startswith("overshoot") else value > 0

@@ -31,22 +31,22 @@ class Cubic:
     """Rudder angle (rad) as a cubic in yaw rate (rad/s): coefficients (4,) from the constant up, and its error.
 
     `rms_rad` and `largest_rad` are the root mean square and the largest error of the rudder angle where it was fitted,
-    `beyond_rad` the largest over the rest of the diagram.
+    `beyond_rad` the largest over the rest of the diagram, None if it has no rest that is single-valued.
     """
 
     coefficients: Array
     rms_rad: float
     largest_rad: float
-    beyond_rad: float
+    beyond_rad: float | None
 
     def __call__(self, yaw_rate_radps: Array) -> Array:
         """Rudder angle, rad."""
         return np.asarray(np.polynomial.polynomial.polyval(yaw_rate_radps, self.coefficients))
 
-    def error_json(self) -> dict[str, float]:
+    def error_json(self) -> dict[str, float | None]:
         """Errors in deg."""
         errors = {"rms": self.rms_rad, "largest": self.largest_rad, "largest_beyond_fit": self.beyond_rad}
-        return {f"{name}_deg": math.degrees(value) for name, value in errors.items()}
+        return {f"{name}_deg": None if value is None else math.degrees(value) for name, value in errors.items()}
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def _cubic(rate: Array, rudder: Array, inside: NDArray[np.bool_], kept: Array) -
     rest = np.linalg.lstsq(powers[inside, n:], left[inside], rcond=None)[0] / scales[n:]
     coefficients = np.concatenate([kept, rest])
     error = np.abs(powers @ (coefficients * scales) - rudder)
-    beyond = float(error[~inside].max()) if not inside.all() else 0.0
+    beyond = float(error[~inside].max()) if not inside.all() else None
     return Cubic(coefficients, float(np.sqrt(np.mean(error[inside] ** 2))), float(error[inside].max()), beyond)
 
 

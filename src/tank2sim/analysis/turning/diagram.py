@@ -13,6 +13,7 @@ rudder held have a negative real part. Folds are solved for, not read off (Moore
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -145,13 +146,16 @@ class SteadyTurning:
         }
 
 
-def hull_states(model: Model) -> tuple[str, ...]:
-    """States that move with the hull at a held rudder: u, v, r, and those of effects on which their rates depend."""
+def hull_states(model: Model, motion: Sequence[str] = _MOTION) -> tuple[str, ...]:
+    """States that move with the hull at a held rudder: u, v, r, and those of effects on which their rates depend.
+
+    Of `motion` alone, if less is asked for; the rest of u, v, r is held.
+    """
     derivative = {state.name: state.derivative for state in model.states}
-    found = list(_MOTION)
+    found = list(motion)
     for name in found:  # grows on the way
         rate = model.expand(model.symbol(derivative[name]))
-        held = (*_PLACE, "rudder.angle", *found)
+        held = (*_PLACE, *_MOTION, "rudder.angle", *found)
         found += [one for one in model.state_names if one not in held and ca.depends_on(rate, model.symbol(one))]
     return tuple(found)
 

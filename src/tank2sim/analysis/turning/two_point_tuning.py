@@ -275,10 +275,14 @@ class _System:
 
 
 def _told(wanted: WantedTurn) -> str:
-    at = f"at {math.degrees(wanted.rudder_rad):.4g} deg"
+    at = f"at {_to_a_side(math.degrees(wanted.rudder_rad), 'deg')}"
     if wanted.yaw_rate_radps is None:
         return f"{wanted.radius_m:.5g} m {at}"
-    return f"{60 * math.degrees(wanted.yaw_rate_radps):.4g} deg/min {at}"
+    return f"{_to_a_side(60 * math.degrees(wanted.yaw_rate_radps), 'deg/min')} {at}"
+
+
+def _to_a_side(value: float, unit: str) -> str:
+    return f"{abs(value):.4g} {unit}" + (f" to {'port' if value < 0 else 'starboard'}" if value else "")
 
 
 def _followed(system: _System, unknown: Array, have: Array, want: Array) -> Array:

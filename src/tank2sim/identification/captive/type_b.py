@@ -23,6 +23,15 @@ def type_b_errors(campaign: Campaign, used: Equations, solution: Solution) -> di
 
     `solution` is that of the equations `used`.
     """
+    shifts = type_b_shifts(campaign, used, solution)
+    return {source: {name: abs(shift) for name, shift in moved.items()} for source, moved in shifts.items()}
+
+
+def type_b_shifts(campaign: Campaign, used: Equations, solution: Solution) -> dict[str, dict[str, float]]:
+    """What each term of a force (prime) moves by, with its sign, for each stated error of one standard deviation.
+
+    `solution` is that of the equations `used`.
+    """
     stated = campaign.uncertainty.model_dump()
     found = {}
     for source, size in stated.items():
@@ -31,7 +40,7 @@ def type_b_errors(campaign: Campaign, used: Equations, solution: Solution) -> di
         changed, altered = _with_error(campaign, used.runs, source, size)
         erring = equations(changed, altered, used.force, used.names).held(used.prior)
         moved = solve(erring, solution.spread).values - solution.values
-        found[source] = {name: float(abs(shift)) for name, shift in zip(used.names, moved, strict=True)}
+        found[source] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
     return found
 
 

@@ -224,5 +224,15 @@ def _notes(study: TowStudy) -> Iterator[str]:
     if not result.options.start_delay and late.get(SIMPLE_LATE, 0.0) < late.get(SIMPLE, 0.0) - 4:
         yield "A start delay explains these tows much better than none (--start-delay)."
     if any(fit.condition_scaled > COLLINEAR**2 for fit in result.fits.values()):
-        known = f"{study.theory[0].near_surface_kg:.0f} by (2.5)" if study.theory else "by theory"
+        theory = study.theory[0].near_surface_kg if study.theory else None
+        known = f"{theory:.0f} by (2.5)" if theory is not None else "by theory"
+        if theory is not None and span is not None and not span[0] <= theory <= span[1]:
+            known += ", which these tows contradict"
         yield f"Take the drag as B3 v^2 alone (--terms B3), or hold M at a known value (--total-mass-kg, {known})."
+    if result.force.degree() > 0:
+        yield (
+            f"A card holds one force: the mean, {result.force_N:.4g} N; a simulation of these tows must be given the "
+            "force over time (input tow.force)."
+        )
+    if result.options.start_delay:
+        yield "A card holds no start delay: a simulation of these tows begins that much later."

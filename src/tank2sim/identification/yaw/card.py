@@ -15,6 +15,7 @@ from tank2sim.cards.writing import YawRigResult, yaw_rig_card_text
 from tank2sim.dynamics.yaw_rig import YawRig
 from tank2sim.errors import InputError
 from tank2sim.files import BYTE_ORDER_MARK
+from tank2sim.identification.yaw.estimate import YawEstimate
 from tank2sim.identification.yaw.identify import METHODS, YawResult
 
 TANK_WATER_KGPM3 = 1000.0
@@ -132,6 +133,7 @@ def rig_card_text(result: YawResult, method: str, *, name: str, source: str, kno
         values[key] = float(f"{value:.6g}")
         if error:
             errors[key] = float(f"{error:.3g}")
+    values |= _gravity(estimate, base)
     values["torque_constant_NmpA"] = result.torque_constant_NmpA
     programme = result.records[0].programme
     told = {"kind": programme.kind, "max_rate_degps": float(f"{math.degrees(programme.max_rate_radps):.9g}")}
@@ -149,6 +151,17 @@ def rig_card_text(result: YawResult, method: str, *, name: str, source: str, kno
             ),
         )
     )
+
+
+def _gravity(estimate: YawEstimate, known: YawRig) -> dict[str, float]:
+    """G and psi_0 of the moment found, with what was known of it: -G sin(psi - psi_0)."""
+    found = [estimate.friction.get(term, (0.0, None))[0] for term in ("gravity_sine", "gravity_cosine")]
+    if not any(found):
+        return {}
+    sine = found[0] + known.gravity_Nm * math.cos(known.gravity_angle_rad)
+    cosine = found[1] - known.gravity_Nm * math.sin(known.gravity_angle_rad)
+    moment, angle = math.hypot(sine, cosine), math.atan2(-cosine, sine)
+    return {"gravity_Nm": float(f"{moment:.6g}"), "gravity_angle_rad": float(f"{angle:.6g}")}
 
 
 BEST = METHODS[0]

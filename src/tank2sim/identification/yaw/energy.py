@@ -86,8 +86,13 @@ def energy_balance(
     return Balance(terms=terms, rows=np.array(rows), work_J=np.array(work), pairs=tuple(pairs), parts=parts)
 
 
-def fit_energy(balance: Balance, record: YawRecord) -> EnergyFit:
-    """Least squares over all subintervals.
+def fit_energy(balance: Balance, record: YawRecord, programmed: Balance | None = None) -> EnergyFit:
+    """Least squares over all subintervals, with the `programmed` motion for instruments.
+
+    A rate from an encoder has errors, and plain least squares take them for motion: the inertia comes out too small,
+    by several per cent where the encoder is coarse or the rows are few. The programme has no such errors and moves
+    with the body, so that Z'(y - X b) = 0, Z the rows of the programme, is free of that (instrumental variables,
+    Reiersol 1945).
 
     Raises
     ------
@@ -99,8 +104,7 @@ def fit_energy(balance: Balance, record: YawRecord) -> EnergyFit:
     if freedom < 1 or not scaled_condition(rows) < _HOPELESS:
         unknowns = ", ".join(balance.terms)
         raise InputError(record.path, "", f"does not tell {unknowns} apart", "give more records, or take fewer --terms")
-    norms = column_norms(rows)
-    inverse = np.linalg.pinv(rows / norms) / norms[:, None]
+    inverse = _inverse(rows, rows if programmed is None else programmed.rows)
     coefficients = inverse @ work
     residuals = work - rows @ coefficients
     # Errors of neighbouring parts hang together: the speed at which one ends is that at which the next begins. The
@@ -111,6 +115,14 @@ def fit_energy(balance: Balance, record: YawRecord) -> EnergyFit:
     clustered = _clustered(inverse, residuals, balance)
     scale = np.maximum(1.0, np.sqrt(np.diag(clustered) / np.diag(covariance)))
     return EnergyFit(coefficients, covariance * np.outer(scale, scale), residuals, balance)
+
+
+def _inverse(rows: Matrix, instruments: Matrix) -> Matrix:
+    """(Z'X)^-1 Z'; with Z = X that of least squares."""
+    norms, other = column_norms(rows), column_norms(instruments)
+    scaled = (instruments / other).T
+    inverse: Matrix = np.linalg.solve(scaled @ (rows / norms), scaled) / norms[:, None]
+    return inverse
 
 
 def _clustered(inverse: Matrix, residuals: Vector, balance: Balance) -> Matrix:

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.stats import f as f_test
 
 from tank2sim.dynamics.yaw_rig import YawRig
 from tank2sim.errors import InputError
+from tank2sim.identification.yaw.checks import (
+    check_current,
+    check_explained,
+    check_mirror,
+    check_sign,
+    check_turn,
+    judged,
+)
 from tank2sim.identification.yaw.energy import (
     EnergyFit,
     as_many_equations,
@@ -36,11 +45,11 @@ METHODS = (
 
 AIR_TERMS = ("inertia", "coulomb", "viscous")
 WATER_TERMS = ("inertia", "coulomb", "viscous", "quadratic")
+GRAVITY = ("gravity_sine", "gravity_cosine")
+_RARE = 1e-3
+_SLIGHT = 0.01
 TORQUE_CONSTANT_NMPA = 0.051
 """k_t of the paper's motor."""
-_NOT_QUITE_MIRRORED = 0.03
-_FULL = 0.995
-"""Share of the largest current from which the motor is taken for saturated."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,11 +81,12 @@ class YawOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class BodyInertia:
-    """J_zz in kg m2, its standard error (None if unknown), and where it is from."""
+    """J_zz in kg m2, its standard error (None if unknown), where it is from, and if by the k_t of the records."""
 
     value_kgm2: float
     error_kgm2: float | None
     source: str
+    by_torque_constant: bool = False
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -123,15 +133,17 @@ class YawResult:
     def added_inertia(self, method: str) -> tuple[float, float | None] | None:
         """lambda661 by a method and its standard error, kg m2; None where J_zz is not known.
 
-        The errors of the total, of J_zz and of k_t count; the last acts on the total in proportion.
+        The errors of the total, of J_zz and of k_t count. The last acts in proportion: on the total where J_zz is
+        known otherwise, on the difference where J_zz was found in air with the same k_t.
         """
         if self.body is None:
             return None
         own = self.estimates[method]
-        parts = [own.inertia_error_kgm2, self.body.error_kgm2, self.torque_constant_error * own.total_inertia_kgm2]
+        added = own.total_inertia_kgm2 - self.body.value_kgm2
+        scaled = added if self.body.by_torque_constant else own.total_inertia_kgm2
+        parts = [own.inertia_error_kgm2, self.body.error_kgm2, self.torque_constant_error * scaled]
         known = [part for part in parts if part is not None]
-        error = math.hypot(*known) if own.inertia_error_kgm2 is not None else None
-        return own.total_inertia_kgm2 - self.body.value_kgm2, error
+        return added, math.hypot(*known) if own.inertia_error_kgm2 is not None else None
 
     def as_json(self) -> dict[str, Any]:
         """The result as plain data; ``added_inertia_kgm2`` and ``dissipation_J`` by method, the rest in ``methods``."""
@@ -218,15 +230,26 @@ def parse_yaw_terms(text: str) -> tuple[str, ...]:
 
 def _result(records: tuple[YawRecord, ...], medium: Medium, options: YawOptions, air: YawResult | None) -> YawResult:
     constant, notes = _torque_constant(records, options)
-    notes += _check_current(records)
+    notes += check_current(records)
+    for record in records:
+        check_turn(record)
     pairs = [pair for record in records for pair in intervals(record)]
     mirror = tuple(mirror_difference(pair) for pair in pairs)
-    notes += _check_mirror(records, mirror, options.mirror_limit)
-    terms = options.terms or (AIR_TERMS if medium == "air" else WATER_TERMS)
+    notes += check_mirror(records, mirror, options.mirror_limit)
     rig = options.known
-    fit = fit_energy(energy_balance(pairs, terms, constant, rig), records[0])
     programmed = [pair for record in records for pair in intervals(record, "reference")]
-    reference = fit_energy(energy_balance(programmed, terms, constant, rig), records[0])
+
+    def fitted(terms: tuple[str, ...]) -> tuple[EnergyFit, EnergyFit]:
+        expected = energy_balance(programmed, terms, constant, rig)
+        measured = fit_energy(energy_balance(pairs, terms, constant, rig), records[0], expected)
+        return measured, fit_energy(expected, records[0])
+
+    terms = options.terms or (AIR_TERMS if medium == "air" else WATER_TERMS)
+    fit, reference = fitted(terms)
+    if options.terms is None and (found := _with_gravity(fit, fitted)):
+        (fit, reference), told_of_gravity = found
+        notes += told_of_gravity
+    check_sign(records[0], fit)
     ideal = programmed[0][0]
     estimates = {
         "energy_least_squares": least_squares_estimate("energy_least_squares", fit, ideal),
@@ -236,7 +259,7 @@ def _result(records: tuple[YawRecord, ...], medium: Medium, options: YawOptions,
         "two_intervals_reference": two_intervals("two_intervals_reference", reference.balance, fit),
     }
     angle, left_out = _angle(records, _rig(constant, rig), estimates["energy_least_squares"], ideal)
-    notes += left_out
+    notes += [*left_out, *check_explained(records, angle.estimate.misfit if angle else None)]
     if angle:
         estimates["output_error"] = angle.estimate
     body, told = _body(records, medium, options, air)
@@ -251,20 +274,47 @@ def _result(records: tuple[YawRecord, ...], medium: Medium, options: YawOptions,
         ideal=ideal,
         angle=angle,
         mirror=mirror,
-        notes=(*notes, *told, *_judged(fit, estimates)),
+        notes=(*notes, *told, *judged(fit, estimates)),
         air=air,
     )
     return result
+
+
+Fits = tuple[EnergyFit, EnergyFit]
+
+
+def _with_gravity(fit: EnergyFit, fitted: Callable[[tuple[str, ...]], Fits]) -> tuple[Fits, list[str]] | None:
+    """The fits with a moment of gravity, and what to say, where the work left over goes with the angle.
+
+    By the F test of the two terms, at a thousandth, and if the moment is at least a hundredth of the motor's mean:
+    the test alone finds the roundings of a record without noise.
+    """
+    try:
+        more, reference = fitted((*fit.balance.terms, *GRAVITY))
+    except InputError:  # the angles do not tell it apart
+        return None
+    freedom = len(more.residuals_J) - len(more.coefficients)
+    rest, before = float(more.residuals_J @ more.residuals_J), float(fit.residuals_J @ fit.residuals_J)
+    moment = float(np.hypot(*more.coefficients[-2:]))
+    turned = sum(abs(own.angle_rad[-1] - own.angle_rad[0]) for pair in more.balance.pairs for own in pair)
+    mean = float(np.abs(more.balance.work_J).sum()) / turned
+    if moment < _SLIGHT * mean or f_test.sf((before - rest) / 2 / (rest / freedom), 2, freedom) > _RARE:
+        return None
+    note = (
+        f"What (3) leaves goes with the angle: a moment of gravity of {moment:.3g} N m is among the terms "
+        f"(--terms {','.join(fit.balance.terms[1:])} leaves it out). The two-interval formulas do not know it."
+    )
+    return (more, reference), [note]
 
 
 def _angle(
     records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, ideal: Interval
 ) -> tuple[AngleFit | None, list[str]]:
     """The nonlinear least squares, and why they are left out."""
-    beyond = [term for term in first.friction if term not in WATER_TERMS]
+    beyond = [term for term in first.friction if term not in (*WATER_TERMS, *GRAVITY)]
     if beyond:
         return None, [
-            f"output_error fits the terms of (3) alone and is left out, for {', '.join(beyond)} is asked for."
+            f"output_error fits the terms of (3) and gravity and is left out, for {', '.join(beyond)} is asked for."
         ]
     angle = fit_angle(records, rig, first, ideal)
     return angle, [] if angle else ["output_error: the fit of the angle did not converge and is left out."]
@@ -290,98 +340,38 @@ def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tup
     return TORQUE_CONSTANT_NMPA, [note]
 
 
-def _check_current(records: tuple[YawRecord, ...]) -> list[str]:
-    notes = []
-    for record in records:
-        if not record.stated:
-            notes.append(
-                f"{record.path.name}: the file does not tell the programme (max_rate_degps, rise_s); the paper's is "
-                "taken."
-            )
-        limit = record.constants.get("max_current_A")
-        if limit is None:
-            continue
-        full = np.abs(record.current_A) >= _FULL * limit
-        for pair in record.programme.pairs():
-            for begin, end in pair:
-                bad = full & (record.time_s >= begin) & (record.time_s <= end)
-                if bad.any():
-                    row = int(np.flatnonzero(bad)[0])
-                    problem = f"reaches the motor's {limit:g} A at {record.time_s[row]:.3f} s, where it is evaluated"
-                    raise InputError(record.path, "column current_A", problem, "run a slower programme, or lower gains")
-        if full.any():
-            first = record.time_s[int(np.flatnonzero(full)[0])]
-            notes.append(
-                f"{record.path.name}: the motor is saturated at {first:.3f} s, outside the intervals that are "
-                "evaluated."
-            )
-    return notes
-
-
-def _check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limit: float) -> list[str]:
-    place = 0
-    for record in records:
-        for number in range(record.programme.humps):
-            if mirror[place] > limit:
-                pair = record.programme.pairs()[number]
-                problem = (
-                    f"the intervals {_span(pair.accelerating_s)} and {_span(pair.braking_s)} are no mirror images: "
-                    f"their rates differ by up to {100 * mirror[place]:.1f} % of the largest, and {100 * limit:g} % is "
-                    "allowed"
-                )
-                remedy = "check start_s and rise_s, tune the controller, leave the hump out, or raise --mirror-percent"
-                raise InputError(record.path, "", problem, remedy)
-            place += 1
-    worst = max(mirror)
-    if worst > _NOT_QUITE_MIRRORED:
-        return [
-            f"The accelerating and braking intervals are mirror images to {100 * worst:.1f} % of the largest rate: the "
-            "two-interval formulas are biased by what that does to the dissipation."
-        ]
-    return []
-
-
-def _span(ends: tuple[float, float]) -> str:
-    return f"{ends[0]:.2f}-{ends[1]:.2f} s"
-
-
 def _body(
     records: tuple[YawRecord, ...], medium: Medium, options: YawOptions, air: YawResult | None
 ) -> tuple[BodyInertia | None, list[str]]:
     if medium == "air":
         return None, []
     if options.inertia_kgm2 is not None:
-        return BodyInertia(
-            value_kgm2=options.inertia_kgm2, error_kgm2=options.inertia_error_kgm2, source="as given"
-        ), []
+        given = BodyInertia(value_kgm2=options.inertia_kgm2, error_kgm2=options.inertia_error_kgm2, source="as given")
+        return given, _lacking(given)
     if air is not None:
         best = air.estimates[METHODS[0]]
         names = ", ".join(record.path.name for record in air.records)
         return BodyInertia(
-            value_kgm2=best.total_inertia_kgm2, error_kgm2=best.inertia_error_kgm2, source=f"in air, {names}"
+            value_kgm2=best.total_inertia_kgm2,
+            error_kgm2=best.inertia_error_kgm2,
+            source=f"in air, {names}",
+            by_torque_constant=True,
         ), []
     for record in records:
         if (stated := record.constants.get("inertia_kgm2")) is not None:
-            return BodyInertia(value_kgm2=stated, error_kgm2=None, source=f"comment of {record.path.name}"), []
+            error = record.constants.get("inertia_error_kgm2")
+            told = BodyInertia(value_kgm2=stated, error_kgm2=error, source=f"comment of {record.path.name}")
+            return told, _lacking(told)
     return None, [
         "J_zz is not known, so that the added inertia cannot be told from the total: give a record in air as well, or "
         "--inertia-kgm2."
     ]
 
 
-def _judged(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[str]:
-    best, two = estimates["energy_least_squares"], estimates["two_intervals"]
-    notes = []
-    if two.bias_kgm2 is not None:
-        share = 100 * two.bias_kgm2 / best.total_inertia_kgm2
-        parts = two.bias_from
-        notes.append(
-            f"The two-interval formula (1) lies {1e4 * two.bias_kgm2:+.3g}e-4 kg m2 ({share:+.2g} % of the total) from "
-            f"the least squares: {1e4 * parts['dissipation']:+.3g}e-4 because the intervals do not dissipate alike, "
-            f"{1e4 * parts['speeds']:+.3g}e-4 because their end speeds differ. Its standard error does not "
-            "contain that."
-        )
-    for term, (value, error) in best.friction.items():
-        if error is not None and abs(value) < 2 * error:
-            notes.append(f"{term} does not differ from zero: {value:.3g} ± {error:.2g} {TERMS[term][1]}.")
-    return notes
+def _lacking(body: BodyInertia) -> list[str]:
+    if body.error_kgm2 is not None:
+        return []
+    return [
+        "J_zz has no standard error, and that of the added inertia is without it: give --inertia-error-kgm2, or a line "
+        "'# inertia_error_kgm2: 0.0002'."
+    ]

@@ -7,6 +7,7 @@ up to a pulse.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -23,10 +24,14 @@ from tank2sim.records.yaw import YawRecord
 Vector = NDArray[np.float64]
 Speeds = Literal["actual", "reference"]
 
-KNOTS_S = (0.1, 0.17, 0.25, 0.35, 0.5)
+KNOTS_S = (0.5, 0.35, 0.25, 0.17, 0.1)
 """Distances of the knots of the spline to choose from: the shortest follows the swings of a closed loop of some 0.1 s,
 the longest smooths away more of an encoder's noise. Each interval takes that of the least generalised cross-validation
-(Craven & Wahba 1979)."""
+(Craven & Wahba 1979), the longest of equals."""
+_CORRELATION = 3.0
+"""How much the errors of an encoder hang together. Neighbouring points share a sample, and where the body passes about
+a whole count a sample the errors drift from one side to the other, which looks like motion. Our choice: with 1 a rate
+from 50 or 100 rows a second has four times the variance."""
 _MARGIN_S = 0.35
 """How far the spline reaches beyond an interval, as far as the body moves there: its ends are its worst places."""
 _DEGREE = 5
@@ -135,6 +140,7 @@ def _interval(record: YawRecord, ends: tuple[float, float], speeds: Speeds, *, b
     own = np.concatenate([[begin], time[inside], [end]])
     if speeds == "reference":
         angle, rate, acceleration = record.programme.at(own)
+        angle = angle + np.interp(record.programme.start_s, time, record.angle_rad)
     else:
         spline = smooth_angle(record, ends)
         angle, rate, acceleration = (spline(own, nu) for nu in (0, 1, 2))
@@ -164,7 +170,7 @@ def smooth_angle(record: YawRecord, ends: tuple[float, float]) -> BSpline:
     changed = np.diff(angle) != 0
     # Between two samples of different counts the angle passed their middle, at about the middle of the two times.
     middle, value = (time[1:] + time[:-1])[changed] / 2, (angle[1:] + angle[:-1])[changed] / 2
-    fewest = max(1, round((end - begin) / KNOTS_S[-1])) + _DEGREE
+    fewest = max(1, round((end - begin) / KNOTS_S[0])) + _DEGREE
     if len(middle) < STEPS_PER_COEFFICIENT * fewest:
         problem = (
             f"has {len(middle)} steps of the encoder from {begin:.3g} to {end:.3g} s, and "
@@ -193,9 +199,10 @@ def _spline(time: Vector, angle: Vector, knot_s: float) -> BSpline | None:
 
 
 def _cross_validation(spline: BSpline, time: Vector, angle: Vector) -> float:
-    """n RSS / (n - m)^2."""
+    """n RSS / (n - c m)^2, c the sum of the correlations of one error with all others (Altman 1990)."""
     left = angle - spline(time)
-    return float(len(time) * (left @ left) / (len(time) - len(spline.c)) ** 2)
+    free = len(time) - _CORRELATION * len(spline.c)
+    return float(len(time) * (left @ left) / free**2) if free > 0 else math.inf
 
 
 def known_work(own: Interval, rig: YawRig) -> float:

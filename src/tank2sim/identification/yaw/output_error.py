@@ -7,11 +7,14 @@ does not run on from hump to hump.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
+from scipy.stats import t as student
 
 from tank2sim.dynamics.yaw_rig import YawRig, yaw_rig_model
 from tank2sim.errors import InputError
@@ -26,11 +29,16 @@ _STEP_S = 0.02
 """Step of the integration, at least a record's own. The current is its mean over a step."""
 _SUBSTEPS = 2
 """Runge-Kutta steps in one: a light body in air is so stiff in its dry friction that one alone may be unstable."""
-_AWAKE = 0.2
-"""Share of the programme's rate below which a hump is left out: there the body may stick, and what holds it then says
-nothing of the inertia."""
+_AWAKE = 0.25
+"""Rise times left out at both ends of a hump, where the programme's rate is below a fifth: there the body may stick,
+and what holds it then says nothing of the inertia."""
+_MEMORY = 0.2
+"""Share of a hump over which its residuals may hang together: long enough for what the current's noise adds up to."""
+_ONE_SIGMA = 0.8413
+"""Probability of less than one standard error, by which Student's distribution is made comparable."""
 _TRIES = 40
 """Steps of the search: from the energy least squares it takes three to ten."""
+_GRAVITY = ("gravity_sine", "gravity_cosine")
 _NAMES = {
     "inertia": "added.inertia",
     "coulomb": "friction.coulomb",
@@ -46,6 +54,8 @@ class _Hump:
     angle_rad: Vector
     current_A: Vector
     start: tuple[float, float]
+    noise_A2: float
+    """Variance of the error of the current's mean over a step."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -71,11 +81,11 @@ def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, i
     ideal : Interval
         The programme's, whose dissipation is told.
     """
-    terms = tuple(term for term in _NAMES if term == "inertia" or term in first.friction)
+    terms = tuple(term for term in (*_NAMES, *_GRAVITY) if term == "inertia" or term in first.friction)
     humps = [hump for record in records for hump in _humps(record)]
     predict = _predictor(rig, terms)
     values = np.array([first.total_inertia_kgm2, *(first.friction[term][0] for term in terms[1:])])
-    scale = np.maximum(np.abs(values), 1e-3 * first.total_inertia_kgm2)
+    scale = np.maximum(np.abs(values), 1e-3 * abs(first.total_inertia_kgm2))
     count = len(terms)
     begin = np.concatenate([values / scale, *(hump.start for hump in humps)])
 
@@ -97,57 +107,113 @@ def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, i
             last[:] = [(unknown.copy(), *evaluate(unknown))]
         return last[0][1], last[0][2]
 
-    try:
-        found = least_squares(lambda z: kept(z)[0], begin, lambda z: kept(z)[1], xtol=1e-7, ftol=1e-8, max_nfev=_TRIES)
-    except ValueError:  # the integration ran away
+    found = _searched(kept, begin, count)
+    if found is None or not np.isfinite(found.x).all() or found.x[0] == 0:
         return None
-    if not found.success or not np.isfinite(found.x).all():
-        return None
-    covariance = _covariance(found.fun, evaluate(found.x)[1], humps)[:count, :count] * np.outer(scale, scale)
+    best = dict(zip(terms, found.x[:count] * scale, strict=True))
+    gain = rig.torque_constant_NmpA / best["inertia"], _decay(best, ideal)
+    covariance = _covariance(found.fun, evaluate(found.x)[1], humps, gain)[:count, :count] * np.outer(scale, scale)
     misfit = float(np.sqrt(np.mean(found.fun**2)))
     estimate = estimate_from("output_error", terms, found.x[:count] * scale, covariance, ideal, misfit)
     return AngleFit(estimate=estimate, time_s=np.concatenate([h.time_s for h in humps]), residual_rad=found.fun)
 
 
-def _covariance(residuals: Vector, design: Matrix, humps: list[_Hump]) -> Matrix:
-    """Covariance with each hump taken as one draw: the residuals within one hang together over seconds.
+def _searched(evaluate: Callable[[Vector], tuple[Vector, Matrix]], begin: Vector, count: int) -> OptimizeResult | None:
+    """The search from `begin`; from friction below zero the integration may run away, and then once more from none."""
+    upright = begin.copy()
+    upright[1:count] = np.maximum(upright[1:count], 0.0)
+    for start in (begin, upright):
+        try:
+            found = least_squares(
+                lambda z: evaluate(z)[0], start, lambda z: evaluate(z)[1], xtol=1e-7, ftol=1e-8, max_nfev=_TRIES
+            )
+        except ValueError:
+            continue
+        if found.success:
+            return found
+    return None
 
-    With one hump alone there is no other to compare it with, and its residuals are taken as independent.
+
+def _decay(best: dict[str, float], ideal: Interval) -> float:
+    """1/s, at which a disturbance of the rate dies away, at the mean rate of the interval."""
+    rate = float(np.abs(ideal.rate_radps).mean())
+    return max(0.0, best.get("viscous", 0.0) + 2 * rate * best.get("quadratic", 0.0)) / abs(best["inertia"])
+
+
+def _from_current(parts: list[Matrix], humps: list[_Hump], gain: tuple[float, float]) -> Vector:
+    """Variances that the noise of the current gives, which the model takes for moments that were there."""
+    variances = np.zeros(len(parts[0]))
+    for part, hump in zip(parts, humps, strict=True):
+        since = np.maximum(0.0, hump.time_s[:, None] - hump.time_s[None, 1:])
+        # Angle that one step of a moment leaves behind: that of a body that the water brakes.
+        swung = -np.expm1(-gain[1] * since) / gain[1] if gain[1] > 1e-6 else since
+        response = gain[0] * np.diff(hump.time_s) * swung
+        variances += hump.noise_A2 * np.sum((part @ response) ** 2, axis=1)
+    return variances
+
+
+def _covariance(residuals: Vector, design: Matrix, humps: list[_Hump], gain: tuple[float, float]) -> Matrix:
+    """Covariance; the residuals hang together over seconds, and from hump to hump.
+
+    The largest of four, term by term: residuals taken as independent, with what the noise of the current does beside;
+    each hump as one draw, with Student's factor for how few they are; and the humps one by one and laid upon each
+    other, with the correlation along them (Newey & West 1987). The last sees what is alike in every hump, as the
+    encoder's errors are where the humps turn by whole counts. `gain` is k_t/J and the decay of the rate.
     """
     norms = column_norms(design)
     inverse = np.linalg.pinv(design / norms) / norms[:, None]
-    ends = np.cumsum([len(hump.angle_rad) for hump in humps])
-    draws = np.array([part.sum(axis=1) for part in np.split(inverse * residuals, ends[:-1], axis=1)]).T
     alone: Matrix = inverse @ inverse.T * float(residuals @ residuals) / max(1, len(residuals) - design.shape[1])
-    if len(humps) == 1:
-        return alone
-    # The start of a hump is free and soaks up its own draw, so the sums are nearly those of the shared terms alone.
-    together: Matrix = len(humps) / (len(humps) - 1) * draws @ draws.T
-    larger = np.maximum(1.0, np.sqrt(np.diag(together) / np.diag(alone)))
-    widened: Matrix = alone * np.outer(larger, larger)
+    ends = np.cumsum([len(hump.angle_rad) for hump in humps])[:-1]
+    parts = np.split(inverse * residuals, ends, axis=1)
+    folded = np.zeros((len(inverse), max(part.shape[1] for part in parts)))
+    for part in parts:
+        folded[:, : part.shape[1]] += part
+    lags = max(1, round(_MEMORY * folded.shape[1]))
+    along = [_newey_west(folded, lags), sum(_newey_west(part, lags) for part in parts)]
+    noise = _from_current(np.split(inverse, ends, axis=1), humps, gain)
+    variances = [np.diag(alone) + noise, *(np.diag(own) / (1 - _MEMORY) for own in along)]
+    if len(humps) > 1:
+        # The start of a hump is free and soaks up its own draw, so the sums are nearly those of the shared terms alone.
+        draws = np.array([part.sum(axis=1) for part in parts]).T
+        few = float(student.ppf(_ONE_SIGMA, len(humps) - 1)) ** 2
+        variances.append(few * len(humps) / (len(humps) - 1) * np.sum(draws**2, axis=1))
+    wider = np.sqrt(np.max(variances, axis=0) / np.diag(alone))
+    widened: Matrix = alone * np.outer(wider, wider)
     return widened
+
+
+def _newey_west(scores: Matrix, lags: int) -> Matrix:
+    """Covariance of the sum of the columns, with Bartlett's weights up to so many lags."""
+    covariance: Matrix = scores @ scores.T
+    for lag in range(1, lags + 1):
+        cross = scores[:, lag:] @ scores[:, :-lag].T
+        covariance = covariance + (1 - lag / (lags + 1)) * (cross + cross.T)
+    return covariance
 
 
 def _humps(record: YawRecord) -> list[_Hump]:
     programme, time = record.programme, record.time_s
     step = max(_STEP_S, float(np.median(np.diff(time))))
     work = np.concatenate([[0.0], np.cumsum(np.diff(time) * (record.current_A[1:] + record.current_A[:-1]) / 2)])
+    # Third differences leave of the current little but its noise; the median leaves out where the body breaks loose.
+    noise_A2 = (1.4826 * float(np.median(np.abs(np.diff(record.current_A, 3))))) ** 2 / 20
     humps = []
     for number in range(programme.humps):
         begin = programme.start_s + number * programme.period_s
-        fine = np.linspace(begin, begin + 3 * programme.rise_s, 601)
-        awake = fine[np.abs(programme.at(fine).rate_radps) > _AWAKE * abs(programme.max_rate_radps)]
-        last = min(float(awake[-1]), float(time[-1]))
-        own = np.arange(float(awake[0]), last, step)
+        first = begin + _AWAKE * programme.rise_s
+        last = min(begin + (3 - _AWAKE) * programme.rise_s, float(time[-1]))
+        # Counted, with room for rounding: a step more or less moves the result by a good part of its error.
+        own: Vector = first + step * np.arange(int((last - first) / step + 1e-6), dtype=np.float64)
         if len(own) < 10:
             raise InputError(record.path, "column t_s", f"has fewer than 10 rows in hump {number + 1}", "sample faster")
-        spline = smooth_angle(record, (float(own[0]), float(own[0]) + programme.rise_s))
+        spline = smooth_angle(record, (first, first + programme.rise_s))
         humps.append(
             _Hump(
                 own,
                 np.interp(own, time, record.angle_rad),
                 np.diff(np.interp(own, time, work)) / np.diff(own),
                 (float(spline(own[0])), float(spline(own[0], 1))),
+                noise_A2 * float(np.median(np.diff(time))) / step,
             )
         )
     return humps
@@ -157,13 +223,18 @@ def _predictor(rig: YawRig, terms: tuple[str, ...]):  # type: ignore[no-untyped-
     """``predict(values, start, hump) -> (angles (n,), sensitivities (n, terms + 2))``."""
     model = yaw_rig_model("body", rig, with_current_loop=False)
     parameters = model.parameter_values({"body.inertia": 0.0})
-    chosen = [model.parameter_names.index(_NAMES[term]) for term in terms]
+    chosen = [model.parameter_names.index(_NAMES[term]) for term in terms if term in _NAMES]
     braking = model.parameter_names.index("friction.quadratic_braking")
     rougher = rig.quadratic_braking - rig.quadratic_Nms2
     given, x = ca.SX.sym("c", len(terms)), model.x
     whole = ca.SX(parameters)
-    for place, value in zip(chosen, ca.vertsplit(given), strict=True):
+    for place, value in zip(chosen, ca.vertsplit(given), strict=False):  # gravity's, if any, are the last
         whole[place] = value
+    if extra := dict(zip(terms[len(chosen) :], ca.vertsplit(given)[len(chosen) :], strict=True)):
+        sine = rig.gravity_Nm * math.cos(rig.gravity_angle_rad) + extra.get("gravity_sine", 0.0)
+        cosine = extra.get("gravity_cosine", 0.0) - rig.gravity_Nm * math.sin(rig.gravity_angle_rad)
+        whole[model.parameter_names.index("gravity.moment")] = ca.sqrt(sine**2 + cosine**2 + 1e-24)
+        whole[model.parameter_names.index("gravity.angle")] = ca.atan2(-cosine, sine)
     whole[braking] = whole[model.parameter_names.index("friction.quadratic")] + rougher
     h = ca.SX.sym("h")
     following = x

@@ -19,6 +19,10 @@ STEADY = 0.9
 """Cosine between rudder and rate of turn from which a turn is steady. A choice of ours, as the one above."""
 
 
+MOVES = 0.3
+"""Spread of a rudder over its size from which it is moved about, not held: a choice of ours."""
+
+
 def rudder_findings(trial: Trial) -> list[Finding]:
     """Unit and sign of the rudder angle and of the order, and where one does not follow the other."""
     findings = []
@@ -45,7 +49,9 @@ def rudder_response(trial: Trial, name: str | None = None) -> float:
     The linear equation of Nomoto (1957) in the weak form, with a and c free, so that a course-unstable ship or one
     that carries rudder is judged alike: a rudder to starboard (b > 0) accelerates the turn to starboard. What happens
     with the propeller stopped or astern, or with the ship going astern, is left out: the rudder's force may reverse.
-    Else by a steady turn: +-1 if the rudder is far over and the ship turns, one proportional to the other.
+    Else, and wherever the rudder hardly moves, by a steady turn: +-1 if the rudder is far over and the ship turns, one
+    proportional to the other. In a turn recorded from its execute b rests on a second or two, and its standard error
+    does not know that the equation is none of a ship that loses speed.
     """
     step, signals = on_uniform_time(trial)
     present = [rudder for rudder in ((name,) if name else RUDDERS) if rudder in signals]
@@ -65,10 +71,12 @@ def rudder_response(trial: Trial, name: str | None = None) -> float:
     else:
         windows = windows_of(yaw, noise["psi_rad"], step)
         r, change = windows.rate(yaw), windows.acceleration(yaw)
-    found = fit(change, [r, windows.mean(rudder), np.ones(len(r))])
-    if found is not None and found.differs(1):
+    mean = windows.mean(rudder)
+    steady = _steady_turn(r, mean)
+    found = fit(change, [r, mean, np.ones(len(r))])
+    if found is not None and found.differs(1) and not (steady and np.nanstd(mean) < MOVES * _rms(mean)):
         return float(found.values[1] / found.errors[1])
-    return _steady_turn(r, windows.mean(rudder))
+    return steady
 
 
 def _steady_turn(rate: Vector, rudder: Vector) -> float:

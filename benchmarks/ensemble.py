@@ -1,0 +1,146 @@
+"""How fast an ensemble is: turns of 600 s of the Mariner, 2 % on each of her coefficients, against a loop by hand in C.
+
+The loop by hand (``ensemble/turns.c`` about ``fmu_step/mariner.c``) steps the same members with the same coefficients
+and keeps only where each ends. The ensemble is the whole way: members drawn, turns run, figures read off, tracks and
+histories kept for their bands. Both run by turns in one process; then an ensemble of 10 000 on the processors of this
+machine, and the memory that it takes. Rates are by processor time: what else the machine does is no part of them. The
+members' last speeds must agree, to the single precision in which histories are kept.
+
+    python benchmarks/ensemble.py [--members N] [--rounds N]
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+from fmu_step import ship_numbers
+
+from tank2sim.analysis.ensemble.draws import draws_of
+from tank2sim.analysis.ensemble.questions import OfManoeuvre, ShipText
+from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.dynamics import build
+from tank2sim.executors import executing
+from tank2sim.native.compiler import FLAGS, SHARED_SUFFIX, require_compiler
+from tank2sim.simulation.bands import figure_bands
+from tank2sim.simulation.ensemble import Draws, Ensemble, ensemble
+from tank2sim.simulation.manoeuvres import Turn
+
+HERE = Path(__file__).parent
+DURATION, RUDDER, SEED = 600.0, np.radians(35.0), 1
+AIM, MEMORY_MB, AGREEMENT = 0.7, 1000, 1e-6
+
+
+def by_hand(folder: Path) -> ctypes.CDLL:
+    library = folder / f"turns{SHARED_SUFFIX}"
+    sources = [str(HERE / "ensemble" / "turns.c"), str(HERE / "fmu_step" / "mariner.c")]
+    visible = [flag for flag in FLAGS if not flag.startswith("-fvisibility")]
+    command = [*require_compiler("the benchmark"), *visible, "-shared", *sources, "-o", str(library), "-lm"]
+    subprocess.run(command, check=True)
+    return ctypes.CDLL(str(library))
+
+
+def hand_loop(library: ctypes.CDLL, ships: np.ndarray, steps: int, h: float) -> np.ndarray:
+    ends = np.empty((len(ships), 7))
+    array = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
+    library.turns.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_double, ctypes.c_double, array, array]
+    library.turns.restype = None
+    library.turns(len(ships), steps, h, float(RUDDER), ships, ends)
+    return ends
+
+
+def numbers_of(card: ManoeuvringCard, draws: Draws, members: int) -> np.ndarray:
+    """The numbers of ``Ship`` in mariner.h of each member."""
+    model = build(card)
+    own = np.array(ship_numbers(model))
+    derivatives = [name for name in model.parameter_names if name.startswith("derivatives.")]
+    ships = np.tile(own, (members, 1))
+    for member in range(members):
+        for name, value in draws.member(member).items():
+            ships[member, len(own) - len(derivatives) + derivatives.index(name)] = value
+    return ships
+
+
+def seconds_of_processors() -> float:
+    """Processor time of this process and of those that it began and that have ended."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)
+
+
+def hand_on_all(library: ctypes.CDLL, ships: np.ndarray, h: float) -> float:
+    """Processor time of a turn of the loop by hand, s, while all processors run it: they may share what one has."""
+    parts = 16 * (os.cpu_count() or 1)
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        begun = time.process_time()
+        list(threads.map(lambda _: hand_loop(library, ships, round(DURATION / h), h), range(parts)))
+        return (time.process_time() - begun) / (parts * len(ships))
+
+
+def on_all(question: OfManoeuvre, draws: Draws, members: int) -> tuple[Ensemble, float, float]:
+    """An ensemble on processes that begin with it, and the time that passes and that processors work."""
+    begun, worked = time.perf_counter(), seconds_of_processors()
+    with executing() as executor:
+        found = ensemble(question, draws, members, executor)
+    return found, time.perf_counter() - begun, seconds_of_processors() - worked
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--members", type=int, default=10_000)
+    parser.add_argument("--rounds", type=int, default=15)
+    asked = parser.parse_args()
+    card = read_card("mariner")
+    assert isinstance(card, ManoeuvringCard)
+    draws, _ = draws_of(card, SEED)
+    question = OfManoeuvre(ShipText.of(card), Turn(float(RUDDER)), DURATION, np.linspace(0, DURATION, 201))
+    h = build(card).step_s
+    steps, part = round(DURATION / h), 64
+    ships = numbers_of(card, draws, part)
+    ensemble(question, draws, 4)
+    hand, ours = [], []
+    with tempfile.TemporaryDirectory() as name:
+        library = by_hand(Path(name))
+        for _ in range(asked.rounds):
+            begun = time.process_time()
+            ends = hand_loop(library, ships, steps, h)
+            middle = time.process_time()
+            found = ensemble(question, draws, part)
+            hand.append((middle - begun) / part)
+            ours.append((time.process_time() - middle) / part)
+        assert found.histories is not None
+        last = found.histories[:, 4, -1]
+        difference = float(np.max(np.abs(last - ends[:, 3].astype(np.float32)) / np.abs(last)))
+        ratio = statistics.median(a / b for a, b in zip(hand, ours, strict=True))
+        print(f"Mariner, turns of {DURATION:g} s, {steps} steps; time of one core, {asked.rounds} rounds by turns")
+        print(f"  loop by hand {1e3 * statistics.median(hand):6.2f} ms a turn")
+        print(f"  ensemble     {1e3 * statistics.median(ours):6.2f} ms a turn, {ratio:.2f} of the rate   (aim {AIM})")
+        print(f"  surge velocities at the end differ by {difference:.1e} relative (kept in single precision)")
+        # The loop by hand before and after, for what else the machine does then.
+        before = hand_on_all(library, ships, h)
+        whole, taken, worked = on_all(question, draws, asked.members)
+        by_loop = (before + hand_on_all(library, ships, h)) / 2
+    largest = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    share = by_loop * asked.members / worked
+    diameter = figure_bands(whole)["tactical_diameter_m"]
+    print(f"{asked.members} turns, {os.cpu_count()} processes, beginning and end and all: {taken:.1f} s")
+    each = 1e3 * worked / asked.members
+    print(
+        f"  processors work {worked:.1f} s, {each:.2f} ms a turn; by hand {1e3 * by_loop:.2f}: {share:.2f} of the rate"
+    )
+    print(f"  tactical diameter {diameter.low:.0f} to {diameter.high:.0f} m, median {diameter.median:.0f} m")
+    print(f"  largest process {largest / 1024:.0f} MB   (must be below {MEMORY_MB})")
+    return 0 if ratio >= AIM and largest / 1024 < MEMORY_MB and difference < AGREEMENT else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

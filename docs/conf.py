@@ -1,0 +1,46 @@
+"""The manual: Sphinx with MyST. Formulas become MathML when the pages are written, so that no page needs a network."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from tank2sim import __version__
+
+project = "tank2sim"
+author = "the authors of tank2sim"
+project_copyright = "MIT licence"
+release = __version__
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathml", "plain_docstrings", "generated"]
+myst_enable_extensions = ["attrs_block", "dollarmath"]
+myst_heading_anchors = 3
+html_math_renderer = "mathml"
+math_number_all = False
+
+default_role = "code"
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+autodoc_default_options = {"members": True, "ignore-module-all": True}
+python_use_unqualified_type_names = True
+toc_object_entries = False
+napoleon_google_docstring = False
+napoleon_use_param = False  # types are words for people; each would be looked up as a name
+napoleon_use_rtype = False
+add_module_names = False
+
+exclude_patterns = ["_build"]
+html_theme = "furo"
+html_title = "tank2sim"
+html_static_path = ["static"]
+html_css_files = ["manual.css"]
+html_copy_source = False
+html_show_sphinx = False
+pygments_style = "friendly"
+
+# Short names of classes may be the same in two packages (Motion, Fit); a link by such a name is left to the reader.
+suppress_warnings = ["ref.python"]

@@ -1,0 +1,237 @@
+"""Parts of the manual that are read off the program: effects, commands, and the reference of its modules.
+
+A page asks for one by a comment of its own, ``<!-- effects -->``, ``<!-- commands -->``, ``<!-- reference: cards -->``,
+``<!-- keys: Glider -->`` or ``<!-- fmu: mariner -->``; nothing is written into the sources.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import math
+import pkgutil
+import re
+import textwrap
+from functools import cache
+from pathlib import Path
+
+import click
+from pydantic import BaseModel
+from pydantic_core import PydanticUndefined
+from sphinx.application import Sphinx
+from sphinx.util import logging
+
+import tank2sim
+from tank2sim.cards import form, read_card
+from tank2sim.cli import COMMANDS
+from tank2sim.cli import tank2sim as program
+from tank2sim.dynamics import build
+from tank2sim.dynamics.effects import EFFECTS, Effect, EffectParameter
+from tank2sim.fmu.interface import FmuVariable, interface
+from tank2sim.records import campaign_form
+
+logger = logging.getLogger(__name__)
+
+FAMILIES = {
+    "surroundings": "Surroundings",
+    "propeller": "Propeller and engine",
+    "rudder": "Rudder",
+    "loaded_rudder": "Rudder",
+    "gear": "Steering gear",
+    "hull": "Hull",
+    "derivatives": "Hull: derivatives and masses",
+    "memory": "Hull: states of their own",
+    "sensors": "Sensors",
+}
+"""Module of an effect's equations to the heading under which a reader looks for it."""
+
+_SUFFIXES = {"rad": ("deg", 180 / math.pi), "radps": ("degps", 180 / math.pi)}
+_UNITS = {"deg": "deg", "degps": "deg/s", "mps": "m/s", "m": "m", "s": "s", "prime": "prime"}
+
+
+def effects() -> str:
+    """Every effect with its parameters, units and bounds, by family."""
+    text: list[str] = []
+    family = ""
+    for effect in sorted(EFFECTS.values(), key=lambda one: list(FAMILIES.values()).index(_family(one))):
+        if _family(effect) != family:
+            family = _family(effect)
+            text += [f"## {family}", ""]
+        text += _effect(effect)
+    return "\n".join(text)
+
+
+def _family(effect: Effect) -> str:
+    return FAMILIES[_module(effect).rpartition(".")[2]]
+
+
+def _module(effect: Effect) -> str:
+    return next(
+        f"tank2sim.dynamics.effects.{name}"
+        for name in FAMILIES
+        if effect in vars(importlib.import_module(f"tank2sim.dynamics.effects.{name}")).values()
+    )
+
+
+def _effect(effect: Effect) -> list[str]:
+    equations = effect.equations
+    document = inspect.getdoc(equations) or "" if equations.__module__ != _MODULE_OF_EFFECT else ""
+    lines = [f"### `{effect.name}`", "", f"{effect.description} Acts on: {effect.acts_on}.", ""]
+    for paragraph in document.split("\n\n"):
+        indented = paragraph.startswith(" ")
+        lines += ["```text", textwrap.dedent(paragraph), "```", ""] if indented else [_text(paragraph), ""]
+    lines += [f"Source: {_text(effect.source)}. Code: `{_module(effect).removeprefix('tank2sim.')}`.", ""]
+    lines += ["| parameter | unit | bounds | where the card gives none | meaning |", "|---|---|---|---|---|"]
+    return [*lines, *(_parameter(one) for one in effect.parameters), ""]
+
+
+_MODULE_OF_EFFECT = "tank2sim.dynamics.effects.effect"
+
+
+def _parameter(one: EffectParameter) -> str:
+    stem, suffix, factor = one.stem, one.name.removeprefix(one.stem).lstrip("_"), 1.0
+    if suffix in _SUFFIXES:
+        suffix, factor = _SUFFIXES[suffix]
+    name = f"{stem}_{suffix}" if suffix else stem
+    bounds = f"{one.minimum * factor:.4g} to {one.maximum * factor:.4g}"
+    default = "required" if one.default is None else "by the card" if callable(one.default) else _number(one, factor)
+    held = f" (input `{one.input_name}`)" if one.input_name else ""
+    return f"| `{name}` | {_UNITS.get(suffix, '1')} | {bounds} | {default} | {_text(one.description)}{held} |"
+
+
+def _number(one: EffectParameter, factor: float) -> str:
+    assert isinstance(one.default, int | float)
+    return f"{one.default * factor:.4g}"
+
+
+def _text(words: str) -> str:
+    return re.sub(r"([|*_<>\[\]$`])", r"\\\1", words)
+
+
+def commands() -> str:
+    """Every command with its arguments and options, as ``--help`` has them."""
+    text: list[str] = []
+    for name in COMMANDS:
+        try:
+            command = program.get_command(click.Context(program), name)
+        except ImportError as error:
+            logger.warning("the command %s cannot be imported: %s", name, error)
+            continue
+        if command is None:
+            raise ValueError(f"no such command: {name}")
+        text += [f"## `tank2sim {name}`", "", *_command(name, command)]
+    return "\n".join(text)
+
+
+def _command(name: str, command: click.Command) -> list[str]:
+    context = click.Context(command, info_name=f"tank2sim {name}")
+    usage = command.get_usage(context).removeprefix("Usage: ")
+    lines = ["```text", " ".join(usage.split()), "```", ""]
+    for paragraph in (command.help or "").split("\n\n"):
+        lines += [_text(" ".join(paragraph.split())), ""]
+    lines += ["{.options}", "| option | meaning |", "|---|---|"]
+    for parameter in command.get_params(context):
+        told = parameter.get_help_record(context)
+        if told is not None and told[1] and "--help" not in parameter.opts:
+            lines.append(f"| `{told[0].replace('|', chr(92) + '|')}` | {_text(' '.join(told[1].split()))} |")
+    return [*lines, ""]
+
+
+def keys(name: str) -> str:
+    """The keys of a section of a card or campaign, with what stands where the file gives none."""
+    section: type[BaseModel] = getattr(form, name, None) or getattr(campaign_form, name)
+    lines = ["| key | where the file gives none |", "|---|---|"]
+    for key, field in section.model_fields.items():
+        absent = "required" if field.is_required() else _absent(field.default)
+        lines.append(f"| `{_in_degrees(key)}` | {absent} |")
+    return "\n".join([*lines, ""])
+
+
+def _absent(default: object) -> str:
+    if default is None or default is PydanticUndefined or default in ((), [], {}):
+        return "none"
+    return f"`{default}`"
+
+
+def _in_degrees(key: str) -> str:
+    return re.sub(r"_rad(ps)?$", r"_deg\1", key) if "propeller" not in key and "nominal" not in key else key
+
+
+def fmu_variables(ship: str) -> str:
+    """Every variable of the FMU of a bundled ship, as its ``modelDescription.xml`` has it."""
+    text: list[str] = []
+    variables = interface(build(read_card(ship))).variables
+    for causality in ("input", "output", "parameter"):
+        rows = [one for one in variables if one.causality == causality]
+        text += [f"### {causality.capitalize()}s", "", "| variable | unit (shown) | start | range | meaning |"]
+        text += ["|---|---|---|---|---|", *(_variable(one) for one in rows), ""]
+    return "\n".join(text)
+
+
+def _variable(one: FmuVariable) -> str:
+    shown = f" ({one.display_unit})" if one.display_unit else ""
+    unit = "Boolean" if one.boolean else f"{one.unit}{shown}"
+    start = "" if one.start is None else str(bool(one.start)).lower() if one.boolean else f"{one.start:.5g}"
+    low, high = ("" if bound is None else f"{bound:.4g}" for bound in (one.minimum, one.maximum))
+    bounds = f"{low} to {high}" if low and high else f"from {low}" if low else f"to {high}" if high else ""
+    fixed = " *Fixed.*" if one.variability == "fixed" else ""
+    return f"| `{one.name}` | {unit} | {start} | {bounds} | {_text(one.description)}{fixed} |"
+
+
+def modules(package: str) -> list[str]:
+    """Public modules of a package of tank2sim: those that the commands import, and those that the theory names."""
+    path = importlib.import_module(f"tank2sim.{package}").__path__
+    there = [f"tank2sim.{package}", *(one.name for one in pkgutil.walk_packages(path, f"tank2sim.{package}."))]
+    return sorted(name for name in there if name in _imported_by_commands() or name in _named_by_theory())
+
+
+@cache
+def _imported_by_commands() -> frozenset[str]:
+    files = Path(tank2sim.__file__).parent.glob("cli/*.py")
+    return frozenset(
+        name for file in files for name in re.findall(r"from (tank2sim[\w.]+) import", file.read_text("utf-8"))
+    )
+
+
+@cache
+def _named_by_theory() -> frozenset[str]:
+    text = "".join(page.read_text("utf-8") for page in (Path(__file__).parent / "theory").glob("*.md"))
+    names = {f"tank2sim.{name}" for name in re.findall(r"`(\w+(?:\.\w+)+)`", text)}
+    return frozenset(names | {name.rpartition(".")[0] for name in names})
+
+
+def reference(package: str) -> str:
+    """All public modules of a package by their docstrings."""
+    text: list[str] = []
+    for name in modules(package):
+        text += [f"## `{name}`", "", "```{eval-rst}", f".. automodule:: {name}", "```", ""]
+    return "\n".join(text)
+
+
+def _fill(app: Sphinx, page: str, source: list[str]) -> None:
+    text = source[0]
+    if "<!-- effects -->" in text:
+        text = text.replace("<!-- effects -->", effects())
+    if "<!-- commands -->" in text:
+        text = text.replace("<!-- commands -->", commands())
+    text = re.sub(r"<!-- keys: (\w+) -->", lambda found: keys(found[1]), text)
+    text = re.sub(r"<!-- fmu: ([\w-]+) -->", lambda found: fmu_variables(found[1]), text)
+    text = re.sub(r"<!-- reference: (\w+) -->", lambda found: reference(found[1]), text)
+    source[0] = text
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Fill pages as they are read; they are read anew when the program changes."""
+    app.connect("source-read", _fill)
+    app.connect("env-get-outdated", lambda app, env, added, changed, removed: _GENERATED & env.found_docs)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+_GENERATED = {
+    "formats/effects",
+    "formats/campaign",
+    "formats/other_cards",
+    "fmu",
+    "commands",
+    *(f"reference/{one.name}" for one in pkgutil.iter_modules(tank2sim.__path__)),
+}

@@ -1,0 +1,241 @@
+"""What an ensemble of a ship says of a manoeuvre, of her stability and the IMO criteria, and of figures by name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.analysis.ensemble.draws import draws_of
+from tank2sim.analysis.ensemble.questions import SIGNALS, OfCriteria, OfFigures, OfManoeuvre, ShipText
+from tank2sim.analysis.stability.imo import Criterion
+from tank2sim.analysis.stability.straight_line import answering_states
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics import build
+from tank2sim.errors import InputError
+from tank2sim.simulation.bands import Band, BandOverTime, TrackBand, figure_bands, history_bands
+from tank2sim.simulation.ensemble import KEPT, Ensemble, ensemble
+from tank2sim.simulation.manoeuvres import Manoeuvre
+
+Array = NDArray[np.float64]
+
+TIMES = 201
+"""Times of the bands of histories and tracks, over the run of the card itself (ours)."""
+
+STRAIGHT = ("criterion_C", "K_prime", "T_prime", "T_s", "T3_s")
+"""Figures of the straight course of which there are bands."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """An ensemble as it is asked for: how many members, from which seed."""
+
+    members: int
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Members:
+    """Who was asked: members, seed, those that cannot be used and why, and what is to be told."""
+
+    members: int
+    seed: int
+    unusable: Mapping[str, int]
+    notices: tuple[str, ...]
+
+    @property
+    def usable(self) -> int:
+        """Members that can be used."""
+        return self.members - sum(self.unusable.values())
+
+    def as_json(self) -> dict[str, object]:
+        """As JSON has it."""
+        return {
+            "members": self.members,
+            "seed": self.seed,
+            "usable": self.usable,
+            "unusable": dict(self.unusable),
+            "notices": list(self.notices),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class ManoeuvreBands:
+    """Bands of a manoeuvre: of its figures, of signals at `times_s` (n,), and of the track."""
+
+    asked: Members
+    figures: Mapping[str, Band]
+    times_s: Array
+    histories: Mapping[str, BandOverTime]
+    track: TrackBand | None
+
+    def as_json(self) -> dict[str, object]:
+        """As JSON has it."""
+        return {
+            **self.asked.as_json(),
+            "figures": {name: band.as_json() for name, band in self.figures.items()},
+            "t_s": self.times_s,
+            "histories": {name: band.as_json() for name, band in self.histories.items()},
+            "track": self.track and self.track.as_json(),
+        }
+
+
+@dataclass(frozen=True)
+class Chance:
+    """How probable it is that a criterion is met.
+
+    Parameters
+    ----------
+    criterion : Criterion
+        With what was found for the card itself.
+    met : float or None
+        Share of all usable members that meet it; None where no member shows it.
+    between : tuple or None
+        95 % interval of that probability, from the number of members alone (Wilson 1927, J. Amer. Stat. Assoc. 22).
+    left_open : int
+        Usable members whose trial does not show it; they count as not meeting it.
+    band : Band or None
+        Of what was found.
+    """
+
+    criterion: Criterion
+    met: float | None
+    between: tuple[float, float] | None
+    left_open: int
+    band: Band | None
+
+    def as_json(self) -> dict[str, object]:
+        """As JSON has it."""
+        one = self.criterion
+        return {
+            "name": one.name,
+            "allowed": one.allowed,
+            "unit": one.unit,
+            "probability_met": self.met,
+            "interval_95": self.between,
+            "not_shown": self.left_open,
+            "band": self.band and self.band.as_json(),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityBands:
+    """Bands of the straight course at the card's speed, how probable it is that she is stable there, and the chances
+    of each criterion."""
+
+    asked: Members
+    figures: Mapping[str, Band]
+    stable: float | None
+    chances: tuple[Chance, ...]
+
+    def as_json(self) -> dict[str, object]:
+        """As JSON has it."""
+        return {
+            **self.asked.as_json(),
+            "figures": {name: band.as_json() for name, band in self.figures.items()},
+            "probability_stable": self.stable,
+            "imo": [one.as_json() for one in self.chances],
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class FigureBands:
+    """Bands of figures by name, and the standard deviation of each over the members."""
+
+    asked: Members
+    figures: Mapping[str, Band]
+    deviations: Mapping[str, float]
+
+    def as_json(self) -> dict[str, object]:
+        """As JSON has it."""
+        figures = {
+            name: {**band.as_json(), "standard_deviation": self.deviations[name]} for name, band in self.figures.items()
+        }
+        return {**self.asked.as_json(), "figures": figures}
+
+
+def manoeuvre_bands(
+    card: ManoeuvringCard,
+    manoeuvre: Manoeuvre,
+    run_s: tuple[float | None, float],
+    asked: Asked,
+    executor: Executor | None = None,
+) -> ManoeuvreBands:
+    """Bands of a manoeuvre; `run_s` is the duration asked for, and how long the run of the card itself took."""
+    draws, told = draws_of(card, asked.seed)
+    times = np.linspace(0.0, run_s[1], TIMES)
+    question = OfManoeuvre(ShipText.of(card), manoeuvre, run_s[0], times)
+    found = ensemble(question, draws, asked.members, executor)
+    if asked.members > KEPT:
+        told.append(f"bands of tracks and histories are of the first {KEPT} members; figures are of all")
+    shown, histories, track = history_bands(found, times, tuple(SIGNALS))
+    return ManoeuvreBands(_members(found, told), figure_bands(found), shown, histories, track)
+
+
+def stability_bands(
+    card: ManoeuvringCard, criteria: Sequence[Criterion], asked: Asked, executor: Executor | None = None
+) -> StabilityBands:
+    """Bands of the straight course at the card's speed, and the chances of the IMO `criteria`."""
+    draws, told = draws_of(card, asked.seed)
+    trials = ensemble(OfCriteria(ShipText.of(card)), draws, asked.members, executor)
+    told.append("an ensemble is judged at the card's speed")
+    try:
+        straight = ensemble(OfFigures(ShipText.of(card), STRAIGHT), draws, asked.members, executor)
+    except InputError as error:
+        straight = Ensemble(asked.members, asked.seed, {})
+        told.append(f"no bands of the straight course: {error.problem}")
+    chances = tuple(chance(one, trials) for one in criteria)
+    unseen = answering_states(build(card))
+    if unseen:
+        told.append(
+            "no probability of stability: the figures of the members are those of slow motions, which "
+            f"{', '.join(unseen)} follow at once"
+        )
+    stable = None if unseen else _stable(straight)
+    return StabilityBands(_members(trials, told), figure_bands(straight), stable, chances)
+
+
+def named_bands(
+    card: ManoeuvringCard, figures: Sequence[str], asked: Asked, executor: Executor | None = None
+) -> FigureBands:
+    """Bands of figures by name (:mod:`tank2sim.analysis.influence.figures`)."""
+    draws, told = draws_of(card, asked.seed)
+    found = ensemble(OfFigures(ShipText.of(card), tuple(figures)), draws, asked.members, executor)
+    bands = figure_bands(found)
+    deviations = {name: float(np.nanstd(found.figures[name], ddof=1)) for name in bands} if asked.members > 1 else {}
+    deviations = {name: deviations.get(name, math.nan) for name in bands}
+    for name, band in bands.items():
+        if band.shown < found.usable:
+            told.append(f"{name}: {found.usable - band.shown} of {asked.members} members do not show it")
+    return FigureBands(_members(found, told), bands, deviations)
+
+
+def chance(criterion: Criterion, found: Ensemble) -> Chance:
+    """The chance of a criterion, from what members found for it by its name."""
+    values = found.figures.get(criterion.name, np.zeros(0))
+    shown = values[np.isfinite(values)]
+    if not len(shown):
+        return Chance(criterion, None, None, found.usable, None)
+    from scipy.stats import binomtest  # slow to load
+
+    count = int(np.sum(shown <= criterion.allowed))
+    between = binomtest(count, found.usable).proportion_ci(0.95, method="wilson")
+    met, ends = count / found.usable, (float(between.low), float(between.high))
+    return Chance(criterion, met, ends, found.usable - len(shown), figure_bands(found)[criterion.name])
+
+
+def _stable(straight: Ensemble) -> float | None:
+    """Share of members whose modes of sway and yaw both decay: C' and T1 + T2 are positive."""
+    if not straight.figures or not straight.usable:
+        return None
+    total = straight.figures["T_s"] + straight.figures["T3_s"]
+    with np.errstate(invalid="ignore"):
+        return float(np.sum((straight.figures["criterion_C"] > 0) & (total > 0))) / straight.usable
+
+
+def _members(found: Ensemble, told: Sequence[str]) -> Members:
+    return Members(found.members, found.seed, found.unusable, (*told, *found.notices))

@@ -1,0 +1,127 @@
+"""``--ensemble N``: how sure a result is, by many ships drawn from what the card says of its errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tank2sim.analysis.ensemble.results import Asked, Members, StabilityBands
+from tank2sim.cards import Card, ManoeuvringCard
+from tank2sim.cards.covariance import Covariance, covariance_file, referring
+from tank2sim.cli.screen import screen, show_notices, show_table
+from tank2sim.errors import InputError
+from tank2sim.executors import FORMS, PROCESSES, check_executor, executing
+from tank2sim.simulation.bands import Band
+from tank2sim.simulation.ensemble import BATCH
+from tank2sim.units import in_words
+
+Command = Callable[..., Any]
+
+executor_option = click.option(
+    "--executor",
+    default=PROCESSES,
+    show_default=True,
+    metavar="E",
+    help=f"Who computes what can be computed apart: {FORMS}.",
+)
+"""``--executor``, the same on every command."""
+
+
+def ensemble_options(command: Command) -> Command:
+    """``--ensemble``, ``--seed`` and ``--executor``."""
+    options = (
+        click.option(
+            "--ensemble",
+            type=click.IntRange(2, 10_000_000),
+            metavar="N",
+            help="Also N ships drawn from the card's errors and their covariance: bands (5, 50, 95 %).",
+        ),
+        click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the ensemble."),
+        executor_option,
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def asked_of(given: Mapping[str, object]) -> Asked | None:
+    """The ensemble asked for, if any.
+
+    Raises
+    ------
+    InputError
+        The executor cannot be used, or is given without an ensemble.
+    """
+    text = check_executor(str(given["executor"]))
+    if given["ensemble"] is None:
+        if text != PROCESSES:
+            raise InputError("--executor", "", "has nothing to do without --ensemble", "give --ensemble N, too")
+        return None
+    return Asked(int(str(given["ensemble"])), int(str(given["seed"])))
+
+
+def with_covariance(text: str, output: Path, covariance: Covariance) -> dict[Path, str | bytes]:
+    """A card's file and its covariance beside it; the card alone where it goes to no file (a pipe)."""
+    if output.exists() and not output.is_file():
+        return {output: text}
+    return {output: referring(text, output), covariance_file(output): covariance.as_text()}
+
+
+def uncertain_ship(card: Card) -> ManoeuvringCard:
+    """The card, if it is one of which an ensemble can be drawn.
+
+    Raises
+    ------
+    InputError
+        It is no ship that manoeuvres.
+    """
+    if not isinstance(card, ManoeuvringCard):
+        raise InputError(card.source, "model.kind", "is no ship that manoeuvres", "give a linear or abkowitz card")
+    return card
+
+
+@contextmanager
+def computing(asked: Asked, executor: object) -> Iterator[Executor | None]:
+    """The executor of an ensemble; none for a few members, which are done before processes have begun."""
+    if str(executor) == PROCESSES and asked.members <= 2 * BATCH:
+        yield None
+        return
+    with executing(str(executor)) as found:
+        yield found
+
+
+def show_bands(bands: Mapping[str, Band], asked: Members) -> None:
+    """Print the bands of figures, and what is to be told of the members."""
+    rows = []
+    for name, band in bands.items():
+        kind, at, argument = name.partition("@")
+        words, unit = in_words(kind)
+        rows.append([words + at + argument, unit, band.low, band.median, band.high, band.shown])
+    title = f"Ensemble of {asked.members}, seed {asked.seed}: nine of ten lie between 5 and 95 %"
+    show_table(title, ["figure", "unit", "5 %", "50 %", "95 %", "shown by"], rows)
+    show_notices(asked.notices)
+
+
+def show_stability_bands(found: StabilityBands) -> None:
+    """Print the bands of the straight course and the chances of the criteria."""
+    show_bands(found.figures, found.asked)
+    if found.stable is not None:
+        screen.print(f"Stable on a straight course with probability {found.stable:.3g}")
+    rows = [
+        [
+            one.criterion.name,
+            *((one.band.low, one.band.median, one.band.high) if one.band else (None, None, None)),
+            one.criterion.allowed,
+            one.criterion.unit,
+            one.met,
+            f"{one.between[0]:.3f} to {one.between[1]:.3f}" if one.between else "-",
+        ]
+        for one in found.chances
+    ]
+    heads = ["criterion", "5 %", "50 %", "95 %", "allowed", "unit", "probability met", "95 % interval"]
+    show_table("IMO MSC.137(76), worse side, over the ensemble", heads, rows)

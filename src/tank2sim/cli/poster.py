@@ -1,0 +1,24 @@
+"""``tank2sim poster``: the wheelhouse poster of a ship."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from tank2sim.analysis.practice.bridge import Bridge
+from tank2sim.cli.bridge import bridge_options, write_bridge
+
+
+@click.command("poster")
+@bridge_options
+def command(card: str, **options: Any) -> None:
+    """Draw the wheelhouse poster (IMO A.601(15), A3) of CARD; what the card does not tell stays blank."""
+    write_bridge(_draw, card, options)
+
+
+def _draw(bridge: Bridge, ballast: Bridge | None) -> str:
+    # Drawing is asked for seldom, and its library is slow to load.
+    from tank2sim.report.bridge_pages import poster_page
+
+    return poster_page(bridge, ballast)

@@ -1,0 +1,60 @@
+"""``tank2sim steer``: a page that carries the ship, to be steered in a browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from rich.markup import escape
+
+from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.cli.changes import parse_changes
+from tank2sim.cli.screen import screen, show_notices
+from tank2sim.dynamics import build
+from tank2sim.errors import InputError
+from tank2sim.files import write_whole
+from tank2sim.identification.trials.measured import measured
+
+
+@click.command("steer")
+@click.argument("card")
+@click.option(
+    "-o",
+    "--page",
+    required=True,
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="PAGE.html",
+    help="The page.",
+)
+@click.option(
+    "--ghost",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="TRIAL",
+    help="A measured trial beside the ship.",
+)
+@click.option(
+    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="A value in place of the card's, by dotted key."
+)
+def command(card: str, page: Path, ghost: Path | None, settings: tuple[str, ...]) -> None:
+    """Write a page in which CARD (a file, or the name of a bundled ship) can be steered; it needs no network."""
+    # Drawing is asked for seldom, and its libraries are slow to load.
+    from tank2sim.native.cross import has_compiled
+    from tank2sim.report.steer import ghost_of, steering_page
+    from tank2sim.report.steer_ship import NO_COMPILER, WEB, has_compiler, ship_in_page
+
+    ship = read_card(card, parse_changes(settings))
+    model = build(ship)
+    if not isinstance(ship, ManoeuvringCard):
+        raise InputError(ship.source, "", "has no rudder", "only a ship (kind linear or abkowitz) can be steered")
+    trial = measured([ghost], ship) if ghost else None
+    beside = ghost_of(trial.trials[0]) if trial else None
+    library = None
+    if has_compiler():
+        if not has_compiled(WEB):
+            screen.print("the compiler makes its own library first, once: about a minute")
+        library = ship_in_page(model)
+    told = [*model.notices, *(trial.notices if trial else ()), *([] if library else [NO_COMPILER])]
+    text = steering_page(model, library, beside, told)
+    write_whole(page, text, inputs=[Path(ship.source), *([ghost] if ghost else [])])
+    screen.print(f"{escape(ship.ship.name)}: {escape(str(page))}, {len(text.encode()) / 1e3:.0f} kB", soft_wrap=True)
+    show_notices(told)

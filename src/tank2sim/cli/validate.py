@@ -1,0 +1,122 @@
+"""``tank2sim validate``: a validation report of a card, against trials where there are any."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.markup import escape
+
+from tank2sim.analysis.practice.standard_trials import MEMBERS, ship_of
+from tank2sim.analysis.practice.validation import REQUIRED, Validation, Verified, validate, verify
+from tank2sim.analysis.stability.imo import imo_criteria
+from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.cli.bridge import manoeuvring
+from tank2sim.cli.changes import parse_changes
+from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.cli.trials import trial_files
+from tank2sim.errors import InputError
+from tank2sim.files import write_together
+from tank2sim.gap.replayed import replayed
+from tank2sim.gap.result import Passed
+from tank2sim.identification.trials.measured import Measured, measured
+from tank2sim.simulation.integrator import NO_COMPILER
+from tank2sim.units import in_words
+
+
+@click.command("validate")
+@click.argument("card")
+@click.argument("trials", nargs=-1, type=click.Path(path_type=Path), metavar="[TRIAL]...")
+@click.option(
+    "--members",
+    type=click.IntRange(min=0, max=100_000),
+    default=MEMBERS,
+    show_default=True,
+    help="Ships drawn within the card's errors for u_input; 0 for none.",
+)
+@click.option(
+    "--required",
+    type=click.FloatRange(min=0, min_open=True),
+    default=REQUIRED,
+    show_default=True,
+    metavar="PERCENT",
+    help="Level of validation that is required, U_reqd in per cent of each measured figure.",
+)
+@click.option(
+    "--set", "settings", multiple=True, metavar="KEY=VALUE", help="A value in place of the card's, by dotted key."
+)
+@click.option(
+    "-o", "--page", type=click.Path(path_type=Path, dir_okay=False), metavar="REPORT.html", help="Write the report."
+)
+@json_option
+def command(card: str, trials: tuple[Path, ...], **options: Any) -> None:
+    """Validate CARD in the manner of ITTC 7.5-02-06-03: by TRIALs that did not make it, figure by figure."""
+    ship = manoeuvring(read_card(card, parse_changes(options["settings"])), "manoeuvres")
+    files = trial_files(trials)
+    given = measured(files, ship) if files else Measured((), "angle", ())
+    found = validate(ship, given.trials, options["members"], options["required"])
+    ready = ship_of(ship)
+    verified, told = verify(ready, options["members"])
+    criteria = imo_criteria(ready.model)
+    replays, trouble = _replays(ship, given)
+    compiler = () if ready.integrator.compiled else (NO_COMPILER,)
+    notices = (*ready.model.notices, *given.notices, *found.notices, *told, *trouble, *compiler)
+    contents: dict[Path, str | bytes] = {}
+    if json_file := options["json_file"]:
+        result = {
+            "kind": "validate",
+            "ship": ship.ship.name,
+            "source": ship.ship.source,
+            **found.as_json(),
+            "verification": [{**vars(one), "U_num": one.numerical} for one in verified],
+            "imo": [one.as_json() for one in criteria],
+            "notices": notices,
+        }
+        contents[json_file] = json_text(result)
+    if page := options["page"]:
+        # Drawing is asked for seldom, and its library is slow to load.
+        from tank2sim.report.page import render_page
+        from tank2sim.report.validation_page import Evidence, validation_page
+
+        evidence = Evidence(ship, ready.model, found, verified, criteria, replays, notices)
+        contents[page] = render_page(validation_page(evidence))
+    write_together(contents, inputs=[Path(ship.source), *files], outputs=(options["page"], options["json_file"]))
+    _show(ship, found, verified)
+    show_notices(notices)
+
+
+def _replays(card: ManoeuvringCard, given: Measured) -> tuple[tuple[Passed, ...], tuple[str, ...]]:
+    """The replays, each by itself, so that one that cannot be replayed is told and spoils no other."""
+    found: list[Passed] = []
+    told: list[str] = []
+    for trial in given.trials:
+        try:
+            found += replayed(card, Measured((trial,), given.driven_by, ()))
+        except InputError as error:
+            told.append(f"{trial.name}: not replayed: {error.problem}")
+    return tuple(found), tuple(told)
+
+
+def _show(card: ManoeuvringCard, found: Validation, verified: tuple[Verified, ...]) -> None:
+    screen.print(f"{escape(card.ship.name)}: [bold]{found.verdict}[/bold]", soft_wrap=True)
+    if found.figures:
+        show_table(
+            "E = simulated less measured, and the validation uncertainty",
+            ["trial", "figure", "measured", "simulated", "E", "U_val", "verdict"],
+            [
+                [
+                    one.trial,
+                    " ".join(part for part in in_words(one.name) if part),
+                    one.measured,
+                    one.simulated,
+                    one.error,
+                    one.uncertainty,
+                    str(one.outcome),
+                ]
+                for one in found.figures
+            ],
+        )
+    shares = [100 * abs(one.numerical / one.value) for one in verified if one.numerical is not None and one.value]
+    if shares:
+        screen.print(f"Numerical uncertainty of {len(shares)} figures of standard trials: {max(shares):.2g} % at most")

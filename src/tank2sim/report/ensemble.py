@@ -1,0 +1,89 @@
+"""Bands of an ensemble: beside the run of the card itself in a picture, and as a section of a page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import altair as alt
+
+from tank2sim.analysis.ensemble.questions import SIGNALS
+from tank2sim.analysis.ensemble.results import FigureBands, ManoeuvreBands, StabilityBands
+from tank2sim.report.charts import History, Track, history_chart, track_chart
+from tank2sim.report.page import Cell, Column, Section, Table
+from tank2sim.report.runs import SHIP_SIGNALS, history_of, signals_of, track_of
+from tank2sim.simulation.bands import Band
+from tank2sim.simulation.trajectory import Trajectory
+from tank2sim.units import in_words
+
+LOW, MIDDLE, HIGH = "5 %", "50 %", "95 %"
+
+_TEXT = (
+    "Members of the ensemble are this ship with numbers drawn from the standard errors of her card, and from their "
+    "covariance where the card has one. Nine of ten lie between the 5 and the 95 % quantile. Each member has a random "
+    "stream of its own, so that the same seed gives the same members everywhere."
+)
+_CHANCES = (
+    " A criterion is met with the probability told: the share of all usable members that meet it, with the 95 % "
+    "interval that their number leaves (Wilson). A member whose trial does not show the figure counts as one that "
+    "does not meet it."
+)
+
+
+def banded_chart(label: str, run: Trajectory, bands: ManoeuvreBands) -> alt.VConcatChart:
+    """Track and histories of the card itself, with the quantiles of the ensemble; those of the track across it."""
+    tracks = [track_of(label, run)]
+    if bands.track is not None:
+        lines = ((LOW, bands.track.low), (MIDDLE, bands.track.middle), (HIGH, bands.track.high))
+        tracks += [Track(label=name, x_m=line[:, 0], y_m=line[:, 1], time_s=bands.times_s) for name, line in lines]
+    track = track_chart(tracks, title=label)
+    track.usermeta = alt.Undefined  # only a chart by itself may carry it
+    names = {variable: (name, factor) for name, (variable, factor) in SIGNALS.items()}
+    histories = [history_of(label, run, SHIP_SIGNALS)]
+    for quantile, name in ((LOW, "low"), (MIDDLE, "median"), (HIGH, "high")):
+        own = {
+            variable: getattr(bands.histories[names[variable][0]], name) / names[variable][1]
+            for variable in SHIP_SIGNALS
+        }
+        histories.append(History(label=quantile, time_s=bands.times_s, values=own))
+    return alt.vconcat(track, history_chart(histories, signals_of(run.model, SHIP_SIGNALS)))
+
+
+def stability_section(found: StabilityBands) -> Section:
+    """The section of a page of stability."""
+    rows: list[list[Cell]] = []
+    for one in found.chances:
+        ends: list[Cell] = [one.band.low, one.band.median, one.band.high] if one.band else [None, None, None]
+        between = f"{one.between[0]:.3f} to {one.between[1]:.3f}" if one.between else None
+        criterion = one.criterion
+        rows.append([criterion.name, *ends, criterion.allowed, criterion.unit, one.met, between, one.left_open])
+    heads = ["criterion", LOW, MIDDLE, HIGH, "allowed", "unit", "probability met", "95 % interval", "not shown by"]
+    columns = [Column(title=head) for head in heads]
+    stable = "" if found.stable is None else f" She is stable on a straight course with probability {found.stable:.3g}."
+    criteria = Table(caption="IMO MSC.137(76), worse side, over the ensemble.", columns=columns, rows=rows)
+    straight = _table("The straight course at the card's speed.", found.figures)
+    return Section(
+        heading=f"Ensemble of {found.asked.members}",
+        text=_TEXT + _CHANCES + stable,
+        tables=[criteria, straight],
+        notes=found.asked.notices,
+    )
+
+
+def figures_section(found: FigureBands) -> Section:
+    """The section of a page of influence coefficients."""
+    return Section(
+        heading=f"Ensemble of {found.asked.members}",
+        text=_TEXT,
+        tables=[_table("Figures over the ensemble.", found.figures)],
+        notes=found.asked.notices,
+    )
+
+
+def _table(caption: str, bands: Mapping[str, Band]) -> Table:
+    columns = [Column(title=head) for head in ("figure", "unit", LOW, MIDDLE, HIGH, "shown by")]
+    rows: list[list[Cell]] = []
+    for name, band in bands.items():
+        kind, at, argument = name.partition("@")
+        words, unit = in_words(kind)
+        rows.append([words + at + argument, unit, band.low, band.median, band.high, band.shown])
+    return Table(caption=caption, columns=columns, rows=rows)

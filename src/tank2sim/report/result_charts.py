@@ -1,0 +1,286 @@
+"""Charts of what the JSON of a result holds: series, matrices, values with standard errors, and the known diagrams."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import altair as alt
+import numpy as np
+
+from tank2sim.report.analysis_charts import (
+    FrequencyResponse,
+    OutputError,
+    PolesZeros,
+    bode_chart,
+    error_chart,
+    pole_zero_chart,
+)
+from tank2sim.report.chart_parts import LINE_SAMPLES, NUMBER, Record, axis_above, data, every, plain, stacked, with_unit
+from tank2sim.report.page import Illustration
+from tank2sim.report.result_values import Json, is_matrix, is_number, rises, words
+
+ACROSS = (
+    "time_s",
+    "t_s",
+    "omega_radps",
+    "frequency_Hz",
+    "rudder_deg",
+    "yaw_rate_degps",
+    "speed_mps",
+    "trim_by_stern_over_length",
+    "lag_s",
+)
+"""What lies along the horizontal axis of series, the first of these that is there; else the first that rises."""
+
+# One series takes the first colour of the palette, which is another on a dark screen.
+_ONE = alt.Color("run:N", legend=None)
+
+_MOST_PANELS = 6
+_MOST_BARS = 60
+_MOST_CELLS = 60
+_WIDTH = 720
+
+
+def series_chart(heading: str, series: Mapping[str, Sequence[Json]]) -> Illustration | None:
+    """Panels of series of one length over the one that lies across; None where nothing lies across or up.
+
+    A series of truth values divides the lines: dashed where it is false.
+    """
+    truths = {key: one for key, one in series.items() if all(isinstance(value, bool) for value in one)}
+    numbers = {key: one for key, one in series.items() if any(is_number(v) for v in one) and key not in truths}
+    across = next((key for key in ACROSS if key in numbers), next((k for k, v in numbers.items() if rises(v)), None))
+    up = [key for key in numbers if key != across][:_MOST_PANELS]
+    if across is None or not up:
+        return None
+    truth = next(iter(truths), None)
+    rows = [
+        {"run": "", "i": place, "x": _plain(x), "truth": truths[truth][place] if truth else True, "part": 0}
+        | {f"y{panel}": _plain(numbers[key][place]) for panel, key in enumerate(up)}
+        for place, x in enumerate(numbers[across])
+    ]
+    rows = _parted(every(rows, LINE_SAMPLES), bool(truth))
+    logarithmic = across in ("omega_radps", "frequency_Hz") and all(row["x"] and row["x"] > 0 for row in rows)
+    panels = [
+        _panel(rows, panel, key, (across, logarithmic, panel == len(up) - 1), truth) for panel, key in enumerate(up)
+    ]
+    names = ", ".join(words(key)[0] for key in up)
+    caption = f"Dashed where {words(truth)[0]} is false." if truth and not all(truths[truth]) else ""
+    chart = stacked(panels, title=heading, description=f"{heading}: {names} over {words(across)[0]}.")
+    return Illustration(chart=chart, caption=caption)
+
+
+def _parted(rows: list[Record], divided: bool) -> list[Record]:
+    # Each part shares its last row with the next, so that the line is whole.
+    if not divided:
+        return rows
+    parted: list[Record] = []
+    for row in rows:
+        if parted and parted[-1]["truth"] != row["truth"]:
+            parted.append({**row, "truth": parted[-1]["truth"], "part": parted[-1]["part"]})
+            parted.append({**row, "part": parted[-1]["part"] + 1})
+        else:
+            parted.append({**row, "part": parted[-1]["part"] if parted else 0})
+    return parted
+
+
+def _panel(
+    rows: list[Record], panel: int, key: str, across: tuple[str, bool, bool], truth: str | None
+) -> alt.LayerChart:
+    name, logarithmic, last = across
+    scale = alt.Scale(type="log") if logarithmic else alt.Scale(zero=False, nice=False)
+    x = alt.X("x:Q", scale=scale, axis=alt.Axis(title=with_unit(*words(name)) if last else None, labels=last))
+    y = alt.Y(f"y{panel}:Q", scale=alt.Scale(zero=False), axis=axis_above(with_unit(*words(key))))
+    dash = alt.StrokeDash("truth:N", scale=alt.Scale(domain=[True, False], range=[[1, 0], [4, 3]]), legend=None)
+    tooltip = [
+        alt.Tooltip("x:Q", title=words(name)[0], format=NUMBER),
+        alt.Tooltip(f"y{panel}:Q", title=words(key)[0], format=NUMBER),
+    ]
+    chart = alt.Chart(data(rows))
+    encoded = {"x": x, "y": y, "color": _ONE, "order": alt.Order("i:Q"), "detail": alt.Detail("part:N")}
+    line = chart.mark_line().encode(**encoded, **({"strokeDash": dash} if truth else {}))
+    points = chart.mark_point(size=60, opacity=0).encode(x=x, y=y, tooltip=tooltip)
+    return alt.layer(line, points).properties(width=_WIDTH, height=130)
+
+
+def heat_map(
+    heading: str, names: Sequence[str], across: Sequence[str], matrix: Sequence[Sequence[Json]]
+) -> Illustration:
+    """A matrix as coloured cells, each with its number; colours diverge from 0 where there are both signs."""
+    rows: list[Record] = [
+        {"row": name, "column": title, "value": _plain(matrix[place][column])}
+        for place, name in enumerate(names)
+        for column, title in enumerate(across)
+    ]
+    values = [row["value"] for row in rows if row["value"] is not None]
+    largest = max((abs(value) for value in values), default=1.0) or 1.0
+    both = min(values, default=0.0) < 0
+    scale = alt.Scale(scheme="purpleorange" if both else "blues", domain=[-largest if both else 0, largest])
+    x = alt.X("column:N", sort=list(across), title=None, axis=alt.Axis(labelAngle=-40))
+    y = alt.Y("row:N", sort=list(names), title=None)
+    base = alt.Chart(data(rows)).encode(x=x, y=y)
+    cells = base.mark_rect().encode(
+        color=alt.Color("value:Q", scale=scale, legend=None),
+        tooltip=["row:N", "column:N", alt.Tooltip("value:Q", format=NUMBER)],
+    )
+    dark = f"abs(datum.value) > {0.55 * largest:.6g}"
+    told = base.mark_text(fontSize=10).encode(
+        text=alt.Text("value:Q", format=",.3~r"),
+        color=alt.condition(dark, alt.value("#ffffff"), alt.value("#16212c")),
+    )
+    layers = [cells, told] if len(across) <= 14 else [cells]
+    height = 26 * len(names)
+    chart = alt.layer(*layers).properties(width=min(_WIDTH, 52 * len(across)), height=height, title=heading)
+    return Illustration(
+        chart=chart.properties(description=f"{heading}: a map of {len(names)} by {len(across)} values.")
+    )
+
+
+def correlation(heading: str, value: Mapping[str, Json]) -> Illustration | None:
+    """The correlation of what is named beside it (``of`` or ``names``), where that is given."""
+    names = value.get("of") or value.get("names")
+    matrix: Json = value.get("matrix") or value.get("correlation")
+    if not (isinstance(names, list) and is_matrix(matrix) and len(names) == len(matrix) == len(matrix[0])):
+        return None
+    if not 1 < len(names) <= _MOST_CELLS:
+        return None
+    texts = [str(name) for name in names]
+    return heat_map(heading, texts, texts, matrix)
+
+
+def error_bars(heading: str, values: Mapping[str, Mapping[str, Json]]) -> Illustration | None:
+    """Standard errors of named values, in per cent of each, the surest at the top; None where none has one."""
+    known = [
+        {"name": name, "percent": _plain(100 * abs(one["standard_error"] / one["value"])), "value": one["value"]}
+        for name, one in values.items()
+        if is_number(one.get("value")) and is_number(one.get("standard_error")) and one["value"] != 0
+    ]
+    known = sorted((row for row in known if row["percent"]), key=lambda row: float(row["percent"]))[:_MOST_BARS]
+    if len(known) < 2:
+        return None
+    low = 10 ** math.floor(math.log10(min(float(row["percent"]) for row in known)))
+    scale = alt.Scale(type="log", domainMin=low, nice=False)
+    axis = alt.Axis(title="standard error (% of the value)", format="~r")
+    base = alt.Chart(data([{**row, "run": "", "low": low} for row in known])).encode(
+        color=_ONE,
+        y=alt.Y("name:N", sort=[row["name"] for row in known], title=None),
+        tooltip=["name:N", alt.Tooltip("value:Q", format=NUMBER), alt.Tooltip("percent:Q", format=NUMBER)],
+    )
+    x = alt.X("percent:Q", scale=scale, axis=axis)
+    stems = base.mark_rule(style="stem").encode(x=alt.X("low:Q", scale=scale, axis=axis), x2="percent:Q")
+    chart = alt.layer(stems, base.mark_point(filled=True, size=60).encode(x=x))
+    chart = chart.properties(width=560, height=18 * len(known), title=heading)
+    return Illustration(chart=chart.properties(description=f"{heading}: standard error of {len(known)} values."))
+
+
+def force_fit(heading: str, runs: Sequence[Mapping[str, Json]]) -> Illustration | None:
+    """Measured against predicted, one point a run; a point off the diagonal is a run that the fit does not follow."""
+    rows: list[Record] = [
+        {"run": str(one.get("run", "")), "type": str(one.get("type", "")).replace("_", " ")}
+        | {"measured": _plain(one["measured"]), "predicted": _plain(one["predicted"])}
+        for one in runs
+        if is_number(one.get("measured")) and is_number(one.get("predicted"))
+    ]
+    if len(rows) < 3:
+        return None
+    ends = [float(row[key]) for row in rows for key in ("measured", "predicted")]
+    diagonal = [{"measured": end, "predicted": end} for end in (min(ends), max(ends))]
+    x = alt.X("measured:Q", scale=alt.Scale(zero=False), title="measured")
+    y = alt.Y("predicted:Q", scale=alt.Scale(zero=False), axis=axis_above("predicted"))
+    line = alt.Chart(data(diagonal)).mark_line(style="reference").encode(x=x, y=y)
+    looks = {"color": alt.Color("type:N", legend=alt.Legend()), "shape": alt.Shape("type:N", legend=alt.Legend())}
+    tooltip = ["run:N", "type:N", alt.Tooltip("measured:Q", format=NUMBER), alt.Tooltip("predicted:Q", format=NUMBER)]
+    points = alt.Chart(data(rows)).mark_point(size=50).encode(x=x, y=y, tooltip=tooltip, **looks)
+    chart = alt.layer(line, points).properties(width=480, height=340, title=heading)
+    return Illustration(
+        chart=chart.properties(description=f"{heading}: measured against predicted for {len(rows)} runs."),
+        caption="Each run predicted from all others.",
+    )
+
+
+def misfits(heading: str, trials: Sequence[Mapping[str, Json]]) -> Illustration | None:
+    """Misfit of each signal in each trial as a map, to switch between before, after and what else there is."""
+    rows = [
+        {"trial": str(trial.get("trial", "")), "signal": words(signal)[0], "model": model.replace("_", " ")}
+        | {"misfit": _plain(value)}
+        for trial in trials
+        for signal, models in (trial.get("signals") or {}).items()
+        for model, value in models.items()
+        if is_number(value)
+    ]
+    models = list(dict.fromkeys(row["model"] for row in rows))
+    if not models:
+        return None
+    pick = alt.binding_radio(options=models, name="model: ")
+    chosen = alt.param(name="model", bind=pick, value=models[0])
+    names, signals = (list(dict.fromkeys(row[key] for row in rows)) for key in ("trial", "signal"))
+    largest = max(float(row["misfit"]) for row in rows)
+    base = alt.Chart(data(rows)).transform_filter("datum.model === model")
+    place = {"x": alt.X("signal:N", sort=signals, title=None, axis=alt.Axis(labelAngle=0))}
+    place |= {"y": alt.Y("trial:N", sort=names, title=None)}
+    scale = alt.Scale(type="log", domain=[1, max(10.0, largest)], clamp=True, scheme="oranges")
+    cells = base.mark_rect().encode(
+        **place, color=alt.Color("misfit:Q", scale=scale, legend=None), tooltip=["trial:N", "signal:N", "misfit:Q"]
+    )
+    dark = f"datum.misfit > {max(10.0, largest) ** 0.6:.6g}"
+    told = base.mark_text(fontSize=11).encode(
+        **place,
+        text=alt.Text("misfit:Q", format=",.3~r"),
+        color=alt.condition(dark, alt.value("#ffffff"), alt.value("#16212c")),
+    )
+    size = {"width": 90 * len(signals), "height": 30 * len(names)}
+    chart = alt.layer(cells, told).add_params(chosen).properties(**size, title=heading)
+    description = f"{heading}: {len(names)} trials by {len(signals)} signals, for each of {', '.join(models)}."
+    caption = "Root mean square of the difference over the noise of the measurement: 1 is noise."
+    return Illustration(chart=chart.properties(description=description), caption=caption)
+
+
+def bode(heading: str, label: str, value: Mapping[str, Json]) -> Illustration:
+    """A Bode diagram from ``omega_radps``, ``magnitude_dB`` and ``phase_deg``."""
+    gain = 10 ** (np.array(value["magnitude_dB"], dtype=float) / 20)
+    response = gain * np.exp(1j * np.radians(np.array(value["phase_deg"], dtype=float)))
+    found = FrequencyResponse(label=label, omega_radps=value["omega_radps"], response=response)
+    return Illustration(chart=bode_chart([found], title=heading))
+
+
+def poles(heading: str, label: str, found: Json, zeros: Json = ()) -> Illustration:
+    """Poles and zeros, [real, imaginary] each."""
+    both = [[complex(*one) for one in those or []] for those in (found, zeros)]
+    return Illustration(chart=pole_zero_chart([PolesZeros(label=label, poles=both[0], zeros=both[1])], title=heading))
+
+
+def errors(heading: str, found: Json, limits: Json) -> Illustration | None:
+    """Errors of an FMU's outputs, by kind, each beside its limit; None where these are none."""
+    if not (isinstance(found, Mapping) and isinstance(limits, Mapping)):
+        return None
+    all_of_them = [
+        OutputError(kind=kind, output=output, error=error, limit=limits[kind])
+        for kind, outputs in found.items()
+        for output, error in (outputs.items() if isinstance(outputs, Mapping) else ())
+        if is_number(error) and is_number(limits.get(kind))
+    ]
+    return Illustration(chart=error_chart(all_of_them, title=heading)) if all_of_them else None
+
+
+def influences(heading: str, found: Mapping[str, Mapping[str, Json]]) -> Illustration | None:
+    """The strongest influences of parameters on figures, in per cent, as a map."""
+
+    def size(of: Json) -> float | None:
+        value = of.get("exact", of.get("difference")) if isinstance(of, Mapping) else of
+        return float(value) if is_number(value) else None
+
+    strongest: dict[str, float] = {}
+    for values in found.values():
+        for name, one in values.items():
+            strongest[name] = max(strongest.get(name, 0.0), abs(size(one) or 0.0))
+    names = sorted(strongest, key=lambda name: -strongest[name])[:20]
+    if not names:
+        return None
+    figures = list(found)
+    matrix = [[size(found[figure].get(name)) for figure in figures] for name in names]
+    shown = [" ".join(part for part in words(figure) if part) for figure in figures]
+    return heat_map(heading, [name.removeprefix("derivatives.") for name in names], shown, matrix)
+
+
+def _plain(value: Json) -> float | None:
+    return plain(float(value)) if is_number(value) else None

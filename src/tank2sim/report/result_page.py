@@ -1,0 +1,239 @@
+"""A page of any result: figures, tables and charts of what the JSON of a command holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tank2sim.report import result_charts as charts
+from tank2sim.report.page import Figure, Illustration, Page, Section, Table, Verdict
+from tank2sim.report.result_kinds import kind_of
+from tank2sim.report.result_values import (
+    LONGEST_LIST,
+    VERDICTS,
+    Json,
+    alike,
+    cell,
+    grouped,
+    is_matrix,
+    is_number,
+    is_objects,
+    is_scalar,
+    is_series,
+    numbered,
+    quantities,
+    rows_of,
+    scalars,
+    short_columns,
+    titled,
+    words,
+)
+
+_TOLD = ("notices", "warnings", "notes")
+_DEEPEST = 5
+_MOST_FIGURES = 8
+_MOST_PARTS = 12
+_BODE = {"omega_radps", "magnitude_dB", "phase_deg"}
+
+
+@dataclass
+class _Parts:
+    """What a section is filled with, in the order of the JSON."""
+
+    tables: list[Table] = field(default_factory=list)
+    charts: list[Illustration] = field(default_factory=list)
+    left_out: int = 0
+
+    def draw(self, chart: Illustration | None) -> None:
+        if chart is not None:
+            self.charts.append(chart)
+
+
+def result_page(result: Json, source: str) -> Page:
+    """The page of a result that a command wrote as JSON.
+
+    Parameters
+    ----------
+    result : dict
+        What stands in the file.
+    source : str
+        Name of the file, for the head of the page and for messages.
+
+    Raises
+    ------
+    InputError
+        It is no result of a command of tank2sim.
+    """
+    kind = kind_of(result, source)
+    told = [str(note) for key in _TOLD for note in result.get(key) or []]
+    name = next((result[key] for key in ("ship", "campaign", "glider", "path") if isinstance(result.get(key), str)), "")
+    checked = charts.errors("Errors of the outputs", result.get("errors"), result.get("limits"))
+    sections = [_section(key, value) for key, value in result.items() if key not in _TOLD and not is_scalar(value)]
+    overview = {key: value for key, value in scalars(result).items() if key not in _TOLD}
+    table = [quantities("The result", overview)] if overview else []
+    first = [Section(heading="Overview", tables=table, charts=[checked] if checked else [], notes=told)]
+    return Page(
+        title=f"{kind.title}: {Path(name).name}" if name else kind.title,
+        subtitle=f"From {source}",
+        figures=_figures(result, kind.headlines),
+        sections=[*(first if overview or told else []), *(one for one in sections if one.tables or one.charts)],
+    )
+
+
+def _figures(result: Mapping[str, Json], headlines: tuple[str, ...]) -> list[Figure]:
+    values = {path: _at(result, path) for path in headlines}
+    figures = result.get("figures")
+    if isinstance(figures, Mapping):
+        values |= {key: value for key, value in figures.items() if is_number(value)}
+    shown = [_figure(path, value) for path, value in values.items() if value is not None and is_scalar(value)]
+    return shown[:_MOST_FIGURES]
+
+
+def _figure(path: str, value: Json) -> Figure:
+    *parents, key = path.split(".")
+    label, unit = words(key)
+    label = " ".join([label, *(f"({words(one)[0]})" for one in parents[-1:] if key in ("fit",))])
+    if isinstance(value, bool):
+        verdict = (Verdict.PASSED if value else Verdict.FAILED) if key in VERDICTS else Verdict.NONE
+        return Figure(label=label, value="yes" if value else "no", verdict=verdict)
+    return Figure(label=label, value=value if is_number(value) else str(cell(key, value)), unit=unit)
+
+
+def _at(result: Json, path: str) -> Json:
+    for key in path.split("."):
+        result = result.get(key) if isinstance(result, Mapping) else None
+    return result
+
+
+def _section(key: str, value: Json) -> Section:
+    parts = _Parts()
+    title = words(key)[0]
+    heading = "IMO criteria" if key == "imo" else title[:1].upper() + title[1:]
+    _fill(parts, heading, key, value, 0)
+    notes = [f"{parts.left_out} longer or deeper parts stand in the JSON alone."] if parts.left_out else []
+    return Section(heading=heading, tables=parts.tables, charts=parts.charts, notes=notes)
+
+
+def _fill(parts: _Parts, caption: str, key: str, value: Json, depth: int) -> None:
+    """Add a value that is no scalar, and all under it, to the parts of a section."""
+    if depth > _DEEPEST:
+        parts.left_out += 1
+    elif isinstance(value, Mapping):
+        _fill_object(parts, caption, key, value, depth)
+    elif is_objects(value):
+        _fill_objects(parts, caption, key, value, depth)
+    elif key in ("eigenvalues", "poles") and is_matrix(value):
+        parts.tables.append(rows_of(caption, [("", {"real_per_s": a, "imaginary_per_s": b}) for a, b in value], ""))
+        if depth == 0:
+            parts.charts.append(charts.poles(caption, caption, value))
+    elif is_matrix(value) and len(value) * len(value[0]) <= LONGEST_LIST**2:
+        rows = [("", {str(place + 1): one for place, one in enumerate(row)}) for row in value]
+        parts.tables.append(rows_of(caption, rows, ""))
+    elif is_series(value) and all(isinstance(one, str) for one in value):
+        parts.tables.append(rows_of(caption, [("", {words(key)[0]: one}) for one in value], ""))
+    elif value:
+        parts.left_out += 1
+
+
+def _fill_object(parts: _Parts, caption: str, key: str, value: Mapping[str, Json], depth: int) -> None:
+    if drawn := charts.correlation(caption, value):
+        parts.draw(drawn)
+        return
+    if set(value) >= _BODE:
+        parts.draw(charts.bode(caption, caption, value))
+        return
+    columns = short_columns(value)
+    plain = {name: one for name, one in scalars(value).items() if name not in columns}
+    if plain:
+        parts.tables.append(quantities(caption, plain))
+    if columns:
+        parts.tables.append(numbered(caption, {name: value[name] for name in columns}))
+    _draw_series(parts, caption, {name: one for name, one in value.items() if is_series(one)})
+    rest = {name: one for name, one in value.items() if not is_scalar(one) and not is_series(one)}
+    parts.draw(charts.errors(f"{caption}: errors", value.get("errors"), value.get("limits")))
+    if key == "influence_percent":
+        parts.draw(charts.influences(f"{caption} (%)", value))
+    _deeper(parts, caption, rest, depth)
+
+
+def _deeper(parts: _Parts, caption: str, values: Mapping[str, Json], depth: int) -> None:
+    """What stands under names: objects of one kind in one table, all else one by one."""
+    if alike(values):
+        _fill_named(parts, caption, values, depth)
+    else:
+        _each(parts, caption, values, depth)
+
+
+def _fill_named(parts: _Parts, caption: str, objects: Mapping[str, Mapping[str, Json]], depth: int) -> None:
+    """Objects of one kind under names: one table of what they have in cells, then what is deeper in each."""
+    parts.draw(charts.error_bars(caption, objects))
+    if any(scalars(one) for one in objects.values()):
+        parts.tables.append(rows_of(caption, [(titled(name), one) for name, one in objects.items()], "name"))
+    shared = _shared(objects)
+    for key in shared:
+        rows = [(titled(name), one[key]) for name, one in objects.items() if one.get(key)]
+        parts.tables.append(rows_of(f"{caption}: {titled(key)}", rows, "name"))
+    for name, one in objects.items():
+        deeper = {k: v for k, v in one.items() if not is_scalar(v) and k not in shared}
+        _draw_series(parts, f"{caption}: {words(name)[0]}", {k: v for k, v in deeper.items() if is_series(v)})
+        _deeper(parts, f"{caption}: {words(name)[0]}", {k: v for k, v in deeper.items() if not is_series(v)}, depth)
+
+
+def _shared(objects: Mapping[str, Mapping[str, Json]]) -> list[str]:
+    """Keys under which two or more of the objects have a small object of one kind."""
+    keys = dict.fromkeys(key for one in objects.values() for key in one)
+    found = {key: {name: one[key] for name, one in objects.items() if one.get(key)} for key in keys}
+    return [key for key, those in found.items() if alike(those) and all(map(_is_small, those.values()))]
+
+
+def _is_small(value: Mapping[str, Json]) -> bool:
+    return all(map(is_scalar, value.values()))
+
+
+def _fill_objects(parts: _Parts, caption: str, key: str, value: list[Mapping[str, Json]], depth: int) -> None:
+    drawn = charts.misfits(f"{caption}: misfit", value) if key == "trials" else None
+    parts.draw(drawn)
+    if all("predicted" in one for one in value):
+        parts.draw(charts.force_fit(caption, value))
+    elif len(value) > LONGEST_LIST:
+        keys = [name for name in value[0] if all(is_number(one.get(name)) for one in value)]
+        parts.draw(charts.series_chart(caption, {name: [one[name] for one in value] for name in keys}))
+    if any(scalars(one) for one in value):
+        parts.tables.append(rows_of(caption, [("", one) for one in value], ""))
+    if drawn:
+        return
+    deep = [one for one in value if any(not is_scalar(v) for v in one.values())]
+    if len(deep) > _MOST_PARTS:
+        parts.left_out += len(deep)
+        return
+    for place, one in enumerate(deep, start=1):
+        label = _label(one) or f"no. {place}"
+        if "poles" in one and isinstance(one.get("zeros"), list):
+            parts.draw(charts.poles(f"{label}: poles and zeros", label, one["poles"], one["zeros"]))
+        deeper = {k: v for k, v in one.items() if not is_scalar(v) and k not in ("poles", "zeros")}
+        _draw_series(parts, f"{caption}: {label}", {k: v for k, v in deeper.items() if is_series(v)})
+        _each(parts, f"{caption}: {label}", {k: v for k, v in deeper.items() if not is_series(v)}, depth)
+
+
+def _each(parts: _Parts, caption: str, values: Mapping[str, Json], depth: int) -> None:
+    small = {k: v for k, v in values.items() if isinstance(v, Mapping) and v and all(map(is_scalar, v.values()))}
+    if len(small) > 1:  # one table in place of many of two rows
+        parts.tables.append(grouped(caption, small))
+        values = {name: one for name, one in values.items() if name not in small}
+    for name, one in values.items():
+        _fill(parts, f"{caption}: {words(name)[0]}", name, one, depth + 1)
+
+
+def _draw_series(parts: _Parts, caption: str, series: Mapping[str, list[Json]]) -> None:
+    """A chart for the series of each length."""
+    for length in dict.fromkeys(len(one) for one in series.values()):
+        together = {name: one for name, one in series.items() if len(one) == length}
+        drawn = charts.series_chart(caption, together)
+        parts.draw(drawn)
+        parts.left_out += drawn is None
+
+
+def _label(one: Mapping[str, Json]) -> str:
+    named = ("name", "system", "trial", "record", "run", "label", "title", "path", "file", "figure")
+    return next((str(one[key]) for key in named if isinstance(one.get(key), str)), "")

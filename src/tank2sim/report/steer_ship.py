@@ -1,0 +1,137 @@
+"""The ship in a page: the FMI 3 library of the FMU as WebAssembly, and what the page must know to steer it."""
+
+from __future__ import annotations
+
+import base64
+import math
+from dataclasses import dataclass
+
+from tank2sim.dynamics.model import Input, Model, Variable
+from tank2sim.errors import InputError
+from tank2sim.fmu.interface import Interface, interface
+from tank2sim.fmu.sources import c_sources
+from tank2sim.native.cross import Target, cross_compiled, require_cross_compiler
+from tank2sim.units import UNITS
+
+TOKEN = "page"
+"""Instantiation token: the page holds one model, and none is mistaken for another."""
+
+FUNCTIONS = (
+    "fmi3InstantiateCoSimulation",
+    "fmi3EnterInitializationMode",
+    "fmi3ExitInitializationMode",
+    "fmi3Reset",
+    "fmi3SetFloat64",
+    "fmi3SetBoolean",
+    "fmi3GetFloat64",
+    "fmi3GetFMUState",
+    "fmi3SetFMUState",
+    "fmi3DoStep",
+)
+"""What the page calls."""
+
+WEB = Target("wasm32-wasi", ".wasm", (*FUNCTIONS, "malloc"))
+"""WebAssembly with the C library of WASI, of which nothing is left but mathematics and memory: it imports nothing."""
+
+NO_COMPILER = (
+    "the ship is not in this page, which needs a compiler to WebAssembly: pip install tank2sim[platforms], and write "
+    "the page again"
+)
+
+LARGEST_RUDDER = math.radians(35.0)
+"""End of the rudder slider where a card states no largest angle: the hard-over of IMO MSC.137(76)."""
+
+FULL_AHEAD, FULL_ASTERN = 1.2, -1.0
+"""Ends of the engine slider, in nominal revolutions. A choice of ours: the little overload that engines bear, and as
+much astern as ahead."""
+
+_SMALL = {"deg": 1.0, "knots": 0.1, "rpm": 1.0}
+"""By what a control moves at a time, in the unit shown. A choice of ours."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Control:
+    """An input that the user sets: `factor` times its SI value is shown in `unit`; bounds are in that unit."""
+
+    name: str
+    label: str
+    unit: str
+    factor: float
+    start: float
+    step: float
+    minimum: float | None = None
+    maximum: float | None = None
+
+
+def has_compiler() -> bool:
+    """Whether the compiler to WebAssembly is installed."""
+    try:
+        require_cross_compiler()
+    except InputError:
+        return False
+    return True
+
+
+def ship_in_page(model: Model) -> str:
+    """The library of the model as WebAssembly, base64; compiled if it is not kept from before.
+
+    Raises
+    ------
+    InputError
+        The compiler is not installed or cannot be run.
+    """
+    sources = c_sources(model, interface(model), 3, TOKEN)
+    return base64.b64encode(cross_compiled(sources, WEB)).decode("ascii")
+
+
+def references(described: Interface) -> dict[str, int]:
+    """Name to value reference of what the page sets and reads: all but parameters of the hull."""
+    wanted = ("initial.", "motion.", "rudder.", "steering.failed", "propeller.", "validity")
+    inputs = {variable.name for variable in described.with_causality("input")}
+    return {
+        variable.name: variable.reference
+        for variable in described.variables
+        if variable.name in inputs or variable.name.startswith(wanted)
+    }
+
+
+def controls(model: Model) -> list[Control]:
+    """The inputs of a ship but the rudder's failure: rudder and engine first, then what the card's effects take."""
+    found = [_control(model, one) for one in model.inputs if not one.boolean]
+    first = ("rudder.command", "propeller.speed")
+    return sorted(found, key=lambda one: first.index(one.name) if one.name in first else len(first))
+
+
+def _control(model: Model, variable: Input) -> Control:
+    unit, factor = shown_in(variable)
+    low, high = variable.minimum, variable.maximum
+    if variable.name == "rudder.command":
+        limits = [one.start for one in model.parameters if one.name == "steering.max_angle"]
+        high = limits[0] if limits else LARGEST_RUDDER
+        low = -high
+    if variable.name == "propeller.speed":
+        low, high = FULL_ASTERN * variable.start, FULL_AHEAD * variable.start
+    return Control(
+        name=variable.name,
+        label=_label(variable.name),
+        unit=unit,
+        factor=factor,
+        start=variable.start,
+        step=_SMALL.get(unit, 0.1),
+        minimum=None if low is None else round(low * factor, 6),
+        maximum=None if high is None else round(high * factor, 6),
+    )
+
+
+def _label(name: str) -> str:
+    known = {"rudder.command": "Rudder", "propeller.speed": "Engine"}
+    return known.get(name, name.replace(".", " ").replace("_", " ").capitalize())
+
+
+def shown_in(variable: Variable, unit: str | None = None) -> tuple[str, float]:
+    """The unit in which a reader sees a variable, and its factor; speeds in knots, angles in deg."""
+    displays = UNITS[variable.unit].displays
+    chosen = unit or variable.display_unit or next(iter(displays), None)
+    if chosen is None or chosen not in displays:
+        return variable.unit, 1.0
+    return chosen, displays[chosen]

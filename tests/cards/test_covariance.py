@@ -1,0 +1,81 @@
+"""The covariance beside a card: what is written is read again, and what cannot be is refused in one line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.cards.covariance import Covariance, covariance_file, read_covariance, referring
+from tank2sim.errors import InputError
+
+NAMES = ("derivatives.Yv", "derivatives.Nv")
+MATRIX = np.array([[4e-10, 3e-10], [3e-10, 9e-10]])
+
+
+def card_with(folder: Path, covariance: Covariance, text: str) -> ManoeuvringCard:
+    path = folder / "ship.toml"
+    path.write_text(referring(text, path))
+    covariance_file(path).write_text(covariance.as_text())
+    card = read_card(path)
+    assert isinstance(card, ManoeuvringCard)
+    return card
+
+
+@pytest.fixture
+def text(mariner_card: ManoeuvringCard) -> str:
+    return mariner_card.text + "\n[uncertainty]\nYv = 2e-5\nNv = 3e-5\n"
+
+
+def test_what_is_written_is_read_again_to_the_last_figure(tmp_path: Path, text: str) -> None:
+    matrix = MATRIX * (1 + 1e-3 * np.pi)
+    found = read_covariance(card_with(tmp_path, Covariance(NAMES, matrix), text))
+    assert found is not None and found.names == NAMES
+    np.testing.assert_array_equal(found.matrix, matrix)
+
+
+def test_a_card_without_the_line_has_none(mariner_card: ManoeuvringCard) -> None:
+    assert read_covariance(mariner_card) is None
+
+
+def test_a_new_reference_takes_the_place_of_the_old_one(text: str) -> None:
+    once = referring(text, Path("a.toml"))
+    twice = referring(once, Path("b.toml"))
+    assert twice.count("# covariance:") == 1 and twice == referring(text, Path("b.toml"))
+
+
+@pytest.mark.parametrize(
+    ("names", "matrix", "word"),
+    [
+        (NAMES, [[4e-10, 3e-10], [2e-10, 9e-10]], "symmetric"),
+        (NAMES, [[4e-10, 7e-10], [7e-10, 9e-10]], "semidefinite"),
+        (NAMES, [[4e-10, 3e-10]], "rows"),
+        (("derivatives.Yv", "derivatives.Yq"), MATRIX.tolist(), "no number"),
+        (("derivatives.Yv", "ship.name"), MATRIX.tolist(), "no number"),
+        (("derivatives.Yv", "derivatives.Yv"), MATRIX.tolist(), "twice"),
+        (NAMES, [[4.4e-10, 3e-10], [3e-10, 9e-10]], "uncertainty.Yv"),
+        (NAMES, [[0.0, 3e-10], [3e-10, 9e-10]], "exact"),
+    ],
+)
+def test_a_covariance_at_fault_is_refused(tmp_path: Path, text: str, names, matrix, word: str) -> None:
+    card = card_with(tmp_path, Covariance(tuple(names), np.array(matrix)), text)
+    with pytest.raises(InputError, match=word):
+        read_covariance(card)
+
+
+@pytest.mark.parametrize("content", ["", "[1]", json.dumps({"format": "other"}), '{"format": "tank2sim-covariance/1"}'])
+def test_a_file_that_is_none_is_refused(tmp_path: Path, text: str, content: str) -> None:
+    card = card_with(tmp_path, Covariance(NAMES, MATRIX), text)
+    covariance_file(tmp_path / "ship.toml").write_text(content)
+    with pytest.raises(InputError):
+        read_covariance(card)
+
+
+def test_a_missing_file_is_told(tmp_path: Path, text: str) -> None:
+    card = card_with(tmp_path, Covariance(NAMES, MATRIX), text)
+    covariance_file(tmp_path / "ship.toml").unlink()
+    with pytest.raises(InputError, match="is missing"):
+        read_covariance(card)

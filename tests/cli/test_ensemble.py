@@ -1,0 +1,80 @@
+"""``--ensemble``: bands in the JSON, the same for the same seed, from the covariance that reduce writes."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+
+import numpy as np
+import pytest
+
+from tank2sim.cards import read_card
+from tank2sim.cards.covariance import read_covariance
+from tests.cli.command_line import refused, tank2sim
+
+TURN = ("simulate", "mariner", "--manoeuvre", "turn:20", "--duration", "300")
+
+
+def test_bands_of_a_manoeuvre_are_the_same_for_the_same_seed(tmp_path) -> None:
+    found = []
+    for seed in ("1", "1", "2"):
+        result = tank2sim(*TURN, "--ensemble", "20", "--seed", seed, "--json", "s.json", cwd=tmp_path)
+        assert result.returncode == 0, result.stderr
+        assert "Ensemble of 20" in result.stdout and "2 % of the value is taken" in " ".join(result.stdout.split())
+        found.append(json.loads((tmp_path / "s.json").read_text())["ensemble"])
+    one, same, other = found
+    assert one == same and one["figures"] != other["figures"]
+    band, own = one["figures"]["advance_m"], json.loads((tmp_path / "s.json").read_text())["figures"]["advance_m"]
+    assert band["p5"] < band["p50"] < band["p95"] and band["p5"] < own < band["p95"] and band["shown_by"] == 20
+    assert len(one["t_s"]) == len(one["histories"]["psi_deg"]["p95"]) == len(one["track"]["middle_m"]) > 100
+    assert one["usable"] == 20 and one["unusable"] == {}
+
+
+@pytest.mark.slow
+def test_a_picture_has_the_bands(tmp_path) -> None:
+    result = tank2sim(*TURN, "--ensemble", "8", "--plot", "s.png", cwd=tmp_path)
+    assert result.returncode == 0 and (tmp_path / "s.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.slow
+def test_stability_and_influence_tell_chances_and_bands(tmp_path) -> None:
+    more = ("--ensemble", "6", "--json", "s.json")
+    result = tank2sim("stability", "mariner", "--no-spiral", *more, "-o", "s.html", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    found = json.loads((tmp_path / "s.json").read_text())["ensemble"]
+    chances = {one["name"]: one["probability_met"] for one in found["imo"]}
+    assert chances["advance"] == 1 and chances["tactical diameter"] == 0 and found["probability_stable"] == 1
+    assert "probability met" in (tmp_path / "s.html").read_text()
+    figure = "steady_radius_m@20"
+    result = tank2sim("influence", "mariner", "--figure", figure, *more, "--page", "i.html", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    told = json.loads((tmp_path / "s.json").read_text())
+    spread = told["ensemble"]["figures"][figure]["standard_deviation"]
+    assert spread == pytest.approx(told["figures"][figure]["standard_error"], rel=0.8)
+    assert "Ensemble of 6" in (tmp_path / "i.html").read_text()
+
+
+def test_a_cluster_without_an_ensemble_and_no_executor_are_refused(tmp_path) -> None:
+    refused(tank2sim(*TURN, "--executor", "threads", cwd=tmp_path), "--executor", "dask://host:port")
+    if shutil.which("dask"):
+        refused(tank2sim(*TURN, "--executor", "dask://127.0.0.1:1", cwd=tmp_path), "--ensemble")
+    refused(tank2sim(*TURN, "--ensemble", "1", cwd=tmp_path), "ensemble")
+
+
+def test_reduce_writes_the_covariance_and_simulate_draws_from_it(data, tmp_path) -> None:
+    campaign = data / "data" / "pmm_synthetic_11" / "campaign.toml"
+    result = tank2sim("reduce", str(campaign), "-o", "ship.toml", "--fill", "clarke1983", cwd=tmp_path)
+    if result.returncode:  # the campaign gives no beam or draught
+        result = tank2sim("reduce", str(campaign), "-o", "ship.toml", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    card = read_card(tmp_path / "ship.toml")
+    known = read_covariance(card)
+    assert known is not None and "derivatives.Yv" in known.names
+    errors = np.sqrt(np.diag(known.matrix))
+    for name, error in zip(known.names, errors, strict=True):
+        assert math.isclose(error, card.uncertainty[name.partition(".")[2]], rel_tol=6e-3)
+    result = tank2sim("simulate", "ship.toml", "--manoeuvre", "turn:10", "--ensemble", "4", cwd=tmp_path)
+    assert result.returncode == 0 and "as the covariance beside the card says" in " ".join(result.stdout.split())
+    (tmp_path / "ship.covariance.json").unlink()
+    refused(tank2sim("simulate", "ship.toml", "--manoeuvre", "turn:10", "--ensemble", "4", cwd=tmp_path), "is missing")

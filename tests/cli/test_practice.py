@@ -1,0 +1,71 @@
+"""``tank2sim compare``, ``validate``, ``poster`` and ``pilotcard``: files whole or none, and one line where refused."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tests.cli.command_line import refused, tank2sim
+
+
+@pytest.mark.slow
+def test_compare_writes_page_and_json(tmp_path) -> None:
+    arguments = ["compare", "mariner", "mariner", "--members", "0", "-o", "c.html", "--json", "c.json"]
+    result = tank2sim(*arguments, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    found = json.loads((tmp_path / "c.json").read_text())
+    assert found["summary"] == [
+        {
+            "card": "mariner (2)",
+            "compared": 45,
+            "beyond_two_standard_errors": 0,
+            "rms_standard_errors": pytest.approx(0),
+        }
+    ]
+    assert len(found["trials"]) == 4 and len(found["trials"][0]["tracks"]) == 2
+    assert (tmp_path / "c.html").read_text().startswith("<!doctype html>")
+
+
+def test_pilot_card_and_poster_are_written_with_their_blanks_counted(tmp_path) -> None:
+    result = tank2sim("pilotcard", "mariner", "-o", "p.html", "--json", "p.json", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "blanks are to be filled in by hand" in result.stdout and "[propulsion]" in result.stdout
+    found = json.loads((tmp_path / "p.json").read_text())
+    assert found["telegraph"] == [] and len(found["turning_circles_deep"]) == 2
+    orders = ["--order", "Full ahead=600", "--order", "Half ahead=450"]
+    result = tank2sim("poster", "esso-osaka", *orders, "-o", "w.html", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "Half ahead" in (tmp_path / "w.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["compare", "mariner"], "two cards"),
+        (["compare", "mariner", "wilinski-zellman"], "manoeuvres"),
+        (["poster", "wilinski-zellman", "-o", "w.html"], "steers"),
+        (["poster", "mariner", "-o", "w.html", "--order", "Half ahead"], "NAME=RPM"),
+        (["pilotcard", "mariner", "-o", "w.html", "--order", "Half ahead=-3"], "NAME=RPM"),
+        (["pilotcard", "mariner"], "--page"),
+        (["validate", "mariner", "nothing.csv", "-o", "v.html"], "nothing.csv"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line_and_nothing_is_written(tmp_path, arguments, words) -> None:
+    refused(tank2sim(*arguments, cwd=tmp_path), words)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_validate_tells_each_figure_of_a_real_trial(tmp_path, data) -> None:
+    trials = data / "data" / "kvlcc2_marin" / "MARIN_FREE_KVLCC2_zz_10_m.dat"
+    arguments = ["validate", "kvlcc2", str(trials), "--members", "0", "-o", "v.html", "--json", "v.json"]
+    result = tank2sim(*arguments, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    found = json.loads((tmp_path / "v.json").read_text())
+    rows = {one["name"]: one for one in found["figures"]}
+    assert rows["overshoot_1_deg"]["measured"] == pytest.approx(9.4, abs=0.3)
+    assert all(one["numerical"] < 0.01 for one in rows.values())
+    assert sum(found["counts"].values()) == len(rows) == 4
+    page = (tmp_path / "v.html").read_text()
+    assert "Replays" in page and "Source of the coefficients" in page

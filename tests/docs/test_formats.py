@@ -1,0 +1,46 @@
+"""The manual's pages on formats name every key, effect and column that the program takes."""
+
+from __future__ import annotations
+
+import re
+from itertools import chain
+
+import pytest
+from pydantic import BaseModel
+
+from tank2sim.cards import form
+from tank2sim.dynamics.abkowitz import TERMS
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.records import campaign_form
+
+from .examples import MANUAL
+
+TEXT = "\n".join(page.read_text(encoding="utf-8") for page in (MANUAL / "formats").glob("*.md"))
+SECTIONS = [
+    one
+    for one in chain(vars(form).values(), vars(campaign_form).values())
+    if isinstance(one, type) and issubclass(one, BaseModel) and one.__module__.startswith("tank2sim")
+]
+
+
+@pytest.mark.parametrize("section", SECTIONS, ids=lambda one: one.__name__)
+def test_every_key_is_in_the_manual(section: type[BaseModel]) -> None:
+    if f"<!-- keys: {section.__name__} -->" in TEXT:
+        return
+    words = set(re.findall(r"\w+", TEXT))
+    spellings = {"_radps": ("_degps", "_rpm"), "_rad": ("_deg",)}
+    for key in section.model_fields:
+        suffix = next((end for end in spellings if key.endswith(end)), "")
+        known = {key, *(key.removesuffix(suffix) + other for other in spellings.get(suffix, ()))}
+        assert known & words, f"{section.__name__}.{key} is in no page on formats"
+
+
+def test_every_derivative_is_in_the_manual() -> None:
+    words = set(re.findall(r"\w+", TEXT))
+    for term in chain.from_iterable(TERMS.values()):
+        assert term in words or re.sub("^N", "Y", term) in words, term
+
+
+def test_the_page_of_effects_is_generated_from_the_library() -> None:
+    assert "<!-- effects -->" in (MANUAL / "formats" / "effects.md").read_text(encoding="utf-8")
+    assert len(EFFECTS) > 40

@@ -1,0 +1,79 @@
+"""Every equation of the theory manual names a source, a place in the code and a test, and both are there."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import ROOT
+
+from .examples import MANUAL
+
+THEORY = sorted((MANUAL / "theory").glob("*.md"))
+_EQUATION = re.compile(r"^\$\$\n(.*?)^\$\$\n", re.DOTALL | re.MULTILINE)
+_WHERE = re.compile(
+    r"\n\{\.where\}\n\*Source\* (?P<source>.+?)\*Code\*\s(?P<code>.+?)\*Test\*\s(?P<test>.+?)\n(?:\n|\Z)", re.DOTALL
+)
+
+
+def places(page: Path) -> list[re.Match[str] | None]:
+    """What stands right after each equation of a page."""
+    text = page.read_text(encoding="utf-8")
+    return [_WHERE.match(text, found.end()) for found in _EQUATION.finditer(text)]
+
+
+def named(text: str) -> list[str]:
+    return re.findall(r"`([^`]+)`", text)
+
+
+def stands_in_the_code(name: str) -> bool:
+    """Whether ``package.module`` or ``package.module.thing`` of tank2sim is there."""
+    try:
+        importlib.import_module(f"tank2sim.{name}")
+    except ModuleNotFoundError:
+        module, _, thing = name.rpartition(".")
+        try:
+            return hasattr(importlib.import_module(f"tank2sim.{module}"), thing)
+        except ModuleNotFoundError:
+            return False
+    return True
+
+
+def stands_in_the_tests(name: str) -> bool:
+    """Whether ``folder/test_module.py::test_name`` is there."""
+    file, _, test = name.partition("::")
+    path = ROOT / "tests" / file.removeprefix("tests/")
+    if not path.is_file():
+        return False
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return not test or any(isinstance(one, ast.FunctionDef) and one.name == test for one in tree.body)
+
+
+def test_the_manual_has_equations() -> None:
+    assert sum(len(places(page)) for page in THEORY) >= 50
+
+
+@pytest.mark.parametrize("page", THEORY, ids=lambda page: page.stem)
+def test_every_equation_says_where_it_is_from_where_it_stands_and_what_holds_it(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    for found, where in zip(_EQUATION.finditer(text), places(page), strict=True):
+        assert where is not None, f"{page.name}: nothing after {found[1]}"
+        assert named(where["code"]) and named(where["test"]), f"{page.name}: no name after {found[1]}"
+        lost = [name for name in named(where["code"]) if not stands_in_the_code(name)]
+        lost += [name for name in named(where["test"]) if not stands_in_the_tests(name)]
+        assert not lost, f"{page.name}: not there: {lost}"
+
+
+@pytest.mark.parametrize("page", sorted(MANUAL.rglob("*.md")), ids=lambda page: page.relative_to(MANUAL).as_posix())
+def test_tests_named_in_the_text_are_there(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert [name for name in re.findall(r"`([\w/]+\.py(?:::\w+)?)`", text) if not stands_in_the_tests(name)] == []
+
+
+def test_what_is_not_there_is_seen() -> None:
+    assert not stands_in_the_code("dynamics.hull.no_such_function") and not stands_in_the_code("no_module.thing")
+    assert not stands_in_the_tests("dynamics/test_ship.py::test_none") and not stands_in_the_tests("no/test_file.py")
