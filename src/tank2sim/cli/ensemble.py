@@ -115,13 +115,12 @@ def show_stability_bands(found: StabilityBands) -> None:
     rows = [
         [
             one.criterion.name,
-            *((one.band.low, one.band.median, one.band.high) if one.band else (None, None, None)),
-            one.criterion.allowed,
-            one.criterion.unit,
-            one.met,
-            f"{one.between[0]:.3f} to {one.between[1]:.3f}" if one.between else "-",
+            *((f"{value:.4g}" for value in (one.band.low, one.band.high)) if one.band else (None, None)),
+            f"{one.criterion.allowed:.4g} {one.criterion.unit}",
+            None if one.met is None else f"{one.met:.3g}",
+            f"{one.between[0]:.3f} to {one.between[1]:.3f}" if one.between else None,
         ]
         for one in found.chances
     ]
-    heads = ["criterion", "5 %", "50 %", "95 %", "allowed", "unit", "probability met", "95 % interval"]
+    heads = ["criterion", "5 %", "95 %", "allowed", "P(met)", "interval of P"]
     show_table("IMO MSC.137(76), worse side, over the ensemble", heads, rows)
