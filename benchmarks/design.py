@@ -42,11 +42,18 @@ def _stability(model: Model) -> None:
     found = stability_study(model)
     assert found.turning is not None
     folds = ", ".join(f"{math.degrees(fold.rudder_rad):.3f} deg" for fold in found.turning.folds) or "none"
-    print(f"  C' = {found.stability.criterion:.4g}, margin {found.margin.percent:.3g} %; folds: {folds}")
+    own, margin = found.stability, found.margin
+    verdict = "stable" if own.stable else "unstable"
+    print(f"  {own.speed_mps:.4g} m/s, drift {own.drift_deg:.3g} deg, rudder {own.rudder_deg:.3g} deg: {verdict}")
+    print(
+        f"  C' = {own.criterion:.4g}, margin {margin.percent:.3g} %, levers {margin.lever:.3g} L apart; folds: {folds}"
+    )
+    ends = (math.degrees(rate) for rate in found.turning.yaw_rate_radps[[0, -1]])
+    print(f"  steady turns at 35 deg to port and to starboard: {' and '.join(f'{rate:.3g}' for rate in ends)} deg/s")
     loop = found.turning.loop
     if loop:
         height = "unknown" if loop.height_radps is None else f"{math.degrees(loop.height_radps):.3f} deg/s"
-        print(f"  hysteresis loop: {math.degrees(loop.width_rad):.2f} deg wide, {height} high")
+        print(f"  hysteresis loop: {math.degrees(loop.width_rad):.2f} deg of rudder wide, {height} high")
     integrator = Integrator(model)
     simulate(model, parse_manoeuvre("turn:35"), integrator=integrator)  # compiled by now
     begin = time.perf_counter()

@@ -24,10 +24,10 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
-from fmu_step import ship_numbers
 
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.analysis.ensemble.questions import OfManoeuvre, ShipText
+from tank2sim.analysis.ensemble.results import Asked, manoeuvre_bands
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.executors import executing
@@ -35,6 +35,7 @@ from tank2sim.native.compiler import FLAGS, SHARED_SUFFIX, require_compiler
 from tank2sim.simulation.bands import figure_bands
 from tank2sim.simulation.ensemble import Draws, Ensemble, ensemble
 from tank2sim.simulation.manoeuvres import Turn
+from tank2sim.simulation.run import simulate
 
 HERE = Path(__file__).parent
 DURATION, RUDDER, SEED = 600.0, np.radians(35.0), 1
@@ -61,6 +62,8 @@ def hand_loop(library: ctypes.CDLL, ships: np.ndarray, steps: int, h: float) -> 
 
 def numbers_of(card: ManoeuvringCard, draws: Draws, members: int) -> np.ndarray:
     """The numbers of ``Ship`` in mariner.h of each member."""
+    from fmu_step import ship_numbers  # slow to import, and every process imports this file
+
     model = build(card)
     own = np.array(ship_numbers(model))
     derivatives = [name for name in model.parameter_names if name.startswith("derivatives.")]
@@ -92,6 +95,15 @@ def on_all(question: OfManoeuvre, draws: Draws, members: int) -> tuple[Ensemble,
     with executing() as executor:
         found = ensemble(question, draws, members, executor)
     return found, time.perf_counter() - begun, seconds_of_processors() - worked
+
+
+def bands_of_readme(card: ManoeuvringCard) -> None:
+    """The bands that the README tells of ``tank2sim simulate mariner --manoeuvre turn:35 --ensemble 100 --seed 3``."""
+    turn, asked = Turn(float(RUDDER)), Asked(100, 3)
+    run = simulate(build(card), turn)
+    bands = manoeuvre_bands(card, turn, (None, float(run.trajectory.t[-1])), asked).figures
+    told = [f"{name} {bands[name].low:.0f} to {bands[name].high:.0f}" for name in ("advance_m", "tactical_diameter_m")]
+    print(f"{asked.members} ships, seed {asked.seed}, 5 and 95 %: {', '.join(told)}")
 
 
 def main() -> int:
@@ -139,6 +151,7 @@ def main() -> int:
     )
     print(f"  tactical diameter {diameter.low:.0f} to {diameter.high:.0f} m, median {diameter.median:.0f} m")
     print(f"  largest process {largest / 1024:.0f} MB   (must be below {MEMORY_MB})")
+    bands_of_readme(card)
     return 0 if ratio >= AIM and largest / 1024 < MEMORY_MB and difference < AGREEMENT else 1
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -14,7 +15,7 @@ from scipy.integrate import odeint
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
-from tank2sim.cards import read_card
+from tank2sim.cards import parse_card, read_card
 
 Array = NDArray[np.float64]
 
@@ -25,14 +26,19 @@ SAMPLE_S = 0.1  # of shipmmg's lists of time: that of its examples
 FINEST_SAMPLE_S = SAMPLE_S / 2**3  # finer, a zigzag of shipmmg takes minutes
 
 
+ABKOWITZ, MARINER = "KVLCC2 Abkowitz", "Mariner Abkowitz"
+MMG, YAWED = "KVLCC2 MMG", "container, yaw moment"
+"""Ships with their equations; figures of one and the same agree, those of others need not."""
+
+
 @dataclass(frozen=True)
 class Case:
     """One library at one manoeuvre.
 
     Parameters
     ----------
-    library, manoeuvre, setting : str
-        Who, what, and what `levels` are.
+    library, ship, manoeuvre, setting : str
+        Who, of which ship with which equations, what, and what `levels` are.
     levels : tuple of float
         From coarse to fine: a step in s, or a relative tolerance.
     delivered : float
@@ -45,9 +51,12 @@ class Case:
         The figure without error of the method, where the finest level cannot give it.
     evaluations : callable, optional
         Number of right-hand sides in what `run` gives, where it is known.
+    as_delivered : str
+        What the library chooses at `delivered`, where that is none of `levels`.
     """
 
     library: str
+    ship: str
     manoeuvre: str
     setting: str
     levels: tuple[float, ...]
@@ -56,6 +65,7 @@ class Case:
     figure: Callable[[Any], float]
     reference: Callable[[], float] | None = None
     evaluations: Callable[[Any], int] | None = None
+    as_delivered: str = ""
 
 
 def tactical_diameter(t: Array, y: Array, psi: Array) -> float:
@@ -129,9 +139,21 @@ def of_shipmmg() -> list[Case]:
 
     samples = tuple(8 * SAMPLE_S / 2**k for k in range(round(math.log2(8 * SAMPLE_S / FINEST_SAMPLE_S)) + 1))
     return [
-        Case("shipmmg", "turn", "tolerance", TOLERANCES, TOLERANCES[0], turn, _diameter_of_states, None, _evaluations),
         Case(
             "shipmmg",
+            MMG,
+            "turn",
+            "tolerance",
+            TOLERANCES,
+            TOLERANCES[0],
+            turn,
+            _diameter_of_states,
+            None,
+            _evaluations,
+        ),
+        Case(
+            "shipmmg",
+            MMG,
             "zigzag",
             "sample, s",
             samples,
@@ -196,7 +218,72 @@ def of_commonocean() -> list[Case]:
     def figure(run: tuple[Array, Array, int]) -> float:
         return tactical_diameter(run[0], run[1][1], run[1][2])
 
-    return [Case("CommonOcean", "turn", "tolerance", TOLERANCES, usual, turn, figure, None, _evaluations)]
+    return [Case("CommonOcean", YAWED, "turn", "tolerance", TOLERANCES, usual, turn, figure, None, _evaluations)]
 
 
-PEERS: dict[str, Callable[[], list[Case]]] = {"shipmmg": of_shipmmg, "CommonOcean": of_commonocean}
+def of_vmm() -> list[Case]:
+    """The Mariner of vessel-manoeuvring-models, with the numbers that lie in it, under the rudder of our card's rate.
+
+    Its Simulator is given the equations of its own module ``vmm_mariner``, as sympy has them, with the surge velocity
+    counted from the speed of approach, as the numbers are: the ready ``SimulatorPerturbed`` counts it from the speed
+    of the moment when it takes prime numbers, so that no resistance acts, and ends in an error of numpy 2 when it
+    takes others. The inertia that is in the printed yaw-rate terms is taken out, for the equations have it themselves.
+    Its zigzag calls ``DataFrame.append``, which pandas has no more.
+    """
+    import pandas
+    import sympy
+    from vessel_manoeuvring_models.models import vmm_mariner
+    from vessel_manoeuvring_models.models.vmm import Simulator
+    from vessel_manoeuvring_models.symbols import U, u
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what pandas 3 thinks of the way in which the numbers are filled in
+        from vessel_manoeuvring_models.models.vessels import mariner
+
+    card: Any = mariner_card()
+    L, speed, rho = card.ship.length_m, card.model.speed_mps, card.environment.water_density_kgpm3
+    mass, x_G = mariner.m_prime_, mariner.xG_prime_
+    own = {"Xvr": -mass, "Xrr": -mass * x_G, "Yr": mass, "Yur": mass, "Nr": mass * x_G, "Nur": mass * x_G}
+    table = mariner.df_parameters
+    prime = table["prime"].fillna(0.0).to_dict()
+    at = {"L": L, "rho": rho, "U": speed}
+    derivatives = {
+        name: (value + own.get(name, 0.0)) * float(sympy.sympify(table.loc[name, "denominator"]).subs(at))
+        if value or name in own
+        else 0.0
+        for name, value in prime.items()
+    }
+    weight = 0.5 * rho * L**3
+    ship = {"x_G": x_G * L, "m": mass * weight, "I_z": mariner.Iz_prime_ * weight * L**2, "L": L, "rho": rho}
+    simulator = Simulator(vmm_mariner.X_eq_general, vmm_mariner.Y_eq_general, vmm_mariner.N_eq_general)
+    forces = vmm_mariner.X_qs_eq, vmm_mariner.Y_qs_eq, vmm_mariner.N_qs_eq
+    simulator.define_quasi_static_forces(*(force.subs(u, u - U) for force in forces))
+    rate, usual = card.steering_gear.max_rate_radps, 0.0
+
+    def turn(tolerance: float) -> Any:
+        t = np.linspace(0.0, DURATION_S, round(DURATION_S / SAMPLE_S) + 1)
+        start = {"x0": 0.0, "y0": 0.0, "psi": 0.0, "u": speed, "v": 0.0, "r": 0.0}
+        orders = pandas.DataFrame(start | {"delta": -np.minimum(rate * t, RUDDER)}, index=t)  # positive to port
+        choice = {"method": "RK45", "rtol": tolerance, "atol": 1e-3 * tolerance} if tolerance != usual else {}
+        return simulator.simulate(orders, derivatives, ship, control_keys=["delta"], **choice).solution
+
+    def figure(run: Any) -> float:
+        return tactical_diameter(run.t, run.y[4], run.y[5])
+
+    levels = TOLERANCES[:4]  # finer, a turn takes seconds
+    told = "Radau, tol. 0.001"
+    nfev: Callable[[Any], int] = lambda run: int(run.nfev)  # noqa: E731
+    return [Case("VMM", MARINER, "turn", "RK45, tol.", levels, usual, turn, figure, None, nfev, told)]
+
+
+def mariner_card() -> Any:
+    """Our Mariner with her forces by the speed of approach and a rudder that moves at its rate, as VMM has her."""
+    text = read_card("mariner").text
+    changes = {'speed_scale = "instantaneous"': 'speed_scale = "nominal"', "time_constant_s = 1.0\n": ""}
+    for old, new in changes.items():
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    return parse_card(text, "mariner")
+
+
+PEERS: dict[str, Callable[[], list[Case]]] = {"shipmmg": of_shipmmg, "VMM": of_vmm, "CommonOcean": of_commonocean}

@@ -162,7 +162,10 @@ def main() -> int:
     body_of_the_paper()
     result = identify_tow(tows)
     algorithm(tows)
-    reanalysis(study_tows(result, towed_body(tows, result.mass_kg, {})))
+    study = study_tows(result, towed_body(tows, result.mass_kg, {}))
+    reanalysis(study)
+    for note in study.notes:
+        print(f"note: {note}")
     print("all agree" if not _failed else f"differ: {', '.join(_failed)}")
     return 1 if _failed else 0
 

@@ -10,18 +10,22 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import get_args
 
 import numpy as np
 
+from tank2sim.cards import YawRigCard, read_card
+from tank2sim.cards.form import YawRig
 from tank2sim.dynamics import yaw_theory as theory
 from tank2sim.dynamics.yaw_energy import inertia_from_work
 from tank2sim.dynamics.yaw_programme import PAPER, YawProgramme, full_turns
-from tank2sim.dynamics.yaw_rig import ELLIPSOID_AIR, ELLIPSOID_T1, SHIP_AIR, SHIP_T1, SHIP_T2, YawRig
+from tank2sim.dynamics.yaw_rig import ELLIPSOID_AIR, ELLIPSOID_T1, SHIP_AIR, SHIP_T1, SHIP_T2
 from tank2sim.identification.yaw.energy import energy_balance
 from tank2sim.identification.yaw.identify import GRAVITY, WATER_TERMS, YawOptions, YawResult, identify_yaw
 from tank2sim.identification.yaw.intervals import intervals
-from tank2sim.records.yaw import Medium, YawRecord
-from tank2sim.simulation.yaw_record import record_of
+from tank2sim.records.yaw import Medium, YawRecord, read_yaw_record, yaw_record_text
+from tank2sim.simulation.yaw_record import record_of, simulated_record
 from tank2sim.simulation.yaw_rig import Measuring, YawRun, run_yaw_rig
 from tank2sim.simulation.yaw_rig_control import AdaptiveController, Controller, TunedController
 
@@ -150,7 +154,7 @@ def print_air() -> None:
 
 def print_programmes() -> None:
     print("\nA body mounted off centre (moment of gravity 1e-3 N m), ship T1, encoder: lambda661 without knowing of it")
-    rig = replace(SHIP_T1, gravity_Nm=1e-3, gravity_angle_rad=1.0)
+    rig = SHIP_T1.model_copy(update={"gravity_Nm": 1e-3, "gravity_angle_rad": 1.0})
     programmes = {
         "unidirectional": PAPER,
         "reversing": replace(PAPER, kind="reversing", humps=4),
@@ -168,7 +172,23 @@ def print_programmes() -> None:
         print_estimates(replace(aware, estimates={"energy_least_squares": next(iter(aware.estimates.values()))}), 302.0)
 
 
+def print_readme() -> None:
+    """What ``tank2sim yaw rig.csv --simulate alyshev --noise 0.003`` tells, and with a record in air beside it."""
+    card = read_card("alyshev")
+    assert isinstance(card, YawRigCard)
+    print("\nThe bundled card, 3 mA of noise: lambda661, 1e-4 kg m2, J_zz by the card; and by a record in air")
+    with TemporaryDirectory() as folder:
+        read = {}
+        for medium in get_args(Medium):
+            path = Path(folder, f"{medium}.csv")
+            path.write_text(yaw_record_text(simulated_record(card, path, 0.003, medium=medium)))
+            read[medium] = read_yaw_record(path)
+    for records in ([read["water"]], [read["water"], read["air"]]):
+        print_estimates(identify_yaw(records), 302.0)
+
+
 def main() -> None:
+    print_readme()
     print_theory()
     print_dissipation()
     print_air()

@@ -7,6 +7,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from docutils import nodes
+from sphinx.application import Sphinx
+
 from tank2sim import __version__
 
 project = "tank2sim"
@@ -14,7 +17,15 @@ author = "the authors of tank2sim"
 project_copyright = "MIT licence"
 release = __version__
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "mathml", "plain_docstrings", "generated"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "mathml",
+    "plain_docstrings",
+    "generated",
+    "pictures",
+]
 myst_enable_extensions = ["attrs_block", "dollarmath"]
 myst_heading_anchors = 3
 html_math_renderer = "mathml"
@@ -44,3 +55,15 @@ pygments_style = "friendly"
 
 # Short names of classes may be the same in two packages (Motion, Fit); a link by such a name is left to the reader.
 suppress_warnings = ["ref.python"]
+
+
+def _tables_of_the_program(app: Sphinx, tree: nodes.document) -> None:
+    """Outputs with a table are told apart from others: on a narrow screen they are scrolled, their lines not broken."""
+    for block in tree.findall(nodes.literal_block):
+        if "━" in block.astext():
+            block["classes"].append("drawn")
+
+
+def setup(app: Sphinx) -> None:
+    """What is done to every page."""
+    app.connect("doctree-read", _tables_of_the_program)

@@ -7,11 +7,9 @@ A page asks for one by a comment of its own, ``<!-- effects -->``, ``<!-- comman
 from __future__ import annotations
 
 import importlib
-import inspect
 import math
 import pkgutil
 import re
-import textwrap
 from functools import cache
 from pathlib import Path
 
@@ -62,30 +60,21 @@ def effects() -> str:
 
 
 def _family(effect: Effect) -> str:
-    return FAMILIES[_module(effect).rpartition(".")[2]]
-
-
-def _module(effect: Effect) -> str:
     return next(
-        f"tank2sim.dynamics.effects.{name}"
-        for name in FAMILIES
-        if effect in vars(importlib.import_module(f"tank2sim.dynamics.effects.{name}")).values()
+        family
+        for module, family in FAMILIES.items()
+        if effect in vars(importlib.import_module(f"tank2sim.dynamics.effects.{module}")).values()
     )
 
 
 def _effect(effect: Effect) -> list[str]:
-    equations = effect.equations
-    document = inspect.getdoc(equations) or "" if equations.__module__ != _MODULE_OF_EFFECT else ""
-    lines = [f"### `{effect.name}`", "", f"{effect.description} Acts on: {effect.acts_on}.", ""]
-    for paragraph in document.split("\n\n"):
-        indented = paragraph.startswith(" ")
-        lines += ["```text", textwrap.dedent(paragraph), "```", ""] if indented else [_text(paragraph), ""]
-    lines += [f"Source: {_text(effect.source)}. Code: `{_module(effect).removeprefix('tank2sim.')}`.", ""]
-    lines += ["| parameter | unit | bounds | where the card gives none | meaning |", "|---|---|---|---|---|"]
-    return [*lines, *(_parameter(one) for one in effect.parameters), ""]
-
-
-_MODULE_OF_EFFECT = "tank2sim.dynamics.effects.effect"
+    told = f"{effect.description} Acts on: {effect.acts_on}."
+    return [
+        *[f"### `{effect.name}`", "", f"{told} [Equation, source and test](../theory/effects.md#{effect.name}).", ""],
+        *["| parameter | unit | bounds | where the card gives none | meaning |", "|---|---|---|---|---|"],
+        *(_parameter(one) for one in effect.parameters),
+        "",
+    ]
 
 
 def _parameter(one: EffectParameter) -> str:

@@ -27,7 +27,9 @@ def test_the_second_overshoot_is_that_to_port() -> None:
 def of_levels(error: float) -> peer_ships.Case:
     """A method of first order whose figure is 100 (1 + error x step)."""
     steps = tuple(8.0 / 2**k for k in range(6))
-    return peer_ships.Case("none", "turn", "step, s", steps, 1.0, lambda step: step, lambda h: 100 * (1 + error * h))
+    return peer_ships.Case(
+        "none", "none", "turn", "step, s", steps, 1.0, lambda step: step, lambda h: 100 * (1 + error * h)
+    )
 
 
 def test_the_coarsest_accurate_level_is_found_and_one_out_of_reach_is_told() -> None:
@@ -55,6 +57,34 @@ def test_shipmmg_has_the_ship_on_a_steady_course_at_the_speed_of_our_card() -> N
     assert np.abs(v).max() < 1e-9
 
 
+def test_what_a_peer_needs_and_does_not_install_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(peers.MODULES, "VMM", "numpy")
+    monkeypatch.setitem(peers.BESIDES, "VMM", ("numpy", "no_such_module"))
+    assert "vessel-manoeuvring-models needs no_such_module, which it does not install" in peers.reason_to_skip("VMM")
+
+
+def test_the_printed_table_says_what_its_columns_are(capsys: pytest.CaptureFixture[str]) -> None:
+    row = peers.Row(
+        "none", peer_ships.MMG, "turn", "equal accuracy", "step, s 1", 969.0, 0.019, "reference", 1, None, 2
+    )
+    peers.show([row], {"tank2sim": 1.0})
+    told = capsys.readouterr().out
+    assert all(
+        words in told
+        for words in ("0.01%", "35 deg", "20/20", "second overshoot", "us/s", "KVLCC2 MMG", "1.9000 % reference")
+    )
+
+
+@pytest.mark.slow
+def test_one_ship_in_two_libraries_turns_alike() -> None:
+    """The Mariner of Chislett and Strom-Tejsen by their equations in sympy, and by ours: one diameter."""
+    if reason := peers.reason_to_skip("VMM"):
+        pytest.skip(reason)
+    (theirs,) = peer_ships.of_vmm()
+    own = next(case for case in peers.ours() if case.ship == theirs.ship)
+    assert theirs.figure(theirs.run(1e-4)) == pytest.approx(own.figure(own.run(own.delivered)), rel=1e-5)
+
+
 @pytest.mark.slow
 def test_the_table_has_every_library_and_holds_ours_and_theirs_to_one_accuracy(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -64,7 +94,9 @@ def test_the_table_has_every_library_and_holds_ours_and_theirs_to_one_accuracy(
     told = capsys.readouterr().out
     found = json.loads((tmp_path / "peers.json").read_text())
     turns = {
-        row["library"]: row for row in found["rows"] if (row["manoeuvre"], row["level"]) == ("turn", "equal accuracy")
+        row["library"]: row
+        for row in found["rows"]
+        if (row["manoeuvre"], row["level"]) == ("turn", "equal accuracy") and row["ship"] != peer_ships.MARINER
     }
     assert {"tank2sim", "shipmmg"} <= set(turns)
     assert all(row["change"] < peers.ACCURACY for row in turns.values())

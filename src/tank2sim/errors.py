@@ -25,3 +25,7 @@ class InputError(Exception):
     def __init__(self, source: Path | str, place: str, problem: str, remedy: str):
         self.source, self.place, self.problem, self.remedy = str(source), place, problem, remedy
         super().__init__(": ".join(part for part in (self.source, place, problem) if part) + f"; {remedy}")
+
+    def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
+        """As it comes back from another process: pickle would call it with its one line alone."""
+        return type(self), (self.source, self.place, self.problem, self.remedy)

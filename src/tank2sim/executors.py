@@ -10,18 +10,16 @@ import multiprocessing
 import os
 import re
 import signal
+import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 
+from tank2sim.cluster import OPTION, connected, working_for_another
 from tank2sim.errors import InputError
 
 PROCESSES = "processes"
 FORMS = f"{PROCESSES}, or dask://host:port"
-OPTION = "--executor"
-
-_ANSWERS_WITHIN = "10s"
-"""A scheduler that has not answered by then is taken to be none (a choice of ours)."""
 
 
 def check_executor(text: str) -> str:
@@ -56,42 +54,51 @@ def executing(text: str = PROCESSES, workers: int | None = None) -> Iterator[Exe
     Raises
     ------
     InputError
-        As :func:`check_executor`; no scheduler answers there, or it has no workers.
+        As :func:`check_executor`; what :func:`tank2sim.cluster.connected` says.
     """
-    making = _processes(workers) if check_executor(text) == PROCESSES else _cluster(text)
+    making = _processes(workers) if check_executor(text) == PROCESSES else connected(text)
     with making as executor:
         yield executor
+
+
+def processes_to_begin(workers: int | None = None) -> int:
+    """As many as were asked for, by default one for each processor; 1 in work that is itself handed to an executor.
+
+    That one keeps the other processors busy, and a worker of Dask may begin no processes.
+    """
+    if multiprocessing.parent_process() is not None or working_for_another():
+        return 1
+    return workers or os.cpu_count() or 1
 
 
 @contextmanager
 def _processes(workers: int | None) -> Iterator[Executor]:
     """Processes that begin anew, as threads may be at work in this one."""
     context = multiprocessing.get_context("spawn")
-    # An interrupt is for this process alone: workers that were told of it, too, would each say so.
-    with ProcessPoolExecutor(
-        workers or os.cpu_count(), context, signal.signal, (signal.SIGINT, signal.SIG_IGN)
-    ) as pool:
+    before = set(multiprocessing.active_children())
+    with ProcessPoolExecutor(workers or os.cpu_count(), context, _prepare) as pool:
         try:
             yield pool
         except BaseException:
+            # Who stops a run does not wait for work of minutes whose results nobody will fetch.
             pool.shutdown(wait=False, cancel_futures=True)
+            for process in set(multiprocessing.active_children()) - before:
+                process.terminate()
             raise
 
 
-@contextmanager
-def _cluster(text: str) -> Iterator[Executor]:
-    from distributed import Client  # seldom asked for, and no part of every installation
+def _prepare() -> None:
+    """Prepare a process for work.
 
-    try:
-        client = Client(f"tcp://{text.removeprefix('dask://')}", timeout=_ANSWERS_WITHIN)
-    except (OSError, TimeoutError, ValueError):
-        problem = f"no scheduler answers at {text}"
-        raise InputError(
-            OPTION, "", problem, "start one there with `dask scheduler`, or leave the option out"
-        ) from None
-    with client:
-        if not client.scheduler_info()["workers"]:
-            problem = f"the scheduler at {text} has no workers"
-            raise InputError(OPTION, "", problem, "start some with `dask worker host:port`")
-        # Not `with`: when it is left by an error, that would wait for all that is under way.
-        yield client.get_executor()
+    An interrupt is for the one that began it alone: workers that were told of it, too, would each say so. A worker that
+    is busy for minutes does not outlive, unseen, the one that began it and was killed.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

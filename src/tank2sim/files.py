@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import stat
 import tempfile
@@ -9,6 +10,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from tank2sim.errors import InputError
 
@@ -196,3 +200,22 @@ def _umask() -> int:
     value = os.umask(0)
     os.umask(value)
     return value
+
+
+def plain_json(value: Any) -> Any:
+    """A result as JSON holds it: arrays become lists, and what is not a finite number becomes None."""
+    match value:
+        case Mapping():
+            return {str(key): plain_json(item) for key, item in value.items()}
+        case np.ndarray():
+            return plain_json(value.tolist())
+        case list() | tuple():
+            return [plain_json(item) for item in value]
+        case np.generic():
+            return plain_json(value.item())
+        case float():
+            return value if math.isfinite(value) else None
+        case Path():
+            return str(value)
+        case _:
+            return value

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tank2sim.cards import ManoeuvringCard, read_card
-from tank2sim.cards.covariance import Covariance, covariance_file, read_covariance, referring
+from tank2sim.cards import ManoeuvringCard, parse_card, read_card
+from tank2sim.cards.covariance import Covariance, carried, covariance_file, not_referring, read_covariance, referring
+from tank2sim.cards.reading import changed_text
 from tank2sim.errors import InputError
 
 NAMES = ("derivatives.Yv", "derivatives.Nv")
@@ -79,3 +80,24 @@ def test_a_missing_file_is_told(tmp_path: Path, text: str) -> None:
     covariance_file(tmp_path / "ship.toml").unlink()
     with pytest.raises(InputError, match="is missing"):
         read_covariance(card)
+
+
+def test_a_changed_card_keeps_the_covariance_of_what_is_the_same(tmp_path: Path, text: str) -> None:
+    effect = "\n[[effects]]\nname = 'rudder_bias'\nparameters = {angle_deg = 1.0}\nuncertainty = {angle_deg = 0.1}\n"
+    names = (*NAMES, "effects.0.parameters.angle_deg")
+    root = np.array([[2e-5, 0, 0], [1e-5, np.sqrt(8) * 1e-5, 0], [0.06, 0.0, 0.08]])
+    card = card_with(tmp_path, Covariance(names, root @ root.T), text + effect)
+    whole = carried(card, card.text)
+    assert whole is not None and whole.names == names
+    found = carried(card, changed_text(card.text, card.source, {"derivatives.Yv": -1170e-5}))
+    assert found is not None and found.names == names[1:]
+    np.testing.assert_array_equal(found.matrix, (root @ root.T)[1:, 1:])
+    within = carried(card, changed_text(card.text, card.source, {"derivatives.Yv": -1160e-5 + 1.9e-5}))
+    beyond = carried(card, changed_text(card.text, card.source, {"derivatives.Yv": -1160e-5 + 2.1e-5}))
+    assert within is not None and within.names == names and beyond is not None and beyond.names == names[1:]
+    less_sure = changed_text(card.text, card.source, {"effects.0.uncertainty.angle_deg": 0.2})
+    other = card.text.replace("'rudder_bias'", "'fixed_rudder_offset'")
+    for changed in (less_sure, other):
+        found = carried(card, changed)
+        assert found is not None and found.names == NAMES
+    assert carried(parse_card(not_referring(card.text), card.source), card.text) is None

@@ -61,6 +61,26 @@ def test_a_time_that_falls_is_a_finding_and_no_bad_input(write):
     assert "repeated" in shown.output
 
 
+def test_the_json_has_the_record_to_draw_with_its_peaks_and_the_places_of_findings(write, tmp_path):
+    path = write("bad.csv")
+    lines = path.read_text().splitlines()
+    header = next(place for place, text in enumerate(lines) if text.startswith("t_s"))
+    column = lines[header].split(",").index("u_mps")
+    cells = lines[header + 1001].split(",")
+    cells[column] = "50.0"
+    lines[header + 1001] = ",".join(cells)
+    path.write_text("\n".join(lines[: header + 2001] + lines[header + 2051 :]) + "\n")
+    result = tmp_path / "result.json"
+    assert run(path, "--json", result).exit_code == 0
+    found = json.loads(result.read_text())
+    places = {entry["column"]: entry["places_s"] for entry in found["findings"] if entry["places_s"]}
+    (spike,), (gap,) = places["u_mps"], places["t_s"]
+    assert spike == pytest.approx([100.0, 100.0]) and gap == pytest.approx([199.9, 205.0])
+    histories = found["trials"][0]["histories"]
+    assert len(histories["t_s"]) <= 420
+    assert histories["u_mps"][histories["t_s"].index(100.0)] == 50.0
+
+
 def test_bad_input_is_refused_and_nothing_is_written(write, tmp_path):
     result = tmp_path / "result.json"
     with pytest.raises(InputError, match="no such file"):

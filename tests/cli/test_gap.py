@@ -145,11 +145,16 @@ def test_what_an_earlier_run_wrote_does_not_lie_there_as_if_it_were_of_this_one(
     assert tank2sim(*arguments, cwd=folder).returncode == 0
     assert json.loads((tmp_path / "gap.json").read_text())["files"] == sorted(written(tmp_path))
     (tmp_path / "corrected/mine.csv").write_text("t_s\n")
+    # As if the card had had a covariance then.
+    told = json.loads((tmp_path / "gap.json").read_text())
+    (tmp_path / "gap.json").write_text(json.dumps({**told, "files": [*told["files"], "improved.covariance.json"]}))
+    (tmp_path / "improved.covariance.json").write_text("{}")
     finding((), NOTHING, test=False)
     result = tank2sim(*arguments, cwd=folder)
     assert result.returncode == 0, result.stderr
     assert written(tmp_path) == {"gap.json", "improved.toml", "report.html", "corrected/mine.csv"}
     assert "corrected/turn20.csv was of an earlier run, and was removed" in result.stdout
+    assert "improved.covariance.json was of an earlier run, and was removed" in result.stdout
     assert "corrected/mine.csv is not of this run, and was left" in result.stdout
     (tmp_path / "corrected/mine.csv").unlink()
     assert tank2sim(*arguments, cwd=folder).returncode == 0 and not (tmp_path / "corrected").exists()

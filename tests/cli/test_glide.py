@@ -24,6 +24,8 @@ def test_angles_give_states(tmp_path) -> None:
     assert [state["path_angle_deg"] for state in found["states"]] == pytest.approx([25, -45, 35, 30])
     assert found["states"][3]["speed_mps"] == pytest.approx(0.2444, abs=6e-5)
     assert found["as_printed"][3]["speed_mps"] == pytest.approx(0.0972, abs=6e-5)
+    assert max(abs(force) for one in found["states"] for force in one["force_residual_N"]) < 1e-10
+    assert min(abs(one["force_residual_N"][0]) for one in found["as_printed"]) > 0.01
     assert found["design"]["smallest_angle_deg"] == pytest.approx(23.385, abs=5e-4)
     assert len(found["design"]["ranges"]) == 6
 

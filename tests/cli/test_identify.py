@@ -166,7 +166,7 @@ from tank2sim.identification.trials import output_error
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a process in the background begins with it ignored
 # As Ctrl-C does, in the middle of the search: a first round is done, others would follow.
-output_error._new_weights = lambda *arguments: signal.raise_signal(signal.SIGINT)
+output_error._new_noise = lambda *arguments: signal.raise_signal(signal.SIGINT)
 main()
 """
     command = [sys.executable, "-c", program, "identify", "off.toml", *FITTED, "-o", "stopped.toml", "--json", "s.json"]

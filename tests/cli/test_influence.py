@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from tank2sim.cards import read_card
+from tank2sim.cards.covariance import Covariance, covariance_file, read_covariance, referring
 from tests.cli.command_line import refused, tank2sim
 
 
@@ -40,6 +42,26 @@ def test_a_tuned_card_is_written_and_read_again(tmp_path) -> None:
     assert read_card(tmp_path / "new.toml").derivatives["Nd"] == pytest.approx(
         -tuned["parameters"]["derivatives.Nd"]["after"], rel=1e-9
     )
+
+
+def test_a_tuned_card_has_a_covariance_of_its_own_in_any_folder(tmp_path) -> None:
+    (tmp_path / "there").mkdir()
+    ship = tmp_path / "ship.toml"
+    text = read_card("mariner").text + "\n[uncertainty]\nNd = 4e-5\nYv = 2e-4\nNv = 1e-4\n"
+    ship.write_text(referring(text, ship))
+    names = ("derivatives.Nd", "derivatives.Yv", "derivatives.Nv")
+    matrix = np.array([[1.6e-9, 2e-9, 0.0], [2e-9, 4e-8, 1e-8], [0.0, 1e-8, 1e-8]])
+    covariance_file(ship).write_text(Covariance(names, matrix).as_text())
+    result = tank2sim(
+        *("influence", "ship.toml", "--tune", "steady_radius_m=640@20", "--by", "fewest", "-o", "there/new.toml"),
+        cwd=tmp_path,
+    )
+    assert result.returncode == 0, result.stderr
+    told = " ".join(result.stdout.split())
+    assert "as if they were independent" in told and "errors of the others are independent now: Nd" in told
+    found = read_covariance(read_card(tmp_path / "there" / "new.toml"))
+    assert found is not None and found.names == names[1:]
+    np.testing.assert_array_equal(found.matrix, matrix[1:, 1:])
 
 
 def test_wishes_that_contradict_each_other_are_a_finding_unless_a_card_was_asked_for(tmp_path) -> None:

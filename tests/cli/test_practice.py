@@ -18,9 +18,10 @@ def test_compare_writes_page_and_json(tmp_path) -> None:
     assert found["summary"] == [
         {
             "card": "mariner (2)",
-            "compared": 45,
+            "compared": 0,
+            "same_number": 45,
             "beyond_two_standard_errors": 0,
-            "rms_standard_errors": pytest.approx(0),
+            "rms_standard_errors": None,
         }
     ]
     assert len(found["trials"]) == 4 and len(found["trials"][0]["tracks"]) == 2
@@ -36,7 +37,8 @@ def test_pilot_card_and_poster_are_written_with_their_blanks_counted(tmp_path) -
     orders = ["--order", "Full ahead=600", "--order", "Half ahead=450"]
     result = tank2sim("poster", "esso-osaka", *orders, "-o", "w.html", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    assert "Half ahead" in (tmp_path / "w.html").read_text()
+    page = (tmp_path / "w.html").read_text()
+    assert "Half ahead" in page and "Dead slow ahead" in page
 
 
 @pytest.mark.parametrize(
@@ -47,6 +49,11 @@ def test_pilot_card_and_poster_are_written_with_their_blanks_counted(tmp_path) -
         (["poster", "wilinski-zellman", "-o", "w.html"], "steers"),
         (["poster", "mariner", "-o", "w.html", "--order", "Half ahead"], "NAME=RPM"),
         (["pilotcard", "mariner", "-o", "w.html", "--order", "Half ahead=-3"], "NAME=RPM"),
+        (["pilotcard", "mariner", "-o", "w.html", "--order", "Full astern=60"], "order astern"),
+        (["poster", "esso-osaka", "-o", "w.html", "--order", "Full=7000000"], "beyond 1,200 revolutions"),
+        (["poster", "esso-osaka", "-o", "w.html", "--order", f"{'x' * 30}=500"], "no room"),
+        (["poster", "mariner", "-o", "w.html", "--ballast", "kvlcc2"], "length 320 m"),
+        (["poster", "mariner", "-o", "w.html", "--ballast", "mariner"], "no smaller"),
         (["pilotcard", "mariner"], "--page"),
         (["validate", "mariner", "nothing.csv", "-o", "v.html"], "nothing.csv"),
     ],
@@ -69,3 +76,12 @@ def test_validate_tells_each_figure_of_a_real_trial(tmp_path, data) -> None:
     assert sum(found["counts"].values()) == len(rows) == 4
     page = (tmp_path / "v.html").read_text()
     assert "Replays" in page and "Source of the coefficients" in page
+
+
+@pytest.mark.slow
+def test_a_criterion_beyond_the_card_is_neither_met_nor_probable(tmp_path) -> None:
+    result = tank2sim("stability", "kvlcc2", "--no-spiral", "--ensemble", "3", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    tables = result.stdout.split("IMO MSC.137(76)")[1:]
+    rows = [next(row for row in one.splitlines() if "tactical" in row) for one in tables]
+    assert len(rows) == 2 and all("beyond" in row and "yes" not in row for row in rows)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from unittest import mock
 
+import numpy as np
 import pytest
 
 from tank2sim.report import steer_ship
@@ -17,6 +19,21 @@ def test_what_simulate_wrote_becomes_a_page(tmp_path: Path) -> None:
     assert result.returncode == 0, result.stderr
     page = (tmp_path / "s.html").read_text(encoding="utf-8")
     assert "Simulated manoeuvre: Mariner class" in page and "tactical diameter" in page
+    assert "Track: turn:35" in page and "Histories: turn:35" in page
+
+
+def test_histories_in_the_json_are_thinned_samples_of_the_run(tmp_path: Path) -> None:
+    command = "simulate mariner --manoeuvre turn:35 --duration 300 --json s.json --out s.csv".split()
+    assert tank2sim(*command, cwd=tmp_path).returncode == 0
+    histories = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))["histories"]
+    header, *lines = (tmp_path / "s.csv").read_text(encoding="utf-8").splitlines()[1:]
+    run = dict(zip(header.split(","), np.array([line.split(",") for line in lines], dtype=float).T, strict=True))
+    assert list(histories) == list(run)
+    assert 600 <= len(histories["t_s"]) < 620 < len(run["t_s"])
+    kept = np.searchsorted(run["t_s"], np.array(histories["t_s"]) - 1e-4)
+    for name, values in histories.items():
+        np.testing.assert_allclose(values, run[name][kept], rtol=1e-5, atol=1e-5, err_msg=name)
+        assert max(values) == pytest.approx(run[name].max(), rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -41,3 +58,8 @@ def test_a_towed_vehicle_has_nothing_to_steer(tmp_path: Path) -> None:
     with mock.patch.object(steer_ship, "has_compiler", return_value=False):
         refused(tank2sim("steer", "wilinski-zellman", "-o", "s.html", cwd=tmp_path), "has no rudder")
     assert not (tmp_path / "s.html").exists()
+
+
+def test_a_steering_card_is_told_from_a_ship(tmp_path: Path) -> None:
+    result = tank2sim("steer", "poznyakov-yudin", "-o", "s.html", cwd=tmp_path)
+    refused(result, "poznyakov-yudin", "is a steering card", "tank2sim influence")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, YawRigCard, read_card
+from tank2sim.records.yaw import read_yaw_record
 from tests.cli.command_line import refused, tank2sim
 from tests.yaw_truth import Truth, record, written
 
@@ -99,6 +101,20 @@ def test_a_run_in_air_can_be_simulated_and_gives_j(folder):
     # The one run by the adaptive controller saturates the motor, and that is said.
     refused(tank2sim("yaw", "six.csv", "--simulate", "alyshev", "--controller", "adaptive", cwd=folder), "saturates")
     refused(tank2sim("yaw", "dry.csv", "--medium", "air", cwd=folder), "--simulate")
+
+
+def test_a_ships_motion_is_run_at_model_size(folder):
+    asked = ("--simulate", "alyshev", "--similar-to", "38,8,100,120", "--json", "similar.json")
+    ended = tank2sim("yaw", "similar.csv", *asked, cwd=folder)
+    assert ended.returncode == 0 and "rates times 8.968" in ended.stdout, ended.stderr
+    # (L*/L) sqrt(B/B*) = 8.968 of paper 3: rates times, times by; a hump's motion lasts three rises.
+    programme = read_yaw_record(folder / "similar.csv").programme
+    assert math.degrees(programme.max_rate_radps) == pytest.approx(100 / 60 * 8.968, rel=1e-4)
+    assert 3 * programme.rise_s == pytest.approx(120 / 8.968, rel=1e-4)
+    assert programme.humps == 5
+    for text in ("38,8,100", "38,8,nan,120", "38,8,100,5"):
+        refused(tank2sim("yaw", "none.csv", "--simulate", "alyshev", "--similar-to", text, cwd=folder), "--similar-to")
+    refused(tank2sim("yaw", "similar.csv", "--similar-to", "38,8,100,120", cwd=folder), "--simulate CARD")
 
 
 def test_theory_stands_beside_the_record(folder):

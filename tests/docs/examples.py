@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import re
 import shutil
 import subprocess
@@ -19,7 +20,7 @@ from itertools import groupby
 from pathlib import Path
 
 from tests.cli.command_line import tank2sim
-from tests.conftest import DATA, ROOT
+from tests.conftest import ROOT
 
 MANUAL = ROOT / "docs"
 LEFT_OUT = "..."
@@ -29,6 +30,7 @@ _EXAMPLE = re.compile(
     r"(?:\n?```text\n(?P<output>.*?)```\n)?",
     re.DOTALL,
 )
+_WITH_PYTHON = os.environ | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
 _NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 _FRAME = str.maketrans(dict.fromkeys("┃│┏┓┗┛└┘┡┩╇┳━─┴┬┼├┤", " "))
 
@@ -54,15 +56,9 @@ def examples(page: Path) -> list[Example]:
 
 
 def prepare(folder: Path) -> None:
-    """What the examples find in their folder: ``models/`` and, where the measured data are, ``campaign/``."""
-    shutil.copytree(ROOT / "models", folder / "models")
-    if needed().is_dir():
-        shutil.copytree(needed(), folder / "campaign")
-
-
-def needed() -> Path:
-    """The campaign that stands for the reader's own."""
-    return DATA / "data" / "pmm_synthetic_12"
+    """What the examples find in their folder: of a fresh checkout the bundled models and what the manual brings."""
+    for name in ("models", "docs/examples"):
+        shutil.copytree(ROOT / name, folder / name)
 
 
 def run(example: Example, folder: Path) -> str:
@@ -80,7 +76,9 @@ def run(example: Example, folder: Path) -> str:
             )
             done = tank2sim(*words.stdout.splitlines()[1:], cwd=folder)
         elif line.strip():
-            done = subprocess.run(["/bin/sh", "-c", line], cwd=folder, capture_output=True, text=True, check=False)
+            done = subprocess.run(
+                ["/bin/sh", "-c", line], cwd=folder, env=_WITH_PYTHON, capture_output=True, text=True, check=False
+            )
         else:
             continue
         assert done.returncode == 0, f"{line}\n{done.stderr}"

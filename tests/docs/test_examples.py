@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
-from .examples import MANUAL, alike, chosen, examples, needed, pages, prepare, run
+from tests.conftest import ROOT
+
+from .examples import MANUAL, alike, chosen, examples, pages, prepare, run
+
+_FOLDER = re.compile(r"`([\w-]+)/`")  # as `campaign/`: a folder in the text of a page
 
 PAGES = [page.relative_to(MANUAL).as_posix() for page in pages()]
 
@@ -20,8 +25,6 @@ def test_every_tutorial_has_examples() -> None:
 @pytest.mark.parametrize("name", PAGES)
 def test_examples_print_what_the_manual_says(name: str, tmp_path: Path) -> None:
     page = MANUAL / name
-    if "campaign/" in page.read_text(encoding="utf-8") and not needed().is_dir():
-        pytest.skip(f"measured data are missing: no folder {needed()} (set TANK2SIM_DATA)")
     prepare(tmp_path)
     for example in examples(page):
         printed = run(example, tmp_path)
@@ -29,6 +32,14 @@ def test_examples_print_what_the_manual_says(name: str, tmp_path: Path) -> None:
             assert alike(printed, example.output), (
                 f"{example.code}\nprinted\n{printed}\nand the manual has\n{example.output}"
             )
+    lost = [one for one in _FOLDER.findall(page.read_text(encoding="utf-8")) if not (tmp_path / one).is_dir()]
+    assert not lost, f"folders that a reader of {name} does not have: {lost}"
+
+
+@pytest.mark.parametrize("page", sorted(MANUAL.rglob("*.md")), ids=lambda page: page.relative_to(MANUAL).as_posix())
+def test_files_of_the_checkout_that_a_page_names_are_there(page: Path) -> None:
+    named = re.findall(r"\b(?:models|docs|benchmarks|fmu_templates)/[\w./-]*\w", page.read_text(encoding="utf-8"))
+    assert [one for one in named if not (ROOT / one).exists()] == []
 
 
 def test_a_wrong_number_sign_or_word_is_seen() -> None:

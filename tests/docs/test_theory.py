@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tank2sim.dynamics.effects import EFFECTS
 from tests.conftest import ROOT
 
 from .examples import MANUAL
@@ -72,6 +73,27 @@ def test_every_equation_says_where_it_is_from_where_it_stands_and_what_holds_it(
 def test_tests_named_in_the_text_are_there(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert [name for name in re.findall(r"`([\w/]+\.py(?:::\w+)?)`", text) if not stands_in_the_tests(name)] == []
+
+
+def sections(text: str) -> dict[str, str]:
+    """What stands under each heading that is the name of an effect."""
+    pieces = re.split(r"^### `(\w+)`\n", text, flags=re.MULTILINE)
+    return dict(zip(pieces[1::2], pieces[2::2], strict=True))
+
+
+def test_every_effect_has_its_equation_with_its_code_and_a_test_that_tries_it() -> None:
+    found = sections((MANUAL / "theory" / "effects.md").read_text(encoding="utf-8"))
+    assert set(found) == set(EFFECTS) and len(found) == len(EFFECTS)
+    for name, text in found.items():
+        assert _EQUATION.search(text), f"{name} has no equation"
+        where = re.search(r"\*Code\*\s`([\w.]+)\.(\w+)`\.\s\*Test\*", text)
+        assert where, f"{name} names no code"
+        module, constant = where.groups()
+        assert getattr(importlib.import_module(f"tank2sim.{module}"), constant) is EFFECTS[name], name
+        files = {ROOT / "tests" / test.partition("::")[0] for test in re.findall(r"`([\w/]+\.py::\w+)`", text)}
+        assert any(re.search(rf"\b{name}\b", file.read_text(encoding="utf-8")) for file in files), (
+            f"{name} is not tried"
+        )
 
 
 def test_what_is_not_there_is_seen() -> None:

@@ -8,12 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tank2sim.cards import YawRigCard, read_card
+from tank2sim.cards.form import TankWalls, YawRig
 from tank2sim.dynamics import build
-from tank2sim.dynamics.yaw_rig import ELLIPSOID_T1, SHIP_T1, Walls, YawRig, rig_of, yaw_rig_model
+from tank2sim.dynamics.yaw_rig import ELLIPSOID_T1, SHIP_T1, yaw_rig_model
+from tank2sim.errors import InputError
 from tests.yaw_truth import Truth
 
 FULL = YawRig(
     inertia_kgm2=0.0204,
+    torque_constant_NmpA=0.051,
     added_inertia_kgm2=0.03,
     coulomb_Nm=7.9e-4,
     viscous_Nms=0.0117,
@@ -23,7 +26,7 @@ FULL = YawRig(
     inertia_braking_kgm2=0.02,
     gravity_Nm=2e-3,
     gravity_angle_rad=0.4,
-    walls=Walls(
+    walls=TankWalls(
         body_length_m=0.67, bow_inertia_kgm2=3e-3, stern_inertia_kgm2=3e-3, bow_damping_Nms=4e-3, stern_damping_Nms=4e-3
     ),
 )
@@ -78,11 +81,13 @@ def test_encoder_counts_whole_pulses_downwards(full):
 
 def test_a_body_too_long_for_its_tank_is_refused():
     with pytest.raises(ValueError, match="strikes the walls"):
-        Walls(body_length_m=1.5)
+        TankWalls(body_length_m=1.5)
+    with pytest.raises(InputError, match=r"yaw_rig\.walls.*strikes the walls"):
+        read_card("alyshev", {"yaw_rig.walls.body_length_m": 1.5})
 
 
 def test_the_bundled_card_is_the_papers_ship():
     card = read_card("alyshev")
     assert isinstance(card, YawRigCard)
-    assert replace(rig_of(card), walls=None) == SHIP_T1
+    assert card.yaw_rig.model_copy(update={"walls": None}) == SHIP_T1
     assert build(card).name == card.ship.name

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import pytest
 
 from tank2sim.analysis.practice.comparison import compare_cards
+from tank2sim.cli.screen import json_text
 from tank2sim.report.charts import chart_specification
 from tank2sim.report.compare_page import compare_page
 from tank2sim.report.page import render_page
+from tank2sim.report.result_page import result_page
 
 
 @pytest.fixture(scope="module")
@@ -36,3 +39,8 @@ def test_the_chart_of_errors_has_a_point_for_each_difference(found) -> None:
     specification = chart_specification(compare_page(found).sections[1].charts[0].chart)
     points = [row for data in specification["datasets"].values() for row in data if "name" in row]
     assert len(points) == len(found.in_errors(1))
+
+
+def test_the_report_of_the_json_is_this_page(found) -> None:
+    told = json.loads(json_text(found.as_json()))
+    assert render_page(result_page(told, "c.json")) == render_page(compare_page(found))

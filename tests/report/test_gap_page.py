@@ -11,10 +11,11 @@ import pytest
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE, Gap, Passed, Rival
 from tank2sim.report.charts import chart_specification
 from tank2sim.report.gap_cause_charts import agreement_chart, binned, rival_chart
-from tank2sim.report.gap_charts import gap_tracks, in_noise, misfit_chart, shown_places, signal_misfit
+from tank2sim.report.gap_charts import gap_tracks, misfit_chart, shown_places, signal_misfit
 from tank2sim.report.gap_page import gap_charts, gap_page
 from tank2sim.report.gap_words import verdict_in_words, with_error
 from tank2sim.report.page import Verdict, render_page
+from tank2sim.report.switched_charts import in_noise
 from tests.gap import made_up
 
 
@@ -50,10 +51,10 @@ def test_every_verdict_has_a_whole_page(verdict) -> None:
 
 def test_a_named_effect_is_told_in_words_and_in_a_mariners_units() -> None:
     words = verdict_in_words(made_up.missing())
-    assert "current (speed 0.45 ± 0.02 m/s, direction 270.0 ± 1.5 deg)" in words
+    assert "current (speed 0.45 ± 0.02 m/s, direction towards 270.0 ± 1.5 deg)" in words
     assert "The water moves over the ground" in words
     (row,) = (row for row in tables_of(page_of(made_up.missing()))["What was found, ± one standard error"].rows[1:])
-    assert row[:4] == ["current", "direction", "270.0 ± 1.5", "deg"]
+    assert row[:4] == ["current", "direction towards", "270.0 ± 1.5", "deg"]
 
 
 def test_a_sensor_at_fault_is_not_called_a_fault_of_the_model() -> None:

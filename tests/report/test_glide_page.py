@@ -67,7 +67,9 @@ def test_a_climb_to_the_east_is_drawn_where_it_goes() -> None:
 
 
 def test_the_polar_marks_the_glides_it_is_given(found) -> None:
-    marked = lines(polar_chart(found.polar, [("best", found.best)]), 2)
+    told = found.as_json()
+    chart = polar_chart(told["polar"], {"best": told["design"]["best_glide"]})
+    marked = lines(chart, 2)
     assert math.degrees(math.atan2(marked[0]["y"], marked[0]["x"])) == pytest.approx(23.385, abs=1e-3)
-    speeds = np.array([row["x"] for row in lines(polar_chart(found.polar, [("best", found.best)]))])
+    speeds = np.array([row["x"] for row in lines(chart)])
     assert speeds.max() == pytest.approx(found.fastest.horizontal_speed_mps, rel=1e-3)

@@ -22,7 +22,7 @@ from tank2sim.report import identification_page as identification_page_module
 from tank2sim.report.charts import chart_specification
 from tank2sim.report.identification_charts import AFTER, BEFORE, MEASURED, Pair, track_grid
 from tank2sim.report.identification_page import MOST_TRIALS, identification_charts, identification_page, pairs_of
-from tank2sim.report.page import Verdict
+from tank2sim.report.page import Verdict, render_page
 from tests.identification.trials import made_up_ship
 
 OFF = {"Nd": 1.25, "Nr": 0.8, "Yv": 1.2, "Xu": 0.8}
@@ -153,6 +153,23 @@ def test_windows_show_the_share_of_each_signal_by_trial(found) -> None:
     for one in (*result.fit.following, *result.holdout.following):
         assert now[one.name, "r"] == pytest.approx(100 * one.relative("motion.r"), 1e-4)
         assert now[one.name, "ψ"] == pytest.approx(100 * one.relative("motion.psi"), 1e-4)
+
+
+def test_maps_beside_each_other_share_one_legend(found) -> None:
+    """Vega warns in the console where one of them has a legend and another none."""
+    maps = [one for row in chart_specification(found[2]["windows"])["vconcat"] for one in row["hconcat"]]
+    legends = [one["layer"][0]["encoding"]["color"]["legend"] for one in maps]
+    assert len(legends) == 4 and all(one == legends[0] for one in legends)
+
+
+def test_overshoots_keep_the_digits_that_their_errors_need(found, monkeypatch) -> None:
+    rows = [
+        ["zigzag", "held out", "overshoot_1_deg", 7.7, 7.81, 7.72, "+0.02", "-"],
+        ["turn", "held out", "advance_m", 1234.5, 1300.0, 1235.5, "+0.1 %", "-"],
+    ]
+    monkeypatch.setattr(identification_page_module, "figure_rows", lambda _: rows)
+    html = render_page(identification_page(found[0], {}))
+    assert all(f">{shown}<" in html for shown in ("7.7", "7.81", "7.72", "1234", "1300"))
 
 
 def test_parameters_are_in_standard_errors_of_the_prior(found) -> None:

@@ -9,7 +9,7 @@ from tank2sim.analysis.tuning.result import Means
 from tank2sim.analysis.tuning.tune import tune
 from tank2sim.analysis.tuning.wishes import parse_wish
 from tank2sim.cards import read_card
-from tank2sim.report.influence_charts import influence_charts, most_influential
+from tank2sim.report.influence_charts import Coefficients, influence_charts, most_influential
 from tank2sim.report.influence_page import influence_page
 from tank2sim.report.page import render_page
 
@@ -30,7 +30,8 @@ def test_the_page_has_every_parameter_both_coefficients_and_the_tuning() -> None
     assert [(one.label, one.unit) for one in page.figures][2:4] == [("steady rate, 20 deg", "deg/min"), ("K", "1/s")]
     tables = [table for section in page.sections for table in section.tables if "K by the" in table.caption]
     assert [len(table.columns) for table in tables] == [4, 3]  # all that is as wide as the page
-    charts = influence_charts(result)
+    told = Coefficients.of(result.as_json())
+    charts = influence_charts(told)
     assert [len(chart.hconcat) for chart in charts] == [3, 2]
     # Nr has the largest K on the criterion with Yv, Nd that on the radius: they stand at the top.
-    assert {result.parameters[place].short for place in most_influential(result)[:4]} >= {"Nd", "Nr", "Yv"}
+    assert {told.names[place] for place in most_influential(told)[:4]} >= {"Nd", "Nr", "Yv"}

@@ -3,9 +3,12 @@
 import json
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tank2sim.errors import InputError
 from tank2sim.report.page import Verdict, render_page
+from tank2sim.report.result_drawn import needs_of
 from tank2sim.report.result_kinds import KINDS, kind_of
 from tank2sim.report.result_page import result_page
 from tank2sim.report.result_values import alike, quantities, rows_of, titled, words
@@ -93,17 +96,18 @@ def test_objects_of_one_kind_share_a_table_and_others_do_not():
 
 def test_a_gap_has_its_verdict_its_notices_and_a_map_to_switch():
     page = result_page(GAP, "gap.json")
-    assert page.figures[0].value == "missing effect"
-    assert [figure.value for figure in page.figures[1:]] == [88.3, 1.04]
+    assert [figure.value for figure in page.figures] == ["missing effect", "88.3 → 1.04"]
+    assert "none was held out" in page.figures[1].label
+    assert "report.html" in page.sections[0].text
     assert page.sections[0].notes == ["look at this"]
-    hidden = section(page, "Could hide").tables[0]
+    hidden = section(page, "Sizes that would not show").tables[0]
     assert [tuple(row) for row in hidden.rows] == [
         ("wind", "speed", "0.1", "m/s"),
         ("rudder bias", "angle", "0.01", "deg"),
     ]
     chart = section(page, "Trials").charts[0].chart.to_dict()
-    switch = next(one for one in chart["params"] if one["name"] == "model")
-    assert switch["bind"]["options"] == ["before", "after"]
+    switch = next(one for one in chart["params"] if one["name"] == "shown")
+    assert switch["bind"]["options"] == ["before", "after", "both"] and switch["value"] == "both"
 
 
 def test_stability_has_its_diagrams_and_the_criteria_their_verdicts():
@@ -141,6 +145,123 @@ def test_every_kind_is_told_apart():
         assert kind_of(dict.fromkeys(kind.keys), "x.json").title == kind.title
 
 
+def test_the_tiles_of_a_gap_name_the_effect_with_its_parameters_and_judge_by_the_trials_held_out():
+    effect = {"name": "current", "parameters": {"speed_mps": 0.52867, "direction_deg": 252.93}}
+    effect |= {"standard_errors": {"speed_mps": 0.0051, "direction_deg": None}}
+    misfit = {"before": {"fit": 9.0, "holdout": 108.02}, "after": {"fit": 2.0, "holdout": 1.06}}
+    page = result_page({**GAP, "effects": [effect], "misfit": misfit}, "gap.json")
+    assert [(one.label, one.value, one.unit) for one in page.figures] == [
+        ("Verdict", "missing effect", ""),
+        ("current: speed", "0.5287 ± 0.0051", "m/s"),
+        ("current: direction towards", "252.9", "deg"),
+        ("Misfit of the trials held out", "108 → 1.06", ""),
+    ]
+
+
+@pytest.mark.parametrize(("found", "verdict", "told"), [(0.5, "", "better"), (110.0, "caution", "worse")])
+def test_the_tiles_of_coefficients_say_whether_the_trials_held_out_are_followed_better(found, verdict, told):
+    misfit = {"fit": 1.0, "holdout": found, "before": {"fit": 2.0, "holdout": 0.997}}
+    tile = result_page({"method": "output_error", "derivatives": {}, "misfit": misfit}, "r.json").figures[0]
+    assert (tile.value, tile.verdict) == (f"0.997 → {found:g}", verdict) and tile.note.startswith(told)
+
+
+def test_the_tiles_of_a_zigzag_are_its_overshoots_and_those_of_captive_tests_the_least_sure_derivative():
+    figures = {"period_s": 215.0, "overshoots_deg": [7.8, 6.3]}
+    page = result_page({"ship": "A", "manoeuvre": "zigzag:20/20", "figures": figures}, "r.json")
+    assert [one.value for one in page.figures] == ["zigzag:20/20", 7.8, 6.3, 215.0]
+    derivatives = {"Yv": {"value": -0.01, "standard_error": 1e-4}, "Yr": {"value": 0.002, "standard_error": 1e-3}}
+    page = result_page({"campaign": "c.toml", "derivatives": derivatives}, "r.json")
+    assert [(one.value, one.note) for one in page.figures] == [(2, ""), (50.0, "of the value, Yr")]
+
+
+def test_the_tiles_of_tows_are_what_they_found_and_not_what_was_given():
+    estimates = {"total_mass_kg": 2857.0, "B3_kgpm": 474.0}
+    method = {"estimates": estimates, "standard_errors": {"total_mass_kg": 96.0, "B3_kgpm": 96.0}}
+    result = {"tows": "t.csv", "mass_kg": 2243.0, "methods": {"paper": {"estimates": estimates}, "qr": method}}
+    page = result_page({**result, "mass_range_kg": [2546.9, 3399.05]}, "r.json")
+    assert [(one.value, one.unit) for one in page.figures] == [
+        ("2857 ± 96", "kg"),
+        ("474 ± 96", "kg/m"),
+        ("2547 to 3399", "kg"),
+    ]
+
+
+def test_a_unit_that_stands_in_the_key_above_is_that_of_each_value_below():
+    values = {"energy_least_squares": 0.03022, "two_intervals": 0.027}
+    method = {"added_inertia_kgm2": 0.03022, "added_inertia_standard_error_kgm2": 0.00016}
+    result = {"records": ["rig.csv"], "added_inertia_kgm2": values, "methods": {"energy_least_squares": method}}
+    page = result_page(result, "r.json")
+    assert [row[-1] for row in section(page, "Added inertia").tables[0].rows] == ["kg m²", "kg m²"]
+    assert [(one.value, one.unit) for one in page.figures] == [("0.03022 ± 0.00016", "kg m²")]
+
+
+def test_few_rows_of_many_columns_are_turned_and_what_nobody_knows_is_left_out():
+    keys = [f"length_{place}_m" for place in range(12)]
+    one = dict.fromkeys(keys, 1.5) | {"nowhere": None, "empty": []}
+    table = rows_of("all", [("a", one), ("b", one)], "name")
+    assert [column.title for column in table.columns] == ["quantity", "a", "b", "unit"]
+    assert [tuple(row) for row in table.rows] == [(f"length {place}", "1.5", "1.5", "m") for place in range(12)]
+    assert [row[0] for row in quantities("all", {"bootstrap": None, "ranges": [], "runs": 0}).rows] == ["runs"]
+
+
+def test_a_fleet_is_told_by_the_names_of_the_folders_without_ways_that_lead_nowhere():
+    told = {"verdict": "no missing effect", "effects": [], "alternatives": [], "trials": {"fit": 1, "holdout": 0}}
+    told |= {"misfit": {"before": {"fit": 1.0, "holdout": None}, "after": {"fit": 1.0, "holdout": None}}}
+    ships = [{"folder": "ship one", "name": "A ship", **told}, {"folder": "two", "fault": "no card"}]
+    page = result_page({"fleet": "f", "ships": ships, "notices": []}, "fleet.json")
+    assert page.figures[0].value == "2"
+    assert section(page, "Ships").tables[0].rows[0][0] == "ship one"
+    assert "report.html" in section(page, "Ships").text
+    assert list(section(page, "Without a result").tables[0].rows[0]) == ["two", "no card"]
+
+
+def test_signals_have_a_row_each_in_one_table_a_statistic():
+    steady = {"verdict": "stationary", "p_values": {"about_level": {"kpss": 0.1}}}
+    one = {"unit": "m/s", "mean": 7.0, "constant": False, "stationarity": steady}
+    trial = {"trial": "a/turn.csv", "columns": {"u_mps": one, "v_mps": one}, "notices": ["look"]}
+    page = result_page({"trials": [trial]}, "signals.json")
+    drawn, told = page.sections
+    assert drawn.heading == "turn.csv" and drawn.notes == ["look"]
+    assert [(table.caption, [row[0] for row in table.rows]) for table in told.tables] == [
+        ("Signals", ["u", "v"]),
+        ("Stationarity", ["u", "v"]),
+    ]
+    assert [column.title for column in told.tables[1].columns] == ["signal", "verdict", "kpss p about level"]
+    assert page.figures[1].value == "2 of 2"
+
+
+DAMAGES = st.sampled_from(["text", 5, True, [1, 2], {"a": 5}, [{}], ["x"] * 20, [None], {"a": {}}])
+NEEDED = {kind.title: [*kind.keys, *needs_of(kind.title), "notices", "figures", "effects"] for kind in KINDS}
+
+
+@settings(max_examples=25, deadline=None)
+@given(data=st.data(), kind=st.sampled_from(KINDS), damage=DAMAGES)
+def test_a_damaged_key_is_an_error_of_the_file_and_never_one_of_the_program(data, kind, damage):
+    """Whatever stands under any key of any kind, the page is drawn or the key is told."""
+    whole = {key: form() for key, form in needs_of(kind.title).items()}
+    key = data.draw(st.sampled_from(NEEDED[kind.title]))
+    result = {**dict.fromkeys(kind.keys), **whole, key: damage}
+    try:
+        page = result_page(result, "x.json")
+    except InputError as error:
+        assert error.source == "x.json" and error.place
+    else:
+        assert page.title
+
+
+@pytest.mark.parametrize("damage", ["text", 5])
+@pytest.mark.parametrize(("kind", "key"), [(one.title, key) for one in KINDS for key in needs_of(one.title)])
+def test_text_or_a_number_in_place_of_what_is_drawn_is_told_by_its_key(kind, key, damage):
+    form = needs_of(kind)[key]
+    if form is object or isinstance(damage, form):
+        return
+    known = next(one for one in KINDS if one.title == kind)
+    whole = {name: own() for name, own in needs_of(kind).items()}
+    with pytest.raises(InputError, match=f"^x.json: {key}: has not the form") as caught:
+        result_page({**dict.fromkeys(known.keys), **whole, key: damage}, "x.json")
+    assert caught.value.place == key
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in")
 @pytest.mark.parametrize("result", [GAP, STABILITY], ids=["gap", "stability"])
@@ -151,4 +272,4 @@ def test_the_page_opens_without_a_word_in_the_console(result, tmp_path):
     assert console == []
     assert 'data-charts="drawn"' in seen
     if result is GAP:
-        assert seen.count('type="radio"') == 2
+        assert seen.count('type="radio"') == 3  # before, after, both

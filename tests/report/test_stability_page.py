@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 
 import numpy as np
 import pytest
@@ -10,9 +11,12 @@ import pytest
 from tank2sim.analysis.stability.study import StabilityStudy, stability_study
 from tank2sim.analysis.turning.spirals import SpiralPoints
 from tank2sim.cards import read_card
+from tank2sim.cli.screen import json_text
 from tank2sim.dynamics import build
+from tank2sim.files import plain_json
 from tank2sim.report.charts import chart_specification
 from tank2sim.report.page import render_page
+from tank2sim.report.result_page import result_page
 from tank2sim.report.stability_charts import DIRECT, STABLE, UNSTABLE, influence_chart, steering_diagram, trim_chart
 from tank2sim.report.stability_page import stability_page
 
@@ -43,7 +47,7 @@ def test_the_page_holds_every_part(study) -> None:
 
 
 def test_the_branches_of_the_diagram_meet_in_the_folds(study) -> None:
-    specification = chart_specification(steering_diagram(study.turning, None, None))
+    specification = chart_specification(steering_diagram(plain_json(study.turning.as_json()), {}))
     drawn = rows(specification, specification["vconcat"][0]["layer"][0])
     parts = [[row for row in drawn if row["part"] == part] for part in range(3)]
     assert [part[0]["run"] for part in parts] == [STABLE, UNSTABLE, STABLE]
@@ -55,7 +59,9 @@ def test_the_branches_of_the_diagram_meet_in_the_folds(study) -> None:
 def test_spirals_are_points_in_the_panel_of_the_yaw_rate_alone(study) -> None:
     nothing = np.zeros(1)
     points = SpiralPoints(np.radians([10.0]), np.radians([1.5]), np.ones(1, dtype=bool), nothing)
-    specification = chart_specification(steering_diagram(study.turning, points, None))
+    specification = chart_specification(
+        steering_diagram(plain_json(study.turning.as_json()), {"direct": points.as_json()})
+    )
     panels = specification["vconcat"]
     (drawn,) = rows(specification, panels[0]["layer"][-1])
     assert (drawn["run"], drawn["d"], drawn["v"]) == (DIRECT, 10, 1.5)
@@ -63,14 +69,23 @@ def test_spirals_are_points_in_the_panel_of_the_yaw_rate_alone(study) -> None:
 
 
 def test_influences_and_trims_are_drawn_as_they_were_found(study) -> None:
-    specification = chart_specification(influence_chart(study.margin))
+    specification = chart_specification(influence_chart(study.margin.as_json()))
     bars = rows(specification, specification["layer"][0])
     assert bars[0]["name"] == study.margin.influences[0].short_name
     assert bars[0]["y"] == pytest.approx(study.margin.influences[0].percent, rel=1e-5)
     lines = {
         row["run"]
-        for data in chart_specification(trim_chart(study.trim))["datasets"].values()
+        for data in chart_specification(trim_chart(study.trim.as_json()))["datasets"].values()
         for row in data
         if "run" in row
     }
     assert len(lines) == 3
+
+
+def test_the_report_of_the_json_has_the_same_charts(study) -> None:
+    told = json.loads(json_text(study.as_json()))
+    own, report = (
+        [chart_specification(one.chart) for section in page.sections for one in section.charts]
+        for page in (stability_page(study, []), result_page(told, "s.json"))
+    )
+    assert len(own) == 8 and report[: len(own)] == own

@@ -14,8 +14,9 @@ from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.records.reading import read_trial
-from tank2sim.report.steer import ghost_of, steering_page
-from tank2sim.report.steer_ship import NO_COMPILER, WEB, controls, has_compiler, ship_in_page
+from tank2sim.report.steer import steering_page
+from tank2sim.report.steer_ghost import ghost_of
+from tank2sim.report.steer_ship import WEB, controls, following, has_compiler, ship_in_page
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
 from tests.report.test_page_in_browser import CHROMIUM, opened
@@ -55,7 +56,10 @@ DRIVE = """<script>{{
   URL.createObjectURL = (blob) => {{ saved.push(blob.text()); return made.call(URL, blob); }};
   const at = (name) => document.getElementById(name);
   const click = (name) => at(name).click();
-  const put = (name, value, kind) => {{ at(name).value = value; at(name).dispatchEvent(new Event(kind)); }};
+  const put = (name, value, kind) => {{
+    at(name).value = value;
+    at(name).dispatchEvent(new Event(kind, {{ bubbles: true }}));
+  }};
   const press = (key, rest) =>
     document.body.dispatchEvent(new KeyboardEvent("keydown", {{ key, bubbles: true, ...rest }}));
   const ready = setInterval(async () => {{
@@ -81,11 +85,21 @@ def page(mariner):
     return steering_page(mariner, ship_in_page(mariner))
 
 
+@pytest.fixture(scope="module")
+def pond(tmp_path_factory):
+    """A ship with an engine that is late, and wind."""
+    text = bundled("models", "esso-osaka", "ship.toml").read_text(encoding="utf-8")
+    card = tmp_path_factory.mktemp("pond") / "ship.toml"
+    late = '\n[[effects]]\nname = "engine_lag"\n[effects.parameters]\ntime_constant_s = 20.0\n'
+    card.write_text(text + late, encoding="utf-8")
+    return build(read_card(card))
+
+
 @pytest.fixture
-def ghost(tmp_path):
+def ghost(mariner, tmp_path):
     file = tmp_path / "trial.csv"
     file.write_text(TRIAL, encoding="utf-8")
-    return ghost_of(read_trial(file))
+    return ghost_of(read_trial(file), mariner)
 
 
 def sailed(html, folder, steps):
@@ -96,7 +110,8 @@ def sailed(html, folder, steps):
     told = json.loads(unescape(re.search(r'data-told="(.*?)"', seen)[1]))
     voyages = []
     for text in told.pop("saved"):
-        rows = list(csv.DictReader(io.StringIO(text.split("\n", 1)[1])))
+        lines = [one for one in text.splitlines() if not one.startswith("#")]
+        rows = list(csv.DictReader(io.StringIO("\n".join(lines))))
         voyages.append({name: np.array([float(row[name]) for row in rows]) for name in rows[0]})
     return told, voyages
 
@@ -117,8 +132,9 @@ def data_of(html):
 
 
 def test_without_the_compiler_the_page_says_what_is_missing(mariner):
-    html = steering_page(mariner, None, None, [NO_COMPILER])
-    assert "pip install tank2sim[platforms]" in html
+    html = steering_page(mariner, None, None, ["another notice"])
+    assert html.index("pip install tank2sim[platforms]") < html.index("another notice")
+    assert "The ship in this page is" not in html
     assert "<canvas" not in html
     assert "<script" not in html
 
@@ -150,11 +166,44 @@ def test_a_ghost_starts_the_ship_where_the_trial_starts(mariner, ghost):
     assert data["ghost"]["rudder"] == pytest.approx(np.radians([0, 5, 5, -3, -3]))
 
 
-def test_a_ghost_without_positions_is_refused(tmp_path):
+def test_a_ghost_without_positions_is_refused(mariner, tmp_path):
     file = tmp_path / "trial.csv"
     file.write_text("t_s,delta_deg,u_mps\n0,0,7\n1,0,7\n2,0,7\n", encoding="utf-8")
     with pytest.raises(InputError, match="hold no track"):
-        ghost_of(read_trial(file))
+        ghost_of(read_trial(file), mariner)
+
+
+def test_a_ghost_without_speed_through_the_water_starts_at_what_was_measured(mariner, tmp_path):
+    file = tmp_path / "trial.csv"
+    file.write_text("t_s,delta_deg,sog_mps,x_m,y_m\n0,0,5,0,0\n1,0,5,0,6\n2,0,5,0,12\n", encoding="utf-8")
+    ghost = ghost_of(read_trial(file), mariner)
+    assert ghost.start["initial.u"] == 5
+    assert ghost.start["initial.psi"] == pytest.approx(np.pi / 2)
+    assert any("over the ground, 9.72 knots" in one for one in ghost.notices)
+    file.write_text("t_s,delta_deg,x_m,y_m\n0,0,0,0\n1,0,0,6\n2,0,0,12\n", encoding="utf-8")
+    ghost = ghost_of(read_trial(file), mariner)
+    assert ghost.start["initial.u"] == pytest.approx(6)
+    assert any("first positions, 11.66 knots" in one for one in ghost.notices)
+
+
+def test_the_mean_wind_of_a_trial_is_that_at_the_start(mariner, pond, tmp_path):
+    file = tmp_path / "trial.csv"
+    rows = "t_s,delta_deg,u_mps,x_m,y_m,wind_speed_mps,wind_direction_deg\n0,0,.3,0,0,3,90\n1,0,.3,.3,0,4,0\n"
+    file.write_text(rows, encoding="utf-8")
+    ghost = ghost_of(read_trial(file), pond)
+    mean = {"wind.speed": 2.5, "wind.direction": np.arctan2(3, 4)}
+    assert ghost.held == pytest.approx(mean)
+    assert any("2.5 m/s from 37 deg" in one for one in ghost.notices)
+    data = data_of(steering_page(pond, "AA==", ghost))
+    assert {one["name"]: one["start"] for one in data["controls"] if one["name"] in mean} == pytest.approx(mean)
+    assert ghost_of(read_trial(file), mariner).held == {}
+
+
+def test_what_surrounds_the_ship_has_the_bounds_of_a_card(pond):
+    found = {one.name: one for one in controls(following(pond))}
+    assert set(found) == {"rudder.command", "propeller.speed", "wind.speed", "wind.direction"}
+    assert found["wind.speed"].maximum == pytest.approx(60 * 3600 / 1852)
+    assert found["wind.direction"].label == "Wind from"
 
 
 def test_the_page_fetches_nothing(mariner):
@@ -195,7 +244,7 @@ class TestInABrowser:
         told.finish = at("finish").disabled;
         const wait = (ms) => new Promise((done) => setTimeout(done, ms));
         press("m"); press("ArrowLeft"); press("ArrowLeft"); await wait(1500); press(" "); click("save");
-        const signals = ["motion.speed", "motion.r", "rudder.angle", "motion.psi"];
+        const signals = ["motion.u", "motion.r", "rudder.angle", "motion.psi"];
         told.read = Object.fromEntries(signals.map((name) => [name, at(`read-${name}`).textContent]));
         click("reset"); put("factor", "50", "change"); click("run"); await wait(2000); click("run"); click("save");
         click("reset"); press("ArrowRight"); press("ArrowLeft"); press("ArrowLeft"); press("ArrowLeft");"""
@@ -203,13 +252,84 @@ class TestInABrowser:
         assert 60 < fast["t_s"][-1] < 101
         assert told["factor"] == "10"
         assert told["finish"] is True
-        assert told["now-rudder.command"] == "\u22122 deg"
+        assert told["now-rudder.command"] == "2 deg port"
         assert voyage["psi_deg"][-1] < 0
         read = {name: float(text.replace("\u2212", "-")) for name, text in told["read"].items()}
-        assert read["motion.speed"] == pytest.approx(voyage["u_mps"][-1] * 3600 / 1852, abs=0.02)
+        assert read["motion.u"] == pytest.approx(voyage["u_mps"][-1] * 3600 / 1852, abs=0.02)
         assert read["motion.r"] == pytest.approx(60 * voyage["r_degps"][-1], abs=0.06)
         assert read["rudder.angle"] == pytest.approx(voyage["delta_deg"][-1], abs=0.06)
         assert read["motion.psi"] == pytest.approx(360 + voyage["psi_deg"][-1], abs=0.06)
+
+    def test_sliders_with_the_focus_keep_their_keys_and_orders_are_told_with_their_side(self, pond, tmp_path):
+        steps = """
+        const engine = at("set-propeller.speed"), rudder = at("set-rudder.command");
+        const on = (place, key) => {
+          const event = new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true });
+          place.dispatchEvent(event);
+          return event.defaultPrevented;
+        };
+        told.wheel = on(document.body, "ArrowUp");
+        told.taken = on(engine, "ArrowLeft"); told.rudder = rudder.getAttribute("aria-valuetext");
+        told.down = on(rudder, "ArrowDown"); told.engine = engine.getAttribute("aria-valuetext");
+        on(engine, " "); told.sailing = at("run").textContent; told.under = at("said").textContent; on(engine, " ");
+        engine.focus(); document.dispatchEvent(new Event("pointerdown"));
+        put("set-propeller.speed", "-600", "input"); put("set-propeller.speed", "-600", "change");
+        told.focus = document.activeElement === engine;
+        told.astern = engine.getAttribute("aria-valuetext");
+        told.turning = at("read-propeller.speed_actual").textContent;
+        on(document.body, "w"); told.ahead = at("now-propeller.speed").textContent;
+        const wind = at("set-wind.speed");
+        put("set-wind.speed", "1e6", "change"); told.wind = wind.value; told.limit = at("said").textContent;
+        put("set-wind.speed", "", "change"); told.kept = wind.value; told.empty = at("said").textContent;
+        click("reset"); click("save");"""
+        told, (voyage,) = sailed(steering_page(pond, ship_in_page(pond)), tmp_path, steps)
+        assert (told["wheel"], told["taken"], told["down"], told["focus"]) == (False,) * 4
+        assert (told["rudder"], told["engine"]) == ("midships", "600.0 rpm ahead")
+        assert (told["sailing"], told["under"]) == ("Stop", "Under way.")
+        assert (told["astern"], told["turning"]) == ("600.0 rpm astern", "600.0")
+        assert told["ahead"] == "599.0 rpm astern"
+        assert float(told["wind"]) == pytest.approx(60 * 3600 / 1852, rel=1e-5)
+        assert "lies between 0 and 116.63 knots" in told["limit"]
+        assert told["kept"] == "116.631" and "a number was expected" in told["empty"]
+        assert voyage["wind_speed_mps"] == pytest.approx(60, rel=1e-6)
+
+    def test_the_page_warns_outside_the_range_and_tells_what_it_cannot_take(self, page, tmp_path):
+        steps = """
+        const outside = () => at("read-validity").closest("div").classList.contains("outside");
+        told.before = outside();
+        put("approach", "2", "change"); told.outside = outside();
+        told.after = getComputedStyle(document.querySelector(".outside dt"), "::after").content;
+        put("approach", "", "change"); told.empty = [at("approach").value, at("said").textContent];
+        put("approach", "-5", "change"); told.low = [at("approach").value, at("said").textContent];
+        put("approach", "1e9", "change"); told.high = [at("approach").value, at("said").textContent];
+        put("approach", "15", "change");
+        at("zigzag-rudder").value = -20.5; at("zigzag-heading").value = 7.3;
+        click("zigzag"); told.zigzag = at("said").textContent;
+        click("midships"); told.ended = at("said").textContent; click("run"); told.stopped = at("said").textContent;
+        at("zigzag-rudder").value = 60; click("zigzag"); told.gear = at("said").textContent; click("run");"""
+        told, _ = sailed(page, tmp_path, steps)
+        assert (told["before"], told["outside"]) == (False, True)
+        assert "outside" in told["after"]
+        assert told["empty"][0] == "2" and "a number was expected" in told["empty"][1]
+        assert told["low"][0] == "0" and "lies between 0 and" in told["low"][1]
+        assert float(told["high"][0]) < 60 and "is taken" in told["high"][1]
+        assert told["zigzag"] == "Zigzag \u221220.5/7.3 is executed."
+        assert "the zigzag is over" in told["ended"]
+        assert "Stopped at" in told["stopped"]
+        assert "its gear stops at 40 deg" in told["gear"]
+
+    def test_a_long_voyage_is_thinned_and_goes_on(self, page, tmp_path):
+        steps = """
+        Record.MOST = 300; click("reset"); put("set-rudder.command", "10", "input");
+        click("zigzag"); click("finish"); told.long = at("said").textContent; click("save");
+        Record.MOST = 100000; click("reset"); click("zigzag"); click("finish"); click("save");"""
+        told, (thin, whole) = sailed(page, tmp_path, steps)
+        assert told["long"] == told["said"]  # the overshoots are those of every step
+        assert 150 <= len(thin["t_s"]) <= 301 < len(whole["t_s"])
+        assert thin["t_s"][-1] == whole["t_s"][-1]
+        assert np.all(np.diff(thin["t_s"]) > 0) and np.max(np.diff(thin["t_s"])) < 10
+        rows = np.searchsorted(whole["t_s"], thin["t_s"])
+        assert thin["psi_deg"] == pytest.approx(whole["psi_deg"][rows], abs=1e-12)
 
     def test_current_is_set_in_knots_and_deg_and_outlasts_a_reset(self, tmp_path):
         text = bundled("models", "mariner", "ship.toml").read_text(encoding="utf-8")
@@ -227,8 +347,31 @@ class TestInABrowser:
         stream = {"current.speed": 2 * 1852 / 3600, "current.direction": np.pi / 2}
         assert worst(second, simulate(model, zigzag, inputs=stream).trajectory) < 1e-9
 
-    def test_the_trial_is_followed_order_by_order(self, mariner, ghost, tmp_path):
-        html = steering_page(mariner, ship_in_page(mariner), ghost)
+    def test_a_measured_rudder_is_followed_past_the_gear(self, mariner, tmp_path):
+        run = simulate(mariner, parse_manoeuvre("zigzag:20/20")).trajectory
+        degrees = {name: np.degrees(run[f"motion.{name}"]) for name in ("r", "psi")}
+        columns = {"t_s": run.t, "delta_deg": np.degrees(run["rudder.angle"]), "u_mps": run["motion.u"]}
+        columns |= {"v_mps": run["motion.v"], "r_degps": degrees["r"], "psi_deg": degrees["psi"]}
+        columns |= {"x_m": run["motion.x"], "y_m": run["motion.y"]}
+        file = tmp_path / "trial.csv"
+        rows = np.column_stack(list(columns.values()))
+        np.savetxt(file, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
+        ghost = ghost_of(read_trial(file), mariner)
+        model = following(mariner)
+        steps = "click('follow'); click('finish'); click('save'); click('zigzag'); click('finish'); click('save');"
+        _, (voyage, zigzag) = sailed(steering_page(model, ship_in_page(model), ghost), tmp_path, steps)
+        last = np.flatnonzero(voyage["t_s"] <= run.t[-1] + 1e-4)[-1]
+        assert voyage["t_s"][last] == pytest.approx(run.t[-1], abs=1e-4)
+        assert np.interp(run.t, voyage["t_s"], voyage["delta_deg"]) == pytest.approx(columns["delta_deg"], abs=1e-4)
+        assert voyage["psi_deg"][last] == pytest.approx(degrees["psi"][-1], abs=0.01)
+        assert np.hypot(voyage["x_m"][last] - run["motion.x"][-1], voyage["y_m"][last] - run["motion.y"][-1]) < 0.1
+        after = zigzag["delta_deg"][last:]  # her gear has the rudder again
+        assert np.ptp(after) == pytest.approx(40, abs=0.1) and np.max(np.abs(np.diff(after))) < 2
+
+    def test_orders_of_a_trial_are_followed_through_the_gear(self, mariner, tmp_path):
+        file = tmp_path / "trial.csv"
+        file.write_text(TRIAL.replace("delta_deg", "delta_order_deg"), encoding="utf-8")
+        html = steering_page(mariner, ship_in_page(mariner), ghost_of(read_trial(file), mariner))
         _, (voyage,) = sailed(html, tmp_path, "click('follow'); click('finish'); click('save');")
         assert voyage["x_m"][0] == 100
         assert voyage["t_s"][-1] == pytest.approx(4)

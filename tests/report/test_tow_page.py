@@ -65,8 +65,10 @@ def test_drag_chart_has_speed_and_reynolds_number(study):
 
 
 def test_residuals_are_readings_less_the_first_fit(table_1):
-    time = np.array([0.0, 50.0])
-    rows = records_of(speed_chart(table_1, time, {"line": 0.0035 * time}), "vconcat", 1)
+    measured = {f"tow {n}": speed.tolist() for n, speed in enumerate(table_1.speed_mps.T, start=1)}
+    speeds = {"t_s": table_1.time_s.tolist(), "measured_mps": measured}
+    speeds |= {"simulated_t_s": [0.0, 50.0], "simulated_mps": {"line": [0.0, 0.175]}}
+    rows = records_of(speed_chart(speeds), "vconcat", 1)
     found = {(row["run"], row["t"]): row["v"] for row in rows}
     assert found["tow 3", 20.0] == pytest.approx(0.078 - 0.07)
     assert found["line", 50.0] == 0

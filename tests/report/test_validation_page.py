@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from tank2sim.analysis.practice.validation import Validated, Validation, Verified
+from tank2sim.analysis.practice.validation import TURN_FIGURES, ZIGZAG_FIGURES, Validated, Validation, Verified
 from tank2sim.analysis.stability.imo import Criterion
 from tank2sim.report.charts import chart_specification
 from tank2sim.report.page import Verdict, render_page
 from tank2sim.report.validation_page import Evidence, validation_page
+from tests.report.browser import measured_in_browser
 
 FIGURES = (
     Validated("turn", "turn 35", "advance_m", 500.0, 510.0, 0.001, 8.0, 3.0),
@@ -27,8 +30,8 @@ def evidence(mariner_card, mariner) -> Evidence:
 def test_each_figure_has_its_verdict(evidence) -> None:
     page = validation_page(evidence)
     section = next(one for one in page.sections if one.heading == "Validation")
-    verdicts = [row[-2] for row in section.tables[1].rows]
-    assert verdicts == [Verdict.PASSED, Verdict.FAILED, Verdict.FAILED]
+    verdicts = [row[-1] for row in section.tables[1].rows]
+    assert verdicts == ["validated", "not validated", "not validated"]
     assert page.figures[0].value == "1 of 3" and page.figures[0].verdict is Verdict.FAILED
     drawn = chart_specification(section.charts[0].chart)["datasets"].values()
     assert sorted(row["e"] for data in drawn for row in data if "e" in row)[:1] == [2.0]
@@ -53,3 +56,38 @@ def test_without_trials_the_report_says_that_nothing_is_validated(evidence) -> N
     page = validation_page(bare)
     assert page.figures[0].verdict is Verdict.CAUTION
     assert "not validated" in render_page(page)
+
+
+def test_a_trial_that_made_the_card_is_no_validation(evidence) -> None:
+    own = tuple(replace(one, made_card=True) for one in FIGURES[:1])
+    page = validation_page(replace(evidence, validation=Validation(own, 40)))
+    assert page.figures[0].value == "0 of 1" and page.figures[0].verdict is Verdict.CAUTION
+    assert "only fitted" in page.figures[0].note
+
+
+def test_a_criterion_beyond_the_card_has_no_verdict(evidence) -> None:
+    beyond = (Criterion("advance", 2.4, 4.5, "L", "leaves the card's validity", beyond_card=True),)
+    page = validation_page(replace(evidence, criteria=beyond))
+    table = next(one for one in page.sections if one.heading == "Standard manoeuvres").tables[0]
+    assert table.rows[0][4] == "beyond the card"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [1440, 1160, 1100])
+def test_the_verdicts_stand_on_the_page_without_scrolling(evidence, tmp_path, width) -> None:
+    figures = tuple(
+        Validated("zigzag of a long name", "zigzag", name, 123.456, 234.567, 0.001234, 12.3456, 3.45678)
+        for name in (*ZIGZAG_FIGURES, *TURN_FIGURES)
+    )
+    verified = tuple(
+        Verified("turn 35 deg to starboard", name, 1234.5, -1.2345e-4, 12.345)
+        for name in ("steady_rate_degps", "speed_loss_percent", "initial_turning_distance_m", "tactical_diameter_m")
+    )
+    own = replace(evidence, validation=Validation(figures, 40), verified=verified)
+    html = render_page(validation_page(own))
+    script = """<script>setTimeout(() => { document.body.dataset.wide = JSON.stringify(
+      [...document.querySelectorAll(".table")].map((one) => one.scrollWidth - one.clientWidth)); }, 500);</script>"""
+    wide = measured_in_browser(
+        html.replace("</body>", script + "</body>"), tmp_path, "wide", f"--window-size={width},2000"
+    )
+    assert len(wide) >= 5 and max(wide) <= 0

@@ -2,6 +2,7 @@
 
 import pytest
 
+from tank2sim.files import plain_json
 from tank2sim.identification.yaw.identify import YawOptions, identify_yaw
 from tank2sim.records.yaw import read_yaw_record
 from tank2sim.report.charts import chart_specification
@@ -15,6 +16,11 @@ def result(tmp_path_factory):
     truth = Truth(humps=1)
     path = written(tmp_path_factory.mktemp("page") / "water.csv", truth, record(truth))
     return identify_yaw([read_yaw_record(path)], YawOptions(inertia_kgm2=0.0204))
+
+
+@pytest.fixture(scope="module")
+def told(result):
+    return plain_json(result.as_json())
 
 
 def values(chart, *keys):
@@ -34,28 +40,28 @@ def values(chart, *keys):
     return found
 
 
-def test_bars_of_the_balance_add_up_to_the_motors_work(result):
-    rows = values(balance_chart(result), "part", "run", "v")
+def test_bars_of_the_balance_add_up_to_the_motors_work(result, told):
+    rows = values(balance_chart(told["energy_balance"]), "part", "run", "v")
     motor = sum(row["v"] for row in rows if row["run"] == "motor")
     spent = sum(row["v"] for row in rows if row["run"] != "motor")
     assert spent == pytest.approx(motor, rel=1e-3)
     assert motor == pytest.approx(1e3 * result.fit.balance.work_J.sum(), rel=1e-4)
 
 
-def test_estimates_stand_within_their_bars(result):
-    rows = values(estimates_chart(result), "name", "v", "low", "high")
+def test_estimates_stand_within_their_bars(result, told):
+    rows = values(estimates_chart(told["methods"]), "name", "v", "low", "high")
     assert len(rows) == len(result.estimates)
     assert all(row["low"] <= row["v"] <= row["high"] for row in rows)
 
 
-def test_every_subinterval_has_its_residual(result):
-    rows = values(energy_residual_chart(result), "hump", "w", "v")
+def test_every_subinterval_has_its_residual(told):
+    rows = values(energy_residual_chart(told["energy_residuals"]), "hump", "w", "v")
     assert len(rows) == 12 and {row["run"] for row in rows} == {"accelerating", "braking"}
 
 
-def test_page_has_a_chart_for_each_record_and_says_what_is_noted(result):
+def test_page_has_a_chart_for_each_record_and_says_what_is_noted(result, told):
     page = yaw_page(result)
     notes = [note for section in page.sections for note in section.notes]
     assert notes == list(result.notes)
-    assert values(record_chart(result, result.records[0]), "run")
+    assert values(record_chart(*next(iter(told["histories"].items()))), "run")
     assert page.figures[0].value == pytest.approx(300, rel=0.01)

@@ -79,10 +79,29 @@ def test_only_the_first_members_keep_their_histories(monkeypatch: pytest.MonkeyP
     assert np.isfinite(found.figures["slope"][10:]).any()
 
 
-def test_bounds_hold_what_is_drawn_beyond_them() -> None:
-    held = Draws(DRAWS.names, DRAWS.mean, DRAWS.root, np.array([0.0, -np.inf]), np.array([2.0, np.inf]), 7)
-    drawn = np.array([list(held.member(k).values()) for k in range(300)])
-    assert drawn[:, 0].min() == 0.0 and drawn[:, 0].max() == 2.0
+def test_what_is_drawn_beyond_a_bound_is_drawn_anew_as_a_whole_and_told() -> None:
+    root = np.array([[1.0, 0.0], [1.0, 0.01]])  # correlation 0.99995
+    held = Draws(DRAWS.names, DRAWS.mean, root, np.array([0.0, -np.inf]), np.array([2.0, np.inf]), 7)
+    first = 0
+    for member in range(200):
+        stream = np.random.default_rng(np.random.SeedSequence(7, spawn_key=(member,)))
+        values = held.mean + root @ stream.standard_normal(2)
+        first += not 0 <= values[0] <= 2
+        while not 0 <= values[0] <= 2:
+            values = held.mean + root @ stream.standard_normal(2)
+        np.testing.assert_allclose(list(held.member(member).values()), values, rtol=1e-13)
+    drawn = np.array([list(held.member(k).values()) for k in range(200)])
+    assert np.corrcoef(drawn.T)[0, 1] > 0.999  # held at the bounds: less than 0.98
+    found = ensemble(Linear(), held, 200, batch=7)
+    assert found.redrawn.members == first > 40 and found.redrawn.beyond == {"a": first}
+    assert f"{first} of 200 members" in found.notices[0] and f"(a {first})" in found.notices[0]
+    assert not found.unusable and ensemble(Linear(), DRAWS, 5).notices == []
+
+
+def test_a_member_that_no_draw_brings_within_its_bounds_cannot_be_used() -> None:
+    nowhere = Draws(DRAWS.names, DRAWS.mean, DRAWS.root, np.array([90.0, -np.inf]), np.array([91.0, np.inf]), 7)
+    found = ensemble(Linear(), nowhere, 2)
+    assert found.unusable == {module.NOT_WITHIN: 2} and not found.figures
 
 
 def test_bands_are_numpys_quantiles_and_end_where_members_end() -> None:
@@ -109,6 +128,50 @@ def test_the_band_of_a_track_lies_across_its_course() -> None:
     away = (track.high - track.middle) @ np.array([-1, 1]) / np.sqrt(2)  # to starboard of north-east
     np.testing.assert_allclose(away, 0.9, atol=1e-5)
     np.testing.assert_allclose((track.low - track.middle) @ np.array([-1, 1]) / np.sqrt(2), -0.9, atol=1e-5)
+
+
+def test_the_band_of_a_track_ends_before_its_edges_run_back() -> None:
+    # A circle of 100 m: members beside each other, more and more, up to 200 m inwards.
+    angle, offset = np.linspace(0, 2, 101), np.linspace(-1, 1, 201)[:, None]
+    radius = 100 - 100 * angle * offset
+    xy = np.stack([radius * np.sin(angle), 100 - radius * np.cos(angle)], axis=1)
+    _, _, track = history_bands(Ensemble(201, 0, {}, xy.astype(np.float32)), angle, ("x_m", "y_m"))
+    assert track is not None
+    # The inmost reach the centre at a = 1; with 1 of 100 of them it ends.
+    assert angle[track.count - 1] == pytest.approx(1 / 0.98, abs=0.05)
+    assert np.isfinite(track.high[: track.count]).all() and np.isnan(track.low[track.count :]).all()
+    assert len(track.low) == len(angle)
+
+
+def test_the_band_of_tracks_is_of_where_members_go_and_not_of_when() -> None:
+    # Two laps of circles that touch in the origin; members of all radii are up to half a radian ahead or astern.
+    rng, t = np.random.default_rng(4), np.linspace(0, 4 * np.pi, 601)
+    radius = np.sort(rng.normal(500, 20, 41))
+    heading = t * rng.uniform(0.96, 1.04, 41)[:, None]
+    xy = radius[:, None, None] * np.stack([np.sin(heading), 1 - np.cos(heading)], axis=1)
+    _, _, track = history_bands(Ensemble(41, 0, {}, xy.astype(np.float32)), t, ("x_m", "y_m"))
+    assert track is not None
+    assert 0.9 * len(t) < track.count < len(t)  # those astern do not come to the end
+    for line, place in ((track.high, 2), (track.middle, 20), (track.low, 38)):  # 5, 50 and 95 % of 41, from inside
+        x, y = line[: track.count].T
+        away = y > 100  # where they touch all are one
+        np.testing.assert_allclose((x**2 + y**2)[away] / (2 * y[away]), radius[place], atol=0.2)
+
+
+def test_a_member_that_stops_short_ends_the_band_of_the_track_where_it_stops() -> None:
+    t = np.linspace(0, 100, 101)
+    x = np.minimum(t, np.linspace(50, 90, 51)[:, None])
+    xy = np.stack([x, np.linspace(-1, 1, 51)[:, None] * t / 100], axis=1)
+    _, _, track = history_bands(Ensemble(51, 0, {}, xy.astype(np.float32)), t, ("x_m", "y_m"))
+    assert track is not None and track.middle[track.count - 1, 0] == pytest.approx(50, abs=1.5)
+
+
+def test_bands_end_where_the_first_members_do() -> None:
+    values = np.zeros((200, 1, 6), dtype=np.float32)
+    values[:3, 0, 3:] = np.nan  # 1.5 % end early
+    assert len(history_bands(Ensemble(200, 0, {}, values), np.arange(6.0), ("r_degps",))[0]) == 3
+    values[:1, 0, 3:] = 0.0
+    assert len(history_bands(Ensemble(200, 0, {}, values), np.arange(6.0), ("r_degps",))[0]) == 6
 
 
 def test_a_question_is_prepared_once_for_many_batches() -> None:

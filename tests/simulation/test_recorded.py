@@ -120,6 +120,24 @@ def test_a_turn_begins_at_its_rudder_and_ends_with_it(model, side):
     assert again["tactical_diameter_m"] == pytest.approx(what.figures["tactical_diameter_m"], rel=0.01)
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_rudder_that_keeps_the_course_before_the_execute_is_no_part_of_the_manoeuvre(model, side):
+    """In the approach the rudder goes as far over as later, to both sides, and comes back."""
+    zigzag = controller(side * np.deg2rad(20), np.deg2rad(10), 0.0, begin=72.0)
+
+    def steered(then):
+        return lambda t, turned, before: (
+            np.deg2rad(19.5) * np.sin(2 * np.pi * t / 45) if t < 45 else then(t, turned, before)
+        )
+
+    turn = recorded(sail(steered(lambda t, turned, before: side * np.deg2rad(20) * (t >= 72)), 260.0), model)
+    assert isinstance(turn.manoeuvre, Turn)
+    for what in (turn, recorded(sail(steered(zigzag), 260.0), model)):
+        assert what.begin_s == pytest.approx(72.0, abs=0.3)
+        assert what.manoeuvre.rudder == pytest.approx(side * np.deg2rad(20), rel=0.01)
+        assert what.rudder_rate_radps == pytest.approx(RATE, rel=0.1)
+
+
 def test_the_start_is_the_measured_state_at_the_execute(model):
     trial = sail(controller(np.deg2rad(20), np.deg2rad(10), 0.0), 150.0)
     start = recorded(trial, model).start
@@ -135,6 +153,21 @@ def test_other_runs_are_neither(model):
     trial = sail(controller(np.deg2rad(20), np.deg2rad(10), 0.0), 100.0)
     less = {name: values for name, values in trial.signals.items() if name != "v_mps"}
     assert recorded(replace(trial, signals=less), model) is None
+
+
+def test_each_measured_turn_and_zigzag_is_recognised_from_its_execute(data: Path) -> None:
+    """Execute, s, and rudder, deg, by hand: where the rudder leaves course-keeping for the angle that it then keeps."""
+    ship = build(read_card("esso-osaka"))
+    turns = {"14-Oct-2020_14_29_49": (110.0, 19.5), "14-Oct-2020_14_56_07": (110.0, -20.2)}
+    turns["14-Sep-2020_15_47_33"] = (142.0, -35.3)
+    runs = {f"turning/turn_{name}": (Turn, *own) for name, own in turns.items()}
+    runs["zigzag/zigzag_31-Jul-2020_13_22_52"] = (Zigzag, 36.1, 14.9)
+    runs["zigzag/zigzag_31-Jul-2020_13_57_45"] = (Zigzag, 26.5, 19.8)
+    for name, (form, execute, rudder) in runs.items():
+        what = recorded(read_trial(data / "data/esso_osaka" / f"{name}.csv"), ship)
+        assert what is not None and isinstance(what.manoeuvre, form), name
+        assert what.begin_s == pytest.approx(execute, abs=0.3)
+        assert math.degrees(what.manoeuvre.rudder) == pytest.approx(rudder, abs=0.2)
 
 
 def test_the_course_of_a_zigzag_is_that_before_the_ship_drifted_off_it(data: Path) -> None:

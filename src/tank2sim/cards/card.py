@@ -20,8 +20,8 @@ from tank2sim.cards.form import (
     SteeringGear,
     Surge,
     SurgeModel,
+    YawRig,
     YawRigModel,
-    YawRigSection,
 )
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
@@ -138,6 +138,6 @@ class YawRigCard(Card):
     """Card of a body on the yaw rig: (3) of paper 3 (Alyshev 2019), SI, and the programme that it runs."""
 
     model: YawRigModel
-    yaw_rig: YawRigSection
+    yaw_rig: YawRig
     programme: Programme | None = None
     uncertainty: Mapping[str, float] = field(default_factory=dict)

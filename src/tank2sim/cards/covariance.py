@@ -34,6 +34,10 @@ ROUNDING = 0.006
 NEGATIVE = 1e-8
 """Share of the largest eigenvalue of the correlations by which rounding may make one negative (ours)."""
 
+HOLDS = 1.0
+"""Standard errors by which a number may be moved (tuned) and still be the one that the covariance is of: tuning by the
+most uncertain moves nearly all numbers a little, and without the covariance they would seem known far worse (ours)."""
+
 _LINE = re.compile(r"^#[ \t]*covariance:[ \t]*(\S[^\r\n]*?)[ \t]*\r?$", re.MULTILINE)
 _WHOLE_LINE = re.compile(_LINE.pattern + r"\n?", re.MULTILINE)
 
@@ -75,6 +79,43 @@ def referring(text: str, card: Path) -> str:
     lines = kept.splitlines(keepends=True)
     head = next((place for place, line in enumerate(lines) if not line.startswith("#")), len(lines))
     return mark + "".join([*lines[:head], f"# covariance: {covariance_file(card).name}\n", *lines[head:]])
+
+
+def not_referring(text: str) -> str:
+    """A card's text without the line that refers to a covariance."""
+    return _WHOLE_LINE.sub("", text)
+
+
+def carried(card: Card, text: str) -> Covariance | None:
+    """What a card's covariance says of another card that was made of it, of `text`: of all numbers that are the same
+    there, or moved within :data:`HOLDS`, with the same standard error.
+
+    What was changed more is a number from elsewhere, and independent then. None if the card refers to none, or nothing
+    of it is left.
+
+    Raises
+    ------
+    InputError
+        As :func:`read_covariance`.
+    """
+    known = read_covariance(card)
+    if known is None:
+        return None
+    old, new = (tomllib.loads(one.removeprefix(BYTE_ORDER_MARK)) for one in (card.text, text))
+
+    def holds(name: str, error: float) -> bool:
+        effect = ".".join([*name.split(".")[:2], "name"]) if name.startswith("effects.") else name
+        before, after = _at(old, name), _at(new, name)
+        if not isinstance(before, int | float) or not isinstance(after, int | float):
+            return False
+        stated = _uncertainty_of(name)
+        alike = _at(old, stated) == _at(new, stated) and (effect == name or _at(old, effect) == _at(new, effect))
+        return alike and abs(after - before) <= HOLDS * error
+
+    errors = np.sqrt(np.maximum(np.diag(known.matrix), 0.0)).tolist()
+    rows = [place for place, one in enumerate(zip(known.names, errors, strict=True)) if holds(*one)]
+    kept = tuple(known.names[row] for row in rows)
+    return Covariance(kept, known.matrix[np.ix_(rows, rows)]) if kept else None
 
 
 def read_covariance(card: Card) -> Covariance | None:

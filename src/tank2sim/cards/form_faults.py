@@ -80,6 +80,8 @@ def _told(fault: Any, key: str, form: type[BaseModel], what: str) -> tuple[str, 
             return f"is {_shown(key, given)}", f"a number {relation} {_shown(key, wanted[bound])} was expected"
         case "literal_error":
             return f"is {short(given)}", f"{wanted['expected']} was expected"
+        case "value_error" if isinstance(given, dict):  # what is wrong with a section as a whole
+            return str(wanted["error"]), "mend its keys"
         case "value_error":
             return f"is {short(given)}", str(wanted["error"])
         case _:

@@ -25,6 +25,12 @@ from tank2sim.units import to_si
 
 # Sections whose keys may give an angle in degrees or radians.
 _SECTIONS_WITH_ANGLES = ("steering_gear", "propulsion", "yaw_rig", "programme")
+# Kind of model, which is also the name of its section of coefficients, to the card that is all in SI.
+_SI_CARDS: dict[str, type[SurgeBodyCard | GliderCard | YawRigCard]] = {
+    "surge": SurgeBodyCard,
+    "glider": GliderCard,
+    "yaw_rig": YawRigCard,
+}
 
 
 def find_card(name: str) -> Path:
@@ -83,11 +89,7 @@ def parse_card(text: str, source: str) -> Card:
         raise form_fault(error, source, spelt, form=FORMS[kind], what="a card") from None
     if isinstance(form, ShipCard):
         return replace(_manoeuvring_card(form, text, source), spelt=spelt)
-    if isinstance(form, GliderForm):
-        return GliderCard(source, text, form.ship, form.environment, form.model, form.glider)
-    if isinstance(form, YawRigForm):
-        return _yaw_rig_card(form, text, source)
-    return _surge_card(form, text, source)
+    return _si_card(form, kind, text, source)
 
 
 def changed_text(text: str, source: str, changes: Mapping[str, object], *, comment: str | None = None) -> str:
@@ -240,37 +242,14 @@ def _manoeuvring_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard
     )
 
 
-def _surge_card(form: SurgeCard, text: str, source: str) -> SurgeBodyCard:
-    for key in form.uncertainty:
-        if key not in type(form.surge).model_fields:
-            known = suggestion(key, list(type(form.surge).model_fields))
-            raise InputError(source, f"uncertainty.{key}", "is no coefficient of [surge]", known)
-    return SurgeBodyCard(
-        source=source,
-        text=text,
-        ship=form.ship,
-        environment=form.environment,
-        model=form.model,
-        surge=form.surge,
-        uncertainty=form.uncertainty,
-    )
-
-
-def _yaw_rig_card(form: YawRigForm, text: str, source: str) -> YawRigCard:
-    for key in form.uncertainty:
-        if key not in type(form.yaw_rig).model_fields:
-            known = suggestion(key, list(type(form.yaw_rig).model_fields))
-            raise InputError(source, f"uncertainty.{key}", "is no coefficient of [yaw_rig]", known)
-    return YawRigCard(
-        source=source,
-        text=text,
-        ship=form.ship,
-        environment=form.environment,
-        model=form.model,
-        yaw_rig=form.yaw_rig,
-        programme=form.programme,
-        uncertainty=form.uncertainty,
-    )
+def _si_card(form: SurgeCard | GliderForm | YawRigForm, section: str, text: str, source: str) -> Card:
+    """A card whose numbers stay as the form has them, SI; ``[uncertainty]`` may name the coefficients of `section`."""
+    fields = {name: value for name, value in form if name != "format"}
+    known = list(type(fields[section]).model_fields)
+    for key in fields.get("uncertainty", {}):
+        if key not in known:
+            raise InputError(source, f"uncertainty.{key}", f"is no coefficient of [{section}]", suggestion(key, known))
+    return _SI_CARDS[section](source=source, text=text, **fields)
 
 
 def _prime_rigid_body(body: RigidBody, scales: Scales | None, source: str) -> RigidBody:

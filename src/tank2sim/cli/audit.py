@@ -12,6 +12,8 @@ from tank2sim.cli.screen import json_option, json_text, screen, show_notices, sh
 from tank2sim.files import write_whole
 from tank2sim.records.audit import Finding, audit, estimated_noise
 from tank2sim.records.reading import read_trial
+from tank2sim.records.signals.columns import SignalName
+from tank2sim.records.thinning import Vector, drawn_columns
 from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.units import from_si
 
@@ -32,6 +34,10 @@ def command(trials: tuple[Path, ...], json_file: Path | None) -> None:
         _show(one)
 
 
+MEASURED_SAMPLES = 400
+"""Samples of each trial in the JSON, for charts; the record itself is the file."""
+
+
 @dataclass(frozen=True)
 class _Judged:
     trial: Trial
@@ -39,7 +45,7 @@ class _Judged:
     noise: dict[str, float]
 
     def as_json(self) -> dict[str, Any]:
-        """Summary of the file; noise in SI, by signal."""
+        """Summary of the file; noise in SI, by signal; what was measured, thinned to draw."""
         return {
             "file": str(self.trial.path),
             "duration_s": float(self.trial.time_s.max() - self.trial.time_s.min()),
@@ -51,7 +57,16 @@ class _Judged:
                 for name, sigma in self.noise.items()
             },
             "notices": list(self.trial.notices),
+            "histories": drawn_columns(
+                {"t_s": self.trial.time_s, **_columns(self.trial)}, MEASURED_SAMPLES, peaks=True
+            ),
         }
+
+
+def _columns(trial: Trial) -> dict[str, Vector]:
+    """Signals by their columns in a trial file."""
+    names = {name: SignalName(name) for name in trial.signals}
+    return {own.file: own.factor * trial.signals[name] for name, own in names.items()}
 
 
 def _judged(path: Path) -> _Judged:

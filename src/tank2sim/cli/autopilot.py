@@ -20,7 +20,7 @@ from tank2sim.cli.progress import showing_stages
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.files import write_together
+from tank2sim.files import plain_json, write_together
 from tank2sim.native.compiler import find_compiler
 from tank2sim.simulation.integrator import NO_COMPILER
 
@@ -72,10 +72,10 @@ def command(card: str, *, track: Path | None, settings: tuple[str, ...], **more:
     if export:
         contents[export], result["export"] = _exported(model, study, str(more["fmi"]), bool(more["verify"]))
     if page:
-        from tank2sim.report.autopilot_page import autopilot_page
+        from tank2sim.report.autopilot_page import piloted_page
         from tank2sim.report.page import render_page
 
-        contents[page] = render_page(autopilot_page(model, study))
+        contents[page] = render_page(piloted_page(plain_json(result)))
     if json_file:
         contents[json_file] = json_text(result)
     inputs = [Path(ship.source), *([] if track is None else [track])]

@@ -10,12 +10,18 @@ from typing import Any
 import click
 from rich.markup import escape
 
-from tank2sim.analysis.practice.bridge import Bridge, bridge_of
+from tank2sim.analysis.practice.bridge import ORDERS_AHEAD, Bridge, bridge_of
+from tank2sim.analysis.practice.comparison import differences_of_size
 from tank2sim.cards import Card, ManoeuvringCard, read_card
 from tank2sim.cli.changes import parse_changes
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
+
+LONGEST_ORDER, MORE_ORDERS = 24, 3
+"""Characters of an order's name, and orders that are not on the form, that one sheet has room for."""
+
+_ON_FORM = {one.casefold() for one in ORDERS_AHEAD}
 
 Draw = Callable[[Bridge, Bridge | None], str]
 
@@ -60,7 +66,7 @@ def parse_orders(given: Iterable[str]) -> dict[str, float]:
     Raises
     ------
     InputError
-        One is no NAME=RPM with positive revolutions, or is given twice.
+        One is no NAME=RPM with positive revolutions, is given twice, is of an order astern, or the forms have no room.
     """
     found: dict[str, float] = {}
     for text in given:
@@ -69,11 +75,41 @@ def parse_orders(given: Iterable[str]) -> dict[str, float]:
             rpm = float(number)
         except ValueError:
             rpm = math.nan
-        if not name or not 0 < rpm < math.inf or name in found:
-            problem = "is given twice" if name in found else "is no NAME=RPM with positive revolutions"
+        problem = ""
+        if not name or not 0 < rpm < math.inf:
+            problem = "is no NAME=RPM with positive revolutions"
+        elif name.casefold() in (one.casefold() for one in found):
+            problem = "is given twice"
+        elif "astern" in name.casefold():
+            problem = "is an order astern: what a ship does astern no card tells, and it is filled in by hand"
+        elif len(name) > LONGEST_ORDER:
+            problem = f"has no room on the form: up to {LONGEST_ORDER} characters have"
+        elif len({one.casefold() for one in (*found, name)} - _ON_FORM) > MORE_ORDERS:
+            problem = f"has no room on the form: {MORE_ORDERS} orders have beside {', '.join(ORDERS_AHEAD)}"
+        if problem:
             raise InputError("--order", text, problem, "give, for example, --order 'Half ahead=56'")
         found[name] = rpm
     return found
+
+
+def check_ballast(loaded: ManoeuvringCard, ballast: ManoeuvringCard) -> list[str]:
+    """What is to be told of a ballast card beside the loaded one.
+
+    Raises
+    ------
+    InputError
+        It is of a ship of another length or breadth, or its draught is not smaller.
+    """
+    remedy = "give the card of the same ship in ballast, as large as she is"
+    if apart := differences_of_size(loaded, ballast):
+        raise InputError(ballast.source, "ship", f"is not of the ship of {loaded.source}: {'; '.join(apart)}", remedy)
+    deep, light = loaded.ship.draught_m, ballast.ship.draught_m
+    if deep is None or light is None:
+        return ["--ballast: one of the cards tells no draught: whether it is the lighter condition is not known"]
+    if light >= deep:
+        problem = f"{light:g} m is no smaller than the {deep:g} m of the loaded card"
+        raise InputError(ballast.source, "ship.draught_m", problem, remedy)
+    return []
 
 
 def write_bridge(draw: Draw, card: str, options: dict[str, Any]) -> None:
@@ -81,6 +117,7 @@ def write_bridge(draw: Draw, card: str, options: dict[str, Any]) -> None:
     orders = parse_orders(options["orders"])
     loaded = manoeuvring(read_card(card, parse_changes(options["settings"])), "steers")
     other = manoeuvring(read_card(options["ballast"]), "steers") if options["ballast"] else None
+    told = check_ballast(loaded, other) if other else []
     first = bridge_of(loaded, orders)
     second = bridge_of(other, orders) if other else None
     contents: dict[Path, str | bytes] = {options["page"]: draw(first, second)}
@@ -89,8 +126,12 @@ def write_bridge(draw: Draw, card: str, options: dict[str, Any]) -> None:
         contents[json_file] = json_text({**first.as_json(), "ballast": ballast})
     inputs = [Path(one.source) for one in (loaded, other) if one]
     write_together(contents, inputs=inputs, outputs=(options["page"], options["json_file"]))
-    blanks = str(contents[options["page"]]).count('class="blank"')
-    told = f"{escape(loaded.ship.name)}: {options['page']} written; {blanks} blanks are to be filled in by hand"
-    screen.print(told, soft_wrap=True)
+    page = str(contents[options["page"]])
+    blanks, hatched = page.count('title="not known'), page.count('title="outside')
+    outside = f", {hatched} of them hatched: outside the range of the card" if hatched else ""
+    line = (
+        f"{escape(loaded.ship.name)}: {options['page']} written; {blanks + hatched} blanks are to be filled in by hand"
+    )
+    screen.print(line + outside, soft_wrap=True)
     missing = [] if loaded.propulsion else ["the card has no [propulsion]: stops and speeds by revolutions are blank"]
-    show_notices([*first.notices, *(second.notices if second else ()), *missing])
+    show_notices([*told, *first.notices, *(second.notices if second else ()), *missing])

@@ -60,12 +60,13 @@ def _show(found: CardComparison) -> None:
     for place, label in enumerate(found.labels[1:], start=1):
         rms = found.rms(place)
         apart = "" if rms is None else f", rms {rms:.3g} (1 by chance)"
+        apart += f"; {same} more are the reference's own numbers" if (same := found.same(place)) else ""
         screen.print(
             f"[bold]{escape(label)}[/bold] against {escape(found.labels[0])}: of {len(found.in_errors(place))} "
             f"coefficients {found.beyond(place)} differ by more than {BEYOND:g} standard errors{apart}",
             soft_wrap=True,
         )
-        rows = [row for row in found.coefficients if row.differences[place - 1].standard_errors is not None]
+        rows = [row for row in found.rows if row.differences[place - 1].standard_errors is not None]
         rows.sort(key=lambda row: -abs(row.differences[place - 1].standard_errors or 0.0))
         show_table(
             f"Farthest apart: {label}",

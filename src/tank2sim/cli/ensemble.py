@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +12,15 @@ import click
 
 from tank2sim.analysis.ensemble.results import Asked, Members, StabilityBands
 from tank2sim.cards import Card, ManoeuvringCard
-from tank2sim.cards.covariance import Covariance, covariance_file, referring
+from tank2sim.cards.covariance import (
+    HOLDS,
+    Covariance,
+    carried,
+    covariance_file,
+    not_referring,
+    read_covariance,
+    referring,
+)
 from tank2sim.cli.screen import screen, show_notices, show_table
 from tank2sim.errors import InputError
 from tank2sim.executors import FORMS, PROCESSES, check_executor, executing
@@ -68,8 +76,34 @@ def asked_of(given: Mapping[str, object]) -> Asked | None:
 def with_covariance(text: str, output: Path, covariance: Covariance) -> dict[Path, str | bytes]:
     """A card's file and its covariance beside it; the card alone where it goes to no file (a pipe)."""
     if output.exists() and not output.is_file():
-        return {output: text}
+        return {output: not_referring(text)}
     return {output: referring(text, output), covariance_file(output): covariance.as_text()}
+
+
+def with_carried_covariance(card: Card, text: str, output: Path) -> tuple[dict[Path, str | bytes], list[str]]:
+    """Files of a card made of `card`, with what of the covariance of that still holds; and what is to be told of it.
+
+    Raises
+    ------
+    InputError
+        The covariance to which `card` refers is at fault.
+    """
+    known = read_covariance(card)
+    if known is None:
+        return {output: text}, []
+    kept = carried(card, text)
+    if kept is None:
+        return {output: not_referring(text)}, [
+            f"{output.name} has no covariance: all numbers of {card.source}'s changed"
+        ]
+    files = with_covariance(text, output, kept)
+    if len(files) == 1 or len(kept.names) == len(known.names):
+        return files, []
+    changed = ", ".join(name.removeprefix("derivatives.") for name in known.names if name not in kept.names)
+    told = (
+        f"the covariance beside {output.name} is that of {len(kept.names)} numbers, moved by {HOLDS:g} standard error"
+    )
+    return files, [f"{told} at most; errors of the others are independent now: {changed}"]
 
 
 def uncertain_ship(card: Card) -> ManoeuvringCard:
@@ -95,8 +129,8 @@ def computing(asked: Asked, executor: object) -> Iterator[Executor | None]:
         yield found
 
 
-def show_bands(bands: Mapping[str, Band], asked: Members) -> None:
-    """Print the bands of figures, and what is to be told of the members."""
+def show_bands(bands: Mapping[str, Band], asked: Members, told: Sequence[str] = ()) -> None:
+    """Print the bands of figures, and what is to be told of the members and was not `told` before."""
     rows = []
     for name, band in bands.items():
         kind, at, argument = name.partition("@")
@@ -104,7 +138,7 @@ def show_bands(bands: Mapping[str, Band], asked: Members) -> None:
         rows.append([words + at + argument, unit, band.low, band.median, band.high, band.shown])
     title = f"Ensemble of {asked.members}, seed {asked.seed}: nine of ten lie between 5 and 95 %"
     show_table(title, ["figure", "unit", "5 %", "50 %", "95 %", "shown by"], rows)
-    show_notices(asked.notices)
+    show_notices([one for one in asked.notices if one not in told])
 
 
 def show_stability_bands(found: StabilityBands) -> None:
@@ -117,8 +151,12 @@ def show_stability_bands(found: StabilityBands) -> None:
             one.criterion.name,
             *((f"{value:.4g}" for value in (one.band.low, one.band.high)) if one.band else (None, None)),
             f"{one.criterion.allowed:.4g} {one.criterion.unit}",
-            None if one.met is None else f"{one.met:.3g}",
-            f"{one.between[0]:.3f} to {one.between[1]:.3f}" if one.between else None,
+            None if one.met is None else "beyond card" if one.criterion.beyond_card else f"{one.met:.3g}",
+            None
+            if one.criterion.beyond_card
+            else f"{one.between[0]:.3f} to {one.between[1]:.3f}"
+            if one.between
+            else None,
         ]
         for one in found.chances
     ]

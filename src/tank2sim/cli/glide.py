@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from tank2sim.analysis.glide.design import Range
 from tank2sim.analysis.glide.path import GlidePath
-from tank2sim.analysis.glide.steady import SteadyGlide, ballast_kg
+from tank2sim.analysis.glide.steady import SteadyGlide, ballast_kg, force_residual
 from tank2sim.analysis.glide.study import GlideQuestion, GlideStudy, study
 from tank2sim.cards import GliderCard, read_card
 from tank2sim.cli.changes import parse_changes
@@ -124,6 +124,8 @@ def _page(found: GlideStudy) -> str:
 
 _HEADS = ("path (deg)", "alpha (deg)", "pitch (deg)", "v (m/s)", "C_L", "C_D", "R (m)")
 """Of a steady glide; all have one roll and one size of buoyancy."""
+_ROUNDING_N = 1e-9
+"""Forces below this are what arithmetic leaves of an equilibrium: a choice of ours."""
 
 
 def _show(found: GlideStudy) -> None:
@@ -172,6 +174,17 @@ def _show_glides(found: GlideStudy) -> None:
         told = ", ".join(f"{ratio:.3g}" for ratio in ratios)
         why = "the drag that they balance, alpha (C_D0 + C_D alpha), is not that of (7)"
         screen.print(f"Printed speeds are {told} times the right ones: {why}", soft_wrap=True)
+        printed, right = _unbalance(found, found.printed), _unbalance(found, found.glides)
+        screen.print(
+            f"By lift and drag of (6) and (7) the printed glides are off balance by {printed}, those above by {right}",
+            soft_wrap=True,
+        )
+
+
+def _unbalance(found: GlideStudy, glides: tuple[SteadyGlide, ...]) -> str:
+    """The largest force that is left."""
+    left = max(abs(force) for glide in glides for force in force_residual(found.card, glide))
+    return f"up to {left:.2g} N" if left > _ROUNDING_N else "nothing"
 
 
 def _row(glide: SteadyGlide) -> list[object]:

@@ -16,7 +16,7 @@ from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
 from tank2sim.cli.trials import TakesSeveral, fitted_and_held, trial_files
 from tank2sim.errors import InputError
-from tank2sim.executors import check_executor, executing
+from tank2sim.executors import PROCESSES, check_executor, executing
 from tank2sim.files import writable_folder, write_together
 from tank2sim.identification.trials.as_json import (
     estimate_rows,
@@ -29,6 +29,7 @@ from tank2sim.identification.trials.as_json import (
 from tank2sim.identification.trials.identify import AUTO, METHODS, Identification, Options, identify
 from tank2sim.identification.trials.measured import Measured
 from tank2sim.identification.trials.remarks import remarks
+from tank2sim.identification.trials.replays import replays, replays_as_json
 from tank2sim.identification.trials.structures import STRUCTURES
 from tank2sim.units import in_words
 
@@ -91,8 +92,9 @@ def command(
         raise InputError(known.source, "model.kind", "is no ship that manoeuvres", "give a linear or abkowitz card")
     options = _options(more)
     fitted, held = fitted_and_held(trials, holdout, known)
-    with showing_progress("fitting") as progress, _executor(options, more) as executor:
+    with showing_progress("fitting") as progress, _executor(options, more, held=bool(held.trials)) as executor:
         result = identify(known, fitted, held, options, progress, executor)
+    both = fitted, held
     told = remarks(result)
     text = improved_text(result, [trial.name for trial in fitted.trials])
     parse_card(text, str(output or "the card found"))
@@ -101,9 +103,9 @@ def command(
         found = in_file(result.card, result.estimate.free, result.estimate.covariance)
         files |= with_covariance(text, output, found)
     if isinstance(json_file, Path):
-        files[json_file] = json_text(identification_as_json(result, told))
+        files[json_file] = json_text({**identification_as_json(result, told), "replays": _replays(known, result, both)})
     if plots:
-        files |= _pictures(result, known, (fitted, held), plots)
+        files |= _pictures(result, known, both, plots)
     asked = [output, json_file if isinstance(json_file, Path) else None]
     write_together(
         files,
@@ -116,10 +118,14 @@ def command(
 
 
 @contextmanager
-def _executor(options: Options, given: dict[str, object]) -> Iterator[Executor | None]:
-    """For cross-validation and bootstrap."""
+def _executor(options: Options, given: dict[str, object], *, held: bool) -> Iterator[Executor | None]:
+    """For cross-validation and bootstrap, and a cluster for the intervals of what is held out, too."""
     text, workers = check_executor(str(given["executor"])), given["workers"]
-    if options.structure != AUTO and not options.bootstrap:
+    here = text == PROCESSES
+    if not here and not (options.structure == AUTO or options.bootstrap or (held and options.members)):
+        problem, remedy = "has nothing to do", f"give --structure {AUTO}, --bootstrap N or --holdout TRIAL, too"
+        raise InputError("--executor", "", problem, remedy)
+    if here and options.structure != AUTO and not options.bootstrap:
         yield None
         return
     with executing(text, workers if isinstance(workers, int) else None) as executor:
@@ -140,6 +146,18 @@ def _options(given: dict[str, object]) -> Options:
         bootstrap=int(str(given["bootstrap"])),
         hold=tuple(str(name) for name in given["hold"]),  # type: ignore[attr-defined]
     )
+
+
+def _replays(
+    known: ManoeuvringCard, result: Identification, trials: tuple[Measured, Measured]
+) -> list[dict[str, object]]:
+    """Every trial, fitted or held out, beside both cards."""
+    return [
+        told
+        for held_out, those in enumerate(trials)
+        if those.trials
+        for told in replays_as_json(replays(known, result, those), held_out=bool(held_out))
+    ]
 
 
 def _pictures(

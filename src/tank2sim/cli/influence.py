@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -22,13 +21,13 @@ from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.cli.agreed import parse_agreed, parse_bounds
 from tank2sim.cli.changes import parse_changes
-from tank2sim.cli.ensemble import asked_of, computing, ensemble_options, show_bands
+from tank2sim.cli.ensemble import asked_of, computing, ensemble_options, show_bands, with_carried_covariance
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
 from tank2sim.cli.steering_card import refuse_options, show_steering_card
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.cli.two_points import Files, tune_through
 from tank2sim.errors import InputError
-from tank2sim.files import write_together
+from tank2sim.files import plain_json, write_together
 from tank2sim.native.compiler import find_compiler
 from tank2sim.simulation.integrator import NO_COMPILER
 
@@ -40,6 +39,11 @@ DEFAULT_FIGURES = (
     "overshoot1_deg@20/20",
 )
 """Figures where none is asked: one of each kind that is most looked at (a choice of ours)."""
+
+ALONE = (
+    "tuning takes standard errors as if they were independent: its bounds, and what counts as a small move, leave out "
+    "the covariance beside the card"
+)
 
 ROWS = 15
 """Parameters in the table on the screen: the most influential; JSON and page have all."""
@@ -125,16 +129,12 @@ def command(
         refuse_options("a steering card", {"--figure": figures, "--tune": wishes, "--set": settings, **_options(more)})
         show_steering_card(steering, _file(more["json_file"]), _file(more["page"]))
         return
-    ship = read_card(card, parse_changes(settings))
-    if not isinstance(ship, ManoeuvringCard):
-        raise InputError(ship.source, "model.kind", "is no ship that manoeuvres", "give a linear or abkowitz card")
+    ship = _ship(card, settings)
     output, page, json_file = (_file(more[key]) for key in ("output", "page", "json_file"))
     if through := _texts(more, "through"):
-        refuse_options(
-            "--through",
-            {"--figure": figures, "--tune": wishes, "--page": page, "--ensemble": more["ensemble"]}
-            | {"--hold": more["hold"], "--bound": more["bounds"], "--agreed": more["agreed"]},
-        )
+        others = {"--figure": figures, "--tune": wishes, "--page": page, "--ensemble": more["ensemble"]}
+        of_tuning = {"--hold": more["hold"], "--bound": more["bounds"], "--agreed": more["agreed"]}
+        refuse_options("--through", others | of_tuning)
         tune_through(ship, through, Files(output, json_file))
         return
     if not wishes:
@@ -150,23 +150,29 @@ def command(
     if asked:
         with computing(asked, more["executor"]) as pool:
             bands = named_bands(ship, [one.text for one in study.figures], asked, pool)
-    notices = list(dict.fromkeys([*result.notices, *([] if find_compiler() else [NO_COMPILER])]))
-    contents: dict[Path, str | bytes] = {}
-    if json_file:
-        told = {**result.as_json(), "notices": notices, **({"tuned": tuned.as_json()} if tuned else {})}
-        told |= {"ensemble": bands.as_json()} if bands else {}
-        contents[json_file] = json_text(told)
-    if output and tuned:
-        contents[output] = tuned_text(ship, tuned)
-    if page:
-        contents[page] = _page(study, result, tuned, bands)
+    written, of_card = with_carried_covariance(ship, tuned_text(ship, tuned), output) if output and tuned else ({}, [])
+    notices = [*result.notices, *([ALONE] if tuned and result.errors.together else []), *of_card]
+    notices = list(dict.fromkeys([*notices, *([] if find_compiler() else [NO_COMPILER])]))
+    told = _told(study, result, tuned, bands) | {"notices": notices} if json_file or page else {}
+    contents = {
+        **written,
+        **({json_file: json_text(told)} if json_file else {}),
+        **({page: _page(told)} if page else {}),
+    }
     write_together(contents, inputs=[Path(ship.source)], outputs=[json_file, output, page])
     _show(result)
     if tuned:
         _show_tuned(tuned)
     show_notices(notices)
     if bands:
-        show_bands(bands.figures, bands.asked)
+        show_bands(bands.figures, bands.asked, told=notices)
+
+
+def _ship(card: str, settings: tuple[str, ...]) -> ManoeuvringCard:
+    ship = read_card(card, parse_changes(settings))
+    if not isinstance(ship, ManoeuvringCard):
+        raise InputError(ship.source, "model.kind", "is no ship that manoeuvres", "give a linear or abkowitz card")
+    return ship
 
 
 def _file(given: object) -> Path | None:
@@ -208,13 +214,20 @@ def _means(more: dict[str, object]) -> Means:
     )
 
 
-def _page(study: Study, result: Influence, tuned: Tuned | None, bands: FigureBands | None) -> str:
-    from tank2sim.report.ensemble import figures_section
-    from tank2sim.report.influence_page import influence_page
+def _told(study: Study, result: Influence, tuned: Tuned | None, bands: FigureBands | None) -> dict[str, object]:
+    """All that was found, as JSON has it."""
+    told = result.as_json()
+    if tuned:
+        after = study.figures_at(tuned.values).tolist()
+        told["tuned"] = tuned.as_json(dict(zip((one.text for one in study.figures), after, strict=True)))
+    return told | ({"ensemble": bands.as_json()} if bands else {})
+
+
+def _page(told: dict[str, object]) -> str:
+    from tank2sim.report.influence_page import influenced_page
     from tank2sim.report.page import render_page
 
-    page = influence_page(result, tuned, None if tuned is None else study.figures_at(tuned.values))
-    return render_page(replace(page, sections=[*page.sections, figures_section(bands)]) if bands else page)
+    return render_page(influenced_page(plain_json(told)))
 
 
 def _contradiction(tuned: Tuned) -> str:
@@ -235,6 +248,7 @@ def _show(result: Influence) -> None:
             for row, one in enumerate(result.figures)
         ],
     )
+    screen.print(result.of_errors[:1].upper() + result.of_errors[1:], soft_wrap=True)
     exact, difference = result.exact, result.difference
     largest = np.nan_to_num(np.abs(exact)).max(axis=0)
     order = [place for place in np.argsort(-largest, kind="stable") if largest[place] > 0][:ROWS]

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import click
-import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+
+from tank2sim.files import plain_json
 
 screen = Console(highlight=False)
 """Where summaries go."""
@@ -58,22 +57,4 @@ def shown(value: object) -> str:
 
 def json_text(result: Mapping[str, object]) -> str:
     """The result as JSON; arrays become lists, and what is not a finite number becomes null."""
-    return json.dumps(_plain(result), indent=1, ensure_ascii=False) + "\n"
-
-
-def _plain(value: Any) -> Any:
-    match value:
-        case Mapping():
-            return {str(key): _plain(item) for key, item in value.items()}
-        case np.ndarray():
-            return _plain(value.tolist())
-        case list() | tuple():
-            return [_plain(item) for item in value]
-        case np.generic():
-            return _plain(value.item())
-        case float():
-            return value if math.isfinite(value) else None
-        case Path():
-            return str(value)
-        case _:
-            return value
+    return json.dumps(plain_json(result), indent=1, ensure_ascii=False) + "\n"

@@ -14,7 +14,7 @@ from tank2sim.files import writable_folder, write_together
 from tank2sim.records.reading import read_trial
 from tank2sim.records.signals.analysis import ColumnAnalysis, Settings, TrialAnalysis, analyse
 from tank2sim.records.signals.as_json import analysis_as_json, effect_as_json
-from tank2sim.records.signals.columns import HELD, SignalName, find_signal
+from tank2sim.records.signals.columns import DIRECTIONS, HELD, SignalName, find_signal
 from tank2sim.records.signals.effect import Filtered
 from tank2sim.records.signals.requests import FORMS, FilterRequest, parse_filter
 from tank2sim.records.signals.sampling import Series, even_series
@@ -122,6 +122,8 @@ def _pictures(analyses: list[TrialAnalysis], filtering: _Filtering | None, folde
 def _show(analysis: TrialAnalysis) -> None:
     heads = ["", "mean", "std", "corr. (s)", "stationarity", "normal", "peak (Hz)"]
     show_table(analysis.trial.name, heads, [_row(column) for column in analysis.columns])
+    if any(column.series.name in DIRECTIONS for column in analysis.columns):
+        screen.print("mean and std of directions: on the circle, 0 to 360 deg.")
     screen.print(
         "corr.: correlation time. normal: tested on samples two correlation times apart, their number in brackets.",
         soft_wrap=True,

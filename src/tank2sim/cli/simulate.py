@@ -15,7 +15,7 @@ from tank2sim.dynamics import build
 from tank2sim.files import write_together
 from tank2sim.simulation.manoeuvres import FORMS, parse_manoeuvre
 from tank2sim.simulation.run import Run, simulate
-from tank2sim.simulation.trial_file import trial_csv
+from tank2sim.simulation.trial_file import histories, trial_csv
 from tank2sim.units import in_words
 
 
@@ -53,6 +53,7 @@ def command(card: str, manoeuvre: str, duration: float | None, settings: tuple[s
         contents[plot] = _picture(run, f"{ship.ship.name}, {manoeuvre}", bands)
     if json_file := files["json_file"]:
         result = {"ship": ship.ship.name, "manoeuvre": manoeuvre, "figures": run.figures, "notices": run.notices}
+        result |= {"histories": histories(run.trajectory)}
         contents[json_file] = json_text(result | ({"ensemble": bands.as_json()} if bands else {}))
     orders = Path(manoeuvre.removeprefix("file:"))
     write_together(contents, inputs=[Path(ship.source), orders], outputs=files.values())

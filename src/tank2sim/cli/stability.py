@@ -11,6 +11,7 @@ import click
 from rich.markup import escape
 
 from tank2sim.analysis.ensemble.results import StabilityBands, stability_bands
+from tank2sim.analysis.ensemble.steering import Grid
 from tank2sim.analysis.stability.imo import Criterion
 from tank2sim.analysis.stability.straight_line import Nomoto
 from tank2sim.analysis.stability.study import StabilityStudy, stability_study
@@ -50,8 +51,10 @@ def command(card: str, speed: float | None, settings: tuple[str, ...], spirals: 
     study = stability_study(model, speed, spirals=spirals)
     bands = None
     if asked:
+        drawn = study.responses and (files["page"] or files["json_file"])
+        curves = (speed, Grid.of(model, study.responses[0])) if drawn else None
         with computing(asked, executor) as pool:
-            bands = stability_bands(uncertain_ship(ship), study.imo, asked, pool)
+            bands = stability_bands(uncertain_ship(ship), study.imo, asked, pool, curves)
     notices = [*model.notices, *study.notices, *([] if find_compiler() else [NO_COMPILER])]
     contents: dict[Path, str | bytes] = {}
     if json_file := files["json_file"]:
@@ -111,7 +114,10 @@ def _show_criteria(criteria: Sequence[Criterion]) -> None:
     rows = []
     for one in criteria:
         name = f"{one.name} ({remarks.index(one.remark) + 1})" if one.remark else one.name
-        rows.append([name, one.found, one.allowed, one.unit, one.passed, one.margin_percent])
+        # A verdict on a figure that the card does not hold for would be taken for one.
+        beyond = one.beyond_card and one.found is not None
+        met, margin = ("beyond card", None) if beyond else (one.passed, one.margin_percent)
+        rows.append([name, one.found, one.allowed, one.unit, met, margin])
     heads = ["criterion", "found", "allowed", "unit", "met", "margin (%)"]
     show_table("IMO MSC.137(76), worse side", heads, _rounded(rows))
     for number, remark in enumerate(remarks, 1):

@@ -8,6 +8,7 @@ import click
 from rich.markup import escape
 
 from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.cli.changes import parse_changes
 from tank2sim.cli.screen import screen, show_notices
 from tank2sim.dynamics import build
@@ -39,22 +40,34 @@ def command(card: str, page: Path, ghost: Path | None, settings: tuple[str, ...]
     """Write a page in which CARD (a file, or the name of a bundled ship) can be steered; it needs no network."""
     # Drawing is asked for seldom, and its libraries are slow to load.
     from tank2sim.native.cross import has_compiled
-    from tank2sim.report.steer import ghost_of, steering_page
-    from tank2sim.report.steer_ship import NO_COMPILER, WEB, has_compiler, ship_in_page
+    from tank2sim.report.steer import steering_page
+    from tank2sim.report.steer_ghost import ghost_of
+    from tank2sim.report.steer_ship import NO_COMPILER, WEB, following, has_compiler, ship_in_page
 
+    _refuse_steering_card(card)
     ship = read_card(card, parse_changes(settings))
     model = build(ship)
     if not isinstance(ship, ManoeuvringCard):
         raise InputError(ship.source, "", "has no rudder", "only a ship (kind linear or abkowitz) can be steered")
     trial = measured([ghost], ship) if ghost else None
-    beside = ghost_of(trial.trials[0]) if trial else None
+    beside = ghost_of(trial.trials[0], model) if trial else None
+    if beside and beside.by_angle:
+        model = following(model)
     library = None
     if has_compiler():
         if not has_compiled(WEB):
             screen.print("the compiler makes its own library first, once: about a minute")
         library = ship_in_page(model)
-    told = [*model.notices, *(trial.notices if trial else ()), *([] if library else [NO_COMPILER])]
+    told = [*(trial.notices if trial else ()), *(beside.notices if beside else ()), *model.notices]
     text = steering_page(model, library, beside, told)
     write_whole(page, text, inputs=[Path(ship.source), *([ghost] if ghost else [])])
     screen.print(f"{escape(ship.ship.name)}: {escape(str(page))}, {len(text.encode()) / 1e3:.0f} kB", soft_wrap=True)
-    show_notices(told)
+    show_notices([*([] if library else [NO_COMPILER]), *told])
+
+
+def _refuse_steering_card(name: str) -> None:
+    """Refuse a card of steering equations, which tells of no ship that moves over the water."""
+    if find_steering_card(name):
+        problem = "is a steering card (equations of drift and turning), not a ship card"
+        remedy = "give a ship card (kind linear or abkowitz); tank2sim influence shows a steering card"
+        raise InputError(name, "", problem, remedy)

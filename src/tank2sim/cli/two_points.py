@@ -11,6 +11,7 @@ from pathlib import Path
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning, WantedTurn, levers_of_ship, tune_to_two_points
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.cards.reading import revised
+from tank2sim.cli.ensemble import with_carried_covariance
 from tank2sim.cli.screen import json_text, show_notices
 from tank2sim.cli.steering_card import show_tuning
 from tank2sim.dynamics import build
@@ -68,11 +69,13 @@ def tune_through(card: ManoeuvringCard, texts: Sequence[str], files: Files) -> N
     contents: dict[Path, str | bytes] = {}
     if files.json:
         contents[files.json] = json_text({**tuning.as_json(), "notices": list(model.notices)})
+    told = list(model.notices)
     if files.card:
-        contents[files.card] = _tuned(card, tuning, " ".join(texts)).text
+        found, of_covariance = with_carried_covariance(card, _tuned(card, tuning, " ".join(texts)).text, files.card)
+        contents, told = contents | found, [*told, *of_covariance]
     write_together(contents, inputs=[Path(card.source)], outputs=[files.card, files.json])
     show_tuning(tuning)
-    show_notices(model.notices)
+    show_notices(told)
 
 
 def _tuned(card: ManoeuvringCard, tuning: TwoPointTuning, points: str) -> ManoeuvringCard:

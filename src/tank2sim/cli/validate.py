@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,16 @@ from tank2sim.cli.screen import json_option, json_text, screen, show_notices, sh
 from tank2sim.cli.trials import trial_files
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
+from tank2sim.gap.as_json import signal_name
 from tank2sim.gap.replayed import replayed
 from tank2sim.gap.result import Passed
 from tank2sim.identification.trials.measured import Measured, measured
+from tank2sim.records.thinning import Vector, drawn_columns
 from tank2sim.simulation.integrator import NO_COMPILER
 from tank2sim.units import in_words
+
+_REPLAY_SAMPLES = 240
+"""Of each trial in the JSON, for charts; the record itself is the file."""
 
 
 @click.command("validate")
@@ -51,7 +57,10 @@ from tank2sim.units import in_words
 )
 @json_option
 def command(card: str, trials: tuple[Path, ...], **options: Any) -> None:
-    """Validate CARD in the manner of ITTC 7.5-02-06-03: by TRIALs that did not make it, figure by figure."""
+    """Validate CARD in the manner of ITTC 7.5-02-06-03: by TRIALs that did not make it, figure by figure.
+
+    A TRIAL that the source of CARD names among those it was identified from is told, and can only refute it.
+    """
     ship = manoeuvring(read_card(card, parse_changes(options["settings"])), "manoeuvres")
     files = trial_files(trials)
     given = measured(files, ship) if files else Measured((), "angle", ())
@@ -71,6 +80,7 @@ def command(card: str, trials: tuple[Path, ...], **options: Any) -> None:
             **found.as_json(),
             "verification": [{**vars(one), "U_num": one.numerical} for one in verified],
             "imo": [one.as_json() for one in criteria],
+            "replays": [_replay_as_json(one) for one in replays],
             "notices": notices,
         }
         contents[json_file] = json_text(result)
@@ -96,6 +106,17 @@ def _replays(card: ManoeuvringCard, given: Measured) -> tuple[tuple[Passed, ...]
         except InputError as error:
             told.append(f"{trial.name}: not replayed: {error.problem}")
     return tuple(found), tuple(told)
+
+
+def _replay_as_json(one: Passed) -> dict[str, object]:
+    """A trial as measured and as simulated, thinned to draw; columns as in a trial file."""
+    names = {name: signal_name(name) for name in one.measured if name in one.before}
+
+    def columns(values: Mapping[str, Vector]) -> dict[str, list[float]]:
+        own = {column.file: column.factor * values[name] for name, column in names.items()}
+        return drawn_columns({"t_s": one.time_s, **own}, _REPLAY_SAMPLES)
+
+    return {"trial": one.name, "measured": columns(one.measured), "simulated": columns(one.before)}
 
 
 def _show(card: ManoeuvringCard, found: Validation, verified: tuple[Verified, ...]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,8 +12,9 @@ import click
 from rich.markup import escape
 
 from tank2sim.cards import ManoeuvringCard, YawRigCard, parse_card, read_card
+from tank2sim.cards.form import YawRig
 from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
-from tank2sim.dynamics.yaw_rig import YawRig, rig_of
+from tank2sim.dynamics.yaw_programme import Similarity, YawProgramme, programme_of
 from tank2sim.dynamics.yaw_theory import FloatingBody, TheoryValue, theory_values
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
@@ -74,6 +76,8 @@ class _Asked:
 @click.option(
     "--controller", type=click.Choice(list(CONTROLLERS)), help="Of the simulated rig: (4), by default, or (6)."
 )
+@click.option("--similar-to", metavar="L,B,R,T",
+              help="Simulate a ship's motion at model size: length, beam in m, yaw rate in deg/min, s.")  # fmt: skip
 @click.option("--noise", "noise_A", type=click.FloatRange(min=0), default=0.0, help="Of the simulated current, A.")
 @click.option("--inertia-kgm2", type=_POSITIVE, metavar="J", help="J_zz of body and rotor; else from records in air.")
 @click.option("--inertia-error-kgm2", "inertia_error", type=click.FloatRange(min=0), help="Its standard error.")
@@ -99,14 +103,15 @@ def command(records: tuple[Path, ...], *, simulate: str | None, **options: objec
 
     Records in air ('# medium: air') give J_zz; the programme stands in comments of the file.
     """
-    driven = {key: options.pop(key) for key in ("noise_A", "medium", "controller")}
+    driven = {key: options.pop(key) for key in ("noise_A", "medium", "controller", "similar_to")}
     asked = _Asked(**options)  # type: ignore[arg-type]  # click has checked them
     if asked.card and not asked.output:
         raise InputError("--card", "", "has no file to be written to", "say which with -o CARD.toml")
     if simulate:
         _simulate(simulate, records, driven)
-    elif driven["medium"] or driven["controller"]:
-        raise InputError("--medium, --controller", "", "are of a simulated rig", "give --simulate CARD as well")
+    elif driven["medium"] or driven["controller"] or driven["similar_to"]:
+        options_told = "--medium, --controller, --similar-to"
+        raise InputError(options_told, "", "are of a simulated rig", "give --simulate CARD as well")
     known = _known(asked.rig)
     result = identify_yaw([read_yaw_record(path) for path in records], _options(asked, known))
     body = _floating_body(asked.theory) if asked.theory else None
@@ -137,14 +142,43 @@ def _simulate(name: str, records: tuple[Path, ...], driven: Mapping[str, Any]) -
     if records[0].exists():
         raise InputError(records[0], "", "is there already, and may be a measurement", "give --simulate a new name")
     card = _rig_card(name, "--simulate")
+    similar = _similar(card, driven["similar_to"]) if driven["similar_to"] else None
     record = simulated_record(
         card,
         records[0],
         driven["noise_A"],
         medium=driven["medium"] or "water",
         controller=CONTROLLERS[driven["controller"] or "tuned"],
+        programme=similar,
     )
     write_together({records[0]: yaw_record_text(record)}, inputs=[Path(card.source)])
+
+
+def _similar(card: YawRigCard, text: str) -> YawProgramme:
+    """The programme that is a ship's motion ``L,B,R,T`` at the size of the card's body; it is told on the screen."""
+    try:
+        length, beam, rate_degpmin, time_s = (float(word) for word in text.split(","))
+    except ValueError:
+        length = beam = rate_degpmin = time_s = 0.0
+    given = (length, beam, abs(rate_degpmin), time_s)
+    if not all(0 < value < math.inf for value in given):
+        remedy = "write length and beam in m, yaw rate in deg/min and time in s: 38,8,100,120"
+        raise InputError("--similar-to", "", f"{text!r} is no motion of a ship", remedy)
+    own = card.ship
+    if own.length_m is None or own.beam_m is None:
+        raise card.fault("ship", "has no length_m or no beam_m", "add them, on the waterline")
+    ratio = Similarity(ship_length_m=length, ship_beam_m=beam, length_m=own.length_m, beam_m=own.beam_m)
+    try:
+        programme = ratio.programme(math.radians(rate_degpmin / 60), time_s, programme_of(card))
+    except ValueError as error:
+        raise InputError("--similar-to", "", str(error), "give another motion of the ship") from None
+    screen.print(
+        f"{length:g} m x {beam:g} m at {own.length_m:g} m x {own.beam_m:g} m: rates times {ratio.rate_ratio:.4g}, so "
+        f"{rate_degpmin:g} deg/min in {time_s:g} s is {math.degrees(programme.max_rate_radps):.4g} deg/s in "
+        f"{3 * programme.rise_s:.4g} s",
+        soft_wrap=True,
+    )
+    return programme
 
 
 def _floating_body(text: str) -> FloatingBody:
@@ -192,7 +226,7 @@ def _rig_card(name: str, option: str) -> YawRigCard:
 
 
 def _known(rig: str | None) -> YawRig | None:
-    return None if rig is None else rig_of(_rig_card(rig, "--rig"))
+    return None if rig is None else _rig_card(rig, "--rig").yaw_rig
 
 
 def _options(asked: _Asked, known: YawRig | None) -> YawOptions:

@@ -11,7 +11,7 @@ from tank2sim.dynamics.glider import glider_model
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import ship_model
 from tank2sim.dynamics.surge import SurgeCoefficients, surge_model
-from tank2sim.dynamics.yaw_rig import rig_of, yaw_rig_model
+from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.units import from_si
 
 
@@ -36,7 +36,7 @@ def build(card: Card) -> Model:
     if isinstance(card, GliderCard):
         return glider_model(card)
     if isinstance(card, YawRigCard):
-        return yaw_rig_model(card.ship.name, rig_of(card))
+        return yaw_rig_model(card.ship.name, card.yaw_rig)
     if not isinstance(card, ManoeuvringCard):
         raise TypeError(f"no model for {type(card).__name__}")
     model = ship_model(card)

@@ -1,4 +1,4 @@
-"""From body to earth: position, heading, and the motion over the ground."""
+"""From body to earth: yaw rate, heading, position, and the motion over the ground."""
 
 from __future__ import annotations
 
@@ -37,6 +37,32 @@ def kinematics(body: Mapping[str, Variable]) -> tuple[Variable, ...]:
     north, east = earth_velocity(body["motion.u"].symbol, body["motion.v"].symbol, psi.symbol)
     xdot, ydot, _ = rates = _rates(north, east, body["motion.r"].symbol)
     return (*states, *rates, *_over_ground(xdot.symbol, ydot.symbol, psi.symbol), *starts)
+
+
+def yaw_rate(nominal_radps: float) -> tuple[State, Parameter]:
+    """State ``motion.r`` (rad/s) of a ship, and its start ``initial.r``.
+
+    Its rate ``motion.rdot`` is what the ship's equations give; `nominal_radps` is the size of an ordinary turn's.
+    """
+    start = Parameter(
+        name="initial.r",
+        unit="rad/s",
+        description="Yaw rate at the start, positive to starboard",
+        display_unit="deg/min",
+        start=0.0,
+        tunable=False,
+    )
+    state = State(
+        name="motion.r",
+        unit="rad/s",
+        description="Yaw rate (rate of turn), positive to starboard",
+        display_unit="deg/min",
+        nominal=nominal_radps,
+        derivative="motion.rdot",
+        start=start.symbol,
+        steady=True,
+    )
+    return state, start
 
 
 def _starts() -> tuple[Parameter, ...]:

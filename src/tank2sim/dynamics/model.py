@@ -204,6 +204,14 @@ class Model:
         """The parameter vector p: start values, with those of `changed` (by name) in place of their own."""
         return _values(self.parameters, changed or {})
 
+    def with_values(self, changed: Mapping[str, float]) -> Model:
+        """The model with parameters that start at the values of `changed` (by name) in place of their own."""
+        parameters = (
+            _same_symbol(one, replace(one, start=changed[one.name])) if one.name in changed else one
+            for one in self.parameters
+        )
+        return replace(self, parameters=tuple(parameters))
+
     # -- making another model of it (what effects do) ----------------------------------------------------------------
 
     def redefine(self, name: str, value: Callable[[ca.SX], ca.SX]) -> Model:

@@ -11,7 +11,7 @@ from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS, geographic
 from tank2sim.dynamics.hull import Hull, motion_quantities
-from tank2sim.dynamics.kinematics import kinematics
+from tank2sim.dynamics.kinematics import kinematics, yaw_rate
 from tank2sim.dynamics.low_speed import low_speed_parameters
 from tank2sim.dynamics.model import Model, Parameter, State, Variable
 from tank2sim.dynamics.propulsion import propulsion
@@ -189,42 +189,40 @@ def _derivative_parameters(card: ManoeuvringCard, names: list[str]) -> tuple[Par
 
 
 def _body_states(card: ManoeuvringCard) -> tuple[Variable, ...]:
-    def start(name: str, unit: str, description: str, value: float) -> Parameter:
-        shown = {"m/s": "knots", "rad/s": "deg/min"}[unit]
-        return Parameter(name=name, unit=unit, description=description, start=value, tunable=False, display_unit=shown)
+    """States ``motion.u``, ``.v``, ``.r``, and the parameters of their start."""
+    speed = card.model.speed_mps
+    trim = Parameter(
+        name="initial.trim",
+        unit="1",
+        description="True: start in steady motion with the inputs given (initial.u, .v, .r are then a first guess)",
+        boolean=True,
+        start=0.0,
+        tunable=False,
+    )
+    surge = _velocity("u", "Surge", ", positive forward", start=speed, nominal=speed)
+    sway = _velocity("v", "Sway", ", positive to starboard", nominal=0.1 * speed)
+    states, starts = zip(surge, sway, yaw_rate(speed / card.ship.length_m), strict=True)
+    return (*states, *starts, trim)
 
-    starts = (
-        start("initial.u", "m/s", "Surge velocity through the water at the start", card.model.speed_mps),
-        start("initial.v", "m/s", "Sway velocity through the water at the start, positive to starboard", 0.0),
-        start("initial.r", "rad/s", "Yaw rate at the start, positive to starboard", 0.0),
-        Parameter(
-            name="initial.trim",
-            unit="1",
-            description="True: start in steady motion with the inputs given (initial.u, .v, .r are then a first guess)",
-            boolean=True,
-            start=0.0,
-            tunable=False,
-        ),
+
+def _velocity(letter: str, name: str, sign: str, *, nominal: float, start: float = 0.0) -> tuple[State, Parameter]:
+    described = f"{name} velocity through the water"
+    first = Parameter(
+        name=f"initial.{letter}",
+        unit="m/s",
+        description=f"{described} at the start{sign}",
+        display_unit="knots",
+        start=start,
+        tunable=False,
     )
-    described = (
-        ("motion.u", "m/s", "Surge velocity through the water, positive forward", "motion.udot", "knots"),
-        ("motion.v", "m/s", "Sway velocity through the water, positive to starboard", "motion.vdot", "knots"),
-        ("motion.r", "rad/s", "Yaw rate (rate of turn), positive to starboard", "motion.rdot", "deg/min"),
+    state = State(
+        name=f"motion.{letter}",
+        unit="m/s",
+        description=f"{described}{sign}",
+        display_unit="knots",
+        nominal=nominal,
+        derivative=f"motion.{letter}dot",
+        start=first.symbol,
+        steady=True,
     )
-    nominals = (card.model.speed_mps, 0.1 * card.model.speed_mps, card.model.speed_mps / card.ship.length_m)
-    states = tuple(
-        State(
-            name=name,
-            unit=unit,
-            description=description,
-            display_unit=shown,
-            nominal=nominal,
-            derivative=derivative,
-            start=parameter.symbol,
-            steady=True,
-        )
-        for (name, unit, description, derivative, shown), parameter, nominal in zip(
-            described, starts, nominals, strict=False
-        )
-    )
-    return (*states, *starts)
+    return state, first

@@ -213,6 +213,10 @@ class Similarity:
         """Model rate over ship rate, (L*/L) sqrt(B/B*): the paper's sqrt(lambda), no scale of lengths."""
         return self.ship_length_m / self.length_m * math.sqrt(self.beam_m / self.ship_beam_m)
 
-    def programme(self, ship_rate_radps: float, ship_time_s: float) -> YawProgramme:
-        """The programme whose humps (t7) are the ship's motion of `ship_time_s` with the rate `ship_rate_radps`."""
-        return YawProgramme(max_rate_radps=ship_rate_radps * self.rate_ratio, rise_s=ship_time_s / self.rate_ratio / 3)
+    def programme(self, ship_rate_radps: float, ship_time_s: float, like: YawProgramme = PAPER) -> YawProgramme:
+        """The programme whose humps (t7) are the ship's motion of `ship_time_s` with the rate `ship_rate_radps`.
+
+        Kind, number and settling are those of the programme `like`; raises as :class:`YawProgramme`.
+        """
+        rise_s = ship_time_s / self.rate_ratio / 3
+        return replace(like, max_rate_radps=ship_rate_radps * self.rate_ratio, rise_s=rise_s)

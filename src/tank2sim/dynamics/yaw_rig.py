@@ -12,12 +12,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 
-from tank2sim.cards.card import YawRigCard
+from tank2sim.cards.form import TankWalls, YawRig
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
 
 # A thousandth of a second, the step of a rig's digital controller; the fastest of the model, the knee of the dry
@@ -28,118 +27,42 @@ _STEP_S = 0.001
 _KNEE_RADPS = 2.5e-4
 
 
-@dataclass(frozen=True, kw_only=True)
-class Walls:
-    """A rectangular tank, and the coefficients of lambda_66l and f_66l.
-
-    Each is c_a/(l_a + 1) + c_f/(l_f + 1), l_a and l_f in m from the ends of the waterline to the nearest wall. (The
-    paper says "the flat wall"; the nearest of the four is our choice. Its a is the bow, its f the stern.)
-
-    Parameters
-    ----------
-    length_m, breadth_m : float
-        The tank, along the body's axis at psi = 0 and across it.
-    x_m, y_m : float
-        Axis of rotation, from the middle of the tank.
-    body_length_m : float
-        On the waterline.
-    bow_inertia_kgm2, stern_inertia_kgm2 : float
-        lambda_66a0, lambda_66f0.
-    bow_damping_Nms, stern_damping_Nms : float
-        f_66a0, f_66f0, N m s.
-    """
-
-    length_m: float = 1.6
-    breadth_m: float = 1.4
-    x_m: float = 0.0
-    y_m: float = 0.0
-    body_length_m: float
-    bow_inertia_kgm2: float = 0.0
-    stern_inertia_kgm2: float = 0.0
-    bow_damping_Nms: float = 0.0
-    stern_damping_Nms: float = 0.0
-
-    def __post_init__(self) -> None:
-        reach = self.body_length_m / 2
-        if abs(self.x_m) + reach >= self.length_m / 2 or abs(self.y_m) + reach >= self.breadth_m / 2:
-            raise ValueError(f"a body of {self.body_length_m:g} m strikes the walls of the tank when it turns")
-
-
-@dataclass(frozen=True, kw_only=True)
-class YawRig:
-    """Body, motor and current loop; SI.
-
-    Parameters
-    ----------
-    inertia_kgm2 : float
-        J_zz, of the body with the rotor of the motor.
-    added_inertia_kgm2 : float
-        lambda_661; 0 in air.
-    coulomb_Nm, viscous_Nms, quadratic_Nms2 : float
-        f_c, f_1 (in water f_12 + f_661), f_662.
-    torque_constant_NmpA, current_lag_s, max_current_A : float
-        k_t, T_c, and the largest current asked of the motor.
-    inertia_accelerating_kgm2, inertia_braking_kgm2 : float
-        lambda_662a, lambda_662d at 1 rad/s.
-    braking_quadratic_Nms2 : float, optional
-        f_662d; by default `quadratic_Nms2`, which is then f_662a = f_662d.
-    gravity_Nm, gravity_angle_rad : float
-        Moment of gravity -G sin(psi - psi_0).
-    walls : Walls, optional
-    pulses_per_turn : float
-        Of the encoder.
-    """
-
-    inertia_kgm2: float
-    added_inertia_kgm2: float = 0.0
-    coulomb_Nm: float = 0.0
-    viscous_Nms: float = 0.0
-    quadratic_Nms2: float = 0.0
-    torque_constant_NmpA: float = 0.051
-    current_lag_s: float = 0.055
-    max_current_A: float = 1.0
-    inertia_accelerating_kgm2: float = 0.0
-    inertia_braking_kgm2: float = 0.0
-    braking_quadratic_Nms2: float | None = None
-    gravity_Nm: float = 0.0
-    gravity_angle_rad: float = 0.0
-    walls: Walls | None = None
-    pulses_per_turn: float = 3000.0
-
-    @property
-    def quadratic_braking(self) -> float:
-        """f_662d."""
-        return self.quadratic_Nms2 if self.braking_quadratic_Nms2 is None else self.braking_quadratic_Nms2
-
-
-def rig_of(card: YawRigCard) -> YawRig:
-    """The rig of a card.
-
-    Raises
-    ------
-    InputError
-        The body strikes the walls of its tank.
-    """
-    own = card.yaw_rig.model_dump(exclude={"walls"})
-    walls = card.yaw_rig.walls
-    try:
-        return YawRig(**own, walls=Walls(**walls.model_dump()) if walls else None)
-    except ValueError as error:
-        raise card.fault("yaw_rig.walls", str(error), "mend its sizes") from None
-
+_TORQUE_CONSTANT_NMPA = 0.051
+"""Of the paper's motor."""
 
 ELLIPSOID_T1 = YawRig(
-    inertia_kgm2=204.3e-4, added_inertia_kgm2=300.4e-4, coulomb_Nm=7.9e-4, viscous_Nms=117.4e-4, quadratic_Nms2=381.0e-4
+    inertia_kgm2=204.3e-4,
+    added_inertia_kgm2=300.4e-4,
+    coulomb_Nm=7.9e-4,
+    viscous_Nms=117.4e-4,
+    quadratic_Nms2=381.0e-4,
+    torque_constant_NmpA=_TORQUE_CONSTANT_NMPA,
 )
 """The paper's ellipsoid in water, its least squares of Tables 1 and 2."""
 SHIP_T1 = YawRig(
-    inertia_kgm2=179.6e-4, added_inertia_kgm2=302.0e-4, coulomb_Nm=9.8e-4, viscous_Nms=43.5e-4, quadratic_Nms2=1434.6e-4
+    inertia_kgm2=179.6e-4,
+    added_inertia_kgm2=302.0e-4,
+    coulomb_Nm=9.8e-4,
+    viscous_Nms=43.5e-4,
+    quadratic_Nms2=1434.6e-4,
+    torque_constant_NmpA=_TORQUE_CONSTANT_NMPA,
 )
-SHIP_T2 = replace(
-    SHIP_T1, added_inertia_kgm2=531.1e-4, coulomb_Nm=2.7e-4, viscous_Nms=216.7e-4, quadratic_Nms2=1480.9e-4
+SHIP_T2 = YawRig(
+    inertia_kgm2=179.6e-4,
+    added_inertia_kgm2=531.1e-4,
+    coulomb_Nm=2.7e-4,
+    viscous_Nms=216.7e-4,
+    quadratic_Nms2=1480.9e-4,
+    torque_constant_NmpA=_TORQUE_CONSTANT_NMPA,
 )
-ELLIPSOID_AIR = YawRig(inertia_kgm2=204.3e-4, coulomb_Nm=10.9e-4, viscous_Nms=7.6e-4)
-SHIP_AIR = YawRig(inertia_kgm2=179.6e-4, coulomb_Nm=10.3e-4, viscous_Nms=10.7e-4)
+ELLIPSOID_AIR = YawRig(
+    inertia_kgm2=204.3e-4, coulomb_Nm=10.9e-4, viscous_Nms=7.6e-4, torque_constant_NmpA=_TORQUE_CONSTANT_NMPA
+)
+SHIP_AIR = YawRig(
+    inertia_kgm2=179.6e-4, coulomb_Nm=10.3e-4, viscous_Nms=10.7e-4, torque_constant_NmpA=_TORQUE_CONSTANT_NMPA
+)
+UNKNOWN_RIG = YawRig(inertia_kgm2=1.0, torque_constant_NmpA=1.0)
+"""A rig of which nothing is known: the first two numbers stand for those that are to be found."""
 
 
 def friction(rate: ca.SX, coulomb: ca.SX, viscous: ca.SX, quadratic: ca.SX) -> ca.SX:
@@ -150,7 +73,7 @@ def friction(rate: ca.SX, coulomb: ca.SX, viscous: ca.SX, quadratic: ca.SX) -> c
     return coulomb * ca.tanh(rate / _KNEE_RADPS) + rate * (viscous + quadratic * ca.fabs(rate))
 
 
-def wall_nearness(heading: Any, walls: Walls) -> tuple[Any, Any]:
+def wall_nearness(heading: Any, walls: TankWalls) -> tuple[Any, Any]:
     """1/(l_a + 1) and 1/(l_f + 1) at a heading (rad): distances, in m, of bow and stern to the nearest wall."""
     near = []
     for half in (walls.body_length_m / 2, -walls.body_length_m / 2):
@@ -160,7 +83,9 @@ def wall_nearness(heading: Any, walls: Walls) -> tuple[Any, Any]:
     return near[0], near[1]
 
 
-def wall_terms(heading: ca.SX, walls: Walls, coefficients: Mapping[str, ca.SX] | None = None) -> tuple[ca.SX, ca.SX]:
+def wall_terms(
+    heading: ca.SX, walls: TankWalls, coefficients: Mapping[str, ca.SX] | None = None
+) -> tuple[ca.SX, ca.SX]:
     """lambda_66l (kg m2) and f_66l (N m s) at a heading; coefficients by name (``wall.bow_inertia``), or the walls'."""
     own: Mapping[str, Any] = coefficients or {name: start for name, _, start, _ in _wall_rows(walls)}
     bow, stern = wall_nearness(heading, walls)
@@ -257,7 +182,7 @@ def _encoder(heading: ca.SX, p: dict[str, ca.SX]) -> Quantity:
 
 
 def _mechanics(
-    heading: ca.SX, rate: ca.SX, current: ca.SX, p: dict[str, ca.SX], walls: Walls | None
+    heading: ca.SX, rate: ca.SX, current: ca.SX, p: dict[str, ca.SX], walls: TankWalls | None
 ) -> tuple[Quantity, ...]:
     """Moments and the acceleration that they give."""
     wall_inertia, wall_damping = wall_terms(heading, walls, p) if walls else (ca.SX(0), ca.SX(0))
@@ -346,7 +271,7 @@ def _parameters(rig: YawRig) -> tuple[Parameter, ...]:
     )
 
 
-def _wall_rows(walls: Walls) -> list[tuple[str, str, float, str]]:
+def _wall_rows(walls: TankWalls) -> list[tuple[str, str, float, str]]:
     return [
         ("wall.bow_inertia", "kg.m2", walls.bow_inertia_kgm2, "Added inertia by the wall at the bow"),
         ("wall.stern_inertia", "kg.m2", walls.stern_inertia_kgm2, "Added inertia by the wall at the stern"),

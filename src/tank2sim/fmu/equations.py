@@ -7,7 +7,7 @@ import casadi as ca
 from tank2sim.dynamics.kinks import kinks
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.interface import other_outputs
-from tank2sim.simulation.scheme import runge_kutta_step
+from tank2sim.simulation.scheme import step_and_constants
 
 
 def equations(model: Model) -> tuple[ca.Function, ...]:
@@ -30,11 +30,11 @@ def equations(model: Model) -> tuple[ca.Function, ...]:
     pulled = ca.vertsplit(ca.jtimes(results, points, ca.vertcat(*seeds), True), places)
     start = model.initial(p)
     trimmed = model.trim_step(x, u, p) if model.trim_step is not None else x
-    h = ca.SX.sym("h")
-    step, constants, values = _without_constants(runge_kutta_step(model)(x, u, p, h), p)
+    step, constants = step_and_constants(model)
+    c, h = ca.SX.sym("c", constants.numel_out(0)), ca.SX.sym("h")
     return (
-        _function("model_step", [x, u, p, constants, h], [step]),
-        _function("model_constants", [p], [values]),
+        _function("model_step", [x, u, p, c, h], [step(x, u, p, c, h)]),
+        _function("model_constants", [p], [constants(p)]),
         _function("model_rates", [x, u, p], [model.rates]),
         _function("model_outputs", [x, u, p], [outputs]),
         _function("model_initial", [p], [start]),
@@ -50,17 +50,6 @@ def other_values(model: Model) -> ca.SX:
     """Outputs that are neither states nor their rates, then the event indicators, as expressions of x, u, p."""
     outputs = [model.symbol(name) for name in other_outputs(model)]
     return ca.vertcat(model.expand(ca.vcat(outputs)), *(kink.value for kink in kinks(model)))
-
-
-def _without_constants(expression: ca.SX, p: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """The expression with symbols for what depends on p alone, those symbols, and the values they stand for.
-
-    Masses and their determinant, scales and the like are then calculated when a parameter is set and not in every step,
-    by the same operations, so that no digit changes.
-    """
-    shorter, symbols, values = ca.extract_parametric(expression, p)
-    none = ca.SX(0, 1)
-    return shorter, ca.vertcat(none, *symbols), ca.vertcat(none, *values)
 
 
 def _function(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:

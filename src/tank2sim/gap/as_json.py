@@ -43,26 +43,8 @@ def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, o
         "verdict": gap.verdict,
         "effects": [_effect(one) for one in gap.effects],
         "alternatives": [joined(one) for one in gap.alternatives],
-        "where": [
-            {
-                "trial": names.get(place.trial, f"{place.trial}.csv"),
-                "signal": signal_name(place.signal).file,
-                "t_start_s": _time(place.t_start_s),
-                "t_end_s": _time(place.t_end_s),
-                "share_of_misfit": _finite(place.share),
-            }
-            for place in gap.where
-        ],
-        "acting": [
-            {
-                "trial": names.get(one.trial, f"{one.trial}.csv"),
-                "equation": one.equation,
-                "t_start_s": _time(one.t_start_s),
-                "t_end_s": _time(one.t_end_s),
-                "standard_errors": _finite(one.size),
-            }
-            for one in acting(gap)[:MOST_PASSAGES]
-        ],
+        "where": _where(gap, names),
+        "acting": _acting(gap, names),
         "equation": gap.equation,
         "misfit": _misfit(gap),
         "could_hide": {
@@ -79,16 +61,7 @@ def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, o
             for one in gap.rivals
         ],
         "trials": [_trial(one, names[one.name]) for one in gap.passed],
-        "figures": [
-            {
-                "trial": names.get(now.trial, now.trial),
-                "figure": now.name,
-                "measured": _finite(now.measured),
-                "before": _finite(before.predicted if before else None),
-                "after": _finite(now.predicted),
-            }
-            for before, now in paired_figures(gap)
-        ],
+        "figures": _figures(gap, names),
         "agreement": _agreement(gap, names),
         "missing_force": _missing(missing_force(gap)),
         "missing_signal": _missing(contradiction(gap)),
@@ -167,6 +140,45 @@ def paired_figures(gap: Gap) -> list[tuple[Figure | None, Figure]]:
     """Each figure of a turn or zigzag, before (None if it is not there) and after; the same where nothing was added."""
     old = {(one.trial, one.name): one for one in gap.figures_before}
     return [(old.get((one.trial, one.name)), one) for one in gap.figures_after or gap.figures_before]
+
+
+def _where(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
+    return [
+        {
+            "trial": names.get(place.trial, f"{place.trial}.csv"),
+            "signal": signal_name(place.signal).file,
+            "t_start_s": _time(place.t_start_s),
+            "t_end_s": _time(place.t_end_s),
+            "share_of_misfit": _finite(place.share),
+        }
+        for place in gap.where
+    ]
+
+
+def _acting(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
+    return [
+        {
+            "trial": names.get(one.trial, f"{one.trial}.csv"),
+            "equation": one.equation,
+            "t_start_s": _time(one.t_start_s),
+            "t_end_s": _time(one.t_end_s),
+            "standard_errors": _finite(one.size),
+        }
+        for one in acting(gap)[:MOST_PASSAGES]
+    ]
+
+
+def _figures(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
+    return [
+        {
+            "trial": names.get(now.trial, now.trial),
+            "figure": now.name,
+            "measured": _finite(now.measured),
+            "before": _finite(before.predicted if before else None),
+            "after": _finite(now.predicted),
+        }
+        for before, now in paired_figures(gap)
+    ]
 
 
 def _effect(one: Named) -> dict[str, object]:

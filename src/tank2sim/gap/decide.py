@@ -43,6 +43,8 @@ LIKELY = 0.5
 """A name less probable than this is none (ours): then all that have :data:`RIVAL` of its probability are named."""
 
 RIVAL = 0.1
+"""Share of the best name's probability that makes another one its rival (ours): odds of 10 to 1, from which Jeffreys
+(1961), Theory of Probability, calls evidence strong."""
 
 STANDARD_ERRORS = 3.0
 """An effect is named if its size exceeds so many of its standard errors."""

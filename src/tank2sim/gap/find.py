@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -14,7 +13,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
-from tank2sim.executors import executing
+from tank2sim.executors import executing, processes_to_begin
 from tank2sim.gap.add import Found, added
 from tank2sim.gap.correct import corrected
 from tank2sim.gap.decide import ENOUGH, Decision, Strange, decide
@@ -115,7 +114,7 @@ def _names(card: ManoeuvringCard, fitted: Measured, options: Options) -> tuple[s
 
 @contextmanager
 def _processes(options: Options, executor: Executor | None) -> Iterator[Executor | None]:
-    count = options.workers or os.cpu_count() or 1
+    count = processes_to_begin(options.workers)
     if executor is not None or count == 1:
         yield executor
         return

@@ -103,9 +103,9 @@ def next_test(
     A manoeuvre's score is the loss of the wrong explanation that is to be expected, the mean over which of the two is
     true, against the rival that it tells apart worst: ``d' (I - J (J'J + P^-1)^-1 J') d``, d the difference of what
     both foresee in noise units, J its derivatives by all that the wrong one could still be: its parameters and its
-    card's coefficients within their covariance P. Both foresee windows of :data:`WINDOW` L/u0 from one and the same
-    motion, that of the first explanation, each with a first state and constant disturbances of its own that absorb what
-    they can: at sea, too, a difference shows in what happens next and not in what has summed up.
+    card's coefficients within their covariance P. Both foresee windows of :data:`WINDOW` L/u0 from the motion of the
+    first explanation, each with a first state and constant disturbances of its own that absorb what they can: at sea,
+    too, a difference shows in what happens next and not in what has summed up.
 
     Parameters
     ----------
@@ -116,8 +116,7 @@ def next_test(
     duration_s : float, optional
         Of the test; by default :data:`LENGTH` L/u0.
     correlation_s : float
-        Time constant of the readings' errors: readings count as one independent reading every 2 time constants (or
-        every :data:`READ_S`, if that is longer).
+        Time constant of the readings' errors: one independent reading every 2 of it (or :data:`READ_S`, if longer).
 
     Returns
     -------
@@ -125,21 +124,16 @@ def next_test(
     """
     if len(explanations) < 2:
         return None
-    models = [driven_model(one.card, "order") for one in explanations]
-    seen = {name: noise[name] for name in SEEN.values() if name in noise and all(name in model for model in models)}
-    ships = [_Ship(one, seen, correlation_s) for one in explanations]
+    ships = _ships(explanations, noise, correlation_s)
     length = LENGTH if duration_s is None else duration_s / ships[0].ship_time
     of = _with_headings(candidates(explanations[0].card, length), explanations)
     orders, motion = ships[0].sail(of, length)
-    foreseen = [ship.foreseen(of, orders, motion) for ship in ships]
-    each = [_lost(foreseen[0], other) for other in foreseen[1:]]
-    scores = np.min(each, axis=0)
-    if not np.isfinite(scores).any():
+    first, *others = (ship.foreseen(of, orders, motion) for ship in ships)
+    each = np.stack([_lost(first, other) for other in others])
+    if not np.isfinite(scores := each.min(axis=0)).any():
         return None
-    least = int(np.nanargmin(scores))
-    best = int(np.argmax(np.nan_to_num(scores) >= AS_GOOD * np.nanmax(scores)))
-    names, own = [one.name for one in explanations], [float(one[best]) for one in each]
-    why = _why(of[best], names, own, (float(scores[least]), of[least]))
+    best, least = _best_and_least(scores)
+    why = _why(of[best], [one.name for one in explanations], each[:, best], (float(scores[least]), of[least]))
     return NextTest(
         manoeuvre=of[best].manoeuvre or "file:next_test.csv",
         orders=orders_csv(ships[0].step_s, {name: values[best] for name, values in orders.items()}, why),
@@ -147,6 +141,19 @@ def next_test(
         expected={one.name: float(score) for one, score in zip(of, scores, strict=True) if np.isfinite(score)},
         sizes=_sizes(explanations),
     )
+
+
+def _ships(explanations: Sequence[Explanation], noise: Mapping[str, float], correlation_s: float) -> list[_Ship]:
+    """The ship of each explanation, with the sensors that there are and that all models know."""
+    models = [driven_model(one.card, "order") for one in explanations]
+    seen = {name: noise[name] for name in SEEN.values() if name in noise and all(name in model for model in models)}
+    return [_Ship(one, seen, correlation_s) for one in explanations]
+
+
+def _best_and_least(scores: Vector) -> tuple[int, int]:
+    """Places of the first manoeuvre that is as good as the best, and of the least telling."""
+    good = np.nan_to_num(scores) >= AS_GOOD * np.nanmax(scores)
+    return int(np.argmax(good)), int(np.nanargmin(scores))
 
 
 def _sizes(explanations: Sequence[Explanation]) -> dict[str, tuple[Mapping[str, float], Mapping[str, float]]]:
@@ -185,7 +192,7 @@ def _with_headings(of: Sequence[Candidate], explanations: Sequence[Explanation])
     return [*of, *(on_heading(one, math.pi / 2) for one in of if one.on_course)] if directed else list(of)
 
 
-def _why(best: Candidate, names: Sequence[str], each: Sequence[float], least: tuple[float, Candidate]) -> str:
+def _why(best: Candidate, names: Sequence[str], each: Vector, least: tuple[float, Candidate]) -> str:
     """What a manoeuvre would tell: the root of a score is a difference in standard deviations of the noise."""
     first, *rivals = names
     apart = " and ".join(f"{math.sqrt(score):.2g} from {name}" for score, name in zip(each, rivals, strict=True))

@@ -10,6 +10,7 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tank2sim.records.thinning import thin_line
 from tank2sim.report.appearance import CROSS
 from tank2sim.report.chart_parts import (
     LINE_SAMPLES,
@@ -28,7 +29,6 @@ from tank2sim.report.chart_parts import (
     stacked,
     vector,
 )
-from tank2sim.report.thinning import thin_line
 
 
 @dataclass(frozen=True, kw_only=True)

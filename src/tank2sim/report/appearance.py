@@ -88,8 +88,15 @@ def vega_config(tone: Tone) -> Config:
         | {"labelColor": tone.muted, "labelFontSize": 11.5, "labelFlush": False}
         | {"titleColor": tone.ink, "titleFontSize": 12, "titleFontWeight": 500, "titlePadding": 8},
         "header": {"labelColor": tone.ink, "labelFontSize": 12, "labelFontWeight": 600, "title": None},
-        "legend": {"orient": "top", "title": None, "labelColor": tone.ink, "labelFontSize": 12, "labelLimit": 320}
-        | {"symbolSize": 90, "symbolStrokeWidth": 2, "columnPadding": 22, "offset": 8, "labelOffset": 8}
+        "legend": {"orient": "top", "title": None, "labelColor": tone.ink, "titleColor": tone.ink, "labelFontSize": 12}
+        | {
+            "labelLimit": 320,
+            "symbolSize": 90,
+            "symbolStrokeWidth": 2,
+            "columnPadding": 22,
+            "offset": 8,
+            "labelOffset": 8,
+        }
         | {"layout": {"top": {"anchor": "start", "direction": "horizontal", "margin": 30}}},
         "line": {"strokeWidth": 1.8, "strokeCap": "butt", "strokeJoin": "round"},
         "point": {"size": 32, "strokeWidth": 1.4, "filled": False, "opacity": 1},

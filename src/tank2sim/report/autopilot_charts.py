@@ -10,6 +10,7 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tank2sim.records.thinning import thin_line
 from tank2sim.report.analysis_charts import FrequencyResponse
 from tank2sim.report.appearance import CROSS
 from tank2sim.report.chart_parts import (
@@ -22,7 +23,6 @@ from tank2sim.report.chart_parts import (
     series_look,
     vector,
 )
-from tank2sim.report.thinning import thin_line
 
 _HALF = 2.5
 """Half of the height of a Nyquist chart: what lies farther from the critical point endangers nothing (ours)."""

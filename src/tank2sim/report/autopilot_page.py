@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
-from tank2sim.analysis.heading.margins import LoopMargins, closed_loop_transfer, loop_transfer
 from tank2sim.analysis.heading.study import AutopilotStudy
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.files import plain_json
+from tank2sim.records.thinning import Vector
 from tank2sim.report.analysis_charts import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
 from tank2sim.report.autopilot_charts import (
     CrossTrack,
@@ -21,78 +21,72 @@ from tank2sim.report.autopilot_charts import (
 )
 from tank2sim.report.motion_charts import History, Signal, Track, history_chart, track_chart
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
-from tank2sim.simulation.trajectory import Trajectory
+from tank2sim.report.result_values import Json, quantities
 
 HIGHEST_PEAK = 2.0
 """Ms above which a loop is thought to be weak: Astrom & Hagglund (2006), Advanced PID Control, take 1.2 to 2."""
 
-_DECADES = (-2.0, 1.3)
-"""What frequencies are shown, in decades from the crossover."""
-
-_WAVES_SHOWN = 40
-"""Of course keeping: more are a smear."""
-
 _SIGNALS = (
-    Signal(name="motion.psi", title="heading", unit="rad"),
-    Signal(name="rudder.angle", title="rudder", unit="rad"),
-    Signal(name="motion.r", title="yaw rate", unit="rad/s"),
+    Signal(name="psi_deg", title="heading", unit="rad"),
+    Signal(name="delta_deg", title="rudder", unit="rad"),
+    Signal(name="r_degps", title="yaw rate", unit="rad/s"),
 )
 
 
-def autopilot_page(ship: Model, study: AutopilotStudy) -> Page:
-    """The page.
+def autopilot_page(study: AutopilotStudy) -> Page:
+    """The page."""
+    return piloted_page(plain_json(study.as_json()))
 
-    Parameters
-    ----------
-    ship : Model
-        That the study is of, without its weather.
-    study : AutopilotStudy
-    """
-    sections = [_controller(study), _loop(ship, study), _calm(study), _weather(study)]
-    if study.tracks:
-        sections.append(_track(study))
-    if study.notices:
-        sections.append(Section(heading="Notes", notes=study.notices))
+
+def piloted_page(found: Json) -> Page:
+    """The page, from what JSON has of an :class:`AutopilotStudy`."""
+    sections = [_controller(found), _loop(found), _calm(found), _weather(found)]
+    if found["track"]:
+        sections.append(_track(found))
+    if exported := found.get("export"):
+        sections.append(_exported(exported))
+    if found["notices"]:
+        sections.append(Section(heading="Notes", notes=found["notices"]))
     return Page(
-        title=f"{study.design.found.name}: heading autopilot",
-        subtitle=study.design.source,
-        figures=_figures(study),
+        title=f"{found['ship']}: heading autopilot",
+        subtitle=found["source"],
+        figures=_figures(found),
         sections=sections,
     )
 
 
-def _figures(study: AutopilotStudy) -> list[Figure]:
-    first, change = study.margins[0], study.changes["change"]
-    peak = Verdict.PASSED if first.sensitivity_peak <= HIGHEST_PEAK else Verdict.CAUTION
-    stable = all(one.stable for one in study.margins)
+def _figures(found: Json) -> list[Figure]:
+    first, speeds = found["margins"]["at_design"], found["margins"]["at_speeds"]
+    change, keeping = found["closed_loop"]["course_changes"]["change"], found["closed_loop"]["course_keeping"]
+    peak = Verdict.PASSED if first["sensitivity_peak"] <= HIGHEST_PEAK else Verdict.CAUTION
+    stable = sum(one["stable"] for one in speeds)
     return [
-        Figure(label="Phase margin", value=first.phase_margin_deg, unit="deg"),
-        Figure(label="Ms", value=first.sensitivity_peak, verdict=peak, note=f"no more than {HIGHEST_PEAK:g}"),
-        Figure(label="Delay margin", value=first.delay_margin_s, unit="s"),
+        Figure(label="Phase margin", value=first["phase_margin_deg"], unit="deg"),
+        Figure(label="Ms", value=first["sensitivity_peak"], verdict=peak, note=f"no more than {HIGHEST_PEAK:g}"),
+        Figure(label="Delay margin", value=first["delay_margin_s"], unit="s"),
         Figure(
             label="Stable",
-            value=f"{sum(one.stable for one in study.margins)} of {len(study.margins)}",
-            verdict=Verdict.PASSED if stable else Verdict.FAILED,
-            note="speeds" if len(study.margins) > 1 else "speed of the design",
+            value=f"{stable} of {len(speeds)}",
+            verdict=Verdict.PASSED if stable == len(speeds) else Verdict.FAILED,
+            note="speeds" if len(speeds) > 1 else "speed of the design",
         ),
         Figure(
             label="Overshoot",
-            value=change.overshoot_deg,
+            value=change["overshoot_deg"],
             unit="deg",
-            note=f"in a change by {change.ordered_deg:.3g} deg",
+            note=f"in a change by {change['ordered_deg']:.3g} deg",
         ),
-        Figure(label="Heading error", value=study.keeping.heading_error_rms_deg, unit="deg", note="rms, in weather"),
+        Figure(label="Heading error", value=keeping["heading_error_rms_deg"], unit="deg", note="rms, in weather"),
     ]
 
 
-def _controller(study: AutopilotStudy) -> Section:
-    rows: list[list[Cell]] = [[name, value] for name, value in study.design.gains.items()]
-    nomoto = study.design.found.nomoto
+def _controller(found: Json) -> Section:
+    rows: list[list[Cell]] = [[name, value] for name, value in found["gains"].items()]
+    alone, limits = found["ship_alone"], found["limits"]
     text = (
-        f"The ship at {study.design.found.speed_mps:.4g} m/s: K = {nomoto.K_per_s:.4g} 1/s, T = {nomoto.T_s:.4g} s, "
-        f"{'stable' if study.design.found.stable else 'unstable'} on a straight course by herself."
+        f"The ship at {alone['speed_mps']:.4g} m/s: K = {alone['K_per_s']:.4g} 1/s, T = {alone['T_s']:.4g} s, "
+        f"{'stable' if alone['stable'] else 'unstable'} on a straight course by herself."
     )
-    limits = study.limits
     text += f"\n\nThe rudder is ordered no further than {limits['largest_rudder_deg']:.3g} deg either way."
     if "anti_windup_time_s" in limits:
         text += (
@@ -112,42 +106,55 @@ def _controller(study: AutopilotStudy) -> Section:
     )
 
 
-def _loop(ship: Model, study: AutopilotStudy) -> Section:
-    pilot, first = study.design.autopilot, study.margins[0]
-    shown = sorted({first.speed_mps, min(_speeds(study)), max(_speeds(study))}, key=lambda v: v != first.speed_mps)
-    loops, sensitivities = [], []
-    for speed in shown:
-        loop = loop_transfer(ship, pilot, speed)
-        omega = first.crossover_radps * np.logspace(*_DECADES, 1500)
-        value = np.asarray(loop(1j * omega)).ravel()
-        label = f"{speed:.3g} m/s"
-        loops.append(_from_the_near_end(label, omega, value))
-        sensitivities.append(FrequencyResponse(label=f"S, {label}", omega_radps=omega, response=1 / (1 + value)))
-        if speed == first.speed_mps:
-            heading = np.asarray(closed_loop_transfer(ship, pilot, speed)(1j * omega))[0].ravel()
-            closed = FrequencyResponse(label=f"heading by its order, {label}", omega_radps=omega, response=heading)
-    poles = [PolesZeros(label=f"{one.speed_mps:.3g} m/s", poles=_shown_poles(one)) for one in study.margins[:1]]
-    charts = [
+def _loop(found: Json) -> Section:
+    margins = found["margins"]["at_speeds"]
+    charts = loop_charts(found["responses"], margins[0])
+    poles = [complex(*pole) for pole in margins[0]["poles"]]
+    near = [pole for pole in poles if abs(pole) < 5 * margins[0]["crossover_radps"]]
+    drawn = [PolesZeros(label=f"{margins[0]['speed_mps']:.3g} m/s", poles=near)]
+    charts.append(
+        Illustration(
+            chart=pole_zero_chart(drawn, title="Poles of the closed loop"),
+            caption="Poles as slow as the ship are shown; those of the gear lie farther to the left.",
+        )
+    )
+    loop = found["closed_loop"]
+    limits = {"rate of the gear": "largest_step_within_rate_limit_deg"}
+    limits |= {"largest rudder": "largest_step_within_angle_limit_deg"}
+    steps = [f"{loop[key]:.3g} deg ({name})" for name, key in limits.items() if loop[key] is not None]
+    linear = f" Changes of course stay linear up to {' and '.join(steps)}." if steps else ""
+    text = f"The ship with her steering gear, linearised at each speed, and the gains of the design.{linear}"
+    return Section(heading="Loop", text=text, tables=[_margins(margins)], charts=charts)
+
+
+def loop_charts(responses: Sequence[Mapping[str, Json]], first: Mapping[str, Json]) -> list[Illustration]:
+    """Bode diagram, Nyquist curve and sensitivities; `first` are the margins at the speed of the design."""
+    loops, sensitivities, closed = [], [], []
+    for one in responses:
+        omega, label = np.array(one["omega_radps"], dtype=float), f"{one['speed_mps']:.3g} m/s"
+        loop, heading = (_complex(one, name) for name in ("loop", "heading"))
+        loops.append(_from_the_near_end(label, omega, loop))
+        sensitivities.append(FrequencyResponse(label=f"S, {label}", omega_radps=omega, response=1 / (1 + loop)))
+        if one["speed_mps"] == first["speed_mps"]:
+            label = f"heading by its order, {label}"
+            closed.append(FrequencyResponse(label=label, omega_radps=omega, response=heading))
+    return [
         Illustration(chart=bode_chart(loops, title="Loop transfer"), caption="Broken at the rudder order."),
         Illustration(
-            chart=nyquist_chart(loops, first.sensitivity_peak, title="Nyquist curve"),
+            chart=nyquist_chart(loops, first["sensitivity_peak"], title="Nyquist curve"),
             caption="Cross: the critical point. Red: the circle 1/Ms about it.",
         ),
         Illustration(
-            chart=sensitivity_chart([*sensitivities, closed], title="Sensitivity and closed loop"),
+            chart=sensitivity_chart([*sensitivities, *closed], title="Sensitivity and closed loop"),
             caption="S above 0 dB: what the loop makes worse. Waves should lie to the right of its peak.",
         ),
-        Illustration(
-            chart=pole_zero_chart(poles, title="Poles of the closed loop"),
-            caption="Poles as slow as the ship are shown; those of the gear lie farther to the left.",
-        ),
     ]
-    steps = [math.degrees(one) for one in (study.steps.within_rate_rad, study.steps.within_angle_rad)]
-    text = (
-        "The ship with her steering gear, linearised at each speed, and the gains of the design. Changes of course "
-        f"stay linear up to {steps[0]:.3g} deg (rate of the gear) and {steps[1]:.3g} deg (largest rudder)."
-    )
-    return Section(heading="Loop", text=text, tables=[_margins(study.margins)], charts=charts)
+
+
+def _complex(one: Mapping[str, Json], name: str) -> NDArray[np.complex128]:
+    parts = (np.array(one[f"{name}_{part}"], dtype=float) for part in ("real", "imaginary"))
+    real, imaginary = parts
+    return np.asarray(real + 1j * imaginary)
 
 
 def _from_the_near_end(label: str, omega: Vector, value: NDArray[np.complex128]) -> FrequencyResponse:
@@ -165,15 +172,7 @@ def _from_the_near_end(label: str, omega: Vector, value: NDArray[np.complex128])
     return FrequencyResponse(label=label, omega_radps=omega[last::-1], response=value[last::-1])
 
 
-def _speeds(study: AutopilotStudy) -> list[float]:
-    return [one.speed_mps for one in study.margins]
-
-
-def _shown_poles(margins: LoopMargins) -> list[complex]:
-    return [pole for pole in margins.poles if abs(pole) < 5 * margins.crossover_radps]
-
-
-def _margins(margins: Sequence[LoopMargins]) -> Table:
+def _margins(margins: Sequence[Mapping[str, Json]]) -> Table:
     columns = [
         Column(title="speed", unit="m/s"),
         Column(title="gain may grow by", digits=3),
@@ -184,28 +183,25 @@ def _margins(margins: Sequence[LoopMargins]) -> Table:
         Column(title="bandwidth", unit="rad/s", digits=3),
         Column(title="stable"),
     ]
+    keys = ("gain_margin_down", "phase_margin_deg", "delay_margin_s", "sensitivity_peak", "bandwidth_radps", "stable")
     rows: list[list[Cell]] = [
         [
-            one.speed_mps,
-            one.gain_margin_up if math.isfinite(one.gain_margin_up) else "any",
-            one.gain_margin_down,
-            one.phase_margin_deg,
-            one.delay_margin_s,
-            one.sensitivity_peak,
-            one.bandwidth_radps,
-            one.stable,
+            one["speed_mps"],
+            "any" if one["gain_margin_up"] is None else one["gain_margin_up"],
+            *(one[key] for key in keys),
         ]
         for one in margins
     ]
     return Table(caption="Margins, the first at the speed of the design", columns=columns, rows=rows)
 
 
-def _history(label: str, run: Trajectory, begin_s: float = 0.0) -> History:
-    part = run.t >= begin_s
-    return History(label=label, time_s=run.t[part], values={one.name: run[one.name][part] for one in _SIGNALS})
+def _history(label: str, columns: Mapping[str, Json]) -> History:
+    values = {one.name: np.radians(np.array(columns[one.name], dtype=float)) for one in _SIGNALS}
+    return History(label=label, time_s=columns["t_s"], values=values)
 
 
-def _calm(study: AutopilotStudy) -> Section:
+def _calm(found: Json) -> Section:
+    changes = found["closed_loop"]["course_changes"]
     columns = [
         Column(title="run"),
         Column(title="ordered", unit="deg", digits=3),
@@ -215,13 +211,13 @@ def _calm(study: AutopilotStudy) -> Section:
         Column(title="largest rudder", unit="deg", digits=3),
         Column(title="at full rate", unit="s", digits=3),
     ]
-    rows: list[list[Cell]] = [[name, *vars(one).values()] for name, one in study.changes.items()]
-    large = [_history(name, run) for name, run in study.runs.items() if name.startswith("large")]
-    ordinary = f"{study.changes['change'].ordered_deg:.3g} deg"
+    rows: list[list[Cell]] = [[name, *one.values()] for name, one in changes.items()]
+    large = [_history(name, one) for name, one in found["histories"].items() if name.startswith("large")]
+    ordinary = f"{changes['change']['ordered_deg']:.3g} deg"
     charts = [
         Illustration(
             chart=history_chart(
-                [_history("change", study.runs["change"])], _SIGNALS, title=f"Course change by {ordinary}"
+                [_history("change", found["histories"]["change"])], _SIGNALS, title=f"Course change by {ordinary}"
             )
         ),
         Illustration(
@@ -231,7 +227,7 @@ def _calm(study: AutopilotStudy) -> Section:
     ]
     text = (
         "On the nonlinear model with the limits of the gear, in calm water, from a course that the autopilot has kept: "
-        f"it holds the {study.design.found.rudder_deg:.3g} deg of rudder that the ship needs for it."
+        f"it holds the {found['ship_alone']['rudder_deg']:.3g} deg of rudder that the ship needs for it."
     )
     return Section(
         heading="Course changes",
@@ -241,33 +237,31 @@ def _calm(study: AutopilotStudy) -> Section:
     )
 
 
-def _weather(study: AutopilotStudy) -> Section:
-    weather, kept = study.weather, study.keeping
+def _weather(found: Json) -> Section:
+    weather, kept = found["weather"], found["closed_loop"]["course_keeping"]
     text = (
-        f"Steering north in a current of {weather.current_mps:.3g} m/s towards "
-        f"{math.degrees(weather.current_towards_rad):.0f} deg, wind of {weather.wind_mps:.3g} m/s from "
-        f"{math.degrees(weather.wind_from_rad):.0f} deg, and waves of {weather.wave_radps:.3g} rad/s that alone would "
-        f"yaw the ship by {math.degrees(weather.wave_yaw_rad):.3g} deg (standard deviation); seed {weather.seed}."
+        f"Steering north in a current of {weather['current_mps']:.3g} m/s towards "
+        f"{weather['current_towards_deg']:.0f} deg, wind of {weather['wind_mps']:.3g} m/s from "
+        f"{weather['wind_from_deg']:.0f} deg, and waves of {weather['wave_radps']:.3g} rad/s that alone would "
+        f"yaw the ship by {weather['wave_yaw_deg']:.3g} deg (standard deviation); seed {weather['seed']}."
     )
     columns = [Column(title="figure"), Column(title="value"), Column(title="unit")]
     rows: list[list[Cell]] = [
-        ["heading error, rms", kept.heading_error_rms_deg, "deg"],
-        ["heading error, mean", kept.heading_error_mean_deg, "deg"],
-        ["integral of heading error squared", kept.heading_error_deg2s, "deg² s"],
-        ["rudder about its mean, rms", kept.rudder_rms_deg, "deg"],
-        ["integral of rudder squared", kept.rudder_deg2s, "deg² s"],
-        ["rudder on the move, mean", kept.rudder_travel_degps, "deg/s"],
-        ["at full rate", kept.rate_limited_percent, "%"],
+        ["heading error, rms", kept["heading_error_rms_deg"], "deg"],
+        ["heading error, mean", kept["heading_error_mean_deg"], "deg"],
+        ["integral of heading error squared", kept["heading_error_deg2s"], "deg² s"],
+        ["rudder about its mean, rms", kept["rudder_rms_deg"], "deg"],
+        ["integral of rudder squared", kept["rudder_deg2s"], "deg² s"],
+        ["rudder on the move, mean", kept["rudder_travel_degps"], "deg/s"],
+        ["at full rate", kept["rate_limited_percent"], "%"],
     ]
-    run = study.runs["keeping"]
-    begin = run.t[-1] - _WAVES_SHOWN * 2 * math.pi / weather.wave_radps
-    chart = history_chart([_history("course keeping", run, begin)], _SIGNALS, title="Course keeping, the last waves")
-    table = Table(caption=f"Over the last {kept.duration_s:.0f} s", columns=columns, rows=rows)
+    history = _history("course keeping", found["histories"]["keeping"])
+    chart = history_chart([history], _SIGNALS, title="Course keeping, the last waves")
+    table = Table(caption=f"Over the last {kept['duration_s']:.0f} s", columns=columns, rows=rows)
     return Section(heading="Course keeping", text=text, tables=[table], charts=[Illustration(chart=chart)])
 
 
-def _track(study: AutopilotStudy) -> Section:
-    assert study.waypoints is not None
+def _track(found: Json) -> Section:
     columns = [
         Column(title="guidance"),
         Column(title="length", unit="m"),
@@ -278,14 +272,12 @@ def _track(study: AutopilotStudy) -> Section:
         Column(title="largest on legs", unit="m", digits=3),
         Column(title="what stays", unit="m", digits=3),
     ]
-    rows: list[list[Cell]] = [[name, *vars(one.figures).values()] for name, one in study.tracks.items()]
-    sailed = [
-        Track(label=name, x_m=one.trajectory["motion.x"], y_m=one.trajectory["motion.y"], time_s=one.trajectory.t)
-        for name, one in study.tracks.items()
-    ]
-    points = study.waypoints
+    rows: list[list[Cell]] = [[name, *one.values()] for name, one in found["track"].items()]
+    runs = found["track_histories"].items()
+    sailed = [Track(label=name, x_m=one["x_m"], y_m=one["y_m"], time_s=one["t_s"]) for name, one in runs]
+    points = np.array(found["waypoints_m"], dtype=float)
     wanted = Track(label="waypoints", x_m=points[:, 0], y_m=points[:, 1], time_s=np.zeros(len(points)), measured=True)
-    errors = [CrossTrack(label=name, time_s=one.time_s, error_m=one.error_m) for name, one in study.tracks.items()]
+    errors = [CrossTrack(label=name, time_s=one["t_s"], error_m=one["cross_track_error_m"]) for name, one in runs]
     text = (
         "Line of sight with lookahead, in the current and the wind of the course keeping. Errors leap where a leg "
         "ends, for the next one counts from there; those on legs are of the second half of each."
@@ -299,3 +291,8 @@ def _track(study: AutopilotStudy) -> Section:
             Illustration(chart=cross_track_chart(errors, title="Cross-track error")),
         ],
     )
+
+
+def _exported(exported: Mapping[str, Json]) -> Section:
+    values = {key: value for key, value in exported.items() if not isinstance(value, list | dict)}
+    return Section(heading="FMU", tables=[quantities("The controller as an FMU", values)])

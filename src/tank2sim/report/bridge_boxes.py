@@ -1,15 +1,19 @@
 """What stands on the pilot card and the wheelhouse poster: boxes of labelled values, after IMO A.601(15).
 
-A value that the card does not tell is None: the page then has a line to be filled in by hand. Nothing is guessed.
+A value that the card does not tell is None: the page then has a line to be filled in by hand. A figure whose manoeuvre
+leaves the card's range is OUTSIDE, and not printed: on a bridge a wrong number is worse than a blank.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import Enum
 
-from tank2sim.analysis.practice.bridge import Bridge, ShipTrack, Telegraph, quarter
+from tank2sim.analysis.practice.bridge import ORDERS_AHEAD, Bridge, Telegraph
+from tank2sim.analysis.practice.card_range import Reading
+from tank2sim.analysis.practice.ship_track import ShipTrack, quarter
 from tank2sim.report.bridge_drawings import clock, knots, metres
 from tank2sim.simulation.manoeuvres import FULL_ASTERN
 from tank2sim.units import KNOT_MPS
@@ -17,17 +21,27 @@ from tank2sim.units import KNOT_MPS
 HEELS_DEG = (2, 4, 8, 12, 16)
 """Heel angles of the poster's table of draught increase."""
 
-ORDERS_AHEAD = ("Full sea speed", "Full ahead", "Half ahead", "Slow ahead", "Dead slow ahead")
 ORDERS_ASTERN = ("Dead slow astern", "Slow astern", "Half astern", "Full astern")
 
-Value = str | None
+
+class Blank(Enum):
+    """What stands in place of a value."""
+
+    OUTSIDE = "outside the range of the card"
+
+
+OUTSIDE = Blank.OUTSIDE
+Value = str | Blank | None
+
+NOT_FOR_USE = "Hatched: outside the range of the card, which is not for use there. Fill in from trials."
+"""The words under a table with such figures."""
 
 
 @dataclass(frozen=True)
 class Row:
     """A label and its values; None is a blank to be filled in by hand."""
 
-    label: Value
+    label: str | None
     values: tuple[Value, ...]
 
 
@@ -40,8 +54,13 @@ class Box:
     heads: tuple[str, ...] = ()
     note: str = ""
 
+    @property
+    def caution(self) -> str:
+        """What the reader must not miss."""
+        return NOT_FOR_USE if any(OUTSIDE in row.values for row in self.rows) else ""
 
-def _number(value: float | None, unit: str, digits: int = 4) -> Value:
+
+def _number(value: float | None, unit: str, digits: int = 4) -> str | None:
     space = "" if unit == "°" else " "
     return None if value is None else f"{value:.{digits}g}{space}{unit}".strip()
 
@@ -52,20 +71,41 @@ def conditions(bridge: Bridge, other: Bridge | None) -> tuple[str, str]:
 
 
 def draughts(bridge: Bridge, other: Bridge | None) -> Box:
-    """Draughts at which the data were obtained: a card has the mean one alone."""
-    means = tuple(_number(one.card.ship.draught_m, "m") if one else None for one in (bridge, other))
-    source = tuple("estimated" if one else None for one in (bridge, other))
+    """Draughts at which the data were obtained, and what else is of those draughts: a card has the mean one alone."""
+    ships = tuple(one.card.ship if one else None for one in (bridge, other))
     rows = (
         Row("Forward", (None, None)),
         Row("Aft", (None, None)),
-        Row("Mean", means),
-        Row("Trial / estimated", source),
+        Row("Mean", tuple(_number(one.draught_m, "m") if one else None for one in ships)),
+        Row("Displacement", tuple(_tonnes(one.displacement_kg) if one else None for one in ships)),
+        Row("Block coefficient", tuple(_number(one.block_coefficient, "") if one else None for one in ships)),
+        Row("Trial / estimated", tuple("estimated" if one else None for one in ships)),
     )
     return Box("Draught of the manoeuvring data", rows, conditions(bridge, other))
 
 
-def steering(bridge: Bridge) -> Box:
-    """Steering particulars."""
+def _tonnes(kilograms: float | None) -> str | None:
+    if kilograms is None:
+        return None
+    tonnes = kilograms / 1000
+    return f"{tonnes:.4g} t" if tonnes < 100 else f"{tonnes:.0f} t"
+
+
+def present_condition() -> Box:
+    """The ship as she is today: the pilot card is of that, and no card knows it."""
+    return Box("Present draught", tuple(Row(label, (None,)) for label in ("Forward", "Aft", "Displacement")))
+
+
+def anchors(*more: str) -> Box:
+    """Anchor chain; `more` are heads beside the number of shackles."""
+    blanks = (None,) * (1 + len(more))
+    rows = tuple(Row(where, blanks) for where in ("Port", "Starboard", "Stern"))
+    last = Row("1 shackle, m", (None,))
+    return Box("Anchor chain", (*rows, last), ("shackles", *more))
+
+
+def steering(bridge: Bridge, *, units: bool = True) -> Box:
+    """Steering particulars; with `units` the times with one and two power units are asked for."""
     gear = bridge.card.steering_gear
     largest = math.degrees(gear.max_angle_rad) if gear and gear.max_angle_rad else None
     neutral = None
@@ -76,57 +116,57 @@ def steering(bridge: Bridge) -> Box:
     rows = (
         Row("Type of rudder(s)", (None,)),
         Row("Maximum rudder angle", (_number(largest, "°"),)),
-        Row("Hard-over to hard-over (gear of the card)", (over,)),
-        Row("with one / two power units", (None,)),
+        Row("Hard-over to hard-over (card's gear)", (over,)),
+        *(Row(f"with {count} power unit{end}", (None,)) for count, end in (("one", ""), ("two", "s")) if units),
         Row("Rudder angle for neutral effect", (neutral,)),
-        Row("Minimum speed to keep course, propeller stopped", (None,)),
+        Row("Least speed to keep course, propeller stopped", (None,)),
     )
     return Box("Steering particulars", rows)
 
 
 def telegraph(bridge: Bridge, other: Bridge | None) -> Box:
     """Engine orders with revolutions and steady speeds straight ahead; astern by hand."""
-    rows: list[Row] = []
-    named = any(one.order for one in bridge.telegraph)
-    for place, one in enumerate(bridge.telegraph):
-        speeds = tuple(_speed(side.telegraph, place) if side else None for side in (bridge, other))
-        rows.append(Row(one.order or None, (f"{one.rpm:.4g}", *speeds)))
-    if not bridge.telegraph:
-        rows = [Row(order, (None, None, None)) for order in ORDERS_AHEAD]
-        rows[0] = Row(ORDERS_AHEAD[0], (None, f"({knots(bridge.card.model.speed_mps)} approach)", None))
+    given = {one.order.casefold(): one for one in bridge.telegraph if one.order}
+    known = {order.casefold(): order for order in ORDERS_AHEAD}
+    rows = [Row(None, _speeds(one, other)) for one in bridge.telegraph if not one.order]
+    if not rows:
+        blank = (None, None, None)
+        rows = [Row(name, _speeds(given[key], other) if key in given else blank) for key, name in known.items()]
+    rows += [Row(one.order, _speeds(one, other)) for key, one in given.items() if key not in known]
     rows += [Row(order, (None, None, None)) for order in ORDERS_ASTERN]
     first, second = conditions(bridge, other)
-    heads = ("Rpm / pitch", f"kn, {first}", f"kn, {second}")
     note = ""
-    if bridge.telegraph:
+    if any(one.speed_mps is not None for one in bridge.telegraph):
         note = "Steady speed straight ahead in deep calm water."
-        note += "" if named else " The ship's own names of these revolutions are to be filled in."
-        outside = any(not one.within for one in bridge.telegraph)
-        note += " * outside the card's range of speeds." if outside else ""
-    return Box("Engine order", tuple(rows), heads, note)
+        note += "" if given else " The ship's own names of these revolutions are to be filled in."
+    return Box("Engine order", tuple(rows), ("Rpm / pitch", f"kn, {first}", f"kn, {second}"), note)
 
 
-def _speed(rows: Sequence[Telegraph], place: int) -> Value:
-    if place >= len(rows) or rows[place].speed_mps is None:
+def _speeds(one: Telegraph, other: Bridge | None) -> tuple[Value, ...]:
+    """Revolutions, speed, and the other condition's speed at the same revolutions."""
+    same = (row for row in other.telegraph if math.isclose(row.rpm, one.rpm)) if other else ()
+    rpm = f"{one.rpm:.0f}" if one.rpm >= 100 else f"{one.rpm:.3g}"
+    return (rpm, _speed(one), _speed(next(iter(same), None)))
+
+
+def _speed(one: Telegraph | None) -> Value:
+    if one is None or one.speed_mps is None:
         return None
-    speed = rows[place].speed_mps
-    assert speed is not None
-    return knots(speed) + ("" if rows[place].within else " *")
+    return knots(one.speed_mps) if one.within else OUTSIDE
 
 
-def engine(bridge: Bridge) -> Box:
-    """Propulsion particulars: none of them is on a card."""
+def engine(*, poster: bool) -> Box:
+    """Propulsion particulars as the form of the poster or of the pilot card asks: none of them is on a card."""
     labels = (
-        "Type of engine, kW (HP)",
+        "Type of engine, kW (HP)" if poster else "Type of engine, maximum kW (HP)",
         "Type of propeller",
         "Critical revolutions",
         "Minimum rpm, knots",
         "Time limit astern",
-        "Time limit at minimum revolutions",
-        "Emergency full ahead to full astern",
-        "Stop to full astern",
+        *(("Time limit at minimum revolutions", "Emergency full ahead to full astern") if poster else ()),
+        "Stop to full astern" if poster else "Full ahead to full astern",
         "Astern power, % ahead",
-        "Maximum number of consecutive starts",
+        "Maximum of consecutive starts",
     )
     return Box("Propulsion particulars", tuple(Row(label, (None,)) for label in labels))
 
@@ -139,80 +179,144 @@ def turning(bridge: Bridge, circles: Sequence[ShipTrack]) -> Box:
         ("Tactical diameter", "tactical_diameter_m"),
         ("Final diameter", "steady_diameter_m"),
     )
-    rows = [Row(label, tuple(_distance(bridge, one.figures.get(name)) for one in circles)) for label, name in names]
-    for heading in (90, 180, 360):
-        marks = [quarter(one, heading) for one in circles]
-        rows.append(Row(f"Time to {heading}°", tuple(clock(one.time_s) if one else None for one in marks)))
-    speeds = [one.figures.get("steady_speed_mps") for one in circles]
-    rows.append(Row("Final speed", tuple(None if one is None else f"{knots(one)} kn" for one in speeds)))
+    length = bridge.card.ship.length_m
+    rows = [
+        Row(label, tuple(_told(one.reading, name, lambda value: _distance(value, length)) for one in circles))
+        for label, name in names
+    ]
+    rows += [Row(f"Time to {heading}°", tuple(_time_to(one, heading) for one in circles)) for heading in (90, 180, 360)]
+    speeds = (_told(one.reading, "steady_speed_mps", lambda value: f"{knots(value)} kn") for one in circles)
+    rows.append(Row("Final speed", tuple(speeds)))
     return Box("", tuple(rows), tuple(one.name for one in circles))
 
 
-def _distance(bridge: Bridge, value: float | None) -> Value:
-    if value is None:
-        return None
-    return f"{metres(value)} m ({value / bridge.card.ship.length_m:.2f} L)"
+def _told(one: Reading, name: str, words: Callable[[float], str]) -> Value:
+    """A figure in words, if the card holds for it."""
+    if one.outside(name):
+        return OUTSIDE
+    return words(one.figures[name]) if name in one.figures else None
+
+
+def _time_to(circle: ShipTrack, heading_deg: float) -> Value:
+    mark = quarter(circle, heading_deg)
+    if mark is None:
+        return OUTSIDE if circle.left else None
+    return OUTSIDE if circle.outside(mark) else clock(mark.time_s)
+
+
+def _distance(value: float, length: float) -> str:
+    return f"{metres(value)} m ({value / length:.2f} L)"
 
 
 def stopping(bridge: Bridge) -> Box:
-    """Full astern from the speeds of the telegraph, and the engine stopped."""
-    rows = [
-        Row(
-            f"{one.order} ({knots(one.speed_mps)} kn)",
-            (_distance(bridge, one.track_reach_m), None if one.time_s is None else clock(one.time_s)),
-        )
-        for one in bridge.stops_from
-    ]
-    if not rows:
-        rows = [Row(f"{order} to full astern", (None, None)) for order in ORDERS_AHEAD]
+    """Full astern from the speeds of the telegraph."""
+    known = {order.casefold(): order for order in ORDERS_AHEAD}
+    given: dict[str, Row] = {}
+    for one in bridge.stops_from:
+        reach = None if one.track_reach_m is None else _distance(one.track_reach_m, bridge.card.ship.length_m)
+        time = None if one.time_s is None else clock(one.time_s)
+        values = (reach, time) if one.within else (OUTSIDE, OUTSIDE)
+        key = one.order.casefold()
+        given[key] = Row(f"{known.get(key, one.order)} ({knots(one.speed_mps)} kn)", values)
+    named = not given or any(one.order for one in bridge.telegraph)
+    rows = [given.pop(key, Row(order, (None, None))) for key, order in known.items()] if named else []
+    rows += list(given.values())
     note = ""
     if bridge.stops:
         lag = (
             "with the card's engine lag" if any(one.name == "engine_lag" for one in bridge.card.effects) else "at once"
         )
         note = (
-            f"{FULL_ASTERN:.0%} of the nominal revolutions astern, {lag}: an assumption of the simulation, to be "
-            "replaced by trials. From orders slower than the card's range of speeds: not told."
+            f"Simulated with {FULL_ASTERN:.0%} of the nominal revolutions astern, {lag}: an assumption, to be replaced "
+            "by trials."
         )
     return Box("Full astern from", tuple(rows), ("track reach", "time"), note)
 
 
 def zigzags(bridge: Bridge) -> Box:
-    """Overshoots, and the initial turning distance of the 10/10 zigzag."""
-    rows = []
-    for name, figures in bridge.zigzags.items():
-        overshoots = tuple(_number(figures.get(f"overshoot_{one}_deg"), "°", 3) for one in (1, 2))
-        distance = figures.get("initial_turning_distance_m")
-        rows.append(Row(name, (*overshoots, _distance(bridge, distance))))
+    """Overshoots, and the initial turning distance of the zigzags."""
+    length = bridge.card.ship.length_m
+    rows = [
+        Row(
+            name,
+            (
+                *(_told(one, f"overshoot_{place}_deg", lambda value: f"{value:.3g}°") for place in (1, 2)),
+                _told(one, "initial_turning_distance_m", lambda value: _distance(value, length)),
+            ),
+        )
+        for name, one in bridge.zigzags.items()
+    ]
     return Box("Zigzags and initial turning", tuple(rows), ("1st overshoot", "2nd", "to first heading"))
 
 
 def draught_increase(bridge: Bridge) -> Box:
-    """By heel B/2 sin(phi), the geometry of a section with square bilges; squat is not on a card."""
+    """By heel B/2 sin(phi), the geometry of a section with square bilges."""
     beam = bridge.card.ship.beam_m
-    rows = [
-        Row(f"Heel {angle}°", (None if beam is None else f"{beam / 2 * math.sin(math.radians(angle)):.2f} m",))
-        for angle in HEELS_DEG
-    ]
-    rows += [Row("Squat: under-keel clearance, speed, bow", (None,))] * 2
-    note = "By heel: half the beam times its sine (square bilges)." if beam else ""
-    return Box("Draught increase", tuple(rows), note=note)
+    values = tuple(None if beam is None else f"{beam / 2 * math.sin(math.radians(one)):.3g} m" for one in HEELS_DEG)
+    note = "Half the beam times the sine of the heel (square bilges)." if beam else ""
+    return Box("Draught increase by heel", (Row("Heel", values),), tuple(f"{one}°" for one in HEELS_DEG), note)
+
+
+def squat() -> Box:
+    """Squat is not on a card."""
+    heads = ("under-keel clearance", "speed, kn", "bow squat")
+    return Box("Draught increase by squat (loaded), estimated", (Row("", (None,) * 3),) * 2, heads)
+
+
+def thrusters() -> Box:
+    """Of the poster; no card has them."""
+    heads = ("kW (HP)", "delay to full thrust", "turning rate at zero speed", "delay to reverse", "no effect above, kn")
+    rows = tuple(Row(where, (None,) * len(heads)) for where in ("Bow", "Stern", "Combined"))
+    return Box("Thruster effect at trial conditions", rows, heads)
+
+
+def overboard() -> Box:
+    """The sequence of actions of the poster."""
+    actions = (
+        "Cast a buoy",
+        "Give the helm order",
+        "Sound the alarm",
+        "Keep the look-out",
+        "Recovery turn, rudder reversed at",
+    )
+    rows = tuple(Row(f"{place}. {one}", (None,)) for place, one in enumerate(actions, start=1))
+    return Box("Man overboard rescue manoeuvre", rows)
+
+
+def visibility() -> Box:
+    """Of the poster; no card knows the wheelhouse."""
+    labels = ("Blind distance ahead, loaded", "Blind distance ahead, ballast", "Height of eye")
+    return Box("Visibility", tuple(Row(label, (None,)) for label in labels))
 
 
 def particulars(bridge: Bridge) -> tuple[Row, ...]:
-    """What the head of the poster and the pilot card tell of the ship."""
+    """The head of the poster. Whether the card is of the summer draught it does not say: those are left blank."""
     ship = bridge.card.ship
-    tonnes = None if ship.displacement_kg is None else ship.displacement_kg / 1000
     return (
         Row("Call sign", (None,)),
         Row("Gross tonnage", (None,)),
         Row("Net tonnage", (None,)),
-        Row("Deadweight", (None,)),
-        Row("Displacement", (None if tonnes is None else f"{tonnes:,.4g} t" if tonnes < 100 else f"{tonnes:.0f} t",)),
-        Row("Block coefficient", (_number(ship.block_coefficient, ""),)),
         Row("Length between perpendiculars", (_number(ship.length_m, "m", 5),)),
+        Row("Max. displacement, summer draught", (None,)),
+        Row("Deadweight, summer draught", (None,)),
+        Row("Block coefficient, summer draught", (None,)),
         Row("Breadth", (_number(ship.beam_m, "m"),)),
     )
+
+
+def of_the_ship(bridge: Bridge) -> Box:
+    """Particulars of the pilot card."""
+    ship = bridge.card.ship
+    rows = (
+        Row("Length overall", (None,)),
+        Row("Length between perpendiculars", (_number(ship.length_m, "m", 5),)),
+        Row("Breadth", (_number(ship.beam_m, "m"),)),
+        Row("Bulbous bow", ("☐ yes  ☐ no",)),
+        Row("Air draught", (None,)),
+        Row("Bow to bridge / bridge to stern", (None,)),
+        Row("Parallel waterline loaded / ballast", (None,)),
+    )
+    return Box("Ship's particulars", rows)
 
 
 def approach(bridge: Bridge) -> str:

@@ -6,12 +6,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tank2sim.analysis.practice.bridge import Mark, ShipTrack
-from tank2sim.report.thinning import thin_line
+from tank2sim.analysis.practice.ship_track import Mark, ShipTrack
+from tank2sim.records.thinning import thin_line
 from tank2sim.units import KNOT_MPS
 
 _MARGIN_MM = 5.0
 _POINTS = 400
+_CHARACTER_MM, _LINE_MM = 1.55, 2.8
+"""Width of a character of a label and height of a line, rather too much than too little."""
+_OFFSETS_MM = (1.6, 3.4, 5.5)
+"""Distances of a label from its point, the nearest preferred."""
+_FULL_TURN_DEG = 350.0
+"""From here on a circle is back among other lines: its label would be read as theirs, and the table has the time."""
 
 
 @dataclass(frozen=True)
@@ -87,44 +93,120 @@ def metres(distance: float) -> str:
     return f"{distance:.0f}" if abs(distance) >= 100 else f"{distance:.1f}"
 
 
+@dataclass(frozen=True)
+class _Block:
+    """A rectangle of paper, mm."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+
+    def meets(self, other: _Block) -> bool:
+        """True if both have paper in common."""
+        across = self.left < other.left + other.width and other.left < self.left + self.width
+        return across and self.top < other.top + other.height and other.top < self.top + self.height
+
+    def holds(self, x: float, y: float) -> bool:
+        """True if the point lies in it."""
+        return 0 <= x - self.left <= self.width and 0 <= y - self.top <= self.height
+
+
+@dataclass
+class _Labels:
+    """Places labels one by one: none over another, within the paper, and over as little of the tracks as may be."""
+
+    paper: _Block
+    points: list[tuple[float, float]]
+    taken: list[_Block]
+
+    def place(self, at: tuple[float, float], texts: Sequence[str], style: str = "word") -> list[Word]:
+        """The lines of a label near a point; none where there is no room, for the table has the numbers."""
+        width, height = _CHARACTER_MM * max(map(len, texts)), _LINE_MM * len(texts)
+        best: tuple[float, _Block] | None = None
+        for distance in _OFFSETS_MM:
+            for step in range(16):
+                angle = math.tau * step / 16
+                across, up = math.sin(angle), math.cos(angle)
+                middle = (at[0] + (distance + width / 2) * across, at[1] - (distance + height / 2) * up)
+                block = _Block(middle[0] - width / 2, middle[1] - height / 2, width, height)
+                if not self._is_free(block):
+                    continue
+                cost = sum(block.holds(*point) for point in self.points) + 3 * distance
+                if best is None or cost < best[0]:
+                    best = cost, block
+        if best is None:
+            return []
+        block = best[1]
+        self.taken.append(block)
+        x, y = block.left + width / 2, block.top + 0.8 * _LINE_MM
+        return [Word(x, y + _LINE_MM * line, text, "middle", style) for line, text in enumerate(texts)]
+
+    def _is_free(self, block: _Block) -> bool:
+        paper = self.paper
+        across = paper.left <= block.left and block.left + block.width <= paper.left + paper.width
+        within = across and paper.top <= block.top and block.top + block.height <= paper.top + paper.height
+        return within and not any(block.meets(other) for other in self.taken)
+
+
 def circles_drawing(
     circles: Sequence[ShipTrack], length_m: float, beam_m: float | None, *, width: float, height: float
 ) -> Drawing:
     """Both turning circles over a grid, with heading, time and speed at each quarter, and the ship at the order.
 
-    Her outline is to scale, and left out where the card has no beam.
+    A track ends where it leaves the card's range, and says so. Her outline is to scale, and left out where the card has
+    no beam.
     """
-    across = [float(one) for path in circles for one in path.starboard_m]
-    up = [float(one) for path in circles for one in path.ahead_m]
-    low = min(across), min(*up, -length_m / 2)
-    frame = _Frame(width, height, low, (max(across), max(up)))
+    across = [float(one) for path in circles for one in path.starboard_m[: path.inside]]
+    up = [float(one) for path in circles for one in path.ahead_m[: path.inside]]
+    frame = _Frame(width, height, (min(across), min(*up, -length_m / 2)), (max(across), max(*up, length_m / 2)))
     grid, numbers = _grid(frame)
-    lines, dots, words = list(grid), [], list(numbers)
+    lines, dots = list(grid), []
+    told: list[tuple[tuple[float, float], list[str], str]] = []
     for path in circles:
-        kept = thin_line([path.starboard_m, path.ahead_m], _POINTS)
-        points = frame.points(path.starboard_m[kept].tolist(), path.ahead_m[kept].tolist())
-        lines.append(Line(points, f"track {path.name}"))
-        side = 1 if path.name == "starboard" else -1
-        for place, mark in enumerate(path.marks):
-            at = frame.place(mark.starboard_m, mark.ahead_m)
+        ahead, starboard = path.ahead_m[: path.inside], path.starboard_m[: path.inside]
+        kept = thin_line([ahead, starboard], _POINTS)
+        lines.append(Line(frame.points(starboard[kept].tolist(), ahead[kept].tolist()), f"track {path.name}"))
+        for mark in path.marks:
+            if not path.outside(mark):
+                at = frame.place(mark.starboard_m, mark.ahead_m)
+                dots.append(at)
+                if mark.heading_change_deg < _FULL_TURN_DEG:
+                    told.append((at, _told(mark), "word"))
+        if path.left and path.inside < len(path.ahead_m):
+            at = frame.place(path.left.starboard_m, path.left.ahead_m)
             dots.append(at)
-            words += _label(mark, at, place, side)
+            told.append((at, ["range of the card ends", *_told(path.left)], "warn"))
+    labels = _Labels(_Block(0, 0, width, height), _sampled(frame, circles), _blocks(numbers, dots))
+    words = [*numbers, *(word for at, texts, style in told for word in labels.place(at, texts, style))]
     if beam_m:
         lines.append(Line(_outline(frame, length_m, beam_m), "ship"))
-    told = "; ".join(f"to {path.name}" for path in circles)
-    return Drawing(width, height, tuple(lines), tuple(dots), tuple(words), f"Turning circles {told}.")
+    sides = "; ".join(f"to {path.name}" for path in circles)
+    return Drawing(width, height, tuple(lines), tuple(dots), tuple(words), f"Turning circles {sides}.")
 
 
-def _label(mark: Mark, at: tuple[float, float], place: int, side: int) -> list[Word]:
-    """Two lines inside the circle, where there is room; none at the full turn, which is back among other lines."""
-    beside = "end" if side > 0 else "start"
-    moves = ((0.0, 4.0, "middle"), (-1.8 * side, -0.4, beside), (0.0, -4.6, "middle"))
-    if place >= len(moves):
-        return []
-    dx, dy, anchor = moves[place]
-    x, y = at[0] + dx, at[1] + dy
-    texts = f"{round(mark.heading_deg)}°  {clock(mark.time_s)}", f"{knots(mark.speed_mps)} kn"
-    return [Word(x, y + 2.8 * line, text, anchor) for line, text in enumerate(texts)]
+def _told(mark: Mark) -> list[str]:
+    return [f"{round(mark.heading_change_deg)}°  {clock(mark.time_s)}", f"{knots(mark.speed_mps)} kn"]
+
+
+def _sampled(frame: _Frame, circles: Sequence[ShipTrack]) -> list[tuple[float, float]]:
+    """Points along the tracks, on paper."""
+    points = []
+    for path in circles:
+        every = max(1, path.inside // _POINTS)
+        pairs = zip(path.starboard_m[: path.inside : every], path.ahead_m[: path.inside : every], strict=True)
+        points += [frame.place(float(across), float(up)) for across, up in pairs]
+    return points
+
+
+def _blocks(words: Sequence[Word], dots: Sequence[tuple[float, float]]) -> list[_Block]:
+    """What numbers of the grid and dots cover."""
+    found = [_Block(x - 1, y - 1, 2, 2) for x, y in dots]
+    for word in words:
+        width = _CHARACTER_MM * len(word.text)
+        left = word.x - {"start": 0.0, "middle": width / 2, "end": width}[word.anchor]
+        found.append(_Block(left, word.y - 2.2, width, _LINE_MM))
+    return found
 
 
 def _outline(frame: _Frame, length: float, beam: float) -> str:
@@ -159,9 +241,12 @@ def _round_step(wanted: float) -> float:
 
 
 def stops_drawing(stops: Sequence[ShipTrack], *, width: float, height: float) -> Drawing:
-    """Stopping tracks side by side from one line, with time and speed along them; one scale for all, ahead is up."""
-    longest = max(float(path.ahead_m.max()) for path in stops)
-    aside = max(float(abs(path.starboard_m).max()) for path in stops)
+    """Stopping tracks side by side from one line, with time and speed along them; one scale for all, ahead is up.
+
+    Each ends where it leaves the card's range, and says so.
+    """
+    longest = max(float(path.ahead_m[: path.inside].max()) for path in stops) or 1.0
+    aside = max(float(abs(path.starboard_m[: path.inside]).max()) for path in stops)
     base, top = height - 9.0, 6.0
     column = width / len(stops)
     scale = min((base - top) / longest, (column / 2 - 20.0) / aside if aside > 0 else math.inf)
@@ -169,17 +254,22 @@ def stops_drawing(stops: Sequence[ShipTrack], *, width: float, height: float) ->
     dots, words = [], []
     for number, path in enumerate(stops):
         zero = (number + 0.3) * column
-        kept = thin_line([path.starboard_m, path.ahead_m], _POINTS)
-        pairs = zip(path.starboard_m[kept], path.ahead_m[kept], strict=True)
+        starboard, ahead = path.starboard_m[: path.inside], path.ahead_m[: path.inside]
+        kept = thin_line([starboard, ahead], _POINTS)
+        pairs = zip(starboard[kept], ahead[kept], strict=True)
         lines.append(Line(" ".join(f"{zero + scale * a:.2f},{base - scale * b:.2f}" for a, b in pairs), "track stop"))
         last = -math.inf
         # The marks crowd together where the ship is slow: the last one counts, so they are told from the end.
-        for mark in reversed(path.marks):
+        ends = [(path.left, "warn")] if path.left else []
+        within = [(mark, "word") for mark in reversed(path.marks) if not path.outside(mark)]
+        for mark, style in (*ends, *within):
             x, y = zero + scale * mark.starboard_m, base - scale * mark.ahead_m
             dots.append((round(x, 2), round(y, 2)))
             if y - last >= 3.2:
                 text = f"{clock(mark.time_s)}  {metres(mark.ahead_m)} m  {knots(mark.speed_mps)} kn"
-                words.append(Word(x + 2.0, y + 0.9, text, "start"))
+                words.append(Word(x + 2.0, y + 0.9, text, "start", style))
                 last = y
+                if style == "warn":
+                    words.append(Word(x + 2.0, y - 2.2, "range of the card ends", "start", style))
         words.append(Word(zero - 0.2 * column, height - 2.0, path.name, "start", "title"))
     return Drawing(width, height, tuple(lines), tuple(dots), tuple(words), "Stopping tracks with time and speed.")

@@ -9,24 +9,43 @@ import jinja2
 from markupsafe import Markup
 
 from tank2sim import __version__
-from tank2sim.analysis.practice.bridge import SHALLOW, Bridge, ShipTrack
+from tank2sim.analysis.practice.bridge import SHALLOW, Bridge
+from tank2sim.analysis.practice.ship_track import ShipTrack
 from tank2sim.report import bridge_boxes as boxes
 from tank2sim.report.bridge_boxes import Box, Row
 from tank2sim.report.bridge_drawings import Drawing, circles_drawing, stops_drawing
 from tank2sim.report.page import beside
 
-PANEL_MM = (90.0, 66.0)
-STOPS_MM = (113.0, 58.0)
-CARD_MM = (88.0, 52.0)
+PANEL_MM = (88.0, 62.0)
+STOPS_MM = (113.0, 48.0)
+CARD_MM = (88.0, 50.0)
 """Width and height of the drawings."""
 
 WARNING = "Performance may differ from this record due to environmental, hull and loading conditions"
 
-_ANCHORS = tuple(Row(where, (None, None)) for where in ("Port", "Starboard", "Stern"))
+_NAME, _SOURCE, _NOTICE, _NOTICES = 60, 260, 140, 4
+"""Characters of the ship's name, of her source and of a notice, and notices, that one sheet has room for."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """Something to be ticked on the pilot card; with `field` something is to be written beside it."""
+
+    label: str
+    field: bool = False
+
+
 _READY = (
-    *("Anchors", "Whistle", "Radar 3 cm", "Radar 10 cm", "ARPA", "Speed log: water / ground", "Engine telegraphs"),
-    *("Steering gear", "Power units operating", "Rudder indicator", "Rpm / pitch indicator", "Rate of turn indicator"),
-    *("Gyro error ± ___°", "VHF", "Electronic position fixing"),
+    *(Check(label) for label in ("Anchors", "Whistle", "Radar  ☐ 3 cm  ☐ 10 cm", "ARPA")),
+    Check("Speed log  ☐ Doppler  ☐ water  ☐ ground"),
+    Check("Axes of the log  ☐ single  ☐ dual"),
+    *(Check(label) for label in ("Engine telegraphs", "Steering gear")),
+    Check("Number of power units operating", field=True),
+    *(Check(label) for label in ("Rudder indicator", "Rpm / pitch indicator", "Rate of turn indicator")),
+    Check("Compass system", field=True),
+    Check("Constant gyro error, ± °", field=True),
+    Check("VHF"),
+    Check("Electronic position fixing, type", field=True),
 )
 
 
@@ -44,27 +63,21 @@ def poster_page(bridge: Bridge, ballast: Bridge | None = None) -> str:
 
     What the cards do not tell is left blank, and marked as a blank.
     """
-    thruster = Box(
-        "Thruster effect",
-        tuple(Row(where, (None,) * 4) for where in ("Bow", "Stern", "Combined")),
-        ("kW (HP)", "delay, reversal", "turning rate at zero speed", "not effective above"),
-    )
-    overboard = ("Buoy, order to the helm", "Recovery: turn, reversal at heading change", "Remarks")
-    visibility = ("Blind distance ahead, loaded", "Blind distance ahead, ballast", "Height of eye")
     left = (
         boxes.draughts(bridge, ballast),
         boxes.steering(bridge),
-        Box("Anchor chain", _ANCHORS, ("shackles", "heaving, min/shackle")),
+        boxes.anchors("heaving, min/shackle"),
         boxes.telegraph(bridge, ballast),
-        boxes.engine(bridge),
+        boxes.engine(poster=True),
+        boxes.visibility(),
     )
     right = (
         boxes.stopping(bridge),
         boxes.zigzags(bridge),
         boxes.draught_increase(bridge),
-        thruster,
-        Box("Man overboard rescue", tuple(Row(label, (None,)) for label in overboard)),
-        Box("Visibility", tuple(Row(label, (None,)) for label in visibility)),
+        boxes.squat(),
+        boxes.thrusters(),
+        boxes.overboard(),
     )
     stops = stops_drawing(bridge.stops, width=STOPS_MM[0], height=STOPS_MM[1]) if bridge.stops else None
     return _rendered(
@@ -73,47 +86,40 @@ def poster_page(bridge: Bridge, ballast: Bridge | None = None) -> str:
         left=left,
         right=right,
         panels=_panels(bridge, ballast),
+        particulars=boxes.particulars(bridge),
+        circles_title=_circles_title(bridge),
         stops=stops,
-        notices=[*bridge.notices, *(ballast.notices if ballast else ())],
+        notices=_notices(bridge, ballast),
     )
 
 
 def pilot_card_page(bridge: Bridge, ballast: Bridge | None = None) -> str:
     """The pilot card; with `ballast` the first card is the loaded condition."""
-    ship = Box(
-        "Ship's particulars",
-        (
-            *boxes.particulars(bridge)[6:],
-            Row("Length overall", (None,)),
-            Row("Displacement", boxes.particulars(bridge)[4].values),
-            Row("Bulbous bow", ("☐ yes  ☐ no",)),
-            Row("Air draught", (None,)),
-            Row("Bow to bridge / bridge to stern", (None,)),
-            Row("Parallel waterline loaded / ballast", (None,)),
-        ),
-    )
     thrusters = Box("Thrusters", tuple(Row(where, (None,)) for where in ("Bow, kW (HP)", "Stern, kW (HP)")))
-    left = (
-        ship,
-        boxes.draughts(bridge, ballast),
-        Box("Anchor chain", _ANCHORS, ("shackles", "m per shackle")),
-        boxes.steering(bridge),
+    shown = (
+        boxes.present_condition(),
+        boxes.of_the_ship(bridge),
+        boxes.anchors(),
         thrusters,
+        boxes.engine(poster=False),
+        boxes.steering(bridge, units=False),
+        boxes.telegraph(bridge, ballast),
+        boxes.stopping(bridge),
     )
-    right = (boxes.telegraph(bridge, ballast), boxes.engine(bridge), boxes.stopping(bridge))
     circles = None
     if bridge.deep:
         drawing = _circles(bridge, bridge.deep, CARD_MM)
-        circles = Panel(_turning_title(bridge, "Deep water,"), drawing, boxes.turning(bridge, bridge.deep))
+        circles = Panel(
+            _turning_title(bridge, f"Deep water,{_draught(bridge)}"), drawing, boxes.turning(bridge, bridge.deep)
+        )
     return _rendered(
         "pilotcard.html.j2",
         bridge,
-        left=left,
-        right=right,
+        boxes=shown,
         circles=circles,
         zigzags=boxes.zigzags(bridge),
         ready=_READY,
-        notices=[*bridge.notices, *(ballast.notices if ballast else ())],
+        notices=_notices(bridge, ballast),
     )
 
 
@@ -141,6 +147,30 @@ def _turning_title(bridge: Bridge, where: str) -> str:
     return f"{where} rudder {bridge.rudder_deg:.3g}°, from {boxes.approach(bridge)}".strip()
 
 
+def _draught(bridge: Bridge) -> str:
+    """The card's draught: the present one is another."""
+    draught = bridge.card.ship.draught_m
+    return "" if draught is None else f" mean draught {draught:.4g} m,"
+
+
+def _circles_title(bridge: Bridge) -> str:
+    gear = bridge.card.steering_gear
+    if gear and gear.max_angle_rad:
+        return "Turning circles at maximum rudder angle"
+    return f"Turning circles at {bridge.rudder_deg:.3g}° rudder: the card tells no maximum angle"
+
+
+def _notices(*bridges: Bridge | None) -> list[str]:
+    """As many as one sheet has room for: the command tells them all."""
+    told = list(dict.fromkeys(_cut(text, _NOTICE) for one in bridges if one for text in one.notices))
+    rest = len(told) - _NOTICES
+    return told if rest <= 0 else [*told[:_NOTICES], f"and {rest} more, which the command tells"]
+
+
+def _cut(text: str, length: int) -> str:
+    return text if len(text) <= length else f"{text[: length - 2].rstrip()} …"
+
+
 def _circles(bridge: Bridge, circles: Sequence[ShipTrack], size: tuple[float, float]) -> Drawing:
     ship = bridge.card.ship
     return circles_drawing(circles, ship.length_m, ship.beam_m, width=size[0], height=size[1])
@@ -154,8 +184,8 @@ def _rendered(template: str, bridge: Bridge, **content: object) -> str:
     return environment.get_template(template).render(
         version=__version__,
         style=Markup(beside("bridge.css")),
-        ship=bridge.card.ship,
-        particulars=boxes.particulars(bridge),
+        name=_cut(bridge.card.ship.name, _NAME),
+        source=_cut(bridge.card.ship.source, _SOURCE),
         warning=WARNING,
         **content,
     )

@@ -9,6 +9,7 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tank2sim.records.thinning import thin_line, thin_points
 from tank2sim.report.chart_parts import (
     LINE_SAMPLES,
     NUMBER,
@@ -28,7 +29,6 @@ from tank2sim.report.chart_parts import (
     vector,
     with_unit,
 )
-from tank2sim.report.thinning import thin_line, thin_points
 
 BAND_OPACITY = 0.16
 _CROWDED = 40

@@ -77,11 +77,14 @@ def _predictions(reduction: Reduction) -> Table:
     return Table(caption="Prediction errors", columns=columns, rows=rows)
 
 
+_AGAINST_MOTION = "Points: measured, bars: their 95 % intervals. Lines: the fit; shaded: its 95 % band."
+
+
 def _chart_sections(charts: Mapping[str, alt.TopLevelMixin]) -> list[Section]:
     """A section for each force and its angles and amplitudes, one for what concerns all."""
     groups: dict[str, list[Illustration]] = {}
     for stem, chart in charts.items():
         words = _FORCES.get(stem.rpartition("_")[2])
         heading = f"{words.capitalize()} against motion" if words else "Loops and residuals"
-        groups.setdefault(heading, []).append(Illustration(chart=chart))
+        groups.setdefault(heading, []).append(Illustration(chart=chart, caption=_AGAINST_MOTION if words else ""))
     return [Section(heading=heading, charts=illustrations) for heading, illustrations in groups.items()]

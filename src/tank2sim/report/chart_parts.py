@@ -11,8 +11,8 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tank2sim.records.thinning import Vector
 from tank2sim.report.appearance import DASHES, SHAPES, STROKE
-from tank2sim.report.thinning import Vector
 from tank2sim.units import UNITS
 
 LINE_SAMPLES = 600

@@ -22,6 +22,7 @@ from tank2sim.report.analysis_charts import (
 from tank2sim.report.appearance import LIGHT, LOCALE
 from tank2sim.report.motion_charts import (
     History,
+    Mark,
     Signal,
     Spiral,
     Tow,
@@ -36,6 +37,7 @@ __all__ = [
     "VEGALITE_VERSION",
     "FrequencyResponse",
     "History",
+    "Mark",
     "OutputError",
     "PolesZeros",
     "Signal",

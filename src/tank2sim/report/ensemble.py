@@ -7,15 +7,18 @@ from collections.abc import Mapping
 import altair as alt
 
 from tank2sim.analysis.ensemble.questions import SIGNALS
-from tank2sim.analysis.ensemble.results import FigureBands, ManoeuvreBands, StabilityBands
+from tank2sim.analysis.ensemble.results import ManoeuvreBands, StabilityBands
+from tank2sim.files import plain_json
 from tank2sim.report.charts import History, Track, history_chart, track_chart
+from tank2sim.report.ensemble_charts import curve_charts
 from tank2sim.report.page import Cell, Column, Section, Table
+from tank2sim.report.result_motions import HIGH, LOW, MIDDLE
+from tank2sim.report.result_values import Json
 from tank2sim.report.runs import SHIP_SIGNALS, history_of, signals_of, track_of
+from tank2sim.report.stability_page import BEYOND
 from tank2sim.simulation.bands import Band
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import in_words
-
-LOW, MIDDLE, HIGH = "5 %", "50 %", "95 %"
 
 _TEXT = (
     "Members of the ensemble are this ship with numbers drawn from the standard errors of her card, and from their "
@@ -25,7 +28,7 @@ _TEXT = (
 _CHANCES = (
     " A criterion is met with the probability told: the share of all usable members that meet it, with the 95 % "
     "interval that their number leaves (Wilson). A member whose trial does not show the figure counts as one that "
-    "does not meet it."
+    "does not meet it. Where the trial of the card itself leaves the card's range no probability is told."
 )
 
 
@@ -34,7 +37,10 @@ def banded_chart(label: str, run: Trajectory, bands: ManoeuvreBands) -> alt.VCon
     tracks = [track_of(label, run)]
     if bands.track is not None:
         lines = ((LOW, bands.track.low), (MIDDLE, bands.track.middle), (HIGH, bands.track.high))
-        tracks += [Track(label=name, x_m=line[:, 0], y_m=line[:, 1], time_s=bands.times_s) for name, line in lines]
+        kept = slice(bands.track.count)
+        tracks += [
+            Track(label=name, x_m=line[kept, 0], y_m=line[kept, 1], time_s=bands.times_s[kept]) for name, line in lines
+        ]
     track = track_chart(tracks, title=label)
     track.usermeta = alt.Undefined  # only a chart by itself may carry it
     names = {variable: (name, factor) for name, (variable, factor) in SIGNALS.items()}
@@ -55,7 +61,9 @@ def stability_section(found: StabilityBands) -> Section:
         ends: list[Cell] = [one.band.low, one.band.median, one.band.high] if one.band else [None, None, None]
         between = f"{one.between[0]:.3f} to {one.between[1]:.3f}" if one.between else None
         criterion = one.criterion
-        rows.append([criterion.name, *ends, criterion.allowed, criterion.unit, one.met, between, one.left_open])
+        met: Cell = BEYOND if criterion.beyond_card and one.met is not None else one.met
+        between = None if criterion.beyond_card else between
+        rows.append([criterion.name, *ends, criterion.allowed, criterion.unit, met, between, one.left_open])
     heads = ["criterion", LOW, MIDDLE, HIGH, "allowed", "unit", "probability met", "95 % interval", "not shown by"]
     columns = [Column(title=head) for head in heads]
     stable = "" if found.stable is None else f" She is stable on a straight course with probability {found.stable:.3g}."
@@ -65,17 +73,20 @@ def stability_section(found: StabilityBands) -> Section:
         heading=f"Ensemble of {found.asked.members}",
         text=_TEXT + _CHANCES + stable,
         tables=[criteria, straight],
+        charts=curve_charts(plain_json(found.curves.as_json())) if found.curves else (),
         notes=found.asked.notices,
     )
 
 
-def figures_section(found: FigureBands) -> Section:
-    """The section of a page of influence coefficients."""
+def figures_section(found: Json) -> Section:
+    """The section of a page of influence coefficients, from what JSON has of a
+    :class:`tank2sim.analysis.ensemble.results.FigureBands`."""
+    bands = {name: Band(one["p5"], one["p50"], one["p95"], one["shown_by"]) for name, one in found["figures"].items()}
     return Section(
-        heading=f"Ensemble of {found.asked.members}",
+        heading=f"Ensemble of {found['members']}",
         text=_TEXT,
-        tables=[_table("Figures over the ensemble.", found.figures)],
-        notes=found.asked.notices,
+        tables=[_table("Figures over the ensemble.", bands)],
+        notes=found["notices"],
     )
 
 

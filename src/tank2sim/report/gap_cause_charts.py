@@ -11,11 +11,11 @@ import numpy as np
 from tank2sim.dynamics.model import Vector
 from tank2sim.gap.as_json import estimate_in_file, in_file, joined, meant
 from tank2sim.gap.result import Gap, MissingForce, MissingSignal, NextTest
+from tank2sim.records.thinning import thin_points
 from tank2sim.report.chart_parts import NUMBER, Record, data, extent, plain, series_look, shown_unit, with_unit
 from tank2sim.report.gap_charts import SETS, small
 from tank2sim.report.gap_words import as_percent
 from tank2sim.report.numbers import format_number
-from tank2sim.report.thinning import thin_points
 from tank2sim.units import in_words
 
 BINS = 12

@@ -12,6 +12,7 @@ from tank2sim.gap.as_json import measured_in, signal_name
 from tank2sim.gap.result import Gap, Passed, Place
 from tank2sim.identification.trials.evaluation import Passage
 from tank2sim.identification.trials.runs import SEEN
+from tank2sim.records.thinning import Vector, thin_points
 from tank2sim.report.chart_parts import (
     NUMBER,
     Record,
@@ -24,8 +25,17 @@ from tank2sim.report.chart_parts import (
     series_look,
     with_unit,
 )
-from tank2sim.report.identification_charts import ACROSS, AFTER, BEFORE, MEASURED, Pair, track_grid
-from tank2sim.report.thinning import Vector, thin_points
+from tank2sim.report.identification_charts import (
+    ACROSS,
+    AFTER,
+    BEFORE,
+    MEASURED,
+    MODELS,
+    Pair,
+    history_grid,
+    track_grid,
+)
+from tank2sim.report.switched_charts import chosen, misfit_maps, switch
 
 MOST_TRIALS = 12
 """Tracks in one picture: those of the largest misfit before; more are hard to look at (ours)."""
@@ -33,14 +43,25 @@ MOST_TRIALS = 12
 MOST_PLACES = 6
 """Worst places that are shown over time: two rows of pictures (ours)."""
 
+PER_SHEET = 6
+"""Trials in one picture of histories: as many as are readable on a sheet of paper."""
+
+HISTORIES = {
+    "motion.psi": ("heading", "rad"),
+    "motion.r": ("yaw rate", "rad/s"),
+    "motion.u": ("velocity ahead", "m/s"),
+    "motion.v": ("velocity to starboard", "m/s"),
+    "motion.u_ground": ("velocity ahead, ground", "m/s"),
+    "motion.v_ground": ("to starboard, ground", "m/s"),
+    "motion.sog": ("speed over ground", "m/s"),
+}
+"""Signal that is shown over time, to its words and unit."""
+
 SHOWN_SAMPLES, SHOWN_POINTS = 140, 50
 """Samples of a line, and points of what was measured, in a panel of about 200 px."""
 
 NOISE_BAND = 2.0
 """Half the width of the noise band, in standard deviations of the noise: 95 % of the measurements are inside."""
-
-MISFIT_SHOWN = 100.0
-"""Misfit in noise units at which the darkest colour begins (ours): far from any doubt."""
 
 SETS = {"held out": True, "fitting": False}
 """Words for the two kinds of trials to whether they were held out; the honest ones first."""
@@ -70,10 +91,23 @@ def gap_tracks(gap: Gap, *, held_out: bool, title: str = "") -> alt.ConcatChart 
     return track_grid([_pair(one) for one in chosen if one.name in worst], title=title)
 
 
+def gap_histories(gap: Gap, *, held_out: bool, title: str = "") -> list[alt.ConcatChart]:
+    """Motions over time as measured, by the card before and by the card found, a column a trial, in sheets.
+
+    Of many trials those are shown whose misfit before was largest.
+    """
+    chosen = [one for one in gap.passed if one.held_out == held_out and set(HISTORIES) & set(measured_in(one))]
+    worst = {one.name for one in sorted(chosen, key=lambda one: -one.misfit("before"))[:MOST_TRIALS]}
+    pairs = [_pair(one) for one in chosen if one.name in worst]
+    sheets = [pairs[first : first + PER_SHEET] for first in range(0, len(pairs), PER_SHEET)]
+    return [history_grid(sheet, signals=HISTORIES, title=title) for sheet in sheets]
+
+
 def _pair(one: Passed) -> Pair:
-    measured = {name: one.measured[name] for name in measured_in(one) if name in ("motion.x", "motion.y")}
+    measured = {name: one.measured[name] for name in measured_in(one)}
     before, after = (
-        Passage(one.name, False, one.time_s, measured, one.time_s, simulated) for simulated in (one.before, one.after)
+        Passage(one.name, False, one.time_s, measured, one.time_s, {name: simulated[name] for name in measured})
+        for simulated in (one.before, one.after)
     )
     return Pair(before=before, after=after)
 
@@ -102,7 +136,7 @@ def place_chart(gap: Gap, *, title: str = "") -> alt.ConcatChart | None:
     panels = [_place_panels(known[place.trial], place) for place in shown_places(gap)]
     if not panels:
         return None
-    grid = alt.concat(*panels, columns=ACROSS, spacing=26)
+    grid = alt.concat(*panels, columns=ACROSS, spacing=26, params=switch(list(MODELS)))
     shared = grid.resolve_scale(color="shared", strokeDash="shared", shape="shared")
     return shared.properties(
         title=alt.Title(title, subtitle="Above: the signal. Below: simulated less measured; grey: 95 % of the noise."),
@@ -126,7 +160,9 @@ def _place_panels(one: Passed, place: Place) -> alt.VConcatChart:
     band = NOISE_BAND * name.factor * one.noise[place.signal]
     times = extent(one.time_s)
     above = _over_time(rows, times, with_unit(name.words, name.unit), look, labelled=False)
-    below = _over_time(left, times, with_unit("simulated − measured", name.unit), look, labelled=True)
+    below = _over_time(
+        left, times, with_unit("simulated − measured", name.unit), look, labelled=True, besides=(-band, band)
+    )
     noise = alt.Chart(data([{"low": plain(-band), "high": plain(band)}])).mark_rect(style="reference", opacity=0.3)
     spans = alt.Chart(data([{"from": plain(place.t_start_s), "to": plain(place.t_end_s)}])).mark_rect(
         style="region", clip=True
@@ -141,17 +177,27 @@ def _place_panels(one: Passed, place: Place) -> alt.VConcatChart:
 
 
 def _over_time(
-    rows: Sequence[Record], times: tuple[float, float], up: str, look: SeriesLook, *, labelled: bool
+    rows: Sequence[Record],
+    times: tuple[float, float],
+    up: str,
+    look: SeriesLook,
+    *,
+    labelled: bool,
+    besides: Sequence[float] = (),
 ) -> list[alt.Chart]:
     axis = alt.Axis(title="time (s)", tickCount=4) if labelled else alt.Axis(title=None, labels=False, ticks=False)
     x = alt.X("t:Q", scale=alt.Scale(domain=list(times), nice=False, zero=False), axis=axis)
-    y = alt.Y("v:Q", scale=alt.Scale(zero=False), axis=axis_above(up, tickCount=3))
+    # The scale is told: it stays when the switch takes a line away.
+    ends = [row["v"] for row in rows if row["v"] is not None] + list(besides)
+    scale = alt.Scale(domain=list(extent(np.array(ends, dtype=float))), nice=True, zero=False)
+    y = alt.Y("v:Q", scale=scale, axis=axis_above(up, tickCount=3))
     tooltip = [
         alt.Tooltip("run:N", title="by"),
         alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
         alt.Tooltip("v:Q", title=up, format=NUMBER),
     ]
     lines = alt.Chart(data([row for row in rows if row["run"] != MEASURED])).mark_line(clip=True, strokeWidth=1.5)
+    lines = lines.transform_filter(chosen(MODELS))
     drawn = [lines.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, order="i:Q", tooltip=tooltip)]
     if points := [row for row in rows if row["run"] == MEASURED]:
         marks = alt.Chart(data(points)).mark_point(clip=True, size=14, strokeWidth=1)
@@ -160,62 +206,21 @@ def _over_time(
 
 
 def misfit_chart(gap: Gap, *, title: str = "") -> alt.VConcatChart:
-    """Misfit of each signal in each trial in noise units, before and after side by side, in one scale of colours."""
+    """Misfit of each signal in each trial in noise units, to switch between before, after and both side by side."""
     there = {name for one in gap.passed for name in measured_in(one)}
     signals = [name for name in SEEN.values() if name in there] + sorted(there - set(SEEN.values()))
-    rows: list[alt.HConcatChart] = []
-    for word, held in SETS.items():
-        trials = [one for one in gap.passed if one.held_out == held]
-        if trials:
-            maps = [
-                _misfit_map(trials, signals, which, f"{word} trials, {which}", head=not rows)
-                for which in shown_models(gap)
-            ]
-            rows.append(alt.hconcat(*maps, spacing=16))
-    subtitle = "Number and colour: root mean square of simulated less measured, in standard deviations of the noise."
-    return alt.vconcat(*rows, spacing=18).properties(
-        title=alt.Title(title, subtitle=subtitle),
-        description="Misfit by trial and signal in noise units, before and after.",
-    )
-
-
-def _misfit_map(
-    trials: Sequence[Passed], signals: Sequence[str], which: str, title: str, *, head: bool
-) -> alt.LayerChart:
     words = {name: signal_name(name).file.rpartition("_")[0].replace("_", " ") for name in signals}
     rows = [
-        {
-            "trial": one.name,
-            "signal": words[name],
-            "misfit": min(one.misfit(which, name), MISFIT_SHOWN),
-            "text": in_noise(one.misfit(which, name)),
-        }
-        for one in trials
-        for name in measured_in(one)
+        {"group": f"{word} trials", "trial": one.name, "signal": words[name], "model": which}
+        | {"misfit": one.misfit(which, name)}
+        for word, held in SETS.items()
+        for one in gap.passed
+        if one.held_out == held
+        for name in signals
+        if name in measured_in(one)
+        for which in shown_models(gap)
     ]
-    named = which == "before"
-    side = alt.Axis(title=None, labelLimit=230) if named else alt.Axis(title=None, labels=False, ticks=False)
-    y = alt.Y("trial:N", sort=[one.name for one in trials], axis=side)
-    x = alt.X("signal:N", sort=list(words.values()), scale=alt.Scale(domain=list(words.values())))
-    x = x.axis(title="signal", orient="bottom", labelAngle=0)
-    colours = alt.Scale(type="log", domain=[1, MISFIT_SHOWN], scheme="blues", clamp=True)
-    legend = alt.Legend(title="misfit (noise units)", gradientLength=180) if named and head else None
-    tooltip = [alt.Tooltip("trial:N"), alt.Tooltip("signal:N"), alt.Tooltip("text:N", title="misfit (noise units)")]
-    base = alt.Chart(data(rows)).encode(x=x, y=y, tooltip=tooltip)
-    cells = base.mark_rect().encode(color=alt.Color("misfit:Q", scale=colours, legend=legend))
-    ink = alt.condition("datum.misfit > 18", alt.value("white"), alt.value("black"))  # on the cell, whatever the page
-    numbers = base.mark_text(fontSize=10.5).encode(text="text:N", color=ink)
-    size = {"width": 40 * len(signals), "height": 21 * len(trials)}
-    return alt.layer(cells, numbers).properties(title=small(title), **size)
-
-
-def in_noise(misfit: float) -> str:
-    """A misfit as a cell shows it: two figures, or more where it has them before the point."""
-    if not math.isfinite(misfit):
-        return "∞"
-    if misfit >= 1e4:
-        return f"{misfit:.0e}".replace("e+0", "e").replace("e+", "e")
-    return f"{misfit:.0f}" if misfit >= 9.95 else f"{misfit:.1f}"
+    return misfit_maps(rows, shown_models(gap), title=title)
 
 
 def small(text: str) -> alt.Title:

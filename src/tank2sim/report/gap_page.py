@@ -17,6 +17,7 @@ from tank2sim.report.gap_charts import (
     MOST_TRIALS,
     SETS,
     added,
+    gap_histories,
     gap_tracks,
     misfit_chart,
     place_chart,
@@ -55,6 +56,11 @@ def gap_charts(gap: Gap) -> dict[str, alt.TopLevelMixin]:
             f"tracks_{word.replace(' ', '_')}": gap_tracks(gap, held_out=held, title=f"Tracks, trials {_ON[word]}")
             for word, held in SETS.items()
         },
+        **{
+            f"histories_{word.replace(' ', '_')}_{sheet + 1}": chart
+            for word, held in SETS.items()
+            for sheet, chart in enumerate(gap_histories(gap, held_out=held, title=f"Motions, trials {_ON[word]}"))
+        },
         "agreement": agreement_chart(gap, title="What each trial alone would have"),
         "expected": expected_chart(test, title="What other manoeuvres would tell") if test else None,
     }
@@ -65,7 +71,8 @@ def gap_page(gap: Gap, charts: Mapping[str, alt.TopLevelMixin]) -> Page:
     """The page; `charts` as :func:`gap_charts` gives them."""
 
     def drawn(*stems: str) -> list[Illustration]:
-        return [Illustration(chart=charts[stem], caption=_CAPTIONS[stem]) for stem in stems if stem in charts]
+        there = [own for stem in stems for own in charts if own == stem or own.rpartition("_")[0] == stem]
+        return [Illustration(chart=charts[stem], caption=_CAPTIONS.get(stem, _RUN)) for stem in there]
 
     sections = [
         Section(
@@ -86,7 +93,7 @@ def gap_page(gap: Gap, charts: Mapping[str, alt.TopLevelMixin]) -> Page:
             tables=[*_places(gap), *_passages(gap)],
             charts=drawn("when_signal", "signal", "when_force", "force", "places"),
         ),
-        Section(heading="Tracks", text=_track_text(gap), charts=drawn("tracks_held_out", "tracks_fitting")),
+        Section(heading="Tracks and motions", text=_track_text(gap), charts=drawn(*_RUNS)),
     ]
     if figures := _figures(gap):
         sections.append(Section(heading="Figures of manoeuvres", text=_FIGURES, tables=figures))
@@ -134,13 +141,18 @@ _NOISE = (
 )
 _WHEN = {"signal": "When the records contradict each other", "force": "When a force is missing"}
 _OVER = {"signal": "How the records contradict each other", "force": "The missing force over what explains it"}
-_STRIPS = "Blue and orange: to either side, darker where more is missing; white is nothing."
+_STRIPS = (
+    "Blue and orange: to either side, stronger where more is missing; pale grey is nothing, no colour: not measured."
+)
 _MEANS = "Points: instants of all trials; squares: means of bins, with 95 % bars by the spread between trials."
 _LINES = (
     "Card before: as given. Card found: with what was found, which is called after elsewhere; one upon the other where "
     "nothing was added."
 )
-_TRACKS = f"Points: measured. Lines: simulated. {_LINES}"
+_RUN = f"Points: measured. Lines: simulated. {_LINES}"
+_RUNS = ("tracks_held_out", "histories_held_out", "tracks_fitting", "histories_fitting")
+
+
 _CAPTIONS = {
     "rivals": "",
     "misfit": "u, v: velocity ahead and to starboard; r: yaw rate; psi: heading; x, y: north and east. The colour "
@@ -150,8 +162,6 @@ _CAPTIONS = {
     "when_force": f"{_STRIPS} By the given card.",
     "signal": f"{_MEANS} What is constant goes with every state.",
     "force": f"The force that the given card needs in addition to follow the measurements. {_MEANS}",
-    "tracks_held_out": _TRACKS,
-    "tracks_fitting": _TRACKS,
     "agreement": "Points: each trial's own estimate; bars: 95 % intervals. Grey: all fitting trials together. Trials "
     "that tell little may leave the picture.",
     "expected": "The larger, the clearer the manoeuvre would decide; the difference is beyond what uncertain "

@@ -10,7 +10,7 @@ from tank2sim.gap.prove import cautions
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, Gap, Named
 from tank2sim.report.numbers import format_column, format_number
 from tank2sim.report.page import Cell
-from tank2sim.units import in_words
+from tank2sim.units import in_words, to_si
 
 GOOD = 1.5
 """Misfit in noise units up to which a model is said to follow the measurements (ours): its own error is then about as
@@ -123,10 +123,18 @@ _EQUATIONS = {
 def parameter_cells(one: Named, name: str) -> list[Cell]:
     """Words, value with its standard error, unit and meaning of a parameter."""
     own, value = estimate_in_file(name, one.parameters[name])
-    words, unit = in_words(own)
+    words, unit = parameter_in_words(one.name, own)
     error = in_file(name, one.standard_errors[name])[1] if name in one.standard_errors else math.nan
     told = f"{meaning(one.name, name)}{'' if name in one.standard_errors else ' (held)'}"
     return [words, with_error(value, error), unit or "-", told]
+
+
+def parameter_in_words(effect: str, own: str) -> tuple[str, str]:
+    """Words and unit of a parameter by its name in a file; a direction is told to be that from or towards which."""
+    words, unit = in_words(own)
+    told = meaning(effect, to_si(own, 0.0)[0])
+    way = next((word for word in ("from", "towards") if f"direction {word} which" in told), "")
+    return f"{words} {way}".strip(), unit
 
 
 def with_error(value: float, error: float) -> str:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tank2sim.analysis.glide.path import GlidePath
-from tank2sim.analysis.glide.steady import SteadyGlide
-from tank2sim.analysis.glide.swing import SwingError
-from tank2sim.analysis.glide.transient import Compared, ProgrammeError
+from tank2sim.records.thinning import Vector, thin_line
 from tank2sim.report.chart_parts import (
     HOVER_SAMPLES,
     LINE_SAMPLES,
@@ -28,8 +25,8 @@ from tank2sim.report.chart_parts import (
     vector,
 )
 from tank2sim.report.motion_charts import History, Signal, history_chart
-from tank2sim.report.thinning import Vector, thin_line
-from tank2sim.simulation.trajectory import Trajectory
+from tank2sim.report.result_values import Json
+from tank2sim.units import to_si
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,21 +39,14 @@ class SpacePath:
     height_m: ArrayLike
 
 
-def space_path(label: str, path: GlidePath) -> SpacePath:
-    """A path of steady glides."""
-    points = path.sampled()
-    return SpacePath(label=label, north_m=points[:, 1], east_m=points[:, 2], height_m=points[:, 3])
+def space_path(label: str, columns: Mapping[str, Sequence[float]]) -> SpacePath:
+    """A path from columns ``x_m``, ``y_m``, ``height_m`` of the JSON."""
+    return SpacePath(label=label, north_m=columns["x_m"], east_m=columns["y_m"], height_m=columns["height_m"])
 
 
-def corners_of(path: GlidePath) -> SpacePath:
-    """The start and the ends of its steps."""
-    points = np.array(path.places)
-    return SpacePath(label="steps", north_m=points[:, 1], east_m=points[:, 2], height_m=points[:, 3])
-
-
-def space_path_of(label: str, run: Trajectory) -> SpacePath:
-    """The path of the transient model."""
-    return SpacePath(label=label, north_m=run["motion.x"], east_m=run["motion.y"], height_m=-run["motion.z"])
+def corners_of(places: Sequence[Mapping[str, float]]) -> SpacePath:
+    """The start and the ends of the steps, from ``path`` of the JSON."""
+    return space_path("steps", {name: [place[name] for place in places] for name in ("x_m", "y_m", "height_m")})
 
 
 def plan_chart(paths: Sequence[SpacePath], *, title: str = "") -> alt.LayerChart:
@@ -107,13 +97,10 @@ def _arms(length: float) -> list[Record]:
     return rows
 
 
-def polar_chart(
-    polar: Sequence[SteadyGlide], marked: Sequence[tuple[str, SteadyGlide]], *, title: str = ""
-) -> alt.LayerChart:
-    """The polar: speed down against speed over the ground, both in one scale, with marked glides."""
-    across = np.array([glide.horizontal_speed_mps for glide in polar])
-    down = np.array([-glide.climb_mps for glide in polar])
-    angle = np.degrees(np.array([abs(glide.path_angle_rad) for glide in polar]))
+def polar_chart(polar: Json, marked: Mapping[str, Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
+    """The polar: speed down against speed over the ground, with marked glides; both as the JSON has them."""
+    across, down = vector(polar["horizontal_speed_mps"]), -vector(polar["climb_mps"])
+    angle = np.abs(vector(polar["path_angle_deg"]))
     x = alt.X("x:Q", title="speed over the ground (m/s)", scale=alt.Scale(zero=True))
     y = alt.Y("y:Q", title="speed down (m/s)", scale=alt.Scale(zero=True, reverse=True))
     tooltip = [
@@ -127,13 +114,13 @@ def polar_chart(
     points = [
         {
             "run": label,
-            "x": glide.horizontal_speed_mps,
-            "y": -glide.climb_mps,
-            "angle": math.degrees(abs(glide.path_angle_rad)),
+            "x": glide["horizontal_speed_mps"],
+            "y": -glide["climb_mps"],
+            "angle": abs(glide["path_angle_deg"]),
         }
-        for label, glide in marked
+        for label, glide in marked.items()
     ]
-    look = series_look([label for label, _ in marked], as_points=[label for label, _ in marked])
+    look = series_look(list(marked), as_points=list(marked))
     dots = alt.Chart(data(points)).mark_point(size=90, strokeWidth=2)
     layers = [
         line,
@@ -147,42 +134,34 @@ def polar_chart(
     )
 
 
-def programme_chart(compared: Compared, *, title: str = "") -> alt.VConcatChart:
-    """Orders and what the transient model makes of them over time."""
-    run = compared.motion
-    signals = {
-        "buoyancy": ("net buoyancy, + light (kg)", "1", "buoyancy.mass", "buoyancy.command"),
-        "pitch": ("pitch, + up", "rad", "pitch.angle", "pitch.command"),
-        "roll": ("roll, + to starboard", "rad", "roll.angle", "roll.command"),
-        "incidence": ("incidence", "rad", "motion.incidence", None),
-        "speed": ("speed", "m/s", "motion.speed", None),
-    }
-    ends = np.array([place.time_s for place in compared.path.places])
-    times = np.repeat(ends, 2)[1:-1]
-    steady = {
-        "incidence": np.repeat([glide.incidence_rad for glide in compared.path.glides], 2),
-        "speed": np.repeat([glide.speed_mps for glide in compared.path.glides], 2),
-    }
-    orders = {
-        key: np.repeat([order[name] for order in compared.path.orders()], 2)
-        for key, (_, _, _, name) in signals.items()
-        if name
-    }
-    transient = History(label="transient", time_s=run.t, values={key: run[one[2]] for key, one in signals.items()})
-    quasi = History(label="orders and steady glides", time_s=times, values={**orders, **steady})
-    panels = [Signal(name=key, title=words, unit=unit) for key, (words, unit, _, _) in signals.items()]
-    return history_chart([quasi, transient], panels, title=title, height_px=90)
+_PROGRAMME = {
+    "buoyancy_kg": ("net buoyancy, + light (kg)", "1"),
+    "pitch_deg": ("pitch, + up", "rad"),
+    "roll_deg": ("roll, + to starboard", "rad"),
+    "incidence_deg": ("incidence", "rad"),
+    "speed_mps": ("speed", "m/s"),
+}
 
 
-def quasi_steady_chart(errors: Sequence[ProgrammeError], *, title: str = "") -> alt.LayerChart:
+def programme_chart(transient: Json, *, title: str = "") -> alt.VConcatChart:
+    """Orders and what the transient model makes of them over time, from ``transient`` of the JSON."""
+    histories = []
+    for label, columns in (("orders and steady glides", transient["orders"]), ("transient", transient["histories"])):
+        values = {name: to_si(name, 1.0)[1] * vector(columns[name]) for name in _PROGRAMME}
+        histories.append(History(label=label, time_s=columns["t_s"], values=values))
+    panels = [Signal(name=name, title=words, unit=unit) for name, (words, unit) in _PROGRAMME.items()]
+    return history_chart(histories, panels, title=title, height_px=90)
+
+
+def quasi_steady_chart(errors: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
     """Largest distance from the transient path, per cent of the way, against the length of a step."""
-    series = [(one.label, one.duration_s, one.share) for one in errors]
+    series = [(one["label"], vector(one["duration_s"]), vector(one["share"])) for one in errors]
     return _errors(series, ("length of a step (s)", "distance of the paths (% of the way)"), title=title)
 
 
-def swing_chart(errors: Sequence[SwingError], *, title: str = "") -> alt.LayerChart:
+def swing_chart(errors: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
     """Error of velocity or rate of turn, per cent, against the period of a swing."""
-    series = [(one.label, one.period_s, one.share) for one in errors]
+    series = [(one["label"], vector(one["period_s"]), vector(one["share"])) for one in errors]
     return _errors(series, ("period of the swing (s)", "error (%)"), title=title)
 
 

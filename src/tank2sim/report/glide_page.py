@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from tank2sim.analysis.glide.steady import SteadyGlide
 from tank2sim.analysis.glide.study import GlideStudy
+from tank2sim.files import plain_json
 from tank2sim.report.glide_charts import (
     corners_of,
     elevation_chart,
@@ -16,10 +17,10 @@ from tank2sim.report.glide_charts import (
     programme_chart,
     quasi_steady_chart,
     space_path,
-    space_path_of,
     swing_chart,
 )
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table
+from tank2sim.report.result_values import Json
 
 
 def glide_page(found: GlideStudy) -> Page:
@@ -30,7 +31,7 @@ def glide_page(found: GlideStudy) -> Page:
     if found.path:
         sections.append(_path(found))
     if found.errors:
-        sections.append(_quasi_steady(found))
+        sections.append(_quasi_steady(plain_json(found.as_json()["quasi_steady_error"])))
     sections.append(Section(heading="What to know of this card", notes=found.notices))
     return Page(
         title=found.card.ship.name,
@@ -98,19 +99,49 @@ def _design(found: GlideStudy) -> Section:
     ]
     if found.ranges:
         tables.append(_ranges(found))
-    chart = polar_chart(found.polar, marked, title="Glide polar") if found.polar else None
     text = (
         "The path angle, not the buoyancy, settles incidence and ratio of lift to drag; speeds go with the root of the "
         f"net buoyancy, here {found.card.glider.buoyancy_kg:g} kg. Below the smallest angle the drag is too large for "
         "the lift at any incidence."
     )
+    return Section(heading="What is best", text=text, tables=tables, charts=_polar(plain_json(found.as_json())))
+
+
+def glides_drawn(found: Json) -> list[Section]:
+    """The charts of a study, from its JSON: polar, path, and the errors of the steady glides."""
+    sections = [Section(heading="What is best", charts=_polar(found))]
+    if "path_histories" in found:
+        sections.append(Section(heading="Path of the programme", charts=_paths(found)))
+    if errors := found.get("quasi_steady_error"):
+        sections.append(_quasi_steady(errors))
+    return [one for one in sections if one.charts]
+
+
+def _polar(found: Json) -> list[Illustration]:
+    design = found["design"]
+    marked = {"best glide": design["best_glide"], "fastest over the ground": design["fastest_glide"]}
     caption = "From the best glide to almost straight down. A line from the origin has the angle of the path."
-    return Section(
-        heading="What is best",
-        text=text,
-        tables=tables,
-        charts=[Illustration(chart=chart, caption=caption)] if chart else [],
-    )
+    return [Illustration(chart=polar_chart(found["polar"], marked, title="Glide polar"), caption=caption)]
+
+
+def _paths(found: Json) -> list[Illustration]:
+    paths = [space_path("steady glides", found["path_histories"])]
+    transient = found.get("transient")
+    if transient:
+        paths.append(space_path("transient", transient["histories"]))
+    if "path_as_printed_histories" in found:
+        paths.append(space_path("as printed", found["path_as_printed_histories"]))
+    charts = [
+        Illustration(chart=plan_chart(paths, title="Path from above")),
+        Illustration(chart=elevation_chart(paths, title="Path from the side, rolled out")),
+        Illustration(
+            chart=isometric_chart(paths[0], corners_of(found["path"]), title="Path in isometric projection"),
+            caption="Plumb lines lead from the shadow, at the height of the start, to the ends of the steps.",
+        ),
+    ]
+    if transient:
+        charts.append(Illustration(chart=programme_chart(transient, title="Programme and motion")))
+    return charts
 
 
 def _ranges(found: GlideStudy) -> Table:
@@ -156,21 +187,6 @@ def _glides(found: GlideStudy) -> Section:
 
 def _path(found: GlideStudy) -> Section:
     assert found.path is not None
-    paths = [space_path("steady glides", found.path)]
-    if found.compared:
-        paths.append(space_path_of("transient", found.compared.motion))
-    if found.printed_path:
-        paths.append(space_path("as printed", found.printed_path))
-    charts = [
-        Illustration(chart=plan_chart(paths, title="Path from above")),
-        Illustration(chart=elevation_chart(paths, title="Path from the side, rolled out")),
-        Illustration(
-            chart=isometric_chart(paths[0], corners_of(found.path), title="Path in isometric projection"),
-            caption="Plumb lines lead from the shadow, at the height of the start, to the ends of the steps.",
-        ),
-    ]
-    if found.compared:
-        charts.append(Illustration(chart=programme_chart(found.compared, title="Programme and motion")))
     heads = ("t|s", "x north|m", "y east|m", "height|m", "heading|deg")
     columns = [Column(title=head.split("|")[0], unit=head.split("|")[1]) for head in heads]
     rows: list[list[Cell]] = [
@@ -178,12 +194,12 @@ def _path(found: GlideStudy) -> Section:
         for place in found.path.places
     ]
     table = Table(caption="Start and end of each step, steady glides", columns=columns, rows=rows)
-    return Section(heading="Path of the programme", tables=[table], charts=charts)
+    return Section(heading="Path of the programme", tables=[table], charts=_paths(plain_json(found.as_json())))
 
 
-def _quasi_steady(found: GlideStudy) -> Section:
-    swings = swing_chart(found.swings, title="Error of the quasi-steady motion, swings")
-    steps = quasi_steady_chart(found.errors, title="Error of the quasi-steady path, steps")
+def _quasi_steady(errors: Json) -> Section:
+    swings = swing_chart(errors["swings"], title="Error of the quasi-steady motion, swings")
+    steps = quasi_steady_chart(errors["steps"], title="Error of the quasi-steady path, steps")
     return Section(
         heading="What slow means",
         text="The paper takes each moment for a steady glide because controls change slowly, and gives no number. Here "

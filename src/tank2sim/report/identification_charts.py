@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import altair as alt
 import numpy as np
 
-from tank2sim.identification.trials.evaluation import SHOWN, Figure, Following, Passage
+from tank2sim.identification.trials.evaluation import Figure, Following, Passage
+from tank2sim.records.thinning import Indices, Vector, thin_points
 from tank2sim.report.chart_parts import (
     NUMBER,
     Position,
@@ -24,9 +25,12 @@ from tank2sim.report.chart_parts import (
     shown_unit,
     with_unit,
 )
-from tank2sim.report.thinning import Indices, Vector, thin_points
+from tank2sim.report.switched_charts import chosen, switch
 
 MEASURED, BEFORE, AFTER = "measured", "card before", "card found"
+
+MODELS = {"before": BEFORE, "after": AFTER}
+"""Word of the switch to the series that it shows."""
 
 ACROSS = 3
 """Trials beside each other in a picture."""
@@ -115,21 +119,23 @@ def track_grid(pairs: Sequence[Pair], *, title: str = "") -> alt.ConcatChart | N
     return _with_rows(chart, rows_of)
 
 
-def history_grid(pairs: Sequence[Pair], *, title: str = "") -> alt.ConcatChart:
-    """Rudder, heading, yaw rate, speed and drift angle over time, a column of panels a trial; angles in degrees."""
-    made = {pair.name: _histories(pair) for pair in pairs}
+def history_grid(
+    pairs: Sequence[Pair], *, signals: Mapping[str, tuple[str, str]] = SIGNALS, title: str = ""
+) -> alt.ConcatChart:
+    """Signals over time, a column of panels a trial; `signals` as :data:`SIGNALS` has them, angles in degrees."""
+    made = {pair.name: _histories(pair, signals) for pair in pairs}
     told = f"Time histories of {', '.join(made)}, measured and simulated."
     chart = _grid([panels for panels, _ in made.values()], title, told)
     return _with_rows(chart, {name: rows for name, (_, rows) in made.items()})
 
 
-def _histories(pair: Pair) -> tuple[alt.VConcatChart, list[Record]]:
-    series = _series(pair, tuple(SIGNALS))
-    names = [name for name in SIGNALS if any(name in columns for columns in series.values())]
-    fields = {name: f"s{place}" for place, name in enumerate(SIGNALS)}
+def _histories(pair: Pair, signals: Mapping[str, tuple[str, str]]) -> tuple[alt.VConcatChart, list[Record]]:
+    series = _series(pair, tuple(signals))
+    names = [name for name in signals if any(name in columns for columns in series.values())]
+    fields = {name: f"s{place}" for place, name in enumerate(signals)}
     rows: list[Record] = []
     for label, columns in series.items():
-        factors = {name: shown_unit(SIGNALS[name][1])[1] for name in names if name in columns}
+        factors = {name: shown_unit(signals[name][1])[1] for name in names if name in columns}
         kept = _thinned(label, [columns[name] for name in factors])
         values = {fields[name]: factor * columns[name][kept] for name, factor in factors.items()}
         rows += records(label, {"t": columns["time"][kept], **values})
@@ -137,12 +143,12 @@ def _histories(pair: Pair) -> tuple[alt.VConcatChart, list[Record]]:
     scale = alt.Scale(domain=list(times), nice=False, zero=False)
     panels = []
     for name in names:
-        words, unit = SIGNALS[name]
+        words, unit = signals[name]
         up, last = with_unit(words, shown_unit(unit)[0]), name == names[-1]
         axis = alt.Axis(title="time (s)", tickCount=4) if last else alt.Axis(title=None, labels=False, ticks=False)
         position: Position = {
             "x": alt.X("t:Q", scale=scale, axis=axis),
-            "y": alt.Y(f"{fields[name]}:Q", scale=alt.Scale(zero=False), axis=axis_above(up, tickCount=3)),
+            "y": alt.Y(f"{fields[name]}:Q", scale=_whole(rows, fields[name]), axis=axis_above(up, tickCount=3)),
         }
         tooltip = [
             alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
@@ -151,6 +157,12 @@ def _histories(pair: Pair) -> tuple[alt.VConcatChart, list[Record]]:
         panels.append(alt.layer(*_marks(position, tooltip)).properties(width=200, height=66))
     chart = alt.vconcat(*panels, data=alt.NamedData(pair.name), spacing=12).resolve_scale(x="shared", **_SHARED)
     return chart.properties(title=_small(pair.name)), rows
+
+
+def _whole(rows: Sequence[Record], field: str) -> alt.Scale:
+    # Told, that it stays when the switch takes a line away.
+    values = np.array([row[field] for row in rows if row.get(field) is not None], dtype=float)
+    return alt.Scale(domain=list(extent(values)), nice=True, zero=False)
 
 
 def window_chart(
@@ -168,10 +180,9 @@ def window_chart(
     every = [one for pair in sets.values() for results in pair for one in results]
     signals = [SYMBOLS[name][0] for name in SYMBOLS if any(name in one.windows for one in every)]
     rows = []
-    for place, (word, pair) in enumerate(sets.items()):
-        head = place == 0
+    for word, pair in sets.items():
         maps = [
-            _window_map(results, signals, f"{words} · {word}", named=words == BEFORE, head=head)
+            _window_map(results, signals, f"{words} · {word}", named=words == BEFORE)
             for words, results in zip((BEFORE, AFTER), pair, strict=True)
         ]
         rows.append(alt.hconcat(*maps, spacing=16))
@@ -181,9 +192,7 @@ def window_chart(
     )
 
 
-def _window_map(
-    results: Sequence[Following], signals: Sequence[str], title: str, *, named: bool, head: bool
-) -> alt.LayerChart:
+def _window_map(results: Sequence[Following], signals: Sequence[str], title: str, *, named: bool) -> alt.LayerChart:
     rows = []
     for one in results:
         for name, (error, _) in one.windows.items():
@@ -199,7 +208,7 @@ def _window_map(
     x = alt.X("signal:N", sort=list(signals), scale=alt.Scale(domain=list(signals)))
     x = x.axis(title="signal", orient="bottom", labelAngle=0)
     colours = alt.Scale(type="log", domain=[1, 100], scheme="blues", clamp=True)
-    legend = alt.Legend(gradientLength=180) if named and head else None
+    legend = alt.Legend(gradientLength=180)  # of all maps alike, which makes it one
     tooltip = [
         alt.Tooltip("trial:N"),
         alt.Tooltip("signal:N"),
@@ -315,7 +324,6 @@ def _series(pair: Pair, names: Sequence[str]) -> dict[str, dict[str, Vector]]:
 
     Of what was measured the part that was simulated: after a turn, a model or ship may have sailed on for long.
     """
-    assert set(names) <= set(SHOWN)
     sources = {
         MEASURED: (pair.after.time_s, pair.after.measured),
         BEFORE: (pair.before.model_time_s, pair.before.simulated),
@@ -359,14 +367,14 @@ def _drawn(kind: str, sign: str, encoding: Record, **mark: float) -> alt.Chart:
     return alt.Chart(
         mark={"type": kind, "clip": True, **mark},
         encoding=alt.FacetedEncoding(**encoding),
-        transform=[{"filter": f"datum.run {sign} '{MEASURED}'"}],
+        transform=[{"filter": f"datum.run {sign} '{MEASURED}'"}, {"filter": chosen(MODELS)}],
     )
 
 
 def _grid(
     panels: Sequence[alt.LayerChart | alt.VConcatChart], title: str, told: str, columns: int = ACROSS
 ) -> alt.ConcatChart:
-    chart = alt.concat(*panels, columns=columns, spacing=26).resolve_scale(**_SHARED)
+    chart = alt.concat(*panels, columns=columns, spacing=26, params=switch(list(MODELS))).resolve_scale(**_SHARED)
     return chart.properties(title=title, description=told)
 
 

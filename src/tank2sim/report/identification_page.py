@@ -10,11 +10,11 @@ import numpy as np
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.identification.trials.as_json import estimate_rows, figure_rows, following_rows, structure_rows
 from tank2sim.identification.trials.comparison import Comparison
-from tank2sim.identification.trials.evaluation import TURN_FIGURES, passages, pooled
+from tank2sim.identification.trials.evaluation import TURN_FIGURES, pooled
 from tank2sim.identification.trials.identify import Identification
 from tank2sim.identification.trials.inference import scaled_prior
 from tank2sim.identification.trials.measured import Measured
-from tank2sim.identification.trials.question import pose
+from tank2sim.identification.trials.replays import replays
 from tank2sim.report.identification_charts import (
     Pair,
     figure_chart,
@@ -37,11 +37,7 @@ PER_SHEET = 6
 
 def pairs_of(card: ManoeuvringCard, result: Identification, trials: Measured) -> tuple[Pair, ...]:
     """Each trial beside `card`, the one that was given, and beside the card found."""
-    both = []
-    for one in (card, result.card):
-        problem = pose(one, trials.trials, trials.driven_by)
-        both.append(passages(problem, one, trials.trials, result.estimate.noise))
-    return tuple(Pair(before=before, after=after) for before, after in zip(*both, strict=True))
+    return tuple(Pair(before=before, after=after) for before, after in replays(card, result, trials))
 
 
 def identification_charts(
@@ -216,14 +212,15 @@ def _figure_tables(result: Identification) -> list[Table]:
     heads = ("trial", "figure", "measured", "before", "now", "error", "95 %")
     tables = []
     for word in (HELD_OUT, FITTED):
-        rows = [
-            [trial, str(name).rpartition("_")[0].replace("_", " "), *rest]
-            for trial, group, name, *rest in figure_rows(result)
-            if group == word
-        ]
-        if rows:
-            caption = f"Trials {word}: overshoots in deg; distances in m, with their error in %"
-            tables.append(_table(caption, heads, rows))
+        # Degrees and metres are not of one size: in one column the digits of the one would hide the other's errors.
+        for ending, caption in (("_deg", "overshoots in deg"), ("_m", "distances in m, with their error in %")):
+            rows = [
+                [trial, str(name).rpartition("_")[0].replace("_", " "), *rest]
+                for trial, group, name, *rest in figure_rows(result)
+                if group == word and str(name).endswith(ending)
+            ]
+            if rows:
+                tables.append(_table(f"Trials {word}: {caption}", heads, rows))
     return tables
 
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import altair as alt
 import numpy as np
 from numpy.typing import NDArray
 
-from tank2sim.analysis.influence.of_card import Influence
-from tank2sim.analysis.tuning.result import Tuned
 from tank2sim.report.chart_parts import NUMBER, Record, data, plain, series_look
+from tank2sim.report.result_values import Json
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,39 @@ PANELS = 4
 _WIDTH = 600
 
 
-def most_influential(result: Influence, limit: int = MOST_ROWS) -> list[int]:
+@dataclass(frozen=True, eq=False)
+class Coefficients:
+    """What is drawn of a result: names of the figures (nf,) and of the parameters (k,), and K % by exact slopes and by
+    the 10 % difference and shares of the variance, (nf, k); nan where there is none."""
+
+    figures: tuple[str, ...]
+    names: tuple[str, ...]
+    exact: Array
+    difference: Array
+    shares: Array
+
+    @staticmethod
+    def of(found: Json) -> Coefficients:
+        """From what JSON has of a :class:`tank2sim.analysis.influence.of_card.Influence`."""
+        figures, parameters = found["influence_percent"], found["parameters"]
+
+        def table(values: Mapping[str, Mapping[str, Json]]) -> Array:
+            return np.array([[row.get(key) for key in parameters] for row in values.values()], dtype=float)
+
+        def part(name: str) -> Array:
+            return table({text: {key: one[name] for key, one in row.items()} for text, row in figures.items()})
+
+        shares = table({text: found["figures"][text]["share_of_variance"] for text in figures})
+        names = tuple(short_name(key, one) for key, one in parameters.items())
+        return Coefficients(tuple(figures), names, part("exact"), part("difference"), shares)
+
+
+def short_name(key: str, parameter: Mapping[str, Json]) -> str:
+    """Name of a parameter as a chart has it."""
+    return str(parameter.get("name") or key.removeprefix("derivatives."))
+
+
+def most_influential(result: Coefficients, limit: int = MOST_ROWS) -> list[int]:
     """Places of the parameters with the largest K % on any figure, each figure measured by its own largest."""
     sizes = np.nan_to_num(np.abs(result.exact))
     largest = sizes.max(axis=1, keepdims=True)
@@ -35,7 +67,7 @@ def most_influential(result: Influence, limit: int = MOST_ROWS) -> list[int]:
     return order[:limit]
 
 
-def influence_charts(result: Influence) -> list[alt.HConcatChart]:
+def influence_charts(result: Coefficients) -> list[alt.HConcatChart]:
     """K % of the most influential parameters: bars by exact slopes, points by the 10 % difference; figures beside
     each other, :data:`PANELS` to a chart."""
     order = most_influential(result)
@@ -48,10 +80,10 @@ def side_by_side(count: int, most: int) -> list[range]:
     return [range(first, min(first + each, count)) for first in range(0, count, each)]
 
 
-def _bars(result: Influence, order: Sequence[int], rows: Sequence[int]) -> alt.HConcatChart:
-    names = [result.parameters[place].short for place in order]
+def _bars(result: Coefficients, order: Sequence[int], rows: Sequence[int]) -> alt.HConcatChart:
+    names = [result.names[place] for place in order]
     panels = [_panel(result, order, names, row, first=row == rows[0], width=_WIDTH // len(rows)) for row in rows]
-    shown = ", ".join(result.figures[row].text for row in rows)
+    shown = ", ".join(result.figures[row] for row in rows)
     return alt.hconcat(*panels, spacing=12).properties(
         title=f"Influence on {shown}",
         description=f"K per cent of {len(names)} parameters on {shown}, by exact slopes and by a 10 % difference.",
@@ -59,7 +91,7 @@ def _bars(result: Influence, order: Sequence[int], rows: Sequence[int]) -> alt.H
 
 
 def _panel(
-    result: Influence, order: Sequence[int], names: list[str], row: int, *, first: bool, width: int
+    result: Coefficients, order: Sequence[int], names: list[str], row: int, *, first: bool, width: int
 ) -> alt.LayerChart:
     exact, difference = result.exact[row], result.difference[row]
     bars = [_record(result, place, EXACT, exact[place], difference[place]) for place in order]
@@ -78,28 +110,28 @@ def _panel(
     marks = alt.Chart(data(points)).mark_point(size=34, strokeWidth=1.6)
     marked = marks.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
     return alt.layer(drawn, zero, marked).properties(
-        width=width, height=19 * len(names), title=alt.Title(result.figures[row].text, fontSize=12, anchor="middle")
+        width=width, height=19 * len(names), title=alt.Title(result.figures[row], fontSize=12, anchor="middle")
     )
 
 
-def _record(result: Influence, place: int, run: str, exact: float, difference: float) -> Record:
+def _record(result: Coefficients, place: int, run: str, exact: float, difference: float) -> Record:
     return {
         "run": run,
-        "name": result.parameters[place].short,
+        "name": result.names[place],
         "k": plain(exact) if math.isfinite(exact) else None,
         "exact": plain(exact),
         "step": plain(difference),
     }
 
 
-def variance_chart(result: Influence) -> alt.Chart:
+def variance_chart(result: Coefficients) -> alt.Chart:
     """Share of each parameter in the variance of each figure, as a heat map of those with 1 % of any."""
     shares = 100 * result.shares
     order = [int(k) for k in np.argsort(-shares.max(axis=0), kind="stable") if shares[:, k].max() >= 1][:MOST_ROWS]
-    names = [result.parameters[place].short for place in order]
-    figures = [figure.text for figure in result.figures]
+    names = [result.names[place] for place in order]
+    figures = list(result.figures)
     rows: list[Record] = [
-        {"figure": figures[row], "name": result.parameters[place].short, "share": plain(float(shares[row, place]))}
+        {"figure": figures[row], "name": result.names[place], "share": plain(float(shares[row, place]))}
         for row in range(len(figures))
         for place in order
     ]
@@ -128,33 +160,29 @@ def variance_chart(result: Influence) -> alt.Chart:
     )
 
 
-def moves_chart(tuned: Tuned) -> alt.LayerChart:
-    """What tuning changed, in standard errors of the card, with the bounds."""
-    moves = [move for move in tuned.moves if move.in_standard_errors is not None][:MOST_ROWS]
-    names = [move.parameter.short for move in moves]
+def moves_chart(tuned: Json, names: Mapping[str, str]) -> alt.LayerChart:
+    """What tuning changed, in standard errors of the card, with the bounds; `names` are those of the keys."""
+    moves = {key: one for key, one in tuned["parameters"].items() if one["standard_errors"] is not None}
     rows: list[Record] = [
-        {
-            "name": move.parameter.short,
-            "z": plain(move.in_standard_errors or 0.0),
-            "before": plain(move.before * move.parameter.factor),
-            "after": plain(move.after * move.parameter.factor),
-        }
-        for move in moves
+        {"name": names.get(key, key), "z": plain(one["standard_errors"])}
+        | {"before": plain(one["before"]), "after": plain(one["after"])}
+        for key, one in list(moves.items())[:MOST_ROWS]
     ]
+    shown = [row["name"] for row in rows]
     x = alt.X("z:Q", title="move (standard errors of the card)")
-    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, grid=True, labelLimit=170))
+    y = alt.Y("name:N", sort=shown, axis=alt.Axis(title=None, grid=True, labelLimit=170))
     tooltip = [
         alt.Tooltip("name:N", title="parameter"),
         *(alt.Tooltip(f"{key}:Q", title=key, format=".6~g") for key in ("before", "after")),
         alt.Tooltip("z:Q", title="standard errors", format=".3f"),
     ]
-    within = tuned.means.within
+    within = tuned["within_standard_errors"]
     bounds = alt.Chart(data([{"z": -within}, {"z": within}])).mark_rule(style="limit", strokeDash=[5, 3]).encode(x=x)
     zero = alt.Chart(data([{"z": 0.0}])).mark_rule(style="reference").encode(x=x)
     bars = alt.Chart(data(rows)).mark_bar(height=10, opacity=0.75).encode(x=x, y=y, tooltip=tooltip)
     return alt.layer(bars, zero, bounds).properties(
         width=_WIDTH,
-        height=max(60, 20 * len(names)),
+        height=max(60, 20 * len(shown)),
         title="What tuning changed",
-        description=f"Moves of {len(names)} parameters in standard errors; the bounds are at {within:g}.",
+        description=f"Moves of {len(shown)} parameters in standard errors; the bounds are at {within:g}.",
     )

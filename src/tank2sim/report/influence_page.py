@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.analysis.influence.of_card import Influence
 from tank2sim.analysis.tuning.result import Tuned
-from tank2sim.report.influence_charts import PANELS, influence_charts, moves_chart, side_by_side, variance_chart
+from tank2sim.files import plain_json
+from tank2sim.report.ensemble import figures_section
+from tank2sim.report.influence_charts import (
+    PANELS,
+    Coefficients,
+    influence_charts,
+    moves_chart,
+    short_name,
+    side_by_side,
+    variance_chart,
+)
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
+from tank2sim.report.result_values import Json
 from tank2sim.units import in_words
 
 Array = NDArray[np.float64]
@@ -23,63 +34,69 @@ _COEFFICIENTS = (
 )
 
 _ERRORS = (
-    "Standard errors of the figures by the delta method, from those of the card's numbers as if they were independent."
+    "By the delta method, {}. The share of a number is the part of the variance that would go if it were known "
+    "exactly; of numbers whose errors go together each has what it shares with the others, too."
 )
 
 
 def influence_page(result: Influence, tuned: Tuned | None = None, after: Array | None = None) -> Page:
     """The page of a result; with the tuning if there was one, and all figures `after` it."""
+    told = result.as_json()
+    if tuned is not None:
+        values = [] if after is None else after.tolist()
+        told["tuned"] = tuned.as_json(dict(zip((one.text for one in result.figures), values, strict=False)))
+    return influenced_page(plain_json(told))
+
+
+def influenced_page(found: Json) -> Page:
+    """The page, from what JSON has of a result: that of :class:`Influence`, ``tuned`` and ``ensemble``."""
+    coefficients = Coefficients.of(found)
     sections = []
-    if tuned is not None:
-        sections.append(_tuning(result, tuned, after))
-    sections.append(_coefficients(result))
-    sections.append(_uncertainty(result))
-    if result.agreed:
-        sections.append(_together(result))
-    sections.append(_all_coefficients(result))
-    if tuned is not None:
-        sections.append(_moves(tuned))
+    tuned = found.get("tuned")
+    if tuned:
+        sections.append(_tuning(found, tuned))
+    charts = [Illustration(chart=chart) for chart in influence_charts(coefficients)]
+    heading = "Influence coefficients"
+    sections.append(Section(heading=heading, text=_COEFFICIENTS, charts=charts, notes=found["notices"]))
+    sections.append(_uncertainty(found, coefficients))
+    if "agreed" in found:
+        sections.append(_together(found["agreed"]))
+    sections.append(_all_coefficients(coefficients))
+    if tuned:
+        sections.append(_moves(tuned["parameters"]))
+    if "ensemble" in found:
+        sections.append(figures_section(found["ensemble"]))
     return Page(
-        title=f"{result.ship}: influence coefficients",
-        subtitle=f"{len(result.parameters)} parameters on {len(result.figures)} figures",
-        figures=_key_figures(result, tuned, after),
+        title=f"{found['ship']}: influence coefficients",
+        subtitle=f"{len(coefficients.names)} parameters on {len(coefficients.figures)} figures",
+        figures=[_key_figure(text, one, tuned or {}) for text, one in found["figures"].items()],
         sections=sections,
     )
 
 
-def _key_figures(result: Influence, tuned: Tuned | None, after: Array | None) -> list[Figure]:
-    wanted = {} if tuned is None else {wish.figure.text: wish for wish in tuned.wishes}
-    told = []
-    for row, one in enumerate(result.figures):
-        words, unit = in_words(one.kind.name)
-        argument = one.text.partition("@")[2]
-        label = f"{words}, {argument} deg" if argument else words
-        if after is not None and tuned is not None and one.text in wanted:
-            verdict = Verdict.PASSED if wanted[one.text] not in tuned.contradiction else Verdict.FAILED
-            note = f"was {result.values[row]:.5g}, wished {wanted[one.text].relation} {wanted[one.text].value:g}"
-            told.append(Figure(label=label, value=float(after[row]), unit=unit, verdict=verdict, note=note))
-        elif after is not None and np.isfinite(after[row]):
-            told.append(
-                Figure(
-                    label=label, value=float(after[row]), unit=unit, note=f"was {result.values[row]:.5g} before tuning"
-                )
-            )
-        else:
-            note = f"standard error {result.standard_errors[row]:.2g}"
-            told.append(Figure(label=label, value=float(result.values[row]), unit=unit, note=note))
-    return told
+def _wished(tuned: Mapping[str, Json]) -> dict[str, tuple[Mapping[str, Json], Verdict]]:
+    """Figure to its wish, and whether that is met."""
+    return {
+        wish["figure"]: (wish, Verdict.FAILED if text in tuned["contradiction"] else Verdict.PASSED)
+        for text, wish in tuned.get("wishes", {}).items()
+    }
 
 
-def _coefficients(result: Influence) -> Section:
-    return Section(
-        heading="Influence coefficients",
-        text=_COEFFICIENTS,
-        charts=[Illustration(chart=chart) for chart in influence_charts(result)],
-        notes=result.notices,
-    )
+def _key_figure(text: str, one: Mapping[str, Json], tuned: Mapping[str, Json]) -> Figure:
+    kind, _, argument = text.partition("@")
+    words, unit = in_words(kind)
+    label = f"{words}, {argument} deg" if argument else words
+    after, (wish, verdict) = tuned.get("figures", {}).get(text), _wished(tuned).get(text, ({}, Verdict.NONE))
+    if after is None:
+        note = f"standard error {one['standard_error']:.2g}"
+        return Figure(label=label, value=one["value"], unit=unit, note=note)
+    note = f"was {one['value']:.5g} before tuning"
+    if wish:
+        note = f"was {one['value']:.5g}, wished {wish['relation']} {wish['wanted']:g}"
+    return Figure(label=label, value=after, unit=unit, verdict=verdict, note=note)
 
 
-def _all_coefficients(result: Influence) -> Section:
+def _all_coefficients(result: Coefficients) -> Section:
     tables = [
         _table(caption, result, K, rows)
         for caption, K in (("K by exact slopes", result.exact), ("K by the 10 % difference", result.difference))
@@ -88,49 +105,51 @@ def _all_coefficients(result: Influence) -> Section:
     return Section(heading="Coefficients of all parameters", tables=tables)
 
 
-def _table(caption: str, result: Influence, K: Array, rows: Sequence[int]) -> Table:
+def _table(caption: str, result: Coefficients, K: Array, rows: Sequence[int]) -> Table:
     """K of some figures, as many as are as wide as the page at most."""
     return Table(
         caption=caption,
-        columns=[Column(title="parameter"), *(Column(title=result.figures[n].text, unit="%", digits=3) for n in rows)],
-        rows=[[one.short, *(_cell(K[n, place]) for n in rows)] for place, one in enumerate(result.parameters)],
+        columns=[Column(title="parameter"), *(Column(title=result.figures[n], unit="%", digits=3) for n in rows)],
+        rows=[[name, *(_cell(K[n, place]) for n in rows)] for place, name in enumerate(result.names)],
     )
 
 
-def _cell(value: float) -> float | None:
-    return float(np.round(value, 3)) + 0.0 if np.isfinite(value) else None
+def _cell(value: float | None) -> float | None:
+    return None if value is None or not np.isfinite(value) else float(np.round(value, 3)) + 0.0
 
 
-def _uncertainty(result: Influence) -> Section:
-    errors = result.standard_errors
+def _uncertainty(found: Json, coefficients: Coefficients) -> Section:
+    figures: Mapping[str, Mapping[str, Json]] = found["figures"]
+    text = _ERRORS.format(found.get("standard_errors", "from the card's standard errors"))
     rows: list[Sequence[Cell]] = []
-    for row, figure in enumerate(result.figures):
-        relative = 100 * abs(errors[row] / result.values[row]) if result.values[row] else np.nan
-        rows.append([figure.text, float(result.values[row]), float(errors[row]), _cell(relative)])
+    for text, one in figures.items():
+        relative = 100 * abs(one["standard_error"] / one["value"]) if one["value"] else None
+        rows.append([text, one["value"], one["standard_error"], _cell(relative)])
     columns = [
         Column(title="figure"),
         Column(title="value"),
         Column(title="standard error", digits=3),
         Column(title="relative", unit="%", digits=3),
     ]
-    charts = [Illustration(chart=variance_chart(result))] if np.any(errors > 0) else []
+    known = any(one["standard_error"] > 0 for one in figures.values())
+    charts = [Illustration(chart=variance_chart(coefficients))] if known else []
     table = Table(caption="Figures and their standard errors", columns=columns, rows=rows)
-    return Section(heading="What is known of the figures", text=_ERRORS, charts=charts, tables=[table])
+    return Section(heading="What is known of the figures", text=text, charts=charts, tables=[table])
 
 
-def _together(result: Influence) -> Section:
-    assert result.agreed is not None
-    agreed = result.agreed
+def _together(agreed: Mapping[str, Json]) -> Section:
     changes: list[Sequence[Cell]] = [
-        [name.removeprefix("derivatives."), float(value)] for name, value in agreed.percent.items()
+        [key.removeprefix("derivatives."), value] for key, value in agreed["percent"].items()
     ]
+    ways = {
+        "foretold_exact": "by exact slopes",
+        "foretold_difference": "by 10 % differences",
+        "direct": "direct",
+    }
     figures: list[Sequence[Cell]] = [
-        [figure.text, *(_cell(value) for value in values)]
-        for figure, *values in zip(
-            result.figures, agreed.foretold, agreed.foretold_by_difference, agreed.direct, strict=True
-        )
+        [text, *(_cell(one[way]) for way in ways)] for text, one in agreed["figures"].items()
     ]
-    percent = [Column(title=title, unit="%") for title in ("by exact slopes", "by 10 % differences", "direct")]
+    percent = [Column(title=title, unit="%") for title in ways.values()]
     return Section(
         heading="Agreed variation",
         text="All these change together. To first order a figure changes by the sum of Kc K / 10; beside it, what "
@@ -146,31 +165,31 @@ def _together(result: Influence) -> Section:
     )
 
 
-def _tuning(result: Influence, tuned: Tuned, after: Array | None) -> Section:
-    wished = {wish.figure.text: wish for wish in tuned.wishes}
+def _tuning(found: Json, tuned: Mapping[str, Json]) -> Section:
+    wished = _wished(tuned)
     figures: list[Sequence[Cell]] = []
-    for row, one in enumerate(result.figures):
-        wish = wished.get(one.text)
-        now = float(after[row]) if after is not None and np.isfinite(after[row]) else None
-        verdict: Cell = None
-        if wish is not None:
-            verdict = Verdict.FAILED if wish in tuned.contradiction else Verdict.PASSED
-        figures.append(
-            [one.text, f"{wish.relation} {wish.value:g}" if wish else "", float(result.values[row]), now, verdict]
-        )
+    for text, one in found["figures"].items():
+        wish, verdict = wished.get(text, ({}, None))
+        wanted = f"{wish['relation']} {wish['wanted']:g}" if wish else ""
+        figures.append([text, wanted, one["value"], tuned["figures"].get(text), verdict])
     heads = ("figure", "wished", "before", "after", "")
     notes = []
-    if not tuned.reached:
-        names = [wish.text for wish in tuned.contradiction]
-        what = f"{' and '.join(names)} contradict each other" if len(names) > 1 else f"{names[0]} cannot be reached"
+    if contradiction := tuned["contradiction"]:
+        several = len(contradiction) > 1
+        what = (
+            f"{' and '.join(contradiction)} contradict each other"
+            if several
+            else f"{contradiction[0]} cannot be reached"
+        )
         notes.append(f"{what} within the bounds. What is shown is the nearest, in least squares of relative misses.")
-    if tuned.agreed_times is not None:
-        notes.append(f"The agreed variation was taken {tuned.agreed_times:+.3g} times.")
+    if tuned["agreed_times"] is not None:
+        notes.append(f"The agreed variation was taken {tuned['agreed_times']:+.3g} times.")
+    names = {key: short_name(key, one) for key, one in found["parameters"].items()}
     return Section(
         heading="Tuning",
-        text=f"By the {'fewest' if tuned.means.by == 'fewest' else 'most uncertain'} parameters, each within "
-        f"{tuned.means.within:g} standard errors of the card.",
-        charts=[Illustration(chart=moves_chart(tuned))] if tuned.moves else [],
+        text=f"By the {'fewest' if tuned['by'] == 'fewest' else 'most uncertain'} parameters, each within "
+        f"{tuned['within_standard_errors']:g} standard errors of the card.",
+        charts=[Illustration(chart=moves_chart(tuned, names))] if tuned["parameters"] else [],
         tables=[
             Table(
                 caption="Figures before and after",
@@ -182,10 +201,9 @@ def _tuning(result: Influence, tuned: Tuned, after: Array | None) -> Section:
     )
 
 
-def _moves(tuned: Tuned) -> Section:
+def _moves(parameters: Mapping[str, Mapping[str, Json]]) -> Section:
     rows: list[Sequence[Cell]] = [
-        [move.parameter.key, *(v * move.parameter.factor for v in (move.before, move.after)), move.in_standard_errors]
-        for move in tuned.moves
+        [key, one["before"], one["after"], one["standard_errors"]] for key, one in parameters.items()
     ]
     columns = [
         Column(title="key"),

@@ -9,6 +9,7 @@ import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tank2sim.records.thinning import Vector, thin_line, thin_points
 from tank2sim.report.chart_parts import (
     HOVER_SAMPLES,
     LINE_SAMPLES,
@@ -29,7 +30,6 @@ from tank2sim.report.chart_parts import (
     vector,
     with_unit,
 )
-from tank2sim.report.thinning import Vector, thin_line, thin_points
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +68,16 @@ class History:
     time_s: ArrayLike
     values: Mapping[str, ArrayLike]
     measured: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mark:
+    """A place in the panel of one signal, from `begin_s` to `end_s` (s), and what is to be said of it."""
+
+    signal: str
+    begin_s: float
+    end_s: float
+    text: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +137,13 @@ def track_chart(
 
 
 def history_chart(
-    runs: Sequence[History], signals: Sequence[Signal], *, title: str = "", width_px: int = 720, height_px: int = 120
+    runs: Sequence[History],
+    signals: Sequence[Signal],
+    *,
+    title: str = "",
+    width_px: int = 720,
+    height_px: int = 120,
+    marks: Sequence[Mark] = (),
 ) -> alt.VConcatChart:
     """Signals over each other with one time axis, the runs overlaid in each; angles in degrees.
 
@@ -141,6 +157,8 @@ def history_chart(
         Title of the chart.
     width_px, height_px : int
         Size of one panel.
+    marks : sequence of Mark
+        Places to tint.
     """
     look = _look(runs)
     span = np.concatenate([vector(run.time_s) for run in runs])
@@ -149,7 +167,8 @@ def history_chart(
     for place, signal in enumerate(signals):
         last = place == len(signals) - 1
         axis = alt.Axis(title="time (s)") if last else alt.Axis(title=None, labels=False, ticks=False)
-        layers = _history_layers(runs, signal, look, alt.X("t:Q", scale=time_scale, axis=axis))
+        x = alt.X("t:Q", scale=time_scale, axis=axis)
+        layers = [*_history_layers(runs, signal, look, x), *_marked(marks, signal, x)]
         panels.append(alt.layer(*layers).properties(width=width_px, height=height_px))
     names = ", ".join(signal.title for signal in signals)
     return stacked(panels, title=title, description=f"Time histories of {names}, of {_listed(runs)}.")
@@ -269,6 +288,19 @@ def _history_layers(runs: Sequence[History], signal: Signal, look: SeriesLook, x
     ]
     y = alt.Y("v:Q", scale=alt.Scale(zero=False), axis=axis_above(title))
     return _lines_and_points(rows, {"x": x, "y": y}, look, tooltip)
+
+
+def _marked(marks: Sequence[Mark], signal: Signal, x: alt.X) -> list[alt.Chart]:
+    """Tinted spans, each with a line where it begins, for the shortest are no wider than that."""
+    rows: list[Record] = [
+        {"t": one.begin_s, "end": one.end_s, "text": one.text} for one in marks if one.signal == signal.name
+    ]
+    if not rows:
+        return []
+    tooltip = [alt.Tooltip("text:N", title="found"), alt.Tooltip("t:Q", title="from (s)", format=NUMBER)]
+    base = alt.Chart(data(rows)).encode(x=x, tooltip=tooltip)
+    spans = base.mark_rect(style="region", clip=True).encode(x2="end:Q")
+    return [spans, base.mark_rule(style="limit", clip=True, strokeWidth=1.2)]
 
 
 def _lines_and_points(

@@ -42,23 +42,43 @@
     return copy;
   }
 
-  function embedded(holder, chart, config) {
-    const looks = { config, formatLocale: locale, renderer: "svg", tooltip: showTip };
+  // The inputs of a chart stand outside of its picture, in a form of their own; drawn anew, it keeps what was chosen.
+  function switches(place) {
+    return (charts[place].params ?? []).filter(({ bind }) => bind?.input);
+  }
+
+  function chosen(place) {
+    const view = views.get(place)?.view;
+    return view ? switches(place).map(({ name }) => [name, view.signal(name)]) : [];
+  }
+
+  function choose(place, values) {
+    const view = views.get(place)?.view;
+    for (const [name, value] of values) view?.signal(name, value);
+    if (values.length) view?.run();
+  }
+
+  function embedded(holder, chart, config, bind) {
+    bind?.replaceChildren();
+    const looks = { config, formatLocale: locale, renderer: "svg", tooltip: showTip, bind };
     return vegaEmbed(holder, chart, { mode: "vega-lite", actions: false, defaultStyle: false, ...looks });
   }
 
   async function draw(place, config) {
     const holder = figures[place].querySelector(".drawing");
     const equal = Boolean(charts[place].usermeta?.equal_scales);
+    const choice = figures[place].querySelector(".choice") ?? undefined;
+    const kept = chosen(place);
     const room = holder.clientWidth;
     let factor = 1;
     for (let attempt = 0; attempt < 4; attempt += 1) {
       views.get(place)?.finalize();
-      views.set(place, await embedded(holder, shrunk(charts[place], factor, equal), config));
+      views.set(place, await embedded(holder, shrunk(charts[place], factor, equal), config, choice));
       const width = holder.querySelector("svg").width.baseVal.value;
       if (width <= room || room === 0) break;
       factor *= (room / width) * 0.99;
     }
+    choose(place, kept);
     figures[place].querySelector(".tools").hidden = false;
   }
 
@@ -80,6 +100,8 @@
 
   async function save(place, kind) {
     const { view, finalize } = await embedded(document.createElement("div"), charts[place], light);
+    for (const [name, value] of chosen(place)) view.signal(name, value);
+    await view.runAsync();
     const link = document.createElement("a");
     link.href = await view.toImageURL(kind, kind === "png" ? 2 : 1);
     link.download = `figure-${place + 1}.${kind}`;
@@ -89,8 +111,17 @@
 
   const onScreen = () => drawAll(darkScreen.matches ? dark : light);
   darkScreen.addEventListener("change", onScreen);
-  addEventListener("beforeprint", () => { if (darkScreen.matches) drawAll(light); });
-  addEventListener("afterprint", () => { if (darkScreen.matches) onScreen(); });
+  // Paper has no switches: it shows what each stands at first.
+  let left = [];
+  addEventListener("beforeprint", () => {
+    left = charts.map((_, place) => chosen(place));
+    charts.forEach((_, place) => choose(place, switches(place).map(({ name, value }) => [name, value])));
+    if (darkScreen.matches) drawAll(light);
+  });
+  addEventListener("afterprint", () => {
+    left.forEach((values, place) => choose(place, values));
+    if (darkScreen.matches) onScreen();
+  });
 
   let width = innerWidth;
   let waiting = 0;
@@ -101,6 +132,7 @@
     waiting = setTimeout(onScreen, 200);
   });
   figures.forEach((figure, place) => {
+    figure.querySelector(".choice")?.addEventListener("submit", (event) => event.preventDefault());
     for (const button of figure.querySelectorAll("button")) {
       button.addEventListener("click", () => save(place, button.dataset.save));
     }

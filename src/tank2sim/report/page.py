@@ -9,6 +9,7 @@ from __future__ import annotations
 import functools
 import importlib.resources
 import json
+import urllib.parse
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -57,7 +58,21 @@ class Column:
 _SHORT = 24
 """Characters of text in a table that are not broken into lines."""
 
-Cell = float | int | bool | str | Verdict | None
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """A cell that leads elsewhere: `path` is that of a file relative to the page, with slashes."""
+
+    text: str
+    path: str
+
+    @property
+    def address(self) -> str:
+        """The path as a page has it: no character of a name means anything but itself."""
+        return urllib.parse.quote(self.path)
+
+
+Cell = float | int | bool | str | Verdict | Link | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,7 +189,11 @@ def _column(column: Column, cells: Sequence[Cell]) -> dict[str, Any]:
     numbers: list[Any] = [cell for cell in cells if is_number(cell)]
     texts = iter(format_column(numbers, column.digits))
     shown = [
-        {"text": next(texts) if is_number(cell) else _shown(cell), "verdict": cell if isinstance(cell, Verdict) else ""}
+        {
+            "text": next(texts) if is_number(cell) else _shown(cell),
+            "verdict": cell if isinstance(cell, Verdict) else "",
+            "address": cell.address if isinstance(cell, Link) else "",
+        }
         for cell in cells
     ]
     longest = max((len(cell["text"]) for cell in shown), default=0)
@@ -187,6 +206,8 @@ def _shown(cell: Cell) -> str:
         return NOTHING
     if isinstance(cell, str):
         return str(cell)
+    if isinstance(cell, Link):
+        return cell.text
     if is_number(cell):
         return format_number(cell)
     return "yes" if cell else "no"
@@ -201,6 +222,9 @@ def _chart(illustration: Illustration, number: int) -> dict[str, Any]:
         "heading": heading,
         "caption": " ".join(text for text in (subtitle, illustration.caption) if text),
         "description": specification.get("description", heading),
+        "switch": any(
+            "bind" in parameter for parameter in specification.get("params", ()) if "select" not in parameter
+        ),
         "moves": any("select" in parameter for parameter in specification.get("params", ())),
         "specification": specification,
     }

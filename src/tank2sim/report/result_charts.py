@@ -19,6 +19,7 @@ from tank2sim.report.analysis_charts import (
 from tank2sim.report.chart_parts import LINE_SAMPLES, NUMBER, Record, axis_above, data, every, plain, stacked, with_unit
 from tank2sim.report.page import Illustration
 from tank2sim.report.result_values import Json, is_matrix, is_number, rises, words
+from tank2sim.report.switched_charts import misfit_maps
 
 ACROSS = (
     "time_s",
@@ -201,8 +202,8 @@ def force_fit(heading: str, runs: Sequence[Mapping[str, Json]]) -> Illustration 
 def misfits(heading: str, trials: Sequence[Mapping[str, Json]]) -> Illustration | None:
     """Misfit of each signal in each trial as a map, to switch between before, after and what else there is."""
     rows = [
-        {"trial": str(trial.get("trial", "")), "signal": words(signal)[0], "model": model.replace("_", " ")}
-        | {"misfit": _plain(value)}
+        {"group": _GROUPS.get(trial.get("held_out"), ""), "trial": str(trial.get("trial", ""))}
+        | {"signal": words(signal)[0], "model": model.replace("_", " "), "misfit": float(value)}
         for trial in trials
         for signal, models in (trial.get("signals") or {}).items()
         for model, value in models.items()
@@ -211,28 +212,10 @@ def misfits(heading: str, trials: Sequence[Mapping[str, Json]]) -> Illustration 
     models = list(dict.fromkeys(row["model"] for row in rows))
     if not models:
         return None
-    pick = alt.binding_radio(options=models, name="model: ")
-    chosen = alt.param(name="model", bind=pick, value=models[0])
-    names, signals = (list(dict.fromkeys(row[key] for row in rows)) for key in ("trial", "signal"))
-    largest = max(float(row["misfit"]) for row in rows)
-    base = alt.Chart(data(rows)).transform_filter("datum.model === model")
-    place = {"x": alt.X("signal:N", sort=signals, title=None, axis=alt.Axis(labelAngle=0))}
-    place |= {"y": alt.Y("trial:N", sort=names, title=None)}
-    scale = alt.Scale(type="log", domain=[1, max(10.0, largest)], clamp=True, scheme="oranges")
-    cells = base.mark_rect().encode(
-        **place, color=alt.Color("misfit:Q", scale=scale, legend=None), tooltip=["trial:N", "signal:N", "misfit:Q"]
-    )
-    dark = f"datum.misfit > {max(10.0, largest) ** 0.6:.6g}"
-    told = base.mark_text(fontSize=11).encode(
-        **place,
-        text=alt.Text("misfit:Q", format=",.3~r"),
-        color=alt.condition(dark, alt.value("#ffffff"), alt.value("#16212c")),
-    )
-    size = {"width": 90 * len(signals), "height": 30 * len(names)}
-    chart = alt.layer(cells, told).add_params(chosen).properties(**size, title=heading)
-    description = f"{heading}: {len(names)} trials by {len(signals)} signals, for each of {', '.join(models)}."
-    caption = "Root mean square of the difference over the noise of the measurement: 1 is noise."
-    return Illustration(chart=chart.properties(description=description), caption=caption)
+    return Illustration(chart=misfit_maps(rows, models, title=heading), caption="1 is noise.")
+
+
+_GROUPS: dict[object, str] = {True: "held out trials", False: "fitting trials"}
 
 
 def bode(heading: str, label: str, value: Mapping[str, Json]) -> Illustration:

@@ -7,14 +7,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tank2sim.report import result_charts as charts
-from tank2sim.report.page import Figure, Illustration, Page, Section, Table, Verdict
-from tank2sim.report.result_kinds import kind_of
+from tank2sim.report.page import Illustration, Page, Section, Table
+from tank2sim.report.result_drawn import drawn, misshapen, whole_page
+from tank2sim.report.result_headlines import headlines
+from tank2sim.report.result_kinds import Kind, kind_of
+from tank2sim.report.result_motions import is_columns, motions
 from tank2sim.report.result_values import (
     LONGEST_LIST,
-    VERDICTS,
     Json,
     alike,
-    cell,
     grouped,
     is_matrix,
     is_number,
@@ -29,10 +30,10 @@ from tank2sim.report.result_values import (
     titled,
     words,
 )
+from tank2sim.report.result_watched import drawn_from, not_as_written
 
 _TOLD = ("notices", "warnings", "notes")
 _DEEPEST = 5
-_MOST_FIGURES = 8
 _MOST_PARTS = 12
 _BODE = {"omega_radps", "magnitude_dB", "phase_deg"}
 
@@ -63,47 +64,39 @@ def result_page(result: Json, source: str) -> Page:
     Raises
     ------
     InputError
-        It is no result of a command of tank2sim.
+        It is no result of a command of tank2sim, or a value in it has not the form of one.
     """
     kind = kind_of(result, source)
+    if key := misshapen(kind.title, result):
+        raise not_as_written(source, key)
+    return drawn_from(result, source, lambda watched: _page(watched, kind, source))
+
+
+def _page(result: Mapping[str, Json], kind: Kind, source: str) -> Page:
+    if whole := whole_page(kind.title, result):
+        return whole
     told = [str(note) for key in _TOLD for note in result.get(key) or []]
     name = next((result[key] for key in ("ship", "campaign", "glider", "path") if isinstance(result.get(key), str)), "")
     checked = charts.errors("Errors of the outputs", result.get("errors"), result.get("limits"))
-    sections = [_section(key, value) for key, value in result.items() if key not in _TOLD and not is_scalar(value)]
-    overview = {key: value for key, value in scalars(result).items() if key not in _TOLD}
+    own, rest = drawn(kind.title, result)
+    if checked:  # all but the largest errors, which the table of all of them has again
+        rest = {key: value for key, value in rest.items() if key != "max_error"}
+    sections = [_section(key, value) for key, value in rest.items() if key not in _TOLD and not is_scalar(value)]
+    overview = {key: value for key, value in scalars(result).items() if key not in (*_TOLD, "kind")}
     table = [quantities("The result", overview)] if overview else []
-    first = [Section(heading="Overview", tables=table, charts=[checked] if checked else [], notes=told)]
+    first = [
+        Section(heading="Overview", text=kind.beside, tables=table, charts=[checked] if checked else [], notes=told)
+    ]
     return Page(
         title=f"{kind.title}: {Path(name).name}" if name else kind.title,
         subtitle=f"From {source}",
-        figures=_figures(result, kind.headlines),
-        sections=[*(first if overview or told else []), *(one for one in sections if one.tables or one.charts)],
+        figures=headlines(result, kind),
+        sections=[
+            *(first if overview or told or kind.beside else []),
+            *own,
+            *(one for one in sections if one.tables or one.charts),
+        ],
     )
-
-
-def _figures(result: Mapping[str, Json], headlines: tuple[str, ...]) -> list[Figure]:
-    values = {path: _at(result, path) for path in headlines}
-    figures = result.get("figures")
-    if isinstance(figures, Mapping):
-        values |= {key: value for key, value in figures.items() if is_number(value)}
-    shown = [_figure(path, value) for path, value in values.items() if value is not None and is_scalar(value)]
-    return shown[:_MOST_FIGURES]
-
-
-def _figure(path: str, value: Json) -> Figure:
-    *parents, key = path.split(".")
-    label, unit = words(key)
-    label = " ".join([label, *(f"({words(one)[0]})" for one in parents[-1:] if key in ("fit",))])
-    if isinstance(value, bool):
-        verdict = (Verdict.PASSED if value else Verdict.FAILED) if key in VERDICTS else Verdict.NONE
-        return Figure(label=label, value="yes" if value else "no", verdict=verdict)
-    return Figure(label=label, value=value if is_number(value) else str(cell(key, value)), unit=unit)
-
-
-def _at(result: Json, path: str) -> Json:
-    for key in path.split("."):
-        result = result.get(key) if isinstance(result, Mapping) else None
-    return result
 
 
 def _section(key: str, value: Json) -> Section:
@@ -112,7 +105,8 @@ def _section(key: str, value: Json) -> Section:
     heading = "IMO criteria" if key == "imo" else title[:1].upper() + title[1:]
     _fill(parts, heading, key, value, 0)
     notes = [f"{parts.left_out} longer or deeper parts stand in the JSON alone."] if parts.left_out else []
-    return Section(heading=heading, tables=parts.tables, charts=parts.charts, notes=notes)
+    tables = [one for one in parts.tables if one.rows and [column.title for column in one.columns] != ["name"]]
+    return Section(heading=heading, tables=tables, charts=parts.charts, notes=notes)
 
 
 def _fill(parts: _Parts, caption: str, key: str, value: Json, depth: int) -> None:
@@ -140,13 +134,16 @@ def _fill_object(parts: _Parts, caption: str, key: str, value: Mapping[str, Json
     if drawn := charts.correlation(caption, value):
         parts.draw(drawn)
         return
+    if is_columns(value):
+        parts.charts += motions(caption, {caption: value})
+        return
     if set(value) >= _BODE:
         parts.draw(charts.bode(caption, caption, value))
         return
     columns = short_columns(value)
     plain = {name: one for name, one in scalars(value).items() if name not in columns}
     if plain:
-        parts.tables.append(quantities(caption, plain))
+        parts.tables.append(quantities(caption, plain, words(key)[1]))
     if columns:
         parts.tables.append(numbered(caption, {name: value[name] for name in columns}))
     _draw_series(parts, caption, {name: one for name, one in value.items() if is_series(one)})

@@ -18,6 +18,9 @@ LONGEST_LIST = 12
 MOST_ROWS = 400
 """Rows of a table; what is beyond is left to the JSON. A choice of ours."""
 
+MOST_COLUMNS, FEW_ROWS = 8, 4
+"""More columns than fit on a sheet in the type of the text, and so few rows that the table is turned. Ours."""
+
 WIDE = 300.0
 """Largest over smallest number of a column that still have their digits in common. A choice of ours."""
 
@@ -66,8 +69,24 @@ _UNITS = {
 }
 
 
+_NAMES = {
+    "speed_polynomial": ("speed polynomial, constant first", "m/s, by powers of t/s"),
+    "force_polynomial": ("force polynomial, constant first", "N, by powers of t/s"),
+    "could_hide": ("sizes that would not show", ""),
+    "could_hide_in_words": ("sizes that would not show, in words", ""),
+    "left_card_range_s": ("left the range of the card after", "s"),
+    "left_card_range_at": ("where it left the range of the card", ""),
+    "outside_card_range": ("outside the range of the card", ""),
+    "p_values": ("p", ""),
+    "members": ("members of the ensemble", ""),
+}
+"""Keys that are no words for a reader."""
+
+
 def words(key: str) -> tuple[str, str]:
     """A key as a reader sees it, and its unit: ``("advance", "m")``; names of files and parameters stay as they are."""
+    if key in _NAMES:
+        return _NAMES[key]
     stem, _, condition = key.partition("@")
     if stem.endswith("_prime"):
         return f"{stem.removesuffix('_prime')}′", ""
@@ -130,9 +149,9 @@ def cell(key: str, value: Json) -> Cell:
     return str(value)
 
 
-def quantities(caption: str, values: Mapping[str, Json]) -> Table:
-    """One row a value: its name, the value, its unit."""
-    return _listed(caption, ["quantity"], [(words(key)[0], key, value) for key, value in values.items()])
+def quantities(caption: str, values: Mapping[str, Json], unit: str = "") -> Table:
+    """One row a value: its name, the value, its unit, which is `unit` where its key has none."""
+    return _listed(caption, ["quantity"], [(words(key)[0], key, value) for key, value in values.items()], unit)
 
 
 def grouped(caption: str, groups: Mapping[str, Mapping[str, Json]]) -> Table:
@@ -145,13 +164,15 @@ def grouped(caption: str, groups: Mapping[str, Mapping[str, Json]]) -> Table:
     return _listed(caption, ["of", "quantity"], rows)
 
 
-def _listed(caption: str, heads: Sequence[str], rows: Sequence[tuple[Json, ...]]) -> Table:
-    """Rows that end with a key and its value: each value has its own digits, for the column has no one unit."""
-    units = [words(key)[1] for *_, key, _ in rows]
+def _listed(caption: str, heads: Sequence[str], rows: Sequence[tuple[Json, ...]], unit: str = "") -> Table:
+    """Rows that end with a key and its value: each value has its own digits, for the column has no one unit. What is
+    not known has no row."""
+    rows = [row for row in rows if cell(row[-2], row[-1]) is not None]
+    units = [words(key)[1] or (unit if is_number(value) else "") for *_, key, value in rows]
     heads = [*heads, "value", *(["unit"] if any(units) else [])]
     cells = [
-        [*names, _digits(cell(key, value)), *([unit] if any(units) else [])]
-        for (*names, key, value), unit in zip(rows, units, strict=True)
+        [*names, _digits(cell(key, value)), *([own] if any(units) else [])]
+        for (*names, key, value), own in zip(rows, units, strict=True)
     ]
     return Table(caption=caption, columns=[Column(title=head) for head in heads], rows=cells)
 
@@ -162,7 +183,9 @@ def _digits(value: Cell) -> Cell:
 
 def rows_of(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], first: str) -> Table:
     """One row an object, one column a key that any of them has; `first` heads the names, empty where there are none."""
-    keys = list(dict.fromkeys(key for _, one in named for key in scalars(one)))
+    keys = [key for key in dict.fromkeys(key for _, one in named for key in scalars(one)) if _is_known(key, named)]
+    if len(keys) > MOST_COLUMNS and len(named) <= FEW_ROWS:
+        return _turned(caption, named, keys)
     columns = [Column(title=words(key)[0], unit=words(key)[1]) for key in keys]
     wide = _wide(named, keys)
     cells = [[_shown(key, one.get(key), key in wide) for key in keys] for _, one in named[:MOST_ROWS]]
@@ -171,6 +194,22 @@ def rows_of(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], first
         cells = [[name, *row] for (name, _), row in zip(named, cells, strict=False)]
     more = f" The first {MOST_ROWS} of {len(named)} rows." if len(named) > MOST_ROWS else ""
     return Table(caption=f"{caption}.{more}" if more else caption, columns=columns, rows=cells)
+
+
+def _is_known(key: str, named: Sequence[tuple[str, Mapping[str, Json]]]) -> bool:
+    return any(is_scalar(one.get(key)) and cell(key, one.get(key)) is not None for _, one in named)
+
+
+def _turned(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], keys: Sequence[str]) -> Table:
+    """A row a key and a column an object, for few objects with many keys: on paper a wide table is cut off."""
+    units = [words(key)[1] for key in keys]
+    heads = [name or f"no. {place}" if len(named) > 1 else name or "value" for place, (name, _) in enumerate(named, 1)]
+    told = [Column(title=head) for head in ("quantity", *heads, *(["unit"] if any(units) else []))]
+    rows = [
+        [words(key)[0], *(_shown(key, one.get(key), True) for _, one in named), *([unit] if any(units) else [])]
+        for key, unit in zip(keys, units, strict=True)
+    ]
+    return Table(caption=caption, columns=told, rows=rows)
 
 
 def _wide(named: Sequence[tuple[str, Mapping[str, Json]]], keys: Sequence[str]) -> set[str]:

@@ -13,6 +13,7 @@ from tank2sim.records.signals.correlation import Autocorrelation, Correlation
 from tank2sim.records.signals.effect import Effect
 from tank2sim.records.signals.spectra import Spectrum, Transfer
 from tank2sim.records.signals.statistics import Density
+from tank2sim.records.thinning import thin_line, thin_points
 from tank2sim.report.captive_charts import BAND_OPACITY
 from tank2sim.report.chart_parts import (
     LINE_SAMPLES,
@@ -29,7 +30,6 @@ from tank2sim.report.chart_parts import (
     stacked,
     with_unit,
 )
-from tank2sim.report.thinning import thin_line, thin_points
 
 _SIZE_PX = (720, 300)
 _LEAST_DECIBEL = -120.0

@@ -29,6 +29,7 @@ _FILTER = ""
 _UNITS = {"rad": "rad", "radps": "rad/s", "mps": "m/s", "m": "m"}
 
 _HOW = (
+    "Mean and standard deviation of directions are those on the circle. "
     "Stationarity: augmented Dickey-Fuller and KPSS tests, whose null hypotheses are opposite, at 5 %. Normality is "
     "tested on samples two correlation times apart (their number in brackets): neighbours repeat each other, and all "
     "samples together make the tests reject what is normal. Spectra: Welch, Hann windows that overlap by half; 95 % "

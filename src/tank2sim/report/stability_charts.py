@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import altair as alt
 import numpy as np
-from numpy.typing import ArrayLike
 
-from tank2sim.analysis.stability.margin import Margin
-from tank2sim.analysis.stability.response import FIRST_ORDER, SteeringResponse
-from tank2sim.analysis.stability.trim import TrimEffect
-from tank2sim.analysis.turning.characteristic import SteeringCharacteristic
-from tank2sim.analysis.turning.diagram import SteadyTurning
-from tank2sim.analysis.turning.spirals import SpiralPoints
+from tank2sim.analysis.stability.response import FIRST_ORDER
+from tank2sim.records.thinning import Vector
 from tank2sim.report.analysis_charts import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
-from tank2sim.report.chart_parts import NUMBER, Record, SeriesLook, axis_above, data, pan_zoom, records, series_look
+from tank2sim.report.chart_parts import (
+    NUMBER,
+    Record,
+    SeriesLook,
+    axis_above,
+    data,
+    pan_zoom,
+    records,
+    series_look,
+    vector,
+)
 from tank2sim.report.chart_parts import stacked as stacked_panels
+from tank2sim.report.result_values import Json
 
 STABLE, UNSTABLE, DIRECT, REVERSE = "stable turns", "unstable turns", "spiral", "reverse spiral"
 FEW = 14
@@ -27,33 +33,39 @@ _WIDTH = 680
 _RUDDER = "rudder angle, starboard positive (deg)"
 
 
-def steering_diagram(
-    turning: SteadyTurning, direct: SpiralPoints | None, reverse: SpiralPoints | None, *, title: str = ""
-) -> alt.VConcatChart:
-    """Yaw rate, speed, drift and heel of steady turns against the rudder; unstable turns dashed, spirals as points."""
-    spirals = {name: points for name, points in ((DIRECT, direct), (REVERSE, reverse)) if points is not None}
-    lines = [STABLE, *([UNSTABLE] if not turning.stable.all() else [])]
-    look = series_look([*lines, *spirals], as_points=list(spirals))
+def steering_diagram(turning: Json, spirals: Json, *, title: str = "") -> alt.VConcatChart:
+    """Yaw rate, speed, drift and heel of steady turns against the rudder; unstable turns dashed, spirals as points;
+    from ``steady_turning`` and ``spirals`` of the JSON."""
+    points = turning["points"]
+    run = {name: spirals[key] for name, key in ((DIRECT, "direct"), (REVERSE, "reverse")) if spirals.get(key)}
+    lines = [STABLE, *([UNSTABLE] if not all(points["stable"]) else [])]
+    look = series_look([*lines, *run], as_points=list(run))
     shown = {
-        "yaw rate (deg/s)": (np.degrees(turning.yaw_rate_radps), 300),
-        "speed (m/s)": (turning.speed_mps, 110),
-        "drift angle (deg)": (np.degrees(turning.drift_rad), 110),
+        "yaw rate (deg/s)": ("yaw_rate_degps", 300),
+        "speed (m/s)": ("speed_mps", 110),
+        "drift angle (deg)": ("drift_deg", 110),
+        "heel (deg)": ("heel_deg", 110),
     }
-    if turning.heel_rad is not None:
-        shown["heel (deg)"] = (np.degrees(turning.heel_rad), 110)
+    shown = {name: one for name, one in shown.items() if one[0] in points}
     panels = []
-    for name, (values, height) in shown.items():
+    for name, (key, height) in shown.items():
         last = name == list(shown)[-1]
-        own = spirals if name.startswith("yaw") else {}
-        panel = _turning_panel(_branches(turning, values), own, look, (name, _RUDDER if last else None))
+        own = run if name.startswith("yaw") else {}
+        panel = _turning_panel(_branches(turning, points[key]), own, look, (name, _RUDDER if last else None))
         panels.append(panel.properties(width=_WIDTH, height=height))
     return stacked_panels(panels, title=title, description="Steady yaw rate, speed and drift against the rudder angle.")
 
 
-def _branches(turning: SteadyTurning, values: ArrayLike) -> list[Record]:
+def _branches(turning: Json, values: Sequence[float]) -> list[Record]:
     """Rows of the branches: between two folds (or changes of stability) one line."""
-    rudder, column = np.degrees(turning.rudder_rad), np.asarray(values, dtype=float)
-    stable, folds = turning.stable, {fold.place for fold in turning.folds}
+    points = turning["points"]
+    rudder, rate, column = (vector(one) for one in (points["rudder_deg"], points["yaw_rate_degps"], values))
+    stable = points["stable"]
+    # A fold is one of the turns.
+    folds = {
+        int(np.argmin(np.abs(rudder - one["rudder_deg"]) + np.abs(rate - one["yaw_rate_degps"])))
+        for one in turning["folds"]
+    }
     ends, rows = [0], []
     for place in range(1, len(rudder) - 1):
         changes = stable[place] != stable[place + 1] and place + 1 not in folds and place not in folds
@@ -69,7 +81,7 @@ def _branches(turning: SteadyTurning, values: ArrayLike) -> list[Record]:
 
 
 def _turning_panel(
-    rows: list[Record], spirals: dict[str, SpiralPoints], look: SeriesLook, titles: tuple[str, str | None]
+    rows: list[Record], spirals: Mapping[str, Json], look: SeriesLook, titles: tuple[str, str | None]
 ) -> alt.LayerChart:
     name, across = titles
     labelled = across is not None
@@ -92,7 +104,7 @@ def _turning_panel(
     points = [
         row
         for label, one in spirals.items()
-        for row in records(label, {"d": np.degrees(one.rudder_rad), "v": np.degrees(one.yaw_rate_radps)})
+        for row in records(label, {"d": vector(one["rudder_deg"]), "v": vector(one["yaw_rate_degps"])})
     ]
     if points:
         layers.append(
@@ -125,33 +137,50 @@ def _level(value: float) -> alt.Chart:
     return alt.Chart(data([{"y": value}])).mark_rule(style="reference", clip=True).encode(y="y:Q")
 
 
-def step_chart(responses: Sequence[SteeringResponse], *, title: str = "") -> alt.LayerChart:
-    """Yaw rate after a step of one degree of rudder (or of its order), deg/s."""
-    rows = [row for one in responses for row in records(one.label, {"x": one.time_s, "y": one.step_per_s})]
-    look = series_look([one.label for one in responses])
+def step_chart(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
+    """Yaw rate after a step of one degree of rudder (or of its order), deg/s; from ``responses`` of the JSON."""
+    rows = [
+        row
+        for one in responses
+        for row in records(
+            one["system"],
+            {"x": vector(one["step"]["time_s"]), "y": vector(one["step"]["yaw_rate_per_rudder_per_s"])},
+        )
+    ]
+    look = series_look([one["system"] for one in responses])
     chart = _curves(rows, look, across="time after the step (s)", up="yaw rate per degree of rudder (deg/s)")
     return chart.properties(title=title, description="Yaw rate over time after a step of the rudder.")
 
 
-def steering_bode(responses: Sequence[SteeringResponse], *, title: str = "") -> alt.VConcatChart:
+def steering_bode(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.VConcatChart:
     """Bode diagram of the yaw rate by the rudder."""
-    return bode_chart(
-        [FrequencyResponse(label=one.label, omega_radps=one.omega_radps, response=one.response) for one in responses],
-        title=title,
-    )
+    drawn = []
+    for one in responses:
+        gain = 10 ** (vector(one["bode"]["magnitude_dB"]) / 20)
+        response = gain * np.exp(1j * np.radians(vector(one["bode"]["phase_deg"])))
+        drawn.append(FrequencyResponse(label=one["system"], omega_radps=one["bode"]["omega_radps"], response=response))
+    return bode_chart(drawn, title=title)
 
 
-def steering_poles(responses: Sequence[SteeringResponse], *, title: str = "") -> alt.LayerChart:
+def steering_poles(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
     """Poles and zeros of the hull, and of Nomoto's first order; those of the gear lie far out and are left out."""
-    shown = [one for one in responses if one.label == responses[0].label or one.label == FIRST_ORDER]
-    systems = [PolesZeros(label=one.label, poles=one.poles, zeros=one.zeros) for one in shown]
+    shown = [one for one in responses if one["system"] in (responses[0]["system"], FIRST_ORDER)]
+    systems = [
+        PolesZeros(
+            label=one["system"],
+            poles=[complex(*pole) for pole in one["poles"]],
+            zeros=[complex(*zero) for zero in one["zeros"]],
+        )
+        for one in shown
+    ]
     return pole_zero_chart(systems, title=title)
 
 
-def influence_chart(margin: Margin, *, title: str = "") -> alt.LayerChart:
-    """Change of C' by ten per cent more of each coefficient, as bars, the strongest at the top."""
-    rows = [{"name": one.short_name, "y": float(f"{one.percent:.6g}")} for one in margin.influences[:FEW]]
-    names = [one.short_name for one in margin.influences[:FEW]]
+def influence_chart(margins: Json, *, title: str = "") -> alt.LayerChart:
+    """Change of C' by ten per cent more of each coefficient, as bars, the strongest at the top; from ``margins``."""
+    strongest = margins["derivatives"][:FEW]
+    names = [one["name"].rpartition(".")[2] for one in strongest]
+    rows = [{"name": name, "y": float(f"{one['percent']:.6g}")} for name, one in zip(names, strongest, strict=True)]
     y = alt.Y("name:N", title=None, sort=names)
     x = alt.X("y:Q", title="change of C′ when the coefficient grows by 10 % (% of |C′|)")
     tooltip = [alt.Tooltip("name:N", title="coefficient"), alt.Tooltip("y:Q", title="change of C′ (%)", format=NUMBER)]
@@ -165,41 +194,46 @@ def influence_chart(margin: Margin, *, title: str = "") -> alt.LayerChart:
     )
 
 
-def speed_chart(margin: Margin, *, title: str = "") -> alt.LayerChart:
-    """C' over speed."""
-    rows = records("C′", {"x": margin.speeds_mps, "y": 1e5 * margin.criteria})
+def speed_chart(speed: Json, *, title: str = "") -> alt.LayerChart:
+    """C' over speed, from ``margins.speed`` of the JSON."""
+    rows = records("C′", {"x": vector(speed["speed_mps"]), "y": 1e5 * vector(speed["C_prime"])})
     look = series_look(["C′"])
     chart = _curves(rows, look, across="speed (m/s)", up="C′ · 10⁵", marks=[_level(0.0)], height=200)
     return chart.properties(title=title, description="Stability criterion over speed.")
 
 
-def trim_chart(trim: TrimEffect, *, title: str = "") -> alt.LayerChart:
-    """C' over trim after Inoue et al., and the two readings of paper 2 as levels around it."""
-    per_cent = 100 * trim.trims
-    base = float(trim.criteria[len(trim.criteria) // 2])
-    series = {"Inoue et al. 1981": trim.criteria}
-    for name, (less, more) in trim.readings.items():
-        series[f"paper 2, read as {name}: ±7.5 % for 1 %"] = base + per_cent * (more - less) / 2
+def trim_chart(trim: Json, *, title: str = "") -> alt.LayerChart:
+    """C' over trim after Inoue et al., and the two readings of paper 2 as levels around it; from ``trim``."""
+    inoue = trim["inoue_1981"]
+    per_cent, criteria = 100 * vector(inoue["trim_by_stern_over_length"]), vector(inoue["C_prime"])
+    base = float(criteria[len(criteria) // 2])
+    series = {"Inoue et al. 1981": criteria}
+    for name, one in trim["paper_7_5_percent"].items():
+        series[f"paper 2, read as {name}: ±7.5 % for 1 %"] = base + per_cent * (one["more"] - one["less"]) / 2
     rows = [row for label, values in series.items() for row in records(label, {"x": per_cent, "y": 1e5 * values})]
     across = "trim by the stern (% of length)"
     chart = _curves(rows, series_look(list(series)), across=across, up="C′ · 10⁵", marks=[_level(0.0)], height=220)
     return chart.properties(title=title, description="Stability criterion over trim, estimated.")
 
 
-def characteristic_chart(found: SteeringCharacteristic, *, title: str = "") -> alt.LayerChart:
-    """Rudder angle against steady yaw rate: the diagram, Bech's cubic and Norrbin's, where they were fitted."""
-    kept = np.abs(found.yaw_rate_radps) <= found.fitted_radps * (1 + 1e-9)
-    rate = found.yaw_rate_radps[kept]
+def characteristic_chart(found: Json, *, title: str = "") -> alt.LayerChart:
+    """Rudder angle against steady yaw rate: the diagram, Bech's cubic and Norrbin's, where they were fitted; from
+    ``characteristic`` of the JSON."""
+    rate = vector(found["curve"]["yaw_rate_degps"])
+    kept = np.abs(rate) <= found["fitted_up_to_degps"] * (1 + 1e-9)
+    rate, rudder = rate[kept], vector(found["curve"]["rudder_deg"])[kept]
+    bech = [found["bech"][name] for name in ("b0_rad", "b1_s", "b2_s2_per_rad", "b3_s3_per_rad2")]
+    norrbin = [found["norrbin"][name] for name in ("n0_radps", "n1", "n2_s_per_rad", "n3_s2_per_rad2")]
+
+    def cubic(coefficients: Sequence[float]) -> Vector:
+        return np.asarray(np.degrees(np.polynomial.polynomial.polyval(np.radians(rate), coefficients)))
+
     series = {
-        "steady turns": found.rudder_rad[kept],
-        "Bech, nearest cubic": found.bech(rate),
-        "Norrbin, slope kept": found.norrbin(rate),
+        "steady turns": rudder,
+        "Bech, nearest cubic": cubic(bech),
+        "Norrbin, slope kept": cubic(norrbin) / found["norrbin"]["K_per_s"],
     }
-    rows = [
-        row
-        for label, values in series.items()
-        for row in records(label, {"x": np.degrees(rate), "y": np.degrees(values)})
-    ]
+    rows = [row for label, values in series.items() for row in records(label, {"x": rate, "y": values})]
     across = "yaw rate, starboard positive (deg/s)"
     chart = _curves(rows, series_look(list(series)), across=across, up="rudder angle (deg)", marks=[_level(0.0)])
     return chart.properties(title=title, description="Rudder angle against steady yaw rate.")

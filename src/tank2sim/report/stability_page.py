@@ -5,12 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import altair as alt
+
 from tank2sim.analysis.stability.imo import Criterion
 from tank2sim.analysis.stability.study import StabilityStudy
 from tank2sim.analysis.turning.characteristic import SteeringCharacteristic
 from tank2sim.analysis.turning.diagram import SteadyTurning
+from tank2sim.files import plain_json
+from tank2sim.report.ensemble_charts import curve_charts
 from tank2sim.report.numbers import format_number
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
+from tank2sim.report.result_values import Json
 from tank2sim.report.stability_charts import (
     characteristic_chart,
     influence_chart,
@@ -21,6 +26,9 @@ from tank2sim.report.stability_charts import (
     step_chart,
     trim_chart,
 )
+
+BEYOND = "beyond the card"
+"""In place of a verdict, where the trial left what the card holds for."""
 
 _VERDICTS = {True: Verdict.PASSED, False: Verdict.FAILED, None: Verdict.NONE}
 
@@ -81,12 +89,12 @@ def stability_page(study: StabilityStudy, notices: Sequence[str]) -> Page:
 
 def _figures(study: StabilityStudy) -> list[Figure]:
     found = study.stability
-    met = [one.passed for one in study.imo]
-    failed, unknown = met.count(False), met.count(None)
+    met = [one.judged for one in study.imo]
     beyond = sum(one.beyond_card and one.found is not None for one in study.imo)
+    failed, unknown = met.count(False), met.count(None) - beyond
     verdict = Verdict.FAILED if failed else Verdict.CAUTION if unknown or beyond else Verdict.PASSED
     open_ones = [f"{unknown} open"] if unknown else []
-    notes = [*open_ones, *([f"{beyond} judged beyond the card's validity"] if beyond else [])]
+    notes = [*open_ones, *([f"{beyond} beyond the card's validity"] if beyond else [])]
     shown = [
         Figure(
             label="Straight course",
@@ -173,21 +181,11 @@ def _moving(study: StabilityStudy) -> Section:
         ],
         rows=rows,
     )
-    changes = ", ".join(f"{name} {change:+.3g} %" for name, change in study.trim.changes.items())
-    caption = f"After Inoue, 1 % of length of trim by the stern changes {changes}."
     return Section(
         heading="What moves the margin",
         text=f"Derivatives are prime, mass in kg and x_G in m. {_TRIM}",
         tables=[table],
-        charts=[
-            *([Illustration(chart=influence_chart(margin, title="Influence on C′"))] if margin.influences else []),
-            *(
-                [Illustration(chart=speed_chart(margin, title="Speed"), caption="Over the card's range of speeds.")]
-                if len(margin.speeds_mps)
-                else []
-            ),
-            Illustration(chart=trim_chart(study.trim, title="Trim (estimate)"), caption=caption),
-        ],
+        charts=_moving_charts(plain_json(margin.as_json()), plain_json(study.trim.as_json())),
     )
 
 
@@ -198,11 +196,7 @@ def _response(study: StabilityStudy) -> Section:
     return Section(
         heading="Response to the rudder",
         text=_RESPONSE,
-        charts=[
-            Illustration(chart=steering_poles(responses, title="Poles and zeros")),
-            Illustration(chart=steering_bode(responses, title="Bode diagram")),
-            Illustration(chart=step_chart(responses, title="Step of the rudder")),
-        ],
+        charts=_response_charts([plain_json(one.as_json()) for one in responses]),
     )
 
 
@@ -225,13 +219,63 @@ def _turning(study: StabilityStudy, turning: SteadyTurning) -> Section:
         heads = [Column(title="rudder", unit="deg"), Column(title="yaw rate", unit="deg/s")]
         tables.append(Table(caption="Folds, where the ship leaves her branch.", columns=heads, rows=folds))
     spirals = study.direct is not None or study.reverse is not None
-    chart = steering_diagram(turning, study.direct, study.reverse, title="Steady turns against the rudder")
+    run = {"direct": study.direct, "reverse": study.reverse}
+    told = {name: one.as_json() for name, one in run.items() if one is not None}
     return Section(
         heading="Steady turning",
         text=f"{_TURNING}\n\n{_SPIRALS}" if spirals else _TURNING,
         tables=tables,
-        charts=[Illustration(chart=chart)],
+        charts=[_diagram(plain_json(turning.as_json()), plain_json(told))],
     )
+
+
+def stability_drawn(found: Json) -> list[Section]:
+    """The charts of a study, from its JSON."""
+    sections = [Section(heading="What moves the margin", charts=_moving_charts(found["margins"], found["trim"]))]
+    if found["responses"]:
+        sections.append(Section(heading="Response to the rudder", charts=_response_charts(found["responses"])))
+    if found["steady_turning"]:
+        chart = _diagram(found["steady_turning"], found["spirals"])
+        sections.append(Section(heading="Steering diagram", text=_TURNING, charts=[chart]))
+    if found["characteristic"]:
+        chart = Illustration(chart=_rudder_that_holds(found["characteristic"]))
+        sections.append(Section(heading="Nonlinear steering characteristic", charts=[chart]))
+    if curves := (found.get("ensemble") or {}).get("curves"):
+        sections.append(Section(heading="Over the ensemble", charts=curve_charts(curves)))
+    return sections
+
+
+def _moving_charts(margins: Json, trim: Json) -> list[Illustration]:
+    changes = ", ".join(
+        f"{name} {change:+.3g} %" for name, change in trim["inoue_1981"]["change_percent_by_1_percent"].items()
+    )
+    caption = f"After Inoue, 1 % of length of trim by the stern changes {changes}."
+    speed = margins["speed"]
+    return [
+        *([Illustration(chart=influence_chart(margins, title="Influence on C′"))] if margins["derivatives"] else []),
+        *(
+            [Illustration(chart=speed_chart(speed, title="Speed"), caption="Over the card's range of speeds.")]
+            if speed
+            else []
+        ),
+        Illustration(chart=trim_chart(trim, title="Trim (estimate)"), caption=caption),
+    ]
+
+
+def _response_charts(responses: Sequence[Json]) -> list[Illustration]:
+    return [
+        Illustration(chart=steering_poles(responses, title="Poles and zeros")),
+        Illustration(chart=steering_bode(responses, title="Bode diagram")),
+        Illustration(chart=step_chart(responses, title="Step of the rudder")),
+    ]
+
+
+def _diagram(turning: Json, spirals: Json) -> Illustration:
+    return Illustration(chart=steering_diagram(turning, spirals, title="Steady turns against the rudder"))
+
+
+def _rudder_that_holds(found: Json) -> alt.LayerChart:
+    return characteristic_chart(found, title="Rudder that holds a yaw rate")
 
 
 def _characteristic(found: SteeringCharacteristic) -> Section:
@@ -260,12 +304,19 @@ def _characteristic(found: SteeringCharacteristic) -> Section:
         heading="Nonlinear steering characteristic",
         text=_CHARACTERISTIC,
         tables=[Table(caption=caption, columns=heads, rows=rows)],
-        charts=[Illustration(chart=characteristic_chart(found, title="Rudder that holds a yaw rate"))],
+        charts=[Illustration(chart=_rudder_that_holds(plain_json(found.as_json())))],
     )
 
 
 def _errors(*values: float | None) -> list[float | None]:
     return [None if value is None else math.degrees(value) for value in values]
+
+
+def imo_verdict(one: Criterion) -> Cell:
+    """The verdict of a criterion as a table has it."""
+    if one.passed is None:
+        return "open"
+    return BEYOND if one.beyond_card else _VERDICTS[one.passed]
 
 
 def _imo(criteria: Sequence[Criterion]) -> Table:
@@ -275,9 +326,9 @@ def _imo(criteria: Sequence[Criterion]) -> Table:
             one.found,
             one.allowed,
             one.unit,
-            _VERDICTS[one.passed] if one.passed is not None else "open",
-            one.margin,
-            one.margin_percent,
+            imo_verdict(one),
+            None if one.beyond_card else one.margin,
+            None if one.beyond_card else one.margin_percent,
             one.remark,
         ]
         for one in criteria

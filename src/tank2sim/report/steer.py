@@ -4,94 +4,48 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import Any
 
 import jinja2
-import numpy as np
 from markupsafe import Markup
 
 from tank2sim import __version__
-from tank2sim.dynamics.model import Input, Model, Parameter, Vector
+from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
 from tank2sim.fmu.interface import interface
-from tank2sim.records.trials import Trial
 from tank2sim.report.page import beside, json_in_html
-from tank2sim.report.steer_ship import TOKEN, controls, references, shown_in
+from tank2sim.report.steer_ghost import Ghost
+from tank2sim.report.steer_ship import NO_COMPILER, TOKEN, Control, controls, references, shown_in
 
 LONGEST_ZIGZAG = 150.0
 """A zigzag that has not ended after so many ship lengths is given up, as in the simulation."""
 
 HISTORY = 25.0
-"""Ship lengths that the chart over time shows at first; later it shows twice as many. A choice of ours."""
+"""Ship lengths that the chart over time shows at first, rounded to :data:`WINDOWS`. A choice of ours."""
 
-_SCRIPTS = ("steer_ship.js", "steer_chart.js", "steer.js")
+WINDOWS = (10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200)
+"""Stretches of time, s, that the chart over time may show: round ones, a choice of ours."""
+
+FASTEST_APPROACH = 2.0
+"""Fastest approach that the page takes, in highest speeds of the card: beyond it nothing is known (ours)."""
+
+_SCRIPTS = ("steer_ship.js", "steer_voyage.js", "steer_pen.js", "steer_track.js", "steer_history.js", "steer.js")
 _BEAM = 1 / 7
 """Beam over length of the drawn ship where the card states none: that of an ordinary merchant ship."""
 
 # signal, what it is called, unit it is shown in, decimals
 _READOUTS = (
-    ("motion.speed", "Speed", "knots", 2),
-    ("motion.sog", "Speed over ground", "knots", 2),
+    ("motion.u", "Speed ahead", "knots", 2),
+    ("motion.sog", "Over ground", "knots", 2),
     ("motion.psi", "Heading", "deg", 1),
     ("motion.r", "Rate of turn", "deg/min", 1),
     ("motion.beta", "Drift angle", "deg", 2),
     ("rudder.angle", "Rudder", "deg", 1),
-    ("propeller.speed", "Engine", "rpm", 1),
+    ("propeller.speed_actual", "Engine", "rpm", 1),
     ("motion.phi", "Heel", "deg", 1),
     ("validity", "Validity", "", 2),
 )
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Ghost:
-    """A measured trial beside the ship, SI, rad, arrays (n,); nan where nothing was measured.
-
-    `start` holds the start of the ship on it (``initial.*``), by name.
-    """
-
-    label: str
-    time_s: Vector
-    x_m: Vector
-    y_m: Vector
-    psi_rad: Vector
-    rudder_rad: Vector
-    rpm_radps: Vector
-    start: Mapping[str, float]
-
-
-def ghost_of(trial: Trial) -> Ghost:
-    """A trial as a ghost: its track from its first row on, and the rudder that steered it (the order, else the angle).
-
-    Raises
-    ------
-    InputError
-        The trial has no positions, or no heading at its start.
-    """
-    blank = np.full(len(trial.time_s), math.nan)
-    signals = {name: np.asarray(values, dtype=float) for name, values in trial.signals.items()}
-    if not np.isfinite(signals.get("x_m", blank)).any() or not np.isfinite(signals.get("y_m", blank)).any():
-        raise InputError(trial.path, "columns x_m, y_m", "hold no track", "a ghost needs positions: leave out --ghost")
-    start = {
-        f"initial.{name}": _first(signals[f"{name}_{unit}"])
-        for name, unit in (("x", "m"), ("y", "m"), ("u", "mps"), ("v", "mps"), ("r", "radps"))
-        if np.isfinite(signals.get(f"{name}_{unit}", blank)).any()
-    }
-    psi = signals.get("psi_rad", blank)
-    start["initial.psi"] = _first(psi) if np.isfinite(psi).any() else _course(signals["x_m"], signals["y_m"])
-    if "delta_rad" in signals and np.isfinite(signals["delta_rad"]).any():
-        start["initial.rudder_angle"] = _first(signals["delta_rad"])
-    return Ghost(
-        label=trial.name,
-        time_s=trial.time_s - trial.time_s[0],
-        x_m=signals["x_m"],
-        y_m=signals["y_m"],
-        psi_rad=psi,
-        rudder_rad=signals.get("delta_order_rad", signals.get("delta_rad", blank)),
-        rpm_radps=signals.get("n_radps", blank),
-        start=start,
-    )
 
 
 def steering_page(model: Model, library: str | None, ghost: Ghost | None = None, notices: Sequence[str] = ()) -> str:
@@ -100,9 +54,10 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
     Parameters
     ----------
     model : Model
-        A ship.
+        A ship; for a ghost with a measured rudder angle that of :func:`tank2sim.report.steer_ship.following`.
     library : str or None
-        Of :func:`tank2sim.report.steer_ship.ship_in_page`; None where it cannot be compiled, which the page tells.
+        Of :func:`tank2sim.report.steer_ship.ship_in_page`; None where it cannot be compiled, which the page tells
+        before anything else.
     ghost : Ghost, optional
         A measured trial.
     notices : sequence of str
@@ -115,9 +70,14 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
     """
     if "rudder.command" not in model.input_names:
         raise InputError(model.name, "", "has no rudder", "only a ship (kind linear or abkowitz) can be steered")
+    if library is None:
+        notices = [NO_COMPILER, *notices]
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("tank2sim", "report"), autoescape=True, undefined=jinja2.StrictUndefined
     )
+    rudder, *others = _controls(model, ghost)
+    engine = next((one for one in others if one.name == "propeller.speed"), None)
+    set_by_hand = [one for one in others if one is not engine]
     environment.trim_blocks = environment.lstrip_blocks = True
     return environment.get_template("steer.html.j2").render(
         name=model.name,
@@ -126,10 +86,11 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
         notices=notices,
         ghost=ghost,
         library=library,
-        controls=[one for one in controls(model) if one.name not in ("rudder.command", "propeller.speed")],
-        rudder=controls(model)[0],
-        engine=next((one for one in controls(model) if one.name == "propeller.speed"), None),
+        controls=set_by_hand,
+        rudder=rudder,
+        engine=engine,
         approach=_approach(model, ghost),
+        windows=_windows(model),
         readouts=_readouts(model),
         fails="steering.failed" in model.input_names,
         style=Markup(beside("page.css") + beside("steer.css")),
@@ -139,25 +100,38 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
 
 
 def _data(model: Model, library: str | None, ghost: Ghost | None) -> dict[str, Any]:
-    described = interface(model)
-    length = _start(model, "ship.length")
-    start = {name: value for name, value in (ghost.start if ghost else {}).items() if name in model}
+    length, speed = _start(model, "ship.length"), _start(model, "ship.speed")
+    gear = [math.degrees(one.start) for one in model.parameters if one.name == "steering.max_angle"]
     return {
         "name": model.name,
         "library": library,
         "token": TOKEN,
-        "references": references(described),
+        "references": references(interface(model)),
         "step": model.step_s,
-        "start": {"initial.u": _start(model, "initial.u")} | start,
+        "start": {"initial.u": _start(model, "initial.u")} | dict(ghost.start if ghost else {}),
         "length": length,
         "beam": _start(model, "ship.beam") if "ship.beam" in model else length * _BEAM,
-        "longest": LONGEST_ZIGZAG * length / _start(model, "ship.speed"),
-        "window": HISTORY * length / _start(model, "ship.speed"),
+        "longest": LONGEST_ZIGZAG * length / speed,
+        "stop": gear[0] if gear else None,
         "knots": shown_in(model["initial.u"], "knots")[1],
-        "controls": [dataclasses.asdict(control) for control in controls(model)],
+        "controls": [dataclasses.asdict(control) for control in _controls(model, ghost)],
         "readouts": _readouts(model),
-        "ghost": None if ghost is None else {"label": ghost.label, **_series(ghost)},
+        "ghost": None if ghost is None else {"label": ghost.label, "angle": ghost.by_angle, **_series(ghost)},
     }
+
+
+def _controls(model: Model, ghost: Ghost | None) -> list[Control]:
+    """What the user sets: at first as the card has it, or as the trial was."""
+    held = ghost.held if ghost else {}
+    return [dataclasses.replace(one, start=held.get(one.name, one.start)) for one in controls(model)]
+
+
+def _windows(model: Model) -> tuple[list[tuple[int, str]], int]:
+    """Stretches that the chart over time may show (s, in words), and the one at first, s."""
+    wanted = HISTORY * _start(model, "ship.length") / _start(model, "ship.speed")
+    place = min(range(1, len(WINDOWS) - 2), key=lambda one: abs(math.log(WINDOWS[one] / wanted)))
+    shown = WINDOWS[place - 1 : place + 3]
+    return [(one, f"{one} s" if one < 120 else f"{one / 60:g} min") for one in shown], WINDOWS[place]
 
 
 def _series(ghost: Ghost) -> dict[str, list[float | None]]:
@@ -184,24 +158,16 @@ def _readouts(model: Model) -> list[dict[str, Any]]:
     ]
 
 
-def _approach(model: Model, ghost: Ghost | None) -> float:
-    """Approach speed, knots: of the trial, else of the card."""
+def _approach(model: Model, ghost: Ghost | None) -> dict[str, float]:
+    """Approach speed of the trial, else of the card, and its bounds, knots."""
+    factor = shown_in(model["initial.u"], "knots")[1]
     measured = ghost.start.get("initial.u") if ghost else None
-    return (_start(model, "initial.u") if measured is None else measured) * shown_in(model["initial.u"], "knots")[1]
+    speed = _start(model, "initial.u") if measured is None else measured
+    fastest = max(FASTEST_APPROACH * _start(model, "ship.fastest"), speed)
+    return {"value": speed * factor, "minimum": min(0.0, speed * factor), "maximum": fastest * factor}
 
 
 def _start(model: Model, name: str) -> float:
     variable = model[name]
     assert isinstance(variable, Parameter | Input)
     return float(variable.start)
-
-
-def _first(values: Vector) -> float:
-    return float(values[np.isfinite(values)][0])
-
-
-def _course(x: Vector, y: Vector) -> float:
-    """Course (rad) of the first twentieth of a track: the approach."""
-    known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
-    end = known[max(1, len(known) // 20)] if len(known) > 1 else known[0]
-    return math.atan2(y[end] - y[known[0]], x[end] - x[known[0]])

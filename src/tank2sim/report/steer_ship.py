@@ -6,6 +6,7 @@ import base64
 import math
 from dataclasses import dataclass
 
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Input, Model, Variable
 from tank2sim.errors import InputError
 from tank2sim.fmu.interface import Interface, interface
@@ -44,6 +45,9 @@ LARGEST_RUDDER = math.radians(35.0)
 FULL_AHEAD, FULL_ASTERN = 1.2, -1.0
 """Ends of the engine slider, in nominal revolutions. A choice of ours: the little overload that engines bear, and as
 much astern as ahead."""
+
+GHOST_STEERS, GHOST_RATE = "ghost.steers", "ghost.rudder_rate"
+"""Inputs of a model that can follow a measured rudder (:func:`following`)."""
 
 _SMALL = {"deg": 1.0, "knots": 0.1, "rpm": 1.0}
 """By what a control moves at a time, in the unit shown. A choice of ours."""
@@ -84,6 +88,22 @@ def ship_in_page(model: Model) -> str:
     return base64.b64encode(cross_compiled(sources, WEB)).decode("ascii")
 
 
+def following(model: Model) -> Model:
+    """The model of a page whose rudder can follow a measured angle, past the steering gear.
+
+        d(delta)/dt = rate of the gear,  or ``ghost.rudder_rate`` (rad/s) while ``ghost.steers``
+
+    Rates that are constant between readings bring the rudder to each of them exactly, so that the angle is straight
+    between them as in :func:`tank2sim.identification.trials.runs.prepare`.
+    """
+    steers = Input(name=GHOST_STEERS, unit="1", description="True: the rudder follows a measured angle", boolean=True)
+    rate = Input(
+        name=GHOST_RATE, unit="rad/s", description="Measured rate of the rudder, positive to starboard", nominal=0.05
+    )
+    followed = model.extend(steers, rate)
+    return followed.redefine("rudder.rate", lambda gear: gear * (1 - steers.symbol) + rate.symbol * steers.symbol)
+
+
 def references(described: Interface) -> dict[str, int]:
     """Name to value reference of what the page sets and reads: all but parameters of the hull."""
     wanted = ("initial.", "motion.", "rudder.", "steering.failed", "propeller.", "validity")
@@ -96,15 +116,15 @@ def references(described: Interface) -> dict[str, int]:
 
 
 def controls(model: Model) -> list[Control]:
-    """The inputs of a ship but the rudder's failure: rudder and engine first, then what the card's effects take."""
-    found = [_control(model, one) for one in model.inputs if not one.boolean]
+    """The inputs of a ship that a hand sets: rudder and engine first, then what the card's effects take."""
+    found = [_control(model, one) for one in model.inputs if not one.boolean and one.name != GHOST_RATE]
     first = ("rudder.command", "propeller.speed")
     return sorted(found, key=lambda one: first.index(one.name) if one.name in first else len(first))
 
 
 def _control(model: Model, variable: Input) -> Control:
     unit, factor = shown_in(variable)
-    low, high = variable.minimum, variable.maximum
+    low, high = _bounds(variable)
     if variable.name == "rudder.command":
         limits = [one.start for one in model.parameters if one.name == "steering.max_angle"]
         high = limits[0] if limits else LARGEST_RUDDER
@@ -123,8 +143,19 @@ def _control(model: Model, variable: Input) -> Control:
     )
 
 
+def _bounds(variable: Input) -> tuple[float | None, float | None]:
+    """Bounds of an input, SI: for what an effect takes from its surroundings those of a card, which the model lacks."""
+    known = [one for effect in EFFECTS.values() for one in effect.parameters if one.input_name == variable.name]
+    return (known[0].minimum, known[0].maximum) if known else (variable.minimum, variable.maximum)
+
+
 def _label(name: str) -> str:
-    known = {"rudder.command": "Rudder", "propeller.speed": "Engine"}
+    known = {
+        "rudder.command": "Rudder",
+        "propeller.speed": "Engine",
+        "current.direction": "Current towards",
+        "wind.direction": "Wind from",
+    }
     return known.get(name, name.replace(".", " ").replace("_", " ").capitalize())
 
 

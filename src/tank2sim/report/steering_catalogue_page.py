@@ -8,30 +8,28 @@ from collections.abc import Mapping
 import altair as alt
 
 from tank2sim.analysis.catalogue.comparison import SteeringComparison
-from tank2sim.analysis.catalogue.tables import model_of
-from tank2sim.analysis.turning.points import TurningPoints
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning
 from tank2sim.cards.steering_card import SteeringCard
+from tank2sim.files import plain_json
 from tank2sim.report.appearance import SHAPES
 from tank2sim.report.chart_parts import NUMBER, Record, data, pan_zoom, plain, series_look
-from tank2sim.report.motion_charts import track_chart
+from tank2sim.report.motion_charts import Track, track_chart
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
-from tank2sim.report.runs import track_of
-
-_TUNED = "through the two trial points"
+from tank2sim.report.result_values import Json
 
 
 def steering_catalogue_page(card: SteeringCard, found: SteeringComparison) -> Page:
     """The page of a comparison (:func:`tank2sim.analysis.catalogue.comparison.compare`)."""
+    told = plain_json(found.as_json())
     return Page(
         title=found.ship,
         subtitle="Steering models compared by their turns and their influence coefficients",
         figures=_figures(card, found),
         sections=[
-            _turning(card, found),
-            _influence(card, found),
+            _turning(card, found, told),
+            _influence(card, found, told),
             *([_agreed(card, found)] if found.predictions else []),
-            _manoeuvres(card, found),
+            _manoeuvres(card, found, told),
             *([_tuning(found)] if found.tuning else []),
             _missing(card, found),
         ],
@@ -54,14 +52,14 @@ def _figures(card: SteeringCard, found: SteeringComparison) -> list[Figure]:
     return [*figures, Figure(label="Models that cannot be computed", value=incomplete, note=note, verdict=verdict)]
 
 
-def _turning(card: SteeringCard, found: SteeringComparison) -> Section:
+def _turning(card: SteeringCard, found: SteeringComparison, told: Json) -> Section:
     rows: list[list[Cell]] = []
     for one in found.turns:
         if one.model in found.runs:
             for turn in one.turns:
-                told = turn.as_json()
+                row = turn.as_json()
                 keys = ("rudder_deg", "radius_m", "yaw_rate_degpmin", "drift_deg")
-                rows.append([one.title, *(told[key] for key in keys)])
+                rows.append([one.title, *(row[key] for key in keys)])
     columns = [
         Column(title="model"),
         Column(title="rudder", unit="deg"),
@@ -74,31 +72,49 @@ def _turning(card: SteeringCard, found: SteeringComparison) -> Section:
         heading="Steady turning",
         text="Each model has a speed that does not fall in the turn. Its steady turns are followed from the straight "
         "course, so that they are those that the ship comes to.",
-        charts=[Illustration(chart=steering_diagram_chart(card, found), caption="Lines: models. Points: known turns.")],
+        charts=[_diagrams(told["diagrams"])],
         tables=[Table(caption="Steady turns", columns=columns, rows=rows)],
         notes=notes,
     )
 
 
-def steering_diagram_chart(card: SteeringCard, found: SteeringComparison) -> alt.LayerChart:
-    """Yaw rate (deg/min) against rudder (deg): the models as lines, the card's points on top, the tuned model too."""
+def catalogue_drawn(found: Json) -> list[Section]:
+    """The charts of a comparison, from its JSON: steering diagrams, influence, turning circles."""
+    return [
+        Section(heading="Steering diagrams", charts=[_diagrams(found["diagrams"])]),
+        Section(heading="Influence on the steady radius", charts=[_bars(found)]),
+        Section(heading="Turning circles", charts=[_circles(found)]),
+    ]
+
+
+def _diagrams(diagrams: Json) -> Illustration:
+    return Illustration(chart=steering_diagram_chart(diagrams), caption="Lines: models. Points: known turns.")
+
+
+def _bars(found: Json) -> Illustration:
+    titles = found["titles"]
+    return Illustration(
+        chart=influence_bars({titles[name]: one["K_percent"] for name, one in found["influence"].items()})
+    )
+
+
+def _circles(found: Json) -> Illustration:
+    runs = found["histories"].items()
+    tracks = [Track(label=label, x_m=one["x_m"], y_m=one["y_m"], time_s=one["t_s"]) for label, one in runs]
+    return Illustration(chart=track_chart(tracks, title=f"Turning circles, {found['rudder_deg']:g} deg of rudder"))
+
+
+def steering_diagram_chart(diagrams: Json) -> alt.LayerChart:
+    """Yaw rate (deg/min) against rudder (deg): the models as lines, the card's points on top, the tuned model too;
+    from ``diagrams`` of the JSON."""
     lines: list[Record] = []
-    largest = max(turn.rudder_rad for one in found.turns for turn in one.turns)
-    curves: list[tuple[str, str, Mapping[str, float] | None]] = []
-    curves += [(card.models[name].title, name, None) for name in found.runs]
-    if isinstance(found.tuning, TwoPointTuning):
-        curves.append((_TUNED, found.main, found.tuning.parameters))
-    for label, name, parameters in curves:
-        for place, turn in enumerate(TurningPoints(model_of(card, name)).diagram(largest, parameters)):
-            rudder, rate = math.degrees(turn.rudder_rad), 60 * math.degrees(turn.yaw_rate_radps)
+    for label, one in diagrams["models"].items():
+        for place, (rudder, rate) in enumerate(zip(one["rudder_deg"], one["yaw_rate_degpmin"], strict=True)):
             lines.append({"run": label, "i": place, "d": plain(rudder), "r": plain(rate)})
     points: list[Record] = []
-    for place, point in enumerate(card.points):
-        rate = point.yaw_rate_radps or math.copysign(
-            card.ship.speed_mps / (point.radius_m or math.inf), point.rudder_rad
-        )
-        told = {"d": plain(math.degrees(point.rudder_rad)), "r": plain(60 * math.degrees(rate)), "source": point.source}
-        points.append({"run": point.label, "i": place, **told})
+    for place, one in enumerate(diagrams["points"]):
+        told = {"d": plain(one["rudder_deg"]), "r": plain(one["yaw_rate_degpmin"]), "source": one["source"]}
+        points.append({"run": one["label"], "i": place, **told})
     return _diagram(lines, points)
 
 
@@ -131,7 +147,7 @@ def _diagram(lines: list[Record], points: list[Record]) -> alt.LayerChart:
     )
 
 
-def _influence(card: SteeringCard, found: SteeringComparison) -> Section:
+def _influence(card: SteeringCard, found: SteeringComparison, told: Json) -> Section:
     names = list(dict.fromkeys(name for one in found.influence for name in one.K_percent))
     printed = card.influence
     columns = [Column(title=""), *(Column(title=card.models[one.model].title, digits=3) for one in found.influence)]
@@ -142,7 +158,7 @@ def _influence(card: SteeringCard, found: SteeringComparison) -> Section:
     return Section(
         heading="Influence on the steady radius",
         text=f"K: change of the radius in % at {found.rudder_deg:g} deg of rudder when one coefficient grows by 10 %.",
-        charts=[Illustration(chart=influence_bars(card, found))],
+        charts=[_bars(told)],
         tables=[Table(caption="K, %", columns=columns, rows=rows)],
     )
 
@@ -151,12 +167,11 @@ def _last(values: list[float] | None) -> float | None:
     return values[-1] if values else None
 
 
-def influence_bars(card: SteeringCard, found: SteeringComparison) -> alt.LayerChart:
-    """K % of every coefficient as bars, the models side by side."""
-    rows: list[Record] = []
-    for one in found.influence:
-        for name, value in one.K_percent.items():
-            rows.append({"run": card.models[one.model].title, "name": name, "K": plain(value)})
+def influence_bars(models: Mapping[str, Mapping[str, float]]) -> alt.LayerChart:
+    """K % of every coefficient as bars, the models (title to K by coefficient) side by side."""
+    rows: list[Record] = [
+        {"run": title, "name": name, "K": plain(value)} for title, K in models.items() for name, value in K.items()
+    ]
     order = list(dict.fromkeys(row["name"] for row in rows))
     labels = list(dict.fromkeys(row["run"] for row in rows))
     y = alt.Y("name:N", sort=order, title=None, axis=alt.Axis(labelLimit=160))
@@ -218,7 +233,7 @@ def _agreed(card: SteeringCard, found: SteeringComparison) -> Section:
     )
 
 
-def _manoeuvres(card: SteeringCard, found: SteeringComparison) -> Section:
+def _manoeuvres(card: SteeringCard, found: SteeringComparison, told: Json) -> Section:
     keys = ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m")
     rows: list[list[Cell]] = []
     for name, one in found.runs.items():
@@ -229,11 +244,10 @@ def _manoeuvres(card: SteeringCard, found: SteeringComparison) -> Section:
         rows.append([card.models[name].title, *cells, *[None] * (2 - len(first))])
     heads = [Column(title=key.removesuffix("_m").replace("_", " "), unit="m") for key in keys]
     over = [Column(title=f"{n} overshoot 10/10", unit="deg", digits=3) for n in ("first", "second")]
-    tracks = [track_of(card.models[name].title, one.turn) for name, one in found.runs.items()]
     return Section(
         heading="Manoeuvres",
         text="The steady models in time: (1) of the paper, drift angle and yaw rate, from a straight course.",
-        charts=[Illustration(chart=track_chart(tracks, title=f"Turning circles, {found.rudder_deg:g} deg of rudder"))],
+        charts=[_circles(told)],
         tables=[Table(caption="Figures", columns=[Column(title="model"), *heads, *over], rows=rows)],
     )
 

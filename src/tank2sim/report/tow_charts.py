@@ -8,12 +8,10 @@ import altair as alt
 import numpy as np
 
 from tank2sim.dynamics.surge_theory import DragPolynomial, TowedBody
-from tank2sim.identification.tow.models import FittedModel
-from tank2sim.identification.tow.study import TowStudy
-from tank2sim.records.tows import Tows
-from tank2sim.report.chart_parts import NUMBER, Record, data, pan_zoom, plain, records, series_look
+from tank2sim.records.thinning import Vector
+from tank2sim.report.chart_parts import NUMBER, Record, data, pan_zoom, plain, records, series_look, vector
 from tank2sim.report.motion_charts import History, Signal, history_chart
-from tank2sim.report.thinning import Vector
+from tank2sim.report.result_values import Json
 
 _SPEEDS = (
     Signal(name="speed", title="speed", unit="m/s"),
@@ -21,29 +19,26 @@ _SPEEDS = (
 )
 
 
-def speed_chart(tows: Tows, time_s: Vector, fits: Mapping[str, Vector], *, title: str = "") -> alt.VConcatChart:
-    """Readings as points and fits as lines; below, all of them less the first fit.
+def speed_chart(speeds: Json, *, title: str = "") -> alt.VConcatChart:
+    """Readings as points and simulated speeds as lines; below, all of them less the first simulation.
 
     Parameters
     ----------
-    time_s : array, (n,)
-        Times of the fits.
-    fits : mapping
-        Name to speeds, (n,), m/s; not empty.
+    speeds : mapping
+        As ``speeds`` of the JSON has them: ``t_s`` and ``measured_mps`` by tow, ``simulated_t_s`` and
+        ``simulated_mps`` by name, not empty; null where nothing was read.
     """
-    reference = next(iter(fits.values()))
-    at_readings = np.interp(tows.time_s, time_s, reference)
-    runs = [
-        History(
-            label=f"tow {number}",
-            time_s=tows.time_s,
-            values={"speed": speed, "left": speed - at_readings},
-            measured=True,
-        )
-        for number, speed in enumerate(tows.speed_mps.T, start=1)
-    ]
-    for name, speed in fits.items():
-        runs.append(History(label=name, time_s=time_s, values={"speed": speed, "left": speed - reference}))
+    time, model_time = (vector(speeds[name]) for name in ("t_s", "simulated_t_s"))
+    simulated = {name: vector(values) for name, values in speeds["simulated_mps"].items()}
+    reference = next(iter(simulated.values()))
+    at_readings = np.interp(time, model_time, reference)
+    runs = []
+    for label, values in speeds["measured_mps"].items():
+        speed = vector(values)
+        own = {"speed": speed, "left": speed - at_readings}
+        runs.append(History(label=label, time_s=time, values=own, measured=True))
+    for name, speed in simulated.items():
+        runs.append(History(label=name, time_s=model_time, values={"speed": speed, "left": speed - reference}))
     return history_chart(runs, _SPEEDS, title=title, height_px=230)
 
 
@@ -100,19 +95,21 @@ def _frame(drags: Mapping[str, DragPolynomial], speeds: Vector, factor: float) -
     return [low - margin, high + margin]
 
 
-def ellipse_chart(study: TowStudy, *, width_px: int = 620) -> alt.LayerChart:
-    """Joint 95 % regions of M and B3 from all tows, and each tow by itself as a point."""
+def ellipse_chart(
+    ellipses: Sequence[Mapping[str, Json]], by_tow: Mapping[str, Mapping[str, Json]], *, width_px: int = 620
+) -> alt.LayerChart:
+    """Joint 95 % regions of M and B3 from all tows, and each tow by itself as a point; both as the JSON has them."""
     lines: list[Record] = []
     points: list[Record] = []
-    ellipses = study.ellipses
     for own in ellipses:
-        lines += records(f"95 %: {own.label}", {"m": own.mass_kg, "b": own.B3_kgpm})
-    for way in study.by_tow:
-        if way.unknowns[:2] == ("M", "B3") and way.label.startswith("output error"):
-            for number, row in enumerate(way.alone, start=1):
-                label = f"each tow: {', '.join(way.unknowns)}"
-                points.append({"run": label, "m": plain(row[0]), "b": plain(row[1]), "tow": number})
-    labels = [f"95 %: {own.label}" for own in ellipses]
+        lines += records(f"95 %: {own['label']}", {"m": vector(own["mass_kg"]), "b": vector(own["B3_kgpm"])})
+    for name, way in by_tow.items():
+        if way["unknowns"][:2] == ["M", "B3"] and name.startswith("output error"):
+            for number, row in enumerate(way["alone"], start=1):
+                if None not in row[:2]:
+                    label = f"each tow: {', '.join(way['unknowns'])}"
+                    points.append({"run": label, "m": plain(row[0]), "b": plain(row[1]), "tow": number})
+    labels = [f"95 %: {own['label']}" for own in ellipses]
     dots = list(dict.fromkeys(str(row["run"]) for row in points))
     look = series_look([*labels, *dots], as_points=dots)
     x = alt.X("m:Q", title="M (kg)", scale=alt.Scale(zero=False))
@@ -139,19 +136,21 @@ def ellipse_chart(study: TowStudy, *, width_px: int = 620) -> alt.LayerChart:
 _VERDICTS = ("usable", "not determined", "drag negative somewhere")
 
 
-def model_chart(models: Sequence[FittedModel], *, width_px: int = 340) -> alt.HConcatChart:
-    """M with its 95 % interval, and AIC above the lowest, of each model."""
-    lowest = min(one.fit.aic for one in models)
+def model_chart(models: Sequence[Mapping[str, Json]], *, width_px: int = 340) -> alt.HConcatChart:
+    """M with its 95 % interval, and AIC above the lowest, of each of the ``models`` of the JSON."""
+    lowest = min(one["aic"] for one in models)
+    names = [", ".join(one["unknowns"]) for one in models]
     rows: list[Record] = []
-    for one in models:
-        low, high = one.mass_interval_kg
+    for name, one in zip(names, models, strict=True):
+        mass, half = one["estimates"]["M"], one["half_widths_95"]["M"]
+        ends = (None, None) if half is None else (plain(mass - half), plain(mass + half))
         rows.append(
-            {"name": one.model.label, "run": _verdict(one), "m": plain(float(one.fit.estimates[0]))}
-            | {"low": plain(low), "high": plain(high), "aic": plain(one.fit.aic - lowest)}
+            {"name": name, "run": _verdict(one), "m": plain(mass)}
+            | {"low": ends[0], "high": ends[1], "aic": plain(one["aic"] - lowest)}
         )
     shown = [verdict for verdict in _VERDICTS if any(row["run"] == verdict for row in rows)]
     look = series_look(shown, as_points=shown)
-    y = alt.Y("name:N", sort=[one.model.label for one in models], axis=alt.Axis(title=None, grid=True, labelLimit=200))
+    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, grid=True, labelLimit=200))
     tooltip = [
         alt.Tooltip("name:N", title="model"),
         alt.Tooltip("run:N", title="it is"),
@@ -167,7 +166,7 @@ def model_chart(models: Sequence[FittedModel], *, width_px: int = 340) -> alt.HC
     masses = alt.layer(bars, marks.encode(x=alt.X("m:Q", scale=scale, title="M with its 95 % interval (kg)")))
     ranks = marks.encode(
         x=alt.X("aic:Q", title="AIC above the lowest"),
-        y=alt.Y("name:N", sort=[one.model.label for one in models], axis=alt.Axis(labels=False, title=None, grid=True)),
+        y=alt.Y("name:N", sort=names, axis=alt.Axis(labels=False, title=None, grid=True)),
     )
     height = 30 * len(models)
     return alt.hconcat(
@@ -175,5 +174,5 @@ def model_chart(models: Sequence[FittedModel], *, width_px: int = 340) -> alt.HC
     ).properties(title="Models of different size", description="Mass and AIC of each model fitted by output error.")
 
 
-def _verdict(one: FittedModel) -> str:
-    return _VERDICTS[2] if not one.plausible else _VERDICTS[0] if one.determined else _VERDICTS[1]
+def _verdict(one: Mapping[str, Json]) -> str:
+    return _VERDICTS[2] if not one["drag_nowhere_negative"] else _VERDICTS[0] if one["determined"] else _VERDICTS[1]

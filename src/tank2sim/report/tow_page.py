@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from tank2sim.dynamics.surge import SurgeCoefficients
-from tank2sim.dynamics.surge_theory import drag_polynomial
+from tank2sim.dynamics.surge_theory import DragPolynomial, TowedBody, drag_polynomial
+from tank2sim.files import plain_json
 from tank2sim.identification.tow import paper as tow_paper
 from tank2sim.identification.tow.fit import KEYS, TowFit
 from tank2sim.identification.tow.force import force_words
-from tank2sim.identification.tow.models import FittedModel
-from tank2sim.identification.tow.output_error import simulated_speeds
 from tank2sim.identification.tow.study import TowStudy
 from tank2sim.report.numbers import format_number
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table
-from tank2sim.report.thinning import Vector
+from tank2sim.report.result_values import Json
 from tank2sim.report.tow_charts import drag_chart, ellipse_chart, model_chart, speed_chart
 
 _UNITS = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m", "delay": "s"}
@@ -118,35 +114,37 @@ def _polynomials(study: TowStudy) -> Table:
 
 
 def _speeds(study: TowStudy) -> Section:
-    result = study.result
-    time = np.linspace(0.0, float(result.tows.time_s[-1]), 301)
-    fits: dict[str, Vector] = {}
-    if study.best is not None:
-        fits[f"best usable: {study.best.model.label}"] = simulated_speeds(
-            _coefficients(study.best), result.force, time, _delay(study.best)
-        )
-    for name in ("output_error", "qr"):
-        if name in result.fits:
-            fit = result.fits[name]
-            speeds = simulated_speeds(fit.coefficients, result.force, time, fit.start_delay_s)
-            label = f"{name.replace('_', ' ')}: {', '.join(fit.unknowns)}"
-            if np.isfinite(speeds).all() and not any(np.allclose(speeds, other) for other in fits.values()):
-                fits[label] = speeds
-    charts = []
-    if fits:
-        first = next(iter(fits))
-        chart = speed_chart(result.tows, time, fits, title="Speeds of the tows and of the models")
-        charts.append(Illustration(chart=chart, caption=f"Below, everything less {first}."))
-    return Section(heading="Speeds and residuals", charts=charts)
+    return Section(heading="Speeds and residuals", charts=speed_illustrations(plain_json(study.as_json()["speeds"])))
 
 
-def _coefficients(one: FittedModel) -> SurgeCoefficients:
-    values = dict(zip(one.model.unknowns, one.fit.estimates.tolist(), strict=True))
-    return SurgeCoefficients(**{KEYS[name]: value for name, value in values.items() if name != "delay"})
+def speed_illustrations(speeds: Json) -> list[Illustration]:
+    """Readings, simulated speeds and what is between them, from ``speeds`` of the JSON."""
+    if not speeds["simulated_mps"]:
+        return []
+    chart = speed_chart(speeds, title="Speeds of the tows and of the models")
+    return [Illustration(chart=chart, caption=f"Below, everything less {next(iter(speeds['simulated_mps']))}.")]
 
 
-def _delay(one: FittedModel) -> float:
-    return float(one.fit.estimates[-1]) if one.model.start_delay else 0.0
+def model_illustrations(found: Json) -> list[Illustration]:
+    """Models of different size and joint regions of M and B3, from the JSON of a study."""
+    charts = [Illustration(chart=model_chart(found["models"]), caption=_MODELS)] if found["models"] else []
+    if found["confidence_ellipses"]:
+        chart = ellipse_chart(found["confidence_ellipses"], found["tow_by_tow"])
+        charts.append(Illustration(chart=chart, caption=_ELLIPSES))
+    return charts
+
+
+def tows_drawn(found: Json) -> list[Section]:
+    """The charts of a study, from its JSON."""
+    charts = [*speed_illustrations(found["speeds"]), *model_illustrations(found)]
+    if body := found.get("body"):
+        drags = {
+            name.replace("_", " "): DragPolynomial(**one["by_length_squared"])
+            for name, one in found["drag_coefficients"].items()
+            if name != "paper" or "qr" not in found["drag_coefficients"]
+        }
+        charts.append(Illustration(chart=drag_chart(drags, TowedBody(**body), found["top_speed_mps"])))
+    return [Section(heading="Speeds, models and drag", charts=charts)]
 
 
 def _models(study: TowStudy) -> Section:
@@ -167,9 +165,7 @@ def _models(study: TowStudy) -> Section:
         ]
         aic, condition = round(fit.aic, 1), float(f"{fit.condition_scaled:.2g}")
         rows.append([one.model.label, "; ".join(told), fit.scatter_mps, aic, condition, one.plausible])
-    charts = [Illustration(chart=model_chart(study.models), caption=_MODELS)] if study.models else []
-    if study.ellipses:
-        charts.append(Illustration(chart=ellipse_chart(study), caption=_ELLIPSES))
+    charts = model_illustrations(plain_json(study.as_json()))
     return Section(
         heading="What these tows can tell",
         text="The same readings by output error with fewer and with more unknowns (SI units; delay: the body starts so "
@@ -217,7 +213,7 @@ def _drag(study: TowStudy) -> Section:
         name.replace("_", " "): own for name, own in study.drags.items() if name != "paper" or "qr" not in study.drags
     }
     if study.best is not None:
-        best = drag_polynomial(_coefficients(study.best), study.body)
+        best = drag_polynomial(study.best.coefficients, study.body)
         if best not in drags.values():
             drags[f"best usable: {study.best.model.label}"] = best
     if tow_paper.are_of_the_paper(study.result.tows):

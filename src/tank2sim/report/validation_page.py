@@ -10,31 +10,26 @@ import altair as alt
 import numpy as np
 
 from tank2sim.analysis.practice.coefficients import Coefficient
-from tank2sim.analysis.practice.validation import Outcome, Validated, Validation, Verified
+from tank2sim.analysis.practice.validation import Outcome, Validation, Verified
 from tank2sim.analysis.stability.imo import Criterion
 from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, ManoeuvringCard
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.model import Model
 from tank2sim.gap.result import Passed
-from tank2sim.report.chart_parts import NUMBER, data, series_look
 from tank2sim.report.model_documentation import documentation
 from tank2sim.report.motion_charts import History, Signal, Track, history_chart, track_chart
 from tank2sim.report.numbers import format_number
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
+from tank2sim.report.stability_page import imo_verdict
+from tank2sim.report.validation_charts import ERRORS, comparison_error_chart
 from tank2sim.units import in_words
-
-VERDICTS = {
-    Outcome.VALIDATED: Verdict.PASSED,
-    Outcome.UNCERTAIN: Verdict.CAUTION,
-    Outcome.OPEN: Verdict.CAUTION,
-    Outcome.REFUTED: Verdict.FAILED,
-}
 
 _METHOD = (
     "E = S − D is the simulated less the measured figure. U_val = 2 √(u_num² + u_input² + u_D²) is what numerics, "
     "coefficients and data leave open, with 95 % probability (ASME V&V 20; ITTC 7.5-03-01-01). Where |E| ≤ U_val the "
     "error of the model is hidden in U_val, and the figure is validated at that level; where |E| > U_val the model "
-    "errs by about E. A level above the required one tells little: such a figure counts as too uncertain."
+    "errs by about E. A level above the required one tells little: such a figure counts as too uncertain. A trial that "
+    "the card was identified from can refute it, and not validate it: its figures are only fitted."
 )
 _SOURCES_OF_U = (
     "u_num comes from repeating the simulation with half the step (three times the change, Roache's factor for two "
@@ -154,16 +149,14 @@ def _coefficients(card: ManoeuvringCard) -> Section:
 def _numerical(verified: Sequence[Verified]) -> Section:
     rows: list[list[Cell]] = []
     for one in verified:
-        words, unit = in_words(one.name)
         deviation = None if one.deviation is None or not one.value else 100 * one.deviation / abs(one.value)
         values = _text(one.value), _text(one.halving, 2), _text(one.numerical, 2), _text(one.deviation, 3)
-        rows.append([one.trial, words, unit, *values, deviation])
+        rows.append([one.trial, _named(one.name), *values, deviation])
     columns = [
         Column(title="trial"),
         Column(title="figure"),
-        Column(title="unit"),
         Column(title="value"),
-        Column(title="change by half the step", digits=2),
+        Column(title="by half the step", digits=2),
         Column(title="U_num", digits=2),
         Column(title="u_input", digits=3),
         Column(title="u_input", unit="%", digits=3),
@@ -183,27 +176,24 @@ def _comparison(found: Validation) -> Section:
         parts = (one.measured, one.simulated, one.error), (one.inputs, one.data, one.uncertainty)
         values = [_text(value) for value in parts[0]] + [_text(value, 3) for value in parts[1]]
         number = list(manoeuvres).index(one.trial) + 1
-        verdict: list[Cell] = [VERDICTS[one.outcome], str(one.outcome)]
-        rows.append([number, _named(one.name), *values, one.level_percent, *verdict])
+        rows.append([f"{number}: {_named(one.name)}", *values, one.level_percent, str(one.outcome)])
     trials: list[list[Cell]] = [[place, *pair] for place, pair in enumerate(manoeuvres.items(), start=1)]
     heads = [Column(title="no."), Column(title="trial"), Column(title="manoeuvre, as recognised")]
     benchmark = Table(caption="Benchmark data.", columns=heads, rows=trials)
     columns = [
-        *(Column(title=title) for title in ("no.", "figure", "D", "S", "E")),
+        *(Column(title=title) for title in ("no.: figure", "D", "S", "E")),
         *(Column(title=title, digits=2) for title in ("u_input", "u_D")),
         Column(title="U_val", digits=3),
-        Column(title="level", unit="% of D", digits=3),
+        Column(title="level", unit="%", digits=3),
         Column(title="verdict"),
-        Column(title=""),
     ]
     required = found.figures[0].required_percent
     largest = max((100 * one.numerical / abs(one.measured) for one in found.figures if one.measured), default=0.0)
     numerical = f"u_num is {format_number(largest, 2)} % of D at most."
-    text = f"{_METHOD} Required here: {required:g} % of D.\n\n{_SOURCES_OF_U} {numerical}\n\n{_CLOSED_LOOP}"
+    level = f"The level is U_val in per cent of D; required here: {required:g} %."
+    text = f"{_METHOD} {level}\n\n{_SOURCES_OF_U} {numerical}\n\n{_CLOSED_LOOP}"
     table = Table(caption=f"{found.verdict[:1].upper()}{found.verdict[1:]}.", columns=columns, rows=rows)
-    chart = Illustration(
-        chart=_error_chart(found.figures), caption="Points: E; bars: plus and minus U_val about zero, in per cent of D."
-    )
+    chart = Illustration(chart=comparison_error_chart([one.as_json() for one in found.figures]), caption=ERRORS)
     return Section(heading="Validation", text=text, tables=[benchmark, table], charts=[chart])
 
 
@@ -215,42 +205,6 @@ def _text(value: float | None, digits: int = 4) -> str | None:
 def _named(name: str) -> str:
     words, unit = in_words(name)
     return f"{words} ({unit})" if unit else words
-
-
-def _error_chart(figures: Sequence[Validated]) -> alt.LayerChart:
-    rows = []
-    for one in figures:
-        if one.error is None or not one.measured:
-            continue
-        own = {"name": f"{one.trial}: {in_words(one.name)[0]}", "e": 100 * one.error / abs(one.measured)}
-        level = one.level_percent or 0.0
-        rows.append({**own, "low": -level, "high": level, "run": str(one.outcome)})
-    names = [str(row["name"]) for row in rows]
-    y = alt.Y("name:N", sort=names, title=None, axis=alt.Axis(labelLimit=320))
-    outcomes = list(dict.fromkeys(str(row["run"]) for row in rows))
-    look = series_look(outcomes, as_points=outcomes)
-    base = alt.Chart(data(rows))
-    bars = base.mark_rule(style="reference", strokeWidth=7, opacity=0.3).encode(
-        x=alt.X("low:Q", title="per cent of the measured figure"), x2="high:Q", y=y
-    )
-    points = base.mark_point(filled=True, size=70).encode(
-        x="e:Q",
-        y=y,
-        color=look.colour,
-        shape=look.shape,
-        tooltip=[
-            alt.Tooltip("name:N", title="figure"),
-            alt.Tooltip("e:Q", title="E (%)", format=NUMBER),
-            alt.Tooltip("high:Q", title="U_val (%)", format=NUMBER),
-        ],
-    )
-    chart: alt.LayerChart = alt.layer(bars, points).properties(
-        title="Comparison error and validation uncertainty",
-        width=430,
-        height=alt.Step(18),
-        description=f"Comparison error of {len(rows)} figures beside the validation uncertainty.",
-    )
-    return chart
 
 
 def _replays(replays: Sequence[Passed]) -> Section:
@@ -304,10 +258,8 @@ def _replay_history(one: Passed) -> alt.VConcatChart:
 
 
 def _standards(criteria: Sequence[Criterion]) -> Section:
-    verdicts = {True: Verdict.PASSED, False: Verdict.FAILED, None: Verdict.NONE}
     rows: list[list[Cell]] = [
-        [one.name, one.found, one.allowed, one.unit, "open" if one.passed is None else verdicts[one.passed], one.remark]
-        for one in criteria
+        [one.name, one.found, one.allowed, one.unit, imo_verdict(one), one.remark] for one in criteria
     ]
     columns = [Column(title=title) for title in ("criterion", "found", "allowed", "unit", "verdict", "remark")]
     table = Table(caption="IMO MSC.137(76), the worse of starboard and port.", columns=columns, rows=rows)

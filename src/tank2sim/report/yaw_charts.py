@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import altair as alt
-import numpy as np
 
-from tank2sim.identification.yaw.identify import YawResult
-from tank2sim.records.yaw import YawRecord
-from tank2sim.report.chart_parts import NUMBER, Record, data, plain, series_look
+from tank2sim.report.chart_parts import NUMBER, Record, data, plain, series_look, vector
 from tank2sim.report.motion_charts import History, Signal, history_chart
+from tank2sim.report.result_values import Json
 
 _NORMAL = 1.959964
 _SIGNALS = (
@@ -20,50 +18,34 @@ _SIGNALS = (
 )
 
 
-def record_chart(result: YawResult, record: YawRecord) -> alt.VConcatChart:
-    """Rate where it is evaluated beside the programme's, tracking error, and current, over the whole record."""
-    programme = record.programme
-    every = slice(None, None, max(1, len(record.time_s) // 6000))
-    time = record.time_s[every]
-    reference = programme.at(time)
-    rate = np.full(len(time), np.nan)
-    first = next(number for number, own in enumerate(result.records) if own is record)
-    before = sum(own.programme.humps for own in result.records[:first])
-    for pair in result.fit.balance.pairs[before : before + programme.humps]:
-        for own in pair:
-            inside = (time >= own.time_s[0]) & (time <= own.time_s[-1])
-            rate[inside] = np.interp(time[inside], own.time_s, own.rate_radps)
-    offset = record.angle_rad[0] - float(programme.at(record.time_s[:1]).angle_rad[0])
-    error = reference.angle_rad + offset - record.angle_rad[every]
+def record_chart(name: str, columns: Mapping[str, Json]) -> alt.VConcatChart:
+    """Rate where it is evaluated beside the programme's, tracking error, and current, over the whole record; from
+    ``histories`` of the JSON."""
+    time = columns["t_s"]
+    own = {"rate": "rate_radps", "error": "tracking_error_rad", "current": "current_A"}
+    values = {key: vector(columns[column]) for key, column in own.items()}
+    programme = {"rate": vector(columns["programme_rate_radps"])}
     histories = [
-        History(
-            label=record.path.name,
-            time_s=time,
-            values={"rate": rate, "error": error, "current": record.current_A[every]},
-        ),
-        History(label="programme", time_s=time, values={"rate": reference.rate_radps}),
+        History(label=name, time_s=time, values=values),
+        History(label="programme", time_s=time, values=programme),
     ]
-    return history_chart(histories, _SIGNALS, title=f"{record.path.name}: programme and record")
+    return history_chart(histories, _SIGNALS, title=f"{name}: programme and record")
 
 
-def balance_chart(result: YawResult, *, width_px: int = 340) -> alt.HConcatChart:
-    """Work of the motor in each subinterval (points) and what it is spent on (bars), the mean over all pairs."""
-    balance, parts = result.fit.balance, result.fit.balance.parts
-    spent = balance.rows * result.fit.coefficients
-    shape = (len(balance.pairs), 2, parts)
-    terms = [term.replace("_", " ") for term in balance.terms]
+def balance_chart(balance: Json, *, width_px: int = 340) -> alt.HConcatChart:
+    """Work of the motor in each subinterval (points) and what it is spent on (bars), the mean over all pairs; from
+    ``energy_balance`` of the JSON."""
+    terms = {term.replace("_", " "): parts for term, parts in balance["spent_J"].items()}
     look = series_look([*terms, "motor"], as_points=["motor"])
     panels = []
-    for stage, name in enumerate(("accelerating", "braking")):
-        bars, points = list[Record](), list[Record]()
-        # Braking parts are counted as mirror images; shown in the order of time.
-        order = range(parts) if stage == 0 else range(parts - 1, -1, -1)
-        for place, part in enumerate(order, start=1):
-            for column, term in enumerate(terms):
-                value = 1e3 * float(spent[:, column].reshape(shape)[:, stage, part].mean())
-                bars.append({"part": place, "run": term, "v": plain(value)})
-            motor = 1e3 * float(balance.work_J.reshape(shape)[:, stage, part].mean())
-            points.append({"part": place, "run": "motor", "v": plain(motor)})
+    for name in ("accelerating", "braking"):
+        bars = [
+            {"part": place, "run": term, "v": plain(1e3 * value)}
+            for term, parts in terms.items()
+            for place, value in enumerate(parts[name], start=1)
+        ]
+        motor = enumerate(balance["motor_J"][name], start=1)
+        points = [{"part": place, "run": "motor", "v": plain(1e3 * value)} for place, value in motor]
         x = alt.X("part:O", title=f"{name}: part of the interval", axis=alt.Axis(labelAngle=0))
         y = alt.Y("v:Q", title="work (mJ)")
         tooltip = [
@@ -82,19 +64,21 @@ def balance_chart(result: YawResult, *, width_px: int = 340) -> alt.HConcatChart
     return alt.hconcat(*panels, spacing=24).resolve_scale(y="shared").properties(title=title, description=description)
 
 
-def estimates_chart(result: YawResult, *, width_px: int = 560) -> alt.LayerChart:
-    """Inertia by each method with its 95 % interval: the added one, or the total where J_zz is not known."""
+def estimates_chart(methods: Mapping[str, Mapping[str, Json]], *, width_px: int = 560) -> alt.LayerChart:
+    """Inertia by each method with its 95 % interval: the added one, or the total where J_zz is not known; from
+    ``methods`` of the JSON."""
     rows: list[Record] = []
     names = []
-    for method, estimate in result.estimates.items():
-        value, error = result.added_inertia(method) or (estimate.total_inertia_kgm2, estimate.inertia_error_kgm2)
+    kind = "total" if any(one["added_inertia_kgm2"] is None for one in methods.values()) else "added"
+    for method, estimate in methods.items():
+        value, error = estimate[f"{kind}_inertia_kgm2"], estimate[f"{kind}_inertia_standard_error_kgm2"]
         spread = _NORMAL * (error or 0.0)
         names.append(method.replace("_", " "))
         rows.append(
             {"name": names[-1], "v": plain(1e4 * value)}
             | {"low": plain(1e4 * (value - spread)), "high": plain(1e4 * (value + spread))}
         )
-    words = "total inertia" if result.body is None else "added inertia"
+    words = f"{kind} inertia"
     scale = alt.Scale(zero=False, nice=True)
     y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, grid=True, labelLimit=260))
     tooltip = [
@@ -116,23 +100,13 @@ def estimates_chart(result: YawResult, *, width_px: int = 560) -> alt.LayerChart
     )
 
 
-def energy_residual_chart(result: YawResult, *, width_px: int = 720) -> alt.LayerChart:
-    """What the least squares leave of each subinterval's work, against the rate in its middle."""
-    balance = result.fit.balance
-    rows = list[Record]()
-    place = 0
-    for pair in balance.pairs:
-        for own in pair:
-            for part in range(balance.parts):
-                rate = own.part(part, balance.parts).rate_radps
-                rows.append(
-                    {"run": "braking" if own.braking else "accelerating", "hump": own.number + 1}
-                    | {
-                        "w": plain(float(np.degrees(np.mean(rate)))),
-                        "v": plain(1e6 * float(result.fit.residuals_J[place])),
-                    }
-                )
-                place += 1
+def energy_residual_chart(residuals: Sequence[Mapping[str, Json]], *, width_px: int = 720) -> alt.LayerChart:
+    """What the least squares leave of each subinterval's work, against the rate in its middle; from
+    ``energy_residuals`` of the JSON."""
+    rows: list[Record] = [
+        {"run": one["stage"], "hump": one["hump"], "w": plain(one["rate_degps"]), "v": plain(1e6 * one["left_J"])}
+        for one in residuals
+    ]
     look = series_look(["accelerating", "braking"], as_points=["accelerating", "braking"])
     tooltip = [
         alt.Tooltip("run:N", title="interval"),
@@ -159,12 +133,9 @@ def energy_residual_chart(result: YawResult, *, width_px: int = 720) -> alt.Laye
     )
 
 
-def angle_residual_chart(time_s: Sequence[float], residual_rad: Sequence[float]) -> alt.VConcatChart:
-    """What the integrated equation leaves of the angle, over time; a gap where nothing is fitted."""
-    time, left = np.asarray(time_s, dtype=float), np.asarray(residual_rad, dtype=float)
-    breaks = np.flatnonzero(np.abs(np.diff(time)) > 1.0) + 1
-    time = np.insert(time, breaks, time[breaks - 1] + 0.01)
-    left = np.insert(left, breaks, np.nan)
-    history = History(label="integrated less measured", time_s=time, values={"left": left})
+def angle_residual_chart(residual: Mapping[str, Json]) -> alt.VConcatChart:
+    """What the integrated equation leaves of the angle, over time; from ``angle_residual`` of the JSON."""
+    left = vector(residual["residual_rad"])
+    history = History(label="integrated less measured", time_s=residual["t_s"], values={"left": left})
     signal = Signal(name="left", title="angle, integrated less measured", unit="rad")
     return history_chart([history], [signal], title="Residuals of the nonlinear least squares")

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from tank2sim.dynamics.yaw_theory import TheoryValue
+from tank2sim.files import plain_json
 from tank2sim.identification.yaw.identify import METHODS, YawResult
 from tank2sim.identification.yaw.intervals import TERMS
 from tank2sim.report.numbers import format_number
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
+from tank2sim.report.result_values import Json
 from tank2sim.report.yaw_charts import (
     angle_residual_chart,
     balance_chart,
@@ -30,38 +33,48 @@ _HOW = {
 def yaw_page(result: YawResult, theory: Sequence[TheoryValue] = ()) -> Page:
     """The page of a result, and beside it what `theory` gives for the body's form."""
     names = ", ".join(record.path.name for record in result.records)
+    estimates, balance, *more = yaw_drawn(plain_json(result.as_json()))
     return Page(
         title="Added yaw inertia by the energy method",
         subtitle=f"{names}, in {result.medium}",
         figures=_figures(result),
         sections=[
-            Section(
-                heading="Estimates by method",
-                text="Inertia and dissipation of one accelerating interval. Bars are 95 % intervals of scatter; a bias "
-                "that is the same in every pair of intervals is not in them.",
-                tables=[_estimates(result)],
-                charts=[Illustration(chart=estimates_chart(result), caption="Dashed: the energy least squares.")],
-                notes=result.notes,
-            ),
-            Section(
-                heading="Energy balance",
-                text="Over each part of the intervals the work of the motor is kinetic energy plus what friction and "
-                "water take.",
-                tables=[_friction(result)],
-                charts=[
-                    Illustration(chart=balance_chart(result), caption="The mean over all pairs of intervals."),
-                    Illustration(chart=energy_residual_chart(result)),
-                ],
-            ),
-            Section(
-                heading="Record and programme",
-                text="The rate is shown where it is evaluated.",
-                charts=[Illustration(chart=record_chart(result, record)) for record in result.records],
-            ),
-            *_angle(result),
+            replace(estimates, tables=[_estimates(result)], notes=result.notes),
+            replace(balance, tables=[_friction(result)]),
+            *more,
             *_theory(theory),
         ],
     )
+
+
+def yaw_drawn(found: Json) -> list[Section]:
+    """The sections with the charts of a result, from its JSON: estimates, energy balance, record and, where it is
+    known, what the integrated equation leaves of the angle."""
+    records = [Illustration(chart=record_chart(name, columns)) for name, columns in found["histories"].items()]
+    estimates = Illustration(chart=estimates_chart(found["methods"]), caption="Dashed: the energy least squares.")
+    balance = Illustration(
+        chart=balance_chart(found["energy_balance"]), caption="The mean over all pairs of intervals."
+    )
+    residuals = Illustration(chart=energy_residual_chart(found["energy_residuals"]))
+    sections = [
+        Section(heading="Estimates by method", text=_ESTIMATES, charts=[estimates]),
+        Section(heading="Energy balance", text=_BALANCE, charts=[balance, residuals]),
+        Section(heading="Record and programme", text="The rate is shown where it is evaluated.", charts=records),
+    ]
+    if found["angle_residual"]:
+        chart = Illustration(chart=angle_residual_chart(found["angle_residual"]))
+        sections.append(Section(heading="Nonlinear least squares", text=_ANGLE, charts=[chart]))
+    return sections
+
+
+_ESTIMATES = (
+    "Inertia and dissipation of one accelerating interval. Bars are 95 % intervals of scatter; a bias that is the same "
+    "in every pair of intervals is not in them."
+)
+_BALANCE = "Over each part of the intervals the work of the motor is kinetic energy plus what friction and water take."
+_ANGLE = (
+    "Equation (3) integrated under the recorded current from a start of its own for each hump, less the recorded angle."
+)
 
 
 def _theory(values: Sequence[TheoryValue]) -> list[Section]:
@@ -162,17 +175,3 @@ def _friction(result: YawResult) -> Table:
 
 
 _UNITS = {"Nm": "N m", "Nms": "N m s", "Nms2": "N m s²", "kgm2": "kg m²"}
-
-
-def _angle(result: YawResult) -> list[Section]:
-    if result.angle is None:
-        return []
-    chart = angle_residual_chart(list(result.angle.time_s), list(result.angle.residual_rad))
-    return [
-        Section(
-            heading="Nonlinear least squares",
-            text="Equation (3) integrated under the recorded current from a start of its own for each hump, less the "
-            "recorded angle.",
-            charts=[Illustration(chart=chart)],
-        )
-    ]

@@ -16,8 +16,18 @@ Array = NDArray[np.float64]
 QUANTILES = (0.05, 0.50, 0.95)
 """Lower end, middle and upper end of a band."""
 
-STILL_RUNNING = 0.95
-"""A band over time ends where fewer than this share of the members still run: what is left are the slow ones (ours)."""
+STILL_RUNNING = 0.99
+"""A band over time ends where fewer than this share of the members still run: those that have ended are the quick ones,
+all on one side of the band, and with each of them its edge jumps. Of the 5 % beyond an edge this is a fifth (ours)."""
+
+
+FOLLOWED = 10.0
+"""Steps of the leading track within which a member beside it is to pass the next normal: it does within one, longer or
+shorter by its distance over the radius of the track; a lap, which is not to be left out, has more (ours)."""
+
+ROUNDED = 0.001
+"""Part of a step by which a track may fall short of a normal or pass it backwards: positions are kept in single
+precision (ours)."""
 
 
 @dataclass(frozen=True)
@@ -49,19 +59,31 @@ class BandOverTime:
 
 @dataclass(frozen=True, eq=False)
 class TrackBand:
-    """The track of the median, and how far nine of ten members lie from it across its course.
+    """Between which lines nine of ten members' tracks lie, whenever each member is there.
+
+    One member's track leads: that which keeps nearest to the median of x and y at equal time. Where it is at the times
+    of the bands stands a normal to it, at which each member's track passes at some distance to starboard; low, middle
+    and high are the quantiles of these distances. So a member that is ahead or astern on the same track is not beside
+    it, and on a second lap each passes on its second lap.
+
+    It ends (nan from there on) where fewer than :data:`STILL_RUNNING` of the members have come to the normal: they lag
+    behind at the end of the run, or are as far apart as the track is curved and would pass it backwards. Up to there
+    the few others keep the distance at which they were last.
 
     Parameters
     ----------
-    middle : array (n, 2)
-        x and y, m.
-    low, high : array (n, 2)
-        Points at its left and right: the 5 and 95 % quantiles of the members' distance across its course, to starboard.
+    middle, low, high : array (n, 2)
+        x and y, m, of the 50, 5 and 95 % quantiles, at the times of the bands (of the leading track).
     """
 
     middle: Array
     low: Array
     high: Array
+
+    @property
+    def count(self) -> int:
+        """Times up to its end."""
+        return int(np.isfinite(self.middle[:, 0]).sum())
 
     def as_json(self) -> dict[str, object]:
         """Three lines of points."""
@@ -92,29 +114,90 @@ def history_bands(
     begun = np.isfinite(kept[:, 0, 0])
     running = np.isfinite(kept[:, 0, :]).sum(axis=0)
     count = int(np.sum(running >= STILL_RUNNING * max(int(begun.sum()), 1)))
-    kept = kept[begun, :, :count]
+    kept = kept[begun]
     bands = {}
     for row, name in enumerate(signals):
-        low, median, high = _quantiles(kept[:, row])
+        low, median, high = _quantiles(kept[:, row, :count])
         bands[name] = BandOverTime(low, median, high)
     track = None
     if count > 1 and {"x_m", "y_m"} <= set(signals):
-        track = _track(kept[:, signals.index("x_m")], kept[:, signals.index("y_m")], bands)
+        tracks = kept[:, [signals.index("x_m"), signals.index("y_m")]].transpose(0, 2, 1)
+        track = track_band(tracks.astype(float), count)
     return times[:count], bands, track
 
 
-def _quantiles(values: NDArray[np.float32]) -> Array:
+def _quantiles(values: NDArray[np.floating]) -> Array:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a time at which no member runs any more has none
         found: Array = np.nanquantile(values.astype(float), QUANTILES, axis=0)
     return found
 
 
-def _track(x: NDArray[np.float32], y: NDArray[np.float32], bands: Mapping[str, BandOverTime]) -> TrackBand:
-    middle = np.column_stack([bands["x_m"].median, bands["y_m"].median])
-    along = np.gradient(middle, axis=0)
+def track_band(tracks: Array, count: int) -> TrackBand:
+    """The band of tracks (members, times, 2), m, at the first `count` times; nan where a member has ended."""
+    leading = _leading(tracks[:, :count])
+    normals, off = _passed(tracks, leading)
+    come = np.isfinite(off).sum(axis=0) >= STILL_RUNNING * len(tracks)
+    end = count if come.all() else int(np.argmin(come))
+    # The few that do not come keep their last distance: without them, most on one side, an edge would jump.
+    known = np.maximum.accumulate(np.where(np.isfinite(off), np.arange(count), 0), axis=1)
+    beside = _quantiles(np.where(np.arange(count) < end, np.take_along_axis(off, known, axis=1), np.nan))
+    low, middle, high = (leading + one[:, None] * normals for one in beside)
+    return TrackBand(middle, low, high)
+
+
+def _leading(tracks: Array) -> Array:
+    """The track (n, 2) that keeps nearest to the median, of those that run to the end."""
+    whole = np.isfinite(tracks[:, :, 0]).all(axis=1)
+    ran = tracks[whole] if whole.any() else tracks
+    apart = np.nanmean(np.sum((ran - np.nanmedian(tracks, axis=0)) ** 2, axis=2), axis=1)
+    found: Array = ran[int(np.argmin(apart))]
+    return found
+
+
+def _passed(tracks: Array, leading: Array) -> tuple[Array, Array]:
+    """Unit normals (n, 2) to starboard of the leading track, and at what distance (members, n) each track passes there.
+
+    Each member is followed from normal to normal: it passes one after the last, in the course of the leading track,
+    and within :data:`FOLLOWED` of its steps. What does not is lost from there on (nan).
+    """
+    along = np.gradient(leading, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None]
-    across = np.column_stack([-along[:, 1], along[:, 0]])
-    off = (x - middle[:, 0]) * across[:, 0] + (y - middle[:, 1]) * across[:, 1]
-    low, _, high = _quantiles(off.astype(np.float32))
-    return TrackBand(middle, middle + low[:, None] * across, middle + high[:, None] * across)
+    normals = np.column_stack([-along[:, 1], along[:, 0]])
+    steps = np.linalg.norm(np.diff(leading, axis=0, append=2 * leading[-1:] - leading[-2:-1]), axis=1)
+    off = np.full((len(tracks), len(leading)), np.nan)
+    at, here = np.zeros(len(tracks), dtype=int), tracks[:, 0].copy()
+    for k, point in enumerate(leading):
+        here, at = _followed(tracks, (here, at), (point, along[k]), steps[max(k - 1, 0)])
+        off[:, k] = (here - point) @ normals[k]
+    return normals, off
+
+
+def _followed(
+    tracks: Array, last: tuple[Array, NDArray[np.intp]], normal: tuple[Array, Array], step: float
+) -> tuple[Array, NDArray[np.intp]]:
+    """Where each track passes the normal to a course at a point next, and which of its times is the one before.
+
+    `last` is where they passed the last one, nan of those that are lost."""
+    here, at = last[0].copy(), last[1].copy()
+    point, along = normal
+    ahead = (here - point) @ along
+    rounded = ROUNDED * step
+    here[ahead > rounded] = np.nan
+    going = np.flatnonzero(ahead < -rounded)
+    left = np.full(len(tracks), FOLLOWED * step)
+    while len(going):
+        beyond = at[going] + 1 >= tracks.shape[1]
+        here[going[beyond]] = np.nan
+        going = going[~beyond]
+        to = tracks[going, at[going] + 1]
+        before, after = (here[going] - point) @ along, (to - point) @ along
+        passes = after >= -rounded
+        share = np.where(passes, np.minimum(before / np.where(passes, before - after, 1.0), 1.0), 1.0)
+        moved = share[:, None] * (to - here[going])
+        here[going] += moved
+        left[going] -= np.linalg.norm(moved, axis=1)
+        here[going[left[going] < 0]] = np.nan
+        at[going[~passes]] += 1
+        going = going[~passes & np.isfinite(here[going, 0])]
+    return here, at

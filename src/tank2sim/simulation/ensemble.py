@@ -30,6 +30,13 @@ KEPT = 10_000
 quantile is known from them to 0.2 %; figures are those of all members (ours)."""
 
 
+DRAWS = 1000
+"""Times that a member is drawn until it is within all bounds (ours). Nearly all are at once; of parameters on their
+bound every other draw is, of ten such still one of a thousand."""
+
+NOT_WITHIN = f"not one of {DRAWS} draws is within the bounds of all parameters"
+
+
 @dataclass(frozen=True, eq=False)
 class Draws:
     """How the parameters of members are drawn: normal, about the card's values.
@@ -42,7 +49,8 @@ class Draws:
     root : array (k, k)
         A root of their covariance: root @ root.T.
     lowest, highest : array (k,)
-        What is drawn beyond these is taken to be there.
+        Values that the parameters cannot leave. What is drawn beyond is drawn anew as a whole, from the same stream:
+        the normal distribution cut off there, in which numbers still go together. Put at the bound they would not.
     seed : int
     """
 
@@ -54,21 +62,42 @@ class Draws:
     seed: int
 
     def member(self, number: int) -> dict[str, float]:
-        """Parameters of a member, by name, from numpy's ``SeedSequence(seed, spawn_key=(number,))``."""
+        """Parameters of a member, by name."""
+        return self.drawn(number).values
+
+    def drawn(self, number: int) -> Drawn:
+        """A member, from numpy's ``SeedSequence(seed, spawn_key=(number,))``: the first draw within the bounds."""
         stream = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(number,)))
-        normal = stream.standard_normal(len(self.names))
-        # Summed by NumPy, row by row: a library of linear algebra sums in an order of each processor's own.
-        values = self.mean + (self.root * normal).sum(axis=1)
-        return dict(zip(self.names, np.clip(values, self.lowest, self.highest).tolist(), strict=True))
+        beyond: tuple[str, ...] = ()
+        for draw in range(DRAWS):
+            # Summed by NumPy, row by row: a library of linear algebra sums in an order of each processor's own.
+            values = self.mean + (self.root * stream.standard_normal(len(self.names))).sum(axis=1)
+            outside = (values < self.lowest) | (values > self.highest)
+            if not outside.any():
+                return Drawn(dict(zip(self.names, values.tolist(), strict=True)), beyond)
+            if draw == 0:
+                beyond = tuple(name for name, out in zip(self.names, outside, strict=True) if out)
+        held = np.clip(values, self.lowest, self.highest)
+        return Drawn(dict(zip(self.names, held.tolist(), strict=True)), beyond, trouble=NOT_WITHIN)
+
+
+class Drawn(NamedTuple):
+    """Parameters of a member by name; those that were beyond a bound in the first draw; and, if every draw was, why it
+    cannot be used (the values then are those of the last, at the bounds)."""
+
+    values: dict[str, float]
+    beyond: tuple[str, ...] = ()
+    trouble: str = ""
 
 
 class Answer(NamedTuple):
-    """What one member answers: figures by name, histories (signals, times), nan where it shows none; and why a member
-    cannot be used, if so."""
+    """What one member answers: figures by name, histories (signals, times), nan where it shows none; why a member
+    cannot be used, if so; and, put in by :func:`ensemble`, the parameters for which it was drawn anew."""
 
     figures: Mapping[str, float]
     histories: Histories | None = None
     trouble: str = ""
+    beyond: tuple[str, ...] = ()
 
 
 Ask = Callable[[Sequence[Mapping[str, float]]], Sequence[Answer]]
@@ -80,6 +109,31 @@ class Question(Protocol):
 
     def prepared(self) -> Ask:
         """What answers it, made once in each process."""
+
+
+@dataclass(frozen=True)
+class Redrawn:
+    """How many members were drawn anew, and the parameters that had been beyond their bounds, to how many times."""
+
+    members: int
+    beyond: Mapping[str, int]
+
+    @staticmethod
+    def of(beyond: Sequence[tuple[str, ...]]) -> Redrawn:
+        """From the parameters that were beyond in the first draw of each member."""
+        counted = Counter(name for names in beyond for name in names)
+        return Redrawn(sum(map(bool, beyond)), dict(counted.most_common()))
+
+    def in_words(self, members: int) -> list[str]:
+        """What the user should be told of it, of so many members."""
+        if not self.members:
+            return []
+        which = ", ".join(f"{name} {count}" for name, count in self.beyond.items())
+        share = 100 * self.members / members
+        return [
+            f"{self.members} of {members} members ({share:.2g} %) were drawn anew, being beyond what numbers can be "
+            f"({which}): their distribution is normal, cut off there"
+        ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +149,7 @@ class Ensemble:
         Of the first members, at most :data:`KEPT`.
     unusable : mapping
         Why members cannot be used, to how many.
+    redrawn : Redrawn
     """
 
     members: int
@@ -102,6 +157,7 @@ class Ensemble:
     figures: Mapping[str, Array]
     histories: Histories | None = None
     unusable: Mapping[str, int] = field(default_factory=dict)
+    redrawn: Redrawn = field(default_factory=lambda: Redrawn(0, {}))
 
     @property
     def usable(self) -> int:
@@ -110,8 +166,9 @@ class Ensemble:
 
     @property
     def notices(self) -> list[str]:
-        """What the user should be told: members that cannot be used."""
-        return [f"{count} of {self.members} members cannot be used: {why}" for why, count in self.unusable.items()]
+        """What the user should be told: members that were drawn anew, or that cannot be used."""
+        told = [f"{count} of {self.members} members cannot be used: {why}" for why, count in self.unusable.items()]
+        return [*self.redrawn.in_words(self.members), *told]
 
 
 def ensemble(
@@ -123,7 +180,9 @@ def ensemble(
     figures: dict[str, Array] = {}
     histories: Histories | None = None
     unusable: Counter[str] = Counter()
+    beyond: list[tuple[str, ...]] = []
     for number, answer in enumerate(_in_order(tasks, executor)):
+        beyond.append(answer.beyond)
         if answer.trouble:
             unusable[answer.trouble] += 1
         for name, value in answer.figures.items():
@@ -134,7 +193,7 @@ def ensemble(
             if histories is None:
                 histories = np.full((min(members, KEPT), *answer.histories.shape), np.nan, dtype=np.float32)
             histories[number] = answer.histories
-    return Ensemble(members, draws.seed, figures, histories, dict(sorted(unusable.items())))
+    return Ensemble(members, draws.seed, figures, histories, dict(sorted(unusable.items())), Redrawn.of(beyond))
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,8 +215,13 @@ def _in_order(tasks: list[_Task], executor: Executor | None) -> Iterator[Answer]
 def _answers(task: _Task) -> list[Answer]:
     ask = _prepared(task.question)
     numbers = range(task.first, task.first + task.count)
-    found = ask([task.draws.member(number) for number in numbers])
-    return [one if number < KEPT else one._replace(histories=None) for number, one in zip(numbers, found, strict=True)]
+    drawn = [task.draws.drawn(number) for number in numbers]
+    found = []
+    for number, one, answer in zip(numbers, drawn, ask([one.values for one in drawn]), strict=True):
+        told = Answer({}, trouble=one.trouble) if one.trouble else answer
+        histories = told.histories if number < KEPT else None
+        found.append(told._replace(histories=histories, beyond=one.beyond))
+    return found
 
 
 @lru_cache(maxsize=2)

@@ -18,7 +18,7 @@ from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
 from tank2sim.native.generate import generate_c
 from tank2sim.native.library import cached_library
-from tank2sim.simulation.scheme import runge_kutta_step
+from tank2sim.simulation.scheme import runge_kutta_step, step_and_constants
 
 # The loop around the generated step. Work arrays are on the stack: their sizes are known when this text is made.
 _LOOP = """
@@ -32,14 +32,17 @@ void rollout(long n, long every, double h, const double* u, const double* p, dou
   double* res[{sz_res}];
   casadi_int iw[{sz_iw}];
   double w[{sz_w}];
-  double between[2][{nx}];
+  double between[2][{nx}], c[{nc}];
   long k, j;
+  arg[0] = p;
+  res[0] = c;
+  constants(arg, res, iw, w, 0);
   for (k = 0; k < n; k += every, x += {nx}) {{
     const long last = every < n - k ? every : n - k;
     const double* from = x;
     for (j = 1; j <= last; ++j) {{
       double* to = j == last ? x + {nx} : between[j & 1];
-      arg[0] = from; arg[1] = u; arg[2] = p; arg[3] = &h;
+      arg[0] = from; arg[1] = u; arg[2] = p; arg[3] = c; arg[4] = &h;
       res[0] = to;
       step(arg, res, iw, w, 0);
       from = to;
@@ -99,7 +102,6 @@ class Integrator:
     def __init__(self, model: Model, compiled: bool | None = None, every: int = 1):
         self.model, self.every = model, every
         self.compiled = find_compiler() is not None if compiled is None else compiled
-        self._step = runge_kutta_step(model)
         if self.compiled:
             try:
                 self._rollout, self._rollouts, self._outputs = self._in_machine_code()
@@ -143,14 +145,16 @@ class Integrator:
         return y
 
     def _in_machine_code(self) -> tuple[Loop, Loop, Loop]:
-        functions = (self._step, self.model.output)
+        step, constants = step_and_constants(self.model)
+        functions = (step, constants, self.model.output)
         sizes = {
             name: max(1, *(getattr(f, name)() for f in functions)) for name in ("sz_arg", "sz_res", "sz_iw", "sz_w")
         }
         lengths = {
-            "np": self._step.size1_in(2),
-            "nx": self._step.size1_in(0),
-            "nu": self._step.size1_in(1),
+            "np": step.size1_in(2),
+            "nx": step.size1_in(0),
+            "nu": step.size1_in(1),
+            "nc": max(1, constants.size1_out(0)),
             "ny": self.model.output.size1_out(0),
         }
         source = generate_c(functions, "model") + _LOOP.format(**sizes, **lengths)
@@ -164,6 +168,7 @@ class Integrator:
 
     def _in_casadi(self) -> tuple[Loop, Loop, Loop]:
         loops: dict[int, ca.Function] = {}
+        step = runge_kutta_step(self.model)
 
         def rollout(n: int, every: int, h: float, u: Vector, p: Vector, kept: Vector) -> None:
             done, x = 0, np.empty((n + 1, kept.shape[1]))
@@ -171,7 +176,7 @@ class Integrator:
             while done < n:  # loops of 1, 2, 4, ... steps, so that few different ones are ever made
                 length = 1 << ((n - done).bit_length() - 1)
                 if length not in loops:
-                    loops[length] = self._step.mapaccum(length)
+                    loops[length] = step.mapaccum(length)
                 part = loops[length](x[done], ca.repmat(u, 1, length), ca.repmat(p, 1, length), ca.repmat(h, 1, length))
                 x[done + 1 : done + 1 + length] = np.array(part).T
                 done += length

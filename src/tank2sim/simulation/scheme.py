@@ -29,3 +29,19 @@ def runge_kutta_step(model: Model) -> ca.Function:
     following = model.x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
     names = ["x", "u", "p", "h"], ["x_next"]
     return ca.Function("step", [model.x, model.u, model.p, h], [following], *names, {"cse": True})
+
+
+def step_and_constants(model: Model) -> tuple[ca.Function, ca.Function]:
+    """``step(x, u, p, c, h) -> x_next`` and ``constants(p) -> c``: :func:`runge_kutta_step` to the last bit.
+
+    Masses and their determinant, scales and the like, which depend on p alone, are then calculated when a parameter is
+    set and not in every step, by the same operations.
+    """
+    arguments = [model.x, model.u, model.p, ca.SX.sym("h")]
+    shorter, symbols, values = ca.extract_parametric(runge_kutta_step(model)(*arguments), model.p)
+    none = ca.SX(0, 1)
+    x, u, p, h = arguments
+    inputs = [x, u, p, ca.vertcat(none, *symbols), h]
+    # Dense results: loops in C read whole vectors, and an entry that is always zero must be written as such.
+    step = ca.Function("step", inputs, [ca.densify(shorter)], {"cse": True})
+    return step, ca.Function("constants", [p], [ca.densify(ca.vertcat(none, *values))], {"cse": True})

@@ -1,4 +1,4 @@
-"""A simulated run as a trial file, so that it can be read wherever a measured one can."""
+"""A simulated run as a trial: a file that can be read wherever a measured one can, and histories thinned to draw."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import io
 
 import numpy as np
 
+from tank2sim.records.thinning import Vector, drawn_columns
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import from_si
 
@@ -23,14 +24,26 @@ _COLUMNS = {
 }
 
 
-def trial_csv(trajectory: Trajectory, comment: str) -> str:
-    """Text of a trial CSV: a comment line, a header with units in its names, one row a sample; + is starboard."""
+def trial_columns(trajectory: Trajectory) -> dict[str, Vector]:
+    """Columns (n,) of a run by their names in the trial format, ``t_s`` first, as far as the model has them."""
     model = trajectory.model
     known = {*model.outputs, *model.state_names, *model.input_names}
-    columns = {name: signal for name, signal in _COLUMNS.items() if signal in known}
-    table = [trajectory.t, *(from_si(name, 1.0) * trajectory[signal] for name, signal in columns.items())]
+    columns = {name: from_si(name, 1.0) * trajectory[signal] for name, signal in _COLUMNS.items() if signal in known}
+    return {"t_s": trajectory.t, **columns}
+
+
+def trial_csv(trajectory: Trajectory, comment: str) -> str:
+    """Text of a trial CSV: a comment line, a header with units in its names, one row a sample; + is starboard."""
+    columns = trial_columns(trajectory)
     text = io.StringIO()
     text.write(f"# {' '.join(comment.split())}\n")
-    text.write(",".join(["t_s", *columns]) + "\n")
-    np.savetxt(text, np.column_stack(table), fmt="%.10g", delimiter=",")
+    text.write(",".join(columns) + "\n")
+    np.savetxt(text, np.column_stack(list(columns.values())), fmt="%.10g", delimiter=",")
     return text.getvalue()
+
+
+def histories(trajectory: Trajectory, begin_s: float = 0.0) -> dict[str, list[float]]:
+    """The columns of :func:`trial_columns` from a time on, thinned to draw, for the JSON of a result."""
+    columns = trial_columns(trajectory)
+    shown = columns["t_s"] >= begin_s
+    return drawn_columns({name: values[shown] for name, values in columns.items()})

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from tank2sim.cards.card import YawRigCard
-from tank2sim.dynamics.yaw_programme import programme_of
-from tank2sim.dynamics.yaw_rig import YawRig, rig_of
+from tank2sim.cards.form import YawRig
+from tank2sim.dynamics.yaw_programme import YawProgramme, programme_of
 from tank2sim.records.yaw import Medium, YawRecord
 from tank2sim.simulation.yaw_rig import Measuring, YawRun, run_yaw_rig
 from tank2sim.simulation.yaw_rig_control import Controller, TunedController
@@ -41,8 +40,9 @@ def simulated_record(
     *,
     medium: Medium = "water",
     controller: Controller | None = None,
+    programme: YawProgramme | None = None,
 ) -> YawRecord:
-    """The record of the card's programme on the card's rig, encoder and all.
+    """The record of a programme on the card's rig, encoder and all.
 
     Parameters
     ----------
@@ -55,13 +55,15 @@ def simulated_record(
         In ``air`` the rig is that of :func:`rig_in_air`.
     controller : optional
         By default (4), from the right inertia.
+    programme : optional
+        By default the card's.
 
     Raises
     ------
     InputError
         The motor saturates, or the card's rig or programme is none.
     """
-    wet, programme = rig_of(card), programme_of(card)
+    wet, programme = card.yaw_rig, programme or programme_of(card)
     rig = rig_in_air(wet) if medium == "air" else wet
     controller = controller or TunedController(inertia_kgm2=rig.inertia_kgm2 + rig.added_inertia_kgm2)
     run = run_yaw_rig(rig, programme, controller, Measuring(current_noise_A=current_noise_A))
@@ -81,12 +83,5 @@ def rig_in_air(rig: YawRig) -> YawRig:
     Dry and viscous friction are those of the card: it does not tell the water's part of them. The inertia, which is
     what a run in air is for, does not depend on that.
     """
-    return replace(
-        rig,
-        added_inertia_kgm2=0.0,
-        quadratic_Nms2=0.0,
-        braking_quadratic_Nms2=None,
-        inertia_accelerating_kgm2=0.0,
-        inertia_braking_kgm2=0.0,
-        walls=None,
-    )
+    water = ("added_inertia_kgm2", "quadratic_Nms2", "inertia_accelerating_kgm2", "inertia_braking_kgm2")
+    return rig.model_copy(update={**dict.fromkeys(water, 0.0), "braking_quadratic_Nms2": None, "walls": None})

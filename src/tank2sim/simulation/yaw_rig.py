@@ -9,9 +9,10 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from tank2sim.cards.form import YawRig
 from tank2sim.dynamics.model import Model, Vector
 from tank2sim.dynamics.yaw_programme import Reference, YawProgramme
-from tank2sim.dynamics.yaw_rig import YawRig, yaw_rig_model
+from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.errors import InputError
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.yaw_rig_control import Controller, TunedController

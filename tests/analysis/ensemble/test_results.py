@@ -12,7 +12,14 @@ import pytest
 from tank2sim.analysis.ensemble import results
 from tank2sim.analysis.ensemble.draws import draws_of, in_file
 from tank2sim.analysis.ensemble.questions import SIGNALS, OfCriteria, OfManoeuvre, ShipText, by_number
-from tank2sim.analysis.ensemble.results import Asked, chance, manoeuvre_bands, named_bands, stability_bands
+from tank2sim.analysis.ensemble.results import (
+    Asked,
+    bands_without_poles,
+    chance,
+    manoeuvre_bands,
+    named_bands,
+    stability_bands,
+)
 from tank2sim.analysis.stability.imo import Criterion, imo_criteria
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cards.covariance import Covariance, covariance_file, referring
@@ -146,6 +153,19 @@ def test_criteria_of_a_member_are_those_of_the_ship_with_its_numbers(mariner_car
     for one in imo_criteria(mariner, draws.member(0)):
         if one.found is not None:
             assert found.figures[one.name][0] == pytest.approx(one.found, rel=1e-4), one.name
+
+
+def test_figures_over_a_criterion_of_both_signs_have_no_band() -> None:
+    C = np.array([2.0, 1.0, 0.5, -0.5, -1.0])
+    figures = {"criterion_C": C, "K_prime": -1 / C, "T_prime": 1 / C, "T3_s": np.ones(5), "advance_m": C}
+    bands, told = bands_without_poles(Ensemble(5, 0, figures))
+    assert set(bands) == {"criterion_C", "T3_s", "advance_m"}
+    (line,) = told
+    assert "K prime and T prime" in line and "3 of 5 members have C' above zero" in line
+    # Without C' its sign is that of T; where all are on one side there is a band.
+    assert "T_prime" not in bands_without_poles(Ensemble(5, 0, {"T_prime": 1 / C}))[0]
+    same = {name: values[:3] for name, values in figures.items()}
+    assert set(bands_without_poles(Ensemble(3, 0, same))[0]) == set(figures)
 
 
 def test_what_is_assumed_is_told(mariner_card: ManoeuvringCard) -> None:

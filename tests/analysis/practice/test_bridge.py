@@ -7,10 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from tank2sim.analysis.practice.bridge import SHALLOW, bridge_of, quarter, steady_speed
+from tank2sim.analysis.practice.bridge import SHALLOW, bridge_of, steady_speed
+from tank2sim.analysis.practice.card_range import reading
+from tank2sim.analysis.practice.ship_track import quarter
 from tank2sim.analysis.practice.standard_trials import ship_of
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card, revised
-from tank2sim.simulation.manoeuvres import Orders
+from tank2sim.errors import InputError
+from tank2sim.simulation.manoeuvres import Orders, Turn
 from tank2sim.simulation.run import simulate
 
 RPM = 2 * math.pi / 60
@@ -39,6 +42,7 @@ def test_circles_lie_on_their_sides_and_show_the_figures(bridge) -> None:
     assert mark.starboard_m == pytest.approx(starboard.figures["transfer_m"], abs=1.0)
     half = quarter(port, 180)
     assert half.starboard_m == pytest.approx(-port.figures["tactical_diameter_m"], abs=1.0)
+    assert 180 <= port.as_json()["marks"][1]["heading_change_deg"] < 181  # to her side: it is no heading
     assert half.time_s == pytest.approx(port.figures["time_180_s"], abs=0.2)
     assert quarter(starboard, 360).speed_mps == pytest.approx(starboard.figures["steady_speed_mps"], rel=1e-3)
 
@@ -83,3 +87,33 @@ def test_what_a_card_does_not_tell_is_none(mariner_card) -> None:
     assert tanker.hard_over_s is None and tanker.neutral_deg is None
     assert [one.order for one in tanker.telegraph] == [""] * 5
     assert [one.within for one in tanker.telegraph] == [True, True, True, False, False]
+
+
+def test_what_is_read_off_before_the_range_ends_is_kept() -> None:
+    ship = ship_of(read_card("kvlcc2", {"model.valid_speed_mps": [5.8, 9.5]}))
+    run = ship.run(Turn(math.radians(10)))
+    read, path = reading(run), run.trajectory
+    row = int(np.argmax(path["motion.speed"] < 5.8))
+    assert read.left_s == pytest.approx(path.t[row], abs=1.0)
+    assert read.figures["time_90_s"] < read.left_s
+    assert not read.outside("advance_m") and not read.outside("time_90_s")
+    assert read.outside("steady_diameter_m")
+    assert read.outside("tactical_diameter_m") == (read.figures["time_180_s"] >= read.left_s)
+
+
+def test_a_card_that_holds_throughout_has_all_its_figures(mariner_card) -> None:
+    found = bridge_of(mariner_card)
+    assert all(one.left is None and one.inside == len(one.ahead_m) for one in found.deep)
+    assert found.as_json()["turning_circles_deep"][0]["outside_card_range"] == []
+    tanker = bridge_of(read_card("kvlcc2"))
+    assert tanker.as_json()["turning_circles_deep"][0]["left_card_range_s"] == pytest.approx(91.6, abs=1)
+    assert any("60° of heading" in one for one in tanker.notices)
+
+
+def test_absurd_revolutions_are_refused() -> None:
+    with pytest.raises(InputError, match="beyond 1,200 revolutions"):
+        bridge_of(read_card("esso-osaka"), {"Full": 7e6})
+    with pytest.raises(InputError, match="beyond 10,000 revolutions"):
+        bridge_of(read_card("mariner"), {"Full": 7e6})
+    given = bridge_of(read_card("mariner"), {"Full ahead": 84.0}).telegraph
+    assert [(one.order, one.rpm, one.speed_mps) for one in given] == [("Full ahead", 84.0, None)]

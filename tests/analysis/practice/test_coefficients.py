@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.analysis.practice.coefficients import compare_coefficients, expanded_as
-from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.analysis.practice.coefficients import SAME, compare_coefficients, compare_effects, expanded_as
+from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics import build
 
 
@@ -41,7 +41,8 @@ def test_a_card_does_not_differ_from_itself(mariner_card) -> None:
     for name, value in mariner_card.derivatives.items():
         if value:
             assert rows[name].cards[1].value == pytest.approx(value, rel=1e-12), name
-            assert rows[name].differences[0].standard_errors == pytest.approx(0.0, abs=1e-9)
+            # Its own number is no second one that agrees.
+            assert rows[name].differences[0].standard_errors is None and rows[name].differences[0].why == SAME
 
 
 def test_a_difference_is_told_in_the_root_of_both_variances(mariner_card) -> None:
@@ -52,6 +53,35 @@ def test_a_difference_is_told_in_the_root_of_both_variances(mariner_card) -> Non
     assert rows["Yv"].differences[0].percent == pytest.approx(100 * 1e-3 / 1160e-5)
     assert rows["Yv"].cards[0].stated and not rows["Nv"].cards[0].stated
     assert rows["Nv"].cards[0].standard_error == pytest.approx(0.02 * 264e-5)
+
+
+def test_a_number_that_was_taken_over_is_not_compared_however_the_other_card_spells_it(mariner_card) -> None:
+    moved = {**mariner_card.derivatives, "Yv": -1160e-5 * (1 + 1e-6)}
+    rows, _ = rows_of(mariner_card, in_convention(replace(mariner_card, derivatives=moved), speed_scale="nominal"))
+    assert rows["Nv"].differences[0].why == SAME and rows["Nv"].differences[0].standard_errors is None
+    assert rows["Yv"].differences[0].standard_errors == pytest.approx(-1e-6 * -1 / (-0.02 * math.sqrt(2)), rel=1e-3)
+
+
+def test_parameters_of_effects_are_compared_and_those_with_a_unit_at_one_size_alone(mariner_card) -> None:
+    def card(Y: float, tau: float) -> ManoeuvringCard:
+        text = (
+            f"{mariner_card.text}\n[[effects]]\nname = 'propeller_side_force'\n"
+            f"parameters = {{Y_prime = {Y}, N_prime = -2e-5}}\nuncertainty = {{Y_prime = 3e-6}}\n"
+            f"[[effects]]\nname = 'flow_memory'\n[effects.parameters]\nshare = 0.3\ntime_constant_s = {tau}\n"
+        )
+        return parse_card(text, "made.toml")
+
+    cards = [card(4e-5, 5.0), card(5e-5, 6.0)]
+    names = [name for name in build(cards[0]).parameter_names if name.startswith(("propeller_side", "flow_memory"))]
+    rows = {row.name: row for row in compare_effects(cards, [build(one) for one in cards])}
+    assert set(rows) == set(names) and rows[names[0]].differences[0].standard_errors == pytest.approx(
+        1e-5 / (3e-6 * math.sqrt(2)), rel=1e-9
+    )
+    assert rows[names[1]].differences[0].why == SAME
+    longer = replace(cards[1], ship=cards[1].ship.model_copy(update={"length_m": 300.0}))
+    other = {row.name: row for row in compare_effects([cards[0], longer], [build(cards[0]), build(longer)])}
+    assert other[names[0]].differences[0].standard_errors is not None
+    assert other[names[-1]].differences[0].why == "of a ship of another size"
 
 
 def test_a_term_that_one_model_has_not_is_told_and_not_compared(mariner_card) -> None:
@@ -113,14 +143,14 @@ def test_a_model_and_her_ship_have_the_same_coefficients(mariner_card) -> None:
     model = mariner_card.model.model_copy(update={"speed_mps": 7.7175 / math.sqrt(ratio)})
     rows, notes = rows_of(mariner_card, replace(mariner_card, ship=ship, model=model))
     assert not notes
-    assert rows["Nvu"].differences[0].standard_errors == pytest.approx(0.0, abs=1e-9)
+    assert rows["Nvu"].differences[0].why == SAME
 
 
 def test_a_speed_outside_the_cards_range_is_not_extrapolated_to(mariner_card) -> None:
     model = mariner_card.model.model_copy(update={"speed_mps": 3.0, "valid_speed_mps": (1.5, 3.6)})
     rows, _ = rows_of(replace(mariner_card, model=model), mariner_card)
     assert "outside the range" in rows["Yv"].differences[0].why  # it has a Yvu
-    assert rows["Xvr"].differences[0].standard_errors == pytest.approx(0.0, abs=1e-9)  # and this no slope
+    assert rows["Xvr"].differences[0].why == SAME  # and this no slope
     assert "revolutions" in rows["Xu"].differences[0].why
 
 
@@ -129,5 +159,5 @@ def test_of_a_linear_card_only_the_linear_terms_are_compared() -> None:
     assert isinstance(card, ManoeuvringCard)
     linear = replace(card, model=card.model.model_copy(update={"kind": "linear"}))
     rows, _ = rows_of(card, linear)
-    assert rows["Nd"].differences[0].standard_errors == pytest.approx(0.0, abs=1e-9)
+    assert rows["Nd"].differences[0].why == SAME
     assert rows["Nvvv"].differences[0].why == "not in the linear model"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.practice.standard_trials import ship_of
-from tank2sim.analysis.practice.validation import Outcome, Validated, validate, verify
+from tank2sim.analysis.practice.validation import Outcome, Validated, made_card, validate, verify
 from tank2sim.cards import revised
 from tank2sim.dynamics import build
 from tank2sim.records.trials import Trial
@@ -78,6 +78,8 @@ def test_the_validation_uncertainty_is_twice_the_root_of_the_squares() -> None:
     assert replace(one, simulated=105.0, required_percent=5.0).outcome is Outcome.UNCERTAIN
     assert replace(one, inputs=None).outcome is Outcome.OPEN
     assert replace(one, simulated=None).outcome is Outcome.REFUTED
+    assert replace(one, simulated=105.0, made_card=True).outcome is Outcome.FITTED
+    assert replace(one, made_card=True).outcome is Outcome.REFUTED
 
 
 def test_the_step_hardly_matters_and_a_coarse_one_does(mariner_card) -> None:
@@ -93,3 +95,14 @@ def test_the_step_hardly_matters_and_a_coarse_one_does(mariner_card) -> None:
 
 def test_without_a_trial_nothing_is_validated(mariner_card) -> None:
     assert validate(mariner_card, []).verdict.startswith("not validated")
+
+
+def test_trials_that_made_a_card_are_known_by_its_source(mariner_card, trials) -> None:
+    how = "PMM tests of a turn; identified by tank2sim (output_error, cross_flow) from zigzag, Z_35_05"
+    own = replace(mariner_card, ship=mariner_card.ship.model_copy(update={"source": how}))
+    assert made_card(own, "zigzag") and made_card(own, "Z_35_05")
+    assert not any(made_card(own, name) for name in ("turn", "zig", "Z_35", "35_05", "Z_35_05_b"))
+    found = validate(own, trials, 0)
+    assert Outcome.VALIDATED not in {one.outcome for one in found.figures if one.trial == "zigzag"}
+    assert all(not one.made_card for one in found.figures if one.trial == "turn")
+    assert any("zigzag: the card was identified from this trial" in notice for notice in found.notices)

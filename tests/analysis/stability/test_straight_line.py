@@ -279,6 +279,7 @@ def test_a_ship_that_sway_does_not_push_is_told_so() -> None:
 def test_a_trial_that_leaves_what_the_card_holds_for_says_so() -> None:
     criteria = {one.name: one for one in imo_criteria(build(read_card("kvlcc2")))}
     advance, zigzag = criteria["advance"], criteria["20/20 zigzag, first overshoot"]
+    assert advance.passed and advance.judged is None and zigzag.judged
     assert advance.beyond_card and "yaw rate" in advance.remark and "3.99" in advance.remark
     assert not zigzag.beyond_card and not zigzag.remark
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import parse_card
+from tank2sim.cards.form import TankWalls
 from tank2sim.dynamics.yaw_programme import PAPER
-from tank2sim.dynamics.yaw_rig import SHIP_T1, Walls, YawRig
+from tank2sim.dynamics.yaw_rig import SHIP_T1, UNKNOWN_RIG
 from tank2sim.errors import InputError
 from tank2sim.identification.yaw.card import rig_card_text
 from tank2sim.identification.yaw.identify import (
@@ -137,16 +138,17 @@ def test_what_is_known_beyond_the_equation_is_taken_off(folder):
     truth = Truth(
         inertia_a=0.02, inertia_d=0.05, braking_quadratic=0.06, wall_inertia=4e-3, wall_damping=5e-3, gravity=1e-3
     )
-    walls = Walls(body_length_m=0.67, **{f"{end}_{what}": value for end in ("bow", "stern")
+    walls = TankWalls(body_length_m=0.67, **{f"{end}_{what}": value for end in ("bow", "stern")
                   for what, value in (("inertia_kgm2", 4e-3), ("damping_Nms", 5e-3))})  # fmt: skip
-    known = YawRig(
-        inertia_kgm2=0.0,
-        quadratic_Nms2=0.0381,
-        braking_quadratic_Nms2=0.06,
-        inertia_accelerating_kgm2=0.02,
-        inertia_braking_kgm2=0.05,
-        gravity_Nm=1e-3,
-        walls=walls,
+    known = UNKNOWN_RIG.model_copy(
+        update={
+            "quadratic_Nms2": 0.0381,
+            "braking_quadratic_Nms2": 0.06,
+            "inertia_accelerating_kgm2": 0.02,
+            "inertia_braking_kgm2": 0.05,
+            "gravity_Nm": 1e-3,
+            "walls": walls,
+        }
     )
     made = read_yaw_record(written(folder / "full.csv", truth))
     aware, unaware = identify_yaw([made], YawOptions(known=known)), identify_yaw([made])
@@ -175,8 +177,8 @@ def test_gravity_cancels_over_full_turns_and_not_over_parts(folder):
 
 
 def test_known_work_gives_the_corrections_of_the_printed_formulas(water):
-    known = YawRig(
-        inertia_kgm2=0.0, braking_quadratic_Nms2=0.02, inertia_accelerating_kgm2=0.03, inertia_braking_kgm2=0.05
+    known = UNKNOWN_RIG.model_copy(
+        update={"braking_quadratic_Nms2": 0.02, "inertia_accelerating_kgm2": 0.03, "inertia_braking_kgm2": 0.05}
     )
     speeding, braking = intervals(water, "reference")[0]
     w1, w2 = speeding.rate_radps[0], speeding.rate_radps[-1]
@@ -193,9 +195,9 @@ def test_known_work_gives_the_corrections_of_the_printed_formulas(water):
 def test_reversing_programmes_are_paired_through_the_same_angles(folder):
     truth = replace(TRUTH, reversing=True, wall_inertia=4e-3, wall_damping=5e-3)
     made = read_yaw_record(written(folder / "reversing.csv", truth))
-    walls = Walls(body_length_m=0.67, **{f"{end}_{what}": value for end in ("bow", "stern")
+    walls = TankWalls(body_length_m=0.67, **{f"{end}_{what}": value for end in ("bow", "stern")
                   for what, value in (("inertia_kgm2", 4e-3), ("damping_Nms", 5e-3))})  # fmt: skip
-    found = identify_yaw([made], YawOptions(known=YawRig(inertia_kgm2=0.0, walls=walls)))
+    found = identify_yaw([made], YawOptions(known=UNKNOWN_RIG.model_copy(update={"walls": walls})))
     assert found.estimates["energy_least_squares"].total_inertia_kgm2 == pytest.approx(0.0504, rel=2e-3)
     assert found.estimates["output_error"].total_inertia_kgm2 == pytest.approx(0.0504, rel=2e-3)
 

@@ -2,7 +2,13 @@ import numpy as np
 import pytest
 
 from tank2sim.records.signals.correlation import autocorrelation
-from tank2sim.records.signals.statistics import Stationary, normality, probability_density, stationarity
+from tank2sim.records.signals.statistics import (
+    Stationary,
+    mean_and_deviation,
+    normality,
+    probability_density,
+    stationarity,
+)
 from tests.records.signals.made import first_order, series, white
 
 
@@ -88,3 +94,15 @@ def test_the_density_of_normal_noise_is_the_normal_one():
     exact = np.exp(-0.5 * ((found.values - 3.0) / 2.0) ** 2) / (2.0 * np.sqrt(2.0 * np.pi))
     assert np.max(np.abs(found.normal - exact)) < 0.01
     assert np.max(np.abs(found.density - exact)) < 0.012
+
+
+def test_directions_have_mean_and_deviation_on_the_circle():
+    # Made continuous, a direction about north may be turns away; a normal one wrapped keeps its deviation (Mardia).
+    values = np.unwrap(np.radians(-20.0) + 0.4 * white(3)) + 4 * np.pi
+    mean, deviation = mean_and_deviation("wind_direction_rad", values)
+    assert np.degrees(mean) == pytest.approx(340.0, abs=1.5) and deviation == pytest.approx(0.4, rel=0.05)
+    assert mean_and_deviation("delta_rad", values) == pytest.approx((values.mean(), values.std()))
+    found = stationarity(series(values, name="psi_rad"), autocorrelation(series(values)))
+    assert np.degrees(found.mean) == pytest.approx((340.0, 340.0), abs=2.0)
+    assert found.variance == pytest.approx((0.16, 0.16), rel=0.1)
+    assert mean_and_deviation("psi_rad", np.full(60, 2 * np.pi))[0] == pytest.approx(0.0, abs=1e-9)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from tank2sim.analysis.catalogue.tables import (
@@ -20,14 +20,20 @@ from tank2sim.analysis.catalogue.tables import (
     not_given,
     turns_of,
 )
+from tank2sim.analysis.turning.points import SteadyTurn, TurningPoints
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning, WantedTurn, levers_of_form, tune_to_two_points
-from tank2sim.cards.steering_card import SteeringCard
+from tank2sim.cards.steering_card import SteeringCard, SteeringPoint
 from tank2sim.errors import InputError
+from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.trajectory import Trajectory
+
+_TUNED = "through the two trial points"
+
+_CIRCLE_SAMPLES = 300
 
 ZIGZAG_DEG = 10.0
 """Rudder and heading of the zigzag by which the models are compared (MSC.137(76))."""
@@ -68,6 +74,14 @@ class SteeringComparison:
         The main model through the first two measured points; a text says why there is none.
     missing : mapping
         Model to what is not known of it.
+    titles : mapping
+        Model to its words.
+    diagrams : mapping
+        Words to the steering diagram of each model of `runs`, and of the tuned one.
+    points : tuple of SteeringPoint
+        Known ones of the diagram.
+    speed_mps : float
+        Of the approach, at which a radius is a yaw rate.
     """
 
     ship: str
@@ -80,9 +94,13 @@ class SteeringComparison:
     polynomials: Mapping[str, tuple[float, ...]]
     tuning: TwoPointTuning | str | None
     missing: Mapping[str, tuple[str, ...]]
+    titles: Mapping[str, str]
+    diagrams: Mapping[str, tuple[SteadyTurn, ...]]
+    points: tuple[SteeringPoint, ...]
+    speed_mps: float
 
     def as_json(self) -> dict[str, object]:
-        """All but the trajectories, in m, deg and deg/min."""
+        """All of it, in m, deg and deg/min; turning circles thinned to draw."""
         tuning = self.tuning.as_json() if isinstance(self.tuning, TwoPointTuning) else self.tuning
         return {
             "ship": self.ship,
@@ -98,7 +116,23 @@ class SteeringComparison:
             "influence_over_draught": {name: list(values) for name, values in self.polynomials.items()},
             "two_point_tuning": tuning,
             "missing": {name: list(words) for name, words in self.missing.items()},
+            "titles": dict(self.titles),
+            "diagrams": self._diagrams(),
+            "histories": {self.titles[name]: _circle(one.turn) for name, one in self.runs.items()},
         }
+
+    def _diagrams(self) -> dict[str, object]:
+        names = ("rudder_deg", "yaw_rate_degpmin")
+        points = []
+        for one in self.points:
+            rate = one.yaw_rate_radps or math.copysign(self.speed_mps / (one.radius_m or math.inf), one.rudder_rad)
+            told = {"rudder_deg": math.degrees(one.rudder_rad), "yaw_rate_degpmin": 60 * math.degrees(rate)}
+            points.append({"label": one.label, "source": one.source, **told})
+        models = {
+            label: {name: [turn.as_json()[name] for turn in turns] for name in names}
+            for label, turns in self.diagrams.items()
+        }
+        return {"models": models, "points": points}
 
 
 def compare(card: SteeringCard, rudder_deg: float | None = None) -> SteeringComparison:
@@ -119,18 +153,39 @@ def compare(card: SteeringCard, rudder_deg: float | None = None) -> SteeringComp
     main = printed.model if printed else names[0]
     same = [name for name in names if card.models[name].draught_m == card.models[main].draught_m]
     others = [name for name in names if name not in same and card.models[name].form == card.models[main].form]
+    turns, runs = tuple(turns_of(card, name, RUDDERS_DEG) for name in names), {n: _runs(card, n, rudder) for n in same}
+    tuning = tuned(card, main)
     return SteeringComparison(
         ship=card.ship.name,
         main=main,
         rudder_deg=rudder,
-        turns=tuple(turns_of(card, name, RUDDERS_DEG) for name in names),
+        turns=turns,
         influence=tuple(influence_of(card, name, rudder) for name in same),
-        runs={name: _runs(card, name, rudder) for name in same},
+        runs=runs,
         predictions={name: combined_prediction(card, name) for name in others} if printed else {},
         polynomials=draught_polynomials(card) if printed else {},
-        tuning=tuned(card, main),
+        tuning=tuning,
         missing=missing_of(card),
+        titles={name: entry.title for name, entry in card.models.items()},
+        diagrams=_diagrams(card, max(turn.rudder_rad for one in turns for turn in one.turns), same, (main, tuning)),
+        points=card.points,
+        speed_mps=card.ship.speed_mps,
     )
+
+
+def _diagrams(
+    card: SteeringCard, largest: float, names: Sequence[str], tuned: tuple[str, TwoPointTuning | str | None]
+) -> dict[str, tuple[SteadyTurn, ...]]:
+    """Of the models by their titles, to the largest rudder, and of the one that was tuned."""
+    found = {card.models[name].title: TurningPoints(model_of(card, name)).diagram(largest) for name in names}
+    main, tuning = tuned
+    if isinstance(tuning, TwoPointTuning):
+        found[_TUNED] = TurningPoints(model_of(card, main)).diagram(largest, tuning.parameters)
+    return {label: tuple(turns) for label, turns in found.items()}
+
+
+def _circle(turn: Trajectory) -> dict[str, list[float]]:
+    return drawn_columns({"t_s": turn.t, "x_m": turn["motion.x"], "y_m": turn["motion.y"]}, _CIRCLE_SAMPLES)
 
 
 def missing_of(card: SteeringCard) -> dict[str, tuple[str, ...]]:

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tank2sim.analysis.influence.parameters import (
-    CardParameter,
-    card_parameters,
-    standard_errors_in_words,
-    study_model,
-)
+from tank2sim.analysis.influence.errors import JointErrors, joint_errors
+from tank2sim.analysis.influence.parameters import CardParameter, card_parameters, study_model
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.cards.covariance import Covariance, read_covariance
+from tank2sim.cards.covariance import Covariance
 from tank2sim.simulation.ensemble import Draws
 
 Array = NDArray[np.float64]
@@ -31,35 +26,23 @@ def draws_of(card: ManoeuvringCard, seed: int) -> tuple[Draws, list[str]]:
     InputError
         The covariance to which the card refers is at fault.
     """
-    known = read_covariance(card)
-    parameters = card_parameters(card, study_model(card))
-    places = {one.key: place for place, one in enumerate(parameters)}
-    own = np.array([one.standard_error for one in parameters])
-    covariance = np.diag(own**2)
-    told: list[str] = []
-    together: set[str] = set()
-    if known is not None:
-        names = [name for name in known.names if name in places]
-        rows = [places[name] for name in names]
-        here = [known.names.index(name) for name in names]
-        factors = np.array([parameters[row].factor for row in rows])
-        covariance[np.ix_(rows, rows)] = known.matrix[np.ix_(here, here)] / np.outer(factors, factors)
-        together = set(names)
-        told.append(f"{len(names)} numbers vary together, as the covariance beside the card says")
-    alone = [replace(one, assumed=one.assumed and one.key not in together) for one in parameters]
-    told += standard_errors_in_words([one for one in alone if one.key not in together])
-    uncertain = np.flatnonzero(np.diag(covariance) > 0)
-    chosen = [parameters[place] for place in uncertain]
+    errors = joint_errors(card, card_parameters(card, study_model(card)))
+    return draws_with(errors, seed), errors.in_words
+
+
+def draws_with(errors: JointErrors, seed: int) -> Draws:
+    """Draws of parameters with these errors; those that are exact are not drawn."""
+    uncertain = np.flatnonzero(np.diag(errors.covariance) > 0)
+    chosen = [errors.parameters[place] for place in uncertain]
     bounds = [one.bounds for one in chosen]
-    draws = Draws(
+    return Draws(
         names=tuple(one.name for one in chosen),
         mean=np.array([one.value for one in chosen]),
-        root=_root(covariance[np.ix_(uncertain, uncertain)]),
+        root=_root(errors.covariance[np.ix_(uncertain, uncertain)]),
         lowest=np.array([-np.inf if low is None else low for low, _ in bounds]),
         highest=np.array([np.inf if high is None else high for _, high in bounds]),
         seed=seed,
     )
-    return draws, told
 
 
 def in_file(card: ManoeuvringCard, names: Sequence[str], matrix: Array) -> Covariance:

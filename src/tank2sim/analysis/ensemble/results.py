@@ -12,14 +12,16 @@ from numpy.typing import NDArray
 
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.analysis.ensemble.questions import SIGNALS, OfCriteria, OfFigures, OfManoeuvre, ShipText
+from tank2sim.analysis.ensemble.steering import Grid, SteeringBands, steering_bands
 from tank2sim.analysis.stability.imo import Criterion
 from tank2sim.analysis.stability.straight_line import answering_states
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.simulation.bands import Band, BandOverTime, TrackBand, figure_bands, history_bands
+from tank2sim.simulation.bands import STILL_RUNNING, Band, BandOverTime, TrackBand, figure_bands, history_bands
 from tank2sim.simulation.ensemble import KEPT, Ensemble, ensemble
 from tank2sim.simulation.manoeuvres import Manoeuvre
+from tank2sim.units import in_words
 
 Array = NDArray[np.float64]
 
@@ -28,6 +30,10 @@ TIMES = 201
 
 STRAIGHT = ("criterion_C", "K_prime", "T_prime", "T_s", "T3_s")
 """Figures of the straight course of which there are bands."""
+
+POLES = ("K_per_s", "K_prime", "T_s", "T1_s", "T_prime")
+"""Figures that are a number over C': where that changes its sign they go through infinity, and the quantiles of members
+on both sides enclose everything but where the members are."""
 
 
 @dataclass(frozen=True)
@@ -131,6 +137,7 @@ class StabilityBands:
     figures: Mapping[str, Band]
     stable: float | None
     chances: tuple[Chance, ...]
+    curves: SteeringBands | None = None
 
     def as_json(self) -> dict[str, object]:
         """As JSON has it."""
@@ -139,6 +146,7 @@ class StabilityBands:
             "figures": {name: band.as_json() for name, band in self.figures.items()},
             "probability_stable": self.stable,
             "imo": [one.as_json() for one in self.chances],
+            "curves": self.curves and self.curves.as_json(),
         }
 
 
@@ -173,13 +181,25 @@ def manoeuvre_bands(
     if asked.members > KEPT:
         told.append(f"bands of tracks and histories are of the first {KEPT} members; figures are of all")
     shown, histories, track = history_bands(found, times, tuple(SIGNALS))
+    if 0 < len(shown) < len(times):
+        share = f"{100 * STILL_RUNNING:g} % of the members"
+        told.append(f"bands over time end at {shown[-1]:.4g} s, up to which {share} run; figures are of all")
+    if track is not None and track.count < len(shown):
+        last = shown[track.count - 1]
+        share = f"{100 * STILL_RUNNING:g} % of the members"
+        told.append(f"the band of the track ends at {last:.4g} s, as far as {share} come while they run")
     return ManoeuvreBands(_members(found, told), figure_bands(found), shown, histories, track)
 
 
 def stability_bands(
-    card: ManoeuvringCard, criteria: Sequence[Criterion], asked: Asked, executor: Executor | None = None
+    card: ManoeuvringCard,
+    criteria: Sequence[Criterion],
+    asked: Asked,
+    executor: Executor | None = None,
+    curves: tuple[float | None, Grid] | None = None,
 ) -> StabilityBands:
-    """Bands of the straight course at the card's speed, and the chances of the IMO `criteria`."""
+    """Bands of the straight course at the card's speed, the chances of the IMO `criteria`, and, if asked, bands of
+    `curves`: at a speed (None: the card's), on a grid."""
     draws, told = draws_of(card, asked.seed)
     trials = ensemble(OfCriteria(ShipText.of(card)), draws, asked.members, executor)
     told.append("an ensemble is judged at the card's speed")
@@ -196,7 +216,11 @@ def stability_bands(
             f"{', '.join(unseen)} follow at once"
         )
     stable = None if unseen else _stable(straight)
-    return StabilityBands(_members(trials, told), figure_bands(straight), stable, chances)
+    bands, through = bands_without_poles(straight)
+    told += through
+    drawn = steering_bands(ShipText.of(card), draws, asked.members, curves, executor) if curves else None
+    told += drawn.notices if drawn else ()
+    return StabilityBands(_members(trials, told), bands, stable, chances, drawn)
 
 
 def named_bands(
@@ -205,13 +229,31 @@ def named_bands(
     """Bands of figures by name (:mod:`tank2sim.analysis.influence.figures`)."""
     draws, told = draws_of(card, asked.seed)
     found = ensemble(OfFigures(ShipText.of(card), tuple(figures)), draws, asked.members, executor)
-    bands = figure_bands(found)
+    bands, through = bands_without_poles(found)
+    told += through
     deviations = {name: float(np.nanstd(found.figures[name], ddof=1)) for name in bands} if asked.members > 1 else {}
     deviations = {name: deviations.get(name, math.nan) for name in bands}
     for name, band in bands.items():
         if band.shown < found.usable:
             told.append(f"{name}: {found.usable - band.shown} of {asked.members} members do not show it")
     return FigureBands(_members(found, told), bands, deviations)
+
+
+def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
+    """Bands of figures by name, but for those of :data:`POLES` that go through infinity, and what is told of these."""
+    bands = figure_bands(found)
+    own = [name for name in POLES if name in bands]
+    if not own:
+        return bands, []
+    judged = found.figures.get("criterion_C")
+    signs = {name: np.sign(found.figures[name] if judged is None else judged) for name in own}
+    gone = [name for name in own if (signs[name] > 0).any() and (signs[name] < 0).any()]
+    if not gone:
+        return bands, []
+    usable, words = found.usable, " and ".join(in_words(name)[0] for name in gone)
+    above = int(np.sum(signs[gone[0]] > 0))
+    told = f"no band of {words}: {above} of {usable} members have C' above zero, the others below, and between these "
+    return {name: band for name, band in bands.items() if name not in gone}, [f"{told}they go through infinity"]
 
 
 def chance(criterion: Criterion, found: Ensemble) -> Chance:

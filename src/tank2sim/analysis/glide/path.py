@@ -22,6 +22,7 @@ from tank2sim.analysis.glide.steady import SteadyGlide, glide_as_printed, glide_
 from tank2sim.cards.card import GliderCard
 from tank2sim.dynamics.model import Vector
 from tank2sim.errors import InputError
+from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.glide_programme import Programme, ProgrammeStep
 
 _POINTS_OF_AN_ARC = 60
@@ -74,6 +75,11 @@ class GlidePath:
             parts = _POINTS_OF_AN_ARC if glide.turn_rate_radps else 1
             rows += [_after(begin, glide, duration * part / parts) for part in range(1, parts + 1)]
         return np.array(rows)
+
+    def histories(self) -> dict[str, list[float]]:
+        """The path in points close enough to draw it, as JSON has it."""
+        rows = self.sampled()
+        return drawn_columns({name: rows[:, k] for k, name in enumerate(("t_s", "x_m", "y_m", "height_m"))}, len(rows))
 
     def states_as_json(self) -> list[dict[str, object]]:
         """The glide of each step as JSON has it, with its duration."""

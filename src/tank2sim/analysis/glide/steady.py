@@ -253,10 +253,16 @@ def radius_as_printed(card: GliderCard, lift: float, path_angle_rad: float, roll
 
 
 def force_residual(card: GliderCard, glide: SteadyGlide) -> tuple[float, float, float]:
-    """What is left of the forces along the course, to starboard and up, less the centripetal force, N: 0 in balance."""
+    """What is left of the forces along the course, to starboard and up, less the centripetal force, N: 0 in balance.
+
+    Lift and drag are those of (6) and (7) at the glide's incidence and speed, whatever equations gave the glide.
+    """
+    own = card.glider
+    pressure = 0.5 * card.environment.water_density_kgpm3 * own.reference_area_m2 * glide.speed_mps**2
+    lift = pressure * lift_coefficient(glide.incidence_rad, own.lift_slope, own.lift_quadratic)
+    drag = pressure * drag_coefficient(glide.incidence_rad, own.drag_zero, own.drag_quadratic)
     along, up = math.cos(glide.path_angle_rad), math.sin(glide.path_angle_rad)
     upright, aside = math.cos(glide.roll_rad), math.sin(glide.roll_rad)
-    lift, drag = glide.lift_N, glide.drag_N
     centripetal = card.glider.mass_kg * glide.horizontal_speed_mps * glide.turn_rate_radps
     return (
         -drag * along - lift * upright * up,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from tank2sim.analysis.glide.design import Range, best_glide, fastest_glide, glide_polar, glide_range
 from tank2sim.analysis.glide.path import GlidePath, fly
-from tank2sim.analysis.glide.steady import SteadyGlide, ballast_kg, glide_as_printed, steady_glide
+from tank2sim.analysis.glide.steady import SteadyGlide, ballast_kg, force_residual, glide_as_printed, steady_glide
 from tank2sim.analysis.glide.swing import SwingError, swing_errors
 from tank2sim.analysis.glide.transient import Compared, ProgrammeError, compare, equilibrium, quasi_steady_error
 from tank2sim.cards.card import GliderCard
@@ -63,7 +63,8 @@ class GlideStudy:
         Of the programme; None without.
     ranges : tuple of Range
         Of best and fastest glide and the glides asked for that do not turn.
-    polar, errors, swings
+    polar : tuple of SteadyGlide
+    errors, swings
         Empty unless views were asked for.
     """
 
@@ -92,6 +93,7 @@ class GlideStudy:
         states = [
             {**glide.as_json(), "turning_radius_with_added_mass_m": radius if math.isfinite(radius) else None}
             | {"ballast_kg": ballast_kg(self.card, glide.buoyancy_kg)}
+            | {"force_residual_N": force_residual(self.card, glide)}
             for glide, radius in zip(self.glides, self.radii_m, strict=True)
         ]
         result: dict[str, object] = {"glider": self.card.ship.name, "states": states}
@@ -101,13 +103,20 @@ class GlideStudy:
             "fastest_glide": self.fastest.as_json(),
             "ranges": [one.as_json() for one in self.ranges],
         }
+        names = ("path_angle_deg", "horizontal_speed_mps", "climb_mps")
+        polar = [one.as_json() for one in self.polar]
+        result["polar"] = {name: [one[name] for one in polar] for name in names}
         if self.printed:
-            result["as_printed"] = [glide.as_json() for glide in self.printed]
+            result["as_printed"] = [
+                {**glide.as_json(), "force_residual_N": force_residual(self.card, glide)} for glide in self.printed
+            ]
         if self.path:
             result["states"] = [*states, *self.path.states_as_json()]
             result |= {"path": self.path.as_json(), "length_m": self.path.length_m}
+            result |= {"path_histories": self.path.histories()}
         if self.printed_path:
             result["path_as_printed"] = self.printed_path.as_json()
+            result["path_as_printed_histories"] = self.printed_path.histories()
         if self.compared:
             result["transient"] = self.compared.as_json()
         if self.errors:
@@ -142,7 +151,7 @@ def study(card: GliderCard, asked: GlideQuestion) -> GlideStudy:
         printed_path=printed_path,
         compared=compare(integrator, path) if path and integrator else None,
         ranges=tuple(_ranges(card, asked, (best, fastest, *glides))),
-        polar=glide_polar(card) if asked.views else (),
+        polar=glide_polar(card),
         errors=quasi_steady_error(card, integrator) if asked.views and integrator else (),
         swings=swing_errors(card, integrator) if asked.views and integrator else (),
         notices=(*model.notices, *([NO_COMPILER] if integrator and not integrator.compiled else [])),

@@ -15,6 +15,7 @@ from tank2sim.analysis.linearisation import OperatingPoint
 from tank2sim.cards.card import GliderCard
 from tank2sim.dynamics.model import Model, Vector
 from tank2sim.errors import InputError
+from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.glide_programme import follow
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.trajectory import Trajectory
@@ -123,7 +124,25 @@ class Compared:
         times = [place.time_s for place in self.path.places]
         named = {"x_m": "motion.x", "y_m": "motion.y", "depth_m": "motion.z", "speed_mps": "motion.speed"}
         rows = [{"t_s": time} | {key: self.motion.at(name, time) for key, name in named.items()} for time in times]
-        return {"path": rows, "distance_m": self.distance_m, "distance_by_length": self.share}
+        told = {"path": rows, "distance_m": self.distance_m, "distance_by_length": self.share}
+        return told | {"histories": self._histories(), "orders": self._orders()}
+
+    def _histories(self) -> dict[str, list[float]]:
+        """The transient motion, thinned to draw."""
+        run, degrees = self.motion, math.degrees(1.0)
+        angles = {"pitch_deg": "pitch.angle", "roll_deg": "roll.angle", "incidence_deg": "motion.incidence"}
+        columns = {"t_s": run.t, "x_m": run["motion.x"], "y_m": run["motion.y"], "height_m": -run["motion.z"]}
+        columns |= {"buoyancy_kg": run["buoyancy.mass"]} | {key: degrees * run[name] for key, name in angles.items()}
+        return drawn_columns(columns | {"speed_mps": run["motion.speed"]})
+
+    def _orders(self) -> dict[str, list[float]]:
+        """What is ordered and the steady glides of it, each held through its step."""
+        ends = np.array([place.time_s for place in self.path.places])
+        steps = [glide.as_json() for glide in self.path.glides]
+        names = ("buoyancy_kg", "pitch_deg", "roll_deg", "incidence_deg", "speed_mps")
+        held = {name: np.repeat(np.array([step[name] for step in steps], dtype=float), 2) for name in names}
+        times = np.repeat(ends, 2)[1:-1]
+        return drawn_columns({"t_s": times, **held}, len(times))
 
 
 def compare(integrator: Integrator, path: GlidePath) -> Compared:

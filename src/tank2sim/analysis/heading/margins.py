@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import control
 import numpy as np
+from numpy.typing import NDArray
 
 from tank2sim.analysis.linearisation import OperatingPoint, state_space, straight_course
 from tank2sim.analysis.stability.straight_line import settled_states
 from tank2sim.dynamics.autopilot_loop import closed_loop_model
 from tank2sim.dynamics.model import Model, Vector
+from tank2sim.records.thinning import drawn_columns
 
 _HELD = ("motion.x", "motion.y", "motion.u")
 """States that no course change of small size moves: position, and the speed to first order."""
@@ -77,6 +79,38 @@ class LargestSteps:
 
     within_rate_rad: float
     within_angle_rad: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LoopResponse:
+    """Frequency responses of a heading loop at one speed: `omega_radps` (n,), and complex (n,) the `loop` transfer and
+    the `heading` by its order, closed."""
+
+    speed_mps: float
+    omega_radps: Vector
+    loop: NDArray[np.complex128]
+    heading: NDArray[np.complex128]
+
+    def as_json(self) -> dict[str, object]:
+        """The result as JSON has it, to seven digits; complex values as their two parts."""
+        parts = {"loop": self.loop, "heading": self.heading}
+        columns = {"omega_radps": self.omega_radps}
+        for name, values in parts.items():
+            columns |= {f"{name}_real": values.real, f"{name}_imaginary": values.imag}
+        return {"speed_mps": self.speed_mps, **drawn_columns(columns, len(self.omega_radps))}
+
+
+_DECADES = (-2.0, 1.3)
+"""What frequencies are told, in decades from the crossover (ours)."""
+_FREQUENCIES = 500
+
+
+def loop_response(ship: Model, autopilot: Model, speed_mps: float, crossover_radps: float) -> LoopResponse:
+    """The loop over frequencies about its crossover."""
+    omega = crossover_radps * np.logspace(*_DECADES, _FREQUENCIES)
+    loop = np.asarray(loop_transfer(ship, autopilot, speed_mps)(1j * omega)).ravel()
+    heading = np.asarray(closed_loop_transfer(ship, autopilot, speed_mps)(1j * omega))[0].ravel()
+    return LoopResponse(speed_mps=speed_mps, omega_radps=omega, loop=loop, heading=heading)
 
 
 def loop_transfer(ship: Model, autopilot: Model, speed_mps: float | None = None) -> control.StateSpace:

@@ -13,9 +13,11 @@ from tank2sim.analysis.heading.designs import HeadingDesign, Weights, design_hea
 from tank2sim.analysis.heading.margins import (
     LargestSteps,
     LoopMargins,
+    LoopResponse,
     growing_effects,
     largest_steps,
     loop_margins,
+    loop_response,
 )
 from tank2sim.analysis.heading.runs import (
     CourseChange,
@@ -32,6 +34,7 @@ from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
 from tank2sim.dynamics.model import Model, Vector
 from tank2sim.errors import InputError
 from tank2sim.simulation.trajectory import Trajectory
+from tank2sim.simulation.trial_file import histories
 
 INTEGRAL_SHARE = 0.25
 """Of the integral line of sight: critically damped (:class:`tank2sim.analysis.heading.track_keeping.Guidance`)."""
@@ -40,6 +43,9 @@ _CHANGE_TIMES = 60
 """Length of a course change in 1/w, w = sqrt(K/T): six times the slowest mode that is placed (choice of ours)."""
 _KEEPING_TIMES = 120
 """Length of course keeping in 1/w; figures are those of its later half."""
+
+_WAVES_TOLD = 40
+"""Of course keeping, in the histories (ours)."""
 
 _BUSY_PERCENT = 10.0
 """Share of the time at full rate from which a gear is said to be overworked by waves (a choice of ours)."""
@@ -88,6 +94,8 @@ class AutopilotStudy:
     design : HeadingDesign
     margins : tuple of LoopMargins
         At the speed of the design, then at others, all with the gains of the design.
+    responses : tuple of LoopResponse
+        At the speed of the design, and at the slowest and the fastest of `margins`.
     steps : LargestSteps
         At the speed of the design.
     weather : Weather
@@ -104,6 +112,7 @@ class AutopilotStudy:
 
     design: HeadingDesign
     margins: tuple[LoopMargins, ...]
+    responses: tuple[LoopResponse, ...]
     steps: LargestSteps
     weather: Weather
     runs: Mapping[str, Trajectory]
@@ -129,8 +138,10 @@ class AutopilotStudy:
         return _in_degrees(found)
 
     def as_json(self) -> dict[str, object]:
-        """The result as JSON has it."""
-        first = self.margins[0]
+        """The result as JSON has it; responses and histories are thinned to draw."""
+        first, found = self.margins[0], self.design.found
+        alone = {"speed_mps": found.speed_mps, "stable": found.stable, "rudder_deg": found.rudder_deg}
+        alone |= {"K_per_s": found.nomoto.K_per_s, "T_s": found.nomoto.T_s}
         return {
             "ship": self.design.found.name,
             "design": self.design.kind,
@@ -148,8 +159,18 @@ class AutopilotStudy:
             },
             "weather": _in_degrees(asdict(self.weather)),
             "track": {name: asdict(one.figures) for name, one in self.tracks.items()},
+            "ship_alone": alone,
+            "responses": [one.as_json() for one in self.responses],
+            "histories": self._histories(),
+            "track_histories": {name: one.as_json() for name, one in self.tracks.items()},
+            "waypoints_m": [] if self.waypoints is None else self.waypoints.tolist(),
             "notices": list(self.notices),
         }
+
+    def _histories(self) -> dict[str, dict[str, list[float]]]:
+        """Of the runs by name; of course keeping the last waves, for more are a smear."""
+        last = self.runs["keeping"].t[-1] - _WAVES_TOLD * 2 * math.pi / self.weather.wave_radps
+        return {name: histories(run, last if name == "keeping" else 0.0) for name, run in self.runs.items()}
 
 
 def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings) -> AutopilotStudy:
@@ -185,13 +206,11 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     weathered: dict[str, float | Vector] = {**inputs, YAW_DISTURBANCE: waves, "heading.command": 0.0}
     runs["keeping"] = loop.run(weathered, steps * loop.model.step_s, parameters=start)
     kept = course_keeping(runs["keeping"], 0.0, runs["keeping"].t[-1] / 2)
-    tracks = {}
-    if settings.waypoints is not None:
-        for name, share in (("line of sight", 0.0), ("with integral", INTEGRAL_SHARE)):
-            tracks[name] = keep_track(loop, settings.waypoints, Guidance(integral_share=share), inputs)
+    tracks = _tracks(loop, settings.waypoints, inputs)
     return AutopilotStudy(
         design=design,
         margins=margins,
+        responses=_responses(ship, design, margins),
         steps=largest_steps(ship, design.autopilot, settings.speed_mps),
         weather=weather,
         runs=runs,
@@ -207,6 +226,14 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
             *_of_the_gear(ship, design, kept, weather),
         ),
     )
+
+
+def _tracks(loop: HeadingLoop, waypoints: Vector | None, inputs: Mapping[str, float]) -> dict[str, TrackRun]:
+    """Runs along waypoints by guidance without and with an integral; none without waypoints."""
+    if waypoints is None:
+        return {}
+    shares = {"line of sight": 0.0, "with integral": INTEGRAL_SHARE}
+    return {name: keep_track(loop, waypoints, Guidance(integral_share=share), inputs) for name, share in shares.items()}
 
 
 def _refuse_other_speed(card: ManoeuvringCard, speed: float | None) -> None:
@@ -254,6 +281,12 @@ def _margins(
         except InputError as error:  # the polynomial of a card may lose its rudder at an end of its range
             told.append(f"no margins at {other:.4g} m/s: {error.problem}")
     return tuple(found), told
+
+
+def _responses(ship: Model, design: HeadingDesign, margins: tuple[LoopMargins, ...]) -> tuple[LoopResponse, ...]:
+    first, speeds = margins[0], [one.speed_mps for one in margins]
+    shown = dict.fromkeys((first.speed_mps, min(speeds), max(speeds)))
+    return tuple(loop_response(ship, design.autopilot, speed, first.crossover_radps) for speed in shown)
 
 
 def _changes(

@@ -21,6 +21,7 @@ from tank2sim.analysis.heading.runs import HeadingLoop
 from tank2sim.dynamics.model import Vector
 from tank2sim.errors import InputError
 from tank2sim.records.csv_table import read_table
+from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.trajectory import Trajectory
 
 GUIDANCE_STEP_S = 1.0
@@ -85,6 +86,12 @@ class TrackRun:
     along_share: Vector
     error_m: Vector
     figures: TrackKeeping
+
+    def as_json(self) -> dict[str, list[float]]:
+        """Place and error over time, thinned to draw; the error positive to starboard of the track."""
+        run = self.trajectory
+        x_m, y_m = (np.interp(self.time_s, run.t, run[name]) for name in ("motion.x", "motion.y"))
+        return drawn_columns({"t_s": self.time_s, "x_m": x_m, "y_m": y_m, "cross_track_error_m": self.error_m})
 
 
 def read_waypoints(path: Path | str) -> Vector:

@@ -1,21 +1,22 @@
 """Influence coefficients of a ship's card: K % of every number on the card on any manoeuvring figure.
 
 By exact slopes, K = 10 c/F dF/dc, and by the 10 % difference of the paper
-(:mod:`tank2sim.analysis.influence.percent`), side by side; and what the standard errors of the card make of each
-figure.
+(:mod:`tank2sim.analysis.influence.percent`), side by side; and what the standard errors of the card, and
+their covariance where one stands beside it, make of each figure.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tank2sim.analysis.influence.errors import JointErrors, joint_errors
 from tank2sim.analysis.influence.figures import Figure
-from tank2sim.analysis.influence.parameters import CardParameter, agreed_by_name, standard_errors_in_words
+from tank2sim.analysis.influence.parameters import CardParameter, agreed_by_name
 from tank2sim.analysis.influence.percent import STEP_PERCENT, change_percent, changed_together, combined_percent
 from tank2sim.analysis.influence.study import Study
 from tank2sim.errors import InputError
@@ -40,7 +41,7 @@ class Agreed:
     direct: tuple[float, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Influence:
     """Influence coefficients of a card.
 
@@ -50,7 +51,8 @@ class Influence:
     figures : tuple of Figure
     values : array (nf,)
         Of the figures.
-    parameters : tuple of CardParameter
+    errors : JointErrors
+        Of the k parameters.
     slopes : array (nf, k)
         Exact slopes dF/dc.
     difference : array (nf, k)
@@ -62,11 +64,16 @@ class Influence:
     ship: str
     figures: tuple[Figure, ...]
     values: Array
-    parameters: tuple[CardParameter, ...]
+    errors: JointErrors
     slopes: Array
     difference: Array
     agreed: Agreed | None = None
     notices: tuple[str, ...] = field(default=())
+
+    @property
+    def parameters(self) -> tuple[CardParameter, ...]:
+        """The parameters (k)."""
+        return self.errors.parameters
 
     @property
     def exact(self) -> Array:
@@ -78,21 +85,36 @@ class Influence:
 
     @property
     def standard_errors(self) -> Array:
-        """Standard error of each figure (nf,), by the delta method with independent parameters."""
-        found: Array = np.linalg.norm(self._parts, axis=1)
-        return found
+        """Standard error of each figure (nf,), by the delta method: the root of J C J^T."""
+        return np.sqrt(self._variances)
 
     @property
     def shares(self) -> Array:
-        """Share (nf, k) of each parameter in the variance of each figure; 0 where that is zero."""
-        variance = self.standard_errors[:, None] ** 2
-        return np.divide(self._parts**2, variance, out=np.zeros_like(self._parts), where=variance > 0)
+        """Share (nf, k) of the variance of each figure that would go if a parameter were known exactly; 0 where that is
+        zero.
+
+        (J C e_k)^2 / (C_kk J C J^T), the squared correlation of figure and parameter: the first-order index of Sobol
+        (1993) of normal errors. Of independent ones it is (J_k s_k)^2 over their sum, and all shares make one; of
+        those that go together each has what it shares with the others, too.
+        """
+        C = self.errors.covariance
+        size = self._variances[:, None] * np.diag(C)
+        return np.divide((self.slopes @ C) ** 2, size, out=np.zeros_like(size), where=size > 0)
 
     @property
-    def _parts(self) -> Array:
-        errors = np.array([one.standard_error for one in self.parameters])
-        found: Array = self.slopes * errors
-        return found
+    def of_errors(self) -> str:
+        """Which standard errors those of the figures are from."""
+        if not self.errors.together:
+            return "standard errors of figures are from those of the card's numbers, as if these were independent"
+        others = "" if len(self.errors.together) == len(self.parameters) else ", others as if independent"
+        count = len(self.errors.together)
+        return f"standard errors of figures are from the covariance beside the card ({count} numbers{others})"
+
+    @property
+    def _variances(self) -> Array:
+        found = np.einsum("ij,jk,ik->i", self.slopes, self.errors.covariance, self.slopes)
+        # Numbers that go together may leave less than rounding of what each would make of the figure alone.
+        return np.asarray(np.maximum(found, 0.0))
 
     def as_json(self) -> dict[str, object]:
         """``influence_percent``: {figure: {parameter: {exact, difference}}}; ``figures`` with standard errors.
@@ -104,6 +126,7 @@ class Influence:
         rows = range(len(self.figures))
         result: dict[str, object] = {
             "ship": self.ship,
+            "standard_errors": self.of_errors,
             "figures": {
                 self.figures[row].text: {
                     "value": float(self.values[row]),
@@ -117,6 +140,7 @@ class Influence:
                     "value": one.value * one.factor,
                     "standard_error": one.standard_error * abs(one.factor),
                     "assumed": one.assumed,
+                    "name": one.short,
                 }
                 for one in self.parameters
             },
@@ -160,15 +184,13 @@ def influence(study: Study, agreed: Mapping[str, float] | None = None) -> Influe
     """
     values, slopes = study.slopes_at(study.values)
     difference = _differences(study)
-    whole = Influence(study.card.ship.name, study.figures, study.base, study.parameters, slopes, difference)
+    errors = joint_errors(study.card, study.parameters)
+    whole = Influence(study.card.ship.name, study.figures, study.base, errors, slopes, difference)
     together = None
     if agreed:
         together = _agreed(study, whole, agreed_by_name(agreed, study.parameters))
-    told = [*study.notices, *standard_errors_in_words(study.parameters), *_not_smooth(whole)]
-    told += _differing(study, values)
-    return Influence(
-        whole.ship, whole.figures, whole.values, whole.parameters, slopes, difference, together, tuple(told)
-    )
+    told = [*study.notices, *errors.in_words, *_not_smooth(whole), *_differing(study, values)]
+    return replace(whole, agreed=together, notices=tuple(told))
 
 
 def _differences(study: Study) -> Array:

@@ -7,7 +7,7 @@ effects. Particulars (length, speed of expansion, density) only scale them, and 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, ManoeuvringCard
@@ -166,10 +166,11 @@ def _effects(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
     return found
 
 
-def standard_errors_in_words(parameters: Sequence[CardParameter]) -> list[str]:
-    """What a user should be told of the standard errors that are taken."""
-    assumed = [one.short for one in parameters if one.assumed and one.standard_error > 0]
-    exact = [one.short for one in parameters if one.standard_error == 0]
+def standard_errors_in_words(parameters: Sequence[CardParameter], known: Collection[str] = frozenset()) -> list[str]:
+    """What a user should be told of the standard errors that are taken; those of the keys `known` stand elsewhere."""
+    others = [one for one in parameters if one.key not in known]
+    assumed = [one.short for one in others if one.assumed and one.standard_error > 0]
+    exact = [one.short for one in others if one.standard_error == 0]
     told = []
     if assumed:
         which = "any number" if len(assumed) + len(exact) == len(parameters) else ", ".join(assumed)

@@ -1,6 +1,7 @@
 """What a bridge wants to know of a ship (IMO A.601(15)): circles, stops, speeds by revolutions, zigzags, from her card.
 
-Only what the card tells is here; what it does not tell is None, and stays a blank on the pilot card and the poster.
+Only what the card tells is here; what it does not tell is None, and stays a blank on the pilot card and the poster. So
+does a figure whose manoeuvre had left what the card holds for: it is marked here, and no bridge document prints it.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tank2sim.analysis.linearisation import straight_course
-from tank2sim.analysis.practice.standard_trials import Numbers, Ship, numbers, ship_of
+from tank2sim.analysis.practice.card_range import Reading, reading
+from tank2sim.analysis.practice.ship_track import Mark, ShipTrack, circle_track, stop_track
+from tank2sim.analysis.practice.standard_trials import Ship, ship_of
+from tank2sim.analysis.stability.imo import TRIAL_RUDDER
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.model import Vector
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import COASTING_END, FULL_ASTERN, Stop, Turn, Zigzag
-from tank2sim.simulation.trajectory import Trajectory
+from tank2sim.simulation.run import Run
 
 SHALLOW = 1.2
 """Depth over draught in shallow water (A.601(15), appendix 2)."""
@@ -29,38 +32,16 @@ DEEP = 20.0
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 """Revolutions over nominal ones at which speeds are told where no telegraph orders are given: a choice of ours."""
 
+ORDERS_AHEAD = ("Full sea speed", "Full ahead", "Half ahead", "Slow ahead", "Dead slow ahead")
+"""Orders ahead of the wheelhouse poster's form (A.601(15), appendix 2)."""
+
+LARGEST_SHARE = 2.0
+"""Revolutions of an order over the nominal ones beyond which it is a slip: engines trip far below. A choice of ours."""
+
+LARGEST_RPM = 10_000.0
+"""The same where the card tells no nominal revolutions: propellers of the smallest models turn slower."""
+
 _RADIANS_PER_S = 2 * math.pi / 60
-
-
-@dataclass(frozen=True)
-class Mark:
-    """A point of a track: time, heading change (deg, to the side of the turn), place (m), speed."""
-
-    time_s: float
-    heading_deg: float
-    ahead_m: float
-    starboard_m: float
-    speed_mps: float
-
-
-@dataclass(frozen=True, eq=False)
-class ShipTrack:
-    """A track from the order on, in axes of the first course: ahead and to starboard, m.
-
-    Parameters
-    ----------
-    name : str
-    ahead_m, starboard_m : array (n,)
-    marks : tuple of Mark
-        At each quarter of a turn (turns), or at equal times (stops).
-    figures : mapping
-    """
-
-    name: str
-    ahead_m: Vector
-    starboard_m: Vector
-    marks: tuple[Mark, ...]
-    figures: Numbers
 
 
 @dataclass(frozen=True)
@@ -78,12 +59,16 @@ class Telegraph:
 
 @dataclass(frozen=True)
 class StopFrom:
-    """Full astern from the speed of an order: track reach and time; None where the run did not show them."""
+    """Full astern from the speed of an order: track reach and time; None where the run did not show them.
+
+    `within` is False where the run left the card's range before the ship was at rest.
+    """
 
     order: str
     speed_mps: float
     track_reach_m: float | None
     time_s: float | None
+    within: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,15 +79,15 @@ class Bridge:
     ----------
     card : ManoeuvringCard
     rudder_deg : float
-        Of the turning circles.
+        Of the turning circles: the largest that the gear allows (A.601(15)), or 35 deg where the card tells no largest.
     deep, shallow : tuple of ShipTrack
         Circles to starboard and port; `shallow` at :data:`SHALLOW` times the draught, empty without the effect.
     stops : tuple of ShipTrack
         Full astern, and the engine stopped; empty without propulsion.
     zigzags : mapping
-        Name to figures.
+        Name to figures; what could not be run has none.
     telegraph : tuple of Telegraph
-        Empty without propulsion.
+        Empty without propulsion, unless orders were given.
     stops_from : tuple of StopFrom
         Full astern from each speed of the telegraph.
     hard_over_s : float or None
@@ -117,7 +102,7 @@ class Bridge:
     deep: tuple[ShipTrack, ...]
     shallow: tuple[ShipTrack, ...]
     stops: tuple[ShipTrack, ...]
-    zigzags: Mapping[str, Numbers]
+    zigzags: Mapping[str, Reading]
     telegraph: tuple[Telegraph, ...]
     stops_from: tuple[StopFrom, ...]
     hard_over_s: float | None
@@ -130,10 +115,10 @@ class Bridge:
             "ship": self.card.ship.name,
             "source": self.card.ship.source,
             "rudder_deg": self.rudder_deg,
-            "turning_circles_deep": [_path_json(one) for one in self.deep],
-            "turning_circles_shallow": [_path_json(one) for one in self.shallow],
-            "stops": [_path_json(one) for one in self.stops],
-            "zigzags": dict(self.zigzags),
+            "turning_circles_deep": [one.as_json() for one in self.deep],
+            "turning_circles_shallow": [one.as_json() for one in self.shallow],
+            "stops": [one.as_json() for one in self.stops],
+            "zigzags": {name: one.as_json() for name, one in self.zigzags.items()},
             "telegraph": [vars(one) for one in self.telegraph],
             "full_astern_from": [vars(one) for one in self.stops_from],
             "hard_over_to_hard_over_s": self.hard_over_s,
@@ -150,20 +135,17 @@ def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) 
     card : ManoeuvringCard
     orders : mapping, optional
         Order of the telegraph to its revolutions, rpm; by default some shares of the nominal ones, without names.
+
+    Raises
+    ------
+    InputError
+        The revolutions of an order are beyond :data:`LARGEST_SHARE` of the nominal ones.
     """
+    _check_orders(card, orders or {})
     ship = ship_of(card)
-    told: list[str] = []
     depths = _depths(ship)
-    sides = (("starboard", 1.0), ("port", -1.0))
-    circles: dict[str, list[ShipTrack]] = {}
-    for where, inputs in depths.items():
-        for side, sign in sides:
-            run = ship.run(Turn(sign * ship.largest_rudder), inputs=inputs)
-            if isinstance(run, str):
-                told.append(f"turn to {side}, {where} water: {run}")
-                continue
-            told += [f"turn to {side}, {where} water: {one}" for one in run.notices if "outside the card" in one]
-            circles.setdefault(where, []).append(_circle(side, sign, run.trajectory, numbers(run.figures)))
+    rudder = _rudder(card)
+    circles, told = _circles(ship, rudder, depths)
     deep = depths["deep"]
     stops, troubles = _stops(ship, deep)
     telegraph = _telegraph(ship, orders)
@@ -171,7 +153,7 @@ def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) 
     largest, rate = (gear.max_angle_rad, gear.max_rate_radps) if gear else (None, None)
     return Bridge(
         card=card,
-        rudder_deg=math.degrees(ship.largest_rudder),
+        rudder_deg=math.degrees(rudder),
         deep=tuple(circles.get("deep", ())),
         shallow=tuple(circles.get("shallow", ())),
         stops=stops,
@@ -182,6 +164,22 @@ def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) 
         neutral_deg=_neutral(ship),
         notices=tuple(dict.fromkeys((*told, *troubles))),
     )
+
+
+def _check_orders(card: ManoeuvringCard, orders: Mapping[str, float]) -> None:
+    engine = card.propulsion
+    largest = LARGEST_SHARE * engine.nominal_radps / _RADIANS_PER_S if engine else LARGEST_RPM
+    for order, rpm in orders.items():
+        if rpm > largest:
+            nominal = f" (the card's nominal ones are {largest / LARGEST_SHARE:.4g})" if engine else ""
+            problem = f"is beyond {largest:,.0f} revolutions a minute{nominal}"
+            raise InputError("--order", f"{order}={rpm:g}", problem, "give the propeller's revolutions, rpm")
+
+
+def _rudder(card: ManoeuvringCard) -> float:
+    """Rudder of the turning circles, rad."""
+    gear = card.steering_gear
+    return gear.max_angle_rad if gear and gear.max_angle_rad else TRIAL_RUDDER
 
 
 def steady_speed(ship: Ship, revolutions_radps: float) -> float | None:
@@ -212,7 +210,7 @@ def steady_speed(ship: Ship, revolutions_radps: float) -> float | None:
 
 def _telegraph(ship: Ship, orders: Mapping[str, float] | None) -> tuple[Telegraph, ...]:
     if ship.card.propulsion is None:
-        return ()
+        return tuple(Telegraph(order, rpm, None) for order, rpm in (orders or {}).items())
     nominal = ship.card.propulsion.nominal_radps / _RADIANS_PER_S
     asked = list(orders.items()) if orders else [("", share * nominal) for share in SHARES]
     slowest, fastest = ship.card.model.speed_range_mps
@@ -231,17 +229,35 @@ def _depths(ship: Ship) -> dict[str, dict[str, float]]:
     return {"deep": {"water.depth": DEEP * draught}, "shallow": {"water.depth": SHALLOW * draught}}
 
 
-def _circle(side: str, sign: float, run: Trajectory, figures: Numbers) -> ShipTrack:
-    ahead, starboard = _in_first_axes(run)
-    change = sign * np.degrees(run["motion.psi"] - run["motion.psi"][0])
-    end = _first_over(change, 360.0)
-    marks = [
-        _mark(run, change, row)
-        for quarter in (90.0, 180.0, 270.0, 360.0)
-        if (row := _first_over(change, quarter)) < len(change)
-    ]
-    end = min(end + 1, len(change))
-    return ShipTrack(side, ahead[:end], starboard[:end], tuple(marks), figures)
+def _circles(
+    ship: Ship, rudder: float, depths: Mapping[str, Mapping[str, float]]
+) -> tuple[dict[str, list[ShipTrack]], list[str]]:
+    """Circles by depth, to starboard and port, and what is to be told of them."""
+    found: dict[str, list[ShipTrack]] = {}
+    told = []
+    if rudder > TRIAL_RUDDER * (1 + 1e-9):
+        shown = f"{math.degrees(rudder):.3g} deg, the largest of the gear"
+        told.append(f"turning circles with {shown}: the card does not say how far its rudder was tested")
+    for where, inputs in depths.items():
+        for side, sign in (("starboard", 1.0), ("port", -1.0)):
+            name = f"turn to {side}, {where} water"
+            run = ship.run(Turn(sign * rudder), inputs=inputs)
+            if isinstance(run, str):
+                told.append(f"{name}: {run}")
+                continue
+            track = circle_track(side, run)
+            found.setdefault(where, []).append(track)
+            told += _left(name, track.left)
+    return found, told
+
+
+def _left(name: str, left: Mark | None) -> list[str]:
+    """Where a run leaves the card's range, in words."""
+    if left is None:
+        return []
+    turned = f" and {left.heading_change_deg:.0f}° of heading" if abs(left.heading_change_deg) >= 1 else ""
+    place = f"after {left.time_s:.0f} s{turned}, at {left.speed_mps:.3g} m/s"
+    return [f"{name}: leaves the card's range {place}: what follows is not told"]
 
 
 def _stops(ship: Ship, inputs: Mapping[str, float]) -> tuple[tuple[ShipTrack, ...], list[str]]:
@@ -257,11 +273,9 @@ def _stops(ship: Ship, inputs: Mapping[str, float]) -> tuple[tuple[ShipTrack, ..
             told.append(f"{name}: {run}")
             continue
         told += [f"{name}: {one}" for one in run.notices if "not show" in one]
-        ahead, starboard = _in_first_axes(run.trajectory)
-        change = np.degrees(run.trajectory["motion.psi"] - run.trajectory["motion.psi"][0])
-        rows = np.unique(np.linspace(0, len(change) - 1, 7).astype(int))[1:]
-        marks = tuple(_mark(run.trajectory, change, int(row)) for row in rows)
-        found.append(ShipTrack(name, ahead, starboard, marks, numbers(run.figures)))
+        track = stop_track(name, run)
+        found.append(track)
+        told += _left(name, track.left)
     return tuple(found), told
 
 
@@ -271,10 +285,15 @@ def _stops_from(ship: Ship, telegraph: Sequence[Telegraph], inputs: Mapping[str,
         if one.speed_mps is None or not one.within:
             continue
         run = ship.run(Stop(), {"initial.u": one.speed_mps}, inputs)
-        figures = {} if isinstance(run, str) else numbers(run.figures)
+        read = _read(run)
+        reach, time = (read.figures.get(name) for name in ("track_reach_m", "time_to_stop_s"))
         order = one.order or f"{one.rpm:.4g} rpm"
-        found.append(StopFrom(order, one.speed_mps, figures.get("track_reach_m"), figures.get("time_to_stop_s")))
+        found.append(StopFrom(order, one.speed_mps, reach, time, not read.outside("track_reach_m")))
     return tuple(found)
+
+
+def _read(run: Run | str) -> Reading:
+    return Reading({}, {}) if isinstance(run, str) else reading(run)
 
 
 def _neutral(ship: Ship) -> float | None:
@@ -287,44 +306,10 @@ def _neutral(ship: Ship) -> float | None:
     return angle if abs(angle) > 1e-6 else None
 
 
-def _zigzags(ship: Ship, inputs: Mapping[str, float]) -> dict[str, Numbers]:
+def _zigzags(ship: Ship, inputs: Mapping[str, float]) -> dict[str, Reading]:
     found = {}
     for angle in (10.0, 20.0):
         for name, sign in (("starboard", 1.0), ("port", -1.0)):
             run = ship.run(Zigzag(sign * math.radians(angle), math.radians(angle)), inputs=inputs)
-            found[f"{angle:g}/{angle:g} first to {name}"] = {} if isinstance(run, str) else numbers(run.figures)
+            found[f"{angle:g}/{angle:g} first to {name}"] = _read(run)
     return found
-
-
-def _in_first_axes(run: Trajectory) -> tuple[Vector, Vector]:
-    north, east = run["motion.x"] - run["motion.x"][0], run["motion.y"] - run["motion.y"][0]
-    cos, sin = math.cos(run["motion.psi"][0]), math.sin(run["motion.psi"][0])
-    return north * cos + east * sin, east * cos - north * sin
-
-
-def _first_over(values: Vector, level: float) -> int:
-    over = np.flatnonzero(values >= level)
-    return int(over[0]) if len(over) else len(values)
-
-
-def _mark(run: Trajectory, change: Vector, row: int) -> Mark:
-    ahead, starboard = _in_first_axes(run)
-    return Mark(
-        float(run.t[row]), float(change[row]), float(ahead[row]), float(starboard[row]), float(run["motion.speed"][row])
-    )
-
-
-def _path_json(path: ShipTrack) -> dict[str, object]:
-    every = max(1, len(path.ahead_m) // 200)
-    return {
-        "name": path.name,
-        "figures": dict(path.figures),
-        "marks": [vars(one) for one in path.marks],
-        "ahead_m": path.ahead_m[::every],
-        "starboard_m": path.starboard_m[::every],
-    }
-
-
-def quarter(path: ShipTrack, heading_deg: float) -> Mark | None:
-    """The mark at a change of heading; None if the turn does not reach it."""
-    return next((one for one in path.marks if one.heading_deg >= heading_deg), None)

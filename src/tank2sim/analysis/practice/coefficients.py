@@ -21,9 +21,11 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from tank2sim.analysis.influence.parameters import card_parameters
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.terms import Term, known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS, TERMS, polynomial
+from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertial_forces
 
 SAME_SPEED = 1e-3
@@ -49,6 +51,11 @@ class Coefficient:
     stated: bool = False
 
 
+SAME = "the reference's own number"
+"""Why a number that is the reference's to the last digit has no difference: one of the cards took it over, or both from
+a third. Their errors are one and the same, and 0 standard errors would pass for the agreement of two."""
+
+
 @dataclass(frozen=True)
 class Difference:
     """A card less the reference: in standard errors, in per cent of the reference, or why there is none."""
@@ -65,6 +72,14 @@ class CoefficientRow:
     name: str
     cards: tuple[Coefficient, ...]
     differences: tuple[Difference, ...]
+
+    def as_json(self) -> dict[str, object]:
+        """As JSON has it."""
+        return {
+            "name": self.name,
+            "cards": [vars(one) for one in self.cards],
+            "differences": [vars(one) for one in self.differences],
+        }
 
 
 @dataclass(frozen=True)
@@ -108,12 +123,46 @@ def _difference(first: Coefficient, other: Coefficient) -> Difference:
         return Difference(why="not in the reference's model" if first.value is None else "not in this model")
     apart = other.value - first.value
     percent = 100 * apart / abs(first.value) if first.value else None
+    if first.standard_error and other.standard_error and _same(first.value, other.value):
+        return Difference(None, percent, SAME)
     if first.standard_error is None or other.standard_error is None:
         return Difference(None, percent, "" if apart == 0 else "no standard error")
     both = math.hypot(first.standard_error, other.standard_error)
     if both == 0:
         return Difference(0.0 if apart == 0 else None, percent, "" if apart == 0 else "both are stated as certain")
     return Difference(apart / both, percent)
+
+
+def compare_effects(cards: Sequence[ManoeuvringCard], models: Sequence[Model]) -> tuple[CoefficientRow, ...]:
+    """All parameters of effects that any card has, in SI, as their models have them; `models` are those of the cards.
+
+    What has a unit (a wind speed, a time) is compared between ships of one size alone.
+    """
+    found = [_of_effects(card, model) for card, model in zip(cards, models, strict=True)]
+    rows = []
+    for name in dict.fromkeys(name for own in found for name in own):
+        row = tuple(own.get(name, Coefficient(None)) for own in found)
+        differences = []
+        for card, model, one in zip(cards[1:], models[1:], row[1:], strict=True):
+            of_size = name in model and model[name].unit not in ("1", "rad")
+            other_size = not math.isclose(card.ship.length_m, cards[0].ship.length_m, rel_tol=1e-6)
+            refused = of_size and other_size
+            differences.append(Difference(why="of a ship of another size") if refused else _difference(row[0], one))
+        rows.append(CoefficientRow(name, row, tuple(differences)))
+    return tuple(rows)
+
+
+def _of_effects(card: ManoeuvringCard, model: Model) -> dict[str, Coefficient]:
+    return {
+        one.name: Coefficient(one.value, one.standard_error, not one.assumed)
+        for one in card_parameters(card, model)
+        if one.key.startswith("effects.")
+    }
+
+
+def _same(one: float, other: float) -> bool:
+    """One number but for rounding, as it is left by a change of convention."""
+    return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-15)
 
 
 def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:

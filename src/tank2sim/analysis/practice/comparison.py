@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tank2sim.analysis.practice.coefficients import BEYOND, CoefficientRow, compare_coefficients
+from tank2sim.analysis.practice.coefficients import BEYOND, SAME, CoefficientRow, compare_coefficients, compare_effects
 from tank2sim.analysis.practice.standard_trials import (
     MEMBERS,
     Numbers,
@@ -25,6 +25,9 @@ from tank2sim.dynamics.model import Vector
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Manoeuvre
 from tank2sim.simulation.trajectory import Trajectory
+
+SAME_SIZE = 0.03
+"""Lengths and breadths that differ by less than this share are those of one ship: not all count them alike. Ours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +86,8 @@ class CardComparison:
     ----------
     labels, ships, sources : tuple of str
         What each card is called here, its ship, and where its numbers come from.
-    coefficients : tuple
+    coefficients, effects : tuple of CoefficientRow
+        Coefficients in the reference's convention, and parameters of the effects, SI.
     trials : tuple
     members : int
         Size of the ensembles behind the deviations of the figures.
@@ -94,14 +98,24 @@ class CardComparison:
     ships: tuple[str, ...]
     sources: tuple[str, ...]
     coefficients: tuple[CoefficientRow, ...]
+    effects: tuple[CoefficientRow, ...]
     trials: tuple[TrialComparison, ...]
     members: int
     notices: tuple[str, ...] = field(default=())
 
+    @property
+    def rows(self) -> tuple[CoefficientRow, ...]:
+        """Coefficients and parameters of effects."""
+        return (*self.coefficients, *self.effects)
+
     def in_errors(self, place: int) -> tuple[float, ...]:
-        """All coefficients' differences of a card (1 is the first after the reference) in standard errors."""
-        found = [row.differences[place - 1].standard_errors for row in self.coefficients]
+        """All differences of a card (1 is the first after the reference) in standard errors, but for :data:`.SAME`."""
+        found = [row.differences[place - 1].standard_errors for row in self.rows]
         return tuple(one for one in found if one is not None)
+
+    def same(self, place: int) -> int:
+        """How many numbers of a card are the reference's own."""
+        return sum(row.differences[place - 1].why == SAME for row in self.rows)
 
     def beyond(self, place: int) -> int:
         """How many coefficients differ by more than :data:`.BEYOND` standard errors."""
@@ -125,19 +139,14 @@ class CardComparison:
                 {
                     "card": self.labels[place],
                     "compared": len(self.in_errors(place)),
+                    "same_number": self.same(place),
                     "beyond_two_standard_errors": self.beyond(place),
                     "rms_standard_errors": self.rms(place),
                 }
                 for place in others
             ],
-            "coefficients": [
-                {
-                    "name": row.name,
-                    "cards": [vars(one) for one in row.cards],
-                    "differences": [vars(one) for one in row.differences],
-                }
-                for row in self.coefficients
-            ],
+            "coefficients": [row.as_json() for row in self.coefficients],
+            "effects": [row.as_json() for row in self.effects],
             "trials": [self._trial_json(trial) for trial in self.trials],
             "members": self.members,
             "notices": list(self.notices),
@@ -199,7 +208,8 @@ def compare_cards(cards: Sequence[ManoeuvringCard], count: int = MEMBERS) -> Car
     names = tuple(card.ship.name for card in cards)
     sources = tuple(card.ship.source for card in cards)
     unique = tuple(dict.fromkeys(notices))
-    return CardComparison(labels, names, sources, rows, tuple(trials), count, unique)
+    effects = compare_effects(cards, [ship.model for ship in ships])
+    return CardComparison(labels, names, sources, rows, effects, tuple(trials), count, unique)
 
 
 def labels_of(cards: Sequence[ManoeuvringCard]) -> tuple[str, ...]:
@@ -207,9 +217,21 @@ def labels_of(cards: Sequence[ManoeuvringCard]) -> tuple[str, ...]:
     stems = []
     for card in cards:
         path = Path(card.source)
-        stems.append(path.parent.name if path.name == "ship.toml" else path.stem)
+        stems.append(path.resolve().parent.name or path.stem if path.name == "ship.toml" else path.stem)
     doubled = {stem for stem in stems if stems.count(stem) > 1}
     return tuple(f"{stem} ({place + 1})" if stem in doubled else stem for place, stem in enumerate(stems))
+
+
+def differences_of_size(one: ManoeuvringCard, other: ManoeuvringCard, scale: float = 1.0) -> list[str]:
+    """Length and breadth of two ships that differ by :data:`SAME_SIZE` or more, in words; `scale` is that of `one`."""
+    found = []
+    for what, own, others in (
+        ("length", one.ship.length_m, other.ship.length_m),
+        ("breadth", one.ship.beam_m, other.ship.beam_m),
+    ):
+        if own is not None and others is not None and not math.isclose(own * scale, others, rel_tol=SAME_SIZE):
+            found.append(f"{what} {others:.4g} m, and not {own * scale:.4g} m")
+    return found
 
 
 def scaled_number(name: str, value: float, length_ratio: float) -> float:
@@ -272,10 +294,15 @@ def _notices(cards: Sequence[ManoeuvringCard], labels: Sequence[str]) -> list[st
     told = []
     reference = cards[0]
     for card, label in zip(cards, labels, strict=True):
+        ratio = reference.ship.length_m / card.ship.length_m
+        if apart := differences_of_size(reference, card, 1 / ratio):
+            form = "; ".join(apart)
+            told.append(f"{label}: is of another form than {labels[0]} (at its size {form}): two ships are compared")
+        elif not math.isclose(ratio, 1.0, rel_tol=SAME_SIZE):
+            told.append(f"{label}: is of another size than {labels[0]}: ships or models of one form are compared")
         assumed = sum(1 for name, value in card.derivatives.items() if value and name not in card.uncertainty)
         if assumed:
             told.append(f"{label}: {assumed} derivatives state no standard error: 2 % of their value is taken")
-        ratio = reference.ship.length_m / card.ship.length_m
         if not math.isclose(ratio, 1.0, rel_tol=1e-6):
             told.append(f"{label}: figures and tracks scaled by Froude's law to a ship {ratio:.4g} times as long")
         speed = _approach(reference, card)

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tank2sim.analysis.ensemble.draws import draws_of
+from tank2sim.analysis.ensemble.draws import draws_with
+from tank2sim.analysis.influence.errors import joint_errors
+from tank2sim.analysis.influence.parameters import card_parameters, study_model
 from tank2sim.analysis.stability.imo import TRIAL_RUDDER
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.cards.covariance import read_covariance
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.simulation.ensemble import Redrawn
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
@@ -120,10 +122,11 @@ def numbers(figures: Figures) -> Numbers:
 def members(
     card: ManoeuvringCard, model: Model, count: int, seed: int = SEED
 ) -> tuple[tuple[dict[str, float], ...], tuple[str, ...]]:
-    """Derivatives of `count` ships such as the card may mean, drawn within its errors; and what is to be told of them.
+    """Parameters of `count` ships such as the card may mean, drawn within its errors; and what is to be told of them.
 
-    Errors are normal, and go together as the covariance beside the card says; without one they are independent. Each
-    member has a random number generator of its own, so that it does not depend on how many there are.
+    Errors of all numbers are normal, and go together as the covariance beside the card says; without one they are
+    independent. Each member has a random number generator of its own, so that it does not depend on how many there are.
+    What is no parameter of the `model` but an input (a current) is calm in the trials, and not drawn.
 
     Raises
     ------
@@ -132,15 +135,17 @@ def members(
     """
     if not count:
         return (), ()
-    draws, _ = draws_of(card, seed)
-    own = [name for name in draws.names if name.startswith("derivatives.") and name in model]
-    drawn = tuple({name: member[name] for name in own} for member in map(draws.member, range(count)))
-    if read_covariance(card) is not None:
-        return drawn, (f"errors of {len(own)} derivatives go together as the covariance beside the card says",)
+    errors = joint_errors(card, card_parameters(card, study_model(card)))
+    draws, known = draws_with(errors, seed), set(model.parameter_names)
+    found = [draws.drawn(number) for number in range(count)]
+    told = Redrawn.of([one.beyond for one in found]).in_words(count)
+    drawn = tuple({name: value for name, value in one.values.items() if name in known} for one in found)
+    if errors.together:
+        return drawn, (errors.together_in_words, *told)
     alone = (
         "no covariance stands beside the card: errors are taken as independent, and deviations of figures may be too"
     )
-    return drawn, (f"{alone} large where errors go together",)
+    return drawn, (f"{alone} large where errors go together", *told)
 
 
 def spread(runs: Sequence[Mapping[str, float]]) -> Numbers:

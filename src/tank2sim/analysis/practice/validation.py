@@ -11,7 +11,7 @@ likewise U_V); Stern, Wilson, Coleman and Paterson (2001), J. Fluids Engineering
 - u_num: the simulation is repeated with half the step. U_num = 3 |S(h) - S(h/2)|, the grid convergence index of two
   grids with its factor of safety of 3 (Roache 1998), taken of the first order, which limits and switches of the rudder
   leave of Runge-Kutta's fourth. u_num is half of it.
-- u_input: deviation of an ensemble with the card's errors of the derivatives, and their covariance if it has one.
+- u_input: deviation of an ensemble with the errors of all numbers on the card, and their covariance if it has one.
 - u_D: the trial's figures are read off again with the noise of its signals added once more, and, where a manoeuvre was
   run several times, the deviation between its runs; times are known to a sample (over sqrt 12). Weather, and what all
   runs have in common, it does not know.
@@ -20,6 +20,7 @@ likewise U_V); Stern, Wilson, Coleman and Paterson (2001), J. Fluids Engineering
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -62,12 +63,16 @@ TURN_FIGURES = ("advance_m", "transfer_m", "tactical_diameter_m", "time_90_s", "
 ZIGZAG_FIGURES = ("overshoot_1_deg", "overshoot_2_deg", "initial_turning_time_s", "reach_s")
 """Figures of IMO MSC.137(76) and ITTC 7.5-04-02-01 that are compared; later ones repeat their errors."""
 
+_IDENTIFIED = r"identified by tank2sim \([^)]*\) from ([^;:]*)"
+"""What ``identify`` writes into the source of its card."""
+
 
 class Outcome(StrEnum):
     """What a comparison of a figure ends with."""
 
     VALIDATED = "validated"
     UNCERTAIN = "too uncertain"
+    FITTED = "only fitted"
     REFUTED = "not validated"
     OPEN = "open"
 
@@ -90,6 +95,8 @@ class Validated:
         u_input, standard; None where the ensemble does not tell it.
     required_percent : float
         U_reqd in per cent of D.
+    made_card : bool
+        True if the trial is one of those that the card was identified from.
     """
 
     trial: str
@@ -101,6 +108,7 @@ class Validated:
     inputs: float | None = 0.0
     data: float = 0.0
     required_percent: float = REQUIRED
+    made_card: bool = False
 
     @property
     def error(self) -> float | None:
@@ -123,13 +131,18 @@ class Validated:
 
     @property
     def outcome(self) -> Outcome:
-        """Open where U_val is not known; a figure that the simulation does not reach is not validated."""
+        """Open where U_val is not known; a figure that the simulation does not reach is not validated.
+
+        One of a trial that made the card cannot be validated by it: at best it is fitted.
+        """
         if self.error is None:
             return Outcome.REFUTED
         if self.uncertainty is None:
             return Outcome.OPEN
         if abs(self.error) > self.uncertainty:
             return Outcome.REFUTED
+        if self.made_card:
+            return Outcome.FITTED
         loose = self.uncertainty > self.required_percent / 100 * abs(self.measured)
         return Outcome.UNCERTAIN if loose else Outcome.VALIDATED
 
@@ -217,13 +230,27 @@ def validate(
     figures: list[Validated] = []
     for what in whats:
         found, trouble = _validated(what, engines, drawn, between)
-        figures += [replace(one, required_percent=required_percent) for one in found]
+        own = made_card(card, what.trial.name)
+        figures += [replace(one, required_percent=required_percent, made_card=own) for one in found]
         told += trouble
+        if own:
+            told.append(f"{what.trial.name}: the card was identified from this trial: its figures are only fitted")
     if whats and not between:
         told.append("no manoeuvre was run twice alike: u_D is of the noise of the signals alone, and so a lower bound")
     if not count:
         told.append("no ensemble was run: u_input is left out, and U_val is a lower bound")
     return Validation(tuple(figures), count, tuple(told))
+
+
+def made_card(card: ManoeuvringCard, trial: str) -> bool:
+    """True if the source of a card tells that a trial, by the name of its file, was one of those that made it.
+
+    What ``identify`` writes is looked through for any name; the rest of the source for names with a digit or an
+    underscore, which are no words.
+    """
+    told = f"{card.ship.source}; {card.ship.notes or ''}"
+    looked = told if re.search(r"[\d_]", trial) else "; ".join(re.findall(_IDENTIFIED, told))
+    return re.search(rf"(?<![\w-]){re.escape(trial)}(?![\w-])", looked) is not None
 
 
 def verify(ship: Ship, count: int = MEMBERS) -> tuple[tuple[Verified, ...], tuple[str, ...]]:

@@ -32,7 +32,7 @@ _SCALE = (
     "model does not keep, and the card tells no scale: judge the overshoots of the ship she stands for"
 )
 
-_HOLDS = 1 - 1e-6
+HOLDS = 1 - 1e-6
 """``validity`` below this has left 1: above what rounding leaves."""
 
 _STILL = 0.05
@@ -61,6 +61,11 @@ class Criterion:
     def passed(self) -> bool | None:
         """True if met; None if the trial did not show it."""
         return None if self.found is None else self.found <= self.allowed
+
+    @property
+    def judged(self) -> bool | None:
+        """The verdict that may be trusted: None where the trial left what the card holds for, too."""
+        return None if self.beyond_card else self.passed
 
     @property
     def margin(self) -> float | None:
@@ -98,7 +103,7 @@ class _Trials:
 
     def _outside(self, run: Trajectory) -> str:
         """How a trial leaves what the card holds for (its ``validity``); empty if it does not."""
-        if "validity" not in self.model.outputs or not run["validity"].min() < _HOLDS:
+        if "validity" not in self.model.outputs or not run["validity"].min() < HOLDS:
             return ""
         values = dict(
             zip(self.model.parameter_names, self.model.parameter_values(self.parameters).tolist(), strict=True)

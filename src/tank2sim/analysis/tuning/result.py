@@ -94,8 +94,14 @@ class Tuned:
         """True if all wishes are met."""
         return not self.contradiction
 
-    def as_json(self) -> dict[str, object]:
-        """``tuned`` of the command: figures before and after, moves, and the contradiction if there is one."""
+    def as_json(self, figures: Mapping[str, float] | None = None) -> dict[str, object]:
+        """``tuned`` of the command: wishes before and after, moves, and the contradiction if there is one.
+
+        Parameters
+        ----------
+        figures : mapping, optional
+            All figures that were asked for, of the tuned card.
+        """
         pairs = zip(self.wishes, self.before, self.after, strict=True)
         return {
             "reached": self.reached,
@@ -103,6 +109,7 @@ class Tuned:
             "within_standard_errors": self.means.within,
             "wishes": {
                 wish.text: {"figure": wish.figure.text, "wanted": wish.value, "before": float(a), "after": float(b)}
+                | {"relation": wish.relation}
                 for wish, a, b in pairs
             },
             "parameters": {
@@ -115,4 +122,5 @@ class Tuned:
             },
             "agreed_times": self.agreed_times,
             "contradiction": [wish.text for wish in self.contradiction],
+            "figures": dict(figures or {}),
         }

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import casadi as ca
 
-from tank2sim.dynamics.kinematics import kinematics
-from tank2sim.dynamics.model import Model, Parameter, Quantity, State, Variable
+from tank2sim.dynamics.kinematics import kinematics, yaw_rate
+from tank2sim.dynamics.model import Model, Parameter, Quantity, State
 from tank2sim.dynamics.steering_gear import steering_gear
 from tank2sim.dynamics.steering_models.form import SteeringForm
 
@@ -49,9 +49,12 @@ def steering_model(
     wrong = [name for name, value in values.items() if value is None or name not in known]
     if wrong:
         raise ValueError(f"{form.name}: missing or unknown: {', '.join(wrong)}")
-    constants = (*_ship(length_m, speed_mps), *_coefficients(form, {k: float(v or 0.0) for k, v in values.items()}))
+    states, starts = zip(_drift(), yaw_rate(nominal_radps=0.01), strict=True)
+    own = _coefficients(form, {k: float(v or 0.0) for k, v in values.items()})
+    constants = (*_ship(length_m, speed_mps), *starts, *own)
     gear, notices = steering_gear(None, length_m / speed_mps)
-    motion = _motion(form, {variable.name: variable.symbol for variable in (*constants, *gear)})
+    given = (*states, *constants, *gear)
+    motion = (*states, *_quantities(form, {variable.name: variable.symbol for variable in given}))
     position = kinematics({variable.name: variable for variable in motion})
     empty = Model(
         name=name,
@@ -76,22 +79,6 @@ def _ship(length_m: float, speed_mps: float) -> tuple[Parameter, ...]:
         speed("ship.speed", "Speed v, which stays constant"),
         speed("ship.slowest", "Lowest speed at which the model holds"),
         speed("ship.fastest", "Highest speed at which the model holds"),
-        Parameter(
-            name="initial.beta",
-            unit="rad",
-            description="Drift angle at the start",
-            display_unit="deg",
-            start=0.0,
-            tunable=False,
-        ),
-        Parameter(
-            name="initial.r",
-            unit="rad/s",
-            description="Yaw rate at the start, positive to starboard",
-            display_unit="deg/min",
-            start=0.0,
-            tunable=False,
-        ),
     )
 
 
@@ -102,42 +89,44 @@ def _coefficients(form: SteeringForm, values: Mapping[str, float]) -> tuple[Para
     )
 
 
-def _motion(form: SteeringForm, symbols: Mapping[str, ca.SX]) -> tuple[Variable, ...]:
-    """States ``motion.beta``, ``motion.r`` with their rates, and the velocities in the ship's axes."""
-    beta = State(
+def _drift() -> tuple[State, Parameter]:
+    """State ``motion.beta`` and its start."""
+    start = Parameter(
+        name="initial.beta",
+        unit="rad",
+        description="Drift angle at the start",
+        display_unit="deg",
+        start=0.0,
+        tunable=False,
+    )
+    state = State(
         name="motion.beta",
         unit="rad",
         description="Drift angle, positive when the water meets the port bow: v = -speed sin(beta)",
         display_unit="deg",
         nominal=0.2,
         derivative="motion.betadot",
-        start=symbols["initial.beta"],
+        start=start.symbol,
         steady=True,
     )
-    r = State(
-        name="motion.r",
-        unit="rad/s",
-        description="Yaw rate (rate of turn), positive to starboard",
-        display_unit="deg/min",
-        nominal=0.01,
-        derivative="motion.rdot",
-        start=symbols["initial.r"],
-        steady=True,
-    )
-    per_second = symbols["ship.speed"] / symbols["ship.length"]
-    own = {one.name: symbols[f"coefficients.{one.name}"] for one in form.coefficients}
-    sway, yaw = form.rates(own, beta.symbol, r.symbol / per_second, symbols["rudder.effective"])
+    return state, start
+
+
+def _quantities(form: SteeringForm, symbols: Mapping[str, ca.SX]) -> tuple[Quantity, ...]:
+    """Rates of the states ``motion.beta``, ``motion.r``, and the velocities in the ship's axes."""
+    beta, r = symbols["motion.beta"], symbols["motion.r"]
     speed = symbols["ship.speed"]
+    per_second = speed / symbols["ship.length"]
+    own = {one.name: symbols[f"coefficients.{one.name}"] for one in form.coefficients}
+    sway, yaw = form.rates(own, beta, r / per_second, symbols["rudder.effective"])
 
     def quantity(name: str, unit: str, description: str, value: ca.SX) -> Quantity:
         return Quantity(name=name, unit=unit, description=description, value=value)
 
     return (
-        beta,
-        r,
         quantity("motion.betadot", "rad/s", "Rate of the drift angle", sway * per_second),
         quantity("motion.rdot", "rad/s2", "Yaw acceleration, positive to starboard", yaw * per_second**2),
-        quantity("motion.u", "m/s", "Surge velocity, positive forward", speed * ca.cos(beta.symbol)),
-        quantity("motion.v", "m/s", "Sway velocity, positive to starboard", -speed * ca.sin(beta.symbol)),
+        quantity("motion.u", "m/s", "Surge velocity, positive forward", speed * ca.cos(beta)),
+        quantity("motion.v", "m/s", "Sway velocity, positive to starboard", -speed * ca.sin(beta)),
         quantity("motion.speed", "m/s", "Speed through the water", speed),
     )

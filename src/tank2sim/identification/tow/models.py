@@ -11,11 +11,11 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy import stats
 
-from tank2sim.dynamics.surge import drag
+from tank2sim.dynamics.surge import SurgeCoefficients, drag
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import COLLINEAR, SINGULAR, Vector, scaled_condition
 from tank2sim.identification.tow import equation_error
-from tank2sim.identification.tow.fit import DELAY
+from tank2sim.identification.tow.fit import DELAY, KEYS
 from tank2sim.identification.tow.output_error import OutputErrorFit, TowOptions, fit_speeds
 from tank2sim.records.tows import Tows
 
@@ -79,6 +79,17 @@ class FittedModel:
         """The estimates can be told apart (scaled condition number at most 900), and a delay is not at its bound, 0."""
         late = not self.model.start_delay or self.fit.estimates[-1] > _NO_DELAY_S
         return late and self.fit.condition_scaled <= COLLINEAR**2
+
+    @property
+    def coefficients(self) -> SurgeCoefficients:
+        """Mass and drag."""
+        values = dict(zip(self.model.unknowns, self.fit.estimates.tolist(), strict=True))
+        return SurgeCoefficients(**{KEYS[name]: value for name, value in values.items() if name != DELAY})
+
+    @property
+    def delay_s(self) -> float:
+        """How much later than t = 0 the body starts."""
+        return float(self.fit.estimates[-1]) if self.model.start_delay else 0.0
 
     @property
     def mass_interval_kg(self) -> tuple[float, float]:

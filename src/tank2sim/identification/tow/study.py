@@ -31,6 +31,7 @@ from tank2sim.identification.tow.models import (
     mass_range,
     tow_by_tow,
 )
+from tank2sim.identification.tow.output_error import simulated_speeds
 from tank2sim.records.tows import Tows
 
 _LEVEL = 0.95
@@ -100,6 +101,31 @@ class TowStudy:
         usable = [one for one in self.models if one.plausible and one.determined]
         return min(usable, key=lambda one: one.fit.aic, default=None)
 
+    def simulated(self) -> tuple[Vector, dict[str, Vector]]:
+        """Times (n,), s, and speeds (n,), m/s, of the best usable model and of the methods, each motion once."""
+        result, time = self.result, np.linspace(0.0, float(self.result.tows.time_s[-1]), 301)
+        found: dict[str, Vector] = {}
+        if self.best is not None:
+            label = f"best usable: {self.best.model.label}"
+            found[label] = simulated_speeds(self.best.coefficients, result.force, time, self.best.delay_s)
+        for name in ("output_error", "qr"):
+            if name in result.fits:
+                fit = result.fits[name]
+                speeds = simulated_speeds(fit.coefficients, result.force, time, fit.start_delay_s)
+                if np.isfinite(speeds).all() and not any(np.allclose(speeds, other) for other in found.values()):
+                    found[f"{name.replace('_', ' ')}: {', '.join(fit.unknowns)}"] = speeds
+        return time, found
+
+    def _speeds_as_json(self) -> dict[str, Any]:
+        time, found = self.simulated()
+        tows = self.result.tows
+        return {
+            "t_s": tows.time_s.tolist(),
+            "measured_mps": {f"tow {n}": speed.tolist() for n, speed in enumerate(tows.speed_mps.T, start=1)},
+            "simulated_t_s": time.tolist(),
+            "simulated_mps": {label: [float(f"{v:.7g}") for v in speeds] for label, speeds in found.items()},
+        }
+
     @property
     def ellipses(self) -> tuple[Ellipse, ...]:
         """Of M and B3, without and with a start delay."""
@@ -120,6 +146,7 @@ class TowStudy:
             "tow_by_tow": {one.label: one.as_json() for one in self.by_tow},
             "confidence_ellipses": [one._asdict() for one in self.ellipses],
             "mass_by_theory": [one.as_json() for one in self.theory],
+            "speeds": self._speeds_as_json(),
         }
         if self.body is not None:
             factor = self.body.area_ratio

@@ -12,10 +12,10 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Vector
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.noise import white
+from tank2sim.identification.trials.noise import Noise, white
 from tank2sim.identification.trials.problem import Problem
 from tank2sim.identification.trials.runs import Run
-from tank2sim.identification.trials.shooting import Pieces, Shooting, Weights, cut
+from tank2sim.identification.trials.shooting import Pieces, Shooting, cut
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn
@@ -57,13 +57,13 @@ class Following:
 def following(problem: Problem, values: Vector, noise: Mapping[str, float]) -> tuple[Following, ...]:
     """How the model at `values` (k,) follows each run of a problem; `noise` weighs signals in the initial states."""
     shooting = Shooting(problem)
-    weights = Weights(tuple(white(noise[name]) for name in problem.seen))
+    own = [white(noise[name]) for name in problem.seen]
     results = []
     for run in problem.runs:
         found = {}
         for length in (WINDOW * problem.ship_time, None):
             pieces = cut(problem, run, length)
-            starts = _settled(shooting, pieces, values, weights)
+            starts = _settled(shooting, pieces, values, own)
             found[length] = shooting.residuals(pieces, starts, values)[0], pieces.measured
         windows, whole = found.values()
         results.append(
@@ -261,24 +261,23 @@ def _replayed(shooting: Shooting, run: Run, noise: Mapping[str, float]) -> Traje
     problem = shooting.problem
     model, values = problem.model, problem.prior_mean
     pieces = cut(problem, run, None)
-    weights = Weights(tuple(white(noise.get(name) or 1.0) for name in problem.seen))
-    starts = _settled(shooting, pieces, values, weights)
+    starts = _settled(shooting, pieces, values, [white(noise.get(name) or 1.0) for name in problem.seen])
     x = shooting.residuals(pieces, starts, values)[1][0]
     u, p = pieces.inputs[0], problem.parameters(values)
     y = np.array(model.output(x.T, u.T, np.repeat(p[:, None], len(x), axis=1))).T
     return Trajectory(model, run.step_s * np.arange(len(x), dtype=float), x, u, y)
 
 
-def _settled(shooting: Shooting, pieces: Pieces, values: Vector, weights: Weights) -> NDArray[np.float64]:
+def _settled(shooting: Shooting, pieces: Pieces, values: Vector, noise: Sequence[Noise]) -> NDArray[np.float64]:
     """Initial states (pieces, nx) that suit the record best, at these parameters."""
     starts = pieces.starts.copy()
     for _ in range(3):  # the motion is nearly linear in its initial state: three steps are plenty
-        cost = shooting.cost(pieces, starts, values, weights)
+        cost = shooting.cost(pieces, starts, values, noise)
         if not np.isfinite(cost):
             break
-        step = shooting.normal(pieces, starts, values, weights).step.reshape(starts.shape)
+        step = shooting.normal(pieces, starts, values, noise).step.reshape(starts.shape)
         better = starts - step
-        if shooting.cost(pieces, better, values, weights) >= cost:
+        if shooting.cost(pieces, better, values, noise) >= cost:
             break
         starts = better
     return starts

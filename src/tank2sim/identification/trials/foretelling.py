@@ -37,7 +37,7 @@ class Answer:
     card: ManoeuvringCard
 
 
-def held_out(answer: Answer, held: Measured, members: int) -> Comparison:
+def held_out(answer: Answer, held: Measured, members: int, executor: Executor | None = None) -> Comparison:
     """The new card against trials held out, with the interval in which each figure was to be expected.
 
     The interval is that of simulations with coefficients drawn from their covariance, under random forces as large and
@@ -55,7 +55,7 @@ def held_out(answer: Answer, held: Measured, members: int) -> Comparison:
         if what is None:
             continue
         try:
-            found = bands(ship, answer.estimate, what, left, BandSettings(members=members)).quantiles
+            found = bands(ship, answer.estimate, what, left, BandSettings(members=members), executor).quantiles
         except InputError:  # every member ran away: no interval can be told
             continue
         for name, (lowest, *_, highest) in found.items():

@@ -163,7 +163,7 @@ def identify(
     progress : callable
         Told of each better estimate. A KeyboardInterrupt ends the search with the best so far.
     executor : concurrent.futures.Executor, optional
-        For the fits of cross-validation.
+        For the fits of cross-validation and bootstrap, and the simulations behind intervals.
 
     Raises
     ------
@@ -207,7 +207,7 @@ def _identified(
         identifiability=result,
         noise=noise,
         fit=compared(improved, trials, estimate.noise),
-        holdout=held_out(answer, held, options.members) if held else None,
+        holdout=held_out(answer, held, options.members, executor) if held else None,
         before=compared(card, trials, estimate.noise),
         before_holdout=compared(card, held, estimate.noise) if held else None,
         structure=structure,

@@ -11,7 +11,7 @@ import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.errors import InputError
-from tank2sim.records.audit import audit, mended
+from tank2sim.records.audit import audited
 from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import Trial, froude_scaled
 
@@ -54,13 +54,10 @@ def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
     """
     trials, notices = [], []
     for path in paths:
-        trial, findings = mended(read_trial(path))
-        notices += [f"{path.name}: {one.column}: {one.what}; taken so: {one.likely_truth}" for one in findings]
-        notices += [
-            f"{path.name}: {one.column}: {one.what}; left as it is: {one.likely_truth}"
-            for one in audit(trial)
-            if not (one.safe and one.mend is not None)
-        ]
+        trial, findings = audited(read_trial(path))
+        for one in findings:
+            done = "taken so" if one.safe and one.mend is not None else "left as it is"
+            notices.append(f"{path.name}: {one.column}: {one.what}; {done}: {one.likely_truth}")
         notices += _unused(trial, card)
         scaled, factor = at_size_of(trial, card)
         if factor != 1:

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from tank2sim.dynamics.model import Vector
 from tank2sim.identification.trials.inference import evidence_scale, sandwich, scaled_prior
-from tank2sim.identification.trials.noise import estimated_noise, white
+from tank2sim.identification.trials.noise import Noise, estimated_noise, white
 from tank2sim.identification.trials.problem import Estimate, Problem, Progress, silent
-from tank2sim.identification.trials.shooting import Normal, Pieces, Shooting, Weights, cut
+from tank2sim.identification.trials.shooting import Normal, Pieces, Shooting, cut
 
 Array = NDArray[np.float64]
 
@@ -38,8 +38,6 @@ class Settings:
         Length of a piece, s; None takes whole runs (never for a course-unstable ship: its motion runs away).
     coloured : bool
         Noise with its autoregressive part; else white.
-    joints : bool
-        The end of a piece is tied to the beginning of the next, as firmly as the defects show.
     scale_prior : bool
         The prior's standard errors are multiplied by the factor of largest evidence, at least 1.
     rounds : int
@@ -48,7 +46,6 @@ class Settings:
 
     piece_s: float | None = None
     coloured: bool = True
-    joints: bool = False
     scale_prior: bool = True
     rounds: int = 4
 
@@ -59,7 +56,7 @@ class _Search:
 
     values: Vector
     starts: list[Array]
-    weights: Weights
+    noise: tuple[Noise, ...]
     scale: dict[str, float] = field(default_factory=dict)
     costs: list[float] = field(default_factory=list)
 
@@ -83,7 +80,7 @@ def output_error(
     shooting = Shooting(problem)
     pieces = [cut(problem, run, settings.piece_s) for run in problem.runs]
     values = problem.prior_mean if start is None else start
-    search = _Search(values.copy(), [piece.starts.copy() for piece in pieces], _first_weights(problem, pieces))
+    search = _Search(values.copy(), [piece.starts.copy() for piece in pieces], _first_noise(problem, pieces))
     notices = []
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as threads:
         work = _Work(problem, shooting, pieces, threads, progress)
@@ -92,7 +89,7 @@ def output_error(
                 last = number == settings.rounds - 1
                 normals = _minimise(work, search, tolerance=1e-4 if last else 1e-2)
                 if not last:
-                    search.weights = _new_weights(problem, pieces, search, normals, settings)
+                    search.noise = _new_noise(problem, pieces, normals, settings)
                     if settings.scale_prior:
                         information = np.asarray(sum(normal.matrix for normal in normals))
                         search.scale = evidence_scale(problem, information, search.values, search.scale)
@@ -102,11 +99,11 @@ def output_error(
     return _estimate(problem, search, normals, tuple(notices))
 
 
-def _first_weights(problem: Problem, pieces: list[Pieces]) -> Weights:
+def _first_noise(problem: Problem, pieces: list[Pieces]) -> tuple[Noise, ...]:
     """A tenth of the spread of each signal: nothing is known of the residuals yet."""
     every = np.concatenate([piece.run.measured for piece in pieces])
     spread = np.nanstd(every, axis=0)
-    return Weights(tuple(white(0.1 * float(one) if one > 0 else 1.0) for one in spread))
+    return tuple(white(0.1 * float(one) if one > 0 else 1.0) for one in spread)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +120,7 @@ class _Work:
         """Normal equations of all runs where the search stands."""
         return list(
             self.threads.map(
-                lambda piece, start: self.shooting.normal(piece, start, search.values, search.weights),
+                lambda piece, start: self.shooting.normal(piece, start, search.values, search.noise),
                 self.pieces,
                 search.starts,
             )
@@ -133,7 +130,7 @@ class _Work:
         """Sum of squares of all runs and of the prior at other values and initial states."""
         own = float(np.sum(((values - self.problem.prior_mean) / prior) ** 2))
         runs = self.threads.map(
-            lambda piece, start: self.shooting.cost(piece, start, values, search.weights), self.pieces, starts
+            lambda piece, start: self.shooting.cost(piece, start, values, search.noise), self.pieces, starts
         )
         return own + sum(runs)
 
@@ -170,9 +167,7 @@ def _minimise(work: _Work, search: _Search, tolerance: float) -> list[Normal]:
     return work.normals(search)
 
 
-def _new_weights(
-    problem: Problem, pieces: list[Pieces], search: _Search, normals: list[Normal], settings: Settings
-) -> Weights:
+def _new_noise(problem: Problem, pieces: list[Pieces], normals: list[Normal], settings: Settings) -> tuple[Noise, ...]:
     noise = []
     for place in range(len(problem.seen)):
         residuals = [one for normal in normals for one in normal.residuals[:, :, place]]
@@ -180,15 +175,7 @@ def _new_weights(
         smallest = 1e-6 * float(np.nanmax(np.abs(measured)) or 1.0)
         found = estimated_noise(residuals, smallest)
         noise.append(found if settings.coloured else white(found.deviation))
-    joints = None
-    if settings.joints:
-        defects = [
-            normal.ends[:-1] - start[1:] for normal, start in zip(normals, search.starts, strict=True) if len(start) > 1
-        ]
-        if defects:
-            nominal = np.array([state.nominal for state in problem.model.states])
-            joints = np.maximum(np.sqrt(np.mean(np.concatenate(defects) ** 2, axis=0)), 1e-7 * nominal)
-    return Weights(tuple(noise), joints)
+    return tuple(noise)
 
 
 def _estimate(problem: Problem, search: _Search, normals: list[Normal], notices: tuple[str, ...]) -> Estimate:
@@ -200,7 +187,7 @@ def _estimate(problem: Problem, search: _Search, normals: list[Normal], notices:
         values=search.values,
         covariance=sandwich(information, prior, [normal.scores for normal in normals]),
         information=information,
-        noise={name: one.deviation for name, one in zip(problem.seen, search.weights.noise, strict=True)},
+        noise={name: one.deviation for name, one in zip(problem.seen, search.noise, strict=True)},
         cost=tuple(search.costs),
         prior_scale=search.scale,
         notices=notices,

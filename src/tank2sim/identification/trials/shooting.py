@@ -1,8 +1,8 @@
 """Multiple shooting: runs cut into pieces, each with an initial state of its own that is estimated with the parameters.
 
-What a piece shows is compared with what was measured, and, where joints are tied, its end with the beginning of the
-next. The initial states are eliminated from the normal equations (a Schur complement), so that what remains has the
-size of the parameters.
+What a piece shows is compared with what was measured; its end is not tied to the beginning of the next. The initial
+states are eliminated from the normal equations (a Schur complement), so that what remains has the size of the
+parameters. The `noise` of the methods is that of each seen variable (ny).
 """
 
 from __future__ import annotations
@@ -89,14 +89,6 @@ def _local(column: Vector, first: int) -> float | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Weights:
-    """Noise of each seen variable (ny), and standard deviations of the joints (nx,), None where they are free."""
-
-    noise: tuple[Noise, ...]
-    joints: Vector | None = None
-
-
-@dataclass(frozen=True, eq=False)
 class Normal:
     """Normal equations of one run with the initial states eliminated, at given parameters and initial states.
 
@@ -113,8 +105,6 @@ class Normal:
         Shares of `vector` in the order of time, each of :data:`BLOCK` lengths or less: for standard errors.
     residuals : array (pieces, n + 1, ny)
         Simulated less measured.
-    ends : array (pieces, nx)
-        Simulated ends.
     """
 
     cost: float
@@ -124,7 +114,6 @@ class Normal:
     step: Vector
     scores: Array
     residuals: Array
-    ends: Array
 
 
 class Shooting:
@@ -145,25 +134,23 @@ class Shooting:
         seen = self.sensitivity.shown(*flat, p).reshape(pieces.measured.shape)
         return seen - pieces.measured, states
 
-    def cost(self, pieces: Pieces, starts: Array, values: Vector, weights: Weights) -> float:
+    def cost(self, pieces: Pieces, starts: Array, values: Vector, noise: Sequence[Noise]) -> float:
         """Sum of squares of a run, inf where the motion leaves all bounds."""
         residuals, states = self.residuals(pieces, starts, values)
         if not np.isfinite(states).all() or np.abs(states).max() > 1e9:
             return np.inf
-        total = float(np.sum(_whitened(residuals, residuals, weights.noise) ** 2))
+        total = float(np.sum(_whitened(residuals, residuals, noise) ** 2))
         total += float(np.sum(((starts - pieces.starts) / self._wide) ** 2))
-        if weights.joints is not None and len(starts) > 1:
-            total += float(np.sum(((states[:-1, -1] - starts[1:]) / weights.joints) ** 2))
         return total
 
-    def normal(self, pieces: Pieces, starts: Array, values: Vector, weights: Weights) -> Normal:
+    def normal(self, pieces: Pieces, starts: Array, values: Vector, noise: Sequence[Noise]) -> Normal:
         """Normal equations of one run."""
         p, h = self.problem.parameters(values), pieces.run.step_s
         residuals, states = self.residuals(pieces, starts, values)
-        _, by, end_by = self.sensitivity.derivatives(states, pieces.inputs, p, h)
+        _, by, _ = self.sensitivity.derivatives(states, pieces.inputs, p, h)
         count, nx = starts.shape
-        white = _whitened(residuals, residuals, weights.noise)
-        white_by = _whitened(residuals, by.reshape(*by.shape[:2], -1), weights.noise, by.shape[3])
+        white = _whitened(residuals, residuals, noise)
+        white_by = _whitened(residuals, by.reshape(*by.shape[:2], -1), noise, by.shape[3])
         r = white.reshape(count, -1)
         J = white_by.reshape(count, -1, by.shape[3])
         own = J.transpose(0, 2, 1) @ J
@@ -179,24 +166,21 @@ class Shooting:
             at = np.r_[piece * nx : (piece + 1) * nx, size : size + k]
             H[np.ix_(at, at)] += own[piece]
             shares[piece, at] += pull[piece]
-        if weights.joints is not None and count > 1:
-            self._tie(H, shares, starts, states, end_by, weights.joints)
         g = shares.sum(axis=0)
         g[:size] += ((starts - pieces.starts) / self._wide**2).ravel()
         inner = np.linalg.inv(H[:size, :size])
         mixed = inner @ H[:size, size:]
         return Normal(
-            cost=self.cost(pieces, starts, values, weights),
+            cost=self.cost(pieces, starts, values, noise),
             matrix=H[size:, size:] - H[size:, :size] @ mixed,
             vector=g[size:] - mixed.T @ g[:size],
             states=mixed,
             step=inner @ g[:size],
-            scores=self._scores(pieces, r, J, mixed, weights),
+            scores=self._scores(pieces, r, J, mixed),
             residuals=residuals,
-            ends=states[:, -1],
         )
 
-    def _scores(self, pieces: Pieces, r: Array, J: Array, mixed: Array, weights: Weights) -> Array:
+    def _scores(self, pieces: Pieces, r: Array, J: Array, mixed: Array) -> Array:
         """Share of each block of time in the gradient by the parameters, (blocks, k)."""
         count, nx = pieces.starts.shape
         rows, ny = pieces.measured.shape[1:]
@@ -207,19 +191,6 @@ class Shooting:
         own = mixed.reshape(count, nx, -1)
         scores: Array = pull[:, :, nx:] - np.einsum("pbx,pxk->pbk", pull[:, :, :nx], own)
         return scores.reshape(count * blocks, -1)
-
-    @staticmethod
-    def _tie(H: Array, shares: Array, starts: Array, states: Array, end_by: Array, joints: Vector) -> None:
-        """Add the joints: (end of a piece - beginning of the next) / deviation."""
-        count, nx = starts.shape
-        k = end_by.shape[2] - nx
-        size = count * nx
-        for piece in range(count - 1):
-            at = np.r_[piece * nx : (piece + 2) * nx, size : size + k]
-            row = np.hstack([end_by[piece, :, :nx], -np.eye(nx), end_by[piece, :, nx:]]) / joints[:, None]
-            defect = (states[piece, -1] - starts[piece + 1]) / joints
-            H[np.ix_(at, at)] += row.T @ row
-            shares[piece, at] += row.T @ defect
 
 
 def _whitened(residuals: Array, values: Array, noise: Sequence[Noise], columns: int = 1) -> Array:

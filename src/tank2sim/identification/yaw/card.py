@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
 
 import tomlkit
 
 from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.cards.form import YawRig
 from tank2sim.cards.reading import changed_text
 from tank2sim.cards.scaling import Scales, file_factor
 from tank2sim.cards.terms import known_term
 from tank2sim.cards.writing import YawRigResult, yaw_rig_card_text
-from tank2sim.dynamics.yaw_rig import YawRig
+from tank2sim.dynamics.yaw_rig import UNKNOWN_RIG
 from tank2sim.errors import InputError
 from tank2sim.files import BYTE_ORDER_MARK
 from tank2sim.identification.yaw.estimate import YawEstimate
@@ -118,10 +118,10 @@ def rig_card_text(result: YawResult, method: str, *, name: str, source: str, kno
         remedy = "take --method energy_least_squares, as_many_equations or output_error"
         raise InputError("--method", "", f"{method} tells no friction, and a rig card needs it", remedy)
     added = known_added_inertia(result, method) if result.medium == "water" else None
-    base = known or YawRig(inertia_kgm2=1.0)
+    base = known or UNKNOWN_RIG
     kept = ("current_lag_s", "max_current_A", "inertia_accelerating_kgm2", "inertia_braking_kgm2", "gravity_Nm",
             "gravity_angle_rad", "pulses_per_turn")  # fmt: skip
-    values = {field.name: getattr(base, field.name) for field in fields(base) if field.name in kept}
+    values = {name: getattr(base, name) for name in kept}
     errors: dict[str, float] = {}
     inertia = [("inertia_kgm2", estimate.total_inertia_kgm2, estimate.inertia_error_kgm2)]
     if added and result.body:

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tank2sim.cards.form import YawRig
 from tank2sim.dynamics.yaw_energy import dissipation_from_work, inertia_from_work
-from tank2sim.dynamics.yaw_rig import YawRig
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import column_norms, scaled_condition
 from tank2sim.identification.yaw.estimate import YawEstimate

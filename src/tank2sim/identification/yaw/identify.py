@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import f as f_test
 
-from tank2sim.dynamics.yaw_rig import YawRig
+from tank2sim.cards.form import YawRig
+from tank2sim.dynamics.yaw_rig import UNKNOWN_RIG
 from tank2sim.errors import InputError
 from tank2sim.identification.yaw.checks import (
     check_current,
@@ -19,6 +20,12 @@ from tank2sim.identification.yaw.checks import (
     check_sign,
     check_turn,
     judged,
+)
+from tank2sim.identification.yaw.drawn import (
+    angle_residual_as_json,
+    balance_as_json,
+    record_histories,
+    residuals_as_json,
 )
 from tank2sim.identification.yaw.energy import (
     EnergyFit,
@@ -146,7 +153,8 @@ class YawResult:
         return added, math.hypot(*known) if own.inertia_error_kgm2 is not None else None
 
     def as_json(self) -> dict[str, Any]:
-        """The result as plain data; ``added_inertia_kgm2`` and ``dissipation_J`` by method, the rest in ``methods``."""
+        """The result as plain data; ``added_inertia_kgm2`` and ``dissipation_J`` by method, the rest in ``methods``;
+        histories, balance and residuals to draw (:mod:`tank2sim.identification.yaw.drawn`)."""
         added = {method: self.added_inertia(method) for method in self.estimates}
         methods = {}
         for method, estimate in self.estimates.items():
@@ -167,6 +175,10 @@ class YawResult:
             "dissipation_J": {method: own.dissipation_J for method, own in self.estimates.items()},
             "methods": methods,
             "mirror_difference": list(self.mirror),
+            "histories": record_histories(self.records, self.fit),
+            "energy_balance": balance_as_json(self.fit),
+            "energy_residuals": residuals_as_json(self.fit),
+            "angle_residual": angle_residual_as_json(self.angle),
             "air": self.air.as_json() if self.air else None,
             "notes": list(self.notes),
         }
@@ -322,7 +334,7 @@ def _angle(
 
 def _rig(constant: float, known: YawRig | None) -> YawRig:
     """The rig that the nonlinear least squares integrate: its own terms are theirs to find."""
-    return replace(known or YawRig(inertia_kgm2=0.0), torque_constant_NmpA=constant)
+    return (known or UNKNOWN_RIG).model_copy(update={"torque_constant_NmpA": constant})
 
 
 def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tuple[float, list[str]]:

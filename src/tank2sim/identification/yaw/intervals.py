@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_lsq_spline
 
-from tank2sim.dynamics.yaw_rig import YawRig, wall_terms
+from tank2sim.cards.form import YawRig
+from tank2sim.dynamics.yaw_rig import wall_terms
 from tank2sim.errors import InputError
 from tank2sim.records.yaw import YawRecord
 

@@ -16,7 +16,8 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 from scipy.stats import t as student
 
-from tank2sim.dynamics.yaw_rig import YawRig, yaw_rig_model
+from tank2sim.cards.form import YawRig
+from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import Matrix, Vector, column_norms
 from tank2sim.identification.yaw.energy import estimate_from

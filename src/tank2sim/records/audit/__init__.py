@@ -2,6 +2,6 @@
 
 from tank2sim.records.audit.finding import Finding
 from tank2sim.records.audit.noise import estimated_noise
-from tank2sim.records.audit.run import audit, mended
+from tank2sim.records.audit.run import audit, audited, mended
 
-__all__ = ["Finding", "audit", "estimated_noise", "mended"]
+__all__ = ["Finding", "audit", "audited", "estimated_noise", "mended"]

@@ -37,6 +37,8 @@ class Finding:
         Whether the mend only restates what was measured (a frame, a sign, a unit, a time base, a failed sensor left
         out), so that :func:`tank2sim.records.audit.mended` applies it. The others (a bias, a scale, a clock) change
         measured values by an estimate and are for the user, or for the gap workflow, to decide.
+    places_s : tuple of (float, float)
+        From when to when it is seen, in the time of the file; empty where it is of the whole record.
     """
 
     source: Path
@@ -47,6 +49,7 @@ class Finding:
     evidence: Mapping[str, float] = field(default_factory=dict)
     mend: Mend | None = None
     safe: bool = False
+    places_s: tuple[tuple[float, float], ...] = ()
 
     @property
     def column(self) -> str:
@@ -54,12 +57,13 @@ class Finding:
         return ", ".join(self.columns)
 
     def as_json(self) -> list[dict[str, Any]]:
-        """One entry a column: file, column, what, likely_truth, kind, mended (by the safe mends) and evidence."""
+        """One entry a column: file, column, what, likely_truth, kind, mended (by the safe mends), evidence, places."""
         rest = {
             "what": self.what,
             "likely_truth": self.likely_truth,
             "kind": self.kind,
             "mended": self.safe and self.mend is not None,
             "evidence": dict(self.evidence),
+            "places_s": [list(place) for place in self.places_s],
         }
         return [{"file": str(self.source), "column": column, **rest} for column in self.columns]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -55,7 +56,13 @@ def _missing(trial: Trial, name: str, values: Vector) -> list[Finding]:
         f"{missing.sum()} values are missing, the longest time {seconds:.3g} s from {trial.time_s[longest.start]:.6g} s"
     )
     evidence = {"values": float(missing.sum()), "runs": float(len(runs)), "longest_s": seconds}
-    return [Finding(trial.path, (trial.heading(name),), what, "not recorded there", "note", evidence)]
+    places = _places(trial, runs)
+    return [Finding(trial.path, (trial.heading(name),), what, "not recorded there", "note", evidence, places_s=places)]
+
+
+def _places(trial: Trial, rows: Sequence[slice]) -> tuple[tuple[float, float], ...]:
+    """When runs of rows begin and end, s."""
+    return tuple((float(trial.time_s[run.start]), float(trial.time_s[run.stop - 1])) for run in rows)
 
 
 def _runs(true: NDArray[np.bool_]) -> list[slice]:
@@ -99,7 +106,8 @@ def _stuck(trial: Trial, name: str, values: Vector) -> list[Finding]:
     rows = np.concatenate([np.arange(run.start + 1, run.stop + 1) for run in stuck])
     mend = _left_out(name, rows, "where the sensor stood still")
     kind = _kind(len(rows), values)
-    return [Finding(trial.path, (trial.heading(name),), what, "the sensor was stuck", kind, evidence, mend, safe=True)]
+    truth, places = "the sensor was stuck", _places(trial, stuck)
+    return [Finding(trial.path, (trial.heading(name),), what, truth, kind, evidence, mend, safe=True, places_s=places)]
 
 
 def _jumps(values: Vector, run: slice, usual: float) -> bool:
@@ -145,10 +153,9 @@ def _spikes(trial: Trial, name: str, values: Vector, noise: float) -> list[Findi
     what = f"{len(runs)} spikes, the first at {trial.time_s[rows[0]]:.6g} s"
     evidence = {"spikes": float(len(runs)), "largest_in_noise": float(np.max(np.abs(away)) / usual) if usual else 0.0}
     mend = _left_out(name, rows, "spikes")
-    truth = "disturbed readings"
-    return [
-        Finding(trial.path, (trial.heading(name),), what, truth, _kind(len(rows), values), evidence, mend, safe=True)
-    ]
+    truth, kind = "disturbed readings", _kind(len(rows), values)
+    places = _places(trial, [slice(known[run.start], known[run.stop - 1] + 1) for run in runs])
+    return [Finding(trial.path, (trial.heading(name),), what, truth, kind, evidence, mend, safe=True, places_s=places)]
 
 
 def _stands_out(values: Vector, run: slice) -> bool:

@@ -33,7 +33,8 @@ def time_findings(trial: Trial) -> list[Finding]:
         what = f"{wide.size} gaps, the longest {steps[longest]:.3g} s at {trial.time_s[longest]:.6g} s"
         evidence = {"gaps": float(wide.size), "longest_s": float(steps[longest]), "samples": float(lost)}
         truth = f"about {lost} rows were not recorded"
-        findings.append(Finding(trial.path, column, what, truth, "note", evidence))
+        places = tuple((float(trial.time_s[row]), float(trial.time_s[row + 1])) for row in wide)
+        findings.append(Finding(trial.path, column, what, truth, "note", evidence, places_s=places))
     if scatter > UNEVEN:
         what = f"the step between rows scatters by {100 * scatter:.0f} % about {step:.4g} s"
         truth = "the rows were recorded at uneven times, or stamped late"

@@ -16,6 +16,7 @@ from tank2sim.records.signals.statistics import (
     Density,
     Normality,
     Stationarity,
+    mean_and_deviation,
     normality,
     probability_density,
     stationarity,
@@ -45,13 +46,13 @@ class ColumnAnalysis:
 
     @property
     def mean(self) -> float:
-        """Mean value, SI."""
-        return float(np.mean(self.series.values))
+        """Mean value, SI; of a direction that on the circle."""
+        return mean_and_deviation(self.series.name, self.series.values)[0]
 
     @property
     def standard_deviation(self) -> float:
-        """Root of the mean square about the mean, SI."""
-        return float(np.std(self.series.values))
+        """Root of the mean square about the mean, SI; of a direction that on the circle."""
+        return mean_and_deviation(self.series.name, self.series.values)[1]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tank2sim.records.signals.analysis import ColumnAnalysis, Randomness, Steering, TrialAnalysis
-from tank2sim.records.signals.columns import SignalName
+from tank2sim.records.signals.columns import DIRECTIONS, SignalName
 from tank2sim.records.signals.effect import Effect
 from tank2sim.records.signals.spectra import Averaging
 from tank2sim.records.signals.statistics import UnitRootTests
@@ -42,6 +42,7 @@ def _column(column: ColumnAnalysis) -> dict[str, Any]:
         "step_s": column.series.step_s,
         "mean": name.factor * column.mean,
         "standard_deviation": name.factor * column.standard_deviation,
+        "on_circle": column.series.name in DIRECTIONS,
         "constant": column.randomness is None,
     }
     return told | (_random(column.randomness, name) if column.randomness else {})

@@ -107,14 +107,11 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
         if not np.array_equal(continuous, values):
             notices.append("was made continuous through north")
             values = continuous
-    steps = np.diff(time)
-    # The mean of the usual steps: their median is as coarse as the digits with which times are written.
-    usual = float(np.median(steps))
-    step = float(np.mean(steps[np.abs(steps - usual) < usual / 2]))
-    place = int(np.argmax(steps))
+    step, gap = _usual_step(time), int(np.argmax(np.diff(time)))
     # Half a step more, so that a gap of five steps in times that are rounded is five steps.
-    if steps[place] > (limit := (GAP_STEPS + 0.5) * step if max_gap_s is None else max_gap_s):
-        problem = f"has no value from {time[place]:.6g} to {time[place + 1]:.6g} s, longer than {limit:.3g} s"
+    limit = (GAP_STEPS + 0.5) * step if max_gap_s is None else max_gap_s
+    if (longest := float(time[gap + 1] - time[gap])) > limit:
+        problem = f"has no value from {time[gap]:.6g} to {time[gap + 1]:.6g} s, longer than {limit:.3g} s"
         raise InputError(trial.path, column, problem, "cut the record there, or allow it with --max-gap SECONDS")
     count = round(float(time[-1] - time[0]) / step) + 1
     step = float(time[-1] - time[0]) / (count - 1)
@@ -122,9 +119,16 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
     if count != time.size or np.max(np.abs(time - grid)) > _JITTER * step:
         values = _at(time, values, grid, held=name in HELD)
         way = "held" if name in HELD else "interpolated by straight lines"
-        notices.append(f"is unevenly sampled or has gaps of up to {steps[place]:.4g} s; it was {way} at {step:.4g} s")
+        notices.append(f"is unevenly sampled or has gaps of up to {longest:.4g} s; it was {way} at {step:.4g} s")
     told = tuple(f"{column.removeprefix('column ')} {notice}" for notice in notices)
     return Series(trial.path, name, float(time[0]), step, values, told)
+
+
+def _usual_step(time: Vector) -> float:
+    """The mean of the usual steps: their median is as coarse as the digits with which times are written."""
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    return float(np.mean(steps[np.abs(steps - usual) < usual / 2]))
 
 
 def at_common_times(first: Series, second: Series) -> tuple[Series, Series]:

@@ -11,6 +11,7 @@ import numpy as np
 from scipy import stats
 
 from tank2sim.records.csv_table import Vector
+from tank2sim.records.signals.columns import DIRECTIONS
 from tank2sim.records.signals.correlation import Autocorrelation
 from tank2sim.records.signals.sampling import Series
 
@@ -81,7 +82,7 @@ class Stationarity:
     block : int
         Samples averaged to one value of the tests, so that their few lags reach over the correlation time.
     mean, variance : (float, float)
-        Of the first and the second half, in the signal's unit and its square.
+        Of the first and the second half, in the signal's unit and its square; those of :func:`mean_and_deviation`.
     """
 
     verdict: Stationary
@@ -137,6 +138,18 @@ class Density:
     normal: Vector
 
 
+def mean_and_deviation(name: str, values: Vector) -> tuple[float, float]:
+    """Mean and standard deviation of a signal (n,), SI; of a direction those on the circle.
+
+    The mean of a direction is that of the sum of its unit vectors, 0 to 2 pi, and with R the length of their mean its
+    deviation is sqrt(-2 ln R) (Mardia and Jupp 2000, Directional Statistics, 2.3): 350 and 10 deg have the mean 0.
+    """
+    if name not in DIRECTIONS:
+        return float(np.mean(values)), float(np.std(values))
+    mean = float(stats.circmean(values)) % (2.0 * np.pi)  # by rounding it may be 2 pi itself
+    return mean, float(stats.circstd(values))
+
+
 def stationarity(series: Series, correlation: Autocorrelation) -> Stationarity:
     """Augmented Dickey-Fuller and KPSS tests (statsmodels), and the two halves side by side.
 
@@ -150,14 +163,14 @@ def stationarity(series: Series, correlation: Autocorrelation) -> Stationarity:
     whole = len(values) // block * block
     means = values[:whole].reshape(-1, block).mean(axis=1)
     level, trend = _unit_root_tests(means, "c"), _unit_root_tests(means, "ct")
-    halves = np.array_split(values, 2)
+    halves = [mean_and_deviation(series.name, half) for half in np.array_split(values, 2)]
     return Stationarity(
         _verdict(level, trend),
         level,
         trend,
         block,
-        (float(halves[0].mean()), float(halves[1].mean())),
-        (float(halves[0].var()), float(halves[1].var())),
+        (halves[0][0], halves[1][0]),
+        (halves[0][1] ** 2, halves[1][1] ** 2),
     )
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Vector = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -60,3 +60,29 @@ def thin_points(columns: Sequence[Vector], limit: int) -> Indices:
         if not np.isnan(column).all():
             kept |= {int(np.nanargmin(column)), int(np.nanargmax(column))}
     return np.array(sorted(kept))
+
+
+DRAWN_SAMPLES = 600
+"""Samples of a run in the JSON of a result: as many as a chart is wide. Whole runs are for trial files."""
+
+_DIGITS = 7
+
+
+def drawn_columns(
+    columns: Mapping[str, ArrayLike], limit: int = DRAWN_SAMPLES, *, peaks: bool = False
+) -> dict[str, list[float]]:
+    """Columns (n,) of one table, thinned to draw, to seven digits; the first lies across.
+
+    Parameters
+    ----------
+    columns : mapping
+        Name to values (n,).
+    limit : int
+        Samples to keep, about.
+    peaks : bool
+        Keep every peak of a record (:func:`thin_line`); else samples are evenly spread (:func:`thin_points`).
+    """
+    whole = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
+    up = list(whole.values())[1:]
+    kept = thin_line(up, limit) if peaks else thin_points(up, limit)
+    return {name: [float(f"{value:.{_DIGITS}g}") for value in values[kept]] for name, values in whole.items()}

@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from tank2sim.report.thinning import thin_line, thin_points
+from tank2sim.records.thinning import thin_line, thin_points
 
 VALUES = arrays(float, st.integers(1, 3000), elements=st.floats(-1e6, 1e6))
 

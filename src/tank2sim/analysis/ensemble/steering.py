@@ -1,0 +1,197 @@
+"""Bands of what a ship's stability page draws: her steady turns against the rudder, and her linear response to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import control
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.analysis.ensemble.questions import ShipText
+from tank2sim.analysis.linearisation import state_space, straight_course
+from tank2sim.analysis.stability.response import SteeringResponse
+from tank2sim.analysis.stability.straight_line import steering_states
+from tank2sim.analysis.turning.diagram import SteadyTurning, largest_rudder, steady_turning
+from tank2sim.dynamics import build
+from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.ship import mass_fault
+from tank2sim.errors import InputError
+from tank2sim.simulation.bands import QUANTILES, STILL_RUNNING, Band, BandOverTime, figure_bands
+from tank2sim.simulation.ensemble import Answer, Ask, Draws, Ensemble, ensemble
+
+Array = NDArray[np.float64]
+
+CURVES = 200
+"""Members of the bands of curves: the first ones. Each takes half a second, and the share below a quantile is known
+from them to 1.5 % (ours)."""
+
+POINTS = 121
+"""Points of every curve (ours)."""
+
+FROM_STARBOARD, FROM_PORT, MAGNITUDE, PHASE, STEP = (
+    "yaw_rate_from_starboard_degps",
+    "yaw_rate_from_port_degps",
+    "magnitude_dB",
+    "phase_deg",
+    "step_per_s",
+)
+_CURVES = (FROM_STARBOARD, FROM_PORT, MAGNITUDE, PHASE, STEP)
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Where curves are read off, (n,) each: rudder (rad), frequency (rad/s) and time after a step (s).
+
+    `phase_deg` is that of the ship herself at the highest frequency: those of the members are within half a turn of it.
+    """
+
+    rudder_rad: Array
+    omega_radps: Array
+    time_s: Array
+    phase_deg: float
+
+    @staticmethod
+    def of(model: Model, response: SteeringResponse) -> Grid:
+        """The rudder that the gear allows, and what the response of the ship herself is drawn over."""
+        largest = largest_rudder(model) * (1 - 1e-9)
+        omega = np.geomspace(response.omega_radps[0], response.omega_radps[-1], POINTS)
+        phase = float(np.degrees(np.unwrap(np.angle(response.response)))[-1])
+        return Grid(np.linspace(-largest, largest, POINTS), omega, np.linspace(0.0, response.time_s[-1], POINTS), phase)
+
+
+@dataclass(frozen=True, eq=False)
+class OfSteering:
+    """Curves of a member over the grid, (5, n), and her hysteresis loop."""
+
+    ship: ShipText
+    speed_mps: float | None
+    grid: Grid
+
+    def prepared(self) -> Ask:
+        """See :class:`tank2sim.simulation.ensemble.Question`."""
+        model = build(self.ship.card())
+        known = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+
+        def ask(values: Mapping[str, float]) -> Answer:
+            # What is an input (a current) is calm in these curves.
+            given = {name: value for name, value in values.items() if name in known}
+            if fault := mass_fault(known | given):
+                return Answer({}, trouble=fault)
+            return self._answer(model.with_values(given))
+
+        return lambda members: [ask(values) for values in members]
+
+    def _answer(self, model: Model) -> Answer:
+        try:
+            turning = steady_turning(model)
+            rows = [*branches(turning, self.grid.rudder_rad), *_responses(model, self.speed_mps, self.grid)]
+        except InputError as error:
+            return Answer({}, trouble=error.problem)
+        width = math.degrees(turning.loop.width_rad) if turning.loop else 0.0
+        return Answer({"loop_width_deg": width}, np.array(rows, dtype=np.float32))
+
+
+@dataclass(frozen=True, eq=False)
+class SteeringBands:
+    """Bands over a grid of what ``stability`` draws, by name of the curve, and of the width of the hysteresis loop.
+
+    Parameters
+    ----------
+    members : int
+        Whose curves these are, and can be used.
+    own : mapping
+        The curves of the ship herself.
+    with_loop : int
+        Members that have a loop; the width of the others is 0.
+    """
+
+    grid: Grid
+    members: int
+    own: Mapping[str, Array]
+    curves: Mapping[str, BandOverTime]
+    loop_width_deg: Band | None
+    with_loop: int
+    notices: tuple[str, ...]
+
+    def as_json(self) -> dict[str, object]:
+        """As JSON has it."""
+
+        def those(*names: str) -> dict[str, object]:
+            return {name: self.curves[name].as_json() | {"own": self.own[name]} for name in names}
+
+        return {
+            "members": self.members,
+            "steady_turning": {
+                "rudder_deg": np.degrees(self.grid.rudder_rad),
+                **those(FROM_STARBOARD, FROM_PORT),
+                "loop_width_deg": self.loop_width_deg and self.loop_width_deg.as_json(),
+                "with_loop": self.with_loop,
+            },
+            "bode": {"omega_radps": self.grid.omega_radps, **those(MAGNITUDE, PHASE)},
+            "step": {"time_s": self.grid.time_s, **those(STEP)},
+        }
+
+
+def steering_bands(
+    ship: ShipText, draws: Draws, members: int, about: tuple[float | None, Grid], executor: Executor | None = None
+) -> SteeringBands | None:
+    """Bands of the first :data:`CURVES` members; `about` is the speed (None: the card's) and the grid.
+
+    None where no member has such curves.
+    """
+    speed, grid = about
+    question = OfSteering(ship, speed, grid)
+    (own,) = question.prepared()([{}])
+    found = ensemble(question, draws, min(members, CURVES), executor)
+    if found.histories is None or own.histories is None:
+        return None
+    told = [f"no steady turns: {one}" for one in found.notices if "cannot be used" in one]
+    if members > CURVES:
+        told.append(f"bands of steady turns, Bode diagram and step are of the first {CURVES} members")
+    width = found.figures["loop_width_deg"]
+    loops = int(np.sum(width > 0))
+    herself = {name: row.astype(float) for name, row in zip(_CURVES, own.histories, strict=True)}
+    bands = {name: _band(found, row) for row, name in enumerate(_CURVES)}
+    if not all(np.isfinite(bands[name].low).all() for name in (FROM_STARBOARD, FROM_PORT)):
+        share = f"{100 * (1 - STILL_RUNNING):.2g} % of the members"
+        told.append(f"bands of steady turns leave out rudders at which more than {share} have no stable turn")
+    loop = figure_bands(found).get("loop_width_deg")
+    return SteeringBands(grid, found.usable, herself, bands, loop, loops, tuple(told))
+
+
+def branches(turning: SteadyTurning, rudder_rad: Sequence[float] | Array) -> tuple[Array, Array]:
+    """Yaw rates (n,), deg/s, of the stable turns to which a spiral comes from starboard and from port: the one farthest
+    to that side; one and the same outside a hysteresis loop, nan where no turn is stable."""
+    found = [[rate for rate, stable in turning.turns_at(float(one)) if stable] for one in rudder_rad]
+    return (
+        np.degrees([max(rates, default=math.nan) for rates in found]),
+        np.degrees([min(rates, default=math.nan) for rates in found]),
+    )
+
+
+def _responses(model: Model, speed_mps: float | None, grid: Grid) -> list[Array]:
+    """Magnitude (dB) and phase (deg) of yaw rate by rudder angle, and the step, 1/s."""
+    point = straight_course(model, speed_mps)
+    hull = state_space(model, point, states=steering_states(model), inputs=["rudder.angle"], outputs=["motion.r"])
+    response = np.asarray(hull(1j * grid.omega_radps), dtype=complex).ravel()
+    with np.errstate(divide="ignore"):
+        magnitude = 20 * np.log10(np.abs(response))
+    phase = np.degrees(np.unwrap(np.angle(response)))
+    phase -= 360.0 * round((phase[-1] - grid.phase_deg) / 360.0)
+    step = np.asarray(control.step_response(hull, T=grid.time_s).outputs, dtype=float).ravel()
+    return [magnitude, phase, step]
+
+
+def _band(found: Ensemble, row: int) -> BandOverTime:
+    """Quantiles where nearly all members that can be used show the curve, nan elsewhere."""
+    assert found.histories is not None
+    values = found.histories[:, row].astype(float)
+    shown = np.isfinite(values).sum(axis=0) >= STILL_RUNNING * max(found.usable, 1)
+    quantiles = np.full((len(QUANTILES), values.shape[1]), np.nan)
+    if shown.any():
+        quantiles[:, shown] = np.nanquantile(np.where(np.isfinite(values), values, np.nan)[:, shown], QUANTILES, axis=0)
+    return BandOverTime(*quantiles)

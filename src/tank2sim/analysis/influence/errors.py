@@ -1,0 +1,66 @@
+"""How the errors of a card's numbers go together: the covariance of its parameters, as the model has them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.analysis.influence.parameters import CardParameter, standard_errors_in_words
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.covariance import read_covariance
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class JointErrors:
+    """Errors of parameters.
+
+    Parameters
+    ----------
+    parameters : tuple of CardParameter
+    covariance : array (k, k)
+        In the units of the parameters' values.
+    together : frozenset of str
+        Keys of those in the covariance beside the card; all others are independent. Empty where the card has none.
+    """
+
+    parameters: tuple[CardParameter, ...]
+    covariance: Array
+    together: frozenset[str]
+
+    @property
+    def in_words(self) -> list[str]:
+        """What a user should be told of them."""
+        told = standard_errors_in_words(self.parameters, self.together)
+        return [self.together_in_words, *told] if self.together else told
+
+    @property
+    def together_in_words(self) -> str:
+        """Which of them go together."""
+        return f"errors of {len(self.together)} numbers go together, as the covariance beside the card says"
+
+
+def joint_errors(card: ManoeuvringCard, parameters: Sequence[CardParameter]) -> JointErrors:
+    """The errors of parameters of a card: those in its covariance go together as it says, all others are independent.
+
+    Raises
+    ------
+    InputError
+        The covariance to which the card refers is at fault.
+    """
+    known = read_covariance(card)
+    own = np.array([one.standard_error for one in parameters])
+    covariance = np.diag(own**2)
+    if known is None:
+        return JointErrors(tuple(parameters), covariance, frozenset())
+    places = {one.key: place for place, one in enumerate(parameters)}
+    names = [name for name in known.names if name in places]
+    rows = [places[name] for name in names]
+    here = [known.names.index(name) for name in names]
+    factors = np.array([parameters[row].factor for row in rows])
+    covariance[np.ix_(rows, rows)] = known.matrix[np.ix_(here, here)] / np.outer(factors, factors)
+    return JointErrors(tuple(parameters), covariance, frozenset(names))

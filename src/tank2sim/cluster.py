@@ -1,0 +1,277 @@
+"""A Dask cluster as a :class:`concurrent.futures.Executor`: machines that share no file with this one.
+
+Work goes there as it would go to another process of this machine: a function of a module and its arguments, pickled
+here and opened there, and its result likewise, so that Dask neither looks into them nor changes them.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import pickle
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor, Future
+from contextlib import contextmanager, suppress
+from functools import cache, partial
+from importlib.metadata import version
+from pathlib import Path
+from threading import Event, Lock, Thread
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from tank2sim import __version__
+from tank2sim.errors import InputError
+
+if TYPE_CHECKING:
+    from distributed import Client
+    from distributed import Future as Remote
+
+Result = TypeVar("Result")
+
+OPTION = "--executor"
+
+ANSWERS_WITHIN_S = 10.0
+"""A scheduler that has not answered by then is taken to be none (ours)."""
+
+PATIENCE_S = 30.0
+"""A cluster without workers, or whose scheduler is silent, is given up after this long: a worker that its nanny starts
+anew is back in a few seconds (ours)."""
+
+LOOKS_EVERY_S = 1.0
+"""How often the cluster is asked whether it has workers (ours)."""
+
+_COMPUTING = ("numpy", "scipy", "casadi", "numba")
+"""Packages on whose version the digits of a result depend."""
+
+_NOT_SENT = ("cli/", "demo/", "report/")
+"""Parts of tank2sim that compute nothing, and may differ."""
+
+
+@cache
+def installed() -> dict[str, str]:
+    """What results depend on and what must be the same on every worker, to its version."""
+    digest = hashlib.sha256()
+    folder = Path(__file__).parent
+    sources = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*.py")}
+    for name in sorted(sources):
+        if not name.startswith(_NOT_SENT):
+            digest.update(name.encode() + sources[name].read_bytes().replace(b"\r\n", b"\n"))
+    own = {"Python": "{}.{}".format(*sys.version_info), "tank2sim": f"{__version__} (source {digest.hexdigest()[:8]})"}
+    return own | {name: version(name) for name in _COMPUTING}
+
+
+@contextmanager
+def connected(text: str) -> Iterator[Executor]:
+    """The cluster whose scheduler is at ``dask://host:port``, for the time of a ``with``.
+
+    When it is left, nothing of ours waits at the scheduler any more.
+
+    Raises
+    ------
+    InputError
+        No scheduler answers there; it has no workers; one of them has other versions than are installed here.
+        While it works: scheduler or workers were lost for good.
+    """
+    with _silent():
+        client = _client(text)
+        cluster = Cluster(client, text)
+        try:
+            cluster.refuse_others()
+            yield cluster
+        finally:
+            cluster.shutdown()
+
+
+class Cluster(Executor):
+    """What is submitted is done by any worker, and anew by another one if that is lost.
+
+    Parameters
+    ----------
+    client : distributed.Client
+        Closed by :meth:`shutdown`.
+    text : str
+        How the user named the cluster.
+
+    Attributes
+    ----------
+    wanted : dict
+        Versions that workers must have.
+    """
+
+    def __init__(self, client: Client, text: str):
+        self._client, self._text, self.wanted = client, text, installed()
+        self._waiting: dict[Future[Any], Remote] = {}
+        self._one, self._ended = Lock(), Event()
+        Thread(target=self._watch, daemon=True).start()
+
+    def refuse_others(self) -> None:
+        """Raise InputError if there are no workers, or one of them has other versions than are `wanted`."""
+        if not self._client.scheduler_info()["workers"]:
+            problem = f"the scheduler at {self._text} has no workers"
+            raise InputError(OPTION, "", problem, "start some with `dask worker host:port`")
+        try:
+            told = _within(PATIENCE_S, lambda: self._client.run(installed, on_error="return"))
+        except (OSError, TimeoutError):  # one does not answer now; each is asked again before it works
+            return
+        for address, found in told.items():
+            if not isinstance(found, OSError):  # such a one has just gone, and another may come
+                _refuse_other(found if isinstance(found, dict) else {}, self.wanted, address)
+
+    def submit(self, fn: Callable[..., Result], /, *args: Any, **kwargs: Any) -> Future[Result]:
+        """As of any executor; raises InputError where the scheduler was lost."""
+        if self._client.status == "closed":
+            raise self._lost()
+        promised: Future[Result] = Future()
+        task = pickle.dumps((fn, args, kwargs))
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="Sending large graph")
+            remote = self._client.submit(_done_there, self.wanted, task, pure=False)
+        with self._one:
+            self._waiting[promised] = remote
+        promised.add_done_callback(self._left)
+        remote.add_done_callback(partial(self._arrived, promised))
+        return promised
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Takes back what is not done, whatever is asked: at the end of a ``with`` nobody waits for it any more."""
+        self._ended.set()
+        with self._one:
+            remotes = list(self._waiting.values())
+            self._waiting.clear()
+        with suppress(Exception):  # it may be gone
+            if remotes and self._client.status == "running":
+                self._client.cancel(remotes, force=True)
+        with suppress(Exception):
+            self._client.close(timeout=ANSWERS_WITHIN_S)
+
+    def _arrived(self, promised: Future[Any], remote: Remote) -> None:
+        try:
+            result = pickle.loads(remote.result())
+        except BaseException as error:
+            told = self._told(error, lost=remote.cancelled() or self._client.status != "running")
+            self._settle(promised, lambda: promised.set_exception(told))
+        else:
+            self._settle(promised, lambda: promised.set_result(result))
+
+    def _settle(self, promised: Future[Any], settle: Callable[[], None]) -> None:
+        """Once: by its result, or by the watch."""
+        with self._one:
+            known = self._waiting.pop(promised, None) is not None
+        if known and promised.set_running_or_notify_cancel():
+            settle()
+
+    def _left(self, promised: Future[Any]) -> None:
+        with self._one:
+            remote = self._waiting.pop(promised, None)
+        if remote is not None and not self._ended.is_set():
+            remote.cancel()
+
+    def _watch(self) -> None:
+        """Dask would wait for ever for workers that do not come back."""
+        well = time.monotonic()
+        while not self._ended.wait(LOOKS_EVERY_S):
+            trouble = self._trouble() if self._waiting else ""
+            if not trouble:
+                well = time.monotonic()
+            elif time.monotonic() - well > PATIENCE_S:
+                with self._one:
+                    waiting = list(self._waiting)
+                for promised in waiting:
+                    error = InputError(OPTION, "", trouble, "mend the cluster, or leave the option out")
+                    self._settle(promised, partial(promised.set_exception, error))
+
+    def _trouble(self) -> str:
+        """What keeps the cluster from working now, if anything."""
+        try:
+            workers = self._client.sync(self._client.scheduler.ncores, callback_timeout=ANSWERS_WITHIN_S)
+        except Exception:  # whatever a broken connection raises
+            return f"the scheduler at {self._text} has not answered for {PATIENCE_S:g} s"
+        return "" if workers else f"all workers of {self._text} are lost, and none has come for {PATIENCE_S:g} s"
+
+    def _told(self, error: BaseException, *, lost: bool) -> BaseException:
+        from distributed.scheduler import KilledWorker
+
+        if isinstance(error, KilledWorker):
+            problem = "one piece of work was lost with worker after worker"
+            return InputError(OPTION, "", problem, "see what their logs say; perhaps each has too little memory")
+        return self._lost() if lost else error
+
+    def _lost(self) -> InputError:
+        problem = f"the scheduler at {self._text} was lost during the work"
+        return InputError(OPTION, "", problem, "start it and its workers anew, or leave the option out")
+
+
+_ONE_AT_A_TIME = Lock()
+"""In a worker, whose threads share what is kept from task to task, and the symbols of CasADi."""
+
+
+def working_for_another() -> bool:
+    """Whether this process is a worker that is at work for some client."""
+    return _ONE_AT_A_TIME.locked()
+
+
+def _done_there(wanted: Mapping[str, str], task: bytes) -> bytes:
+    from distributed import get_worker
+
+    _refuse_other(installed(), wanted, get_worker().address)
+    with _ONE_AT_A_TIME:
+        fn, args, kwargs = pickle.loads(task)
+        return pickle.dumps(fn(*args, **kwargs))
+
+
+def _client(text: str) -> Client:
+    from distributed import Client  # seldom asked for, and no part of every installation
+
+    address = f"tcp://{text.removeprefix('dask://')}"
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of other versions; those that matter are told below
+            # What listens there and is no scheduler may keep Dask waiting longer than it was told to.
+            return _within(
+                2 * ANSWERS_WITHIN_S, lambda: Client(address, timeout=ANSWERS_WITHIN_S, set_as_default=False)
+            )
+    except (OSError, TimeoutError, ValueError):
+        problem, remedy = f"no scheduler answers at {text}", "start one there with `dask scheduler`"
+        raise InputError(OPTION, "", problem, f"{remedy}, or leave the option out") from None
+
+
+def _refuse_other(there: Mapping[str, str], here: Mapping[str, str], address: str) -> None:
+    for name, wanted in here.items():
+        if there.get(name) != wanted:
+            problem = f"has {name} {there[name]}, but here it is {wanted}" if name in there else f"lacks this {name}"
+            raise InputError(
+                OPTION, f"worker {address}", problem, "install the same on both, and start the worker anew"
+            )
+
+
+def _within(seconds: float, make: Callable[[], Result]) -> Result:
+    """What `make` returns or raises; TimeoutError if it does neither in that time."""
+    promised: Future[Result] = Future()
+
+    def work() -> None:
+        try:
+            promised.set_result(make())
+        except BaseException as error:
+            promised.set_exception(error)
+
+    Thread(target=work, daemon=True).start()
+    return promised.result(seconds)
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Dask tells of each connection that breaks, on the error stream; what the user is to know of it, we tell."""
+    import distributed  # noqa: F401 - it sets up its loggers when it is imported
+
+    trees = ("distributed", "tornado", "asyncio")
+    names = {*trees, *(name for name in logging.root.manager.loggerDict if name.startswith(trees))}
+    before = {name: logging.getLogger(name).level for name in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for name, level in before.items():
+            logging.getLogger(name).setLevel(level)

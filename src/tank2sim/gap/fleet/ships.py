@@ -1,0 +1,196 @@
+"""A fleet: a folder with a sub-folder for each ship, in which lie her card and beside it her trials.
+
+::
+
+    FOLDER/
+      mariner/       ship.toml  zigzag.csv  turn.csv  holdout/pullout.csv
+      esso osaka/    card.toml  ...
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from tank2sim.errors import InputError
+from tank2sim.files import read_exact_text
+from tank2sim.records.reading import looks_like_a_trial
+
+HOLDOUT = "holdout"
+"""Sub-folder of a ship with the trials that are held out."""
+
+GAP, IMPROVED = "gap.json", "improved.toml"
+"""What the results of a ship hold: a folder with them and no other card is no ship."""
+
+_SHIP, _CAMPAIGN = "tank2sim-ship/", "tank2sim-campaign/"
+
+
+@dataclass(frozen=True)
+class ShipFolder:
+    """Where a ship's card and trials lie.
+
+    Parameters
+    ----------
+    name : str
+        Of the folder.
+    card : Path
+    trials, holdout : tuple of Path
+        Fitted and held out, in the order of their names; none held out if there is no such sub-folder.
+    """
+
+    name: str
+    card: Path
+    trials: tuple[Path, ...]
+    holdout: tuple[Path, ...]
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """All files that are read."""
+        return (self.card, *self.trials, *self.holdout)
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """The ships of a folder.
+
+    Parameters
+    ----------
+    folder : Path
+    ships : tuple of ShipFolder
+    faults : mapping
+        Folder's name to what is wrong with it, one line.
+    passed_over : tuple of Path
+        Sub-folders that hold neither card nor trial.
+    """
+
+    folder: Path
+    ships: tuple[ShipFolder, ...]
+    faults: dict[str, str]
+    passed_over: tuple[Path, ...] = ()
+
+
+def fleet_in(folder: Path, output: Path) -> Fleet:
+    """The ships in a folder; no ships are hidden folders, that of the results, and those without card and trials.
+
+    Parameters
+    ----------
+    folder : Path
+    output : Path
+        Where the results go, which may be inside it.
+
+    Raises
+    ------
+    InputError
+        There is no ship, or the results are to go to where the ships lie.
+    """
+    if output.exists() and (output.samefile(folder) or (output.parent.samefile(folder) and _cards(output))):
+        raise InputError(output, "", "is where a ship's card and trials lie", "give a folder of its own with -o")
+    ships, faults, passed_over = [], {}, []
+    for path in _folders_in(folder):
+        if output.exists() and output.samefile(path):
+            continue
+        try:
+            ship = ship_in(path)
+        except InputError as error:
+            faults[path.name] = str(error)
+            continue
+        if ship:
+            ships.append(ship)
+        else:
+            passed_over.append(path)
+    if not ships and not faults:
+        remedy = "a folder with a sub-folder for each ship was expected, in it her card (.toml) and her trials"
+        raise InputError(folder, "", "holds no ship", remedy)
+    return Fleet(folder, tuple(ships), faults, tuple(passed_over))
+
+
+def ship_in(folder: Path) -> ShipFolder | None:
+    """The ship whose card and trials lie in a folder; None if it is of something else.
+
+    Raises
+    ------
+    InputError
+        There is a card and no trial, a trial and no card, or more than one card; a file beside the card is called like
+        a trial and is none: without it, she would be judged by less than what was measured; or a file cannot be read.
+    """
+    cards, (trials, others) = _cards(folder), _trials(folder)
+    if not cards:
+        if not trials:
+            return None
+        raise InputError(folder, "", "holds trials and no ship card", "put her card (.toml) beside them")
+    if len(cards) > 1:
+        names = ", ".join(path.name for path in cards)
+        raise InputError(folder, "", f"holds {len(cards)} cards ({names})", "leave one of them there")
+    _refuse(others)
+    if not trials:
+        raise InputError(folder, "", "holds a card and no trial", "put her trials (.csv or .dat) beside the card")
+    held: tuple[Path, ...] = ()
+    if (folder / HOLDOUT).is_dir():
+        held, others = _trials(folder / HOLDOUT)
+        _refuse(others)
+        if not held:
+            raise InputError(folder / HOLDOUT, "", "holds no trial", "put one there, or take the folder away")
+    return ShipFolder(folder.name, cards[0], trials, held)
+
+
+def ship_alone(folder: Path) -> ShipFolder | None:
+    """The ship whose card lies in a folder itself, which then is no fleet; None if no card lies there.
+
+    Raises
+    ------
+    InputError
+        As :func:`ship_in`; or cards lie in its sub-folders, too.
+    """
+    if not _cards(folder):
+        return None
+    for path in _folders_in(folder):
+        if path.name != HOLDOUT and _cards(path):
+            remedy = "take one of them away, or give the card with its trials"
+            raise InputError(folder, "", f"holds a card, and so does its sub-folder {path.name}", remedy)
+    return ship_in(folder)
+
+
+def _folders_in(folder: Path) -> list[Path]:
+    """Sub-folders in the order of their names, without those of results."""
+    return [path for path in sorted(_visible(folder)) if path.is_dir() and not _is_of_results(path)]
+
+
+def _is_of_results(folder: Path) -> bool:
+    return (folder / GAP).is_file() and {path.name for path in folder.glob("*.toml")} <= {IMPROVED}
+
+
+def _visible(folder: Path) -> list[Path]:
+    try:
+        return [path for path in folder.iterdir() if not path.name.startswith(".")]
+    except OSError as error:
+        raise InputError(folder, "", f"cannot be read ({error.strerror})", "check its permissions") from None
+
+
+def _cards(folder: Path) -> list[Path]:
+    """The cards in a folder. A campaign of captive tests has a TOML file as well, and CSV files that are no trials."""
+    found = [path for path in sorted(_visible(folder)) if path.suffix.lower() == ".toml" and path.is_file()]
+    texts = {path: read_exact_text(path) for path in found}
+    named = [path for path, text in texts.items() if _SHIP in text]
+    # What says neither may be a card with a fault, which its reader tells of.
+    return named or ([] if any(_CAMPAIGN in text for text in texts.values()) else found)
+
+
+def _trials(folder: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
+    """Trials, and files that are called like one and are none."""
+    called = [one for one in sorted(_visible(folder)) if one.suffix.lower() in (".csv", ".dat") and one.is_file()]
+    found = [path for path in called if _is_trial(path)]
+    return tuple(found), tuple(path for path in called if path not in found)
+
+
+def _refuse(others: tuple[Path, ...]) -> None:
+    """Files that are called like a trial and are none: a header that is mistyped, or something else."""
+    for path in others[:1]:
+        why = "no column t_s" if path.suffix.lower() == ".csv" else "its first line names neither MARIN nor HSVA"
+        raise InputError(path, "", f"is no trial: {why}", "mend its header, or put it elsewhere if it is none")
+
+
+def _is_trial(path: Path) -> bool:
+    try:
+        return looks_like_a_trial(path)
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read ({error.strerror})", "check its permissions") from None

@@ -1,0 +1,90 @@
+"""What is drawn of records of the yaw rig: histories beside the programme, the energy balance part by part, residuals.
+
+As JSON has it: plain lists, thinned to draw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tank2sim.identification.yaw.energy import EnergyFit
+from tank2sim.identification.yaw.output_error import AngleFit
+from tank2sim.records.thinning import drawn_columns
+from tank2sim.records.yaw import YawRecord
+
+_HISTORY_SAMPLES = 900
+"""Of a record, for each peak to be seen in any of its signals."""
+
+STAGES = ("accelerating", "braking")
+
+
+def record_histories(records: Sequence[YawRecord], fit: EnergyFit) -> dict[str, dict[str, list[float]]]:
+    """Of each record by its name: rate where it is evaluated, that of the programme, tracking error and current."""
+    found, before = {}, 0
+    for record in records:
+        programme, time = record.programme, record.time_s
+        reference = programme.at(time)
+        rate = np.full(len(time), np.nan)
+        for pair in fit.balance.pairs[before : before + programme.humps]:
+            for own in pair:
+                inside = (time >= own.time_s[0]) & (time <= own.time_s[-1])
+                rate[inside] = np.interp(time[inside], own.time_s, own.rate_radps)
+        before += programme.humps
+        offset = record.angle_rad[0] - float(programme.at(time[:1]).angle_rad[0])
+        columns = {
+            "t_s": time,
+            "rate_radps": rate,
+            "programme_rate_radps": reference.rate_radps,
+            "tracking_error_rad": reference.angle_rad + offset - record.angle_rad,
+            "current_A": record.current_A,
+        }
+        found[record.path.name] = drawn_columns(columns, _HISTORY_SAMPLES, peaks=True)
+    return found
+
+
+def balance_as_json(fit: EnergyFit) -> dict[str, Any]:
+    """Work of the motor in each part of the intervals, and what it is spent on, J: means over all pairs, in the order
+    of time."""
+    balance = fit.balance
+    shape = (len(balance.pairs), 2, balance.parts)
+    # Braking parts are counted as mirror images.
+    order = (slice(None), slice(None, None, -1))
+
+    def stages(values: np.ndarray) -> dict[str, list[float]]:
+        mean = values.reshape(shape).mean(axis=0)
+        return {name: mean[place][order[place]].tolist() for place, name in enumerate(STAGES)}
+
+    spent = balance.rows * fit.coefficients
+    return {
+        "motor_J": stages(balance.work_J),
+        "spent_J": {term: stages(spent[:, column]) for column, term in enumerate(balance.terms)},
+    }
+
+
+def residuals_as_json(fit: EnergyFit) -> list[dict[str, Any]]:
+    """What the least squares leave of each subinterval's work, J, with the mean rate in it, deg/s."""
+    balance, left = fit.balance, iter(fit.residuals_J.tolist())
+    return [
+        {
+            "stage": STAGES[own.braking],
+            "hump": own.number + 1,
+            "rate_degps": float(np.degrees(np.mean(own.part(part, balance.parts).rate_radps))),
+            "left_J": next(left),
+        }
+        for pair in balance.pairs
+        for own in pair
+        for part in range(balance.parts)
+    ]
+
+
+def angle_residual_as_json(angle: AngleFit | None) -> dict[str, list[float]] | None:
+    """What the integrated equation leaves of the angle, a gap (nan) where nothing is fitted."""
+    if angle is None:
+        return None
+    time, left = angle.time_s, angle.residual_rad
+    breaks = np.flatnonzero(np.abs(np.diff(time)) > 1.0) + 1
+    time = np.insert(time, breaks, time[breaks - 1] + 0.01)
+    return drawn_columns({"t_s": time, "residual_rad": np.insert(left, breaks, np.nan)}, peaks=True)

@@ -1,0 +1,238 @@
+"""Tracks and time histories of the JSON of a result: what stands under ``histories``, by the names of the trial format.
+
+One table of columns is ``{"t_s": [...], "psi_deg": [...], ...}``; angles may be in degrees or radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from tank2sim.records.thinning import Vector
+from tank2sim.report.motion_charts import (
+    History,
+    Mark,
+    Signal,
+    Spiral,
+    Track,
+    history_chart,
+    spiral_chart,
+    track_chart,
+)
+from tank2sim.report.page import Column, Illustration, Section, Table
+from tank2sim.report.result_values import Json, titled, words
+from tank2sim.units import to_si
+
+Columns = Mapping[str, Sequence[float | None]]
+
+LOW, MIDDLE, HIGH = "5 %", "50 %", "95 %"
+"""Labels of the quantiles of an ensemble."""
+
+# The order of the panels, and the words where the name itself is none for a reader.
+_TITLES = {
+    "delta_order": "rudder ordered",
+    "delta": "rudder, + to starboard",
+    "n": "revolutions",
+    "psi": "heading",
+    "r": "yaw rate",
+    "u": "surge velocity",
+    "v": "sway velocity, + to starboard",
+    "u_ground": "surge velocity over ground",
+    "v_ground": "sway velocity over ground",
+    "sog": "speed over ground",
+    "cog": "course over ground",
+    "phi": "heel",
+}
+_UNITS = {
+    "m": "m",
+    "s": "s",
+    "mps": "m/s",
+    "mps2": "m/s2",
+    "rad": "rad",
+    "radps": "rad/s",
+    "kg": "kg",
+    "N": "N",
+    "Nm": "N.m",
+    "A": "A",
+}
+_TRACK = ("x_m", "y_m")
+
+_MOST_RECORDS = 12
+"""Records drawn in one page, a quarter of a MB each (ours)."""
+
+
+def is_columns(value: Json) -> bool:
+    """Whether this is a table of columns over time."""
+    if not isinstance(value, Mapping) or not isinstance(value.get("t_s"), list) or len(value["t_s"]) < 2:
+        return False
+    return len(value) > 1 and all(isinstance(one, list) and len(one) == len(value["t_s"]) for one in value.values())
+
+
+def motions(
+    title: str, runs: Mapping[str, Columns], measured: Sequence[str] = (), marks: Sequence[Mark] = ()
+) -> list[Illustration]:
+    """The tracks of some runs in one chart, where positions are known, and their time histories in another.
+
+    Parameters
+    ----------
+    title : str
+        What the runs are.
+    runs : mapping
+        Label to columns; those in `measured` are drawn as points.
+    marks : sequence of Mark
+        By the name of the column without its unit.
+    """
+    tables = {label: _in_si(columns) for label, columns in runs.items()}
+    drawn = []
+    if tracks := [_track(label, table, label in measured) for label, table in tables.items() if _moves(table)]:
+        drawn.append(Illustration(chart=track_chart(tracks, title=f"Track: {title}")))
+    signals = _signals(runs)
+    if signals:
+        histories = [
+            History(label=label, time_s=table["t_s"], values=_by_stem(table), measured=label in measured)
+            for label, table in tables.items()
+        ]
+        height = 110 if len(signals) <= 6 else 80
+        chart = history_chart(histories, signals, title=f"Histories: {title}", height_px=height, marks=marks)
+        drawn.append(Illustration(chart=chart))
+    return drawn
+
+
+def simulated(result: Json) -> list[Section]:
+    """Track and histories of a simulated manoeuvre, with the bands of an ensemble where there was one."""
+    runs: dict[str, Columns] = {"simulated": result["histories"]}
+    runs |= _bands(result.get("ensemble") or {})
+    text = "Nine of ten members of the ensemble lie between the 5 and the 95 % quantile." if len(runs) > 1 else ""
+    return [Section(heading="Motion", text=text, charts=[*_spiral(result), *motions(result["manoeuvre"], runs)])]
+
+
+def _spiral(result: Json) -> list[Illustration]:
+    """Of a spiral, the steady yaw rate against the rudder."""
+    rudder, rate = (result["figures"].get(name) for name in ("rudder_deg", "rate_degps"))
+    if not (isinstance(rudder, list) and isinstance(rate, list)):
+        return []
+    spiral = Spiral(label=result["manoeuvre"], rudder_rad=np.radians(rudder), yaw_rate_radps=np.radians(rate))
+    return [Illustration(chart=spiral_chart([spiral], title=f"Steady yaw rate: {result['manoeuvre']}"))]
+
+
+def audited(result: Json) -> list[Section]:
+    """What each trial measured, with the places of the findings, below what was found."""
+    sections = []
+    # Trials with findings come first: of many records the page has as many as it can hold.
+    faulty = {one["file"] for one in result["findings"]}
+    trials = [one for one in result["trials"] if is_columns(one.get("histories"))]
+    for trial in sorted(trials, key=lambda one: one["file"] not in faulty)[:_MOST_RECORDS]:
+        found = [one for one in result["findings"] if one["file"] == trial["file"]]
+        name = str(trial["file"]).rpartition("/")[2]
+        marks = _marks(found, trial)
+        charts = motions(name, {"measured": trial["histories"]}, marks=marks)
+        text = "" if found else "Nothing is found wrong."
+        if marks:
+            text = "Red in the histories: the places of findings about single values and rows."
+        sections.append(
+            Section(heading=f"Record {name}", text=text, charts=charts, tables=[_findings(found)] if found else [])
+        )
+    return sections
+
+
+def identified(result: Json) -> list[Section]:
+    """Each trial as measured beside the card that was given and the card found, those held out first."""
+    charts: list[Illustration] = []
+    for one in sorted(result["replays"], key=lambda one: not one["held_out"])[:_MOST_RECORDS]:
+        runs = {"measured": one["measured"], "card given": one["before"], "card found": one["found"]}
+        name = f"{one['trial']} ({'held out' if one['held_out'] else 'fitted'})"
+        charts += motions(name, {label: run for label, run in runs.items() if is_columns(run)}, ["measured"])
+    return [Section(heading="Trials", text=_REPLAYED, charts=charts)] if charts else []
+
+
+_REPLAYED = (
+    "Turns and zigzags are steered as the manoeuvre asks, from the measured start; other trials are given the recorded "
+    "rudder, from the initial state that suits the record best."
+)
+
+_WAYS = {
+    "turning_circles_deep": "Turning circles in deep water",
+    "turning_circles_shallow": "Turning circles in shallow water",
+    "stops": "Stopping",
+}
+
+
+def from_the_bridge(result: Json) -> list[Section]:
+    """Turning circles and stops of a poster or a pilot card: the way ahead is up, starboard is right."""
+    charts = []
+    for key, title in _WAYS.items():
+        tracks = [Track(label=one["name"], x_m=one["ahead_m"], y_m=one["starboard_m"]) for one in result[key]]
+        if tracks:
+            charts.append(Illustration(chart=track_chart(tracks, title=title), caption="The ship heads up the page."))
+    return [Section(heading="Ways", charts=charts)] if charts else []
+
+
+def _findings(found: Sequence[Mapping[str, Json]]) -> Table:
+    heads = {"kind": "", "column": "column", "what": "what", "likely_truth": "likely truth", "mended": "mended"}
+    rows = [[one.get(key) for key in heads] for one in found]
+    return Table(caption="Findings", columns=[Column(title=head) for head in heads.values()], rows=rows)
+
+
+def _marks(found: Sequence[Mapping[str, Json]], trial: Mapping[str, Json]) -> list[Mark]:
+    """A finding about a column in its panel, one about the time in all."""
+    _, *columns = trial["histories"]
+    stems = dict(zip(trial["columns"], map(_stem, columns), strict=False))  # by what the file calls them
+    marks = []
+    for one in found:
+        at = [stems[one["column"]]] if one["column"] in stems else list(stems.values())
+        for begin, end in one.get("places_s") or ():
+            marks += [Mark(signal=name, begin_s=begin, end_s=end, text=str(one["what"])) for name in at]
+    return marks
+
+
+def _bands(ensemble: Mapping[str, Json]) -> dict[str, Columns]:
+    """The quantiles of an ensemble as runs; its track is that of the median and of the band across its course."""
+    if not (isinstance(ensemble.get("histories"), Mapping) and isinstance(ensemble.get("t_s"), list)):
+        return {}
+    track: Mapping[str, Json] = ensemble.get("track") or {}
+    runs: dict[str, Columns] = {}
+    for label, key, side in ((LOW, "p5", "low_m"), (MIDDLE, "p50", "middle_m"), (HIGH, "p95", "high_m")):
+        own = {name: one[key] for name, one in ensemble["histories"].items() if name not in _TRACK}
+        if points := track.get(side):
+            own |= {"x_m": [point[0] for point in points], "y_m": [point[1] for point in points]}
+        runs[label] = {"t_s": ensemble["t_s"], **own}
+    return runs
+
+
+def _in_si(columns: Columns) -> dict[str, Vector]:
+    found = {}
+    for name, values in columns.items():
+        numbers = np.array([np.nan if one is None else one for one in values], dtype=float)
+        si, factor = to_si(name, 1.0)
+        found[si] = factor * numbers
+    return found
+
+
+def _stem(name: str) -> str:
+    return name.rpartition("_")[0] or name
+
+
+def _by_stem(table: Mapping[str, Vector]) -> dict[str, Vector]:
+    return {_stem(name): values for name, values in table.items() if name != "t_s" and name not in _TRACK}
+
+
+def _signals(runs: Mapping[str, Columns]) -> list[Signal]:
+    names = dict.fromkeys(name for columns in runs.values() for name in columns if name not in ("t_s", *_TRACK))
+    found = []
+    for name in names:
+        unit = to_si(name, 1.0)[0].rpartition("_")[2]
+        display = {"n": "rpm"}.get(_stem(name))
+        known = _UNITS.get(unit, "1")
+        title = _TITLES.get(_stem(name)) or (words(name)[0] if unit in _UNITS else titled(name))
+        found.append(Signal(name=_stem(name), title=title, unit=known, display_unit=display))
+    order = list(_TITLES)
+    return sorted(found, key=lambda one: order.index(one.name) if one.name in order else len(order))
+
+
+def _moves(table: Mapping[str, Vector]) -> bool:
+    return all(name in table and np.isfinite(table[name]).any() for name in _TRACK)
+
+
+def _track(label: str, table: Mapping[str, Vector], measured: bool) -> Track:
+    return Track(label=label, x_m=table["x_m"], y_m=table["y_m"], time_s=table["t_s"], measured=measured)

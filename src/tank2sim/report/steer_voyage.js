@@ -1,0 +1,209 @@
+// A voyage with the ship: her orders, the zigzag, and the record of what she did.
+
+// Rudder one way until the heading has changed by `heading`, then the other way, and so on: five executes, rad.
+class Zigzag {
+  static EXECUTES = 5;
+
+  constructor(rudder, heading, course, latest) {
+    Object.assign(this, { rudder: Math.abs(rudder), heading, course, latest });
+    this.side = this.first = Math.sign(rudder);
+    this.executes = 0;
+    this.overshoots = [];
+    this.furthest = 0;
+  }
+
+  get order() { return this.side * this.rudder; }
+
+  beyond(psi) { return this.side * (psi - this.course) - this.heading; }
+
+  // What the ship has swung past the last switch; called at each step.
+  watch(psi) {
+    if (this.executes > 0) this.furthest = Math.max(this.furthest, -this.side * (psi - this.course) - this.heading);
+  }
+
+  // At the heading: the other way. Returns true after the last execute.
+  turn() {
+    if (this.executes > 0) this.overshoots.push(this.furthest);
+    this.executes += 1;
+    this.furthest = 0;
+    if (this.executes === Zigzag.EXECUTES) return true;
+    this.side = -this.side;
+    return false;
+  }
+}
+
+// Columns of samples. When they are full every second row goes, and of what follows fewer are kept; the last row is
+// always that of now.
+class Record {
+  static MOST = 100000; // even, so that the last row stays; the longest zigzag of a bundled ship has fewer
+
+  constructor(names) {
+    this.columns = Object.fromEntries(names.map((name) => [name, []]));
+    this.stride = 1;
+    this.passing = false;
+  }
+
+  get length() { return this.columns.t.length; }
+
+  // One row; if it is `passing` the next takes its place.
+  add(row, passing = false) {
+    const place = this.passing ? this.length - 1 : this.length;
+    for (const [name, column] of Object.entries(this.columns)) column[place] = row[name];
+    this.passing = passing;
+    if (this.length > Record.MOST) this.#thin();
+  }
+
+  // A value of the last row, which stays.
+  change(name, value) {
+    if (name in this.columns) this.columns[name][this.length - 1] = value;
+    this.passing = false;
+  }
+
+  #thin() {
+    for (const [name, column] of Object.entries(this.columns)) {
+      this.columns[name] = column.filter((_, row) => row % 2 === 0);
+    }
+    this.stride *= 2;
+  }
+}
+
+// A ship under way. Steps lie on a grid of whole ones; a switch or an order between two of them is one more sample.
+class Voyage {
+  static SIGNALS = ["motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "rudder.angle"];
+  static ORDERS = ["rudder.command", "propeller.speed", "wind.speed", "wind.direction"];
+
+  constructor(ship, data) {
+    this.ship = ship;
+    this.step = data.step;
+    this.longest = data.longest;
+    this.begin(data.start);
+  }
+
+  begin(start, orders = {}) {
+    this.ship.begin({ ...start, ...orders });
+    this.time = 0;
+    this.steps = 0;
+    this.zigzag = null;
+    this.programme = [];
+    this.orders = { "rudder.command": 0, ...orders };
+    this.record = new Record(["t", ...Voyage.SIGNALS, ...Voyage.ORDERS]);
+    this.begun = { ...this.orders };
+    this.changes = []; // [t, name, value] of what no column holds
+    this.#sample(true);
+  }
+
+  get samples() { return this.record.columns; }
+
+  order(name, value) {
+    this.ship.set(name, value);
+    this.orders[name] = value;
+    this.record.change(name, value);
+    if (!Voyage.ORDERS.includes(name)) this.changes.push([this.time, name, value]);
+  }
+
+  // The rudder is the hand's again, and her gear's. Returns what has ended: "zigzag", "programme" or null.
+  release() {
+    const ended = this.zigzag ? "zigzag" : this.programme.length > 0 ? "programme" : null;
+    this.zigzag = null;
+    this.programme = [];
+    if (this.ship.has("ghost.steers")) this.ship.setTruth("ghost.steers", false);
+    return ended;
+  }
+
+  startZigzag(rudder, heading) {
+    this.release();
+    this.zigzag = new Zigzag(rudder, heading, this.ship.get("motion.psi"), this.time + this.longest);
+    this.order("rudder.command", this.zigzag.order);
+  }
+
+  // Orders [{t, name: value, ...}], each held until the next, from now on.
+  follow(programme) {
+    this.release();
+    this.programme = programme.filter((one) => one.t >= this.time - 1e-9 * this.step);
+    this.#obey();
+  }
+
+  // On to the next sample. Returns "zigzag", "programme" if that has just ended, else null.
+  advance() {
+    const tolerance = 1e-9 * this.step;
+    const onGrid = this.time <= this.steps * this.step + tolerance;
+    const grid = (this.steps + 1) * this.step;
+    const ordered = this.programme[0]?.t ?? Infinity;
+    const whole = ordered >= grid - tolerance;
+    const size = whole ? (onGrid ? this.step : grid - this.time) : ordered - this.time;
+    const before = this.time;
+    if (this.zigzag) this.ship.keep();
+    this.ship.step(before, size);
+    if (this.zigzag?.beyond(this.ship.get("motion.psi")) >= 0) return this.#switch(before, size);
+    this.time = whole ? grid : ordered;
+    if (whole) this.steps += 1;
+    this.#sample(!whole);
+    if (this.zigzag && this.time >= this.zigzag.latest) return this.#ended("zigzag");
+    return this.#obey();
+  }
+
+  // Halves the step until the heading is met within rounding, and goes there.
+  #switch(before, size) {
+    let [low, high] = [0, size];
+    for (;;) {
+      const middle = (low + high) / 2;
+      if (!(before + middle > before + low && before + middle < before + high)) break;
+      this.ship.back();
+      this.ship.step(before, middle);
+      if (this.zigzag.beyond(this.ship.get("motion.psi")) >= 0) high = middle; else low = middle;
+    }
+    this.ship.back();
+    this.ship.step(before, high);
+    this.time = before + high;
+    const last = this.time >= (this.steps + 1) * this.step - 1e-9 * this.step;
+    if (last) this.steps += 1;
+    this.#sample(true);
+    if (this.zigzag.turn()) return this.#ended("zigzag");
+    this.order("rudder.command", this.zigzag.order);
+    return null;
+  }
+
+  #obey() {
+    const begun = this.programme.length > 0;
+    while (this.programme[0]?.t <= this.time + 1e-9 * this.step) {
+      const { t, ...orders } = this.programme.shift();
+      for (const [name, value] of Object.entries(orders)) {
+        if (typeof value === "boolean") this.ship.setTruth(name, value);
+        else if (name.startsWith("ghost.")) this.ship.set(name, value);
+        else this.order(name, value);
+      }
+    }
+    return begun && this.programme.length === 0 ? "programme" : null;
+  }
+
+  #ended(what) {
+    this.done = this.zigzag;
+    this.zigzag = null;
+    return what;
+  }
+
+  #sample(kept) {
+    const row = { t: this.time };
+    for (const name of Voyage.SIGNALS) row[name] = this.ship.get(name);
+    for (const name of Voyage.ORDERS) row[name] = this.orders[name] ?? 0;
+    this.record.add(row, !kept && this.steps % this.record.stride !== 0);
+    this.zigzag?.watch(row["motion.psi"]);
+  }
+
+  // The voyage as a trial file of tank2sim, with all digits; `comments` are its first lines.
+  csv(comments) {
+    const deg = (value) => value * 180 / Math.PI;
+    const rpm = (value) => value * 30 / Math.PI;
+    const [engine, wind] = ["propeller.speed" in this.orders, "wind.speed" in this.orders];
+    const columns = {
+      t_s: ["t", Number], delta_order_deg: ["rudder.command", deg], delta_deg: ["rudder.angle", deg],
+      ...(engine ? { n_rpm: ["propeller.speed", rpm] } : {}), u_mps: ["motion.u", Number], v_mps: ["motion.v", Number],
+      r_degps: ["motion.r", deg], psi_deg: ["motion.psi", deg], x_m: ["motion.x", Number], y_m: ["motion.y", Number],
+      ...(wind ? { wind_speed_mps: ["wind.speed", Number], wind_direction_deg: ["wind.direction", deg] } : {}),
+    };
+    const rows = this.samples.t.map((_, row) =>
+      Object.values(columns).map(([name, shown]) => shown(this.samples[name][row])).join(","));
+    if (this.record.stride > 1) comments = [...comments, `samples of every ${this.record.stride} steps`];
+    return [...comments.map((one) => `# ${one}`), Object.keys(columns).join(","), ...rows, ""].join("\n");
+  }
+}

@@ -1,0 +1,232 @@
+"""A folder of ships: what is a ship and what is not, what need not be computed again, and one bad ship among others."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tank2sim.cards import ManoeuvringCard
+from tank2sim.errors import InputError
+from tank2sim.gap.find import Options
+from tank2sim.gap.fleet.record import NEW, RUN, record_of, stale, with_results
+from tank2sim.gap.fleet.search import Fault, Sought, found_at_once, found_one_by_one
+from tank2sim.gap.fleet.ships import ShipFolder, fleet_in, ship_alone, ship_in
+from tank2sim.identification.trials.measured import Measured
+
+CARD, TRIAL = 'format = "tank2sim-ship/1"\n', "# a trial\nt_s,delta_deg,u_mps\n0,0,7\n"
+
+
+def laid(folder: Path, *names: str) -> Path:
+    """A folder with files of these names: cards, trials, or what is neither."""
+    for name in names:
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text({".toml": CARD, ".csv": TRIAL}.get(path.suffix, "mine"))
+    return folder
+
+
+# -- what is a ship ------------------------------------------------------------------------------------------------
+
+
+def test_each_sub_folder_with_a_card_and_trials_is_a_ship(tmp_path: Path) -> None:
+    laid(tmp_path, "b b/any.toml", "b b/z.csv", "b b/a.csv", "a/c.toml", "a/t.csv", "a/holdout/h.csv", "a/notes.txt")
+    laid(tmp_path, ".hidden/c.toml", ".hidden/t.csv", "papers/read.me", "ship.txt", "a/.old.toml", "a/._t.csv")
+    (tmp_path / "a/folder.csv").mkdir()
+    found = fleet_in(tmp_path, tmp_path / "out")
+    assert found.faults == {} and [one.name for one in found.ships] == ["a", "b b"]
+    a, b = found.ships
+    assert [path.name for path in a.inputs] == ["c.toml", "t.csv", "h.csv"]
+    assert found.passed_over == (tmp_path / "papers",)
+    assert [path.name for path in b.trials] == ["a.csv", "z.csv"] and b.holdout == ()
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (("s/a.toml", "s/b.toml", "s/t.csv"), "holds 2 cards (a.toml, b.toml)"),
+        (("s/a.toml",), "holds a card and no trial"),
+        (("s/t.csv",), "holds trials and no ship card"),
+        (("s/a.toml", "s/t.csv", "s/holdout/read.me"), "holds no trial"),
+    ],
+)
+def test_a_folder_at_fault_is_told_and_does_not_hide_the_others(
+    tmp_path: Path, names: tuple[str, ...], words: str
+) -> None:
+    found = fleet_in(laid(tmp_path, *names, "good/a.toml", "good/t.csv"), tmp_path / "out")
+    assert [one.name for one in found.ships] == ["good"]
+    assert list(found.faults) == ["s"] and words in found.faults["s"] and str(tmp_path / "s") in found.faults["s"]
+
+
+@pytest.mark.parametrize(
+    ("good", "bad", "why"),
+    [
+        ((), "s/t.csv", "no column t_s"),
+        (("s/u.csv",), "s/t.csv", "no column t_s"),
+        (("s/u.csv",), "s/holdout/t.csv", "no column t_s"),
+        (("s/u.csv",), "s/t.dat", "its first line names neither MARIN nor HSVA"),
+    ],
+)
+def test_a_file_that_is_called_like_a_trial_and_is_none_is_a_fault(
+    tmp_path: Path, good: tuple[str, ...], bad: str, why: str
+) -> None:
+    """Judged without it, she would be judged by less than what was measured."""
+    laid(tmp_path, "s/a.toml", *good, bad)
+    (tmp_path / bad).write_text("ts,delta_deg,u_mps\n0,0,7\n")
+    found = fleet_in(tmp_path, tmp_path / "out")
+    assert found.ships == () and found.faults["s"].startswith(f"{tmp_path / bad}: is no trial: {why};")
+
+
+def test_results_are_no_ships(tmp_path: Path) -> None:
+    """Those of this run, of a fleet before it, and of one ship alone, which hold an improved card and trials."""
+    laid(tmp_path, "a/c.toml", "a/t.csv", "out/a/improved.toml", "out/a/t.csv", "old/a/improved.toml")
+    laid(tmp_path, "one/gap.json", "one/improved.toml", "one/next_test.csv")
+    for output in ("out", "new"):
+        found = fleet_in(tmp_path, tmp_path / output)
+        assert [one.name for one in found.ships] == ["a"] and found.faults == {}
+    laid(tmp_path, "out/mine.csv")
+    assert fleet_in(tmp_path, tmp_path / "out").faults == {}
+
+
+def test_results_do_not_go_where_ships_lie(tmp_path: Path) -> None:
+    laid(tmp_path, "a/c.toml", "a/t.csv")
+    for output in (tmp_path, tmp_path / "a"):
+        with pytest.raises(InputError, match="where a ship's card and trials lie"):
+            fleet_in(tmp_path, output)
+
+
+def test_a_folder_without_ships_is_refused(tmp_path: Path) -> None:
+    campaign = laid(tmp_path, "captive/campaign.toml", "captive/run.csv", "papers/read.me")
+    (tmp_path / "captive/campaign.toml").write_text('format = "tank2sim-campaign/1"\n')
+    (tmp_path / "captive/run.csv").write_text("time,force\n")
+    with pytest.raises(InputError, match="holds no ship; a folder with a sub-folder for each ship"):
+        fleet_in(campaign, tmp_path / "out")
+
+
+def test_a_folder_with_a_card_is_one_ship_but_not_with_others_in_it(tmp_path: Path) -> None:
+    laid(
+        tmp_path, "a/c.toml", "a/t.csv", "a/holdout/c.toml", "a/holdout/h.csv", "a/out/gap.json", "a/out/improved.toml"
+    )
+    assert ship_alone(tmp_path) is None
+    assert ship_alone(tmp_path / "a") == ship_in(tmp_path / "a")
+    laid(tmp_path, "a/sister/c.toml")
+    with pytest.raises(InputError, match="so does its sub-folder sister"):
+        ship_alone(tmp_path / "a")
+
+
+# -- what need not be computed again -------------------------------------------------------------------------------
+
+
+def wrote(folder: Path, ship: ShipFolder, options: Options) -> Path:
+    """A folder as a run leaves it."""
+    files = {folder / "gap.json": "{}", folder / "corrected/t.csv": b"t_s\r\n"}
+    record = with_results(record_of(ship, options), files, folder)
+    laid(folder, "gap.json", "corrected/t.csv")
+    (folder / "gap.json").write_text("{}")
+    (folder / "corrected/t.csv").write_bytes(b"t_s\r\n")
+    (folder / RUN).write_text(json.dumps(record))
+    return folder
+
+
+CHANGES: dict[str, tuple[Callable[[Path], object], str]] = {
+    "nothing": (lambda folder: None, ""),
+    "only the time of a file": (lambda folder: (folder / "ship/t.csv").touch(), ""),
+    "card": (lambda folder: (folder / "ship/c.toml").write_text(CARD + "#"), "the card was changed"),
+    "trial": (lambda folder: (folder / "ship/t.csv").write_text(TRIAL + "1,0,7\n"), "the trials were changed"),
+    "more trials": (lambda folder: laid(folder, "ship/u.csv"), "the trials were changed"),
+    "held out": (lambda folder: (folder / "ship/holdout/h.csv").write_text(TRIAL * 2), "held out were changed"),
+    "result": (lambda folder: (folder / "out/gap.json").write_text("{ }"), "its results were changed"),
+    "no result": (lambda folder: (folder / "out/corrected/t.csv").unlink(), "its results were changed"),
+    "no record": (lambda folder: (folder / "out" / RUN).unlink(), NEW),
+    "torn record": (lambda folder: (folder / "out" / RUN).write_text('{"format'), NEW),
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_a_result_stands_until_what_it_was_computed_from_changes(tmp_path: Path, what: str) -> None:
+    ship = ship_in(laid(tmp_path / "ship", "c.toml", "t.csv", "holdout/h.csv"))
+    assert ship is not None
+    out = wrote(tmp_path / "out", ship, Options())
+    change, words = CHANGES[what]
+    change(tmp_path)
+    now = ship_in(tmp_path / "ship")
+    assert now is not None
+    told = stale(record_of(now, Options()), out)
+    assert (words in told) if words else told == ""
+
+
+def test_options_that_change_the_result_make_it_stale_and_others_do_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ship = ship_in(laid(tmp_path / "ship", "c.toml", "t.csv"))
+    assert ship is not None
+    out = wrote(tmp_path / "out", ship, Options(effects=("current",)))
+    assert stale(record_of(ship, Options(effects=("current",), workers=7)), out) == ""
+    for other in (Options(), Options(("current",), ("wind",)), Options(("current",), max_effects=1)):
+        assert stale(record_of(ship, other), out) == "the options were changed"
+    monkeypatch.setattr("tank2sim.gap.fleet.record.__version__", "99")
+    assert stale(record_of(ship, Options(effects=("current",))), out) == "computed by another version"
+
+
+# -- the work ------------------------------------------------------------------------------------------------------
+
+
+def sought(card: ManoeuvringCard, *names: str) -> list[Sought]:
+    none = Measured((), "angle", ())
+    return [
+        Sought(ShipFolder(name, Path(card.source), (), ()), replace(card, source=name), none, none) for name in names
+    ]
+
+
+@pytest.fixture
+def failing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search that fails at two ships, one by her data and one by a fault of the program."""
+
+    def find_gap(card, fitted, held, options, progress, executor=None):
+        progress("looking")
+        if card.source == "bad":
+            raise InputError("bad.csv", "row 3", "is torn", "mend it")
+        if card.source == "odd":
+            raise ZeroDivisionError("by zero")
+        return f"gap of {card.source}"
+
+    monkeypatch.setattr("tank2sim.gap.fleet.search.find_gap", find_gap)
+
+
+def test_a_bad_ship_does_not_stop_the_others(mariner_card: ManoeuvringCard, failing) -> None:
+    told: list[str] = []
+    ships = sought(mariner_card, "a", "bad", "odd", "z")
+    with ThreadPoolExecutor(2) as pool:
+        for found in (
+            found_one_by_one(ships, Options(), told.append),
+            found_at_once(iter(ships), Options(), told.append, pool),
+        ):
+            results = {ship.folder.name: result for ship, result in found}
+            assert results["a"] == "gap of a" and results["z"] == "gap of z"
+            assert results["bad"] == Fault("bad.csv: row 3: is torn; mend it")
+            assert (
+                isinstance(results["odd"], Fault) and "not of yours: ZeroDivisionError: by zero" in results["odd"].line
+            )
+    assert "a: looking" in told and any(" to go: " in one for one in told)
+
+
+def test_a_lost_executor_ends_the_run_in_one_line(mariner_card: ManoeuvringCard) -> None:
+    class Lost(ThreadPoolExecutor):
+        def submit(self, *work, **more):  # type: ignore[override]
+            future: Future[object] = Future()
+            future.set_exception(BrokenExecutor("killed"))
+            return future
+
+    with Lost(1) as pool, pytest.raises(InputError, match=r"a worker was lost while a was sought .*goes on where"):
+        list(found_at_once(sought(mariner_card, "a"), Options(), lambda stage: None, pool))
+
+
+def test_what_is_sent_to_a_worker_needs_no_file_of_this_machine(mariner_card: ManoeuvringCard) -> None:
+    (ship,) = sought(mariner_card, "a")
+    there = pickle.loads(pickle.dumps(ship))
+    assert there.card == ship.card and there.folder == ship.folder
