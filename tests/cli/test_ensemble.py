@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
-import shutil
 
 import numpy as np
 import pytest
@@ -57,7 +57,7 @@ def test_stability_and_influence_tell_chances_and_bands(tmp_path) -> None:
 
 def test_a_cluster_without_an_ensemble_and_no_executor_are_refused(tmp_path) -> None:
     refused(tank2sim(*TURN, "--executor", "threads", cwd=tmp_path), "--executor", "dask://host:port")
-    if shutil.which("dask"):
+    if importlib.util.find_spec("distributed"):
         refused(tank2sim(*TURN, "--executor", "dask://127.0.0.1:1", cwd=tmp_path), "--ensemble")
     refused(tank2sim(*TURN, "--ensemble", "1", cwd=tmp_path), "ensemble")
 
