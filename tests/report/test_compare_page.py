@@ -12,7 +12,7 @@ from tank2sim.cli.screen import json_text
 from tank2sim.report.charts import chart_specification
 from tank2sim.report.compare_page import compare_page
 from tank2sim.report.page import render_page
-from tank2sim.report.result_page import result_page
+from tank2sim.report.results.page import result_page
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from tank2sim.dynamics import build
 from tank2sim.files import plain_json
 from tank2sim.report.charts import chart_specification
 from tank2sim.report.page import render_page
-from tank2sim.report.result_page import result_page
+from tank2sim.report.results.page import result_page
 from tank2sim.report.stability_charts import DIRECT, STABLE, UNSTABLE, influence_chart, steering_diagram, trim_chart
 from tank2sim.report.stability_page import stability_page
 

@@ -13,7 +13,7 @@ from tank2sim.cards.steering_card import SteeringCard, read_steering_card
 from tank2sim.cli.screen import json_text
 from tank2sim.report.charts import chart_specification
 from tank2sim.report.page import Verdict
-from tank2sim.report.result_page import result_page
+from tank2sim.report.results.page import result_page
 from tank2sim.report.steering_catalogue_page import influence_bars, steering_catalogue_page, steering_diagram_chart
 
 

@@ -19,6 +19,6 @@ def command(card: str, **options: Any) -> None:
 
 def _draw(bridge: Bridge, ballast: Bridge | None) -> str:
     # Drawing is asked for seldom, and its library is slow to load.
-    from tank2sim.report.bridge_pages import poster_page
+    from tank2sim.report.bridge.pages import poster_page
 
     return poster_page(bridge, ballast)

@@ -29,7 +29,7 @@ def command(result: Path, page: Path) -> None:
     # Drawing is slow to load, and is not needed to refuse a file.
     content = _read(result)
     from tank2sim.report.page import render_page
-    from tank2sim.report.result_page import result_page
+    from tank2sim.report.results.page import result_page
 
     told = result_page(content, str(result))
     text = render_page(told)

@@ -40,9 +40,9 @@ def command(card: str, page: Path, ghost: Path | None, settings: tuple[str, ...]
     """Write a page in which CARD (a file, or the name of a bundled ship) can be steered; it needs no network."""
     # Drawing is asked for seldom, and its libraries are slow to load.
     from tank2sim.native.cross import has_compiled
-    from tank2sim.report.steer import steering_page
-    from tank2sim.report.steer_ghost import ghost_of
-    from tank2sim.report.steer_ship import NO_COMPILER, WEB, following, has_compiler, ship_in_page
+    from tank2sim.report.steering.ghost import ghost_of
+    from tank2sim.report.steering.page import steering_page
+    from tank2sim.report.steering.ship import NO_COMPILER, WEB, following, has_compiler, ship_in_page
 
     _refuse_steering_card(card)
     ship = read_card(card, parse_changes(settings))

@@ -21,7 +21,7 @@ from tank2sim.report.autopilot_charts import (
 )
 from tank2sim.report.motion_charts import History, Signal, Track, history_chart, track_chart
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
-from tank2sim.report.result_values import Json, quantities
+from tank2sim.report.results.values import Json, quantities
 
 HIGHEST_PEAK = 2.0
 """Ms above which a loop is thought to be weak: Astrom & Hagglund (2006), Advanced PID Control, take 1.2 to 2."""

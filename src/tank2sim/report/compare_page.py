@@ -13,7 +13,7 @@ from tank2sim.report.chart_parts import NUMBER, data, series_look
 from tank2sim.report.motion_charts import Track, track_chart
 from tank2sim.report.numbers import format_number
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 from tank2sim.units import in_words
 
 _COEFFICIENTS = (

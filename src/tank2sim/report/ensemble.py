@@ -12,8 +12,8 @@ from tank2sim.files import plain_json
 from tank2sim.report.charts import History, Track, history_chart, track_chart
 from tank2sim.report.ensemble_charts import curve_charts
 from tank2sim.report.page import Cell, Column, Section, Table
-from tank2sim.report.result_motions import HIGH, LOW, MIDDLE
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.motions import HIGH, LOW, MIDDLE
+from tank2sim.report.results.values import Json
 from tank2sim.report.runs import SHIP_SIGNALS, history_of, signals_of, track_of
 from tank2sim.report.stability_page import BEYOND
 from tank2sim.simulation.bands import Band

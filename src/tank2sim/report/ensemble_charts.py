@@ -23,7 +23,7 @@ from tank2sim.report.chart_parts import (
     vector,
 )
 from tank2sim.report.page import Illustration
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 
 _WIDTH = 680
 _APART = 1e-6

@@ -25,7 +25,7 @@ from tank2sim.report.chart_parts import (
     vector,
 )
 from tank2sim.report.motion_charts import History, Signal, history_chart
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 from tank2sim.units import to_si
 
 

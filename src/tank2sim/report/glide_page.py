@@ -20,7 +20,7 @@ from tank2sim.report.glide_charts import (
     swing_chart,
 )
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 
 
 def glide_page(found: GlideStudy) -> Page:

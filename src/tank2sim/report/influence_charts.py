@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.report.chart_parts import NUMBER, Record, data, plain, series_look
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 
 Array = NDArray[np.float64]
 

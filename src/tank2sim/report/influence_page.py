@@ -21,7 +21,7 @@ from tank2sim.report.influence_charts import (
     variance_chart,
 )
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 from tank2sim.units import in_words
 
 Array = NDArray[np.float64]

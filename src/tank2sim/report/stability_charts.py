@@ -23,7 +23,7 @@ from tank2sim.report.chart_parts import (
     vector,
 )
 from tank2sim.report.chart_parts import stacked as stacked_panels
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 
 STABLE, UNSTABLE, DIRECT, REVERSE = "stable turns", "unstable turns", "spiral", "reverse spiral"
 FEW = 14

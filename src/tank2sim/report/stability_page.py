@@ -15,7 +15,7 @@ from tank2sim.files import plain_json
 from tank2sim.report.ensemble_charts import curve_charts
 from tank2sim.report.numbers import format_number
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 from tank2sim.report.stability_charts import (
     characteristic_chart,
     influence_chart,

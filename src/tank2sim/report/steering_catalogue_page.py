@@ -15,7 +15,7 @@ from tank2sim.report.appearance import SHAPES
 from tank2sim.report.chart_parts import NUMBER, Record, data, pan_zoom, plain, series_look
 from tank2sim.report.motion_charts import Track, track_chart
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 
 
 def steering_catalogue_page(card: SteeringCard, found: SteeringComparison) -> Page:

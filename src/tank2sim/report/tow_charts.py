@@ -11,7 +11,7 @@ from tank2sim.dynamics.surge_theory import DragPolynomial, TowedBody
 from tank2sim.records.thinning import Vector
 from tank2sim.report.chart_parts import NUMBER, Record, data, pan_zoom, plain, records, series_look, vector
 from tank2sim.report.motion_charts import History, Signal, history_chart
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 
 _SPEEDS = (
     Signal(name="speed", title="speed", unit="m/s"),

@@ -10,7 +10,7 @@ from tank2sim.identification.tow.force import force_words
 from tank2sim.identification.tow.study import TowStudy
 from tank2sim.report.numbers import format_number
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 from tank2sim.report.tow_charts import drag_chart, ellipse_chart, model_chart, speed_chart
 
 _UNITS = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m", "delay": "s"}

@@ -8,8 +8,8 @@ import altair as alt
 
 from tank2sim.report.chart_parts import NUMBER, data, series_look
 from tank2sim.report.page import Illustration, Section
-from tank2sim.report.result_motions import motions
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.motions import motions
+from tank2sim.report.results.values import Json
 from tank2sim.units import in_words
 
 ERRORS = "Points: E; bars: plus and minus U_val about zero, in per cent of D."

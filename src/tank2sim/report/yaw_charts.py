@@ -8,7 +8,7 @@ import altair as alt
 
 from tank2sim.report.chart_parts import NUMBER, Record, data, plain, series_look, vector
 from tank2sim.report.motion_charts import History, Signal, history_chart
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 
 _NORMAL = 1.959964
 _SIGNALS = (

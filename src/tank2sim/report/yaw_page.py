@@ -11,7 +11,7 @@ from tank2sim.identification.yaw.identify import METHODS, YawResult
 from tank2sim.identification.yaw.intervals import TERMS
 from tank2sim.report.numbers import format_number
 from tank2sim.report.page import Cell, Column, Figure, Illustration, Page, Section, Table, Verdict
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 from tank2sim.report.yaw_charts import (
     angle_residual_chart,
     balance_chart,

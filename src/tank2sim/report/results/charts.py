@@ -18,7 +18,7 @@ from tank2sim.report.analysis_charts import (
 )
 from tank2sim.report.chart_parts import LINE_SAMPLES, NUMBER, Record, axis_above, data, every, plain, stacked, with_unit
 from tank2sim.report.page import Illustration
-from tank2sim.report.result_values import Json, is_matrix, is_number, rises, words
+from tank2sim.report.results.values import Json, is_matrix, is_number, rises, words
 from tank2sim.report.switched_charts import misfit_maps
 
 ACROSS = (

@@ -21,7 +21,7 @@ from tank2sim.report.motion_charts import (
     track_chart,
 )
 from tank2sim.report.page import Column, Illustration, Section, Table
-from tank2sim.report.result_values import Json, titled, words
+from tank2sim.report.results.values import Json, titled, words
 from tank2sim.units import to_si
 
 Columns = Mapping[str, Sequence[float | None]]

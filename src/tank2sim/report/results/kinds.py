@@ -21,7 +21,7 @@ class Kind:
         What the JSON of this command has at its top, and that of no other has all of.
     headlines : tuple of str
         Paths of the values that the reader looks for first, with dots between keys; for those that are
-        worked out see :mod:`tank2sim.report.result_headlines`.
+        worked out see :mod:`tank2sim.report.results.headlines`.
     beside : str
         What the JSON has not, and where it is.
     """

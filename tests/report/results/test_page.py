@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 from tank2sim.errors import InputError
 from tank2sim.report.page import Verdict, render_page
-from tank2sim.report.result_drawn import needs_of
-from tank2sim.report.result_kinds import KINDS, kind_of
-from tank2sim.report.result_page import result_page
-from tank2sim.report.result_values import alike, quantities, rows_of, titled, words
+from tank2sim.report.results.drawn import needs_of
+from tank2sim.report.results.kinds import KINDS, kind_of
+from tank2sim.report.results.page import result_page
+from tank2sim.report.results.values import alike, quantities, rows_of, titled, words
 from tests.report.test_page_in_browser import CHROMIUM, opened
 
 GAP = {

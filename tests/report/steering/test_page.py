@@ -14,9 +14,9 @@ from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.records.reading import read_trial
-from tank2sim.report.steer import steering_page
-from tank2sim.report.steer_ghost import ghost_of
-from tank2sim.report.steer_ship import WEB, controls, following, has_compiler, ship_in_page
+from tank2sim.report.steering.ghost import ghost_of
+from tank2sim.report.steering.page import steering_page
+from tank2sim.report.steering.ship import WEB, controls, following, has_compiler, ship_in_page
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
 from tests.report.test_page_in_browser import CHROMIUM, opened

@@ -10,10 +10,10 @@ from tank2sim.report.compare_page import compared_page
 from tank2sim.report.glide_page import glides_drawn
 from tank2sim.report.influence_page import influenced_page
 from tank2sim.report.page import Page, Section
-from tank2sim.report.result_fleet import told_fleet_page
-from tank2sim.report.result_motions import audited, from_the_bridge, identified, simulated
-from tank2sim.report.result_signals import signals_drawn
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.fleet import told_fleet_page
+from tank2sim.report.results.motions import audited, from_the_bridge, identified, simulated
+from tank2sim.report.results.signals import signals_drawn
+from tank2sim.report.results.values import Json
 from tank2sim.report.stability_page import stability_drawn
 from tank2sim.report.steering_catalogue_page import catalogue_drawn
 from tank2sim.report.tow_page import tows_drawn
@@ -144,7 +144,7 @@ def whole_page(kind: str, result: Json) -> Page | None:
 
 
 def drawn(kind: str, result: Mapping[str, Json]) -> tuple[list[Section], Json]:
-    """Sections with the charts of a result of a kind (:data:`tank2sim.report.result_kinds.KINDS`), and what is left
+    """Sections with the charts of a result of a kind (:data:`tank2sim.report.results.kinds.KINDS`), and what is left
     of it for tables."""
     drawer = _DRAWERS.get(kind)
     if drawer is None or not all(key in result for key in drawer.needs):

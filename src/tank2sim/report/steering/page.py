@@ -15,8 +15,8 @@ from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
 from tank2sim.fmu.interface import interface
 from tank2sim.report.page import beside, json_in_html
-from tank2sim.report.steer_ghost import Ghost
-from tank2sim.report.steer_ship import NO_COMPILER, TOKEN, Control, controls, references, shown_in
+from tank2sim.report.steering.ghost import Ghost
+from tank2sim.report.steering.ship import NO_COMPILER, TOKEN, Control, controls, references, shown_in
 
 LONGEST_ZIGZAG = 150.0
 """A zigzag that has not ended after so many ship lengths is given up, as in the simulation."""
@@ -30,7 +30,7 @@ WINDOWS = (10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200)
 FASTEST_APPROACH = 2.0
 """Fastest approach that the page takes, in highest speeds of the card: beyond it nothing is known (ours)."""
 
-_SCRIPTS = ("steer_ship.js", "steer_voyage.js", "steer_pen.js", "steer_track.js", "steer_history.js", "steer.js")
+_SCRIPTS = ("ship.js", "voyage.js", "pen.js", "track.js", "history.js", "page.js")
 _BEAM = 1 / 7
 """Beam over length of the drawn ship where the card states none: that of an ordinary merchant ship."""
 
@@ -54,9 +54,9 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
     Parameters
     ----------
     model : Model
-        A ship; for a ghost with a measured rudder angle that of :func:`tank2sim.report.steer_ship.following`.
+        A ship; for a ghost with a measured rudder angle that of :func:`tank2sim.report.steering.ship.following`.
     library : str or None
-        Of :func:`tank2sim.report.steer_ship.ship_in_page`; None where it cannot be compiled, which the page tells
+        Of :func:`tank2sim.report.steering.ship.ship_in_page`; None where it cannot be compiled, which the page tells
         before anything else.
     ghost : Ghost, optional
         A measured trial.
@@ -79,7 +79,7 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
     engine = next((one for one in others if one.name == "propeller.speed"), None)
     set_by_hand = [one for one in others if one is not engine]
     environment.trim_blocks = environment.lstrip_blocks = True
-    return environment.get_template("steer.html.j2").render(
+    return environment.get_template("steering/page.html.j2").render(
         name=model.name,
         description=model.description,
         version=__version__,
@@ -93,8 +93,8 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
         windows=_windows(model),
         readouts=_readouts(model),
         fails="steering.failed" in model.input_names,
-        style=Markup(beside("page.css") + beside("steer.css")),
-        script=Markup("\n".join(beside(name) for name in _SCRIPTS)),
+        style=Markup(beside("page.css") + beside("steering/page.css")),
+        script=Markup("\n".join(beside(f"steering/{name}") for name in _SCRIPTS)),
         data=json_in_html(_data(model, library, ghost)),
     )
 

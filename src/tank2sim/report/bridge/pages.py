@@ -11,9 +11,9 @@ from markupsafe import Markup
 from tank2sim import __version__
 from tank2sim.analysis.practice.bridge import SHALLOW, Bridge
 from tank2sim.analysis.practice.ship_track import ShipTrack
-from tank2sim.report import bridge_boxes as boxes
-from tank2sim.report.bridge_boxes import Box, Row
-from tank2sim.report.bridge_drawings import Drawing, circles_drawing, stops_drawing
+from tank2sim.report.bridge import boxes
+from tank2sim.report.bridge.boxes import Box, Row
+from tank2sim.report.bridge.drawings import Drawing, circles_drawing, stops_drawing
 from tank2sim.report.page import beside
 
 PANEL_MM = (88.0, 62.0)
@@ -81,7 +81,7 @@ def poster_page(bridge: Bridge, ballast: Bridge | None = None) -> str:
     )
     stops = stops_drawing(bridge.stops, width=STOPS_MM[0], height=STOPS_MM[1]) if bridge.stops else None
     return _rendered(
-        "poster.html.j2",
+        "bridge/poster.html.j2",
         bridge,
         left=left,
         right=right,
@@ -113,7 +113,7 @@ def pilot_card_page(bridge: Bridge, ballast: Bridge | None = None) -> str:
             _turning_title(bridge, f"Deep water,{_draught(bridge)}"), drawing, boxes.turning(bridge, bridge.deep)
         )
     return _rendered(
-        "pilotcard.html.j2",
+        "bridge/pilotcard.html.j2",
         bridge,
         boxes=shown,
         circles=circles,
@@ -183,7 +183,7 @@ def _rendered(template: str, bridge: Bridge, **content: object) -> str:
     environment.trim_blocks = environment.lstrip_blocks = True
     return environment.get_template(template).render(
         version=__version__,
-        style=Markup(beside("bridge.css")),
+        style=Markup(beside("bridge/sheet.css")),
         name=_cut(bridge.card.ship.name, _NAME),
         source=_cut(bridge.card.ship.source, _SOURCE),
         warning=WARNING,

@@ -21,7 +21,7 @@ from tank2sim.records.tows import read_tows
 from tank2sim.records.yaw import read_yaw_record
 from tank2sim.report.charts import chart_specification
 from tank2sim.report.page import Illustration, Page, Section, render_page
-from tank2sim.report.result_page import result_page
+from tank2sim.report.results.page import result_page
 from tests.cli.command_line import tank2sim
 from tests.report.test_page_in_browser import CHROMIUM, opened
 from tests.yaw_truth import Truth, record, written

@@ -10,8 +10,8 @@ from tank2sim.records.signals.statistics import Stationary
 from tank2sim.report.gap_words import effect_in_words, parameter_in_words, with_error
 from tank2sim.report.numbers import format_number
 from tank2sim.report.page import Figure, Verdict
-from tank2sim.report.result_kinds import Kind
-from tank2sim.report.result_values import VERDICTS, Json, cell, is_number, is_scalar, words
+from tank2sim.report.results.kinds import Kind
+from tank2sim.report.results.values import VERDICTS, Json, cell, is_number, is_scalar, words
 
 _MOST_FIGURES = 8
 _NOISE = "times the noise, before → after"

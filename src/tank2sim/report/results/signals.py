@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import PurePath
 
-from tank2sim.report import result_charts as charts
 from tank2sim.report.page import Illustration, Section, Table
-from tank2sim.report.result_values import Json, is_scalar, is_series, rows_of, titled, words
+from tank2sim.report.results import charts
+from tank2sim.report.results.values import Json, is_scalar, is_series, rows_of, titled, words
 
 _DRAWN = {
     "autocorrelation": "Autocorrelation",

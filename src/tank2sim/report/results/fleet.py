@@ -7,7 +7,7 @@ from dataclasses import replace
 from tank2sim.gap.fleet.told import REPORT, FleetTold, ShipTold
 from tank2sim.report.fleet_page import fleet_page
 from tank2sim.report.page import Link, Page, Section, Table
-from tank2sim.report.result_values import Json
+from tank2sim.report.results.values import Json
 
 _WHERE = f"Each ship has a page of her own, {REPORT}, in the folder of her name beside fleet.json."
 

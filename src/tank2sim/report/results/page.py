@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tank2sim.report import result_charts as charts
 from tank2sim.report.page import Illustration, Page, Section, Table
-from tank2sim.report.result_drawn import drawn, misshapen, whole_page
-from tank2sim.report.result_headlines import headlines
-from tank2sim.report.result_kinds import Kind, kind_of
-from tank2sim.report.result_motions import is_columns, motions
-from tank2sim.report.result_values import (
+from tank2sim.report.results import charts
+from tank2sim.report.results.drawn import drawn, misshapen, whole_page
+from tank2sim.report.results.headlines import headlines
+from tank2sim.report.results.kinds import Kind, kind_of
+from tank2sim.report.results.motions import is_columns, motions
+from tank2sim.report.results.values import (
     LONGEST_LIST,
     Json,
     alike,
@@ -30,7 +30,7 @@ from tank2sim.report.result_values import (
     titled,
     words,
 )
-from tank2sim.report.result_watched import drawn_from, not_as_written
+from tank2sim.report.results.watched import drawn_from, not_as_written
 
 _TOLD = ("notices", "warnings", "notes")
 _DEEPEST = 5

@@ -1,0 +1,1 @@
+"""Sheets for the bridge: wheelhouse poster and pilot card."""

@@ -1,0 +1,1 @@
+"""One page of any result that a command wrote as JSON."""
