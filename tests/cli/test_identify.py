@@ -158,6 +158,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(folder: Path) -> None:
     assert not (folder / "n.toml").exists()
 
 
+@pytest.mark.slow
 def test_an_interrupt_keeps_the_best_card_so_far(folder: Path) -> None:
     program = """
 import signal

@@ -23,6 +23,7 @@ def run(*arguments):
     return result
 
 
+@pytest.mark.slow
 def test_card_json_and_plots_are_written_and_agree(path, tmp_path):
     card, result, plots = tmp_path / "card.toml", tmp_path / "result.json", tmp_path / "plots"
     shown = run(path, "-o", card, "--json", result, "--plot", plots)

@@ -12,6 +12,7 @@ from tank2sim.cards import ManoeuvringCard, read_card
 from .command_line import refused, tank2sim
 
 
+@pytest.mark.slow
 def test_a_steering_card_gives_the_tables_of_paper_4(tmp_path: Path) -> None:
     result = tank2sim("influence", "poznyakov-yudin", "--json", "out.json", "--page", "out.html", cwd=tmp_path)
     assert result.returncode == 0, result.stderr

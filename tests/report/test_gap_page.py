@@ -196,6 +196,7 @@ def test_a_misfit_fits_into_its_cell(misfit, text) -> None:
     assert in_noise(misfit) == text
 
 
+@pytest.mark.slow
 def test_thirteen_trials_take_little_of_the_page() -> None:
     gap = made_up.missing()
     trials = tuple(made_up.passed(f"trial_{place}", 5.0, 1.0, held_out=place > 6) for place in range(13))

@@ -267,6 +267,7 @@ def written(trial: Trial, folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_page_and_its_pictures(trials, tmp_path) -> None:
     card, plots = tmp_path / "off.toml", tmp_path / "plots"
     card.write_text(text_of(OFF), encoding="utf-8")

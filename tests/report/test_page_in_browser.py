@@ -58,6 +58,7 @@ def opened(html, folder, *flags):
     return run.stdout, [line for line in run.stderr.splitlines() if "CONSOLE" in line]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_page_draws_every_chart_without_a_word_in_the_console(page, tmp_path, scheme):
     flags = ["--blink-settings=preferredColorScheme=0"] if scheme == "dark" else []
