@@ -19,10 +19,14 @@ enum { STEPS_BETWEEN_CHECKS = 256 };
 
 static const size_t STATE_BYTES = (STATES_END - STATES_BEGIN) * sizeof(double);
 
-/* The values of a range are all finite, or the place of the first that is not. */
-static bool finite_states(const double states[], size_t *place) {
+/* A state this many times beyond its bounds has left all that the equations can mean: a choice of ours. */
+static const double TIMES_BEYOND = 10;
+
+/* The states are all numbers that a ship can have, or the place of the first that is not. */
+static bool plausible_states(const double states[], size_t *place) {
     for (size_t i = STATES_BEGIN; i < STATES_END; ++i) {
-        if (!isfinite(states[i - STATES_BEGIN])) {
+        const double largest = TIMES_BEYOND * fmax(fabs(VARIABLES[i].minimum), fabs(VARIABLES[i].maximum));
+        if (!(fabs(states[i - STATES_BEGIN]) <= largest)) {
             *place = i;
             return false;
         }
@@ -106,7 +110,7 @@ Status set_experiment(Instance *self, double start, bool stop_defined, double st
 Status finish_initialisation(Instance *self) {
     size_t place;
     const int iterations = find_initial_states(self);
-    if (!finite_states(self->value + STATES_BEGIN, &place)) {
+    if (!plausible_states(self->value + STATES_BEGIN, &place)) {
         self->stale |= STALE_STATES;
         return report(self, DISCARD, "%s is not finite at the start (%g)", VARIABLES[place].name, self->value[place]);
     }
@@ -159,24 +163,33 @@ static void arrive(Instance *self, const double states[], double time) {
     self->stale |= STALE_RATES | STALE_OUTPUTS;
 }
 
-/* The input or parameter that is furthest beyond its usual size: the likeliest cause of a motion without bounds. */
-static size_t furthest_off(const Instance *self) {
-    size_t found = INPUTS_BEGIN;
+/* The input or parameter that is furthest from its start, in its usual size: the likeliest cause of a motion without
+ * bounds; TIME if none has been changed. */
+static size_t furthest_from_start(const Instance *self) {
+    size_t found = TIME;
     double most = 0;
     for (size_t i = INPUTS_BEGIN; i < PARAMETERS_END; ++i) {
-        const double size = fabs(self->value[i]) / fmax(VARIABLES[i].nominal, fabs(VARIABLES[i].start));
-        if (size > most) {
-            most = size;
+        const double usual = fmax(VARIABLES[i].nominal, fabs(VARIABLES[i].start));
+        const double distance = fabs(self->value[i] - VARIABLES[i].start) / usual;
+        if (distance > most) {
+            most = distance;
             found = i;
         }
     }
     return found;
 }
 
-static Status diverged(const Instance *self, size_t place, double start, double size) {
-    const size_t cause = furthest_off(self);
-    return report(self, DISCARD, "%s is not finite at the end of the step from %g s to %g s, with %s = %g",
-                  VARIABLES[place].name, start, start + size, VARIABLES[cause].name, self->value[cause]);
+static Status diverged(const Instance *self, size_t place, double reached, double start, double size) {
+    const size_t cause = furthest_from_start(self);
+    const char *what = isfinite(reached) ? "leaves all bounds" : "is not finite";
+    if (cause == TIME) {
+        return report(self, DISCARD,
+                      "%s %s (%g) in the step from %g s to %g s, with every input and parameter at its start value",
+                      VARIABLES[place].name, what, reached, start, start + size);
+    }
+    return report(self, DISCARD, "%s %s (%g) in the step from %g s to %g s; furthest from its start value is %s = %g",
+                  VARIABLES[place].name, what, reached, start, start + size, VARIABLES[cause].name,
+                  self->value[cause]);
 }
 
 /* If it fails, nothing has changed. */
@@ -189,9 +202,9 @@ static Status integrate(Instance *self, double start, double size) {
     for (long i = 0; i < count; ++i) {
         advance(self, &work, at, size / (double)count, path[i & 1]);
         at = path[i & 1];
-        if ((i + 1) % STEPS_BETWEEN_CHECKS == 0 && !finite_states(at, &place)) break;
+        if ((i + 1) % STEPS_BETWEEN_CHECKS == 0 && !plausible_states(at, &place)) break;
     }
-    if (!finite_states(at, &place)) return diverged(self, place, start, size);
+    if (!plausible_states(at, &place)) return diverged(self, place, at[place - STATES_BEGIN], start, size);
     arrive(self, at, start + size);
     return OK;
 }
@@ -210,9 +223,9 @@ static Status integrate_in_view(Instance *self, double start, double size) {
         const double regular = i < count ? start + (double)i * step : start + size;
         double asked;
         advance(self, &work, self->value + STATES_BEGIN, regular <= end ? step : end - now, next);
-        if (!finite_states(next, &place)) {
+        if (!plausible_states(next, &place)) {
             arrive(self, before, begun);
-            return diverged(self, place, start, size);
+            return diverged(self, place, next[place - STATES_BEGIN], start, size);
         }
         asked = now = fmin(regular, end);
         arrive(self, next, now);

@@ -81,10 +81,11 @@ static void mark_stale(Instance *self, unsigned set) {
     if (self->mode & BEFORE_START) self->stale |= STALE_STATES;
 }
 
-/* Parameters keep to their bounds, beyond which the equations mean nothing; what moves the ship may be anything. */
+/* Parameters and inputs keep to their bounds, beyond which the equations mean nothing. */
 static bool within_bounds(unsigned reference, double value) {
     const Variable *variable = &VARIABLES[reference];
-    return !is_parameter(reference) || (value >= variable->minimum && value <= variable->maximum);
+    if (!is_parameter(reference) && !is_input(reference)) return true;
+    return value >= variable->minimum && value <= variable->maximum;
 }
 
 /* Sets all of the variables or, if one of them cannot be set, none. */

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import stat
+import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,6 +16,9 @@ from typing import Any
 import numpy as np
 
 from tank2sim.errors import InputError
+
+STANDARD_OUTPUT = Path("-")
+"""This very object as a target of :func:`write_together` is standard output; any other path called - is refused."""
 
 BYTE_ORDER_MARK = "\ufeff"
 """What some editors put before UTF-8 text."""
@@ -54,9 +58,9 @@ def write_together(
         One of the targets is an input, is given twice or is a folder, or its folder is missing or cannot be written;
         then nothing has been written.
     """
-    targets = [_target(Path(path)) for path in contents]
+    targets = [_target(path if isinstance(path, Path) else Path(path)) for path in contents]
     _refuse_doubled(targets)
-    _refuse_doubled([_target(Path(path)) for path in outputs if path is not None])
+    _refuse_doubled([_target(path) for path in outputs if path is not None])
     _refuse_inputs(targets, [Path(path) for path in inputs])
     ready: list[tuple[Path, _Target]] = []
     direct: list[tuple[bytes, _Target]] = []
@@ -68,8 +72,12 @@ def write_together(
             else:
                 direct.append((data, target))
         for data, target in direct:
-            with _told(target.given), target.path.open("wb") as stream:
-                stream.write(data)
+            with _told(target.given):
+                if target.given is STANDARD_OUTPUT:
+                    sys.stdout.write(data.decode("utf-8"))
+                    continue
+                with target.path.open("wb") as stream:
+                    stream.write(data)
         for temporary, target in ready:
             with _told(target.given):
                 temporary.replace(target.path)
@@ -88,6 +96,10 @@ class _Target:
 
 
 def _target(given: Path) -> _Target:
+    if given is STANDARD_OUTPUT:
+        return _Target(given, given, False)
+    if given.name == "-" and given.parent == Path():
+        raise InputError(given, "", "is no name of a file", "only --json writes to standard output")
     with _told(given):
         try:
             mode = given.stat().st_mode

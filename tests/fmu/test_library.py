@@ -204,18 +204,31 @@ def test_a_simulator_that_only_asks_whether_to_go_on_ends(fmi: int, fmu_file: Ca
 
 
 @FMI
-def test_a_step_to_states_that_are_not_finite_is_discarded(fmi: int, instantiate: Instantiate, status: Status) -> None:
+@pytest.mark.parametrize(("input_name", "beyond"), [("propeller.speed", 1e9), ("rudder.command", 35.0)])
+def test_an_input_beyond_its_bounds_is_discarded_and_changes_nothing(
+    input_name: str, beyond: float, fmi: int, instantiate: Instantiate, status: Status
+) -> None:
+    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+    before = fmu.read([input_name])
+    assert status(fmu.write, {input_name: beyond}) == DISCARD
+    assert fmu.read([input_name]) == before
+    assert len(fmu.log) == 1 and input_name in fmu.log[0]
+
+
+@FMI
+def test_a_step_to_states_that_no_ship_has_is_discarded(fmi: int, instantiate: Instantiate, status: Status) -> None:
     fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
     before = steps(fmu, 10)
-    fmu.write({"propeller.speed": 1e300})
+    fmu.write({"derivatives.thrust": 1e3, "propeller.speed": 1e3})
     assert status(fmu.instance.doStep, 1.0, 0.1) == DISCARD
     assert fmu.read(STATES) == before
     assert fmu.read(["time"]) == [1.0]
     (told,) = fmu.log
-    assert "motion." in told and "not finite" in told and "with propeller.speed = 1e+300" in told
+    assert "motion." in told and "leaves all bounds" in told
+    assert told.endswith("derivatives.thrust = 1000")  # 10 000 times its start value, the revolutions 1000 times
     if fmi == 2:  # FMPy does not hand on what fmi3DoStep says of it
         assert fmu.instance.getBooleanStatus(fmpy.fmi2.fmi2Terminated)
-    fmu.write({"propeller.speed": 1.0})
+    fmu.write({"propeller.speed": 1.0, "derivatives.thrust": 0.1})
     undisturbed = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
     assert steps(fmu, 5, begin=1.0) == steps(undisturbed, 15)
 
@@ -226,7 +239,9 @@ def test_an_output_or_a_rate_that_is_not_finite_is_discarded(
 ) -> None:
     fmu = begun(instantiate("hull", fmi, "ModelExchange"))
     fmu.instance.enterEventMode() if fmi == 2 else None
-    fmu.write({"derivatives.thrust": 1e3, "propeller.speed": 1e308})
+    states = (ctypes.c_double * 7)(0, 0, 0, 1e200, 0, 0, 0)  # the drag goes with the square of the speed
+    fmu.instance.enterContinuousTimeMode()
+    fmu.instance.setContinuousStates(states, 7)
     assert status(fmu.read, ["motion.udot"]) == DISCARD
     rates = (ctypes.c_double * 7)()
     get = fmu.instance.getDerivatives if fmi == 2 else fmu.instance.getContinuousStateDerivatives

@@ -9,14 +9,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from scipy.integrate import solve_ivp
 
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
 from tank2sim.fmu.interface import interface
 from tank2sim.fmu.running import RunningFmu, running
 from tank2sim.fmu.unpacking import unpack
+from tank2sim.simulation.manoeuvres import Turn
+from tank2sim.simulation.run import simulate
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 TUNED = {"derivatives.Nr": -0.004, "derivatives.Xu": -0.004}
@@ -174,3 +178,30 @@ parameters = { speed_mps = 8.0, direction_deg = 200.0 }
     assert math.degrees(shown["motion.cog"]) == pytest.approx(45.0)
     assert shown["motion.sog"] == pytest.approx(math.hypot(0.5, 0.5))
     assert shown["motion.speed"] == pytest.approx(0.5)
+
+
+@FMI
+def test_a_rudder_order_past_the_stops_is_held_there_and_one_in_degrees_is_refused(
+    fmi: int, start: Callable[[int, str], RunningFmu]
+) -> None:
+    fmu = start(fmi, "CoSimulation")
+    initialise(fmu, {})
+    fmu.write({"rudder.command": math.radians(60.0)})
+    for step in range(40):
+        fmu.instance.doStep(currentCommunicationPoint=0.5 * step, communicationStepSize=0.5)
+    assert fmu.read(["rudder.angle"]) == [pytest.approx(math.radians(40.0), abs=1e-3)]
+    with pytest.raises(FMICallException):
+        fmu.write({"rudder.command": 35.0})
+    assert fmu.read(["rudder.command"]) == [math.radians(60.0)]
+
+
+def test_revolutions_in_rpm_where_rad_per_s_belong_are_refused(mariner_card: ManoeuvringCard) -> None:
+    text = mariner_card.text + "\n[propulsion]\nnominal_rpm = 90.0\nXnn = 77e-5\n"
+    model = build(parse_card(text, "ship.toml"))
+    lowest, highest = interface(model).by_name["propeller.speed"].accepted or (0.0, 0.0)
+    assert lowest < -math.radians(6 * 90.0) < math.radians(6 * 90.0 * 1.2) < highest < 90.0
+    nominal = interface(model).by_name["propulsion.nominal_speed"]
+    assert 0 < nominal.minimum < nominal.start < nominal.maximum
+    with pytest.raises(InputError) as caught:
+        simulate(model, Turn(0.5), inputs={"propeller.speed": 90.0})
+    assert caught.value.place == "propeller.speed"

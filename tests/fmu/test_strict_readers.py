@@ -10,6 +10,7 @@ from dataclasses import replace
 from datetime import datetime
 from functools import cache
 from pathlib import Path
+from unittest import mock
 
 import fmpy
 import pytest
@@ -29,6 +30,8 @@ from tank2sim.fmu.passport import PASSPORT_PAGE, Replay
 from tank2sim.fmu.provenance import Origin
 from tank2sim.fmu.templates import c_identifier
 from tank2sim.fmu.unpacking import UnpackedFmu
+from tank2sim.simulation.card_range import Reading
+from tank2sim.simulation.run import Run
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 SHIPS = pytest.mark.parametrize("ship", [*bundled_cards(), "autopilot"])
@@ -248,13 +251,14 @@ def test_no_name_breaks_the_description(fmi: int, text: str, models: dict[str, M
 @given(text=TEXT)
 def test_no_name_breaks_the_passport(text: str, models: dict[str, Model]) -> None:
     strange = replace(models["gain"], name=text, description=text, notices=(text,))
+    zigzag = Run(mock.Mock(), {"overshoots_deg": [1.0]}, (text,), Reading({}, {"x": 0.0}, 0.0, text))
     documents = Documents(source=text, validity=text, origins={"command": Origin(text, text)})
-    files = passport_files(strange, documents, {"zigzag_20_20": {"overshoots_deg": [1.0]}}, Replay(problem=text))
+    files = passport_files(strange, documents, {"zigzag_20_20": zigzag}, Replay(problem=text))
     tags = [one.tag for one in page_of(files).iter()]
     quiet = passport_files(
         replace(strange, name="x", description="x", notices=("x",)),
         Documents(source="x", validity="x", origins={"command": Origin("x", "x")}),
-        {"zigzag_20_20": {"overshoots_deg": [1.0]}},
+        {"zigzag_20_20": zigzag},
         Replay(problem="x"),
     )
     if text:  # without a text a paragraph is left out

@@ -101,15 +101,6 @@ def test_a_run_too_short_leaves_figures_open_and_says_so(mariner) -> None:
     assert run.figures["advance_m"] is None and any("does not show" in notice for notice in run.notices)
 
 
-def test_a_run_outside_the_range_of_speeds_says_so(mariner_card) -> None:
-    narrow = mariner_card.text.replace("valid_speed_mps = [5.4, 9.3]", "valid_speed_mps = [7.0, 9.3]")
-    model = build(parse_card(narrow, "ship.toml"))
-    assert any("outside the card's range" in n for n in simulate(model, parse_manoeuvre("turn:35")).notices)
-    assert not simulate(model, parse_manoeuvre("turn:35"), duration_s=5.0).notices[:0]
-    inside = build(mariner_card)
-    assert not any("outside" in n for n in simulate(inside, parse_manoeuvre("turn:35")).notices)
-
-
 def test_the_spiral_of_a_stable_ship_has_no_loop_and_that_of_an_unstable_one_has(mariner_card) -> None:
     stable = simulate(build(mariner_card), parse_manoeuvre("spiral:5")).figures
     assert stable["loop_width_deg"] == 0.0

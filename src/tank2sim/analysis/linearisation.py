@@ -3,83 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 import control
 import numpy as np
-from scipy.optimize import root
 
 from tank2sim.dynamics.model import Model, Vector
-from tank2sim.errors import InputError
+from tank2sim.simulation.straight_course import OperatingPoint, straight_course
 
-
-@dataclass(frozen=True)
-class OperatingPoint:
-    """Where a model is linearised.
-
-    Parameters
-    ----------
-    x, u, p : arrays (nx,), (nu,), (np,)
-        States, inputs and parameters of the model.
-    """
-
-    x: Vector
-    u: Vector
-    p: Vector
-
-
-def straight_course(model: Model, speed_mps: float | None = None) -> OperatingPoint:
-    """Straight course of a ship at a speed: the sway velocity and the rudder at which Y and N vanish with r = 0.
-
-    On an asymmetric ship (Y0, N0) neither is zero. The speed is held: what the engine must give for it is not asked.
-
-    Raises
-    ------
-    InputError
-        The model is no ship, or there is no such course.
-    """
-    if "rudder.angle" not in model:
-        raise InputError(model.name, "", "has no rudder", "this needs the card of a ship (kind linear or abkowitz)")
-    p, u = model.parameter_values(), model.input_values()
-    x = np.array(model.initial(p)).ravel()
-    names = model.state_names
-    if speed_mps is not None:
-        x[names.index("motion.u")] = speed_mps
-    unknown = [names.index("motion.v"), names.index("rudder.angle")]
-    accelerations = ca.vcat([model.expand(model.symbol(name)) for name in ("motion.vdot", "motion.rdot")])
-    arguments = [model.x, model.u, model.p]
-    residual = ca.Function("residual", arguments, [accelerations])
-    slope = ca.Function("slope", arguments, [ca.jacobian(accelerations, model.x)])
-
-    def with_unknown(values: Vector) -> Vector:
-        full = x.copy()
-        full[unknown] = values
-        return full
-
-    solution = root(
-        lambda values: np.array(residual(with_unknown(values), u, p)).ravel(),
-        x[unknown],
-        jac=lambda values: np.array(slope(with_unknown(values), u, p))[:, unknown],
-        tol=1e-14,
-    )
-    left = np.abs(np.array(residual(with_unknown(solution.x), u, p)).ravel())
-    if not np.all(left < 1e-9) or abs(solution.x[1]) > np.pi / 4:
-        problem = "no rudder angle below 45 deg holds a straight course"
-        raise InputError(model.name, "", problem, _cause(np.array(slope(x, u, p))[:, unknown]))
-    x = with_unknown(solution.x)
-    u[model.input_names.index("rudder.command")] = solution.x[1]
-    return OperatingPoint(x, u, p)
-
-
-def _cause(slopes: Vector) -> str:
-    """Why there is no straight course, from the slopes (2, 2) of sway and yaw acceleration by v and by the rudder."""
-    by_sway, by_rudder = np.abs(slopes).max(axis=0)
-    if not by_sway:
-        return "sway moves neither Y nor N: check Yv and Nv of the card"
-    if not by_rudder:
-        return "the rudder moves neither Y nor N: check Yd and Nd of the card"
-    return "check Yd, Nd, Y0 and N0 of the card"
+__all__ = ["OperatingPoint", "jacobians", "signal_name", "state_space", "straight_course"]
 
 
 def jacobians(

@@ -24,6 +24,11 @@ Mass = Annotated[float, Field(ge=1e-6, le=1e12)]
 Text = Annotated[str, Field(min_length=1)]
 
 
+DRIFT_OF_CAPTIVE_TESTS, YAW_RATE_OF_CAPTIVE_TESTS = 0.5235987755982988, 1.0
+"""Drift angle (rad, 30 deg) and abs(r') (a turn of one length of radius) up to which a card that states no others is
+taken to hold: captive tests seldom go further. Project choice."""
+
+
 def _rising_pair(value: object) -> object:
     """TOML has lists, the form has pairs.
 
@@ -94,6 +99,9 @@ class ShipModel(Section):
     yaw_rate_terms: Literal["total", "hydrodynamic"]
     rudder_sign: Literal["port", "starboard"]
     valid_speed_mps: SpeedRange | None = None
+    valid_drift_rad: Annotated[float, Field(ge=0, le=1.5707963267948966)] = DRIFT_OF_CAPTIVE_TESTS
+    valid_rudder_rad: Annotated[float, Field(ge=0, le=1.5707963267948966)] | None = None
+    valid_yaw_rate_prime: Annotated[float, Field(ge=0, le=10)] = YAW_RATE_OF_CAPTIVE_TESTS
 
     @property
     def speed_range_mps(self) -> tuple[float, float]:

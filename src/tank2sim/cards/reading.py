@@ -24,7 +24,7 @@ from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
 from tank2sim.units import to_si
 
 # Sections whose keys may give an angle in degrees or radians.
-_SECTIONS_WITH_ANGLES = ("steering_gear", "propulsion", "yaw_rig", "programme")
+_SECTIONS_WITH_ANGLES = ("model", "steering_gear", "propulsion", "yaw_rig", "programme")
 # Kind of model, which is also the name of its section of coefficients, to the card that is all in SI.
 _SI_CARDS: dict[str, type[SurgeBodyCard | GliderCard | YawRigCard]] = {
     "surge": SurgeBodyCard,

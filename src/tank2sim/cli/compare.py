@@ -12,7 +12,7 @@ from tank2sim.analysis.practice.comparison import CardComparison, compare_cards
 from tank2sim.analysis.practice.standard_trials import MEMBERS
 from tank2sim.cards import read_card
 from tank2sim.cli.bridge import manoeuvring
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.cli.screen import json_option, json_text, screen, show_marked, show_notices, show_table
 from tank2sim.files import write_together
 from tank2sim.units import in_words
 
@@ -57,6 +57,7 @@ def _page(found: CardComparison) -> str:
 
 
 def _show(found: CardComparison) -> None:
+    others = show_marked(found.notices)
     for place, label in enumerate(found.labels[1:], start=1):
         rms = found.rms(place)
         apart = "" if rms is None else f", rms {rms:.3g} (1 by chance)"
@@ -96,7 +97,7 @@ def _show(found: CardComparison) -> None:
             if row.name in _SHOWN
         ],
     )
-    show_notices(found.notices)
+    show_notices(others)
 
 
 def _with_errors(values: tuple[float | None, ...], deviations: tuple[float | None, ...]) -> list[str]:

@@ -21,7 +21,7 @@ from tank2sim.cards.covariance import (
     read_covariance,
     referring,
 )
-from tank2sim.cli.screen import screen, show_notices, show_table
+from tank2sim.cli.screen import screen, show_marked, show_notices, show_table
 from tank2sim.errors import InputError
 from tank2sim.executors import FORMS, PROCESSES, check_executor, executing
 from tank2sim.simulation.bands import Band
@@ -136,9 +136,10 @@ def show_bands(bands: Mapping[str, Band], asked: Members, told: Sequence[str] = 
         kind, at, argument = name.partition("@")
         words, unit = in_words(kind)
         rows.append([words + at + argument, unit, band.low, band.median, band.high, band.shown])
+    remaining = show_marked(one for one in asked.notices if one not in told)
     title = f"Ensemble of {asked.members}, seed {asked.seed}: nine of ten lie between 5 and 95 %"
     show_table(title, ["figure", "unit", "5 %", "50 %", "95 %", "shown by"], rows)
-    show_notices([one for one in asked.notices if one not in told])
+    show_notices(remaining)
 
 
 def show_stability_bands(found: StabilityBands) -> None:

@@ -22,7 +22,7 @@ from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.cli.agreed import parse_agreed, parse_bounds
 from tank2sim.cli.changes import parse_changes
 from tank2sim.cli.ensemble import asked_of, computing, ensemble_options, show_bands, with_carried_covariance
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.cli.screen import json_option, json_text, screen, show_marked, show_notices, show_table
 from tank2sim.cli.steering_card import refuse_options, show_steering_card
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.cli.two_points import Files, tune_through
@@ -103,7 +103,9 @@ _PAIR, _MARGINS = 17, 3
     metavar="RATE@RUDDER ...",
     help="Scale the hull's balance of moment and damping, and the rudder, until the steady turns meet two points: "
     "deg/min to the side of the rudder, without a sign, at deg of rudder, + to starboard (20@-3: 20 deg/min to port at "
-    "3 deg to port; at 0, of an unstable ship: to starboard), or a radius, 424m@20.",
+    "3 deg to port; at 0, of an unstable ship: to starboard), or a radius, 424m@20. "
+    "Not with --figure, --tune, --hold, "
+    "--bound, --agreed, --page or --ensemble.",
 )
 @click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="A value in place of the card's.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the tuned card.")
@@ -160,10 +162,11 @@ def command(
         **({page: _page(told)} if page else {}),
     }
     write_together(contents, inputs=[Path(ship.source)], outputs=[json_file, output, page])
+    remaining = show_marked(notices)
     _show(result)
     if tuned:
         _show_tuned(tuned)
-    show_notices(notices)
+    show_notices(remaining)
     if bands:
         show_bands(bands.figures, bands.asked, told=notices)
 

@@ -11,13 +11,27 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from tank2sim.files import plain_json
+from tank2sim.files import STANDARD_OUTPUT, plain_json
+from tank2sim.marks import marked
 
 screen = Console(highlight=False)
 """Where summaries go."""
 
+
+def _standard_output(context: click.Context, parameter: click.Parameter, given: Path | None) -> Path | None:
+    if given != Path("-"):
+        screen.stderr = False
+        return given
+    screen.stderr = True  # the summary goes there, so that standard output is JSON and nothing else
+    return STANDARD_OUTPUT
+
+
 json_option = click.option(
-    "--json", "json_file", type=click.Path(path_type=Path, dir_okay=False), help="Write the full result as JSON."
+    "--json",
+    "json_file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    callback=_standard_output,
+    help="Write the full result as JSON; - is standard output, and the summary then goes to the error stream.",
 )
 """``--json FILE``, the same on every command."""
 
@@ -38,6 +52,15 @@ def show_notices(notices: Iterable[str]) -> None:
     """Print what the user should be told, a line each."""
     for notice in notices:
         screen.print(f"[yellow]note:[/yellow] {escape(notice)}", soft_wrap=True)
+
+
+def show_marked(notices: Iterable[str]) -> list[str]:
+    """Print the notices that mark the result as one that its data do not carry; return the others, for its end."""
+    notices = list(notices)
+    first = marked(notices)
+    for notice in first:
+        screen.print(f"[bold red]{escape(notice)}[/bold red]", soft_wrap=True)
+    return [notice for notice in notices if notice not in first]
 
 
 def shown(value: object) -> str:

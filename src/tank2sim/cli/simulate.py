@@ -10,9 +10,10 @@ from tank2sim.analysis.ensemble.results import ManoeuvreBands, manoeuvre_bands
 from tank2sim.cards import read_card
 from tank2sim.cli.changes import parse_changes
 from tank2sim.cli.ensemble import asked_of, computing, ensemble_options, show_bands, uncertain_ship
-from tank2sim.cli.screen import json_option, json_text, show_notices, show_table
+from tank2sim.cli.screen import json_option, json_text, show_marked, show_notices, show_table
 from tank2sim.dynamics import build
 from tank2sim.files import write_together
+from tank2sim.simulation.card_range import Reading, entry_name
 from tank2sim.simulation.manoeuvres import FORMS, parse_manoeuvre
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trial_file import histories, trial_csv
@@ -52,16 +53,29 @@ def command(card: str, manoeuvre: str, duration: float | None, settings: tuple[s
     if plot := files["plot"]:
         contents[plot] = _picture(run, f"{ship.ship.name}, {manoeuvre}", bands)
     if json_file := files["json_file"]:
-        result = {"ship": ship.ship.name, "manoeuvre": manoeuvre, "figures": run.figures, "notices": run.notices}
+        result = {"ship": ship.ship.name, "manoeuvre": manoeuvre, "figures": run.figures, **run.reading.as_json()}
+        result["notices"] = run.notices
         result |= {"histories": histories(run.trajectory)}
         contents[json_file] = json_text(result | ({"ensemble": bands.as_json()} if bands else {}))
     orders = Path(manoeuvre.removeprefix("file:"))
     write_together(contents, inputs=[Path(ship.source), orders], outputs=files.values())
-    rows = [[*in_words(name), value] for name, value in run.figures.items()]
-    show_table(f"{ship.ship.name}, {manoeuvre}", ["figure", "unit", "value"], rows)
-    show_notices(run.notices)
+    others = show_marked(run.notices)
+    rows = [[*in_words(name), value, _beyond(name, value, run.reading)] for name, value in run.figures.items()]
+    heads = ["figure", "unit", "value", "card"]
+    if not run.reading.message:
+        rows, heads = [row[:3] for row in rows], heads[:3]
+    show_table(f"{ship.ship.name}, {manoeuvre}", heads, rows)
+    show_notices(others)
     if bands:
         show_bands(bands.figures, bands.asked)
+
+
+def _beyond(name: str, value: object, read: Reading) -> str:
+    """Whether a figure was settled outside the card's range, for the table; of a list, from which entry on."""
+    if not isinstance(value, list):
+        return "beyond" if value is not None and read.outside(name) else ""
+    outside = [place for place in range(len(value)) if read.outside(entry_name(name, place))]
+    return "" if not outside else "beyond" if outside[0] == 0 else f"beyond from no. {outside[0] + 1}"
 
 
 def _picture(run: Run, title: str, bands: ManoeuvreBands | None) -> bytes:

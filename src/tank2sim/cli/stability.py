@@ -18,7 +18,7 @@ from tank2sim.analysis.stability.study import StabilityStudy, stability_study
 from tank2sim.cards import read_card
 from tank2sim.cli.changes import parse_changes
 from tank2sim.cli.ensemble import asked_of, computing, ensemble_options, show_stability_bands, uncertain_ship
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.cli.screen import json_option, json_text, screen, show_marked, show_notices, show_table
 from tank2sim.dynamics import build
 from tank2sim.files import write_together
 from tank2sim.native.compiler import find_compiler
@@ -64,8 +64,9 @@ def command(card: str, speed: float | None, settings: tuple[str, ...], spirals: 
     if page := files["page"]:
         contents[page] = _page(study, notices, bands)
     write_together(contents, inputs=[Path(ship.source)], outputs=files.values())
+    others = show_marked(notices)
     _show(study)
-    show_notices(notices)
+    show_notices(others)
     if bands:
         show_stability_bands(bands)
 

@@ -15,7 +15,7 @@ from tank2sim.analysis.stability.imo import imo_criteria
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.cli.bridge import manoeuvring
 from tank2sim.cli.changes import parse_changes
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.cli.screen import json_option, json_text, screen, show_marked, show_notices, show_table
 from tank2sim.cli.trials import trial_files
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
@@ -92,8 +92,9 @@ def command(card: str, trials: tuple[Path, ...], **options: Any) -> None:
         evidence = Evidence(ship, ready.model, found, verified, criteria, replays, notices)
         contents[page] = render_page(validation_page(evidence))
     write_together(contents, inputs=[Path(ship.source), *files], outputs=(options["page"], options["json_file"]))
+    others = show_marked(notices)
     _show(ship, found, verified)
-    show_notices(notices)
+    show_notices(others)
 
 
 def _replays(card: ManoeuvringCard, given: Measured) -> tuple[tuple[Passed, ...], tuple[str, ...]]:

@@ -63,8 +63,8 @@ def _with_effect(model: Model, card: ManoeuvringCard, entry: EffectEntry, place:
                 continue
             raise card.fault(f"{place}.parameters.{name}", "is missing", f"give the {parameter.description}")
         value = entry.parameters[name]
-        if not parameter.minimum <= value <= parameter.maximum:
+        if not parameter.lowest(card) <= value <= parameter.maximum:
             key, shown = card.in_file(f"{place}.parameters.{name}", value)
-            lowest, highest = (from_si(key, bound) for bound in (parameter.minimum, parameter.maximum))
+            lowest, highest = (from_si(key, bound) for bound in (parameter.lowest(card), parameter.maximum))
             raise card.fault(key, f"is {shown:g}", f"{lowest:g} to {highest:g} was expected")
     return effect.apply(model, entry.parameters, card)

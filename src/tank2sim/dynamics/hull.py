@@ -30,9 +30,9 @@ VALIDITY_MARGIN = 0.2
 
 A choice of ours: forces grow with the square of speed, so 20 % of speed is 44 % of force."""
 
-LARGEST_DRIFT, LARGEST_YAW_RATE = 0.5, 1.0
-"""abs(v') (30 deg of drift) and abs(r') (a turn of one length of radius) to which captive tests go at the most: from
-there ``validity`` falls to 0 at twice that. No card states its own: a choice of ours."""
+DRIFT_MARGIN, YAW_RATE_MARGIN, RUDDER_MARGIN = 0.5, 1.0, 0.35
+"""Beyond the largest abs(v'), abs(r') and abs(delta) (rad) of the card ``validity`` falls from 1 to 0 over these: those
+of v' and r' are what captive tests usually reach, that of the rudder 20 deg. Project choice."""
 
 
 @dataclass(frozen=True)
@@ -305,8 +305,9 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
     yaw_rate = hull["motion.r"] * hull["ship.length"] / speed.symbol
     inside = (
         _inside(speed.symbol - hull["ship.fastest"], VALIDITY_MARGIN * u0)
-        * _inside(ca.fabs(v) / speed.symbol - LARGEST_DRIFT, LARGEST_DRIFT)
-        * _inside(ca.fabs(yaw_rate) - LARGEST_YAW_RATE, LARGEST_YAW_RATE)
+        * _inside(ca.fabs(v) / speed.symbol - ca.sin(hull["ship.largest_drift"]), DRIFT_MARGIN)
+        * _inside(ca.fabs(yaw_rate) - hull["ship.largest_yaw_rate"], YAW_RATE_MARGIN)
+        * _inside(ca.fabs(hull["rudder.effective"]) - hull["ship.largest_rudder"], RUDDER_MARGIN)
     )
     low = Quantity(
         name="low_speed.share",
@@ -320,9 +321,9 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
         name="validity",
         unit="1",
         description=(
-            "1 in the range of speeds in which the card holds, to 30 deg of drift and a yaw rate of U/L; below that "
-            "speed the share of the card's polynomial in the forces, 0 at low speed and astern; falling to 0 above it, "
-            "and towards twice that drift velocity and yaw rate"
+            "1 in the range of speed, drift angle, yaw rate and rudder angle in which the card holds; below that "
+            "speed the share of the card's polynomial in the forces, 0 at low speed and astern; falling to 0 beyond "
+            "the others"
         ),
         minimum=0.0,
         maximum=1.0,

@@ -20,6 +20,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from tank2sim.errors import InputError
 from tank2sim.units import UNITS
 
 Vector = NDArray[np.float64]
@@ -73,9 +74,23 @@ class Parameter(Variable):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Input(Variable):
-    """What acts on the model from outside."""
+    """What acts on the model from outside.
+
+    `accepted` is the largest magnitude of an order that the model itself holds within its bounds, such as a rudder's at
+    its stops; None: a value beyond the bounds is refused.
+    """
 
     start: float = 0.0
+    accepted: float | None = None
+
+    @property
+    def accepted_range(self) -> tuple[float, float]:
+        """Lowest and highest value that may be set."""
+        if self.accepted is not None:
+            return -self.accepted, self.accepted
+        extent = UNITS[self.unit].extent
+        low, high = self.minimum, self.maximum
+        return -extent if low is None else low, extent if high is None else high
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -197,8 +212,30 @@ class Model:
         return tuple(variable.name for variable in self.parameters)
 
     def input_values(self, changed: Mapping[str, float] | None = None) -> Vector:
-        """The input vector u: start values, with those of `changed` (by name) in place of their own."""
+        """The input vector u: start values, with those of `changed` (by name) in place of their own.
+
+        Raises
+        ------
+        InputError
+            A value is beyond the bounds of its input.
+        """
+        self.check_inputs(changed or {})
         return _values(self.inputs, changed or {})
+
+    def check_inputs(self, values: Mapping[str, float]) -> None:
+        """Refuse values of inputs, by name, that are beyond their bounds.
+
+        Raises
+        ------
+        InputError
+            One of them is.
+        """
+        for variable in self.inputs:
+            value = values.get(variable.name, variable.start)
+            low, high = variable.accepted_range
+            if not low <= value <= high:
+                remedy = f"it lies between {low:g} and {high:g} {variable.unit}: {variable.description}"
+                raise InputError(self.name, variable.name, f"cannot be {value:g} {variable.unit}", remedy)
 
     def parameter_values(self, changed: Mapping[str, float] | None = None) -> Vector:
         """The parameter vector p: start values, with those of `changed` (by name) in place of their own."""

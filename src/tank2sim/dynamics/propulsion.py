@@ -7,6 +7,10 @@ import casadi as ca
 from tank2sim.cards.form import Propulsion
 from tank2sim.dynamics.model import Input, Parameter, Quantity, Variable
 
+LARGEST_REVOLUTIONS = 3.0
+"""Largest revolutions over the nominal ones: no engine reaches it, and an order in rpm where rad/s belong (9.5 times)
+lies beyond it. Project choice."""
+
 
 def propulsion(section: Propulsion) -> tuple[Variable, ...]:
     """Input ``propeller.speed`` (rad/s), quantity ``propeller.speed_actual``, parameters ``propulsion.*``."""
@@ -16,6 +20,8 @@ def propulsion(section: Propulsion) -> tuple[Variable, ...]:
         description="Propeller revolutions, positive ahead",
         display_unit="rpm",
         nominal=section.nominal_radps,
+        minimum=-LARGEST_REVOLUTIONS * section.nominal_radps,
+        maximum=LARGEST_REVOLUTIONS * section.nominal_radps,
         start=section.nominal_radps,
     )
     return (
@@ -34,7 +40,8 @@ def propulsion(section: Propulsion) -> tuple[Variable, ...]:
             description="Revolutions that hold the speed of expansion",
             display_unit="rpm",
             nominal=section.nominal_radps,
-            minimum=0.0,
+            minimum=section.nominal_radps / LARGEST_REVOLUTIONS,
+            maximum=LARGEST_REVOLUTIONS * section.nominal_radps,
             start=section.nominal_radps,
         ),
         Parameter(

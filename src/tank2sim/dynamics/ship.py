@@ -65,10 +65,19 @@ def ship_model(card: ManoeuvringCard) -> Model:
         quantities=(),
         outputs=(),
         step_s=_step(card),
-        notices=(*notices, *gear_notices),
+        notices=(*notices, *gear_notices, *_without_yaw(card)),
     )
     outputs = (*OUTPUTS, *(["propeller.speed_actual"] if engine else []))
     return empty.extend(*given, *motion_quantities(hull), outputs=outputs)
+
+
+def _without_yaw(card: ManoeuvringCard) -> list[str]:
+    if card.model.valid_yaw_rate_prime > 0:
+        return []
+    return [
+        "no test behind the card had a yaw rate (valid_yaw_rate_prime = 0): its derivatives by r, and with them course "
+        "stability and every turn, are estimates"
+    ]
 
 
 def _description(card: ManoeuvringCard) -> str:
@@ -151,7 +160,20 @@ def _ship_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
             display_unit=more.get("display_unit"),
         )
 
-    body = card.rigid_body
+    def largest(name: str, unit: str, description: str, start: float) -> Parameter:
+        return Parameter(
+            name=name,
+            unit=unit,
+            description=description,
+            display_unit="deg" if unit == "rad" else None,
+            start=start,
+            minimum=0.0,
+            maximum=math.pi / 2 if unit == "rad" else None,
+            tunable=False,
+        )
+
+    body, model = card.rigid_body, card.model
+    rudder = math.pi / 2 if model.valid_rudder_rad is None else model.valid_rudder_rad
     return (
         particular("ship.length", "m", "Length between perpendiculars", scales.length),
         particular("ship.speed", "m/s", "Speed u0 about which forces are expanded", scales.speed, display_unit="knots"),
@@ -161,6 +183,11 @@ def _ship_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
         particular("ship.water_density", "kg/m3", "Density of the water", scales.density),
         particular("ship.slowest", "m/s", "Lowest speed at which the card holds", slowest, display_unit="knots"),
         particular("ship.fastest", "m/s", "Highest speed at which the card holds", fastest, display_unit="knots"),
+        largest("ship.largest_drift", "rad", "Largest drift angle at which the card holds", model.valid_drift_rad),
+        largest(
+            "ship.largest_yaw_rate", "1", "Largest yaw rate r L/U at which the card holds", model.valid_yaw_rate_prime
+        ),
+        largest("ship.largest_rudder", "rad", "Largest rudder angle at which the card holds", rudder),
     )
 
 

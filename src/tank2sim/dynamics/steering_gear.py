@@ -79,6 +79,7 @@ def _inputs(gear: SteeringGear) -> tuple[Input, Input]:
         nominal=0.35,
         minimum=-(gear.max_angle_rad or ca.pi / 2),
         maximum=gear.max_angle_rad or ca.pi / 2,
+        accepted=ca.pi / 2,  # more is an angle in degrees; up to there the gear stops at its largest angle
     )
     failed = Input(
         name="steering.failed",

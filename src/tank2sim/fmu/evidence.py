@@ -18,7 +18,7 @@ from tank2sim.fmu.reference import output_errors
 from tank2sim.fmu.reference_run import ReferenceRun, reference_run
 from tank2sim.fmu.templates import render
 from tank2sim.fmu.unpacking import unpack
-from tank2sim.simulation.figures import Figures
+from tank2sim.simulation.run import Run
 from tank2sim.units import in_words
 
 _TITLES = {"zigzag_20_20": "Zigzag 20/20", "turn_35": "Turning circle, rudder 35 deg to starboard"}
@@ -32,13 +32,13 @@ class Evidence:
     ----------
     reference : ReferenceRun, optional
         None if the motion leaves all bounds.
-    figures : mapping
-        Manoeuvring figures of a ship, by run.
+    manoeuvres : mapping
+        Standard manoeuvres of a ship, by name.
     """
 
     model: Model
     reference: ReferenceRun | None
-    figures: Mapping[str, Figures]
+    manoeuvres: Mapping[str, Run]
 
     def reference_files(self) -> dict[str, str]:
         """Name in the FMU to text of the reference result."""
@@ -46,7 +46,7 @@ class Evidence:
 
     def passport_files(self, documents: Documents, fmu: bytes, fmi: int) -> dict[str, str]:
         """Name in the FMU to text: the passport for machines and as a page, with what the FMU `fmu` itself answered."""
-        return passport_files(self.model, documents, self.figures, replayed(fmu, self.reference, self.model, fmi))
+        return passport_files(self.model, documents, self.manoeuvres, replayed(fmu, self.reference, self.model, fmi))
 
 
 def gather(model: Model) -> Evidence:
@@ -75,11 +75,9 @@ def replayed(fmu: bytes, reference: ReferenceRun | None, model: Model, fmi: int)
     return Replay(run=reference.title, platform=platform, max_error=errors[worst], output=worst)
 
 
-def passport_files(
-    model: Model, documents: Documents, figures: Mapping[str, Figures], replay: Replay
-) -> dict[str, str]:
+def passport_files(model: Model, documents: Documents, manoeuvres: Mapping[str, Run], replay: Replay) -> dict[str, str]:
     """Name in the FMU to text: the passport for machines and as a page."""
-    made = passport(model, documents, figures, replay)
+    made = passport(model, documents, manoeuvres, replay)
     page = {
         "passport": made,
         "version": version("tank2sim"),

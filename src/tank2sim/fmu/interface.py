@@ -35,6 +35,8 @@ class FmuVariable:
         Start value in `unit`; None where it is calculated.
     derivative_of : int, optional
         Value reference of the state of which this is the time derivative.
+    accepted : pair of float, optional
+        Lowest and highest value that an input may be set to; None: those of minimum and maximum.
     """
 
     name: str
@@ -51,6 +53,7 @@ class FmuVariable:
     start: float | None = None
     boolean: bool = False
     derivative_of: int | None = None
+    accepted: tuple[float, float] | None = None
 
     @property
     def tunable(self) -> bool:
@@ -221,6 +224,7 @@ def _input(variable: Input, reference: int) -> FmuVariable:
         variability="discrete" if variable.boolean else "continuous",
         start=float(variable.start),
         boolean=variable.boolean,
+        accepted=None if variable.boolean else variable.accepted_range,
     )
 
 

@@ -13,6 +13,7 @@ from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.provenance import ABSENT, Origin
 from tank2sim.fmu.reference_run import EXTRA
+from tank2sim.simulation.run import Run
 
 PASSPORT_FILE = f"{EXTRA}/passport.json"
 PASSPORT_PAGE = "documentation/passport.html"
@@ -73,6 +74,7 @@ class Passport:
     coefficients: tuple[Coefficient, ...]
     notices: tuple[str, ...]
     figures: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    card_range: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     replay: Replay = field(default_factory=Replay)
 
     def as_json(self) -> str:
@@ -81,9 +83,7 @@ class Passport:
         return json.dumps(_finite(values), indent=1, allow_nan=False) + "\n"
 
 
-def passport(
-    model: Model, documents: Documents, figures: Mapping[str, Mapping[str, object]], replay: Replay
-) -> Passport:
+def passport(model: Model, documents: Documents, manoeuvres: Mapping[str, Run], replay: Replay) -> Passport:
     """The passport of a model, from the origins that its documents state."""
     variables: list[Parameter | Input] = [*model.parameters]
     variables += [one for one in model.inputs if one.name in documents.origins]
@@ -99,7 +99,8 @@ def passport(
             if not one.name.startswith(_NOT_OF_THE_SHIP)
         ),
         notices=model.notices,
-        figures=figures,
+        figures={name: run.figures for name, run in manoeuvres.items()},
+        card_range={name: run.reading.as_json() | {"message": run.reading.message} for name, run in manoeuvres.items()},
         replay=replay,
     )
 

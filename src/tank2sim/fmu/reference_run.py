@@ -18,10 +18,9 @@ from tank2sim.dynamics.model import Model, Vector
 from tank2sim.errors import InputError
 from tank2sim.fmu.manoeuvre import Manoeuvre, manoeuvre
 from tank2sim.fmu.reference import by_scheme
-from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
-from tank2sim.simulation.run import simulate
+from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trajectory import Trajectory
 
 EXTRA = "extra/org.tank2sim"
@@ -66,24 +65,24 @@ class ReferenceRun:
         }
 
 
-def reference_run(model: Model) -> tuple[ReferenceRun | None, dict[str, Figures]]:
-    """The reference run of a model, and manoeuvring figures of a ship: zigzag 20/20 and turning circle, 35 deg.
+def reference_run(model: Model) -> tuple[ReferenceRun | None, dict[str, Run]]:
+    """The reference run of a model, and standard manoeuvres of a ship: zigzag 20/20 and turning circle, 35 deg.
 
-    The run is None, and figures are missing, where the motion leaves all bounds.
+    The run is None, and manoeuvres are missing, where the motion leaves all bounds.
     """
     if not all(name in model for name in _SHIP):
         return _answered("steps of every input", manoeuvre(model), model), {}
-    figures: dict[str, Figures] = {}
+    runs: dict[str, Run] = {}
     run = None
     integrator = Integrator(model, compiled=False)  # compiling would take longer than the runs
     try:
         zigzag = simulate(model, _ZIGZAG, integrator=integrator)
-        figures["zigzag_20_20"] = zigzag.figures
+        runs["zigzag_20_20"] = zigzag
         run = _answered("zigzag 20/20", _at_points(zigzag.trajectory), model)
-        figures["turn_35"] = simulate(model, _TURN, integrator=integrator).figures
+        runs["turn_35"] = simulate(model, _TURN, integrator=integrator)
     except InputError:  # the motion leaves all bounds: the passport says what is missing
         pass
-    return run, figures
+    return run, runs
 
 
 def read_reference(folder: Path) -> ReferenceRun | None:

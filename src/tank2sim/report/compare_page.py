@@ -17,7 +17,7 @@ from tank2sim.report.results.values import Json
 from tank2sim.units import in_words
 
 _COEFFICIENTS = (
-    "Prime system, rudder positive to starboard, in the convention of the first card. A coefficient belongs to the "
+    "Prime system, in the convention of the first card, the sign of its rudder included. A coefficient belongs to the "
     "speed about which forces are expanded, to the speed that makes them non-dimensional and to what of the inertia is "
     "in it; where cards differ in these, the forces are expanded anew to the third order, and the standard errors go "
     "with them. A difference is divided by the root of both variances: beyond 2 it is unlikely to be chance. A number "

@@ -16,7 +16,7 @@ from tank2sim.report.results.motions import HIGH, LOW, MIDDLE
 from tank2sim.report.results.values import Json
 from tank2sim.report.runs import SHIP_SIGNALS, history_of, signals_of, track_of
 from tank2sim.report.stability_page import BEYOND
-from tank2sim.simulation.bands import Band
+from tank2sim.simulation.bands import Band, small_edge_first
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import in_words
 
@@ -36,7 +36,9 @@ def banded_chart(label: str, run: Trajectory, bands: ManoeuvreBands) -> alt.VCon
     """Track and histories of the card itself, with the quantiles of the ensemble; those of the track across it."""
     tracks = [track_of(label, run)]
     if bands.track is not None:
-        lines = ((LOW, bands.track.low), (MIDDLE, bands.track.middle), (HIGH, bands.track.high))
+        middle = bands.track.middle
+        small, large = small_edge_first(bands.track.low, middle, bands.track.high)
+        lines = ((LOW, small), (MIDDLE, middle), (HIGH, large))
         kept = slice(bands.track.count)
         tracks += [
             Track(label=name, x_m=line[kept, 0], y_m=line[kept, 1], time_s=bands.times_s[kept]) for name, line in lines

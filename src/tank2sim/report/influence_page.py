@@ -122,9 +122,9 @@ def _uncertainty(found: Json, coefficients: Coefficients) -> Section:
     figures: Mapping[str, Mapping[str, Json]] = found["figures"]
     text = _ERRORS.format(found.get("standard_errors", "from the card's standard errors"))
     rows: list[Sequence[Cell]] = []
-    for text, one in figures.items():
+    for name, one in figures.items():
         relative = 100 * abs(one["standard_error"] / one["value"]) if one["value"] else None
-        rows.append([text, one["value"], one["standard_error"], _cell(relative)])
+        rows.append([name, one["value"], one["standard_error"], _cell(relative)])
     columns = [
         Column(title="figure"),
         Column(title="value"),

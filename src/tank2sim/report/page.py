@@ -21,6 +21,7 @@ import vl_convert
 from markupsafe import Markup
 
 from tank2sim import __version__
+from tank2sim.marks import marked
 from tank2sim.report.appearance import DARK, LIGHT, LOCALE
 from tank2sim.report.charts import VEGALITE_VERSION, chart_specification
 from tank2sim.report.numbers import NOTHING, format_column, format_number, is_number
@@ -136,6 +137,7 @@ def render_page(page: Page) -> str:
     environment.filters["paragraphs"] = _paragraphs
     return environment.get_template("page.html.j2").render(
         page=page,
+        marks=marked(_messages(page)),
         cards_across=_cards_across(len(page.figures)),
         figures=[(figure, _shown(figure.value)) for figure in page.figures],
         sections=sections,
@@ -145,6 +147,14 @@ def render_page(page: Page) -> str:
         library=Markup(_vega()) if specifications else None,
         drawings=json_in_html({"light": LIGHT, "dark": DARK, "locale": LOCALE, "charts": specifications}),
     )
+
+
+def _messages(page: Page) -> Iterable[str]:
+    """The notes of all sections, and the cells of their tables that are text."""
+    for section in page.sections:
+        yield from section.notes
+        for table in section.tables:
+            yield from (cell for row in table.rows for cell in row if isinstance(cell, str))
 
 
 def _cards_across(count: int) -> int:

@@ -89,7 +89,7 @@ def stability_page(study: StabilityStudy, notices: Sequence[str]) -> Page:
 
 def _figures(study: StabilityStudy) -> list[Figure]:
     found = study.stability
-    met = [one.judged for one in study.imo]
+    met = [one.passed for one in study.imo]
     beyond = sum(one.beyond_card and one.found is not None for one in study.imo)
     failed, unknown = met.count(False), met.count(None) - beyond
     verdict = Verdict.FAILED if failed else Verdict.CAUTION if unknown or beyond else Verdict.PASSED
@@ -314,9 +314,9 @@ def _errors(*values: float | None) -> list[float | None]:
 
 def imo_verdict(one: Criterion) -> Cell:
     """The verdict of a criterion as a table has it."""
-    if one.passed is None:
-        return "open"
-    return BEYOND if one.beyond_card else _VERDICTS[one.passed]
+    if one.beyond_card and one.found is not None:
+        return BEYOND
+    return "open" if one.passed is None else _VERDICTS[one.passed]
 
 
 def _imo(criteria: Sequence[Criterion]) -> Table:

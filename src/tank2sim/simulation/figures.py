@@ -157,7 +157,8 @@ def _pull_out(run: Trajectory, rudder: float) -> Figures:
     halved = run.t[midships:][side * rates[midships:] < side * rates[midships] / 2]
     return {
         "steady_rate_degps": float(rates[midships]),
-        # Not zero on a ship that is asymmetric (Y0, N0) or unstable: then the two sides end at different rates.
+        "neutral_rudder_deg": math.degrees(run["rudder.command"][midships]),
+        # With the neutral rudder: zero on a ship that is stable on a straight course, symmetric or not.
         "residual_rate_degps": float(rates[-1]),
         "time_to_half_rate_s": float(halved[0] - run.t[midships]) if len(halved) else None,
     }

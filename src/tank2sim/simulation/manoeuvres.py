@@ -48,11 +48,34 @@ STEADY_CHANGE = 1e-3
 """Steady: over two ship lengths the yaw rate changes by less than this share of itself, or of 0.01 u0/L if less."""
 
 
+def _check_angles(name: str, **angles: float) -> None:
+    """Refuse an angle of 90 deg (in rad) or more.
+
+    Raises
+    ------
+    InputError
+        One of the angles is out of bounds, as one in degrees is.
+    """
+    for key, angle in angles.items():
+        if not abs(angle) < math.pi / 2:
+            problem = f"is {angle:g} rad, and angles are below 90 deg (1.57 rad)"
+            raise InputError(name, key, problem, f"angles are in rad: give math.radians({angle:g}) for {angle:g} deg")
+
+
 @dataclass(frozen=True)
 class Turn:
-    """Turning circle: the rudder is put over and held."""
+    """Turning circle: the rudder (rad, positive to starboard) is put over and held.
+
+    Raises
+    ------
+    InputError
+        The rudder is 90 deg or more, as an angle in degrees is.
+    """
 
     rudder: float
+
+    def __post_init__(self) -> None:
+        _check_angles("Turn", rudder=self.rudder)
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Run for `duration` s, or until the heading has changed by :data:`TURN_HEADING` (at most 150 L/u0)."""
@@ -72,12 +95,20 @@ class Zigzag:
     A negative rudder begins to port; `heading` is positive. The order comes `lag_s` after the heading is reached: the
     delay of a helmsman or of a model basin's controller (0.1 to 0.6 s at model scale). Headings count from `course`
     (rad), by default from that at the execute.
+
+    Raises
+    ------
+    InputError
+        An angle is 90 deg or more, as one in degrees is.
     """
 
     rudder: float
     heading: float
     lag_s: float = 0.0
     course: float | None = None
+
+    def __post_init__(self) -> None:
+        _check_angles("Zigzag", rudder=self.rudder, heading=self.heading)
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Run for `duration` s, or to the heading's return after the fifth execute (at most 150 L/u0)."""
@@ -96,15 +127,29 @@ class Zigzag:
 
 @dataclass(frozen=True)
 class PullOut:
-    """Pull-out: a steady turn, then the rudder amidships; a stable ship comes back to (nearly) a straight course."""
+    """Pull-out: a steady turn, then the neutral rudder; a stable ship comes back to a straight course.
+
+    The neutral rudder is the angle that holds a straight course at the speed of the approach: not zero on an asymmetric
+    ship (ITTC 7.5-04-02-01), which with the rudder at zero would keep a yaw rate that says nothing of its stability.
+    Where no rudder below 45 deg holds a straight course, it is amidships.
+
+    Raises
+    ------
+    InputError
+        The rudder is 90 deg or more, as an angle in degrees is.
+    """
 
     rudder: float
 
+    def __post_init__(self) -> None:
+        _check_angles("PullOut", rudder=self.rudder)
+
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
-        """Turn until steady (at most 60 L/u0), then `duration` s (by default 40 L/u0) with the rudder amidships."""
+        """Turn until steady (at most 60 L/u0), then `duration` s (by default 40 L/u0) with the neutral rudder."""
+        neutral = running.neutral_rudder()
         running.order({"rudder.command": self.rudder})
         _until_steady(running, ship_time, at_most=60 * ship_time)
-        running.order({"rudder.command": 0.0})
+        running.order({"rudder.command": neutral})
         running.run(40 * ship_time if duration is None else duration)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.simulation.card_range import Reading, reading
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
 from tank2sim.simulation.manoeuvres import LONGEST_RUN_S, Manoeuvre, Orders
@@ -28,12 +29,15 @@ class Run:
     figures : dict
         Manoeuvring figures, units in their names; None where the run was too short.
     notices : tuple of str
-        What the user should be told.
+        What the user should know.
+    reading : Reading
+        Which figures were settled outside the range that the card was measured in.
     """
 
     trajectory: Trajectory
     figures: Figures
     notices: tuple[str, ...]
+    reading: Reading
 
 
 def simulate(
@@ -77,11 +81,13 @@ def simulate(
     manoeuvre.drive(running, values["ship.length"] / values["ship.speed"], duration_s)
     trajectory = running.trajectory()
     figures = figures_of(manoeuvre, trajectory, values["ship.length"])
-    notices = [*model.notices, *_outside_range(trajectory, values["ship.slowest"], values["ship.fastest"])]
+    read = reading(figures, trajectory, values)
+    notices = [read.message] if read.message else []
+    notices += model.notices
     notices += _beyond_the_gear(trajectory, values.get("steering.max_angle"))
     notices += [] if integrator.compiled else [NO_COMPILER]
     notices += [] if isinstance(manoeuvre, Orders) else _not_shown(trajectory, figures)
-    return Run(trajectory, figures, tuple(notices))
+    return Run(trajectory, figures, tuple(notices), read)
 
 
 def _not_shown(trajectory: Trajectory, figures: Figures) -> list[str]:
@@ -95,16 +101,4 @@ def _beyond_the_gear(trajectory: Trajectory, largest: float | None) -> list[str]
         return []
     return [
         f"the rudder was ordered to {np.degrees(ordered):.4g} deg, and its gear stops at {np.degrees(largest):.4g} deg"
-    ]
-
-
-def _outside_range(trajectory: Trajectory, slowest: float, fastest: float) -> list[str]:
-    speed = trajectory["motion.speed"]
-    outside = (speed < slowest) | (speed > fastest)
-    if not outside.any():
-        return []
-    first = int(np.argmax(outside))
-    return [
-        f"outside the card's range of {slowest:.4g} to {fastest:.4g} m/s: the speed is {speed[first]:.4g} m/s at "
-        f"{trajectory.t[first]:.0f} s, and reaches {speed.min():.4g} to {speed.max():.4g} m/s"
     ]

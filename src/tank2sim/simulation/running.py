@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from tank2sim.dynamics.model import Vector
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.straight_course import straight_course
 from tank2sim.simulation.trajectory import Trajectory
 
 RUNAWAY = "the motion leaves all bounds"
@@ -74,8 +75,24 @@ class Running:
         """Present value of a state."""
         return float(self._x[self.model.state_names.index(name)])
 
+    def neutral_rudder(self) -> float:
+        """Rudder angle (rad) that holds a straight course at the present speed; 0 where none below 45 deg does."""
+        speed = self.state("motion.u")
+        try:
+            course = straight_course(self.model, speed, inputs=self._u, parameters=self._p)
+        except InputError:
+            return 0.0
+        return float(course.u[self.model.input_names.index("rudder.command")])
+
     def order(self, inputs: Mapping[str, float]) -> None:
-        """Set inputs, by name, from now on."""
+        """Set inputs, by name, from now on.
+
+        Raises
+        ------
+        InputError
+            A value is beyond the bounds of its input.
+        """
+        self.model.check_inputs(inputs)
         self._u = self._u.copy()
         for name, value in inputs.items():
             self._u[self.model.input_names.index(name)] = value

@@ -10,6 +10,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tank2sim.dynamics.model import Model, Vector
+from tank2sim.units import UNITS
+
+TIMES_BEYOND = 10.0
+"""A state this many times beyond the extent of its unit has left all that the equations can mean. Project choice."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +77,9 @@ class Trajectory:
         return {"time": self.t, **{name: self[name] for name in (*names, *rest)}}
 
     def is_finite(self) -> bool:
-        """True if no state or output is infinite or not a number."""
-        return bool(np.isfinite(self.x).all() and np.isfinite(self.y).all())
+        """True if every output is a number and every state one that a ship can have (:data:`TIMES_BEYOND`)."""
+        largest = TIMES_BEYOND * np.array([UNITS[state.unit].extent for state in self.model.states])
+        return bool(np.all(np.abs(self.x) <= largest) and np.isfinite(self.y).all())
 
 
 def _through(times: list[float], values: list[float], time: float) -> float:

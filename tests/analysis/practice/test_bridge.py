@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.practice.bridge import SHALLOW, bridge_of, steady_speed
-from tank2sim.analysis.practice.card_range import reading
 from tank2sim.analysis.practice.ship_track import quarter
 from tank2sim.analysis.practice.standard_trials import ship_of
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card, revised
@@ -90,9 +89,10 @@ def test_what_a_card_does_not_tell_is_none(mariner_card) -> None:
 
 
 def test_what_is_read_off_before_the_range_ends_is_kept() -> None:
-    ship = ship_of(read_card("kvlcc2", {"model.valid_speed_mps": [5.8, 9.5]}))
+    changed = {"model.valid_speed_mps": [5.8, 9.5], "model.valid_yaw_rate_prime": 1.0}
+    ship = ship_of(read_card("kvlcc2", changed))
     run = ship.run(Turn(math.radians(10)))
-    read, path = reading(run), run.trajectory
+    read, path = run.reading, run.trajectory
     row = int(np.argmax(path["motion.speed"] < 5.8))
     assert read.left_s == pytest.approx(path.t[row], abs=1.0)
     assert read.figures["time_90_s"] < read.left_s
@@ -105,7 +105,7 @@ def test_a_card_that_holds_throughout_has_all_its_figures(mariner_card) -> None:
     found = bridge_of(mariner_card)
     assert all(one.left is None and one.inside == len(one.ahead_m) for one in found.deep)
     assert found.as_json()["turning_circles_deep"][0]["outside_card_range"] == []
-    tanker = bridge_of(read_card("kvlcc2"))
+    tanker = bridge_of(read_card("kvlcc2", {"model.valid_yaw_rate_prime": 1.0, "model.valid_rudder_deg": 40.0}))
     assert tanker.as_json()["turning_circles_deep"][0]["left_card_range_s"] == pytest.approx(91.6, abs=1)
     assert any("60° of heading" in one for one in tanker.notices)
 

@@ -40,7 +40,8 @@ def test_a_card_does_not_differ_from_itself(mariner_card) -> None:
     assert not notes
     for name, value in mariner_card.derivatives.items():
         if value:
-            assert rows[name].cards[1].value == pytest.approx(value, rel=1e-12), name
+            in_file = -value if name.count("d") % 2 and not name.endswith("dot") else value  # rudder positive to port
+            assert rows[name].cards[1].value == pytest.approx(in_file, rel=1e-12), name
             # Its own number is no second one that agrees.
             assert rows[name].differences[0].standard_errors is None and rows[name].differences[0].why == SAME
 

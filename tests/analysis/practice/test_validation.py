@@ -64,6 +64,11 @@ def test_a_trial_of_a_ship_with_another_rudder_is_refuted(mariner_card, trials) 
     assert "not validated" in found.verdict
 
 
+def test_without_members_nothing_is_known_of_the_inputs_and_no_figure_is_judged(mariner_card, trials) -> None:
+    found = validate(mariner_card, trials[1:], 0)
+    assert found.figures and all(one.outcome is Outcome.OPEN and one.uncertainty is None for one in found.figures)
+
+
 def test_repeats_enter_the_uncertainty_of_the_data(mariner_card, trials) -> None:
     again = trial_of(mariner_card, "again", Turn(math.radians(20.3)), seed=1)
     alone, both = (validate(mariner_card, those, 0).figures[0] for those in (trials[:1], [trials[0], again]))

@@ -11,6 +11,7 @@ import pytest
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.dynamics import Model, build
 from tank2sim.dynamics.abkowitz import ALL_TERMS
+from tank2sim.errors import InputError
 
 from .ships import (
     CB,
@@ -108,14 +109,20 @@ def test_water_depth_follows_kijima() -> None:
     same({"water_depth": {"depth_m": H}}, mariner_text(), changed(card, **new))
 
 
-def test_the_depth_is_an_input_and_a_ship_aground_still_has_numbers() -> None:
+def test_the_depth_is_an_input_and_a_ship_aground_is_refused() -> None:
     model = ship({"water_depth": {"depth_m": 12.0}})
     assert model.input_names[-1] == "water.depth"
     other = ship({"water_depth": {"depth_m": 20.0}})
     at = STATES[0]
     np.testing.assert_array_equal(values(model, WANTED, {**at, "water.depth": 20.0}), values(other, WANTED, at))
-    for depth in (0.0, 1.0, T, 1.01 * T):
-        assert np.all(np.isfinite(values(model, WANTED, {**at, "water.depth": depth})))
+    assert np.all(np.isfinite(values(model, WANTED, {**at, "water.depth": 1.06 * T})))
+    for depth in (-5.0, 0.0, 1.0, T, 1.04 * T):
+        with pytest.raises(InputError) as caught:
+            model.input_values({"water.depth": depth})
+        assert caught.value.place == "water.depth"
+        with pytest.raises(InputError) as caught:
+            ship({"water_depth": {"depth_m": depth}})
+        assert caught.value.place == "effects.0.parameters.depth_m"
 
 
 def test_trim_changes_the_linear_derivatives_of_the_even_keel() -> None:

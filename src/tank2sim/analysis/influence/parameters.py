@@ -17,6 +17,7 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.marks import ASSUMED
 from tank2sim.units import from_si
 
 
@@ -173,8 +174,11 @@ def standard_errors_in_words(parameters: Sequence[CardParameter], known: Collect
     exact = [one.short for one in others if one.standard_error == 0]
     told = []
     if assumed:
-        which = "any number" if len(assumed) + len(exact) == len(parameters) else ", ".join(assumed)
-        told.append(f"the card states no standard error of {which}: 2 % of the value is taken")
+        every = len(assumed) + len(exact) == len(parameters)
+        which = "any number" if every else ", ".join(assumed)
+        mark = f"{ASSUMED}, not measured ones: " if every else ""
+        share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of the value is taken"
+        told.append(f"{mark}the card states no standard error of {which}: {share}")
     if exact:
         told.append(f"taken as exact, for a card states no standard error of them: {', '.join(exact)}")
     return told

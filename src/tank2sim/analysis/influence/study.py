@@ -187,7 +187,10 @@ class Study:
         model, integrator = self.model, self._integrator
         run = simulate(model, manoeuvre, parameters=values, integrator=integrator, duration_s=duration_s)
         if not self._known:
-            self._told |= dict.fromkeys(run.notices)
+            angles = [manoeuvre.rudder, *([manoeuvre.heading] if isinstance(manoeuvre, Zigzag) else [])]
+            words = f"{type(manoeuvre).__name__.lower()} {'/'.join(f'{math.degrees(angle):.4g}' for angle in angles)}"
+            marked = {f"{words}: {run.reading.message}": None} if run.reading.message else {}
+            self._told |= marked | dict.fromkeys(one for one in run.notices if one != run.reading.message)
         return run
 
 

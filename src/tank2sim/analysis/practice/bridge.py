@@ -14,12 +14,12 @@ import numpy as np
 from scipy.optimize import brentq
 
 from tank2sim.analysis.linearisation import straight_course
-from tank2sim.analysis.practice.card_range import Reading, reading
 from tank2sim.analysis.practice.ship_track import Mark, ShipTrack, circle_track, stop_track
 from tank2sim.analysis.practice.standard_trials import Ship, ship_of
 from tank2sim.analysis.stability.imo import TRIAL_RUDDER
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.errors import InputError
+from tank2sim.simulation.card_range import NOTHING_READ, Reading
 from tank2sim.simulation.manoeuvres import COASTING_END, FULL_ASTERN, Stop, Turn, Zigzag
 from tank2sim.simulation.run import Run
 
@@ -118,7 +118,7 @@ class Bridge:
             "turning_circles_deep": [one.as_json() for one in self.deep],
             "turning_circles_shallow": [one.as_json() for one in self.shallow],
             "stops": [one.as_json() for one in self.stops],
-            "zigzags": {name: one.as_json() for name, one in self.zigzags.items()},
+            "zigzags": {name: {"figures": one.figures, **one.as_json()} for name, one in self.zigzags.items()},
             "telegraph": [vars(one) for one in self.telegraph],
             "full_astern_from": [vars(one) for one in self.stops_from],
             "hard_over_to_hard_over_s": self.hard_over_s,
@@ -293,7 +293,7 @@ def _stops_from(ship: Ship, telegraph: Sequence[Telegraph], inputs: Mapping[str,
 
 
 def _read(run: Run | str) -> Reading:
-    return Reading({}, {}) if isinstance(run, str) else reading(run)
+    return NOTHING_READ if isinstance(run, str) else run.reading
 
 
 def _neutral(ship: Ship) -> float | None:

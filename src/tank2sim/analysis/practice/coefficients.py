@@ -16,13 +16,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
 
 from tank2sim.analysis.influence.parameters import card_parameters
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.scaling import file_factor
 from tank2sim.cards.terms import Term, known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS, TERMS, polynomial
 from tank2sim.dynamics.model import Model
@@ -40,7 +41,7 @@ _RIGID_BODY = ("mass", "yaw_inertia", "x_G")
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A coefficient of one card in the reference's convention, prime, starboard positive.
+    """A coefficient of one card in the reference's convention, prime; in rows with the rudder's sign of the reference.
 
     `value` is None where the card's model has no such term, `standard_error` where none is known; `stated` is False
     where it rests on the default share of the value.
@@ -109,13 +110,23 @@ def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[Coeffi
     for name in (*_RIGID_BODY, *ALL_TERMS):
         if not any(name in one.coefficients for one in expansions):
             continue
-        found = tuple(one.coefficients.get(name, Coefficient(None)) for one in expansions)
+        found = tuple(_in_sign_of(reference, name, one.coefficients.get(name)) for one in expansions)
         differences = tuple(
             Difference(why=one.refused[name]) if name in one.refused else _difference(found[0], own)
             for one, own in zip(expansions[1:], found[1:], strict=True)
         )
         rows.append(CoefficientRow(name, found, differences))
     return tuple(rows), tuple(note for one in expansions[1:] for note in one.notes)
+
+
+def _in_sign_of(reference: ManoeuvringCard, name: str, found: Coefficient | None) -> Coefficient:
+    """A coefficient (rudder positive to starboard) with the rudder's sign of the reference's card."""
+    if found is None or found.value is None:
+        return Coefficient(None)
+    if name in _RIGID_BODY:
+        return found
+    factor = file_factor(known_term(name), None, rudder_to_port=reference.model.rudder_sign == "port")
+    return replace(found, value=factor * found.value)
 
 
 def _difference(first: Coefficient, other: Coefficient) -> Difference:

@@ -12,7 +12,6 @@ import numpy as np
 from tank2sim.analysis.practice.coefficients import BEYOND, SAME, CoefficientRow, compare_coefficients, compare_effects
 from tank2sim.analysis.practice.standard_trials import (
     MEMBERS,
-    Numbers,
     Ship,
     members,
     numbers,
@@ -20,9 +19,11 @@ from tank2sim.analysis.practice.standard_trials import (
     spread,
     standard_trials,
 )
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, ManoeuvringCard
 from tank2sim.dynamics.model import Vector
 from tank2sim.errors import InputError
+from tank2sim.marks import ASSUMED, EXTRAPOLATED
+from tank2sim.simulation.card_range import Numbers
 from tank2sim.simulation.manoeuvres import Manoeuvre
 from tank2sim.simulation.trajectory import Trajectory
 
@@ -50,11 +51,14 @@ class FigureRow:
         With its unit.
     values, deviations : tuple of float or None
         Of each card, the reference first; None where the run did not show it, or nothing is known of its error.
+    outside : tuple of bool
+        True where the run had left what the card was measured in before the figure was settled.
     """
 
     name: str
     values: tuple[float | None, ...]
     deviations: tuple[float | None, ...]
+    outside: tuple[bool, ...] = ()
 
     def difference(self, place: int) -> float | None:
         """A card's figure less the reference's."""
@@ -160,6 +164,7 @@ class CardComparison:
                 row.name: {
                     "values": list(row.values),
                     "standard_deviations": list(row.deviations),
+                    "outside_card_range": list(row.outside),
                     "differences": [row.difference(place) for place in others],
                     "differences_standard_errors": [row.in_errors(place) for place in others],
                 }
@@ -250,6 +255,7 @@ def _trial(
     reference = ships[0].card
     found: list[Numbers] = []
     deviations: list[Numbers] = []
+    outside: list[set[str]] = []
     tracks, told = [], []
     for ship, label, own in zip(ships, labels, drawn, strict=True):
         ratio = reference.ship.length_m / ship.card.ship.length_m
@@ -259,8 +265,10 @@ def _trial(
             told.append(f"{label}: {name}: {run}")
             found.append({})
             deviations.append({})
+            outside.append(set())
             continue
-        told += [f"{label}: {name}: {one}" for one in run.notices if "outside the card" in one or "not show" in one]
+        told += [f"{label}: {name}: {one}" for one in run.notices if EXTRAPOLATED in one or "not show" in one]
+        outside.append(set(run.reading.outside_names))
         found.append(_scaled(numbers(run.figures), ratio))
         runs = [ship.run(manoeuvre, {**start, **member}) for member in own]
         those = spread([{} if isinstance(one, str) else numbers(one.figures) for one in runs])
@@ -268,8 +276,13 @@ def _trial(
         tracks.append(_track(label, run.trajectory, ratio))
     names = dict.fromkeys(one for figures in found for one in figures)
     rows = tuple(
-        FigureRow(one, tuple(figures.get(one) for figures in found), tuple(own.get(one) for own in deviations))
-        for one in names
+        FigureRow(
+            name,
+            tuple(figures.get(name) for figures in found),
+            tuple(errors.get(name) for errors in deviations),
+            tuple(name in beyond for beyond in outside),
+        )
+        for name in names
     )
     return TrialComparison(name, rows, tuple(tracks)), told
 
@@ -300,9 +313,11 @@ def _notices(cards: Sequence[ManoeuvringCard], labels: Sequence[str]) -> list[st
             told.append(f"{label}: is of another form than {labels[0]} (at its size {form}): two ships are compared")
         elif not math.isclose(ratio, 1.0, rel_tol=SAME_SIZE):
             told.append(f"{label}: is of another size than {labels[0]}: ships or models of one form are compared")
-        assumed = sum(1 for name, value in card.derivatives.items() if value and name not in card.uncertainty)
-        if assumed:
-            told.append(f"{label}: {assumed} derivatives state no standard error: 2 % of their value is taken")
+        present = [name for name, value in card.derivatives.items() if value]
+        if assumed := [name for name in present if name not in card.uncertainty]:
+            mark = f"{ASSUMED}, not measured ones: " if assumed == present else ""
+            share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of their value is taken"
+            told.append(f"{label}: {mark}{len(assumed)} derivatives state no standard error: {share}")
         if not math.isclose(ratio, 1.0, rel_tol=1e-6):
             told.append(f"{label}: figures and tracks scaled by Froude's law to a ship {ratio:.4g} times as long")
         speed = _approach(reference, card)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tank2sim.analysis.practice.card_range import Reading, left_at, reading
-from tank2sim.analysis.practice.standard_trials import Numbers
+from tank2sim.analysis.practice.standard_trials import numbers
 from tank2sim.dynamics.model import Vector
+from tank2sim.simulation.card_range import Numbers, Reading, left_at
 from tank2sim.simulation.run import Run
 from tank2sim.simulation.trajectory import Trajectory
 
@@ -35,8 +35,10 @@ class ShipTrack:
     ahead_m, starboard_m : array (n,)
     marks : tuple of Mark
         At each quarter of a turn (turns), or at equal times (stops).
+    figures : mapping
+        Figures, also those that were settled outside what the card was measured in.
     reading : Reading
-        Figures, and which of them the card holds for.
+        Which those are.
     inside : int
         Points of the track until it leaves the card's range.
     left : Mark, optional
@@ -47,14 +49,10 @@ class ShipTrack:
     ahead_m: Vector
     starboard_m: Vector
     marks: tuple[Mark, ...]
+    figures: Numbers
     reading: Reading
     inside: int
     left: Mark | None = None
-
-    @property
-    def figures(self) -> Numbers:
-        """All figures, also those that are outside the card's range."""
-        return self.reading.figures
 
     def outside(self, mark: Mark) -> bool:
         """True if the run has left the card's range at a mark."""
@@ -65,6 +63,7 @@ class ShipTrack:
         every = max(1, len(self.ahead_m) // 200)
         return {
             "name": self.name,
+            "figures": self.figures,
             **self.reading.as_json(),
             "left_card_range_at": vars(self.left) if self.left else None,
             "marks": [vars(one) for one in self.marks],
@@ -93,11 +92,13 @@ def _track(name: str, run: Run, change: Vector, rows: list[int], end: int) -> Sh
     path = run.trajectory
     ahead, starboard = _in_first_axes(path)
     marks = tuple(_mark(path, change, row) for row in rows)
-    row = left_at(path)
+    row, figures = left_at(path), numbers(run.figures)
     if row is None:
-        return ShipTrack(name, ahead[:end], starboard[:end], marks, reading(run), end)
+        return ShipTrack(name, ahead[:end], starboard[:end], marks, figures, run.reading, end)
     left = _mark(path, change, row)
-    return ShipTrack(name, ahead[:end], starboard[:end], marks, reading(run), min(row + 1, end), left)
+    return ShipTrack(
+        name, ahead[:end], starboard[:end], marks, numbers(run.figures), run.reading, min(row + 1, end), left
+    )
 
 
 def quarter(path: ShipTrack, change_deg: float) -> Mark | None:

@@ -16,6 +16,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.simulation.card_range import Numbers, entry_name, single_figures
 from tank2sim.simulation.ensemble import Redrawn
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
@@ -35,9 +36,6 @@ OVERSHOOTS = 2
 """Overshoots that are looked at: those of IMO MSC.137(76)."""
 
 _ONE_SIGMA = (0.158655, 0.841345)
-
-Numbers = dict[str, float]
-"""Figure by name with unit."""
 
 
 @dataclass(frozen=True)
@@ -110,13 +108,10 @@ def standard_trials(ships: Sequence[Ship]) -> dict[str, Manoeuvre]:
 
 def numbers(figures: Figures) -> Numbers:
     """The figures of a run that are single numbers, with the first overshoots; what it did not show is left out."""
-    found: Numbers = {}
-    for name, value in figures.items():
-        if name == "overshoots_deg" and isinstance(value, list):
-            found |= {f"overshoot_{place + 1}_deg": one for place, one in enumerate(value[:OVERSHOOTS])}
-        elif isinstance(value, float) and not name.endswith("_lengths") and name != "stopped_at_mps":
-            found[name] = value
-    return found
+    overshoots = {entry_name("overshoots_deg", place) for place in range(OVERSHOOTS)}
+    left_out = {"stopped_at_mps", *(name for name in figures if name.endswith("_lengths"))}
+    single = single_figures(figures).items()
+    return {name: value for name, value in single if (name in figures or name in overshoots) and name not in left_out}
 
 
 def members(

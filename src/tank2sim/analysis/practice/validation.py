@@ -27,10 +27,10 @@ from enum import StrEnum
 
 import numpy as np
 
+from tank2sim.analysis.influence.parameters import card_parameters, standard_errors_in_words, study_model
 from tank2sim.analysis.practice.standard_trials import (
     MEMBERS,
     SEED,
-    Numbers,
     Ship,
     members,
     numbers,
@@ -41,8 +41,10 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.marks import EXTRAPOLATED
 from tank2sim.records.audit.noise import estimated_noise
 from tank2sim.records.trials import Trial, sampling_step
+from tank2sim.simulation.card_range import NOTHING_READ, Numbers, Reading
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.recorded import Recorded, recorded, repeat, steerable
@@ -210,7 +212,7 @@ def validate(
     trials : sequence of Trial
         At the ship's size.
     count : int
-        Members of the ensemble for u_input; 0 for none (u_input is then 0, and said so).
+        Members of the ensemble for u_input; 0 for none (u_input is then not known, and every figure is open).
     required_percent : float
         U_reqd in per cent of each measured figure.
     """
@@ -224,7 +226,7 @@ def validate(
         for trial, what in known
         if what is None
     ]
-    told += of_errors
+    told += [*standard_errors_in_words(card_parameters(card, study_model(card))), *of_errors]
     whats = [what for _, what in known if what is not None]
     between = _between_repeats(whats)
     figures: list[Validated] = []
@@ -238,7 +240,7 @@ def validate(
     if whats and not between:
         told.append("no manoeuvre was run twice alike: u_D is of the noise of the signals alone, and so a lower bound")
     if not count:
-        told.append("no ensemble was run: u_input is left out, and U_val is a lower bound")
+        told.append("no ensemble was run: u_input and U_val are not known, and no figure can be judged")
     return Validation(tuple(figures), count, tuple(told))
 
 
@@ -265,7 +267,7 @@ def verify(ship: Ship, count: int = MEMBERS) -> tuple[tuple[Verified, ...], tupl
         if isinstance(run, str) or isinstance(fine, str):
             told.append(f"{trial}: {run if isinstance(run, str) else fine}")
             continue
-        told += [f"{trial}: {one}" for one in run.notices if "outside the card" in one or "not show" in one]
+        told += [f"{trial}: {one}" for one in run.notices if EXTRAPOLATED in one or "not show" in one]
         many = [ship.run(manoeuvre, member) for member in drawn]
         deviation = spread([{} if isinstance(one, str) else numbers(one.figures) for one in many])
         halved = numbers(fine.figures)
@@ -282,21 +284,23 @@ def _validated(
     between: Mapping[tuple[str, str], float],
 ) -> tuple[list[Validated], list[str]]:
     measured = compared(what)
-    coarse, fine = (_repeated(what, engine) for engine in engines)
-    ensemble = [_repeated(what, engines[0], member) for member in drawn]
+    (coarse, read), (fine, _) = (_repeated(what, engine) for engine in engines)
+    ensemble = [_repeated(what, engines[0], member)[0] for member in drawn]
     inputs, data = spread(ensemble), _read_again(what, engines[0].model)
     told = [
         f"{what.trial.name}: {name}: too few members of the ensemble reach it to tell u_input"
         for name in measured
         if drawn and name in coarse and name not in inputs
     ]
+    if beyond := [name for name in measured if read.outside(name) and name in coarse]:
+        told.insert(0, f"{what.trial.name}: {', '.join(beyond)}: {read.message}")
     rows = []
     for name, value in measured.items():
         simulated, finer = coarse.get(name), fine.get(name)
         halving = 0.0 if simulated is None or finer is None else abs(simulated - finer)
         sampled = sampling_step(what.trial) / math.sqrt(12) if name.endswith("_s") else 0.0
         u_data = math.hypot(data.get(name, 0.0), between.get((kind(what), name), 0.0), sampled)
-        u_input = inputs.get(name) if drawn else 0.0
+        u_input = inputs.get(name)
         u_num = SAFETY * halving / COVERAGE
         rows.append(Validated(what.trial.name, what.words, name, value, simulated, u_num, u_input, u_data))
     return rows, told
@@ -318,11 +322,13 @@ def kind(what: Recorded) -> str:
     return f"zigzag {angle}/{round(math.degrees(what.manoeuvre.heading))} {speed}"
 
 
-def _repeated(what: Recorded, engine: Integrator, member: dict[str, float] | None = None) -> Numbers:
+def _repeated(what: Recorded, engine: Integrator, member: dict[str, float] | None = None) -> tuple[Numbers, Reading]:
+    """The figures of a recorded manoeuvre as simulated, and which of them are settled outside the card's range."""
     try:
-        return numbers(repeat(what, engine, member).figures)
+        run = repeat(what, engine, member)
     except InputError:  # the motion left all bounds: none of its figures is reached
-        return {}
+        return {}, NOTHING_READ
+    return numbers(run.figures), run.reading
 
 
 def _between_repeats(whats: Sequence[Recorded]) -> dict[tuple[str, str], float]:

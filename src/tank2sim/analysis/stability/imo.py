@@ -6,11 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from tank2sim.dynamics.hull import LARGEST_DRIFT, LARGEST_YAW_RATE
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.simulation.card_range import NOTHING_READ, Reading, entry_name
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import FULL_ASTERN, Manoeuvre, Stop, Turn, Zigzag
@@ -31,12 +29,6 @@ _SCALE = (
     "MSC.137(76) is for ships of 100 m and more: its limits of the 10/10 overshoots go with L/V in seconds, which a "
     "model does not keep, and the card tells no scale: judge the overshoots of the ship she stands for"
 )
-
-HOLDS = 1 - 1e-6
-"""``validity`` below this has left 1: above what rounding leaves."""
-
-_STILL = 0.05
-"""Share of u0 below which drift and yaw rate over speed are not told: a ship at rest has none. Ours."""
 
 _TURNED = math.radians(90.0)
 """A ship that has turned so far against her rudder does not answer late, but the wrong way. A choice of ours."""
@@ -59,13 +51,8 @@ class Criterion:
 
     @property
     def passed(self) -> bool | None:
-        """True if met; None if the trial did not show it."""
-        return None if self.found is None else self.found <= self.allowed
-
-    @property
-    def judged(self) -> bool | None:
-        """The verdict that may be trusted: None where the trial left what the card holds for, too."""
-        return None if self.beyond_card else self.passed
+        """True if met; None if the trial did not show it, or only outside what the card was measured in."""
+        return None if self.found is None or self.beyond_card else self.found <= self.allowed
 
     @property
     def margin(self) -> float | None:
@@ -98,60 +85,50 @@ class _Trials:
         try:
             run = simulate(self.model, manoeuvre, inputs=calm, parameters=own, integrator=integrator)
         except InputError as error:
-            return _Trial({}, f"{error.place}: {error.problem}" if error.place else error.problem, "")
-        return _Trial(run.figures, _wrong_way(manoeuvre, run.trajectory), self._outside(run.trajectory))
-
-    def _outside(self, run: Trajectory) -> str:
-        """How a trial leaves what the card holds for (its ``validity``); empty if it does not."""
-        if "validity" not in self.model.outputs or not run["validity"].min() < HOLDS:
-            return ""
-        values = dict(
-            zip(self.model.parameter_names, self.model.parameter_values(self.parameters).tolist(), strict=True)
-        )
-        slowest, fastest, speed = values["ship.slowest"], values["ship.fastest"], run["motion.speed"]
-        moving = np.maximum(speed, _STILL * values["ship.speed"])
-        drift = float(np.max(np.abs(run["motion.v"]) / moving))
-        rate = float(np.max(np.abs(run["motion.r"]) * values["ship.length"] / moving))
-        parts = []
-        if speed.min() < slowest or speed.max() > fastest:
-            parts.append(f"{speed.min():.2f} to {speed.max():.2f} m/s, card {slowest:.2f} to {fastest:.2f} m/s")
-        if rate > LARGEST_YAW_RATE:
-            parts.append(f"yaw rate {rate:.3g} U/L")
-        if drift > LARGEST_DRIFT:
-            parts.append(f"drift {math.degrees(math.asin(min(drift, 1.0))):.3g} deg")
-        return f"leaves the card's validity (down to {run['validity'].min():.2g}): {'; '.join(parts)}"
+            return _Trial({}, f"{error.place}: {error.problem}" if error.place else error.problem)
+        return _Trial(run.figures, _wrong_way(manoeuvre, run.trajectory), run.reading)
 
     def worst(self, manoeuvres: Sequence[Manoeuvre], *places: tuple[str, int | None]) -> list[_Worse]:
         """The larger of each figure over the trials, and why there is none or what to know of it."""
-        runs = [self.run(one) for one in manoeuvres]
-        trouble = next((one.trouble for one in runs if one.trouble), "")
-        outside = next((one.outside for one in runs if one.outside), "")
+        runs = [self.run(manoeuvre) for manoeuvre in manoeuvres]
+        trouble = next((run.trouble for run in runs if run.trouble), "")
         found: list[_Worse] = []
         for name, number in places:
-            values = [_number(one.figures.get(name), number) for one in runs]
+            values = [_number(run.figures.get(name), number) for run in runs]
             shown = [value for value in values if value is not None]
-            whole = len(shown) == len(values)
-            missing = trouble or "; ".join(one for one in ("the run does not show it", outside) if one)
-            found.append(_Worse(max(shown), outside, bool(outside)) if whole else _Worse(None, missing, bool(outside)))
+            single = name if number is None else entry_name(name, number)
+            outside = next((run.reading.message for run in runs if run.reading.outside(single)), "")
+            if len(shown) == len(values):
+                found.append(_Worse(max(shown), outside))
+            else:
+                missing = trouble or "; ".join(part for part in ("the run does not show it", outside) if part)
+                found.append(_Worse(None, missing, bool(outside)))
         return found
 
 
 @dataclass(frozen=True)
 class _Trial:
-    """Figures of a trial, why there are none, and how it leaves what the card holds for."""
+    """Figures of a trial, why there are none, and which were settled outside what the card was measured in."""
 
     figures: Figures
     trouble: str
-    outside: str
+    reading: Reading = NOTHING_READ
 
 
 @dataclass(frozen=True)
 class _Worse:
-    """The worse figure of trials, None if they do not show it; a remark, and whether they left the card's range."""
+    """The worse figure of trials, None if they do not show it; a remark, and whether they left the card's range first.
+
+    A figure that is there has a remark only if it was settled outside the card's range.
+    """
 
     value: float | None
     remark: str
-    beyond: bool
+    left_range: bool = False
+
+    @property
+    def beyond(self) -> bool:
+        return self.left_range or (self.value is not None and bool(self.remark))
 
 
 def _wrong_way(manoeuvre: Manoeuvre, run: Trajectory) -> str:

@@ -27,6 +27,8 @@ from tank2sim.analysis.turning import continuation
 from tank2sim.analysis.turning.continuation import Array, Bounds, Curve, corrected, follow
 from tank2sim.dynamics.model import Model, Vector
 from tank2sim.errors import InputError
+from tank2sim.marks import EXTRAPOLATED
+from tank2sim.simulation.card_range import range_left
 
 LARGEST_RUDDER = math.radians(35.0)
 """The diagram goes to 35 deg of rudder (MSC.137(76)), or as far as the gear allows."""
@@ -346,12 +348,6 @@ def _how_it_ends(found: SteadyTurning) -> list[str]:
 
 def _out_of_range(model: Model, found: SteadyTurning) -> list[str]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-    slowest, fastest = values["ship.slowest"], values["ship.fastest"]
-    outside = (found.speed_mps < slowest) | (found.speed_mps > fastest)
-    if not outside.any():
-        return []
-    least = float(np.min(np.abs(found.rudder_rad[outside])))
-    return [
-        f"steady turns from {math.degrees(least):.3g} deg of rudder are at {found.speed_mps[outside].min():.3g} to "
-        f"{found.speed_mps[outside].max():.3g} m/s, outside the card's range of {slowest:.3g} to {fastest:.3g} m/s"
-    ]
+    rate = found.yaw_rate_radps * values["ship.length"] / found.speed_mps
+    left = range_left(values, found.speed_mps, rate, found.drift_rad, found.rudder_rad)
+    return [f"{EXTRAPOLATED} what the card was measured in: steady turns have {left}"] if left else []

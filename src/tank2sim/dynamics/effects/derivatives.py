@@ -11,7 +11,7 @@ from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Equations, Symbols
 from tank2sim.dynamics.effects.forces import scales
-from tank2sim.dynamics.effects.particulars import with_particulars
+from tank2sim.dynamics.effects.particulars import particular, with_particulars
 from tank2sim.dynamics.effects.sizes import lengths
 from tank2sim.dynamics.model import Model
 
@@ -193,15 +193,23 @@ SHALLOW_WATER = Effect(
 )
 
 
+AGROUND = 0.95
+"""Largest draught over depth: at 1 the ship is aground, and the fit of the source ends before. Project choice."""
+
+
+def _least_depth(card: ManoeuvringCard) -> float:
+    return particular(card, "draught_m") / AGROUND
+
+
 def _at_depth(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
     """Y_v, N_v, N_r times f = 1/(1 - h)^n - h with h = T/H, as input ``water.depth`` says.
 
     n = 0.40 Cb B/T for Y_v, 0.425 Cb B/T for N_v, 1.5 - 14.28 T/L for N_r: Kijima, Katsuno, Nakiri and Furukawa (1990),
-    J. Soc. Naval Arch. Japan 168. f is 1 in deep water. h is held below 0.95: at 1 the ship is aground. Added masses,
+    J. Soc. Naval Arch. Japan 168. f is 1 in deep water. h is held below :data:`AGROUND`. Added masses,
     Y_r and the terms of higher order stay as they are; the card must be of deep water.
     """
     model, (beam, draught, block) = with_particulars(model, card, "beam_m", "draught_m", "block_coefficient")
-    h = ca.fmin(draught / ca.fmax(given["depth"], draught), 0.95)
+    h = ca.fmin(draught / ca.fmax(given["depth"], draught), AGROUND)
     fullness = block * beam / draught
     powers = {"Yv": 0.40 * fullness, "Nv": 0.425 * fullness, "Nr": 1.5 - 14.28 * draught / card.ship.length_m}
     changes = {name: ((1 - h) ** -power - h - 1) * hydrodynamic(model, name, card) for name, power in powers.items()}
@@ -215,7 +223,7 @@ WATER_DEPTH = Effect(
     source="Kijima, Katsuno, Nakiri and Furukawa (1990), J. Soc. Naval Architects of Japan 168",
     parameters=(
         # Not sought in trials: what they show of shallow water is one factor, that of SHALLOW_WATER.
-        EffectParameter("depth_m", "depth of the water", 0.01, 1e4, input_name="water.depth"),
+        EffectParameter("depth_m", "depth of the water", 0.01, 1e4, input_name="water.depth", least=_least_depth),
     ),
     equations=_at_depth,
 )

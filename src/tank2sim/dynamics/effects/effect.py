@@ -51,6 +51,8 @@ class EffectParameter:
     spread : float or callable, optional
         Standard deviation, SI, of what is known beforehand of a parameter with a default, if a search shall estimate
         it with the others; None: it stays at its default.
+    least : callable, optional
+        A lower bound, SI, that depends on the ship, where that is above `minimum`.
     """
 
     name: str
@@ -62,6 +64,7 @@ class EffectParameter:
     absent: float | None = field(default=None, kw_only=True)
     typical: Values | Callable[[ManoeuvringCard], Values] = field(default=(), kw_only=True)
     spread: float | Callable[[ManoeuvringCard], float] | None = field(default=None, kw_only=True)
+    least: Callable[[ManoeuvringCard], float] | None = field(default=None, kw_only=True)
 
     @property
     def stem(self) -> str:
@@ -75,6 +78,10 @@ class EffectParameter:
             return values[self.name]
         return self.default(card) if callable(self.default) else self.default
 
+    def lowest(self, card: ManoeuvringCard) -> float:
+        """The lower bound on this ship, SI."""
+        return max(self.minimum, self.least(card)) if self.least else self.minimum
+
     def typical_values(self, card: ManoeuvringCard) -> Values:
         """Values from which a search begins on this ship, SI; none if it is not to be tried."""
         return self.typical(card) if callable(self.typical) else self.typical
@@ -83,7 +90,7 @@ class EffectParameter:
         """Standard deviation beforehand on this ship, SI; None if the parameter stays at its default."""
         return self.spread(card) if callable(self.spread) else self.spread
 
-    def variable(self, effect: str, value: float) -> Parameter | Input:
+    def variable(self, effect: str, value: float, card: ManoeuvringCard) -> Parameter | Input:
         """The model's variable that holds it, ``<effect>.<name without its unit>`` if it is no input."""
         suffix = self.name.removeprefix(self.stem).lstrip("_")
         unit, description = _UNITS.get(suffix, "1"), self.description[0].upper() + self.description[1:]
@@ -93,8 +100,8 @@ class EffectParameter:
                 unit=unit,
                 description=description,
                 display_unit=_SHOWN.get(suffix),
-                # A direction that goes round and round is one; nothing is known of the largest wind.
-                minimum=None if unit == "rad" else self.minimum,
+                # A direction may go round and round, and a negative speed is one the other way; no largest is known.
+                minimum=None if unit in ("rad", "m/s") else self.lowest(card),
                 start=value,
             )
         return Parameter(
@@ -199,7 +206,7 @@ class Effect:
         KeyError
             A required value is missing.
         """
-        variables = {one.stem: one.variable(self.name, one.value(values, card)) for one in self.parameters}
+        variables = {one.stem: one.variable(self.name, one.value(values, card), card) for one in self.parameters}
         symbols = {stem: variable.symbol for stem, variable in variables.items()}
         changed = self.equations(model.extend(*variables.values()), symbols, card)
         if self.readings is None:

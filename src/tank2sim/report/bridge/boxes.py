@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 from tank2sim.analysis.practice.bridge import ORDERS_AHEAD, Bridge, Telegraph
-from tank2sim.analysis.practice.card_range import Reading
 from tank2sim.analysis.practice.ship_track import ShipTrack, quarter
 from tank2sim.report.bridge.drawings import clock, knots, metres
+from tank2sim.simulation.card_range import Reading
 from tank2sim.simulation.manoeuvres import FULL_ASTERN
 from tank2sim.units import KNOT_MPS
 

@@ -22,6 +22,7 @@ from tank2sim.report.motion_charts import (
 )
 from tank2sim.report.page import Column, Illustration, Section, Table
 from tank2sim.report.results.values import Json, titled, words
+from tank2sim.simulation.bands import small_edge_first
 from tank2sim.units import to_si
 
 Columns = Mapping[str, Sequence[float | None]]
@@ -192,10 +193,12 @@ def _bands(ensemble: Mapping[str, Json]) -> dict[str, Columns]:
         return {}
     track: Mapping[str, Json] = ensemble.get("track") or {}
     runs: dict[str, Columns] = {}
-    for label, key, side in ((LOW, "p5", "low_m"), (MIDDLE, "p50", "middle_m"), (HIGH, "p95", "high_m")):
+    lines = [np.array(track.get(side) or [], dtype=float).reshape(-1, 2) for side in ("low_m", "middle_m", "high_m")]
+    small, large = small_edge_first(*lines)
+    for label, key, points in ((LOW, "p5", small), (MIDDLE, "p50", lines[1]), (HIGH, "p95", large)):
         own = {name: one[key] for name, one in ensemble["histories"].items() if name not in _TRACK}
-        if points := track.get(side):
-            own |= {"x_m": [point[0] for point in points], "y_m": [point[1] for point in points]}
+        if len(points):
+            own |= {"x_m": points[:, 0].tolist(), "y_m": points[:, 1].tolist()}
         runs[label] = {"t_s": ensemble["t_s"], **own}
     return runs
 

@@ -1,0 +1,21 @@
+"""Marks of a result that its data do not carry: a message that contains one is shown before the result itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+EXTRAPOLATED = "EXTRAPOLATED beyond"
+"""Figures settled outside what the card was measured in."""
+
+ASSUMED = "ASSUMED standard errors"
+"""No standard error is known, and every interval rests on an assumed one."""
+
+FORCED = "FORCED"
+"""A refusal was overridden."""
+
+
+def marked(messages: Iterable[str]) -> list[str]:
+    """The messages that contain a mark, each once, in their order."""
+    return list(
+        dict.fromkeys(text for text in messages if any(mark in text for mark in (EXTRAPOLATED, ASSUMED, FORCED)))
+    )

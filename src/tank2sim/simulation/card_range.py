@@ -1,0 +1,150 @@
+"""Where a run leaves what its card was measured in, and which of its figures were settled before that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.dynamics.model import Vector
+from tank2sim.marks import EXTRAPOLATED
+from tank2sim.simulation.figures import Figures
+from tank2sim.simulation.trajectory import Trajectory
+
+INSIDE = 1 - 1e-6
+"""``validity`` below this has left 1: above what rounding leaves."""
+
+_STILL = 0.05
+"""Share of u0 below which drift and yaw rate over speed are not reported: a ship at rest has none. Project choice."""
+
+Numbers = dict[str, float]
+"""Figure by name with unit."""
+
+_QUARTER = ("advance_m", "advance_lengths", "transfer_m", "time_90_s")
+_HALF = ("tactical_diameter_m", "tactical_diameter_lengths", "time_180_s")
+_FIRST_HEADING = ("initial_turning_time_s", "initial_turning_distance_m", "initial_turning_lengths")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Figures of a run, and which of them were settled inside the range that the card was measured in.
+
+    Parameters
+    ----------
+    figures : mapping
+        Figure by name with unit; entries of a list have names of their own (``overshoot_1_deg``).
+    read_s : mapping
+        When each is settled, s from the order; the end of the run for those that are not in it.
+    left_s : float or None
+        When the output ``validity`` first leaves 1; None if it never does.
+    how : str
+        What leaves the range, and by how much; empty if nothing does.
+    """
+
+    figures: Numbers
+    read_s: Numbers
+    left_s: float | None = None
+    how: str = ""
+
+    def outside(self, name: str) -> bool:
+        """True if the run had left the card's range before this figure was settled."""
+        return self.left_s is not None and self.read_s.get(name, math.inf) >= self.left_s
+
+    @property
+    def outside_names(self) -> tuple[str, ...]:
+        """Names of the figures that were settled outside the card's range."""
+        return tuple(name for name in self.figures if self.outside(name))
+
+    @property
+    def message(self) -> str:
+        """How the run leaves the card's range, in a line; empty if no figure is settled outside it."""
+        if self.left_s is None or not self.outside_names:
+            return ""
+        return f"{EXTRAPOLATED} what the card was measured in, from {self.left_s:.3g} s on: {self.how}"
+
+    def as_json(self) -> dict[str, object]:
+        """When and by what the run left the card's range, and the names of the figures settled outside it."""
+        return {
+            "left_card_range_s": self.left_s,
+            "left_card_range_by": self.how,
+            "outside_card_range": list(self.outside_names),
+        }
+
+
+NOTHING_READ = Reading({}, {})
+"""That of a run that could not be made."""
+
+
+def reading(figures: Figures, run: Trajectory, parameters: Mapping[str, float]) -> Reading:
+    """The figures of a run with the times at which they are settled; `parameters` are all of the model, by name."""
+    row = left_at(run)
+    left = None if row is None else float(run.t[row])
+    settled: Numbers = {}
+    for names, last in ((_QUARTER, "time_90_s"), (_HALF, "time_180_s"), (_FIRST_HEADING, "initial_turning_time_s")):
+        if isinstance(time := figures.get(last), float):
+            settled |= dict.fromkeys(names, time)
+    executes, waits = (figures.get(name) or [] for name in ("execute_times_s", "overshoot_times_s"))
+    if isinstance(executes, list) and isinstance(waits, list):
+        for place, (begun, later) in enumerate(zip(executes, waits, strict=False), start=1):
+            settled[f"overshoot_{place}_deg"] = settled[f"overshoot_time_{place}_s"] = begun + later
+        settled |= {f"execute_time_{place}_s": time for place, time in enumerate(executes, start=1)}
+    return Reading(single_figures(figures), settled, left, "" if left is None else _how(run, parameters))
+
+
+def single_figures(figures: Figures) -> Numbers:
+    """The figures of a run as single numbers: entries of lists by ``overshoot_1_deg``; what is None is left out."""
+    found: Numbers = {}
+    for name, value in figures.items():
+        if isinstance(value, float):
+            found[name] = value
+        elif isinstance(value, list):
+            found |= {entry_name(name, place): entry for place, entry in enumerate(value)}
+    return found
+
+
+def entry_name(name: str, place: int) -> str:
+    """Name of the n-th entry of a list of figures: ``overshoots_deg``, 0 is ``overshoot_1_deg``."""
+    stem, _, unit = name.rpartition("_")
+    return f"{stem.removesuffix('s')}_{place + 1}_{unit}"
+
+
+def left_at(run: Trajectory) -> int | None:
+    """Row at which ``validity`` first leaves 1; None if it never does, or the model does not state it."""
+    if "validity" not in run.model.outputs:
+        return None
+    rows = np.flatnonzero(run["validity"] < INSIDE)
+    return int(rows[0]) if len(rows) else None
+
+
+def _how(run: Trajectory, values: Mapping[str, float]) -> str:
+    moving = np.maximum(run["motion.speed"], _STILL * values["ship.speed"])
+    rate = run["motion.r"] * values["ship.length"] / moving
+    drift = np.arcsin(np.clip(run["motion.v"] / moving, -1.0, 1.0))
+    return range_left(values, run["motion.speed"], rate, drift, run["rudder.angle"])
+
+
+def range_left(values: Mapping[str, float], speed: Vector, rate: Vector, drift: Vector, rudder: Vector) -> str:
+    """What of a motion leaves the range of the card, with both ranges, in words; empty if nothing does.
+
+    Parameters
+    ----------
+    values : mapping
+        Parameters of the ship's model, by name.
+    speed, rate, drift, rudder : arrays (n,)
+        U (m/s), r L/U, drift angle and rudder angle (rad).
+    """
+    slowest, fastest = values["ship.slowest"], values["ship.fastest"]
+    parts = []
+    if speed.min() < slowest or speed.max() > fastest:
+        parts.append(f"speed {speed.min():.2f} to {speed.max():.2f} m/s (card {slowest:.2f} to {fastest:.2f} m/s)")
+    for words, motion, name, scale, unit in (
+        ("yaw rate", rate, "ship.largest_yaw_rate", 1.0, "U/L"),
+        ("drift", drift, "ship.largest_drift", 180 / math.pi, "deg"),
+        ("rudder", rudder, "ship.largest_rudder", 180 / math.pi, "deg"),
+    ):
+        limit, largest = values.get(name, math.inf), float(np.max(np.abs(motion)))
+        if largest > limit * (1 + 1e-9):
+            parts.append(f"{words} to {scale * largest:.3g} {unit} (card {scale * limit:.3g} {unit})")
+    return ", ".join(parts)
