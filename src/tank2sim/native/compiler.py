@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shlex
 import shutil
@@ -82,6 +83,10 @@ def compile_shared(
     compiler = require_compiler("compiling a model")
     all_flags = [*flags, *(f"-I{path}" for path in include)]
     refusal = _refusal(compiler, list(sources), Path(library), all_flags, seldom)
+    if refusal is not None and os.strerror(errno.ENOSPC) in refusal:
+        problem = f"the C compiler found no room ({os.strerror(errno.ENOSPC)})"
+        remedy = "make room there, or name another folder in the environment variable TMPDIR"
+        raise InputError(tempfile.gettempdir(), "", problem, remedy)
     if refusal is not None:
         raise RuntimeError(f"{shlex.join(compiler)} refused generated C\n{refusal}")
 
