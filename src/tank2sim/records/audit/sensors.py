@@ -143,10 +143,14 @@ def _spikes(trial: Trial, name: str, values: Vector, noise: float) -> list[Findi
     left = 1.0 - float(savgol_coeffs(WINDOW, DEGREE)[WINDOW // 2])
     usual = max(1.4826 * float(np.median(np.abs(away))), noise * float(np.sqrt(left)))
     limit = max(SPIKE, float(norm.isf(FALSE_ALARM / known.size / 2))) * usual
-    # a signal that often moves as far between neighbours has no spikes
-    limit = max(limit, 3 * float(np.quantile(np.abs(np.diff(values[known])), 0.99)))
-    far = np.abs(away) > limit
-    runs = [run for run in _runs(far) if run.stop - run.start <= SPIKE_SAMPLES and _stands_out(values[known], run)]
+    runs = _isolated(values[known], np.abs(away) > limit)
+    # a signal that often moves as far between neighbours, the spikes left out, has none
+    still = np.ones(known.size - 1, dtype=bool)
+    for run in runs:
+        still[max(0, run.start - 1) : run.stop] = False
+    if still.any():
+        limit = max(limit, 3 * float(np.quantile(np.abs(np.diff(values[known]))[still], 0.99)))
+        runs = _isolated(values[known], np.abs(away) > limit)
     if not runs or limit == 0:
         return []
     rows = np.concatenate([known[run] for run in runs])
@@ -158,16 +162,24 @@ def _spikes(trial: Trial, name: str, values: Vector, noise: float) -> list[Findi
     return [Finding(trial.path, (trial.heading(name),), what, truth, kind, evidence, mend, safe=True, places_s=places)]
 
 
-def _stands_out(values: Vector, run: slice) -> bool:
-    """Whether the steps into and out of a run are twice any step near it: the top of a smooth curve is no spike."""
+def _isolated(values: Vector, far: NDArray[np.bool_]) -> list[slice]:
+    """The runs of values far away that are as short as a spike, and stand out."""
+    return [run for run in _runs(far) if run.stop - run.start <= SPIKE_SAMPLES and _stands_out(values, run, far)]
+
+
+def _stands_out(values: Vector, run: slice, far: NDArray[np.bool_]) -> bool:
+    """Whether the steps into and out of a run are twice any step near it: the top of a smooth curve is no spike.
+
+    Steps from and to other values far away do not count, for spikes may lie close together.
+    """
     near = slice(max(0, run.start - 2 * SPIKE_SAMPLES), run.stop + 2 * SPIKE_SAMPLES)
     steps = np.abs(np.diff(values[near]))
-    own = np.zeros(len(steps), dtype=bool)
-    own[max(0, run.start - near.start - 1) : run.stop - near.start] = True
-    if own.all():
+    touched = far[near][1:] | far[near][:-1]
+    if touched.all():
         return False
-    edges = steps[own][[0, -1]]
-    return bool(edges.min() > 2 * steps[~own].max())
+    first, last = run.start - near.start - 1, run.stop - near.start - 1
+    edges = [steps[place] for place in (first, last) if 0 <= place < len(steps)]
+    return bool(min(edges) > 2 * steps[~touched].max())
 
 
 def _kind(rows: int, values: Vector) -> Literal["fault", "note"]:
