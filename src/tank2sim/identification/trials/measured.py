@@ -13,7 +13,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.errors import InputError
 from tank2sim.records.audit import Finding, audited
 from tank2sim.records.reading import read_trial
-from tank2sim.records.trials import Trial, froude_scaled
+from tank2sim.records.trials import RUDDERS, Trial, froude_scaled
 
 TYPICAL_SPEED = 95
 """Percentile of the speed that stands for a trial's approach: some begin at rest, and all are slower afterwards."""
@@ -49,8 +49,9 @@ def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
     Raises
     ------
     InputError
-        A file is at fault, the audit finds a fault that it cannot repair, two trials have one name, a trial is of another size and does not tell its scale, or the
-        rudder's angle is known in some trials and only its order in others.
+        A file is at fault, the audit finds a fault that it cannot repair, two trials have one name, a trial is of
+        another size and does not tell its scale, or the rudder's angle is known in some trials and only its order in
+        others.
     """
     trials, notices = [], []
     for path in paths:
@@ -59,6 +60,8 @@ def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
             _refuse_open(one)
             done = "taken so" if one.safe and one.mend is not None else "left as it is"
             notices.append(f"{path.name}: {one.column}: {one.what}; {done}: {one.likely_truth}")
+        if not set(RUDDERS) & set(trial.signals):
+            raise InputError(path, "column of the rudder", "has no usable reading", "give the rudder in more rows")
         notices += _unused(trial, card)
         scaled, factor = at_size_of(trial, card)
         if factor != 1:

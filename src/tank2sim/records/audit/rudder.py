@@ -97,7 +97,8 @@ def _steady_turn(rate: Vector, rudder: Vector) -> float:
 
 
 def _rms(values: Vector) -> float:
-    return float(np.sqrt(np.nanmean(np.square(values))))
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(np.square(known)))) if known.size else 0.0
 
 
 def _too_large(trial: Trial, name: str, largest: float) -> Finding:
@@ -170,7 +171,3 @@ def _saturation(trial: Trial) -> list[Finding]:
     truth = "the steering gear or the sensor saturates there"
     evidence = {"stop_deg": float(np.rad2deg(stop)), "share": share}
     return [Finding(trial.path, (trial.heading("delta_rad"),), what, truth, "note", evidence)]
-
-
-def rudder_clock_findings(trial: Trial) -> list[Finding]:
-    return []

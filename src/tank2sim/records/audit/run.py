@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from tank2sim.records.audit.finding import Finding
-from tank2sim.records.audit.rudder import rudder_clock_findings, rudder_findings, rudder_unit_findings
+from tank2sim.records.audit.rudder import rudder_findings, rudder_unit_findings
+from tank2sim.records.audit.rudder_clock import rudder_clock_findings
 from tank2sim.records.audit.sensors import sensor_findings
 from tank2sim.records.audit.speed_unit import speed_unit_findings
 from tank2sim.records.audit.time_base import time_findings
 from tank2sim.records.audit.time_unit import time_unit_findings
 from tank2sim.records.audit.track import track_findings
 from tank2sim.records.audit.yaw import heading_unit_findings, rate_unit_findings, yaw_findings
-from tank2sim.records.trials import Trial
+from tank2sim.records.trials import Trial, with_signals
 
 CHECKS: tuple[Callable[[Trial], list[Finding]], ...] = (
     time_findings,
@@ -69,5 +72,14 @@ def audited(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
         findings += found
         for finding in found:
             if finding.safe and finding.mend is not None:
-                trial = finding.mend(trial)
+                trial = _without_empty(finding.mend(trial))
     return trial, tuple(findings)
+
+
+def _without_empty(trial: Trial) -> Trial:
+    """The trial without signals whose only readings a repair has left out."""
+    empty = [name for name, values in trial.signals.items() if np.isnan(values).all()]
+    if not empty:
+        return trial
+    headings = ", ".join(trial.heading(name) for name in empty)
+    return with_signals(trial, dict.fromkeys(empty), f"{headings}: no reading is left")

@@ -39,11 +39,11 @@ class _Scale:
         return self.error < KNOWN * self.factor
 
     def is_of(self, unit: float) -> bool:
-        return abs(np.log(self.factor / unit)) < CERTAIN and self.unexplained < MISCALIBRATED
+        return bool(abs(np.log(self.factor / unit)) < CERTAIN) and self.unexplained < MISCALIBRATED
 
     @property
     def usual(self) -> bool:
-        return abs(np.log(self.factor)) < np.log(1 + MISCALIBRATED)
+        return bool(abs(np.log(self.factor)) < np.log(1 + MISCALIBRATED))
 
 
 def speed_unit_findings(trial: Trial) -> list[Finding]:
@@ -71,7 +71,7 @@ def speed_unit_findings(trial: Trial) -> list[Finding]:
 def _of(trial: Trial, names: tuple[str, ...]) -> Finding | None:
     track = track_of(trial)
     values = [track.signals[name] for name in names]
-    given: Complex = values[0] + 1j * (values[1] if len(values) > 1 else 0.0)
+    given = np.asarray(values[0] + 1j * (values[1] if len(values) > 1 else 0.0), dtype=np.complex128)
     if np.count_nonzero(np.isfinite(track.windows.mean(given) + track.ground)) < 10:
         return None
     scale = _scale(track, given, names)

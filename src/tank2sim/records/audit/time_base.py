@@ -15,9 +15,9 @@ GAP = 1.5
 UNEVEN = 0.1
 """Scatter of the step, as a share of it, worth a word: beyond any rounding of a uniform time to two digits."""
 
-STRAY = 10.0
-"""Times the duration of the middle nine tenths of a record from its middle: no row of one manoeuvre is as far away.
-Project choice; it also bounds the memory that later checks take."""
+STRAY = 20.0
+"""Times the duration of the middle half of a record from its middle, ten times the record: no row of one manoeuvre is
+as far away. Project choice; it also bounds the memory that later checks take."""
 FEW = 0.05
 """Share of rows with stray times up to which they are left out. Project choice, as for the readings of a sensor."""
 
@@ -32,7 +32,7 @@ def time_findings(trial: Trial) -> list[Finding]:
 
 def _stray(trial: Trial) -> Finding | None:
     """Times far from all others, such as an epoch among seconds."""
-    early, middle, late = np.quantile(trial.time_s, [0.05, 0.5, 0.95])
+    early, middle, late = np.quantile(trial.time_s, [0.25, 0.5, 0.75])
     far = np.abs(trial.time_s - middle) > STRAY * max(late - early, 0.0)
     rows = np.flatnonzero(far)
     if rows.size == 0 or late <= early:
@@ -101,7 +101,8 @@ def _not_rising(trial: Trial, steps: NDArray[np.float64]) -> Finding:
     def mend(other: Trial) -> Trial:
         return replace(select_rows(other, rows), notices=(*other.notices, f"time: {truth}"))
 
-    return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", evidence, mend, safe=True)
+    enough = len(rows) > 1
+    return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", evidence, mend, safe=enough)
 
 
 def _repeats(trial: Trial) -> NDArray[np.bool_]:

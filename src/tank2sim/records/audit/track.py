@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -22,7 +23,7 @@ some readings are compared."""
 SCALE, OFFSET, CURRENT = 0.01, np.deg2rad(0.3), 0.01
 """What is worth a word: a log or a current to 1 % of the speed, a compass to 0.3 deg. Choices of ours."""
 FASTEST = 0.5
-"""Current, as a share of the speed over ground, from which it is none. Project choice: no trial is run in such a one."""
+"""Current, as a share of the speed over ground, from which it is none. Project choice: no trial is run in such."""
 
 PAIRS = (("u_mps", "v_mps"), ("u_ground_mps", "v_ground_mps"))
 
@@ -107,10 +108,12 @@ class Track:
 
     @property
     def speed(self) -> float:
+        """Root mean square of the speed over ground, m/s."""
         return float(np.sqrt(np.nanmean(np.abs(self.ground) ** 2)))
 
 
 def track_of(trial: Trial) -> Track:
+    """The track of a trial that has x_m and y_m."""
     step, signals = on_uniform_time(trial)
     place = signals["x_m"] + 1j * signals["y_m"]
     noise = estimated_noise(trial)
@@ -241,7 +244,9 @@ def _lesser(trial: Trial, track: Track, pair: tuple[str, str], given: Complex) -
             truth = "x, y or the velocities are not what their names say: no current is as fast"
             findings.append(Finding(trial.path, (*columns, *places), what, truth, "fault", evidence))
         else:
-            findings.append(Finding(trial.path, columns, what, truth, "note", evidence))
+            # velocities that say they are over ground, and are not, would be used as such
+            kind: Literal["fault", "note"] = "fault" if pair == PAIRS[1] else "note"
+            findings.append(Finding(trial.path, columns, what, truth, kind, evidence))
     return findings
 
 

@@ -118,6 +118,7 @@ def windows_for(noise: float, motion: float, step_s: float, count: int) -> Windo
     step_s, count : float, int
         Time base.
     """
+    motion = motion if np.isfinite(motion) else 0.0
     wanted = (10 / 9 * (2 * np.pi) ** 2 * step_s * (noise / max(SHARE * motion, 1e-9 * noise, 1e-300)) ** 2) ** (
         1 / 3
     ) / step_s
