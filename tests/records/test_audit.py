@@ -426,7 +426,7 @@ def test_a_heading_to_port_without_rate_and_velocities_does_not_turn_the_rudder(
     np.testing.assert_array_equal(mended(record)[0].signals["delta_rad"], m["delta_rad"])
 
 
-@pytest.mark.parametrize("name", ["psi_rad", "r_radps"])
+@pytest.mark.parametrize("name", ["psi_rad", "r_radps", "delta_rad"])
 @pytest.mark.parametrize("count", [12, 60])
 def test_many_spikes_are_left_out_though_some_lie_close_together(name, count):
     record = trial(MOTIONS["turn"])
@@ -492,7 +492,7 @@ def test_a_rudder_that_is_late_is_noted_and_left_as_it_is(late_s):
     record = smooth_rudder(MOTIONS["zigzag"], late_s)
     (finding,) = audit(record)
     assert (finding.column, finding.kind, finding.safe) == ("delta_deg", "note", False)
-    assert finding.evidence["delay_s"] == pytest.approx(late_s, abs=1.0)
+    assert finding.evidence["delay_s"] == pytest.approx(late_s, abs=1.5)
     assert mended(record)[0] is record
 
 

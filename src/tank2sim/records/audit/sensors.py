@@ -24,6 +24,10 @@ SPIKE_SAMPLES = 3
 SPIKE = 10.0
 """Standard deviations of a spike from its neighbours, for the noise of real sensors has longer tails than normal."""
 
+PULSE = np.deg2rad(5.0)
+"""Least spike of a rudder angle, whose noise is often none; a steering gear does not go and come back in three rows.
+Project choice."""
+
 ROUNDING = 1e-9
 """Share of a signal below which its noise is that of the arithmetic: the signal was calculated, not measured."""
 SHORT = 0.05
@@ -42,6 +46,8 @@ def sensor_findings(trial: Trial) -> list[Finding]:
         elif name in MOTIONS:
             findings += _stuck(trial, name, values)
             findings += _spikes(trial, name, values, noise[name])
+        elif name == "delta_rad":
+            findings += _spikes(trial, name, values, 0.0, PULSE)
     return findings
 
 
@@ -134,7 +140,7 @@ def _stands_still(trial: Trial, name: str, noise: dict[str, float]) -> list[Find
     return [Finding(trial.path, (trial.heading(name),), what, truth, mend=without, safe=True)]
 
 
-def _spikes(trial: Trial, name: str, values: Vector, noise: float) -> list[Finding]:
+def _spikes(trial: Trial, name: str, values: Vector, noise: float, least: float = 0.0) -> list[Finding]:
     """Values far from the median of their neighbours (Hampel 1974), on both sides."""
     known = np.flatnonzero(np.isfinite(values))
     if known.size < 4 * WINDOW:
@@ -142,7 +148,7 @@ def _spikes(trial: Trial, name: str, values: Vector, noise: float) -> list[Findi
     away = values[known] - median_filter(values[known], size=2 * SPIKE_SAMPLES + 1, mode="nearest")
     left = 1.0 - float(savgol_coeffs(WINDOW, DEGREE)[WINDOW // 2])
     usual = max(1.4826 * float(np.median(np.abs(away))), noise * float(np.sqrt(left)))
-    limit = max(SPIKE, float(norm.isf(FALSE_ALARM / known.size / 2))) * usual
+    limit = max(least, max(SPIKE, float(norm.isf(FALSE_ALARM / known.size / 2))) * usual)
     runs = _isolated(values[known], np.abs(away) > limit)
     # a signal that often moves as far between neighbours, the spikes left out, has none
     still = np.ones(known.size - 1, dtype=bool)

@@ -117,7 +117,11 @@ class _Comparison:
 def _headings(trial: Trial, heading: Vector) -> list[Vector]:
     """The heading, and as it is if it is in rad, wrapped at 2 pi, under the name of degrees."""
     turn = 2 * np.pi * DEGREE
-    if "deg" not in trial.heading("psi_rad") or np.nanmax(np.abs(heading)) > 1.01 * turn:
+    if (
+        not np.isfinite(heading).any()
+        or "deg" not in trial.heading("psi_rad")
+        or np.nanmax(np.abs(heading)) > 1.01 * turn
+    ):
         return [heading]
     known = np.isfinite(heading)
     again = heading.copy()
