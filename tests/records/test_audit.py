@@ -537,3 +537,15 @@ def test_no_pattern_of_empty_cells_and_times_breaks_the_audit():
         right, findings = audited(slow)
         assert len(right.time_s) <= count
         json.dumps([entry for one in findings for entry in one.as_json()])
+
+
+@pytest.mark.parametrize("manoeuvre", ["turn:35", "turn:-20"])
+def test_the_sign_of_a_rudder_in_radians_is_judged_on_its_degrees(manoeuvre, mariner) -> None:
+    """A turn recorded from its execute: read as it stands, its small rudder seems to turn the ship to port."""
+    run = simulate(mariner, parse_manoeuvre(manoeuvre), duration_s=600.0).trajectory
+    names = {"delta_rad": "rudder.angle", "r_radps": "motion.r", "psi_rad": "motion.psi"}
+    signals = {name: np.asarray(run[of])[::5] for name, of in names.items()}
+    noise = {"r_radps": np.radians(0.01), "psi_rad": np.radians(0.1)}
+    record = trial({"t_s": run.t[::5], **signals, "delta_rad": DEG * signals["delta_rad"]}, noise=noise)
+    assert [(one.column, one.likely_truth.split()[-1]) for one in audit(record)] == [("delta_deg", "degrees")]
+    np.testing.assert_allclose(mended(record)[0].signals["delta_rad"], signals["delta_rad"])
