@@ -158,6 +158,56 @@ def test_bad_input_is_one_line_and_nothing_is_written(folder: Path) -> None:
     assert not (folder / "n.toml").exists()
 
 
+def rewritten(folder: Path, source: str, name: str, factors: dict[str, float]) -> str:
+    """A trial's file with some columns multiplied."""
+    heads, *rows = (folder / source).read_text().splitlines()
+    table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+    for head, factor in factors.items():
+        table[:, heads.split(",").index(head)] *= factor
+    np.savetxt(folder / name, table, delimiter=",", header=heads, comments="")
+    return name
+
+
+@pytest.mark.parametrize(
+    ("factors", "columns"),
+    [
+        ({"t_s": 2.0}, ["t_s"]),
+        ({"x_m": 1.3, "y_m": 1.3}, ["x_m"]),
+        ({"u_mps": 2.0, "v_mps": 2.0}, ["u_mps", "v_mps"]),
+        ({"r_degps": 1.5}, ["r_degps", "psi_deg"]),
+    ],
+)
+@pytest.mark.parametrize("command", ["identify", "validate", "gap"])
+def test_a_scale_of_no_unit_stops_the_commands_that_use_the_trial(
+    folder: Path, command: str, factors: dict[str, float], columns: list[str]
+) -> None:
+    name = rewritten(folder, "zigzag20.csv", "odd.csv", factors)
+    outputs = {"identify": ("-o", "odd.toml"), "validate": ("-o", "odd.html"), "gap": ("-o", "odd")}[command]
+    refused(tank2sim(command, "off.toml", name, *outputs, cwd=folder), "odd.csv", *columns)
+    assert not any((folder / output).exists() for output in ("odd.toml", "odd.html", "odd"))
+
+
+REPAIRED = {
+    "rudder in radians": {"delta_deg": np.pi / 180},
+    "positions in km": {"x_m": 1e-3, "y_m": 1e-3},
+    "positions in feet": {"x_m": 1 / 0.3048, "y_m": 1 / 0.3048},
+}
+
+
+@pytest.mark.parametrize("name", REPAIRED)
+def test_a_repaired_unit_gives_the_card_of_the_right_file(folder: Path, name: str) -> None:
+    found = {}
+    for kind in ("turn25.csv", "zigzag20.csv"):
+        rewritten(folder, kind, f"wrong_{kind}", REPAIRED[name])
+    for label, files in {"right": ("", "zigzag20.csv"), "wrong": ("wrong_", "wrong_zigzag20.csv")}.items():
+        arguments = ("identify", "off.toml", f"{files[0]}turn25.csv", files[1], "--method", "equation_error")
+        result = tank2sim(*arguments, "--members", "0", "--json", f"{label}.json", cwd=folder)
+        assert result.returncode == 0, result.stderr
+        found[label] = json.loads((folder / f"{label}.json").read_text())["derivatives"]
+    for term in ("Nv", "Nr", "Nd", "Yv"):
+        assert found["wrong"][term]["value"] == pytest.approx(found["right"][term]["value"], rel=1e-3)
+
+
 @pytest.mark.slow
 def test_an_interrupt_keeps_the_best_card_so_far(folder: Path) -> None:
     program = """

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.records.audit import audit, estimated_noise, mended
+from tank2sim.records.audit import audit, audited, estimated_noise, mended
 from tank2sim.records.audit.rudder import rudder_response
 from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import select_rows
@@ -341,3 +341,211 @@ def test_the_side_of_the_rudder_is_told_by_a_turn_recorded_from_its_execute(ever
     noise = {"u_mps": 0.03, "r_radps": np.radians(0.01), "psi_rad": np.radians(0.1)}
     record = trial({**signals, "delta_rad": sign * signals["delta_rad"]}, noise=noise)
     assert np.sign(rudder_response(record)) == sign
+
+
+def scaled(**factors):
+    def change(m):
+        return {name: m[name] * factor for name, factor in factors.items()}
+
+    return change
+
+
+DEPENDENT = {
+    "rudder in radians to port": (scaled(delta_rad=-DEG), ["delta_deg", "delta_deg"]),
+    "r in rad/s to port": (scaled(r_radps=-DEG), ["r_degps", "r_degps"]),
+    "psi in radians to port": (scaled(psi_rad=-DEG), ["psi_deg", "psi_deg"]),
+    "psi and r in radians": (scaled(psi_rad=DEG, r_radps=DEG), ["psi_deg", "r_degps"]),
+    "psi, r and rudder in radians": (
+        scaled(psi_rad=DEG, r_radps=DEG, delta_rad=DEG),
+        ["psi_deg", "r_degps", "delta_deg"],
+    ),
+    "velocities in knots, v to port": (scaled(u_mps=3600 / 1852, v_mps=-3600 / 1852), ["u_mps, v_mps", "v_mps"]),
+    "positions in km, y to west": (scaled(x_m=1e-3, y_m=-1e-3), ["x_m, y_m", "x_m, y_m"]),
+    "positions in km": (scaled(x_m=1e-3, y_m=1e-3), ["x_m, y_m"]),
+    "positions in feet": (scaled(x_m=1 / 0.3048, y_m=1 / 0.3048), ["x_m, y_m"]),
+    "positions in nautical miles": (scaled(x_m=1 / 1852, y_m=1 / 1852), ["x_m, y_m"]),
+}
+
+
+@pytest.mark.parametrize("kind", ["zigzag", "turn", "turn_port"])
+@pytest.mark.parametrize("name", DEPENDENT)
+def test_faults_that_depend_on_each_other_are_repaired_one_after_the_other(kind, name):
+    change, columns = DEPENDENT[name]
+    true, changed = MOTIONS[kind], change(MOTIONS[kind])
+    shrink = {of: abs(np.median(changed[of][true[of] != 0] / true[of][true[of] != 0])) for of in changed}
+    noise = {of: value * shrink.get(of, 1.0) for of, value in NOISE.items()}
+    record = trial({**true, **changed}, noise=noise)
+    assert [one.column for one in audit(record)] == columns
+    right, _ = mended(record)
+    for signal in ("delta_rad", "r_radps", "psi_rad", "u_mps", "v_mps", "x_m", "y_m"):
+        # half a knot's third digit of the speed, six times the noise of the rest
+        np.testing.assert_allclose(right.signals[signal], true[signal], atol=6 * NOISE.get(signal, 0.0) + 1e-9)
+    assert not audit(right)
+
+
+UNKNOWN = {
+    "a clock twice too fast": (lambda m: {"t_s": 2.0 * m["t_s"]}, "t_s"),
+    "a clock twice too slow": (lambda m: {"t_s": 0.5 * m["t_s"]}, "t_s"),
+    "r at 1.5 times": (scaled(r_radps=1.5), "r_degps, psi_deg"),
+    "velocities at 1.3 times": (scaled(u_mps=1.3, v_mps=1.3), "u_mps, v_mps, x_m, y_m"),
+    "velocities at twice": (scaled(u_mps=2.0, v_mps=2.0), "u_mps, v_mps, x_m, y_m"),
+    "positions at 0.7 times": (scaled(x_m=0.7, y_m=0.7), "u_mps, v_mps, x_m, y_m"),
+}
+
+
+@pytest.mark.parametrize("kind", ["zigzag", "turn"])
+@pytest.mark.parametrize("name", UNKNOWN)
+def test_a_factor_of_no_unit_is_a_fault_and_left_alone(kind, name):
+    change, column = UNKNOWN[name]
+    record = trial({**MOTIONS[kind], **change(MOTIONS[kind])})
+    (finding,) = audit(record)
+    assert (finding.column, finding.kind, finding.open) == (column, "fault", True)
+    right, applied = mended(record)
+    assert not applied and right is record
+
+
+def test_without_a_rate_of_turn_half_the_speed_is_not_knots():
+    m = MOTIONS["zigzag"]
+    record = trial({name: values for name, values in {**m, "t_s": 2.0 * m["t_s"]}.items() if name != "r_radps"})
+    (finding,) = audit(record)
+    assert finding.open and "knots" in finding.likely_truth
+
+
+def test_a_sign_that_no_other_column_tells_is_not_chosen():
+    m = MOTIONS["zigzag"]
+    record = trial({"t_s": m["t_s"], "delta_rad": 0.0 * m["t_s"], "r_radps": -m["r_radps"], "psi_rad": m["psi_rad"]})
+    (finding,) = audit(record)
+    assert (finding.column, finding.open) == ("r_degps, psi_deg", True)
+
+
+def test_a_heading_to_port_without_rate_and_velocities_does_not_turn_the_rudder():
+    m = MOTIONS["zigzag"]
+    kept = {name: m[name] for name in ("t_s", "delta_rad", "x_m", "y_m")}
+    record = trial({**kept, "psi_rad": -m["psi_rad"]})
+    assert audit(record)[0].column == "psi_deg, x_m, y_m"
+    np.testing.assert_array_equal(mended(record)[0].signals["delta_rad"], m["delta_rad"])
+
+
+@pytest.mark.parametrize("name", ["psi_rad", "r_radps", "delta_rad"])
+@pytest.mark.parametrize("count", [12, 60])
+def test_many_spikes_are_left_out_though_some_lie_close_together(name, count):
+    record = trial(MOTIONS["turn"])
+    rng = np.random.default_rng(3)
+    struck = np.sort(rng.choice(np.arange(5, 3995, 4), count, replace=False))
+    record.signals[name][struck] += np.deg2rad(40) * rng.choice([-1, 1], count)
+    (finding,) = audit(record)
+    assert finding.evidence["spikes"] == count
+    assert np.flatnonzero(np.isnan(mended(record)[0].signals[name])).tolist() == struck.tolist()
+
+
+@pytest.mark.parametrize(("row", "value"), [(0, -1.7e9), (2000, 1.7e9), (4000, 1.7e9), (4000, 1e15)])
+def test_a_stray_time_is_named_and_its_row_left_out(row, value):
+    record = trial(MOTIONS["zigzag"])
+    times = record.time_s.copy()
+    times[row] = value
+    findings = audit(replace(record, time_s=times))
+    assert findings[0].columns == ("t_s",) and findings[0].evidence["first_row"] == row + 1
+    right, _ = mended(replace(record, time_s=times))
+    np.testing.assert_array_equal(right.time_s, np.delete(record.time_s, row))
+
+
+def test_two_recordings_in_one_file_are_not_chosen_between():
+    record = trial(MOTIONS["zigzag"])
+    times = np.where(np.arange(4001) < 3790, record.time_s, record.time_s + 1e6)
+    (finding,) = audit(replace(record, time_s=times))
+    assert finding.columns == ("t_s",) and finding.open
+
+
+@pytest.mark.parametrize("every", [2, 5])
+@pytest.mark.parametrize("name", ["psi in radians", "rudder in radians", "velocities in knots", "v to port"])
+def test_columns_recorded_less_often_are_judged_as_others(every, name):
+    change, column, truth = FAULTS[name]
+    record = faulty("zigzag", change, SHRUNK.get(name))
+    slow = np.arange(4001) % every > 0
+    for signal in ("psi_rad", "u_mps", "v_mps", "x_m", "y_m"):
+        record.signals[signal][slow] = np.nan
+    faults = [one for one in audit(record) if one.kind == "fault"]
+    assert [one.column for one in faults] == [column]
+    assert truth in faults[0].likely_truth
+
+
+def smooth_rudder(m, late_s):
+    """The rudder of a motion by a gear of 2.5 deg/s, and the yaw of a ship of second order that follows it."""
+    t = m["t_s"]
+    order = np.deg2rad(20) * np.sign(np.sin(2 * np.pi * (t - 20) / 120)) * (t > 20)
+    rudder, r, lagging, psi = (np.zeros_like(t) for _ in range(4))
+    for k in range(1, len(t)):
+        h = t[k] - t[k - 1]
+        rudder[k] = rudder[k - 1] + np.clip(order[k - 1] - rudder[k - 1], -np.deg2rad(2.5) * h, np.deg2rad(2.5) * h)
+        # T1 T2 r'' + (T1 + T2) r' + r = K (delta + T3 delta'), with T1, T2, T3 = 40, 6, 12 s, as a sum of two lags
+        lagging[k] = lagging[k - 1] + h / 6 * (rudder[k - 1] - lagging[k - 1])
+        driven = 2.0 * rudder[k - 1] - 1.0 * lagging[k - 1]
+        r[k] = r[k - 1] + h / 40 * (0.08 * driven - r[k - 1])
+        psi[k] = psi[k - 1] + h * r[k]
+    shown = np.interp(t - late_s, t, rudder)
+    noise = {"r_radps": np.deg2rad(0.02), "psi_rad": np.deg2rad(0.1)}
+    return trial({"t_s": t, "delta_rad": shown, "r_radps": r, "psi_rad": psi}, noise=noise)
+
+
+@pytest.mark.parametrize("late_s", [3.0, 4.0, 5.0])
+def test_a_rudder_that_is_late_is_noted_and_left_as_it_is(late_s):
+    record = smooth_rudder(MOTIONS["zigzag"], late_s)
+    (finding,) = audit(record)
+    assert (finding.column, finding.kind, finding.safe) == ("delta_deg", "note", False)
+    assert finding.evidence["delay_s"] == pytest.approx(late_s, abs=1.5)
+    assert mended(record)[0] is record
+
+
+@pytest.mark.parametrize("late_s", [0.0, -1.0, -3.0])
+def test_a_rudder_that_is_not_late_is_not_noted(late_s):
+    assert audit(smooth_rudder(MOTIONS["zigzag"], late_s)) == ()
+
+
+def test_velocities_through_the_water_named_over_ground_are_not_to_be_used():
+    m = MOTIONS["zigzag"]
+    named = {{"u_mps": "u_ground_mps", "v_mps": "v_ground_mps"}.get(name, name): values for name, values in m.items()}
+    (finding,) = audit(trial({**named, **moved(m, (0.3 - 0.4j) * m["t_s"])}))
+    assert finding.open and finding.columns == ("u_ground_mps", "v_ground_mps")
+
+
+def test_no_pattern_of_empty_cells_and_times_breaks_the_audit():
+    """Seeded: columns at lower rates, in bursts, at one end or in a few rows; times with jumps, repeats and strays."""
+    rng = np.random.default_rng(20)
+    whole = select_rows(trial(MOTIONS["zigzag"]), np.arange(0, 4001, 8))
+    for _ in range(200):
+        count = int(rng.choice([2, 3, 9, 40, 500]))
+        record = select_rows(whole, np.arange(count))
+        rows = np.arange(count)
+        kept = rng.random(len(record.signals)) < 0.8
+        kept[0] = True
+        signals = {name: values for (name, values), keep in zip(record.signals.items(), kept, strict=True) if keep}
+        for name, values in signals.items():
+            patterns = (
+                rows % rng.integers(2, 12) > 0,
+                rng.random(count) < rng.random(),
+                rows > rng.integers(count),
+                rows != rng.integers(count),
+                rows % 50 < 25,
+            )
+            empty = patterns[rng.integers(len(patterns))] if rng.random() < 0.6 else rows < 0
+            empty[rng.integers(count)] = False
+            signals[name] = np.where(empty, np.nan, values)
+        times = record.time_s.copy()
+        struck = rng.integers(count, size=rng.integers(4))
+        times[struck] = rng.choice([1.7e9, -1e12, 0.0, times[-1] * 3, 1e300], size=len(struck))
+        slow = replace(record, time_s=times * rng.choice([1.0, 1e-6, 1e6]), signals=signals)
+        right, findings = audited(slow)
+        assert len(right.time_s) <= count
+        json.dumps([entry for one in findings for entry in one.as_json()])
+
+
+@pytest.mark.parametrize("manoeuvre", ["turn:35", "turn:-20"])
+def test_the_sign_of_a_rudder_in_radians_is_judged_on_its_degrees(manoeuvre, mariner) -> None:
+    """A turn recorded from its execute: read as it stands, its small rudder seems to turn the ship to port."""
+    run = simulate(mariner, parse_manoeuvre(manoeuvre), duration_s=600.0).trajectory
+    names = {"delta_rad": "rudder.angle", "r_radps": "motion.r", "psi_rad": "motion.psi"}
+    signals = {name: np.asarray(run[of])[::5] for name, of in names.items()}
+    noise = {"r_radps": np.radians(0.01), "psi_rad": np.radians(0.1)}
+    record = trial({"t_s": run.t[::5], **signals, "delta_rad": DEG * signals["delta_rad"]}, noise=noise)
+    assert [(one.column, one.likely_truth.split()[-1]) for one in audit(record)] == [("delta_deg", "degrees")]
+    np.testing.assert_allclose(mended(record)[0].signals["delta_rad"], signals["delta_rad"])

@@ -199,3 +199,37 @@ def test_changed_signals_leave_the_others_and_say_so(write):
     assert after.notices[-1] == "changed"
     np.testing.assert_array_equal(after.signals["psi_rad"], before.signals["psi_rad"])
     np.testing.assert_array_equal(after.signals["r_radps"], 2 * before.signals["r_radps"])
+
+
+@pytest.mark.parametrize(
+    ("comment", "right"),
+    [
+        ("# rudder-sign: port", "rudder_sign"),
+        ("# Rudder_Sign: port", "rudder_sign"),
+        ("# rudder sign: port", "rudder_sign"),
+        ("# rudder_sign = port", "rudder_sign"),
+        ("# ruddersign: port", "rudder_sign"),
+        ("# Scale: 45.7", "scale"),
+        ("# scales: 45.7", "scale"),
+        ("# nois: u_mps 0.03", "noise"),
+        ("# NOISE: u_mps 0.03", "noise"),
+    ],
+)
+def test_a_comment_that_resembles_a_key_is_refused_with_its_spelling(tmp_path, comment, right):
+    path = tmp_path / "run.csv"
+    path.write_text(f"{comment}\nt_s,delta_deg,u_mps\n0,0,5\n1,0,5\n")
+    with pytest.raises(InputError, match=f"'# {right}: ...'"):
+        read_trial(path)
+
+
+@pytest.mark.parametrize(
+    "comment",
+    [
+        *("# source: a pond", "# note: wind 3 m/s", "# a zigzag 20/20, run 3", "# noise was heard from the bow"),
+        *("# see https://example.org/noise", "# ship: a tanker", "# scale 1:25 model", "# model: wood"),
+    ],
+)
+def test_free_text_stays_allowed(tmp_path, comment):
+    path = tmp_path / "run.csv"
+    path.write_text(f"{comment}\nt_s,delta_deg,u_mps\n0,5,5\n1,5,5\n")
+    assert read_trial(path).scale is None

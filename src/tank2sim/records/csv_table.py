@@ -7,6 +7,7 @@ begin with ``#`` are comments; ``# key: value`` with a single word before the co
 from __future__ import annotations
 
 import csv
+import difflib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -27,6 +28,11 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _NOT_OF_NUMBERS = re.compile(r"[^0-9eE+\-., \t\n]")
 _EMPTY_CELL = re.compile(r"(?<![^,\n])(?=[,\n])", re.ASCII)
 _QUOTED_LENGTH = 30
+
+_RESEMBLES = 0.8
+"""Likeness (difflib) from which a comment key is taken for a misspelt one: one letter of four, ``nois`` or ``nosie``
+for ``noise``, while ``note`` and ``source`` stay free text. Project choice."""
+_ALMOST_KEY = re.compile(r"([A-Za-z_][\w.-]*(?:[ \t]+[A-Za-z_][\w.-]*)?)\s*[:=](?!//)")  # two words, or an equals sign
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +118,25 @@ class Table:
             problem = f"{_quoted(text)} is no number" if "\n" not in text else "is given more than once"
             raise InputError(self.path, f"comment {key}", problem, f"write one line such as '# {key}: 11.63'")
         return number
+
+    def refuse_misspelt_keys(self, known: Sequence[str]) -> None:
+        """Refuse a comment line whose key resembles one of the known keys but is none; free text is let through.
+
+        Raises
+        ------
+        InputError
+            There is such a line; the message tells the right spelling.
+        """
+        keys = [(key, f"# {key}:") for key in self.comments if key not in known]
+        matches = (_ALMOST_KEY.match(remark) for remark in self.remarks)
+        keys += [(match[1], f"# {match[0]}") for match in matches if match]
+        spellings = {key.lower(): key for key in known}
+        for key, shown in keys:
+            plain = re.sub(r"[\s.-]+", "_", key.strip().lower())
+            near = difflib.get_close_matches(plain, spellings, n=1, cutoff=_RESEMBLES)
+            if near:
+                problem = f"{_quoted(shown)} resembles a key and is none"
+                raise InputError(self.path, f"comment {key}", problem, f"write '# {spellings[near[0]]}: ...'")
 
     def si(self) -> Table:
         """The table in SI and radians, its columns renamed by :func:`tank2sim.units.to_si` (psi_deg to psi_rad).

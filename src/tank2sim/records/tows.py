@@ -94,6 +94,7 @@ def read_tows(path: Path | str) -> Tows:
         no reading, there are fewer than five times with one, or the time does not rise from 0 or later.
     """
     table = read_table(path)
+    table.refuse_misspelt_keys(("force_N", "mass_kg", *BODY_KEYS))
     time = table.increasing("t_s")
     if time[0] < 0:
         raise InputError(

@@ -12,6 +12,9 @@ from tank2sim.records.csv_table import Table, Vector, read_table
 from tank2sim.records.trials import MEASURED, RUDDERS, SIGNALS, Trial, unwrapped
 from tank2sim.units import to_si
 
+COMMENT_KEYS = ("rudder_sign", "noise", "scale")
+"""Comments that are understood."""
+
 
 def read_trial_csv(path: Path | str) -> Trial:
     """Read a trial such as ``t_s,delta_deg,n_rpm,u_mps,v_mps,r_degps,psi_deg,x_m,y_m``; times as they stand.
@@ -27,6 +30,7 @@ def read_trial_csv(path: Path | str) -> Trial:
         rudder or nothing measured; a column has the name of a signal and another unit; a comment is not understood.
     """
     raw = read_table(path)
+    raw.refuse_misspelt_keys(COMMENT_KEYS)
     table = raw.si()
     time = table.column("t_s")
     empty = np.flatnonzero(np.isnan(time))

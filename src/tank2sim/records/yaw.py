@@ -16,6 +16,7 @@ from tank2sim.units import to_si
 
 Medium = Literal["air", "water"]
 
+_COMMENTS = "medium programme max_rate_degps max_rate_radps rise_s settle_s start_s humps".split()
 _PLAIN = (
     "torque_constant_NmpA",
     "inertia_kgm2",
@@ -82,6 +83,7 @@ def read_yaw_record(path: Path | str) -> YawRecord:
         these values, or the record is shorter than the programme.
     """
     table = read_table(path).si()
+    table.refuse_misspelt_keys((*_COMMENTS, *_PLAIN))
     time = table.increasing("t_s")
     angle, current = _complete(table, "phi_rad"), _complete(table, "current_A")
     medium = table.comments.get("medium", "water").strip().lower()

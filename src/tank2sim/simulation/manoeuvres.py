@@ -308,6 +308,8 @@ def read_orders(path: Path) -> Orders:
     for name, values in columns.items():
         if np.isnan(values).any():
             raise InputError(path, f"column {name}", "has an empty cell", "give every order")
+    if not any(key.lower() == "rudder_sign" for key in table.comments):
+        table.refuse_misspelt_keys(("rudder_sign",))
     port = _rudder_sign(path, table.comments) == "port"
     inputs = {names[name]: values for name, values in columns.items() if name in names}
     inputs["rudder.command"] = inputs["rudder.command"] * (-1.0 if port else 1.0)

@@ -11,9 +11,9 @@ import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.errors import InputError
-from tank2sim.records.audit import audited
+from tank2sim.records.audit import Finding, audited
 from tank2sim.records.reading import read_trial
-from tank2sim.records.trials import Trial, froude_scaled
+from tank2sim.records.trials import RUDDERS, Trial, froude_scaled
 
 TYPICAL_SPEED = 95
 """Percentile of the speed that stands for a trial's approach: some begin at rest, and all are slower afterwards."""
@@ -49,15 +49,19 @@ def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
     Raises
     ------
     InputError
-        A file is at fault, two trials have one name, a trial is of another size and does not tell its scale, or the
-        rudder's angle is known in some trials and only its order in others.
+        A file is at fault, the audit finds a fault that it cannot repair, two trials have one name, a trial is of
+        another size and does not tell its scale, or the rudder's angle is known in some trials and only its order in
+        others.
     """
     trials, notices = [], []
     for path in paths:
         trial, findings = audited(read_trial(path))
         for one in findings:
+            _refuse_open(one)
             done = "taken so" if one.safe and one.mend is not None else "left as it is"
             notices.append(f"{path.name}: {one.column}: {one.what}; {done}: {one.likely_truth}")
+        if not set(RUDDERS) & set(trial.signals):
+            raise InputError(path, "column of the rudder", "has no usable reading", "give the rudder in more rows")
         notices += _unused(trial, card)
         scaled, factor = at_size_of(trial, card)
         if factor != 1:
@@ -73,6 +77,14 @@ def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
         remedy = "give trials that all have delta_deg, or all only delta_order_deg"
         raise InputError(odd.path, "header", "has no delta_deg, as others have", remedy)
     return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(dict.fromkeys(notices)))
+
+
+def _refuse_open(finding: Finding) -> None:
+    """Refuse a trial of which a column is not what its name says, and nobody knows what it is instead."""
+    if finding.open:
+        place = f"column{'s' * (len(finding.columns) > 1)} {finding.column}"
+        remedy = f"probably {finding.likely_truth}: correct the file, or leave the column out"
+        raise InputError(finding.source, place, finding.what, remedy)
 
 
 def _unused(trial: Trial, card: ManoeuvringCard) -> list[str]:

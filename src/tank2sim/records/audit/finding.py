@@ -56,6 +56,11 @@ class Finding:
         """The columns in one text."""
         return ", ".join(self.columns)
 
+    @property
+    def open(self) -> bool:
+        """Whether it is a fault that :func:`tank2sim.records.audit.mended` leaves: the trial is then not to be used."""
+        return self.kind == "fault" and not (self.safe and self.mend is not None)
+
     def as_json(self) -> list[dict[str, Any]]:
         """One entry a column: file, column, what, likely_truth, kind, mended (by the safe mends), evidence, places."""
         rest = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from tank2sim.records.audit.finding import Finding
 from tank2sim.records.audit.noise import estimated_noise
@@ -23,8 +24,8 @@ MOVES = 0.3
 """Spread of a rudder over its size from which it is moved about, not held: a choice of ours."""
 
 
-def rudder_findings(trial: Trial) -> list[Finding]:
-    """Unit and sign of the rudder angle and of the order, and where one does not follow the other."""
+def rudder_unit_findings(trial: Trial) -> list[Finding]:
+    """Unit of the rudder angle and of the order."""
     findings = []
     for name in RUDDERS:
         if name not in trial.signals:
@@ -32,12 +33,19 @@ def rudder_findings(trial: Trial) -> list[Finding]:
         largest = float(np.nanmax(np.abs(trial.signals[name])))
         if largest > SIDEWAYS:
             findings.append(_too_large(trial, name, largest))
-            continue
-        response = rudder_response(trial, name)
-        if response and _too_small(trial, name, largest):
-            findings.append(_in_radians(trial, name, largest))
-        if response < 0:
-            findings.append(_wrong_sign(trial, name, response))
+        elif _too_small(trial, name, largest):
+            found = _in_radians(trial, name, largest)
+            assert found.mend is not None
+            if rudder_response(found.mend(trial), name):
+                findings.append(found)
+    return findings
+
+
+def rudder_findings(trial: Trial) -> list[Finding]:
+    """Sign of the rudder angle and of the order, in their right unit, and where one does not follow the other."""
+    present = [name for name in RUDDERS if name in trial.signals]
+    responses = {name: rudder_response(trial, name) for name in present}
+    findings = [_wrong_sign(trial, name, response) for name, response in responses.items() if response < 0]
     return findings or _saturation(trial)
 
 
@@ -89,7 +97,8 @@ def _steady_turn(rate: Vector, rudder: Vector) -> float:
 
 
 def _rms(values: Vector) -> float:
-    return float(np.sqrt(np.nanmean(np.square(values))))
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(np.square(known)))) if known.size else 0.0
 
 
 def _too_large(trial: Trial, name: str, largest: float) -> Finding:
@@ -109,9 +118,16 @@ def _too_small(trial: Trial, name: str, largest: float) -> bool:
 
     Rightly read a zigzag changes the heading as far as the rudder, and a turn some tens of times as far.
     """
-    if "deg" not in trial.heading(name) or "psi_rad" not in trial.signals or largest > np.deg2rad(np.pi / 4):
+    if "deg" not in trial.heading(name) or largest > np.deg2rad(np.pi / 4):
         return False
-    heading = trial.signals["psi_rad"]
+    if "psi_rad" in trial.signals:
+        heading = trial.signals["psi_rad"]
+    elif "r_radps" in trial.signals:
+        rate = trial.signals["r_radps"]
+        known = np.isfinite(rate)
+        heading = cumulative_trapezoid(rate[known], trial.time_s[known], initial=0.0)
+    else:
+        return False
     return bool(np.nanmax(heading) - np.nanmin(heading) > largest * 180 / np.pi)
 
 

@@ -3,25 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
 
 from tank2sim.records.audit.finding import Finding
-from tank2sim.records.audit.rudder import rudder_findings
+from tank2sim.records.audit.rudder import rudder_findings, rudder_unit_findings
+from tank2sim.records.audit.rudder_clock import rudder_clock_findings
 from tank2sim.records.audit.sensors import sensor_findings
+from tank2sim.records.audit.speed_unit import speed_unit_findings
 from tank2sim.records.audit.time_base import time_findings
 from tank2sim.records.audit.time_unit import time_unit_findings
 from tank2sim.records.audit.track import track_findings
-from tank2sim.records.audit.yaw import yaw_findings
-from tank2sim.records.trials import Trial
+from tank2sim.records.audit.yaw import heading_unit_findings, rate_unit_findings, yaw_findings
+from tank2sim.records.trials import Trial, with_signals
 
 CHECKS: tuple[Callable[[Trial], list[Finding]], ...] = (
     time_findings,
     time_unit_findings,
     sensor_findings,
+    heading_unit_findings,
+    rate_unit_findings,
+    speed_unit_findings,
+    rudder_unit_findings,
     yaw_findings,
     track_findings,
     rudder_findings,
+    rudder_clock_findings,
 )
-"""In this order, for a later check takes what an earlier one judges for granted."""
+"""In this order, for a later check takes what an earlier one judges for granted: signs are judged on values whose unit
+is repaired, the rudder on a rate of turn whose sign is."""
 
 
 def audit(trial: Trial) -> tuple[Finding, ...]:
@@ -45,12 +56,30 @@ def mended(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
 
 
 def audited(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
-    """The trial as :func:`mended` gives it, and all that is wrong with it, as :func:`audit` does."""
+    """The trial as :func:`mended` gives it, and all that is wrong with it, as :func:`audit` does.
+
+    After a fault that is not repaired (:attr:`.Finding.open`) nothing more is: what follows may depend on it, and is
+    reported only where it is about other columns. After one of the time nothing else can be judged.
+    """
     findings: list[Finding] = []
     for check in CHECKS:
-        found = check(trial)
+        doubtful = {column for finding in findings if finding.open for column in finding.columns}
+        if trial.heading("t_s") in doubtful:
+            break
+        found = [finding for finding in check(trial) if not doubtful.intersection(finding.columns)]
+        if doubtful:
+            found = [replace(finding, safe=False) for finding in found]
         findings += found
         for finding in found:
             if finding.safe and finding.mend is not None:
-                trial = finding.mend(trial)
+                trial = _without_empty(finding.mend(trial))
     return trial, tuple(findings)
+
+
+def _without_empty(trial: Trial) -> Trial:
+    """The trial without signals whose only readings a repair has left out."""
+    empty = [name for name, values in trial.signals.items() if np.isnan(values).all()]
+    if not empty:
+        return trial
+    headings = ", ".join(trial.heading(name) for name in empty)
+    return with_signals(trial, dict.fromkeys(empty), f"{headings}: no reading is left")

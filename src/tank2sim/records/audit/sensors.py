@@ -24,6 +24,10 @@ SPIKE_SAMPLES = 3
 SPIKE = 10.0
 """Standard deviations of a spike from its neighbours, for the noise of real sensors has longer tails than normal."""
 
+PULSE = np.deg2rad(5.0)
+"""Least spike of a rudder angle, whose noise is often none; a steering gear does not go and come back in three rows.
+Project choice."""
+
 ROUNDING = 1e-9
 """Share of a signal below which its noise is that of the arithmetic: the signal was calculated, not measured."""
 SHORT = 0.05
@@ -42,6 +46,8 @@ def sensor_findings(trial: Trial) -> list[Finding]:
         elif name in MOTIONS:
             findings += _stuck(trial, name, values)
             findings += _spikes(trial, name, values, noise[name])
+        elif name == "delta_rad":
+            findings += _spikes(trial, name, values, 0.0, PULSE)
     return findings
 
 
@@ -134,7 +140,7 @@ def _stands_still(trial: Trial, name: str, noise: dict[str, float]) -> list[Find
     return [Finding(trial.path, (trial.heading(name),), what, truth, mend=without, safe=True)]
 
 
-def _spikes(trial: Trial, name: str, values: Vector, noise: float) -> list[Finding]:
+def _spikes(trial: Trial, name: str, values: Vector, noise: float, least: float = 0.0) -> list[Finding]:
     """Values far from the median of their neighbours (Hampel 1974), on both sides."""
     known = np.flatnonzero(np.isfinite(values))
     if known.size < 4 * WINDOW:
@@ -142,11 +148,15 @@ def _spikes(trial: Trial, name: str, values: Vector, noise: float) -> list[Findi
     away = values[known] - median_filter(values[known], size=2 * SPIKE_SAMPLES + 1, mode="nearest")
     left = 1.0 - float(savgol_coeffs(WINDOW, DEGREE)[WINDOW // 2])
     usual = max(1.4826 * float(np.median(np.abs(away))), noise * float(np.sqrt(left)))
-    limit = max(SPIKE, float(norm.isf(FALSE_ALARM / known.size / 2))) * usual
-    # a signal that often moves as far between neighbours has no spikes
-    limit = max(limit, 3 * float(np.quantile(np.abs(np.diff(values[known])), 0.99)))
-    far = np.abs(away) > limit
-    runs = [run for run in _runs(far) if run.stop - run.start <= SPIKE_SAMPLES and _stands_out(values[known], run)]
+    limit = max(least, max(SPIKE, float(norm.isf(FALSE_ALARM / known.size / 2))) * usual)
+    runs = _isolated(values[known], np.abs(away) > limit)
+    # a signal that often moves as far between neighbours, the spikes left out, has none
+    still = np.ones(known.size - 1, dtype=bool)
+    for run in runs:
+        still[max(0, run.start - 1) : run.stop] = False
+    if still.any():
+        limit = max(limit, 3 * float(np.quantile(np.abs(np.diff(values[known]))[still], 0.99)))
+        runs = _isolated(values[known], np.abs(away) > limit)
     if not runs or limit == 0:
         return []
     rows = np.concatenate([known[run] for run in runs])
@@ -158,16 +168,24 @@ def _spikes(trial: Trial, name: str, values: Vector, noise: float) -> list[Findi
     return [Finding(trial.path, (trial.heading(name),), what, truth, kind, evidence, mend, safe=True, places_s=places)]
 
 
-def _stands_out(values: Vector, run: slice) -> bool:
-    """Whether the steps into and out of a run are twice any step near it: the top of a smooth curve is no spike."""
+def _isolated(values: Vector, far: NDArray[np.bool_]) -> list[slice]:
+    """The runs of values far away that are as short as a spike, and stand out."""
+    return [run for run in _runs(far) if run.stop - run.start <= SPIKE_SAMPLES and _stands_out(values, run, far)]
+
+
+def _stands_out(values: Vector, run: slice, far: NDArray[np.bool_]) -> bool:
+    """Whether the steps into and out of a run are twice any step near it: the top of a smooth curve is no spike.
+
+    Steps from and to other values far away do not count, for spikes may lie close together.
+    """
     near = slice(max(0, run.start - 2 * SPIKE_SAMPLES), run.stop + 2 * SPIKE_SAMPLES)
     steps = np.abs(np.diff(values[near]))
-    own = np.zeros(len(steps), dtype=bool)
-    own[max(0, run.start - near.start - 1) : run.stop - near.start] = True
-    if own.all():
+    touched = far[near][1:] | far[near][:-1]
+    if touched.all():
         return False
-    edges = steps[own][[0, -1]]
-    return bool(edges.min() > 2 * steps[~own].max())
+    first, last = run.start - near.start - 1, run.stop - near.start - 1
+    edges = [steps[place] for place in (first, last) if 0 <= place < len(steps)]
+    return bool(min(edges) > 2 * steps[~touched].max())
 
 
 def _kind(rows: int, values: Vector) -> Literal["fault", "note"]:

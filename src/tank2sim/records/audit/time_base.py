@@ -15,9 +15,43 @@ GAP = 1.5
 UNEVEN = 0.1
 """Scatter of the step, as a share of it, worth a word: beyond any rounding of a uniform time to two digits."""
 
+STRAY = 20.0
+"""Times the duration of the middle half of a record from its middle, ten times the record: no row of one manoeuvre is
+as far away. Project choice; it also bounds the memory that later checks take."""
+FEW = 0.05
+"""Share of rows with stray times up to which they are left out. Project choice, as for the readings of a sensor."""
+
 
 def time_findings(trial: Trial) -> list[Finding]:
     """Faults of the time base, each with what mends it."""
+    stray = _stray(trial)
+    if stray is None:
+        return _of_steps(trial)
+    return [stray] if stray.mend is None else [stray, *_of_steps(stray.mend(trial))]
+
+
+def _stray(trial: Trial) -> Finding | None:
+    """Times far from all others, such as an epoch among seconds."""
+    early, middle, late = np.quantile(trial.time_s, [0.25, 0.5, 0.75])
+    far = np.abs(trial.time_s - middle) > STRAY * max(late - early, 0.0)
+    rows = np.flatnonzero(far)
+    if rows.size == 0 or late <= early:
+        return None
+    first = int(rows[0])
+    what = f"{rows.size} times are far from all others, first {trial.time_s[first]:.10g} in row {first + 1}"
+    evidence = {"rows": float(rows.size), "first_row": float(first + 1)}
+    found = Finding(trial.path, (trial.heading("t_s"),), what, "another clock or another recording", evidence=evidence)
+    if rows.size > max(1, FEW * len(far)) or np.count_nonzero(~far) < 2:
+        return found
+    truth = "a time of another clock or a slip in these rows: they are left out"
+
+    def left_out(other: Trial) -> Trial:
+        return replace(select_rows(other, np.flatnonzero(~far)), notices=(*other.notices, f"time: {truth}"))
+
+    return replace(found, likely_truth=truth, mend=left_out, safe=True)
+
+
+def _of_steps(trial: Trial) -> list[Finding]:
     steps = np.diff(trial.time_s)
     if np.any(steps <= 0):
         return [_not_rising(trial, steps)]
@@ -67,7 +101,8 @@ def _not_rising(trial: Trial, steps: NDArray[np.float64]) -> Finding:
     def mend(other: Trial) -> Trial:
         return replace(select_rows(other, rows), notices=(*other.notices, f"time: {truth}"))
 
-    return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", evidence, mend, safe=True)
+    enough = len(rows) > 1
+    return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", evidence, mend, safe=enough)
 
 
 def _repeats(trial: Trial) -> NDArray[np.bool_]:

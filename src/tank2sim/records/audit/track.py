@@ -1,21 +1,20 @@
-"""Velocities against positions: unit, frame, sign and axes, then current, scale, heading offset, antenna and clock."""
+"""Velocities against positions: frame, sign and axes, then current, scale, heading offset, antenna and clock."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from tank2sim.records.audit.finding import Finding, Mend
 from tank2sim.records.audit.noise import estimated_noise
+from tank2sim.records.audit.time_unit import MISCALIBRATED
 from tank2sim.records.audit.weak import Complex, Fit, Windows, fit, on_uniform_time, windows_of
 from tank2sim.records.csv_table import Vector
 from tank2sim.records.trials import Trial, with_signals
-from tank2sim.units import KNOT_MPS
 
-UNITS = {1.0: "m/s", KNOT_MPS: "knots", 1 / KNOT_MPS: "", 1 / 3.6: "km/h", 3.6: "", 0.3048: "ft/s"}
-"""Factor between speed over ground and speed as given, to the unit it tells of."""
 CLEARER = 1.5
 """How many times the misfit as labelled must be that of another reading: more than an error of the fit's own scale."""
 EVIDENCE = 20.0
@@ -23,12 +22,14 @@ EVIDENCE = 20.0
 some readings are compared."""
 SCALE, OFFSET, CURRENT = 0.01, np.deg2rad(0.3), 0.01
 """What is worth a word: a log or a current to 1 % of the speed, a compass to 0.3 deg. Choices of ours."""
+FASTEST = 0.5
+"""Current, as a share of the speed over ground, from which it is none. Project choice: no trial is run in such."""
 
-_PAIRS = (("u_mps", "v_mps"), ("u_ground_mps", "v_ground_mps"))
+PAIRS = (("u_mps", "v_mps"), ("u_ground_mps", "v_ground_mps"))
 
 
 @dataclass(frozen=True)
-class _Reading:
+class Reading:
     """One way to read the columns.
 
     Velocity over ground follows from w = u + iv and e = exp(i psi), for x + iy is north + i east; ``mirrored`` if y is
@@ -45,17 +46,17 @@ class _Reading:
     quarter_wrong: tuple[str, ...] = ()
 
 
-_AS_LABELLED = _Reading("", (), lambda w, e: w * e)
-_READINGS = (
-    _Reading(
+_AS_LABELLED = Reading("", (), lambda w, e: w * e)
+OTHERWISE = (
+    Reading(
         "v is positive to port",
         ("v",),
         lambda w, e: w.conj() * e,
         quarter_truth="u and v are interchanged",
         quarter_wrong=("u", "v"),
     ),
-    _Reading("they are earth-fixed velocities, along x and y", ("u", "v"), lambda w, e: w, earth=True),
-    _Reading(
+    Reading("they are earth-fixed velocities, along x and y", ("u", "v"), lambda w, e: w, earth=True),
+    Reading(
         "they are earth-fixed velocities, along x and against y",
         ("u", "v"),
         lambda w, e: w.conj(),
@@ -63,7 +64,7 @@ _READINGS = (
         quarter_truth="they are earth-fixed velocities, along y and x",
         quarter_wrong=("u", "v"),
     ),
-    _Reading(
+    Reading(
         "y is positive to west",
         ("x", "y"),
         lambda w, e: w * e,
@@ -71,7 +72,7 @@ _READINGS = (
         quarter_truth="x and y are interchanged: x is east and y north",
         quarter_wrong=("x", "y"),
     ),
-    _Reading(
+    Reading(
         "psi is counted anticlockwise",
         ("psi", "r"),
         lambda w, e: w * e.conj(),
@@ -81,26 +82,24 @@ _READINGS = (
 )
 
 
-_EARTH = {truth for reading in _READINGS if reading.earth for truth in (reading.truth, reading.quarter_truth)}
+READINGS = (_AS_LABELLED, *OTHERWISE)
+
+_EARTH = {truth for reading in OTHERWISE if reading.earth for truth in (reading.truth, reading.quarter_truth)}
 
 
 def track_findings(trial: Trial) -> list[Finding]:
-    """What velocities and positions tell of each other; nothing if there are no positions or no heading."""
+    """What velocities and positions, each in its unit, tell of each other; nothing without positions and heading."""
     if not {"x_m", "y_m", "psi_rad"} <= set(trial.signals):
         return []
     findings: list[Finding] = []
-    for pair in _PAIRS:
+    for pair in PAIRS:
         if set(pair) <= set(trial.signals):
             findings += _of_pair(trial, pair)
-    if not set(_PAIRS[0]) <= set(trial.signals) and "u_mps" in trial.signals:
-        findings += _of_surge(trial)
-    if "sog_mps" in trial.signals:
-        findings += _of_speed(trial)
     return findings
 
 
 @dataclass(frozen=True, eq=False)
-class _Track:
+class Track:
     """Signals on a uniform time base, and the velocity over ground in windows, (windows,) complex, north + i east."""
 
     signals: dict[str, Vector]
@@ -109,79 +108,44 @@ class _Track:
 
     @property
     def speed(self) -> float:
+        """Root mean square of the speed over ground, m/s."""
         return float(np.sqrt(np.nanmean(np.abs(self.ground) ** 2)))
 
 
-def _track(trial: Trial) -> _Track:
+def track_of(trial: Trial) -> Track:
+    """The track of a trial that has x_m and y_m."""
     step, signals = on_uniform_time(trial)
     place = signals["x_m"] + 1j * signals["y_m"]
     noise = estimated_noise(trial)
     windows = windows_of(place, max(noise["x_m"], noise["y_m"]), step)
-    return _Track(signals, windows, windows.rate(place))
+    return Track(signals, windows, windows.rate(place))
 
 
 def _of_pair(trial: Trial, pair: tuple[str, str]) -> list[Finding]:
-    track = _track(trial)
+    track = track_of(trial)
     given = track.signals[pair[0]] + 1j * track.signals[pair[1]]
     if np.count_nonzero(np.isfinite(track.windows.mean(given) + track.ground)) < 10:
         return []
-    found = _units(trial, track, pair, given)
-    findings = [found] if found else []
-    if found and found.mend:
-        trial = found.mend(trial)
-        track = _track(trial)
-        given = track.signals[pair[0]] + 1j * track.signals[pair[1]]
+    findings: list[Finding] = []
     frame = _frame(trial, track, pair, given)
     earth = frame is not None and frame.likely_truth in _EARTH
     if frame is not None:
         findings.append(frame)
         assert frame.mend is not None
         trial = frame.mend(trial)
-        track = _track(trial)
+        track = track_of(trial)
         given = track.signals[pair[0]] + 1j * track.signals[pair[1]]
     lesser = _lesser(trial, track, pair, given)
     # velocities along the axes of the track have been turned with psi and back: they do not tell of it
     return findings + [one for one in lesser if not (earth and one.columns == (trial.heading("psi_rad"),))]
 
 
-def _units(trial: Trial, track: _Track, pair: tuple[str, str], given: Complex) -> Finding | None:
-    """Unit of the speed, whatever its frame: speed over ground over speed as given."""
-    mean = track.windows.mean(np.abs(given))
-    moving = mean > 0
-    if not moving.any():
-        return None
-    ratio = float(np.nanmedian(np.abs(track.ground[moving]) / mean[moving]))
-    nearest = min(UNITS, key=lambda factor: abs(np.log(ratio / factor)))
-    # a quarter: less than half the way from one unit to the next, more than any usual current or log error
-    if not ratio > 0 or nearest == 1.0 or not UNITS[nearest] or abs(np.log(ratio / nearest)) > np.log(1.15):
-        return None
-    truth = f"they are in {UNITS[nearest]}"
-
-    wrong = pair[:1] if _sway_is_right(track, given, nearest) else pair
-
-    def in_si(other: Trial) -> Trial:
-        changes = {name: other.signals[name] * nearest for name in wrong}
-        return with_signals(other, changes, f"{', '.join(wrong)}: {truth}")
-
-    columns = tuple(trial.heading(name) for name in wrong)
-    what = f"speed over ground is {ratio:.3g} times the speed given"
-    return Finding(trial.path, columns, what, truth, "fault", {"factor": ratio}, in_si, safe=True)
-
-
-def _sway_is_right(track: _Track, given: Complex, factor: float) -> bool:
-    """Whether v alone is in m/s, by the velocity across the heading."""
-    turn = track.windows.mean(np.exp(1j * track.signals["psi_rad"]))
-    sway = track.windows.mean(given.imag)
-    found = fit((track.ground * turn.conj()).imag, [sway, np.ones(len(sway))])
-    return found is not None and found.differs(0, factor) and abs(found.values[0] - 1) < abs(found.values[0] - factor)
-
-
-def _frame(trial: Trial, track: _Track, pair: tuple[str, str], given: Complex) -> Finding | None:
+def _frame(trial: Trial, track: Track, pair: tuple[str, str], given: Complex) -> Finding | None:
     """Another reading than the labelled one, where it explains the track clearly better."""
     turn = np.exp(1j * track.signals["psi_rad"])
     labelled, _ = _misfit(track, _AS_LABELLED, given, turn)
-    misfits = {reading: _misfit(track, reading, given, turn) for reading in _READINGS}
-    best = min(_READINGS, key=lambda reading: misfits[reading][0])
+    misfits = {reading: _misfit(track, reading, given, turn) for reading in OTHERWISE}
+    best = min(OTHERWISE, key=lambda reading: misfits[reading][0])
     misfit, rotation = misfits[best]
     independent = np.count_nonzero(np.isfinite(track.ground)) / 2
     least = 1e-9 * track.speed  # no misfit is less than the rounding of the numbers
@@ -200,10 +164,11 @@ def _frame(trial: Trial, track: _Track, pair: tuple[str, str], given: Complex) -
     )
     evidence = {"misfit_as_labelled_mps": labelled, "misfit_mps": misfit, "speed_mps": track.speed}
     mend = _mend(best, pair, f"{', '.join(names)}: {truth}", 1j**quarters)
-    return Finding(trial.path, columns, what, truth, "fault", evidence, mend, safe=True)
+    explained = misfit < MISCALIBRATED * track.speed  # else more is wrong than the frame
+    return Finding(trial.path, columns, what, truth, "fault", evidence, mend, safe=explained)
 
 
-def _misfit(track: _Track, reading: _Reading, given: Complex, turn: Complex) -> tuple[float, float]:
+def _misfit(track: Track, reading: Reading, given: Complex, turn: Complex) -> tuple[float, float]:
     """Root mean square misfit of a reading, m/s, with a constant current and a constant rotation left free; this."""
     ground = track.ground.conj() if reading.mirrored else track.ground
     velocity = track.windows.mean(reading.velocity(given, turn))
@@ -220,7 +185,7 @@ def _signal(pair: tuple[str, str], name: str) -> str:
     return {"u": pair[0], "v": pair[1], "x": "x_m", "y": "y_m", "psi": "psi_rad", "r": "r_radps"}[name]
 
 
-def _mend(reading: _Reading, pair: tuple[str, str], notice: str, quarter: complex) -> Mend:
+def _mend(reading: Reading, pair: tuple[str, str], notice: str, quarter: complex) -> Mend:
     if reading.earth:
         notice += "; turned to body axes by psi (those through the water are the same if there is no current)"
 
@@ -241,7 +206,7 @@ def _mend(reading: _Reading, pair: tuple[str, str], notice: str, quarter: comple
     return read
 
 
-def _lesser(trial: Trial, track: _Track, pair: tuple[str, str], given: Complex) -> list[Finding]:
+def _lesser(trial: Trial, track: Track, pair: tuple[str, str], given: Complex) -> list[Finding]:
     """Current c, scale and turn a, antenna l or clock tau: d(x + iy)/dt = a w e + c + d(l e)/dt, or + tau d(w e)/dt."""
     turn = np.exp(1j * track.signals["psi_rad"])
     velocity = given * turn
@@ -261,6 +226,7 @@ def _lesser(trial: Trial, track: _Track, pair: tuple[str, str], given: Complex) 
     if best is None:
         return findings
     columns = tuple(trial.heading(name) for name in pair)
+    places = tuple(trial.heading(name) for name in ("x_m", "y_m"))
     if best.differs(0, 1.0) and abs(best.values[0] - 1) > SCALE:
         findings.append(_scale(trial, pair, best))
     if best.differs(1) and abs(best.values[1]) > OFFSET:
@@ -269,11 +235,18 @@ def _lesser(trial: Trial, track: _Track, pair: tuple[str, str], given: Complex) 
     if (best.differs(2) or best.differs(3)) and abs(c) > CURRENT * track.speed:
         towards = float(np.rad2deg(np.angle(c)) % 360)
         truth = f"a current of {abs(c):.3g} m/s towards {towards:.0f} deg, if the velocities are through the water"
-        if pair == _PAIRS[1]:
+        if pair == PAIRS[1]:
             truth = f"they are through the water, in a current of {abs(c):.3g} m/s towards {towards:.0f} deg"
         evidence = {"speed_mps": abs(c), "direction_deg": towards, "standard_error_mps": float(best.errors[2])}
         what = "velocity over ground and the velocities differ by a constant in earth axes"
-        findings.append(Finding(trial.path, columns, what, truth, "note", evidence))
+        if abs(c) > FASTEST * track.speed:
+            what += f" of {abs(c):.3g} m/s"
+            truth = "x, y or the velocities are not what their names say: no current is as fast"
+            findings.append(Finding(trial.path, (*columns, *places), what, truth, "fault", evidence))
+        else:
+            # velocities that say they are over ground, and are not, would be used as such
+            kind: Literal["fault", "note"] = "fault" if pair == PAIRS[1] else "note"
+            findings.append(Finding(trial.path, columns, what, truth, kind, evidence))
     return findings
 
 
@@ -308,8 +281,10 @@ def _scale(trial: Trial, pair: tuple[str, str], found: Fit) -> Finding:
     what = f"velocity over ground is {factor:.4g} times the velocities"
     columns = tuple(trial.heading(name) for name in pair)
     if factor < 0:  # no log reads backwards
-        truth = "both are of the opposite sign"
-        return Finding(trial.path, columns, what, truth, "fault", evidence, scaled)
+        return Finding(trial.path, columns, what, "both are of the opposite sign", "fault", evidence, scaled)
+    if abs(np.log(factor)) > np.log(1 + MISCALIBRATED):
+        truth = "the factor is that of no unit: velocities, positions or the clock are not what their names say"
+        return Finding(trial.path, columns, what, truth, "fault", evidence)
     return Finding(trial.path, columns, what, truth, "note", evidence, scaled)
 
 
@@ -326,28 +301,3 @@ def _offset(trial: Trial, found: Fit) -> Finding:
 
     what = "the track is turned by a constant angle against heading and velocities"
     return Finding(trial.path, (trial.heading("psi_rad"),), what, truth, "note", evidence, turned)
-
-
-def _of_surge(trial: Trial) -> list[Finding]:
-    """Unit of u alone, by the velocity along the heading."""
-    alone = replace(trial, signals={**trial.signals, "v_mps": np.zeros(len(trial.time_s))})
-    track = _track(alone)
-    found = _units(alone, track, _PAIRS[0], np.asarray(track.signals["u_mps"], dtype=complex))
-    return [_only(found, trial, "u_mps")] if found else []
-
-
-def _of_speed(trial: Trial) -> list[Finding]:
-    """Unit of the speed over ground."""
-    track = _track(trial)
-    found = _units(trial, track, ("sog_mps", "sog_mps"), np.asarray(track.signals["sog_mps"], dtype=complex))
-    return [_only(found, trial, "sog_mps")] if found else []
-
-
-def _only(found: Finding, trial: Trial, name: str) -> Finding:
-    factor = min(UNITS, key=lambda unit: abs(np.log(found.evidence["factor"] / unit)))
-
-    def in_si(other: Trial) -> Trial:
-        told = f"{name}: {found.likely_truth}"
-        return with_signals(other, {name: other.signals[name] * factor}, told)
-
-    return replace(found, columns=(trial.heading(name),), mend=in_si, likely_truth=f"it is in {UNITS[factor]}")

@@ -24,6 +24,10 @@ SHARE = 0.01
 """The noise that a rate may keep, as a share of the motion: below most of the differences that matter."""
 FEWEST = 12
 """Independent windows below which nothing is judged."""
+FINEST = 20
+"""Steps of a uniform time base for one row: bounds what uneven times may take. Project choice."""
+ORDERS = ("delta_order_rad", "n_radps")
+"""Signals that hold until the next reading."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +118,7 @@ def windows_for(noise: float, motion: float, step_s: float, count: int) -> Windo
     step_s, count : float, int
         Time base.
     """
+    motion = motion if np.isfinite(motion) else 0.0
     wanted = (10 / 9 * (2 * np.pi) ** 2 * step_s * (noise / max(SHARE * motion, 1e-9 * noise, 1e-300)) ** 2) ** (
         1 / 3
     ) / step_s
@@ -160,6 +165,8 @@ def fit(target: Vector | Complex, regressors: Sequence[Vector | Complex]) -> Fit
 
     table = np.column_stack(regressors)
     whole = np.isfinite(target) & np.isfinite(table).all(axis=1)
+    if np.count_nonzero(whole) < 2 * FEWEST:
+        return None
     table, wanted = table[whole], target[whole]
     if np.iscomplexobj(target) or np.iscomplexobj(table):
         both = np.stack([table, 1j * table], axis=2).reshape(len(table), -1)
@@ -186,13 +193,29 @@ def fit(target: Vector | Complex, regressors: Sequence[Vector | Complex]) -> Fit
 def on_uniform_time(trial: Trial) -> tuple[float, dict[str, Vector]]:
     """Step (s) and signals on a uniform time base: as they are if theirs is uniform, else interpolated linearly.
 
-    What lies in a gap of more than two steps is nan.
+    A signal recorded less often than the rows, regularly, is taken as straight between its readings, orders as held.
+    What lies in a longer gap of its signal or of the rows is nan. The time base has at most `FINEST` steps a row.
     """
-    time, step = trial.time_s, sampling_step(trial)
+    time = trial.time_s
+    step = max(sampling_step(trial), float(time[-1] - time[0]) / (FINEST * (len(time) - 1)))
     even = time[0] + step * np.arange(len(time))
-    if np.max(np.abs(time - even)) < 0.5 * step:
-        return step, dict(trial.signals)
-    grid = np.arange(time[0], time[-1] + step / 2, step)
+    uniform = bool(np.max(np.abs(time - even)) < 0.5 * step)
+    grid = time if uniform else np.arange(time[0], time[-1] + step / 2, step)
+    return step, {
+        name: values if uniform and np.isfinite(values).all() else _on_grid(name, trial, grid, step)
+        for name, values in trial.signals.items()
+    }
+
+
+def _on_grid(name: str, trial: Trial, grid: Vector, step: float) -> Vector:
+    known = np.isfinite(trial.signals[name])
+    time, values = trial.time_s[known], trial.signals[name][known]
+    if len(time) < 2:
+        return np.full(len(grid), np.nan)
     after = np.clip(np.searchsorted(time, grid), 1, len(time) - 1)
-    gap = (time[after] - time[after - 1]) > 2 * step
-    return step, {name: np.where(gap, np.nan, np.interp(grid, time, v)) for name, v in trial.signals.items()}
+    own = float(np.median(np.diff(time)))
+    missing = (time[after] - time[after - 1]) > max(2 * step, 1.5 * own)
+    missing |= (grid < time[0] - step / 2) | (grid > time[-1] + step / 2)
+    if name in ORDERS:
+        return np.where(missing, np.nan, values[np.clip(np.searchsorted(time, grid, side="right") - 1, 0, None)])
+    return np.where(missing, np.nan, np.interp(grid, time, values))

@@ -10,31 +10,59 @@ from scipy.signal import correlate, correlation_lags
 from tank2sim.records.audit.finding import Finding, Mend
 from tank2sim.records.audit.noise import estimated_noise
 from tank2sim.records.audit.rudder import rudder_response
+from tank2sim.records.audit.time_unit import MISCALIBRATED
 from tank2sim.records.audit.weak import Fit, Windows, fit, on_uniform_time, windows_of
 from tank2sim.records.csv_table import Vector
 from tank2sim.records.trials import Trial, unwrapped, with_signals
 
 DEGREE = np.pi / 180
-UNIT_TOLERANCE = 0.1
-"""How far a factor may be from that of a unit to be taken for it; 57.3 and 60 are told apart by which is nearer."""
+UNIT_TOLERANCE = 0.023
+"""How far a factor may be from that of a unit to be taken for it: half the way from 57.3 to the 60 of a time in minutes
+or of a rate per minute. Project choice."""
+COARSE = 0.3
+"""The same for the course of a track over the heading, for the drift angle turns as well."""
 FACTOR = 0.02
 """Scale error of a rate of turn worth a word: above what rate gyros are usually calibrated to. A choice of ours."""
 _ALIKE = 0.9  # correlation from which two signals are taken for the same motion
+UNLIKE = 0.44
+"""What a signal leaves of the spread of another that is the same motion: that of a correlation of 0.9."""
+
+
+def heading_unit_findings(trial: Trial) -> list[Finding]:
+    """Unit of the heading, by the course of the track: whatever the unit of the positions, it turns as the heading."""
+    slope = _course_slope(trial)
+    if slope is None:
+        return []
+    heading = trial.heading("psi_rad")
+    degrees = "deg" in heading
+    factor = 1 / DEGREE if degrees else DEGREE
+    if abs(np.log(abs(slope) / factor)) > COARSE:
+        return []
+    truth = "psi is in radians" if degrees else "psi is in degrees"
+    what = f"the course over ground turns {abs(slope):.3g} times as far as psi"
+    mend = _scaled("psi_rad", factor, truth)
+    return [Finding(trial.path, (heading,), what, truth, "fault", {"factor": slope}, mend, safe=True)]
+
+
+def rate_unit_findings(trial: Trial) -> list[Finding]:
+    """Unit of the rate of turn and of the heading, by each other."""
+    found = _alike(trial)
+    wrong = None if found is None else _unit(trial, found)
+    return [] if wrong is None else [wrong]
 
 
 def yaw_findings(trial: Trial) -> list[Finding]:
-    """What rate of turn and heading (and the track, where they disagree) tell of each other."""
+    """Sign, factor, bias and clock of rate of turn and heading, whose units are right."""
     if "psi_rad" not in trial.signals:
         return []
     if "r_radps" not in trial.signals:
-        return _heading_by_track(trial)
+        return _against_track(trial)
+    found = _alike(trial)
+    if found is not None:
+        return _judged(trial, found)
     step, signals = on_uniform_time(trial)
     rate, heading = signals["r_radps"], signals["psi_rad"]
     noise = estimated_noise(trial)
-    for candidate in _headings(trial, heading):
-        alike = _comparison(windows_of(candidate, noise["psi_rad"], step), rate, candidate, step)
-        if alike is not None and alike.alike:
-            return _judged(trial, alike)
     windows = windows_of(heading, noise["psi_rad"], step)
     found = _comparison(windows, rate, heading, step)
     if found is None:
@@ -46,6 +74,24 @@ def yaw_findings(trial: Trial) -> list[Finding]:
     figures = {"correlation": found.correlation}
     what = f"r and dpsi/dt are not the same motion (correlation {found.correlation:.2f})"
     return [Finding(trial.path, tuple(ends), what, "one of the two is no yaw motion of this ship", evidence=figures)]
+
+
+def _alike(trial: Trial) -> _Comparison | None:
+    """The comparison of the two, read so that they are one motion; None if they are not, or one was not measured."""
+    if not {"psi_rad", "r_radps"} <= set(trial.signals):
+        return None
+    step, signals = on_uniform_time(trial)
+    rate, noise = signals["r_radps"], estimated_noise(trial)["psi_rad"]
+    for candidate in _headings(trial, signals["psi_rad"]):
+        windows = windows_of(candidate, noise, step)
+        found = _comparison(windows, rate, candidate, step)
+        if found is not None and not found.alike:
+            # noise that the estimate does not see (digits lost, waves) shows as what is left: wider windows take it
+            left = found.fit.residual / windows.noise_of_rate(1.0)
+            found = _comparison(windows_of(candidate, max(left, noise), step), rate, candidate, step)
+        if found is not None and found.alike:
+            return found
+    return None
 
 
 @dataclass(frozen=True)
@@ -71,7 +117,11 @@ class _Comparison:
 def _headings(trial: Trial, heading: Vector) -> list[Vector]:
     """The heading, and as it is if it is in rad, wrapped at 2 pi, under the name of degrees."""
     turn = 2 * np.pi * DEGREE
-    if "deg" not in trial.heading("psi_rad") or np.nanmax(np.abs(heading)) > 1.01 * turn:
+    if (
+        not np.isfinite(heading).any()
+        or "deg" not in trial.heading("psi_rad")
+        or np.nanmax(np.abs(heading)) > 1.01 * turn
+    ):
         return [heading]
     known = np.isfinite(heading)
     again = heading.copy()
@@ -131,18 +181,12 @@ def _coarse_lag(windows: Windows, rate: Vector, heading: Vector) -> int:
 
 def _judged(trial: Trial, found: _Comparison) -> list[Finding]:
     findings = []
-    wrong_unit = _unit(trial, abs(found.factor))
-    if wrong_unit is not None:
-        findings.append(wrong_unit)
     if found.factor < 0:
         findings.append(_sign(trial, found))
     factor = abs(found.factor)
-    unexplained = wrong_unit is None and abs(factor - 1) > FACTOR
-    if unexplained and found.fit.differs(0, np.sign(found.factor)):
-        what = f"dpsi/dt is {factor:.4g} times r"
-        truth = f"r is to be multiplied by {factor:.4g} if the heading is right"
-        findings.append(_note(trial, what, truth, {"factor": factor, "standard_error": float(found.fit.errors[0])}))
-    if found.fit.differs(1) and wrong_unit is None:
+    if abs(factor - 1) > FACTOR and found.fit.differs(0, float(np.sign(found.factor))):
+        findings.append(_factor(trial, found))
+    if found.fit.differs(1):
         findings.append(_bias(trial, -float(found.fit.values[1]) / found.factor, float(found.fit.errors[1]) / factor))
     if abs(found.lag_s) > max(found.step_s, 4.5 * found.lag_error_s):  # 4.5 errors: 1e-5 of normal ones
         late = "r is late" if found.lag_s > 0 else "psi is late"
@@ -175,28 +219,47 @@ def _bias(trial: Trial, bias: float, error: float) -> Finding:
     return replace(note, mend=unbiased)
 
 
-def _unit(trial: Trial, factor: float) -> Finding | None:
-    """The unit that a factor between dpsi/dt and r tells of."""
-    units = {1.0: "", 1 / DEGREE: "small", DEGREE: "large", 1 / 60.0: "minute"}
-    nearest = min(units, key=lambda unit: abs(np.log(factor / unit)))
-    if not units[nearest] or abs(np.log(factor / nearest)) > UNIT_TOLERANCE:
+def _factor(trial: Trial, found: _Comparison) -> Finding:
+    """A scale between the two that is none of a unit: a note, or a fault where no sensor is so far out."""
+    factor = abs(found.factor)
+    evidence = {"factor": factor, "standard_error": float(found.fit.errors[0])}
+    what = f"dpsi/dt is {factor:.4g} times r"
+    # noise of r makes the factor of a regression too small, and that of the reverse one, this, too large
+    largest = factor / found.correlation**2
+    if largest < 1 / (1 + MISCALIBRATED) or factor > 1 + MISCALIBRATED:
+        truth = "one of them is not what its name says, and the factor is that of no unit"
+        columns = (trial.heading("r_radps"), trial.heading("psi_rad"))
+        return Finding(trial.path, columns, what, truth, "fault", evidence)
+    truth = f"r is to be multiplied by {factor:.4g} if the heading is right"
+    return replace(_note(trial, what, truth, evidence), mend=_scaled("r_radps", factor, truth))
+
+
+def _unit(trial: Trial, found: _Comparison) -> Finding | None:
+    """The unit that a factor between dpsi/dt and r tells of, and of which of them, if that can be told."""
+    factor = abs(found.factor)
+    nearest = min((1.0, 1 / DEGREE, DEGREE, 1 / 60), key=lambda unit: abs(np.log(factor / unit)))
+    # few or noisy windows tell a factor less well
+    tolerance = max(UNIT_TOLERANCE, min(0.1, 4.5 * float(found.fit.errors[0]) / factor))
+    if nearest == 1.0 or abs(np.log(factor / nearest)) > tolerance:
         return None
-    evidence = {"factor": factor}
     r, psi = trial.heading("r_radps"), trial.heading("psi_rad")
     what = f"dpsi/dt is {factor:.4g} times r"
-    if units[nearest] == "minute":
-        truth = "r is in deg/min" if "deg" in r else "r is 60 times too large"
-        return Finding(trial.path, (r,), what, truth, "fault", evidence, _scaled("r_radps", 1 / 60, truth), safe=True)
-    small = units[nearest] == "small"
-    r_can, psi_can = ("deg" in r, "deg" not in psi) if small else ("deg" not in r, "deg" in psi)
-    slope = _course_slope(trial)
-    by_track = slope is not None and abs(np.log(abs(slope) * nearest)) < 1.0  # the course turns as r does
-    if psi_can and (by_track or not r_can):
-        truth = "psi is in degrees" if small else "psi is in radians"
-        mend = _scaled("psi_rad", nearest**-1 if small else 1 / DEGREE, truth)
-        return Finding(trial.path, (psi,), what, truth, "fault", evidence, mend, safe=True)
-    truth = "r is in rad/s" if small else "r is in deg/s"
-    return Finding(trial.path, (r,), what, truth, "fault", evidence, _scaled("r_radps", nearest, truth), safe=True)
+    small, slope = nearest == 1 / DEGREE, _course_slope(trial)
+    psi_right = slope is not None and abs(np.log(abs(slope))) < 1.0  # the course turns as it does
+    readings = []
+    if nearest == 1 / 60 and "deg" in r:
+        readings.append(("r_radps", 1 / 60, "r is in deg/min"))
+    if nearest != 1 / 60 and ("deg" in r) == small:
+        readings.append(("r_radps", nearest, "r is in rad/s" if small else "r is in deg/s"))
+    if nearest != 1 / 60 and ("deg" in psi) != small and not psi_right:
+        readings.append(("psi_rad", 1 / nearest, "psi is in degrees" if small else "psi is in radians"))
+    fault = Finding(trial.path, (r, psi), what, "", "fault", {"factor": factor})
+    if len(readings) != 1:
+        truth = ", or ".join(truth for *_, truth in readings) or "one of them is in another unit, not that of its name"
+        return replace(fault, likely_truth=truth)
+    ((name, scale, truth),) = readings
+    mend = _scaled(name, scale, truth)
+    return replace(fault, columns=(trial.heading(name),), likely_truth=truth, mend=mend, safe=True)
 
 
 def _scaled(name: str, factor: float, notice: str) -> Mend:
@@ -208,26 +271,41 @@ def _scaled(name: str, factor: float, notice: str) -> Mend:
 
 
 def _sign(trial: Trial, found: _Comparison) -> Finding:
-    """Which of r and psi has the wrong sign: the one against the track; without one, against the rudder; else r."""
+    """Which of r and psi has the wrong sign: the one against the track; without one, against the rudder."""
     slope = _course_slope(trial)
-    response = rudder_response(trial)
-    psi_right = slope > 0 if slope is not None else response >= 0 if response else True
-    if slope is None and response:
-        psi_right = response < 0  # the response is that of r
+    # of the heading, by the track; or of r, by the rudder
+    response = 0.0 if slope is not None else rudder_response(trial)
+    what = "r and dpsi/dt have opposite signs"
+    evidence = {"factor": found.factor, "correlation": found.correlation}
+    if slope is None and response == 0:
+        columns = (trial.heading("r_radps"), trial.heading("psi_rad"))
+        return Finding(trial.path, columns, what, "one of the two is positive to port", "fault", evidence)
+    psi_right = slope > 0 if slope is not None else response < 0
     wrong = "r_radps" if psi_right else "psi_rad"
     truth = f"{'r' if psi_right else 'psi'} is positive to port"
-    what = "r and dpsi/dt have opposite signs"
 
     def turned(other: Trial) -> Trial:
         return with_signals(other, {wrong: 0.0 - other.signals[wrong]}, f"{truth} in the file")
 
-    evidence = {"factor": found.factor, "correlation": found.correlation}
     return Finding(trial.path, (trial.heading(wrong),), what, truth, "fault", evidence, turned, safe=True)
+
+
+def _against_track(trial: Trial) -> list[Finding]:
+    """A course that turns against the heading, where no velocities tell which of them is mirrored."""
+    slope = _course_slope(trial)
+    if slope is None or abs(np.log(abs(slope))) > 1.0 or slope > 0 or {"u_mps", "v_mps"} <= set(trial.signals):
+        return []
+    columns = tuple(trial.heading(name) for name in ("psi_rad", "x_m", "y_m"))
+    what, truth = (
+        "the track turns against the heading",
+        "psi is positive to port, or y to west, or x and y interchanged",
+    )
+    return [Finding(trial.path, columns, what, truth, evidence={"factor": slope})]
 
 
 def _course_slope(trial: Trial) -> float | None:
     """Change of the course of the track for one of the heading, or None if there is no track or no turn."""
-    if not {"x_m", "y_m"} <= set(trial.signals):
+    if not {"x_m", "y_m", "psi_rad"} <= set(trial.signals):
         return None
     step, signals = on_uniform_time(trial)
     noise = estimated_noise(trial)
@@ -238,22 +316,11 @@ def _course_slope(trial: Trial) -> float | None:
         return None
     going = np.abs(velocity) > 0.3 * np.nanmedian(np.abs(velocity))
     course = unwrapped(np.where(going, np.angle(velocity), np.nan))
-    found = fit(course, [windows.mean(signals["psi_rad"]), np.ones(len(course))])
-    turned = np.nanmax(course) - np.nanmin(course) > 10 * DEGREE  # beyond any drift of a straight run
-    return float(found.values[0]) if found is not None and found.differs(0) and turned else None
-
-
-def _heading_by_track(trial: Trial) -> list[Finding]:
-    """Unit of a heading without a rate of turn, by the course of the track."""
-    slope = _course_slope(trial)
-    if slope is None or slope <= 0:
-        return []
-    heading = trial.heading("psi_rad")
-    degrees = "deg" in heading
-    factor = 1 / DEGREE if degrees else DEGREE
-    if abs(np.log(slope / factor)) > 3 * UNIT_TOLERANCE:  # the drift angle turns as well
-        return []
-    truth = "psi is in radians" if degrees else "psi is in degrees"
-    what = f"the course over ground turns {slope:.3g} times as far as psi"
-    mend = _scaled("psi_rad", factor, truth)
-    return [Finding(trial.path, (heading,), what, truth, "fault", {"factor": slope}, mend, safe=True)]
+    if not np.nanmax(course) - np.nanmin(course) > 10 * DEGREE:  # beyond any drift of a straight run
+        return None
+    spread = float(np.nanstd(course))
+    for candidate in _headings(trial, signals["psi_rad"]):
+        found = fit(course, [windows.mean(candidate), np.ones(len(course))])
+        if found is not None and found.differs(0) and found.residual < UNLIKE * spread:
+            return float(found.values[0])
+    return None
