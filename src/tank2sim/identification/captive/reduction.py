@@ -59,7 +59,7 @@ class Options:
     off_speed : bool
         Use runs away from the test speed, too, and find terms in Du.
     all_terms : bool
-        Keep terms that are not significant.
+        Keep terms that the tests do not determine.
     test_symmetry : bool
         Test terms of the other parity, which (3.8) leaves out.
     """

@@ -1,15 +1,17 @@
-"""Generalised least squares over a campaign, with the zero error that every run has of its own.
+"""Generalised least squares over a campaign, with the zero error and the gain error that every run has of its own.
 
-The covariance of a run's coefficients is ``noise`` times its within-run covariance plus ``zero_variance`` for its
-mean. Both factors are found by restricted maximum likelihood over the campaign (REML; Patterson & Thompson 1971), so
-that the scatter from run to run, not only that within a run, tells how well a derivative is known.
+The covariance of a run's coefficients is ``noise`` times its within-run covariance, plus ``zero_variance`` for its
+mean, plus ``gain_variance`` times the outer product of the coefficients that its gauge showed: a gauge that reads 0.5 %
+more in one run than in the next errs in all harmonics of that run together. The factors are found by restricted maximum
+likelihood over the campaign (REML; Patterson & Thompson 1971), so that the scatter from run to run, not only that
+within a run, determines how well a derivative is known.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +23,10 @@ from tank2sim.identification.conditioning import Matrix, Vector, column_norms, s
 
 _LEAST, _MOST = 1e-3, 1e4
 """Range of the factor on the within-run covariance."""
+_GAIN = 1e-5
+"""Variance of the gain from which the search begins: 0.3 %, between good gauges (0.1 %) and poor ones (1 %)."""
+_GAIN_RANGE = (-20.0, 8.0)
+"""Natural logarithms of the factor on it: from nothing to a gain that is 18 % off from run to run."""
 _FEWEST_RUNS = 8
 _CLEARLY = 0.05
 """Chance of so much higher a likelihood if all types of run scatter alike, below which each gets its own variance."""
@@ -38,11 +44,14 @@ class Spread:
         Variance of the zero error from run to run, in ``Equations.unit`` squared.
     by_type : mapping
         Type of run to its own such variance, where the types differ; what (3.8) does not follow is in it.
+    gain_variance : float
+        Variance of the gauge's relative gain from run to run.
     """
 
     noise: float
     zero_variance: float
     by_type: Mapping[str, float] = field(default_factory=dict)
+    gain_variance: float = 0.0
 
     def zeros(self, equations: Equations) -> Vector:
         """Variance of the zero error of each run, (runs,)."""
@@ -50,26 +59,43 @@ class Spread:
 
     def weighted(self, equations: Equations, columns: Matrix) -> Matrix:
         """Columns (rows, n) multiplied by an inverse root of the covariance of the equations."""
-        zero, size = equations.zero, equations.zero_sizes
-        share = 1.0 - np.sqrt(self.noise / (self.noise + self.zeros(equations) * size))
-        along = equations.run_sums(zero[:, None] * columns) * (share / size)[:, None]
-        result: Matrix = (columns - zero[:, None] * along[equations.run_of_row]) / math.sqrt(self.noise)
+        result: Matrix = columns / math.sqrt(self.noise)
+        for direction, sizes, variances in self._common_errors(equations):
+            share = 1.0 - np.sqrt(self.noise / (self.noise + variances * sizes))
+            along = equations.run_sums(direction[:, None] * result) * (share / sizes)[:, None]
+            result = result - direction[:, None] * along[equations.run_of_row]
         return result
 
     def run_root(self, equations: Equations, place: int) -> Matrix:
         """A root of the covariance of one run's coefficients, in ``Equations.unit``."""
         start, size = int(equations.first_rows[place]), len(equations.roots[place])
-        zero, length = equations.zero[start : start + size], float(equations.zero_sizes[place])
-        along = math.sqrt(1.0 + float(self.zeros(equations)[place]) * length / self.noise) - 1.0
-        symmetric = math.sqrt(self.noise) * (np.eye(size) + np.outer(zero, zero) * along / length)
-        root: Matrix = equations.roots[place] @ symmetric
+        root: Matrix = math.sqrt(self.noise) * equations.roots[place]
+        for direction, sizes, variances in self._common_errors(equations):
+            own, length = direction[start : start + size], float(sizes[place])
+            along = math.sqrt(1.0 + float(variances[place]) * length / self.noise) - 1.0
+            root = root @ (np.eye(size) + np.outer(own, own) * along / length)
         return root
 
     def log_determinant(self, equations: Equations) -> float:
         """Of the covariance of the weighted equations."""
-        rows, runs = len(equations.values), len(equations.runs)
-        each = np.log(self.noise + self.zeros(equations) * equations.zero_sizes)
-        return (rows - runs) * math.log(self.noise) + float(np.sum(each))
+        total = len(equations.values) * math.log(self.noise)
+        for _, sizes, variances in self._common_errors(equations):
+            total += float(np.sum(np.log1p(variances * sizes / self.noise)))
+        return total
+
+    def _common_errors(self, equations: Equations) -> Iterator[tuple[Vector, Vector, Vector]]:
+        """What errs together in a run: direction (rows,), its squared norm in each run, and its variance (runs,).
+
+        The covariance is noise R (I + g g' gain/noise) R', R R' = I + z z' zero/noise, g the inverse of R times the
+        gauge's coefficients: each error is taken out after the other.
+        """
+        zeros, sizes = self.zeros(equations), equations.zero_sizes
+        yield equations.zero, sizes, zeros
+        if self.gain_variance:
+            zero, gauge = equations.zero, equations.gauge
+            share = (1.0 - np.sqrt(self.noise / (self.noise + zeros * sizes))) / sizes
+            gauge = gauge - zero * (equations.run_sums(zero * gauge) * share)[equations.run_of_row]
+            yield gauge, np.maximum(equations.run_sums(gauge**2), 1e-300), np.full(len(sizes), self.gain_variance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,11 +202,13 @@ def _best(equations: Equations, start: Mapping[str, float], single: bool) -> tup
     its likelihood."""
 
     def spread(logs: Vector) -> Spread:
-        variances = {kind: value * math.exp(log) for (kind, value), log in zip(start.items(), logs[1:], strict=True)}
+        zero_logs = logs[2:]
+        variances = {kind: value * math.exp(log) for (kind, value), log in zip(start.items(), zero_logs, strict=True)}
         usual = math.exp(sum(math.log(value) for value in variances.values()) / len(variances))
-        return Spread(1.0 if single else math.exp(logs[0]), usual, {} if "" in variances else variances)
+        by_type = {} if "" in variances else variances
+        return Spread(1.0 if single else math.exp(logs[0]), usual, by_type, _GAIN * math.exp(logs[1]))
 
-    bounds = [(math.log(_LEAST), math.log(_MOST))] + [(-25.0, 25.0)] * len(start)
+    bounds = [(math.log(_LEAST), math.log(_MOST)), _GAIN_RANGE] + [(-25.0, 25.0)] * len(start)
     found = minimize(
         lambda logs: _criterion(equations, spread(logs)),
         np.zeros(len(bounds)),
