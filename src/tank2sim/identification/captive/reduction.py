@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.cautions import body_of
 from tank2sim.identification.captive.contradictions import contradicted
 from tank2sim.identification.captive.equations import SPEED_RANGE
 from tank2sim.identification.captive.faults import record_faults, reduced_faults
@@ -35,13 +36,15 @@ from tank2sim.identification.captive.oscillation import (
 from tank2sim.identification.captive.regression import Solution, solve
 from tank2sim.identification.captive.selection import Selection, select
 from tank2sim.identification.captive.symmetry import Asymmetry, asymmetry
-from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER
+from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER, impossible_body
 from tank2sim.identification.captive.trends import Trend, trends
 from tank2sim.identification.captive.type_b import type_b_errors
 from tank2sim.records.campaigns import FORCES, Campaign, together
 
 DISAGREEMENT_LIMIT = 3.5
 """Standard errors by which the two ways may differ before it is told."""
+THRUST_LIMIT = 4.0
+"""Standard errors by which a resistance must be negative to be refused: chance does so once in 30 000 campaigns."""
 ESSENTIAL = ("Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot", "Yv", "Nv", "Yr", "Nr", "Yd", "Nd")
 """Derivatives without which no manoeuvre can be simulated rightly."""
 
@@ -170,9 +173,10 @@ def reduce_campaign(campaign: Campaign, options: Options | None = None) -> Reduc
     ------
     InputError
         Runs are at fault and `keep_going` is not asked for (all are told); no run is left; or a key that the runs need
-        is missing.
+        is missing; or a number of ``[model]``, or the sign of the resistance, cannot be.
     """
     options = options or Options()
+    _refuse_impossible_body(campaign)
     runs, faults = _sound_runs(campaign)
     if faults and not options.keep_going:
         raise together(faults)
@@ -188,6 +192,7 @@ def reduce_campaign(campaign: Campaign, options: Options | None = None) -> Reduc
         raise InputError(campaign.path, "runs", "no run can be used", remedy)
     forces = {force: _force_result(campaign, used, force, options) for force in FORCES}
     derivatives = {name: found for force in FORCES for name, found in _derivatives(campaign, forces[force]).items()}
+    _refuse_thrust(campaign, derivatives)
     alone = oscillations(campaign, runs)
     return Reduction(
         campaign=campaign,
@@ -201,6 +206,29 @@ def reduce_campaign(campaign: Campaign, options: Options | None = None) -> Reduc
         cubics=cubics([row for row in alone if row.run not in not_used]),
         missing=tuple(name for name in ESSENTIAL if name not in derivatives),
     )
+
+
+def _refuse_impossible_body(campaign: Campaign) -> None:
+    for key, problem in impossible_body(body_of(campaign)):
+        raise InputError(campaign.path, f"model.{key}", problem, "one of these numbers is in another unit")
+
+
+def _refuse_thrust(campaign: Campaign, derivatives: Mapping[str, Derivative]) -> None:
+    """A towed model that the water pushes ahead: the X gauge is reversed.
+
+    Where the added mass is negative the signs of all forces are in doubt, and a warning says so.
+    """
+    found = derivatives.get("X0")
+    reversed_forces = "Yvdot" in derivatives and derivatives["Yvdot"].value > 0
+    if found is None or not is_resistance(campaign) or reversed_forces:
+        return
+    if found.value > THRUST_LIMIT * found.standard_error:
+        problem = (
+            f"shows X0 = {found.value:+.3g} ± {found.standard_error:.2g}: the water would push the model ahead, and no "
+            "propeller works"
+        )
+        remedy = "change the sign of the X columns; if its propeller worked, give [test] propeller_rps"
+        raise InputError(campaign.path, "gauge X", problem, remedy)
 
 
 def _sound_runs(campaign: Campaign) -> tuple[list[ReducedRun], list[InputError]]:

@@ -25,10 +25,9 @@ from tank2sim.identification.captive.regression import Solution, Spread, fitted_
 from tank2sim.identification.conditioning import COLLINEAR, scaled_condition
 from tank2sim.records.campaigns import Campaign
 
-DETERMINED = 0.5
+DETERMINED = math.sqrt(0.5)
 """Largest standard error of a reported third-order term, in the standard deviations of its prior: the tests then weigh
-at least three times as much as the prior (1/0.5^2 - 1), and the value is theirs. A project choice: at 0.7 the two weigh
-the same, below 0.3 tests with rudder angles of 15 deg would already be left out."""
+at least as much as what known ships have in common (1/s^2 - 1 >= 1), and the value is theirs."""
 
 _NORMAL = 1.959964
 """Standard errors of a two-sided 95 % interval of the normal distribution."""
