@@ -84,6 +84,8 @@ class TankTest(Section):
     inertia_speed
         The u with which the rigid body's m u r and m x_G u r are computed: ``test``, u = U as the paper has it
         (papers 2.2, 2.3), or ``axial``, u = U cos(beta). They differ in runs that yaw with drift alone.
+    force_delay_s
+        By how much the recorded forces lag the recorded motion, s (filters, clocks); it is taken out.
     free_motions
         Motions left free, such as ``["heave", "pitch"]``.
     """
@@ -95,6 +97,7 @@ class TankTest(Section):
     rudder_sign: Literal["starboard", "port"] = "starboard"
     inertia_speed: Literal["test", "axial"] = "test"
     propeller_radps: NotNegative | None = None
+    force_delay_s: Annotated[float, Field(gt=-10, lt=10)] = 0.0
     free_motions: list[str] | str | bool | None = None
     kinematic_viscosity_m2ps: Viscosity | None = None
 
@@ -124,6 +127,8 @@ class UncertaintySection(Section):
         Of the carriage speed.
     mass_relative, yaw_inertia_relative
         Of the carried mass and its yaw inertia.
+    force_delay_s
+        Of the delay of the forces behind the motion, s.
     """
 
     calibration_relative: NotNegative = 0.0
@@ -132,6 +137,7 @@ class UncertaintySection(Section):
     speed_relative: NotNegative = 0.0
     mass_relative: NotNegative = 0.0
     yaw_inertia_relative: NotNegative = 0.0
+    force_delay_s: NotNegative = 0.0
 
 
 class FullScaleSection(Section):

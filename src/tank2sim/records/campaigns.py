@@ -66,6 +66,8 @@ class Run:
         Forces and moment in the hydrodynamic sense (see the module), about midships.
     propeller_radps : float or None
         Revolutions.
+    force_delay_s : float
+        By how much the forces lag the motion.
     """
 
     name: str
@@ -82,6 +84,7 @@ class Run:
     y_m: Vector | None = None
     psi_rad: Vector | None = None
     propeller_radps: float | None = None
+    force_delay_s: float = 0.0
 
     @property
     def is_average(self) -> bool:
@@ -286,6 +289,7 @@ def _read_run(sheet: RunSheet, form: CampaignFile, folder: Path) -> Run:
         y_m=y,
         psi_rad=psi,
         propeller_radps=sheet.propeller_radps if sheet.propeller_radps is not None else form.test.propeller_radps,
+        force_delay_s=form.test.force_delay_s,
     )
 
 
