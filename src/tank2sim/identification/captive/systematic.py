@@ -19,7 +19,7 @@ from tank2sim.identification.captive.equations import Equations
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import distinct
 from tank2sim.identification.captive.regression import Solution, Spread, fitted_spread, solve
-from tank2sim.identification.conditioning import COLLINEAR, Matrix, Vector
+from tank2sim.identification.conditioning import SINGULAR, Matrix, Vector
 
 SHOWN = 4.0
 """Standard errors from which such an error is reported: of the some 20 that are looked for chance shows one in 800
@@ -30,6 +30,10 @@ force is then in the added mass, a third of a percent."""
 LEAST_GAIN = 0.02
 """Relative error of a gauge in one kind of run before it is reported. A project choice: gauges are calibrated to 0.1 to
 1 %, and what (3.8) does not follow is of that size."""
+VISIBLE_GAIN = 0.1
+"""Relative error of a gauge in one kind of run that must show, or it is said that none would. A project choice."""
+_AS_WELL = 2.0
+"""Difference of two ratios to the standard error within which either kind of run may be the one that errs."""
 _ALIKE = 1e-3
 """Chance of delays so different, if they are one, below which they are none: the flow then remembers earlier motion."""
 _NEARLY = 0.2
@@ -50,6 +54,8 @@ class SystematicError:
         The gauges concerned: ``Y``, ``N``, or ``XYN``.
     runs : str
         Type of the runs concerned; empty if it is all that oscillate.
+    or_runs : tuple of str
+        Other types of run whose error would explain it nearly as well.
     size, standard_error : float
         Delay in s, positive if the forces lag the motion; relative gain, positive if the gauge reads too much.
     """
@@ -59,6 +65,7 @@ class SystematicError:
     runs: str
     size: float
     standard_error: float
+    or_runs: tuple[str, ...] = ()
 
     @property
     def message(self) -> str:
@@ -77,10 +84,11 @@ class SystematicError:
                 "errors hold what it changes."
             )
         more = "more" if self.size > 0 else "less"
+        instead = f" (or those of {', '.join(self.or_runs)} err)" if self.or_runs else ""
         return (
             f"The {self.force} gauge reads {100 * abs(self.size):.2g} ± {100 * self.standard_error:.1g} % {more} in "
-            f"runs of {self.runs} than all other kinds of run imply (or those err): check its calibration there; until "
-            "then the standard errors hold what it changes."
+            f"runs of {self.runs} than all other kinds of run imply{instead}: check its calibration there; until then "
+            "the standard errors hold what it changes."
         )
 
     def shifts(self, equations: Equations, solution: Solution) -> dict[str, float]:
@@ -137,19 +145,28 @@ def gauge_gains(
     """
     predicted = _predicted(equations, spread)
     kinds = np.array([run.run.type for run in equations.runs])[equations.run_of_row]
-    found, unknown = [], []
+    gains: dict[str, tuple[float, float]] = {}
+    unknown = []
     for kind in dict.fromkeys(kinds.tolist()):
         solution = solve(_joined(equations, {"gain": np.where(kinds == kind, predicted, 0.0)}), spread)
         size, error = solution.value("gain"), solution.error("gain")
-        if solution.condition > COLLINEAR:
+        if solution.condition > SINGULAR or SHOWN * error > VISIBLE_GAIN:
             unknown.append(kind)
         elif abs(size) > max(SHOWN * error, rival * error, LEAST_GAIN):
-            source = f"gain of {equations.force} in {kind}"
-            found.append(
-                SystematicError(source=source, force=equations.force, runs=kind, size=size, standard_error=error)
-            )
-    worst = sorted(found, key=lambda one: -abs(one.size) / one.standard_error)[:1]
-    return tuple(worst), tuple(unknown)
+            gains[kind] = size, error
+    if not gains:
+        return (), tuple(unknown)
+    ratios = {kind: abs(size) / error for kind, (size, error) in gains.items()}
+    worst = max(ratios, key=lambda kind: ratios[kind])
+    found = SystematicError(
+        source=f"gain of {equations.force} in {worst}",
+        force=equations.force,
+        runs=worst,
+        size=gains[worst][0],
+        standard_error=gains[worst][1],
+        or_runs=tuple(kind for kind in gains if kind != worst and ratios[worst] - ratios[kind] < _AS_WELL),
+    )
+    return (found,), tuple(unknown)
 
 
 def advanced(equations: Equations, delay_s: float) -> Equations:

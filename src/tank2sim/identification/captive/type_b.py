@@ -19,15 +19,6 @@ from tank2sim.identification.captive.systematic import advanced
 from tank2sim.records.campaigns import Campaign
 
 
-def type_b_errors(campaign: Campaign, used: Equations, solution: Solution) -> dict[str, dict[str, float]]:
-    """Standard error (prime) of each term of a force from each stated error: source to term to error.
-
-    `solution` is that of the equations `used`.
-    """
-    shifts = type_b_shifts(campaign, used, solution)
-    return {source: {name: abs(shift) for name, shift in moved.items()} for source, moved in shifts.items()}
-
-
 def type_b_shifts(campaign: Campaign, used: Equations, solution: Solution) -> dict[str, dict[str, float]]:
     """What each term of a force (prime) moves by, with its sign, for each stated error of one standard deviation.
 
