@@ -33,7 +33,7 @@ from tank2sim.identification.captive.oscillation import (
     frequency_parameter,
     oscillations,
 )
-from tank2sim.identification.captive.regression import Solution, solve
+from tank2sim.identification.captive.regression import Solution, efficient_solution
 from tank2sim.identification.captive.selection import Selection, select
 from tank2sim.identification.captive.symmetry import Asymmetry, asymmetry
 from tank2sim.identification.captive.systematic import SystematicError, force_delays, gauge_gains
@@ -293,7 +293,7 @@ def _force_result(
         systematic, unchecked = gauge_gains(selected.equations, scatter_within_tests(selected.equations), rival)
     within = scatter_within_tests(selection.equations)
     steps = stepwise(selection.equations, within, campaign.test.speed_mps)
-    together = solve(selection.equations, within)
+    together = efficient_solution(selection.equations, within)
     return ForceResult(
         selection=selection,
         solution=solution,

@@ -5,14 +5,18 @@ mean, plus ``gain_variance`` times the outer product of the coefficients that it
 more in one run than in the next errs in all harmonics of that run together. The factors are found by restricted maximum
 likelihood over the campaign (REML; Patterson & Thompson 1971), so that the scatter from run to run, not only that
 within a run, determines how well a derivative is known.
+
+The gain errors widen the standard errors and do not weight the runs: the weights are those that are likeliest without
+them. Weights by gain errors would let a misfit of (3.8) in one harmonic pass for the gain of the run, at the cost of
+the harmonics that fit.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import minimize
@@ -21,8 +25,12 @@ from scipy.special import chdtrc
 from tank2sim.identification.captive.equations import Equations
 from tank2sim.identification.conditioning import Matrix, Vector, column_norms, scaled_condition
 
-_LEAST, _MOST = 1e-3, 1e4
-"""Range of the factor on the within-run covariance."""
+_NOISE_RANGE = (math.log(1e-3), math.log(1e4))
+"""Natural logarithms of the factor on the within-run covariance."""
+_ZERO_RANGE = (-25.0, 25.0)
+"""Natural logarithms of the factor on a zero variance at the start."""
+_LEAST_GAIN = 1e-8
+"""Variance of the gain, 0.01 %, at which the likelihood must be higher than without."""
 _GAIN = 1e-5
 """Variance of the gain from which the search begins: 0.3 %, between good gauges (0.1 %) and poor ones (1 %)."""
 _GAIN_RANGE = (-20.0, 4.5)
@@ -48,12 +56,15 @@ class Spread:
         Type of run to its own such variance, where the types differ; what (3.8) does not follow is in it.
     gain_variance : float
         Variance of the gauge's relative gain from run to run.
+    weights : Spread or None
+        By which the runs are weighted, if not by this.
     """
 
     noise: float
     zero_variance: float
     by_type: Mapping[str, float] = field(default_factory=dict)
     gain_variance: float = 0.0
+    weights: Spread | None = None
 
     def zeros(self, equations: Equations) -> Vector:
         """Variance of the zero error of each run, (runs,)."""
@@ -149,7 +160,39 @@ class Solution:
 
 
 def solve(equations: Equations, spread: Spread) -> Solution:
-    """Weighted least squares by QR with a known spread."""
+    """Weighted least squares by QR; the covariance is that of a known spread, whatever the weights."""
+    weights = spread.weights
+    solution = efficient_solution(equations, weights or spread)
+    if weights is None or not equations.names:
+        return replace(solution, spread=spread)
+    scatter = np.sum(scatters(equations, spread), axis=0) + equations.prior_rows.T @ equations.prior_rows
+    return replace(solution, spread=spread, covariance=solution.covariance @ scatter @ solution.covariance)
+
+
+def scatters(equations: Equations, spread: Spread) -> Matrix:
+    """Covariance of what each run adds to the right of the weighted normal equations, (runs, terms, terms)."""
+    design = (spread.weights or spread).weighted(equations, equations.design)
+    ends = [*equations.first_rows[1:], len(equations.values)]
+    found = np.empty((len(equations.runs), len(equations.names), len(equations.names)))
+    for place, (start, end) in enumerate(zip(equations.first_rows, ends, strict=True)):
+        own = design[start:end]
+        found[place] = own.T @ run_covariance(equations, spread, place) @ own
+    return found
+
+
+def run_covariance(equations: Equations, spread: Spread, place: int) -> Matrix:
+    """Covariance of the weighted equations of one run, (rows, rows): unity if the weights are those of the spread."""
+    size = len(equations.roots[place])
+    if spread.weights is None:
+        return np.eye(size)
+    # Both are roots of covariances of the same coefficients, one by its weights and one as it is.
+    root = np.linalg.solve(spread.weights.run_root(equations, place), spread.run_root(equations, place))
+    covariance: Matrix = np.asarray(root @ root.T, dtype=np.float64)
+    return covariance
+
+
+def efficient_solution(equations: Equations, spread: Spread) -> Solution:
+    """Generalised least squares by QR: weighted by the whole of a known spread, gain errors, too."""
     design, values = weighted_system(equations, spread)
     if not equations.names:
         return Solution((), np.zeros(0), np.zeros((0, 0)), spread, 1.0, np.zeros(0))
@@ -184,33 +227,50 @@ def fitted_spread(equations: Equations, *, by_type: bool = True) -> Spread:
     """
     single = len(equations.values) == len(equations.runs)
     common, least = _best(equations, {"": _starting_zero(equations)}, single)
-    if not by_type:
-        return common
     counts = Counter[str](run.run.type for run in equations.runs)
     types = [kind for kind, count in counts.items() if count >= _FEWEST_RUNS]
-    if len(types) < 2:
-        return common
+    if not by_type or len(types) < 2:
+        return _with_gain(equations, common, single)
     # Each type by itself is the start: a common one is a likely spread, too, from which no way leads downhill.
     alone = {
         kind: _starting_zero(equations.of_runs([n for n, run in enumerate(equations.runs) if run.run.type == kind]))
         for kind in types
     }
     own, lower = _best(equations, alone, single)
-    return own if chdtrc(len(types) - 1, max(least - lower, 0.0)) < _CLEARLY else common
+    clearly = chdtrc(len(types) - 1, max(least - lower, 0.0)) < _CLEARLY
+    return _with_gain(equations, own if clearly else common, single)
 
 
 def _best(equations: Equations, start: Mapping[str, float], single: bool) -> tuple[Spread, float]:
-    """The likeliest spread with a zero variance for each type of run in `start` (one type, "": all), and -2 log of
-    its likelihood."""
+    """The likeliest spread without gain errors, with a zero variance for each type of run in `start` (one type, "":
+    all), and -2 log of its likelihood."""
 
     def spread(logs: Vector) -> Spread:
-        zero_logs = logs[2:]
-        variances = {kind: value * math.exp(log) for (kind, value), log in zip(start.items(), zero_logs, strict=True)}
+        variances = {kind: value * math.exp(log) for (kind, value), log in zip(start.items(), logs[1:], strict=True)}
         usual = math.exp(sum(math.log(value) for value in variances.values()) / len(variances))
-        by_type = {} if "" in variances else variances
-        return Spread(1.0 if single else math.exp(logs[0]), usual, by_type, _GAIN * math.exp(logs[1]))
+        return Spread(1.0 if single else math.exp(logs[0]), usual, {} if "" in variances else variances)
 
-    bounds = [(math.log(_LEAST), math.log(_MOST)), _GAIN_RANGE] + [(-25.0, 25.0)] * len(start)
+    return _likeliest(equations, spread, [_NOISE_RANGE] + [_ZERO_RANGE] * len(start))
+
+
+def _with_gain(equations: Equations, base: Spread, single: bool) -> Spread:
+    """The likeliest spread with gain errors, weighted by one without; that itself if the likelihood knows of none."""
+    if _criterion(equations, replace(base, gain_variance=_LEAST_GAIN)) >= _criterion(equations, base):
+        return base
+
+    def spread(logs: Vector) -> Spread:
+        noise = base.noise * (1.0 if single else math.exp(logs[0]))
+        factor = math.exp(logs[1])
+        by_type = {kind: variance * factor for kind, variance in base.by_type.items()}
+        return Spread(noise, base.zero_variance * factor, by_type, _GAIN * math.exp(logs[2]), base)
+
+    return _likeliest(equations, spread, [_NOISE_RANGE, _ZERO_RANGE, _GAIN_RANGE])[0]
+
+
+def _likeliest(
+    equations: Equations, spread: Callable[[Vector], Spread], bounds: list[tuple[float, float]]
+) -> tuple[Spread, float]:
+    """The spread of greatest likelihood by its logarithms, from zero within their bounds, and -2 log of that."""
     found = minimize(
         lambda logs: _criterion(equations, spread(logs)),
         np.zeros(len(bounds)),

@@ -32,6 +32,8 @@ LEAST_GAIN = 0.02
 1 %, and what (3.8) does not follow is of that size."""
 VISIBLE_GAIN = 0.1
 """Relative error of a gauge in one kind of run that must show, or it is said that none would. A project choice."""
+_SUSPECT = 2.0
+"""Standard errors from which a gain is looked at more closely."""
 _AS_WELL = 2.0
 """Difference of two ratios to the standard error within which either kind of run may be the one that errs."""
 _ALIKE = 1e-3
@@ -148,7 +150,13 @@ def gauge_gains(
     gains: dict[str, tuple[float, float]] = {}
     unknown = []
     for kind in dict.fromkeys(kinds.tolist()):
-        solution = solve(_joined(equations, {"gain": np.where(kinds == kind, predicted, 0.0)}), spread)
+        joined = _joined(equations, {"gain": np.where(kinds == kind, predicted, 0.0)})
+        solution = solve(joined, spread)
+        if solution.condition < SINGULAR and abs(solution.value("gain")) > max(
+            LEAST_GAIN, _SUSPECT * solution.error("gain")
+        ):
+            # Scatter within kinds still holds what a gauge in error does: that beside the error is what counts.
+            solution = solve(joined, fitted_spread(joined, by_type=False))
         size, error = solution.value("gain"), solution.error("gain")
         if solution.condition > SINGULAR or SHOWN * error > VISIBLE_GAIN:
             unknown.append(kind)
