@@ -112,16 +112,16 @@ def force_delays(forces: Mapping[str, Equations]) -> tuple[SystematicError, ...]
     """
     fastest = max((run.motion.frequency_radps for used in forces.values() for run in used.runs), default=0.0)
     found = {force: _delays(used) for force, used in forces.items() if force in "YN"}
-    together = _one_delay([delay for delays in found.values() for delay in delays], fastest)
-    if together is not None and len(found) > 1 and all(found.values()):
-        return (
-            SystematicError(source="force_delay", force="XYN", runs="", size=together[0], standard_error=together[1]),
-        )
-    alone = {force: _one_delay(delays, fastest) for force, delays in found.items() if len(delays) > 1}
+    shown = {force: _one_delay(delays, fastest) for force, delays in found.items()}
+    common = _one_delay([delay for delays in found.values() for delay in delays], fastest)
+    if common is None and (alone := [delay for delay in shown.values() if delay is not None])[1:]:
+        common = _one_delay(alone, fastest)
+    if common is not None and all(found.values()):
+        return (SystematicError(source="force_delay", force="XYN", runs="", size=common[0], standard_error=common[1]),)
     return tuple(
-        SystematicError(source="force_delay", force=force, runs="", size=one[0], standard_error=one[1])
-        for force, one in alone.items()
-        if one is not None
+        SystematicError(source="force_delay", force=force, runs="", size=delay[0], standard_error=delay[1])
+        for force, delay in shown.items()
+        if delay is not None and len(found[force]) > 1
     )
 
 
