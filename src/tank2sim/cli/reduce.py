@@ -42,7 +42,7 @@ from tank2sim.records.campaigns import FORCES, Campaign, read_campaign
 @click.option("--keep-going", is_flag=True, help="Leave out runs at fault and reduce the rest.")
 @click.option("--keep-fast", is_flag=True, help="Use runs with omega U/g of 0.1 and more, too.")
 @click.option("--off-speed", is_flag=True, help="Use runs away from the test speed, too, for terms in the speed.")
-@click.option("--all-terms", is_flag=True, help="Keep terms that do not differ from zero.")
+@click.option("--all-terms", is_flag=True, help="Keep terms that the tests do not determine.")
 @click.option("--test-symmetry", is_flag=True, help="Test terms that port-starboard symmetry leaves out.")
 @click.option("--plot", "plots", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Plots, page.")
 @json_option

@@ -29,6 +29,13 @@ OSCILLATING: tuple[RunType, ...] = ("pure_sway", "pure_yaw", "yaw_with_drift")
 """Types of run in which the model oscillates; in the others it is towed steadily."""
 
 NotNegative = Annotated[float, Field(ge=0)]
+Gravity = Annotated[float, Field(gt=9.7, lt=9.9)]
+"""On Earth: 9.764 m/s2 (Huascaran) to 9.834 (Arctic Ocean), EGM2008; wider by half a percent."""
+WaterDensity = Annotated[float, Field(gt=900, lt=1100)]
+"""kg/m3. Fresh water has 958 (boiling) to 1000, sea water up to 1030, the Dead Sea 1240: a project choice that refuses
+g/cm3 and t/m3, and air."""
+Viscosity = Annotated[float, Field(gt=1e-7, lt=1e-5)]
+"""m2/s. Water has 0.3e-6 (boiling) to 1.8e-6 (freezing): refuses centistokes."""
 Angle = Annotated[float, Field(gt=-1.5707963267948966, lt=1.5707963267948966)]
 
 
@@ -77,19 +84,22 @@ class TankTest(Section):
     inertia_speed
         The u with which the rigid body's m u r and m x_G u r are computed: ``test``, u = U as the paper has it
         (papers 2.2, 2.3), or ``axial``, u = U cos(beta). They differ in runs that yaw with drift alone.
+    force_delay_s
+        By how much the recorded forces lag the recorded motion, s (filters, clocks); it is taken out.
     free_motions
         Motions left free, such as ``["heave", "pitch"]``.
     """
 
-    water_density_kgpm3: Positive = 1000.0
-    gravity_mps2: Positive = 9.80665
+    water_density_kgpm3: WaterDensity = 1000.0
+    gravity_mps2: Gravity = 9.80665
     speed_mps: Positive
     force_convention: Literal["on_model", "on_gauge", "hydrodynamic"]
     rudder_sign: Literal["starboard", "port"] = "starboard"
     inertia_speed: Literal["test", "axial"] = "test"
     propeller_radps: NotNegative | None = None
+    force_delay_s: Annotated[float, Field(gt=-10, lt=10)] = 0.0
     free_motions: list[str] | str | bool | None = None
-    kinematic_viscosity_m2ps: Positive | None = None
+    kinematic_viscosity_m2ps: Viscosity | None = None
 
 
 class TankSection(Section):
@@ -117,6 +127,8 @@ class UncertaintySection(Section):
         Of the carriage speed.
     mass_relative, yaw_inertia_relative
         Of the carried mass and its yaw inertia.
+    force_delay_s
+        Of the delay of the forces behind the motion, s.
     """
 
     calibration_relative: NotNegative = 0.0
@@ -125,14 +137,15 @@ class UncertaintySection(Section):
     speed_relative: NotNegative = 0.0
     mass_relative: NotNegative = 0.0
     yaw_inertia_relative: NotNegative = 0.0
+    force_delay_s: NotNegative = 0.0
 
 
 class FullScaleSection(Section):
     """``[full_scale]``: the water the ship sails in, for a card at ship scale."""
 
-    water_density_kgpm3: Positive = 1025.0
-    gravity_mps2: Positive = 9.80665
-    kinematic_viscosity_m2ps: Positive = 1.19e-6
+    water_density_kgpm3: WaterDensity = 1025.0
+    gravity_mps2: Gravity = 9.80665
+    kinematic_viscosity_m2ps: Viscosity = 1.19e-6
 
 
 class RunSheet(Section):

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
@@ -38,6 +39,8 @@ from tank2sim.records.campaign_form import (
 from tank2sim.records.csv_table import Table, Vector, read_table
 
 FORCES = ("X", "Y", "N")
+_FEWEST_READINGS = 16
+"""Readings of three gauges that cannot agree by chance, however coarse the gauges are."""
 _FORCE_COLUMNS = {"X": "X_N", "Y": "Y_N", "N": "N_Nm"}
 
 
@@ -63,6 +66,8 @@ class Run:
         Forces and moment in the hydrodynamic sense (see the module), about midships.
     propeller_radps : float or None
         Revolutions.
+    force_delay_s : float
+        By how much the forces lag the motion.
     """
 
     name: str
@@ -79,6 +84,7 @@ class Run:
     y_m: Vector | None = None
     psi_rad: Vector | None = None
     propeller_radps: float | None = None
+    force_delay_s: float = 0.0
 
     @property
     def is_average(self) -> bool:
@@ -181,6 +187,9 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
             runs.append(_read_run(sheet, form, path.parent))
         except InputError as fault:
             faults.append(fault)
+    copies = _copies(runs)
+    runs = [run for run in runs if run.name not in copies]
+    faults += copies.values()
     if faults and not keep_going:
         raise together(faults)
     if not runs:
@@ -196,6 +205,32 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
         faults=tuple(faults),
         remarks=tuple(remarks),
     )
+
+
+def _copies(runs: list[Run]) -> dict[str, InputError]:
+    """Runs whose readings are those of a run before, to the last digit: name to fault.
+
+    One record may be a part of the other, at its beginning or its end. Noise never repeats itself; records without
+    noise, of a computed campaign or a dead gauge, are no evidence.
+    """
+    found: dict[str, InputError] = {}
+    seen: dict[tuple[str, bytes], list[tuple[Run, NDArray[np.float64]]]] = {}
+    for run in runs:
+        readings = np.column_stack([run.force(force) for force in FORCES])
+        if run.is_average or len(readings) < _FEWEST_READINGS or not np.ptp(readings, axis=0).all():
+            continue
+        ends = [("first", readings[0].tobytes()), ("last", readings[-1].tobytes())]
+        for end in ends:
+            for other, others in seen.get(end, []):
+                common = min(len(readings), len(others))
+                part = slice(None, common) if end[0] == "first" else slice(-common, None)
+                if run.name not in found and np.array_equal(readings[part], others[part]):
+                    problem = f"has the forces of {other.name}, reading for reading"
+                    remedy = "one is a copy of the other: take it out, or give the run its own record"
+                    found[run.name] = InputError(run.name, "", problem, remedy)
+        for end in ends:
+            seen.setdefault(end, []).append((run, readings))
+    return found
 
 
 def together(faults: list[InputError]) -> InputError:
@@ -254,6 +289,7 @@ def _read_run(sheet: RunSheet, form: CampaignFile, folder: Path) -> Run:
         y_m=y,
         psi_rad=psi,
         propeller_radps=sheet.propeller_radps if sheet.propeller_radps is not None else form.test.propeller_radps,
+        force_delay_s=form.test.force_delay_s,
     )
 
 

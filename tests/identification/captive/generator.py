@@ -8,7 +8,9 @@ carriage's speed, frequencies and amplitudes that differ from the sheet, and rec
 
 from __future__ import annotations
 
+import copy
 import math
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -58,6 +60,10 @@ class Campaign:
         Readings a second.
     periods : float
         Length of oscillation records, in periods.
+    gain_error : float
+        Standard deviation of the gauges' relative gain from run to run, each force by itself.
+    force_delay_s : float
+        By how much the forces lag the motion in the record.
     faults : mapping
         Name of a run to what is wrong with it: see :data:`FAULTS`.
     """
@@ -78,6 +84,8 @@ class Campaign:
     frequency_parameters: tuple[float, ...] = (0.03, 0.05, 0.07, 0.09)
     rate_hz: float = 20.0
     periods: float = 6.0
+    gain_error: float = 0.0
+    force_delay_s: float = 0.0
     faults: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -216,12 +224,13 @@ def plan(campaign: Campaign, model: Ship) -> list[Run]:
     ]
 
 
-def motion(campaign: Campaign, model: Ship, run: Run, rng: np.random.Generator) -> Motion:
-    """How the mechanism moves the model; psi turns with the drift angle (psi = beta on a straight course)."""
+def motion(campaign: Campaign, model: Ship, run: Run, rng: np.random.Generator, before_s: float = 0.0) -> Motion:
+    """How the mechanism moves the model, or did a time before; psi turns with the drift angle (psi = beta on a straight
+    course)."""
     w = run.frequency
     periods = campaign.periods + (rng.uniform(0.0, 0.9) if campaign.part_periods else 0.0)
     duration = periods * 2 * math.pi / w if w else 12.0
-    t = np.arange(round(duration * campaign.rate_hz)) / campaign.rate_hz
+    t = np.arange(round(duration * campaign.rate_hz)) / campaign.rate_hz - before_s
     phase = w * t + (rng.uniform(0, 2 * math.pi) if campaign.part_periods else 0.0)
     cos, sin, zero = np.cos(phase), np.sin(phase), np.zeros_like(t)
     slow, begin = 2 * math.pi / rng.uniform(6.0, 30.0, 3), rng.uniform(0, 2 * math.pi, 3)
@@ -365,8 +374,11 @@ def write(campaign: Campaign, folder: Path) -> Written:
 
 
 def _table(campaign: Campaign, model: Ship, run: Run, rng: np.random.Generator) -> np.ndarray:
+    before = motion(campaign, model, run, copy.deepcopy(rng), campaign.force_delay_s)
     m = motion(campaign, model, run, rng)
-    forces = gauge_forces(campaign, model, m) + disturbances(campaign, model, m.t, rng)
+    number = zlib.crc32(run.name.encode())
+    gains = 1 + campaign.gain_error * np.random.default_rng([campaign.seed, 4, number]).standard_normal((3, 1))
+    forces = gains * gauge_forces(campaign, model, before) + disturbances(campaign, model, m.t, rng)
     shown_speed = m.speed + 5e-4 * campaign.noise * rng.standard_normal(m.t.size)
     return np.column_stack([m.t, m.y, m.psi, m.v, m.r, shown_speed, m.rudder, *forces])
 

@@ -39,6 +39,7 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
             force: [asdict(choice) for choice in result.selection.choices] for force, result in reduction.forces.items()
         },
         "spread": {force: _spread(result) for force, result in reduction.forces.items()},
+        "systematic_errors": [{**asdict(error), "message": error.message} for error in reduction.systematic],
         "trends": [asdict(trend) for result in reduction.forces.values() for trend in result.trends],
         "symmetry": {force: asdict(result.asymmetry) for force, result in reduction.forces.items() if result.asymmetry},
         "leave_one_out": {
@@ -101,6 +102,7 @@ def _spread(result: ForceResult) -> dict[str, Any]:
         "noise_factor": spread.noise,
         "zero_error_prime": zero,
         "zero_error_si": zero * unit,
+        "gain_error": float(np.sqrt(spread.gain_variance)),
         "by_type": {kind: float(np.sqrt(variance)) for kind, variance in spread.by_type.items()},
     }
 

@@ -8,12 +8,14 @@ from tank2sim.cards import ManoeuvringCard
 from tank2sim.identification.captive.caution import Caution
 from tank2sim.identification.captive.plausibility import (
     ADDED_MASSES,
+    added_masses,
     force_convention,
     levers,
     unusual_signs,
     yaw_force,
 )
 from tank2sim.identification.captive.tank_conditions import (
+    LEAST_DEPTH_RATIO,
     Body,
     Oscillation,
     Tank,
@@ -30,7 +32,7 @@ from tank2sim.identification.captive.tank_conditions import (
 )
 from tank2sim.records.campaigns import Campaign
 
-__all__ = ["Caution", "Oscillation", "cautions_of_result", "cautions_of_test"]
+__all__ = ["Caution", "Oscillation", "body_of", "cautions_of_result", "cautions_of_test"]
 
 
 def cautions_of_test(
@@ -50,19 +52,10 @@ def cautions_of_test(
     model, test = campaign.model, campaign.test
     gravity, speed, length = test.gravity_mps2, test.speed_mps, model.length_m
     tank = Tank(campaign.tank.breadth_m, campaign.tank.depth_m)
-    body = Body(
-        length_m=length,
-        mass_kg=model.mass_kg,
-        density_kgpm3=test.water_density_kgpm3,
-        yaw_inertia_kgm2=model.yaw_inertia_kgm2,
-        beam_m=model.beam_m,
-        draught_m=model.draught_m,
-    )
     found = [
         *model_length(length),
         *frequency_parameters(runs, speed, gravity),
         *flow_memory(runs, speed, length),
-        *carried_mass(body, model.block_coefficient),
         *trim(model.trim_m, length),
         *tank_resonance(runs, tank, gravity),
         *blockage(model.beam_m, model.draught_m, tank),
@@ -81,13 +74,31 @@ def cautions_of_result(
     numbers = _numbers(campaign)
     mass, inertia = numbers["m'"], numbers["J_z'"]
     assert mass is not None
+    body = body_of(campaign)
+    deep = not (campaign.tank.depth_m and body.draught_m) or campaign.tank.depth_m >= LEAST_DEPTH_RATIO * body.draught_m
     # A positive added mass is told once, with its likely cause.
     others = {name: value for name, value in derivatives.items() if name not in ADDED_MASSES}
     return (
         *force_convention(derivatives, mass, inertia or 0.0, campaign.test.force_convention),
+        *carried_mass(body, campaign.model.block_coefficient),
+        *(added_masses(derivatives, standard_errors, mass, inertia) if deep else ()),
         *unusual_signs(others, standard_errors),
         *yaw_force(derivatives, mass),
         *levers(derivatives, standard_errors),
+    )
+
+
+def body_of(campaign: Campaign) -> Body:
+    """The body that the gauges carry."""
+    model = campaign.model
+    return Body(
+        length_m=model.length_m,
+        mass_kg=model.mass_kg,
+        density_kgpm3=campaign.test.water_density_kgpm3,
+        yaw_inertia_kgm2=model.yaw_inertia_kgm2,
+        beam_m=model.beam_m,
+        draught_m=model.draught_m,
+        x_G_m=model.x_G_m,
     )
 
 

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tank2sim.identification.captive.reduction import Reduction
-from tank2sim.identification.captive.type_b import type_b_shifts
+from tank2sim.identification.captive.reduction import Reduction, common_shifts
 
 Array = NDArray[np.float64]
 
@@ -16,8 +15,9 @@ Array = NDArray[np.float64]
 def reduction_covariance(reduction: Reduction, names: Sequence[str]) -> Array:
     """Covariance (k, k), prime, of the derivatives `names` that the campaign gave.
 
-    Type A is that of the regression of each force, whose errors are independent. An error common to the campaign (Type
-    B) moves the derivatives of all three forces together: the outer product of what they move by.
+    Type A is that of the regression of each force, whose errors are independent. An error common to many runs (Type B,
+    or shown by the campaign itself) moves the derivatives of all three forces together: the outer product of what they
+    move by.
     """
     places = {name: place for place, name in enumerate(names)}
     covariance = np.zeros((len(names), len(names)))
@@ -27,7 +27,7 @@ def reduction_covariance(reduction: Reduction, names: Sequence[str]) -> Array:
         own = [place for place, name in enumerate(solution.names) if name in places]
         rows = [places[solution.names[place]] for place in own]
         covariance[np.ix_(rows, rows)] += solution.covariance[np.ix_(own, own)]
-        for source, moved in type_b_shifts(reduction.campaign, result.selection.equations, solution).items():
+        for source, moved in common_shifts(reduction.campaign, result).items():
             shift = shifts.setdefault(source, np.zeros(len(names)))
             for name, by in moved.items():
                 if name in places:

@@ -52,6 +52,9 @@ class Equations:
         The water's force so weighted.
     zero : array, (rows,)
         What a zero error of 1 common to a run adds, so weighted.
+    gauge : array, (rows,)
+        The force as the gauge showed it, the reaction of the body's inertia in it, so weighted: what a gain error of 1
+        common to a run adds.
     run_of_row : array of int, (rows,)
         Place of each row's run in `runs`.
     runs : tuple of ReducedRun
@@ -69,6 +72,7 @@ class Equations:
     design: Matrix
     values: Vector
     zero: Vector
+    gauge: Vector
     run_of_row: NDArray[np.int64]
     runs: tuple[ReducedRun, ...]
     unit: float
@@ -101,6 +105,7 @@ class Equations:
             design=self.design[rows],
             values=self.values[rows],
             zero=self.zero[rows],
+            gauge=self.gauge[rows],
             run_of_row=np.array([renumbered[place] for place in self.run_of_row[rows]], dtype=np.int64),
             runs=tuple(self.runs[place] for place in places),
             roots=tuple(self.roots[place] for place in places),
@@ -133,7 +138,7 @@ def equations(campaign: Campaign, runs: Sequence[ReducedRun], force: str, names:
     """
     scales = campaign.scales
     unit = scales.force * (scales.length if force == "N" else 1.0)
-    blocks, values, zeros, roots, places = [], [], [], [], []
+    blocks, values, zeros, gauges, roots, places = [], [], [], [], [], []
     for place, run in enumerate(runs):
         histories = np.column_stack([*(_history(campaign, run.motion, name) for name in names)]) / unit
         own = rigid_body_force(campaign, run.motion)[force] / unit
@@ -141,11 +146,13 @@ def equations(campaign: Campaign, runs: Sequence[ReducedRun], force: str, names:
         fit, count = run.fits[force], run.regressed
         covariance = fit.covariance[:count, :count] / unit**2
         root = np.linalg.cholesky(covariance)
-        measured = fit.coefficients[:count] / unit + projected[:, -1]
-        weighted = np.linalg.solve(root, np.column_stack([projected[:, :-1], measured, np.eye(count)[:, 0]]))
-        blocks.append(weighted[:, :-2])
-        values.append(weighted[:, -2])
-        zeros.append(weighted[:, -1])
+        gauge = fit.coefficients[:count] / unit
+        right = [gauge + projected[:, -1], np.eye(count)[:, 0], gauge]
+        weighted = np.linalg.solve(root, np.column_stack([projected[:, :-1], *right]))
+        blocks.append(weighted[:, :-3])
+        values.append(weighted[:, -3])
+        zeros.append(weighted[:, -2])
+        gauges.append(weighted[:, -1])
         roots.append(root)
         places += [place] * count
     return Equations(
@@ -154,6 +161,7 @@ def equations(campaign: Campaign, runs: Sequence[ReducedRun], force: str, names:
         design=np.vstack(blocks),
         values=np.concatenate(values),
         zero=np.concatenate(zeros),
+        gauge=np.concatenate(gauges),
         run_of_row=np.array(places, dtype=np.int64),
         runs=tuple(runs),
         unit=unit,

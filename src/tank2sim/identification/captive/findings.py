@@ -11,6 +11,7 @@ from tank2sim.identification.captive.cautions import Oscillation, cautions_of_re
 from tank2sim.identification.captive.oscillation import cubic_findings
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
 from tank2sim.identification.captive.repeats import repeats
+from tank2sim.identification.captive.systematic import can_show_delay
 
 _SHEET = 0.05
 _UNEXPLAINED = 2.0
@@ -28,6 +29,7 @@ def findings(reduction: Reduction) -> tuple[str, ...]:
         *_missing(reduction),
         *_physics(reduction),
         *_conventions(reduction),
+        *_unchecked(reduction),
     ]
     for force, result in reduction.forces.items():
         found += _of_force(reduction, force, result)
@@ -38,10 +40,13 @@ def findings(reduction: Reduction) -> tuple[str, ...]:
 
 
 def implausible(reduction: Reduction) -> tuple[str, ...]:
-    """What no ship has among the derivatives: a wrong unit, sign or convention of the whole campaign shows there."""
+    """What makes the derivatives doubtful as a whole: systematic errors of the records, and values that no ship has."""
     values = {name: derivative.value for name, derivative in reduction.derivatives.items()}
     errors = {name: derivative.standard_error for name, derivative in reduction.derivatives.items()}
-    return tuple(caution.message for caution in cautions_of_result(values, errors, reduction.campaign))
+    return (
+        *(error.message for error in reduction.systematic),
+        *(caution.message for caution in cautions_of_result(values, errors, reduction.campaign)),
+    )
 
 
 def _left_out(reduction: Reduction) -> Iterator[str]:
@@ -105,6 +110,18 @@ def _conventions(reduction: Reduction) -> Iterator[str]:
             f"that yaw with drift Yvvr would come out lower by m'/2 = {prime / 2:.3g} and Nvvr by "
             f'{prime * campaign.model.x_G_m / campaign.model.length_m / 2:.2g}: [test] inertia_speed = "axial".'
         )
+
+
+def _unchecked(reduction: Reduction) -> Iterator[str]:
+    """Which systematic errors this campaign could not show."""
+    kinds = dict.fromkeys(kind for force in "YN" for kind in reduction.forces[force].unchecked)
+    if kinds:
+        yield (
+            f"Not known is whether the gauges read the same in runs of {', '.join(kinds)} as in the others: no other "
+            "kind of run gives the same derivatives."
+        )
+    if any(run.run.oscillates for run in reduction.runs) and not can_show_delay(reduction.runs):
+        yield "Not known is whether the forces lag the motion: it takes oscillations at two frequencies or more."
 
 
 def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator[str]:

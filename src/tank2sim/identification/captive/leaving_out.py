@@ -8,7 +8,13 @@ import numpy as np
 from scipy.special import chdtrc
 
 from tank2sim.identification.captive.equations import Equations
-from tank2sim.identification.captive.regression import Spread, weighted_system
+from tank2sim.identification.captive.regression import (
+    Spread,
+    run_covariance,
+    scatters,
+    solve,
+    weighted_system,
+)
 from tank2sim.identification.conditioning import Matrix, Vector, column_norms
 
 _UNLIKELY = 1e-4
@@ -70,12 +76,16 @@ def leave_one_out(equations: Equations, spread: Spread) -> tuple[LeftOut, ...]:
     """
     if not equations.names:
         return ()
-    design, values = weighted_system(equations, spread)
+    weights = spread.weights or spread
+    design, values = weighted_system(equations, weights)
     norms = column_norms(design)
     design = design / norms
     normal, right = design.T @ design, design.T @ values
     whole = np.linalg.pinv(normal)
-    estimate, errors = whole @ right, np.sqrt(np.diag(whole))
+    estimate, errors = whole @ right, solve(equations, spread).standard_errors * norms
+    prior = design[len(equations.values) :]
+    scatter = scatters(equations, spread) / np.outer(norms, norms)
+    together = np.sum(scatter, axis=0) + prior.T @ prior
     found = []
     ends = [*equations.first_rows[1:], len(equations.values)]
     for place, (start, end) in enumerate(zip(equations.first_rows, ends, strict=True)):
@@ -87,8 +97,9 @@ def leave_one_out(equations: Equations, spread: Spread) -> tuple[LeftOut, ...]:
         without = inverse @ (right - own.T @ target)
         shift = np.abs(without - estimate) / np.maximum(errors, 1e-300)
         most = int(np.argmax(shift))
-        misfit_covariance = np.eye(end - start) + own @ inverse @ own.T
-        root = spread.run_root(equations, place)
+        by_others = own @ inverse @ (together - scatter[place]) @ inverse @ own.T
+        misfit_covariance = run_covariance(equations, spread, place) + by_others
+        root = weights.run_root(equations, place)
         which = 1 if equations.runs[place].run.oscillates else 0
         shown, expected = root @ target, root @ (own @ without)
         squares = _squares(target - own @ without, misfit_covariance)

@@ -36,8 +36,9 @@ class Motion:
     kept : slice
         Rows of the record used.
     time_s : array, (rows,)
-        Of those rows; in an oscillating run counted from a moment at which the leading velocity (v in pure sway, else
-        r) is greatest, so that it is cos(omega t) and its acceleration is -sin(omega t).
+        Of those rows, less the delay of the forces behind the motion; in an oscillating run counted from a moment at
+        which the leading velocity (v in pure sway, else r) is greatest, so that it is cos(omega t) and its acceleration
+        is -sin(omega t).
     frequency_radps : float
         omega; 0 in a steady run.
     periods : int
@@ -129,10 +130,13 @@ def _oscillating(run: Run) -> Motion:
     first = _fitted(leading(run)[kept], harmonic_basis(time, frequency, 1))
     time = time - math.atan2(first[2], first[1]) / frequency
     basis = harmonic_basis(time, frequency, MOTION_HARMONICS)
-    slope = _derivative_basis(basis, frequency)
     v, r, speed, rudder = (
         _fitted(values[kept], basis) for values in (run.v_mps, run.r_radps, run.speed_mps, run.delta_rad)
     )
+    # What the forces of a row show is the motion a delay before.
+    time = time - run.force_delay_s
+    basis = harmonic_basis(time, frequency, MOTION_HARMONICS)
+    slope = _derivative_basis(basis, frequency)
     return Motion(
         kept=kept,
         time_s=time,

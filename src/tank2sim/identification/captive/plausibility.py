@@ -14,6 +14,11 @@ from tank2sim.identification.captive.expected_signs import EXPECTED_SIGNS, Expec
 ADDED_SHARE = (0.1, 3.0)
 """Added mass and added yaw inertia of ships over their own lie between; about 0.9 and 0.7 are usual."""
 
+DEEP_ADDED_SHARES = {"Yvdot": (0.5, 1.6), "Nrdot": (0.25, 2.0)}
+"""Added mass over mass, and added yaw inertia over yaw inertia, of ships in deep water: 0.76 and 0.60 (KVLCC2), 0.89
+(S175), 0.94 and 1.12 (Mariner); a project choice on either side. With half the mass, whose reaction the gauges then
+seem to show in the water, 0.94 becomes 2.9."""
+
 ADDED_MASSES = ("Yvdot", "Nrdot")
 """Derivatives that tell a wrong convention of the forces; their sign is judged with it."""
 
@@ -50,6 +55,32 @@ def force_convention(
             if value >= inertia:
                 message += f", and with that of the model ({inertia:.3g}) the whole is too"
             yield Caution("force convention", f"{message}; {_likely_cause(value, inertia, convention)}.")
+
+
+def added_masses(
+    derivatives: Mapping[str, float],
+    standard_errors: Mapping[str, float],
+    mass_prime: float,
+    inertia_prime: float | None,
+) -> Iterator[Caution]:
+    """Added mass or yaw inertia that no known ship has in deep water beside its own, by more than two standard errors.
+
+    Of positive derivatives :func:`force_convention` speaks.
+    """
+    inertias = ((mass_prime, "mass", "mass_kg"), (inertia_prime, "yaw inertia", "yaw_inertia_kgm2"))
+    for name, (inertia, what, key) in zip(ADDED_MASSES, inertias, strict=True):
+        value = derivatives.get(name)
+        if value is None or value > 0 or not inertia:
+            continue
+        low, high = DEEP_ADDED_SHARES[name]
+        share, doubt = -value / inertia, _SIGNIFICANT * standard_errors.get(name, 0.0) / inertia
+        if not low - doubt <= share <= high + doubt:
+            yield Caution(
+                "mass",
+                f"{name} is {value:.3g}: the added {what} would be {share:.2g} times the model's own ({inertia:.3g}), "
+                f"and known ships have {low:g} to {high:g} in deep water; check [model] {key} and the unit of the "
+                "gauges.",
+            )
 
 
 def _likely_cause(value: float, inertia: float, convention: str) -> str:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.cautions import body_of
 from tank2sim.identification.captive.contradictions import contradicted
 from tank2sim.identification.captive.equations import SPEED_RANGE
 from tank2sim.identification.captive.faults import record_faults, reduced_faults
@@ -32,16 +33,19 @@ from tank2sim.identification.captive.oscillation import (
     frequency_parameter,
     oscillations,
 )
-from tank2sim.identification.captive.regression import Solution, solve
+from tank2sim.identification.captive.regression import Solution, efficient_solution
 from tank2sim.identification.captive.selection import Selection, select
 from tank2sim.identification.captive.symmetry import Asymmetry, asymmetry
-from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER
+from tank2sim.identification.captive.systematic import SystematicError, force_delays, gauge_gains
+from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER, impossible_body
 from tank2sim.identification.captive.trends import Trend, trends
-from tank2sim.identification.captive.type_b import type_b_errors
+from tank2sim.identification.captive.type_b import type_b_shifts
 from tank2sim.records.campaigns import FORCES, Campaign, together
 
 DISAGREEMENT_LIMIT = 3.5
 """Standard errors by which the two ways may differ before it is told."""
+THRUST_LIMIT = 4.0
+"""Standard errors by which a resistance must be negative to be refused: chance does so once in 30 000 campaigns."""
 ESSENTIAL = ("Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot", "Yv", "Nv", "Yr", "Nr", "Yd", "Nd")
 """Derivatives without which no manoeuvre can be simulated rightly."""
 
@@ -59,7 +63,7 @@ class Options:
     off_speed : bool
         Use runs away from the test speed, too, and find terms in Du.
     all_terms : bool
-        Keep terms that are not significant.
+        Keep terms that the tests do not determine.
     test_symmetry : bool
         Test terms of the other parity, which (3.8) leaves out.
     """
@@ -82,7 +86,7 @@ class Derivative:
     type_a : float
         Standard error from the scatter of the campaign.
     type_b : mapping
-        Source to standard error from what was stated of the campaign.
+        Source to standard error from what was stated of the campaign, and from systematic errors that it shows.
     found_in : tuple of str
         Types of run on which it rests most, told by the paper's order; empty if that does not give it.
     """
@@ -114,6 +118,10 @@ class ForceResult:
         Each run predicted from all the others.
     asymmetry : Asymmetry or None
         The test of the other parity, if asked for.
+    systematic : tuple
+        Errors common to many runs that the campaign shows in this force.
+    unchecked : tuple of str
+        Types of run of which no other gives the derivatives: an error of the gauge in them alone would not be seen.
     """
 
     selection: Selection
@@ -123,6 +131,8 @@ class ForceResult:
     trends: tuple[Trend, ...]
     left_out: tuple[LeftOut, ...]
     asymmetry: Asymmetry | None = None
+    systematic: tuple[SystematicError, ...] = ()
+    unchecked: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -162,6 +172,11 @@ class Reduction:
     cubics: tuple[Cubic, ...]
     missing: tuple[str, ...]
 
+    @property
+    def systematic(self) -> tuple[SystematicError, ...]:
+        """Errors common to many runs that the campaign shows, each once."""
+        return tuple(dict.fromkeys(error for result in self.forces.values() for error in result.systematic))
+
 
 def reduce_campaign(campaign: Campaign, options: Options | None = None) -> Reduction:
     """Derivatives from a campaign.
@@ -170,9 +185,10 @@ def reduce_campaign(campaign: Campaign, options: Options | None = None) -> Reduc
     ------
     InputError
         Runs are at fault and `keep_going` is not asked for (all are told); no run is left; or a key that the runs need
-        is missing.
+        is missing; or a number of ``[model]``, or the sign of the resistance, cannot be.
     """
     options = options or Options()
+    _refuse_impossible_body(campaign)
     runs, faults = _sound_runs(campaign)
     if faults and not options.keep_going:
         raise together(faults)
@@ -186,8 +202,11 @@ def reduce_campaign(campaign: Campaign, options: Options | None = None) -> Reduc
         told = [*map(str, faults), *(f"{name}, for {reason}" for name, reason in not_used.items())]
         remedy = f"the first was left out: {told[0]}" if told else "give it runs"
         raise InputError(campaign.path, "runs", "no run can be used", remedy)
-    forces = {force: _force_result(campaign, used, force, options) for force in FORCES}
+    selections = {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCES}
+    delays = force_delays({force: selection.equations for force, selection in selections.items()})
+    forces = {force: _force_result(campaign, selection, delays, options) for force, selection in selections.items()}
     derivatives = {name: found for force in FORCES for name, found in _derivatives(campaign, forces[force]).items()}
+    _refuse_thrust(campaign, derivatives)
     alone = oscillations(campaign, runs)
     return Reduction(
         campaign=campaign,
@@ -201,6 +220,29 @@ def reduce_campaign(campaign: Campaign, options: Options | None = None) -> Reduc
         cubics=cubics([row for row in alone if row.run not in not_used]),
         missing=tuple(name for name in ESSENTIAL if name not in derivatives),
     )
+
+
+def _refuse_impossible_body(campaign: Campaign) -> None:
+    for key, problem in impossible_body(body_of(campaign)):
+        raise InputError(campaign.path, f"model.{key}", problem, "one of these numbers is in another unit")
+
+
+def _refuse_thrust(campaign: Campaign, derivatives: Mapping[str, Derivative]) -> None:
+    """A towed model that the water pushes ahead: the X gauge is reversed.
+
+    Where the added mass is negative the signs of all forces are in doubt, and a warning says so.
+    """
+    found = derivatives.get("X0")
+    reversed_forces = "Yvdot" in derivatives and derivatives["Yvdot"].value > 0
+    if found is None or not is_resistance(campaign) or reversed_forces:
+        return
+    if found.value > THRUST_LIMIT * found.standard_error:
+        problem = (
+            f"shows X0 = {found.value:+.3g} ± {found.standard_error:.2g}: the water would push the model ahead, and no "
+            "propeller works"
+        )
+        remedy = "change the sign of the X columns; if its propeller worked, give [test] propeller_rps"
+        raise InputError(campaign.path, "gauge X", problem, remedy)
 
 
 def _sound_runs(campaign: Campaign) -> tuple[list[ReducedRun], list[InputError]]:
@@ -239,13 +281,19 @@ def _used_runs(
     return used, not_used
 
 
-def _force_result(campaign: Campaign, runs: Sequence[ReducedRun], force: str, options: Options) -> ForceResult:
-    selection = select(campaign, runs, force, all_terms=options.all_terms)
-    selection, found = trends(campaign, selection)
+def _force_result(
+    campaign: Campaign, selected: Selection, delays: Sequence[SystematicError], options: Options
+) -> ForceResult:
+    selection, found = trends(campaign, selected)
     solution = selection.solution
+    unchecked: tuple[str, ...] = ()
+    systematic = tuple(delay for delay in delays if selection.equations.force in delay.force)
+    if not systematic:
+        rival = max((abs(trend.slope) / trend.standard_error for trend in found), default=0.0)
+        systematic, unchecked = gauge_gains(selected.equations, scatter_within_tests(selected.equations), rival)
     within = scatter_within_tests(selection.equations)
     steps = stepwise(selection.equations, within, campaign.test.speed_mps)
-    together = solve(selection.equations, within)
+    together = efficient_solution(selection.equations, within)
     return ForceResult(
         selection=selection,
         solution=solution,
@@ -258,17 +306,19 @@ def _force_result(campaign: Campaign, runs: Sequence[ReducedRun], force: str, op
         trends=found,
         left_out=leave_one_out(selection.equations, selection.spread),
         asymmetry=asymmetry(campaign, selection) if options.test_symmetry else None,
+        systematic=systematic,
+        unchecked=unchecked,
     )
 
 
 def _derivatives(campaign: Campaign, result: ForceResult) -> dict[str, Derivative]:
     solution, steps = result.solution, result.stepwise
-    sources = type_b_errors(campaign, result.selection.equations, solution)
+    sources = common_shifts(campaign, result)
     found = {}
     for name, value, error in zip(solution.names, solution.values, solution.standard_errors, strict=True):
         if name not in result.selection.reported or " " in name:
             continue  # not shown, or a trend with frequency, which is no derivative
-        type_b = {source: errors[name] for source, errors in sources.items()}
+        type_b = {source: abs(shifts.get(name, 0.0)) for source, shifts in sources.items()}
         found[name] = Derivative(
             value=float(value),
             standard_error=float(np.sqrt(error**2 + sum(size**2 for size in type_b.values()))),
@@ -277,6 +327,16 @@ def _derivatives(campaign: Campaign, result: ForceResult) -> dict[str, Derivativ
             found_in=steps.found_in[steps.names.index(name)] if name in steps.names else "",
         )
     return found
+
+
+def common_shifts(campaign: Campaign, result: ForceResult) -> dict[str, dict[str, float]]:
+    """What each term of a force (prime) moves by, with its sign, for each error common to many runs: source to shifts.
+
+    Stated errors (Type B) of one standard deviation, and the errors that the campaign itself shows, in full.
+    """
+    used, solution = result.selection.equations, result.solution
+    shown = {error.source: error.shifts(used, solution) for error in result.systematic}
+    return type_b_shifts(campaign, used, solution) | shown
 
 
 def is_resistance(campaign: Campaign) -> bool:

@@ -1,16 +1,22 @@
-"""Generalised least squares over a campaign, with the zero error that every run has of its own.
+"""Generalised least squares over a campaign, with the zero error and the gain error that every run has of its own.
 
-The covariance of a run's coefficients is ``noise`` times its within-run covariance plus ``zero_variance`` for its
-mean. Both factors are found by restricted maximum likelihood over the campaign (REML; Patterson & Thompson 1971), so
-that the scatter from run to run, not only that within a run, tells how well a derivative is known.
+The covariance of a run's coefficients is ``noise`` times its within-run covariance, plus ``zero_variance`` for its
+mean, plus ``gain_variance`` times the outer product of the coefficients that its gauge showed: a gauge that reads 0.5 %
+more in one run than in the next errs in all harmonics of that run together. The factors are found by restricted maximum
+likelihood over the campaign (REML; Patterson & Thompson 1971), so that the scatter from run to run, not only that
+within a run, determines how well a derivative is known.
+
+The gain errors widen the standard errors and do not weight the runs: the weights are those that are likeliest without
+them. Weights by gain errors would let a misfit of (3.8) in one harmonic pass for the gain of the run, at the cost of
+the harmonics that fit.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import minimize
@@ -19,8 +25,18 @@ from scipy.special import chdtrc
 from tank2sim.identification.captive.equations import Equations
 from tank2sim.identification.conditioning import Matrix, Vector, column_norms, scaled_condition
 
-_LEAST, _MOST = 1e-3, 1e4
-"""Range of the factor on the within-run covariance."""
+_NOISE_RANGE = (math.log(1e-3), math.log(1e4))
+"""Natural logarithms of the factor on the within-run covariance."""
+_ZERO_RANGE = (-25.0, 25.0)
+"""Natural logarithms of the factor on a zero variance at the start."""
+_LEAST_GAIN = 1e-8
+"""Variance of the gain, 0.01 %, at which the likelihood must be higher than without."""
+_GAIN = 1e-5
+"""Variance of the gain from which the search begins: 0.3 %, between good gauges (0.1 %) and poor ones (1 %)."""
+_GAIN_RANGE = (-20.0, 4.5)
+"""Natural logarithms of the factor on it: from nothing to gains that differ by 3 % from run to run. Such gains cost the
+likelihood 1000 a run where a force is not explained at all; were 10 % allowed, 100 would be less than what noise costs
+in a campaign with a gross error, and all forces would pass for errors of gain about zero."""
 _FEWEST_RUNS = 8
 _CLEARLY = 0.05
 """Chance of so much higher a likelihood if all types of run scatter alike, below which each gets its own variance."""
@@ -38,11 +54,17 @@ class Spread:
         Variance of the zero error from run to run, in ``Equations.unit`` squared.
     by_type : mapping
         Type of run to its own such variance, where the types differ; what (3.8) does not follow is in it.
+    gain_variance : float
+        Variance of the gauge's relative gain from run to run.
+    weights : Spread or None
+        By which the runs are weighted, if not by this.
     """
 
     noise: float
     zero_variance: float
     by_type: Mapping[str, float] = field(default_factory=dict)
+    gain_variance: float = 0.0
+    weights: Spread | None = None
 
     def zeros(self, equations: Equations) -> Vector:
         """Variance of the zero error of each run, (runs,)."""
@@ -50,26 +72,43 @@ class Spread:
 
     def weighted(self, equations: Equations, columns: Matrix) -> Matrix:
         """Columns (rows, n) multiplied by an inverse root of the covariance of the equations."""
-        zero, size = equations.zero, equations.zero_sizes
-        share = 1.0 - np.sqrt(self.noise / (self.noise + self.zeros(equations) * size))
-        along = equations.run_sums(zero[:, None] * columns) * (share / size)[:, None]
-        result: Matrix = (columns - zero[:, None] * along[equations.run_of_row]) / math.sqrt(self.noise)
+        result: Matrix = columns / math.sqrt(self.noise)
+        for direction, sizes, variances in self._common_errors(equations):
+            share = 1.0 - np.sqrt(self.noise / (self.noise + variances * sizes))
+            along = equations.run_sums(direction[:, None] * result) * (share / sizes)[:, None]
+            result = result - direction[:, None] * along[equations.run_of_row]
         return result
 
     def run_root(self, equations: Equations, place: int) -> Matrix:
         """A root of the covariance of one run's coefficients, in ``Equations.unit``."""
         start, size = int(equations.first_rows[place]), len(equations.roots[place])
-        zero, length = equations.zero[start : start + size], float(equations.zero_sizes[place])
-        along = math.sqrt(1.0 + float(self.zeros(equations)[place]) * length / self.noise) - 1.0
-        symmetric = math.sqrt(self.noise) * (np.eye(size) + np.outer(zero, zero) * along / length)
-        root: Matrix = equations.roots[place] @ symmetric
+        root: Matrix = math.sqrt(self.noise) * equations.roots[place]
+        for direction, sizes, variances in self._common_errors(equations):
+            own, length = direction[start : start + size], float(sizes[place])
+            along = math.sqrt(1.0 + float(variances[place]) * length / self.noise) - 1.0
+            root = root @ (np.eye(size) + np.outer(own, own) * along / length)
         return root
 
     def log_determinant(self, equations: Equations) -> float:
         """Of the covariance of the weighted equations."""
-        rows, runs = len(equations.values), len(equations.runs)
-        each = np.log(self.noise + self.zeros(equations) * equations.zero_sizes)
-        return (rows - runs) * math.log(self.noise) + float(np.sum(each))
+        total = len(equations.values) * math.log(self.noise)
+        for _, sizes, variances in self._common_errors(equations):
+            total += float(np.sum(np.log1p(variances * sizes / self.noise)))
+        return total
+
+    def _common_errors(self, equations: Equations) -> Iterator[tuple[Vector, Vector, Vector]]:
+        """What errs together in a run: direction (rows,), its squared norm in each run, and its variance (runs,).
+
+        The covariance is noise R (I + g g' gain/noise) R', R R' = I + z z' zero/noise, g the inverse of R times the
+        gauge's coefficients: each error is taken out after the other.
+        """
+        zeros, sizes = self.zeros(equations), equations.zero_sizes
+        yield equations.zero, sizes, zeros
+        if self.gain_variance:
+            zero, gauge = equations.zero, equations.gauge
+            share = (1.0 - np.sqrt(self.noise / (self.noise + zeros * sizes))) / sizes
+            gauge = gauge - zero * (equations.run_sums(zero * gauge) * share)[equations.run_of_row]
+            yield gauge, np.maximum(equations.run_sums(gauge**2), 1e-300), np.full(len(sizes), self.gain_variance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +160,39 @@ class Solution:
 
 
 def solve(equations: Equations, spread: Spread) -> Solution:
-    """Weighted least squares by QR with a known spread."""
+    """Weighted least squares by QR; the covariance is that of a known spread, whatever the weights."""
+    weights = spread.weights
+    solution = efficient_solution(equations, weights or spread)
+    if weights is None or not equations.names:
+        return replace(solution, spread=spread)
+    scatter = np.sum(scatters(equations, spread), axis=0) + equations.prior_rows.T @ equations.prior_rows
+    return replace(solution, spread=spread, covariance=solution.covariance @ scatter @ solution.covariance)
+
+
+def scatters(equations: Equations, spread: Spread) -> Matrix:
+    """Covariance of what each run adds to the right of the weighted normal equations, (runs, terms, terms)."""
+    design = (spread.weights or spread).weighted(equations, equations.design)
+    ends = [*equations.first_rows[1:], len(equations.values)]
+    found = np.empty((len(equations.runs), len(equations.names), len(equations.names)))
+    for place, (start, end) in enumerate(zip(equations.first_rows, ends, strict=True)):
+        own = design[start:end]
+        found[place] = own.T @ run_covariance(equations, spread, place) @ own
+    return found
+
+
+def run_covariance(equations: Equations, spread: Spread, place: int) -> Matrix:
+    """Covariance of the weighted equations of one run, (rows, rows): unity if the weights are those of the spread."""
+    size = len(equations.roots[place])
+    if spread.weights is None:
+        return np.eye(size)
+    # Both are roots of covariances of the same coefficients, one by its weights and one as it is.
+    root = np.linalg.solve(spread.weights.run_root(equations, place), spread.run_root(equations, place))
+    covariance: Matrix = np.asarray(root @ root.T, dtype=np.float64)
+    return covariance
+
+
+def efficient_solution(equations: Equations, spread: Spread) -> Solution:
+    """Generalised least squares by QR: weighted by the whole of a known spread, gain errors, too."""
     design, values = weighted_system(equations, spread)
     if not equations.names:
         return Solution((), np.zeros(0), np.zeros((0, 0)), spread, 1.0, np.zeros(0))
@@ -156,31 +227,50 @@ def fitted_spread(equations: Equations, *, by_type: bool = True) -> Spread:
     """
     single = len(equations.values) == len(equations.runs)
     common, least = _best(equations, {"": _starting_zero(equations)}, single)
-    if not by_type:
-        return common
     counts = Counter[str](run.run.type for run in equations.runs)
     types = [kind for kind, count in counts.items() if count >= _FEWEST_RUNS]
-    if len(types) < 2:
-        return common
+    if not by_type or len(types) < 2:
+        return _with_gain(equations, common, single)
     # Each type by itself is the start: a common one is a likely spread, too, from which no way leads downhill.
     alone = {
         kind: _starting_zero(equations.of_runs([n for n, run in enumerate(equations.runs) if run.run.type == kind]))
         for kind in types
     }
     own, lower = _best(equations, alone, single)
-    return own if chdtrc(len(types) - 1, max(least - lower, 0.0)) < _CLEARLY else common
+    clearly = chdtrc(len(types) - 1, max(least - lower, 0.0)) < _CLEARLY
+    return _with_gain(equations, own if clearly else common, single)
 
 
 def _best(equations: Equations, start: Mapping[str, float], single: bool) -> tuple[Spread, float]:
-    """The likeliest spread with a zero variance for each type of run in `start` (one type, "": all), and -2 log of
-    its likelihood."""
+    """The likeliest spread without gain errors, with a zero variance for each type of run in `start` (one type, "":
+    all), and -2 log of its likelihood."""
 
     def spread(logs: Vector) -> Spread:
         variances = {kind: value * math.exp(log) for (kind, value), log in zip(start.items(), logs[1:], strict=True)}
         usual = math.exp(sum(math.log(value) for value in variances.values()) / len(variances))
         return Spread(1.0 if single else math.exp(logs[0]), usual, {} if "" in variances else variances)
 
-    bounds = [(math.log(_LEAST), math.log(_MOST))] + [(-25.0, 25.0)] * len(start)
+    return _likeliest(equations, spread, [_NOISE_RANGE] + [_ZERO_RANGE] * len(start))
+
+
+def _with_gain(equations: Equations, base: Spread, single: bool) -> Spread:
+    """The likeliest spread with gain errors, weighted by one without; that itself if the likelihood knows of none."""
+    if _criterion(equations, replace(base, gain_variance=_LEAST_GAIN)) >= _criterion(equations, base):
+        return base
+
+    def spread(logs: Vector) -> Spread:
+        noise = base.noise * (1.0 if single else math.exp(logs[0]))
+        factor = math.exp(logs[1])
+        by_type = {kind: variance * factor for kind, variance in base.by_type.items()}
+        return Spread(noise, base.zero_variance * factor, by_type, _GAIN * math.exp(logs[2]), base)
+
+    return _likeliest(equations, spread, [_NOISE_RANGE, _ZERO_RANGE, _GAIN_RANGE])[0]
+
+
+def _likeliest(
+    equations: Equations, spread: Callable[[Vector], Spread], bounds: list[tuple[float, float]]
+) -> tuple[Spread, float]:
+    """The spread of greatest likelihood by its logarithms, from zero within their bounds, and -2 log of that."""
     found = minimize(
         lambda logs: _criterion(equations, spread(logs)),
         np.zeros(len(bounds)),

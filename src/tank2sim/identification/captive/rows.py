@@ -58,7 +58,7 @@ def by_the_papers_order(reduction: Reduction, name: str) -> Stepped | None:
 
 def terms_left_out(reduction: Reduction) -> list[Choice]:
     """Terms that the runs excite and that are not in the result."""
-    return [choice for choice in _choices(reduction) if choice.reason in ("collinear", "not significant")]
+    return [choice for choice in _choices(reduction) if choice.reason in ("collinear", "not determined")]
 
 
 def terms_not_excited(reduction: Reduction) -> list[str]:

@@ -1,13 +1,16 @@
 """Which terms of (3.8) a campaign can give: every term left out is told, with the reason.
 
 Every term that the campaign excites and can tell from the others is in the regression, third-order terms held loosely
-about zero (:mod:`tank2sim.identification.captive.prior`). Reported are always the linear terms, the acceleration
-derivatives and X0, and of the others those that the campaign shows: |value| of at least 2.6 standard errors. A term
-that is not reported keeps its part in the standard errors of the others.
+about zero (:mod:`tank2sim.identification.captive.prior`). Whether a term is reported depends on the design of the tests
+and never on its value: to leave out a term because it does not differ from zero would claim that it is zero, with no
+error, and would move every manoeuvre that needs it. Reported are the linear terms, the acceleration derivatives, X0,
+and every other term on which the tests say more than the prior: at large angles with a small standard error, at small
+angles with a large one. A term that is not reported keeps its part in the standard errors of the others.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -22,8 +25,9 @@ from tank2sim.identification.captive.regression import Solution, Spread, fitted_
 from tank2sim.identification.conditioning import COLLINEAR, scaled_condition
 from tank2sim.records.campaigns import Campaign
 
-SIGNIFICANT = 2.6
-"""Least ratio of a value to its standard error for a term beyond the linear ones (1 % level)."""
+DETERMINED = math.sqrt(0.5)
+"""Largest standard error of a reported third-order term, in the standard deviations of its prior: the tests then weigh
+at least as much as what known ships have in common (1/s^2 - 1 >= 1), and the value is theirs."""
 
 _NORMAL = 1.959964
 """Standard errors of a two-sided 95 % interval of the normal distribution."""
@@ -40,7 +44,7 @@ class Choice:
     kept : bool
         It is reported.
     reason : str
-        ``linear``, ``significant``, ``asked for``, ``not excited``, ``collinear``, ``not significant``, ``symmetry``.
+        ``linear``, ``determined``, ``asked for``, ``not excited``, ``collinear``, ``not determined``, ``trend``.
     told : str
         The reason in a sentence, with its figures.
     inflation, ratio : float or None
@@ -59,7 +63,7 @@ class Choice:
 class Selection:
     """The regression over the whole campaign: equations of all terms that it can tell apart, and each candidate's fate.
 
-    Of the terms in the regression those that are not significant have ``kept`` false: they are not reported.
+    Of the terms in the regression those that the tests do not determine have ``kept`` false: they are not reported.
     """
 
     equations: Equations
@@ -90,7 +94,7 @@ def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_te
     Parameters
     ----------
     all_terms : bool
-        Report terms that are not significant, too.
+        Report terms that the tests do not determine, too.
 
     Raises
     ------
@@ -104,7 +108,7 @@ def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_te
     selection = Selection(used, spread, ())
     solution = selection.solution
     for place, name in enumerate(used.names):
-        choices[name] = _judged(solution, place, all_terms)
+        choices[name] = _judged(solution, place, used.prior.get(name, math.inf), all_terms=all_terms)
     order = [term.name for term in candidate_terms(force)]
     return replace(selection, choices=tuple(sorted(choices.values(), key=lambda choice: order.index(choice.name))))
 
@@ -121,18 +125,21 @@ def told_apart(campaign: Campaign, runs: Sequence[ReducedRun], force: str, choic
     return full.of_terms(_told_apart(full, choices))
 
 
-def _judged(solution: Solution, place: int, all_terms: bool) -> Choice:
-    """Whether a term of the regression is reported."""
+def _judged(solution: Solution, place: int, held: float, *, all_terms: bool) -> Choice:
+    """Whether a term of the regression, held within a standard deviation `held` of zero, is reported."""
     name, ratio = solution.names[place], float(solution.ratios[place])
     value, error = solution.values[place], solution.standard_errors[place]
     if _always(name):
         reason, told = "linear", f"value / standard error {ratio:.3g}"
-    elif abs(ratio) >= SIGNIFICANT:
-        reason, told = "significant", f"value / standard error {ratio:.3g}, and {SIGNIFICANT:g} was asked"
+    elif error <= DETERMINED * held:
+        reason, told = "determined", f"value / standard error {ratio:.3g}"
     else:
-        reason = "asked for" if all_terms else "not significant"
-        told = f"{value:.3g} ± {error:.2g} does not differ from zero; its doubt is in the errors of the others"
-    return Choice(name, reason != "not significant", reason, told, float(solution.inflation[place]), ratio)
+        reason = "asked for" if all_terms else "not determined"
+        told = (
+            f"the tests reach too small angles to show it: {value:.3g} ± {error:.2g}, and known ships scatter by "
+            f"{held:.2g}; its uncertainty is in the errors of the others"
+        )
+    return Choice(name, reason != "not determined", reason, told, float(solution.inflation[place]), ratio)
 
 
 def _always(name: str) -> bool:

@@ -37,8 +37,29 @@ LARGEST_DEPTH_FROUDE = 0.6
 BLOCK_TOLERANCE = 0.05
 """Relative difference between a stated block coefficient and that of the mass: a choice of ours."""
 
+BLOCK_COEFFICIENTS = (0.4, 0.9)
+"""Mass over rho L B T of ships: 0.45 (destroyers) to 0.87 (tankers); a project choice on either side."""
+
+POSSIBLE_BLOCKS = (0.05, 1.05)
+"""Beyond these no floating body is meant. Above: a body displaces no more than its box; 5 % for a waterline longer than
+the length given. Below: catamarans with their overall beam have 0.1 and more, kg for t or cm for m 0.01 and less."""
+
+POSSIBLE_MASSES = (5e-4, 0.1)
+"""m' = m/(1/2 rho L^3) where beam or draught is not given: 2 C_B (B/L)(T/L), from a rowing eight's 0.3, 0.06, 0.015 to
+a stubby barge's 0.95, 0.4, 0.13."""
+
 RADII_OF_GYRATION = (0.18, 0.32)
 """In yaw, in lengths, about midships: 0.25 is usual; a choice of ours on either side."""
+
+POSSIBLE_RADII = (0.1, 0.5)
+"""Above: a body of length L has at most L/2, all its mass at its ends. Below: all mass within 0.17 L of midships; a
+project choice that takes t m2 or kg cm2 for what they are."""
+
+POSSIBLE_CENTRE = 0.5
+"""|x_G| in lengths from midships: beyond, the centre of gravity is off the ship."""
+
+CENTRES_OF_GRAVITY = 0.1
+"""|x_G| in lengths of ships that float on even keel: some 0.05 at most; a project choice beyond it."""
 
 SIMILARITY = {"m'": (0.02, "relative"), "J_z'": (0.05, "relative"), "x_G'": (0.005, ""), "z_G'": (0.005, "")}
 """How far model and ship may be apart, relative or in lengths: a choice of ours, paper 2 asks for equality."""
@@ -71,6 +92,21 @@ class Body:
     yaw_inertia_kgm2: float | None = None
     beam_m: float | None = None
     draught_m: float | None = None
+    x_G_m: float = 0.0
+
+    @property
+    def block(self) -> float | None:
+        """Mass over rho L B T; None if beam or draught is not known."""
+        if self.beam_m is None or self.draught_m is None:
+            return None
+        return self.mass_kg / (self.density_kgpm3 * self.length_m * self.beam_m * self.draught_m)
+
+    @property
+    def radius(self) -> float | None:
+        """Radius of gyration in yaw, lengths; None if the yaw inertia is not known."""
+        if self.yaw_inertia_kgm2 is None:
+            return None
+        return math.sqrt(self.yaw_inertia_kgm2 / self.mass_kg) / self.length_m
 
 
 @dataclass(frozen=True)
@@ -268,31 +304,64 @@ def depth_froude(speed_mps: float, depth_m: float | None, gravity_mps2: float) -
         yield Caution("depth Froude number", message + "waves of the model.")
 
 
-def carried_mass(body: Body, block_coefficient: float | None = None) -> Iterator[Caution]:
-    """A mass that does not fit the hull, a yaw inertia that does not fit the mass: most often a wrong unit.
+def impossible_body(body: Body) -> Iterator[tuple[str, str]]:
+    """What no floating body has: the key under ``[model]``, and what is wrong. Most often a wrong unit."""
+    if body.block is not None and not _within(body.block, POSSIBLE_BLOCKS):
+        yield (
+            "mass_kg",
+            f"is {body.mass_kg:.4g}, {body.block:.3g} times the water in L x B x T ({body.length_m:g} m x "
+            f"{body.beam_m:g} m x {body.draught_m:g} m at {body.density_kgpm3:g} kg/m3); ships have "
+            f"{BLOCK_COEFFICIENTS[0]:g} to {BLOCK_COEFFICIENTS[1]:g}",
+        )
+    prime = body.mass_kg / (0.5 * body.density_kgpm3 * body.length_m**3)
+    if body.block is None and not _within(prime, POSSIBLE_MASSES):
+        yield (
+            "mass_kg",
+            f"is {body.mass_kg:.4g}, m' = {prime:.3g} with L = {body.length_m:g} m at {body.density_kgpm3:g} kg/m3; "
+            f"floating bodies have {POSSIBLE_MASSES[0]:g} to {POSSIBLE_MASSES[1]:g}",
+        )
+    if body.radius is not None and not _within(body.radius, POSSIBLE_RADII):
+        yield (
+            "yaw_inertia_kgm2",
+            f"is {body.yaw_inertia_kgm2:.4g}: with {body.mass_kg:.4g} kg the radius of gyration is {body.radius:.3g} "
+            f"L, and ships have {RADII_OF_GYRATION[0]:g} to {RADII_OF_GYRATION[1]:g}",
+        )
+    if abs(body.x_G_m) >= POSSIBLE_CENTRE * body.length_m:
+        yield "x_G_m", f"is {body.x_G_m:.4g}: the centre of gravity is off the ship, {body.length_m:g} m long"
 
-    The gauges may carry less than the whole model; only what cannot be, or contradicts the block coefficient, is told.
-    """
-    if body.beam_m is not None and body.draught_m is not None:
-        block = body.mass_kg / (body.density_kgpm3 * body.length_m * body.beam_m * body.draught_m)
-        if block > 1:
-            yield Caution(
-                "mass", f"The mass is {block:.3g} times that of the water in L x B x T; no floating body's is."
-            )
-        elif block_coefficient is not None and abs(block / block_coefficient - 1) > BLOCK_TOLERANCE:
-            yield Caution(
-                "mass",
-                f"The mass corresponds to a block coefficient of {block:.3g}, and {block_coefficient:.3g} is given: do "
-                "the gauges carry a part of the model alone?",
-            )
-    if body.yaw_inertia_kgm2 is not None:
-        radius = math.sqrt(body.yaw_inertia_kgm2 / body.mass_kg) / body.length_m
+
+def carried_mass(body: Body, block_coefficient: float | None = None) -> Iterator[Caution]:
+    """A mass that does not fit the hull, a yaw inertia or a centre of gravity that does not fit a ship."""
+    block = body.block
+    if block is not None and not _within(block, BLOCK_COEFFICIENTS):
+        low, high = BLOCK_COEFFICIENTS
+        yield Caution(
+            "mass",
+            f"The mass is {block:.3g} times that of the water in L x B x T, and ships have {low:g} to {high:g}: check "
+            "mass, length, beam and draught.",
+        )
+    if block is not None and block_coefficient is not None and abs(block / block_coefficient - 1) > BLOCK_TOLERANCE:
+        yield Caution(
+            "mass",
+            f"The mass corresponds to a block coefficient of {block:.3g}, and {block_coefficient:.3g} is given: do "
+            "the gauges carry a part of the model alone?",
+        )
+    if body.radius is not None and not _within(body.radius, RADII_OF_GYRATION):
         low, high = RADII_OF_GYRATION
-        if not low <= radius <= high:
-            yield Caution(
-                "mass",
-                f"The radius of gyration in yaw is {radius:.3g} L; ships and their models have {low:g} to {high:g}.",
-            )
+        yield Caution(
+            "mass",
+            f"The radius of gyration in yaw is {body.radius:.3g} L; ships and their models have {low:g} to {high:g}.",
+        )
+    if abs(body.x_G_m) > CENTRES_OF_GRAVITY * body.length_m:
+        yield Caution(
+            "mass",
+            f"The centre of gravity is {abs(body.x_G_m) / body.length_m:.2g} L from midships, and ships have some 0.05 "
+            "L at most: check [model] x_G_m.",
+        )
+
+
+def _within(value: float, limits: tuple[float, float]) -> bool:
+    return limits[0] <= value <= limits[1]
 
 
 def scale_effect(scale: float | None, length_m: float, speed_mps: float, viscosity_m2ps: float | None) -> Caution:

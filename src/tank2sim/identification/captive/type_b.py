@@ -15,16 +15,8 @@ from tank2sim.identification.captive.equations import Equations, equations
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.motion import Motion
 from tank2sim.identification.captive.regression import Solution, solve
+from tank2sim.identification.captive.systematic import advanced
 from tank2sim.records.campaigns import Campaign
-
-
-def type_b_errors(campaign: Campaign, used: Equations, solution: Solution) -> dict[str, dict[str, float]]:
-    """Standard error (prime) of each term of a force from each stated error: source to term to error.
-
-    `solution` is that of the equations `used`.
-    """
-    shifts = type_b_shifts(campaign, used, solution)
-    return {source: {name: abs(shift) for name, shift in moved.items()} for source, moved in shifts.items()}
 
 
 def type_b_shifts(campaign: Campaign, used: Equations, solution: Solution) -> dict[str, dict[str, float]]:
@@ -37,17 +29,24 @@ def type_b_shifts(campaign: Campaign, used: Equations, solution: Solution) -> di
     for source, size in stated.items():
         if not size:
             continue
-        changed, altered = _with_error(campaign, used.runs, source, size)
-        erring = equations(changed, altered, used.force, used.names).held(used.prior)
+        erring = _with_error(campaign, used, source, size)
         moved = solve(erring, solution.spread).values - solution.values
         found[source] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
     return found
 
 
-def _with_error(
+def _with_error(campaign: Campaign, used: Equations, source: str, size: float) -> Equations:
+    """The equations as they would be if the error were of one standard deviation."""
+    if source == "force_delay_s":
+        return advanced(used, size)
+    changed, altered = _altered(campaign, used.runs, source, size)
+    return equations(changed, altered, used.force, used.names).held(used.prior)
+
+
+def _altered(
     campaign: Campaign, runs: Sequence[ReducedRun], source: str, size: float
 ) -> tuple[Campaign, list[ReducedRun]]:
-    """The campaign as it would be if the error were of one standard deviation."""
+    """Campaign and runs as they would be if the error were of one standard deviation."""
     if source == "mass_relative":
         return _model(campaign, "mass_kg", 1 + size), list(runs)
     if source == "yaw_inertia_relative":

@@ -1,0 +1,306 @@
+"""Systematic errors that a campaign shows by itself: forces that lag the motion, a gauge that errs in one kind of run.
+
+Both are extra unknowns of the same regression. A delay tau turns every harmonic k of a force by k omega tau: with the
+known inertia of the body the damping then seems to change with omega^2, and the added mass by a constant. A gauge that
+reads more in one kind of run gives other derivatives there than all other kinds of run together. Nothing is corrected
+here: what is found is reported first, and what its correction would change is added to the standard errors.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import chdtrc
+
+from tank2sim.identification.captive.equations import Equations
+from tank2sim.identification.captive.harmonics import ReducedRun
+from tank2sim.identification.captive.oscillation import distinct
+from tank2sim.identification.captive.regression import Solution, Spread, fitted_spread, solve
+from tank2sim.identification.conditioning import SINGULAR, Matrix, Vector
+
+SHOWN = 4.0
+"""Standard errors from which such an error is reported: of the some 20 that are looked for chance shows one in 800
+campaigns."""
+LEAST_PHASE_RAD = 0.003
+"""Phase by which a delay turns the fastest oscillation before it is reported. A project choice: 0.003 of the damping
+force is then in the added mass, a third of a percent."""
+LEAST_GAIN = 0.02
+"""Relative error of a gauge in one kind of run before it is reported. A project choice: gauges are calibrated to 0.1 to
+1 %, and what (3.8) does not follow is of that size."""
+VISIBLE_GAIN = 0.1
+"""Relative error of a gauge in one kind of run that must show, or it is said that none would. A project choice."""
+_SUSPECT = 2.0
+"""Standard errors from which a gain is looked at more closely."""
+_AS_WELL = 2.0
+"""Difference of two ratios to the standard error within which either kind of run may be the one that errs."""
+_ALIKE = 1e-3
+"""Chance of delays so different, if they are one, below which they are none: the flow then remembers earlier motion."""
+_NEARLY = 0.2
+"""Share by which delays found in different runs may differ and still be one: (3.8) is no better than that."""
+_ITERATIONS = 4
+_MOTIONS = {"sway": ("pure_sway",), "yaw": ("pure_yaw", "yaw_with_drift")}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SystematicError:
+    """An error common to many runs.
+
+    Parameters
+    ----------
+    source : str
+        ``force_delay``, or ``gain of Y in static_drift``.
+    force : str
+        The gauges concerned: ``Y``, ``N``, or ``XYN``.
+    runs : str
+        Type of the runs concerned; empty if it is all that oscillate.
+    or_runs : tuple of str
+        Other types of run whose error would explain it nearly as well.
+    size, standard_error : float
+        Delay in s, positive if the forces lag the motion; relative gain, positive if the gauge reads too much.
+    """
+
+    source: str
+    force: str
+    runs: str
+    size: float
+    standard_error: float
+    or_runs: tuple[str, ...] = ()
+
+    @property
+    def message(self) -> str:
+        """What was found, what it does, and what to do."""
+        if self.source == "force_delay":
+            gauges = "The forces lag" if self.force == "XYN" else f"The {self.force} gauge lags"
+            remedy = (
+                f"give [test] force_delay_s = {self.size:.4g} and [uncertainty] force_delay_s = "
+                f"{self.standard_error:.2g} to take it out"
+                if self.force == "XYN"
+                else "shift its column in time"
+            )
+            return (
+                f"{gauges} the motion by {self.size:.4g} ± {self.standard_error:.2g} s: added masses and inertias are "
+                f"wrong by the damping times that. Check filters and clocks, and {remedy}; until then the standard "
+                "errors hold what it changes."
+            )
+        more = "more" if self.size > 0 else "less"
+        instead = f" (or those of {', '.join(self.or_runs)} err)" if self.or_runs else ""
+        return (
+            f"The {self.force} gauge reads {100 * abs(self.size):.2g} ± {100 * self.standard_error:.1g} % {more} in "
+            f"runs of {self.runs} than all other kinds of run imply{instead}: check its calibration there; until then "
+            "the standard errors hold what it changes."
+        )
+
+    def shifts(self, equations: Equations, solution: Solution) -> dict[str, float]:
+        """What each term of a force (prime) moves by if the error is corrected."""
+        if equations.force not in self.force:
+            return {}
+        corrected = advanced(equations, self.size) if not self.runs else _regauged(equations, self.runs, self.size)
+        moved = solve(corrected, solution.spread).values - solution.values
+        return {name: float(shift) for name, shift in zip(equations.names, moved, strict=True)}
+
+
+def force_delays(forces: Mapping[str, Equations]) -> tuple[SystematicError, ...]:
+    """The delay of all gauges behind the motion, or of one, that oscillations at several frequencies show.
+
+    Parameters
+    ----------
+    forces : mapping
+        ``Y`` and ``N`` to their equations, without trends with frequency (which would take it up).
+    """
+    fastest = max((run.motion.frequency_radps for used in forces.values() for run in used.runs), default=0.0)
+    found = {force: _delays(used) for force, used in forces.items() if force in "YN"}
+    shown = {force: _one_delay(delays, fastest) for force, delays in found.items()}
+    common = _one_delay([delay for delays in found.values() for delay in delays], fastest)
+    if common is None and (alone := [delay for delay in shown.values() if delay is not None])[1:]:
+        common = _one_delay(alone, fastest)
+    if common is not None and all(found.values()):
+        return (SystematicError(source="force_delay", force="XYN", runs="", size=common[0], standard_error=common[1]),)
+    return tuple(
+        SystematicError(source="force_delay", force=force, runs="", size=delay[0], standard_error=delay[1])
+        for force, delay in shown.items()
+        if delay is not None and len(found[force]) > 1
+    )
+
+
+def can_show_delay(runs: Sequence[ReducedRun]) -> bool:
+    """Whether some kind of oscillation was made at two frequencies."""
+    return any(_several_frequencies(runs, kinds) for kinds in _MOTIONS.values())
+
+
+def gauge_gains(
+    equations: Equations, spread: Spread, rival: float
+) -> tuple[tuple[SystematicError, ...], tuple[str, ...]]:
+    """The kind of run in which a gauge departs most from what all other kinds imply, if it does; and the kinds of which
+    that cannot be said, since no other kind gives their derivatives.
+
+    Parameters
+    ----------
+    equations : Equations
+        Without trends with frequency.
+    spread : Spread
+        Of the runs within each kind.
+    rival : float
+        Largest ratio of a trend with frequency to its standard error: what explains the runs better is not repeated.
+    """
+    predicted = _predicted(equations, spread)
+    kinds = np.array([run.run.type for run in equations.runs])[equations.run_of_row]
+    gains: dict[str, tuple[float, float]] = {}
+    unknown = []
+    for kind in dict.fromkeys(kinds.tolist()):
+        joined = _joined(equations, {"gain": np.where(kinds == kind, predicted, 0.0)})
+        solution = solve(joined, spread)
+        if solution.condition < SINGULAR and abs(solution.value("gain")) > max(
+            LEAST_GAIN, _SUSPECT * solution.error("gain")
+        ):
+            # Scatter within kinds still holds what a gauge in error does: that beside the error is what counts.
+            solution = solve(joined, fitted_spread(joined, by_type=False))
+        size, error = solution.value("gain"), solution.error("gain")
+        if solution.condition > SINGULAR or SHOWN * error > VISIBLE_GAIN:
+            unknown.append(kind)
+        elif abs(size) > max(SHOWN * error, rival * error, LEAST_GAIN):
+            gains[kind] = size, error
+    if not gains:
+        return (), tuple(unknown)
+    ratios = {kind: abs(size) / error for kind, (size, error) in gains.items()}
+    worst = max(ratios, key=lambda kind: ratios[kind])
+    found = SystematicError(
+        source=f"gain of {equations.force} in {worst}",
+        force=equations.force,
+        runs=worst,
+        size=gains[worst][0],
+        standard_error=gains[worst][1],
+        or_runs=tuple(kind for kind in gains if kind != worst and ratios[worst] - ratios[kind] < _AS_WELL),
+    )
+    return (found,), tuple(unknown)
+
+
+def advanced(equations: Equations, delay_s: float) -> Equations:
+    """The equations with the forces of the oscillating runs as they were a delay later: corrected for it."""
+    change = np.zeros_like(equations.gauge)
+    for rows, run, root in _oscillating(equations):
+        turn = _turned(len(root), run.motion.frequency_radps * delay_s)
+        change[rows] = np.linalg.solve(root, turn @ root @ equations.gauge[rows]) - equations.gauge[rows]
+    return replace(equations, values=equations.values + change, gauge=equations.gauge + change)
+
+
+def _regauged(equations: Equations, kind: str, gain: float) -> Equations:
+    """The equations with what a gauge read too much in one kind of run taken off."""
+    here = np.array([run.run.type == kind for run in equations.runs])[equations.run_of_row]
+    change = np.where(here, -gain / (1.0 + gain) * equations.gauge, 0.0)
+    return replace(equations, values=equations.values + change, gauge=equations.gauge + change)
+
+
+def _one_delay(delays: Sequence[tuple[float, float]], fastest_radps: float) -> tuple[float, float] | None:
+    """The common value of several delays (value, standard error) and its standard error, s; None if none is shown."""
+    if not delays:
+        return None
+    values, weights = np.array([value for value, _ in delays]), np.array([error**-2.0 for _, error in delays])
+    mean, error = float(weights @ values / weights.sum()), float(weights.sum() ** -0.5)
+    if abs(mean) < max(SHOWN * error, LEAST_PHASE_RAD / max(fastest_radps, 1e-12)):
+        return None
+    chance = float(chdtrc(len(values) - 1, weights @ (values - mean) ** 2)) if len(values) > 1 else 1.0
+    apart = np.abs(values - mean) * np.sqrt(weights) > SHOWN
+    if chance < _ALIKE and np.any(apart & (np.abs(values - mean) > _NEARLY * abs(mean))):
+        return None
+    return mean, error
+
+
+def _delays(equations: Equations) -> list[tuple[float, float]]:
+    """The delay of one gauge in runs of sway and in runs of yaw by themselves, as far as they show it."""
+    motions = {motion: kinds for motion, kinds in _MOTIONS.items() if _several_frequencies(equations.runs, kinds)}
+    if not motions:
+        return []
+    # The prior is by the linear terms, which a long delay leaves without any size.
+    free = equations.held({})
+    found, spread = dict.fromkeys(motions, 0.0), None
+    for last in (False, True):
+        for _ in range(_ITERATIONS):
+            joined = _with_slopes(free, motions, found)
+            spread = spread or fitted_spread(joined, by_type=False)
+            solution = solve(joined, spread)
+            steps = {motion: solution.value(motion) for motion in motions}
+            found = {motion: delay + steps[motion] for motion, delay in found.items()}
+            if all(abs(step) < 0.1 * solution.error(motion) for motion, step in steps.items()):
+                break
+        shown = any(abs(delay) > SHOWN * solution.error(motion) for motion, delay in found.items())
+        if last or not shown:
+            break
+        spread = None  # that of the uncorrected forces has the delay in it
+    return [(found[motion], solution.error(motion)) for motion in motions]
+
+
+def _several_frequencies(runs: Sequence[ReducedRun], kinds: Sequence[str]) -> bool:
+    return distinct([run.motion.frequency_radps for run in runs if run.run.type in kinds]) > 1
+
+
+def _with_slopes(equations: Equations, motions: Mapping[str, Sequence[str]], delays: Mapping[str, float]) -> Equations:
+    """The equations corrected for a delay of each motion, with a small further one of each as unknown."""
+    corrected = equations
+    for motion, kinds in motions.items():
+        corrected = _some_advanced(corrected, kinds, delays[motion])
+    return _joined(corrected, {motion: _slope(corrected, kinds) for motion, kinds in motions.items()})
+
+
+def _some_advanced(equations: Equations, kinds: Sequence[str], delay_s: float) -> Equations:
+    here = np.array([run.run.type in kinds for run in equations.runs])[equations.run_of_row]
+    whole = advanced(equations, delay_s)
+    return replace(
+        equations,
+        values=np.where(here, whole.values, equations.values),
+        gauge=np.where(here, whole.gauge, equations.gauge),
+    )
+
+
+def _slope(equations: Equations, kinds: Sequence[str]) -> Vector:
+    """What a delay of 1 s of the gauge in some kinds of run adds to the equations: less its rate of change, (rows,)."""
+    column = np.zeros_like(equations.gauge)
+    for rows, run, root in _oscillating(equations):
+        if run.run.type in kinds:
+            column[rows] = -np.linalg.solve(
+                root, _rate(len(root), run.motion.frequency_radps) @ root @ equations.gauge[rows]
+            )
+    return column
+
+
+def _oscillating(equations: Equations) -> Iterator[tuple[slice, ReducedRun, Matrix]]:
+    for place, (run, root) in enumerate(zip(equations.runs, equations.roots, strict=True)):
+        if run.run.oscillates:
+            start = int(equations.first_rows[place])
+            yield slice(start, start + len(root)), run, root
+
+
+def _rate(count: int, frequency_radps: float) -> Matrix:
+    """Takes mean and harmonics (count,) of a force to those of its rate of change."""
+    matrix = np.zeros((count, count))
+    for place in range(1, count, 2):
+        order = (place + 1) // 2
+        matrix[place, place + 1], matrix[place + 1, place] = order * frequency_radps, -order * frequency_radps
+    return matrix
+
+
+def _turned(count: int, phase_rad: float) -> Matrix:
+    """Takes mean and harmonics (count,) of a force to those of the force a phase later: harmonic k turns by k times."""
+    matrix = np.eye(count)
+    for place in range(1, count, 2):
+        angle = (place + 1) // 2 * phase_rad
+        both = slice(place, place + 2)
+        matrix[both, both] = [[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]]
+    return matrix
+
+
+def _joined(equations: Equations, columns: Mapping[str, Vector]) -> Equations:
+    """The equations with more unknowns."""
+    return replace(
+        equations,
+        names=(*equations.names, *columns),
+        design=np.column_stack([equations.design, *columns.values()]),
+    )
+
+
+def _predicted(equations: Equations, spread: Spread) -> Vector:
+    """The gauge's coefficients as the derivatives predict them: no noise in them, (rows,)."""
+    residual: Vector = equations.values - equations.design @ solve(equations, spread).values
+    return equations.gauge - residual
