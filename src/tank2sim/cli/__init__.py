@@ -130,9 +130,8 @@ def _silence() -> None:
 
 
 def _unwritable(error: OSError) -> int:
-    place = f"{error.filename}: " if error.filename else ""
-    temporary = f" (temporary files are in {tempfile.gettempdir()})"
-    return _refuse(f"{place}cannot be written ({error.strerror}){temporary}; make room, or send the output elsewhere")
+    place = error.filename or "the output"
+    return _refuse(f"{place} cannot be written ({error.strerror}); make room, or send the output elsewhere")
 
 
 def _refuse(message: str, code: int = 2) -> int:

@@ -26,6 +26,8 @@ MOST_PROBLEMS = 8
 def command(fmu: Path, card: str | None, json_file: Path | None) -> int:
     """Validate FMU and drive it through fmpy, in each kind it offers, beside the CasADi model of its card.
 
+    It runs the FMU's own code, with your rights: check only files from sources that you trust.
+
     Ends with exit code 1 if the description is not valid or an output differs.
     """
     model = _model(fmu, card)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -65,22 +66,44 @@ def drive_apart(unpacked: UnpackedFmu, drive: Drive) -> Answer:
         np.savez(task, times=drive.run.times, held=drive.run.inputs, **names)
         command = [sys.executable, "-P", "-c", _ENTRY, str(unpacked.folder), drive.kind, str(task), str(answer)]
         try:
-            ended = subprocess.run(
-                command,
-                env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                timeout=_LONGEST_S,
-                check=False,
-            )
+            code = _run_alone(command, os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))})
         except subprocess.TimeoutExpired:
             return Answer(problem=f"the library did not come to an end in {_LONGEST_S:g} s")
-        if ended.returncode != 0 or not answer.exists():
-            return Answer(problem=f"the library ended the process that ran it ({_end(ended.returncode)})")
+        if code != 0 or not answer.exists():
+            return Answer(problem=f"the library ended the process that ran it ({_end(code)})")
         with np.load(answer) as found:
             return Answer(
                 parameters=found.get("parameters"), outputs=found.get("outputs"), problem=str(found["problem"])
             )
+
+
+def _run_alone(command: list[str], environment: dict[str, str]) -> int:
+    """Run a command in a process group of its own; whatever processes it started end with it.
+
+    Raises
+    ------
+    subprocess.TimeoutExpired
+        It took longer than allowed.
+    """
+    nothing = subprocess.DEVNULL  # a pipe would be held open by a process that the library has started
+    own_group = os.name == "posix"
+    with subprocess.Popen(
+        command, env=environment, stdin=nothing, stdout=nothing, stderr=nothing, start_new_session=own_group
+    ) as process:
+        try:
+            return process.wait(_LONGEST_S)
+        finally:
+            _end_group(process)
+
+
+def _end_group(process: subprocess.Popen[bytes]) -> None:
+    """End a process and those that it started, also if it has ended itself."""
+    if os.name == "posix":
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+    else:
+        kill = ["taskkill", "/F", "/T", "/PID", str(process.pid)]
+        subprocess.run(kill, capture_output=True, check=False)
 
 
 def drive_here(folder: str, kind: Kind, task: str, answer: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,6 +19,11 @@ Kind = Literal["ModelExchange", "CoSimulation"]
 
 CARD_IN_FMU = "resources/ship.toml"
 """Where an FMU keeps the card of its ship, so that a check can build the model again."""
+
+
+LARGEST_BYTES, MOST_FILES = 512_000_000, 10_000
+"""Size unpacked (bytes) and number of files above which an archive is refused: a ship's FMU for all platforms has a
+hundredth of it. Project choice."""
 
 
 @dataclass(frozen=True)
@@ -72,11 +78,12 @@ def unpack(path: Path, folder: Path) -> UnpackedFmu:
     Raises
     ------
     InputError
-        The file is missing, no FMU, damaged, of another version of FMI than 2.0 or 3.0, or has no library for this
-        machine.
+        The file is missing, no FMU, damaged, too large, of another version of FMI than 2.0 or 3.0, names a library
+        outside the archive, or has none for this machine.
     """
     try:
         with zipfile.ZipFile(path) as archive:
+            _require_bounded(path, archive)
             damaged = archive.testzip()
             names = archive.namelist()
         if damaged is not None:
@@ -98,6 +105,7 @@ def unpack(path: Path, folder: Path) -> UnpackedFmu:
     if not description.fmiVersion.startswith(("2.", "3.")):
         problem = f"is of FMI {description.fmiVersion}"
         raise InputError(path, "fmiVersion", problem, "give an FMU of FMI 2.0 or 3.0")
+    _require_plain_identifiers(path, description)
     unpacked = UnpackedFmu(folder, description)
     if not unpacked.kinds:
         raise InputError(path, "", "offers neither Model Exchange nor Co-Simulation", "export the FMU again")
@@ -115,9 +123,28 @@ def embedded_card(path: Path) -> str | None:
     """
     try:
         with zipfile.ZipFile(path) as archive:
+            _require_bounded(Path(path), archive)
             return archive.read(CARD_IN_FMU).decode("utf-8") if CARD_IN_FMU in archive.namelist() else None
     except (OSError, zipfile.BadZipFile, UnicodeDecodeError, RuntimeError) as error:
         raise _no_fmu(Path(path), error) from None
+
+
+def _require_bounded(path: Path, archive: zipfile.ZipFile) -> None:
+    """Refuse an archive that would fill the disk; what is unpacked is never more than its directory says."""
+    entries = archive.infolist()
+    size = sum(entry.file_size for entry in entries)
+    if size > LARGEST_BYTES or len(entries) > MOST_FILES:
+        problem = f"would unpack to {size / 1e6:.0f} MB in {len(entries)} files"
+        remedy = f"at most {LARGEST_BYTES / 1e6:.0f} MB in {MOST_FILES} files are unpacked: it is no FMU of a ship"
+        raise InputError(path, "", problem, remedy)
+
+
+def _require_plain_identifiers(path: Path, description: Any) -> None:
+    """Refuse a modelIdentifier that is not a C identifier (FMI 2.0, 4.3.1; FMI 3.0, 4.2.1): as a path it leads anywhere."""
+    for interface in (description.coSimulation, description.modelExchange):
+        if interface is not None and not re.fullmatch(r"[A-Za-z_]\w*", interface.modelIdentifier or "", re.ASCII):
+            problem = f"is {interface.modelIdentifier!r}, and the name of a library in the archive is made of it"
+            raise InputError(path, "modelIdentifier", problem, "a C identifier was expected: do not trust this file")
 
 
 def _require_library(path: Path, unpacked: UnpackedFmu) -> None:
