@@ -140,7 +140,7 @@ def _require_bounded(path: Path, archive: zipfile.ZipFile) -> None:
 
 
 def _require_plain_identifiers(path: Path, description: Any) -> None:
-    """Refuse a modelIdentifier that is not a C identifier (FMI 2.0, 4.3.1; FMI 3.0, 4.2.1): as a path it leads anywhere."""
+    """Refuse a modelIdentifier that is not a C identifier (FMI 2.0, 4.3.1): as a path it leads anywhere."""
     for interface in (description.coSimulation, description.modelExchange):
         if interface is not None and not re.fullmatch(r"[A-Za-z_]\w*", interface.modelIdentifier or "", re.ASCII):
             problem = f"is {interface.modelIdentifier!r}, and the name of a library in the archive is made of it"
