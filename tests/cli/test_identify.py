@@ -12,6 +12,8 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance import read_covariance
+from tank2sim.identification.trials.evaluation import predicted_figures
+from tank2sim.identification.trials.measured import measured
 from tests.identification.trials.made_up_ship import CARD, TRUTH, trial, turn, zigzag
 
 from .command_line import refused, tank2sim
@@ -120,6 +122,41 @@ def test_a_term_that_is_held_stays_as_the_card_has_it(folder: Path) -> None:
     beside = read_covariance(after)  # which it refuses if its standard errors are not those of the card
     assert beside is not None and "derivatives.Nr" in beside.names
     refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--hold", "Nope", cwd=folder), "--hold", "Nope")
+
+
+def test_the_figures_told_are_those_of_the_card_written(folder: Path) -> None:
+    """Of a hard turn too, in which the ship is slower than in any of the zigzags fitted."""
+    options = ("--method", "equation_error", "--members", "0")
+    files = ("zigzag20.csv", "zigzag10.csv", "--holdout", "turn-35.csv")
+    result = tank2sim("identify", "off.toml", *files, *options, "-o", "w.toml", "--json", "w.json", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    card = read_card(str(folder / "w.toml"))
+    assert isinstance(card, ManoeuvringCard) and card.model.valid_speed_mps is not None
+    told = json.loads((folder / "w.json").read_text())
+    trials = measured([folder / "turn-35.csv"], card).trials
+    again = {one.name: one.predicted for one in predicted_figures(card, trials)}
+    found = {one["figure"]: one["predicted"] for one in told["figures"]["holdout"]}
+    assert len(found) == 3 and found == pytest.approx(again, rel=1e-9)
+    slowest = min(np.loadtxt(folder / "turn-35.csv", delimiter=",", skiprows=1)[:, 2])
+    assert slowest < card.model.valid_speed_mps[0], "the turn is held out at all its speeds"
+    assert "turn-35" in told["yaw_rate_error_over_windows"]["holdout"]
+
+
+def test_trials_without_velocities_identify_what_they_show(folder: Path) -> None:
+    for name in ("zigzag20", "turn25"):
+        lines = [line.split(",") for line in (folder / f"{name}.csv").read_text().splitlines()]
+        kept = [place for place, head in enumerate(lines[0]) if head not in ("u_mps", "v_mps")]
+        text = "\n".join(",".join(line[place] for place in kept) for line in lines)
+        (folder / f"{name}_gps.csv").write_text(text + "\n")
+    result = tank2sim("identify", "off.toml", "zigzag20_gps.csv", "--json", "z.json", "-o", "z.toml", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    found = json.loads((folder / "z.json").read_text())
+    assert "Xvv" not in found["derivatives"]
+    assert any("nothing of" in warning and "Xvv" in warning for warning in found["warnings"])
+    assert found["derivatives"]["Nd"]["value"] == pytest.approx(TRUTH["Nd"], rel=0.1)
+    before, after = (read_card(str(folder / name)) for name in ("off.toml", "z.toml"))
+    assert isinstance(before, ManoeuvringCard) and isinstance(after, ManoeuvringCard)
+    assert after.derivatives["Xvv"] == before.derivatives["Xvv"]
 
 
 def test_holdout_takes_all_that_follow_it_up_to_the_next_option(folder: Path) -> None:

@@ -195,5 +195,9 @@ def _show(result: Identification, told: tuple[str, ...]) -> None:
     if rows := figure_rows(result):
         heads = ["trial", "", "figure", "measured", "before", "now", "error", "95 %"]
         named = [[trial, word, ", ".join(in_words(str(name))), *rest] for trial, word, name, *rest in rows]
-        show_table("Figures, simulated in closed loop from the measured start", heads, named)
+        show_table(
+            "Figures, simulated in closed loop from the measured start, with the rudder rate and lag of each trial",
+            heads,
+            named,
+        )
     show_notices([*result.notices, *result.identifiability.notices, *told])

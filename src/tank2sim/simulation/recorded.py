@@ -429,16 +429,14 @@ def _motion(trial: Trial, model: Model, ship_time: float) -> dict[str, Vector] |
     time = trial.time_s
     smooth = {name: _smoothed(time, _filled(time, trial.signals[name]), ship_time) for name in known}
 
-    def slope(name: str) -> Vector:
-        return _smoothed(time, np.gradient(smooth[name], time), ship_time)
-
     if "r_radps" not in known:
-        smooth["r_radps"] = slope("psi_rad")
+        smooth["r_radps"] = _slope(time, smooth["psi_rad"], ship_time)
     if not {"u_mps", "v_mps"} <= known:
         fed = {**dict(zip(model.input_names, model.input_values(), strict=True)), **_fed(trial, model)}
         inputs = np.tile([fed[name] for name in model.input_names], (len(time), 1))
         drift = drift_over_ground(model, inputs, smooth["psi_rad"])
-        ground = (slope("x_m") - drift[:, 0], slope("y_m") - drift[:, 1], -smooth["psi_rad"])
+        north, east = (_slope(time, smooth[name], ship_time) for name in ("x_m", "y_m"))
+        ground = (north - drift[:, 0], east - drift[:, 1], -smooth["psi_rad"])
         u, v = earth_velocity(*(ca.DM(values) for values in ground))  # type: ignore[arg-type]
         derived = {"u_mps": np.array(u).ravel(), "v_mps": np.array(v).ravel()}
         smooth |= {name: values for name, values in derived.items() if name not in known}
@@ -465,6 +463,15 @@ def _smoothed(time: Vector, values: Vector, ship_time: float) -> Vector:
         return values
     smooth: Vector = savgol_filter(values, window, 3)
     return smooth
+
+
+def _slope(time: Vector, values: Vector, ship_time: float) -> Vector:
+    """Time derivative by straight lines through windows: at the ends of a record a higher degree follows the noise."""
+    window = _window(time, ship_time)
+    if window < 3 or window > len(values):
+        return np.asarray(np.gradient(values, time), dtype=np.float64)
+    rise, run = (savgol_filter(signal, window, 1, deriv=1) for signal in (values, time))
+    return np.asarray(rise / run, dtype=np.float64)
 
 
 def _filled(time: Vector, values: Vector) -> Vector:

@@ -25,7 +25,7 @@ from tank2sim.identification.trials.measured import Measured
 from tank2sim.identification.trials.output_error import Settings, output_error
 from tank2sim.identification.trials.portable import portable
 from tank2sim.identification.trials.problem import Estimate, Problem, Progress, silent
-from tank2sim.identification.trials.question import answered, pose
+from tank2sim.identification.trials.question import answered, pose, with_speeds
 from tank2sim.identification.trials.recursive import recursive
 from tank2sim.identification.trials.selection import (
     Criteria,
@@ -192,10 +192,12 @@ def _identified(
     structure = simplest(tried) if tried else options.structure
     started = STRUCTURES[structure].start(card)
     problem = pose(started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold)
-    refuse_unseen(problem)
+    unseen = refuse_unseen(problem)
+    problem = problem.without(unseen)
     estimate = estimated(problem, options, progress)
-    improved = answered(started, estimate)
-    answer = Answer(problem, estimate, improved)
+    improved = with_speeds(answered(started, estimate), problem)
+    whole = started.model.valid_speed_mps is None
+    answer = Answer(problem, estimate, improved, whole)
     noise = noise_of(trials, problem)
     result = identifiability(problem, estimate)
     held = holdout if holdout is not None and holdout.trials else None
@@ -206,7 +208,7 @@ def _identified(
         estimate=estimate,
         identifiability=result,
         noise=noise,
-        fit=compared(improved, trials, estimate.noise),
+        fit=compared(improved, trials, estimate.noise, whole=whole),
         holdout=held_out(answer, held, options.members, executor) if held else None,
         before=compared(card, trials, estimate.noise),
         before_holdout=compared(card, held, estimate.noise) if held else None,
@@ -217,7 +219,13 @@ def _identified(
             answer, trials.driven_by, partial(_in_pieces, options=options), options.bootstrap, executor
         ),
         manoeuvres=_manoeuvres(improved, (*trials.trials, *(held.trials if held else ()))),
-        notices=(*trials.notices, *(held.notices if held else ()), *_told(card), *estimate.notices),
+        notices=(
+            *trials.notices,
+            *(held.notices if held else ()),
+            *_told(card),
+            *_told_unseen(unseen),
+            *estimate.notices,
+        ),
     )
 
 
@@ -290,6 +298,13 @@ def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
     results = following(problem, estimate.values, estimate.noise)
     limits = {name: WHOLE_RUN_MISFIT * deviation for name, deviation in estimate.noise.items()}
     return all(error <= limits[name] for result in results for name, error in result.whole.items())
+
+
+def _told_unseen(names: Sequence[str]) -> Sequence[str]:
+    if not names:
+        return ()
+    told = ", ".join(name.removeprefix("derivatives.") for name in names)
+    return (f"the trials show nothing of {told}: held as the card has them",)
 
 
 def _told(card: ManoeuvringCard) -> Sequence[str]:

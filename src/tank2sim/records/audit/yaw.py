@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import correlate, correlation_lags
 
 from tank2sim.records.audit.finding import Finding, Mend
-from tank2sim.records.audit.noise import estimated_noise
+from tank2sim.records.audit.noise import estimated_noise, rounding
 from tank2sim.records.audit.rudder import rudder_response
 from tank2sim.records.audit.weak import Fit, Windows, fit, on_uniform_time, windows_of
 from tank2sim.records.csv_table import Vector
@@ -19,6 +19,9 @@ UNIT_TOLERANCE = 0.1
 """How far a factor may be from that of a unit to be taken for it; 57.3 and 60 are told apart by which is nearer."""
 FACTOR = 0.02
 """Scale error of a rate of turn worth a word: above what rate gyros are usually calibrated to. A choice of ours."""
+ROUNDED = 1.5
+"""Times what rounding is expected to leave that is put down to it: errors of rounding are not quite so random (project
+choice)."""
 _ALIKE = 0.9  # correlation from which two signals are taken for the same motion
 
 
@@ -42,6 +45,8 @@ def yaw_findings(trial: Trial) -> list[Finding]:
     expected = np.hypot(windows.noise_of_rate(noise["psi_rad"]), windows.noise_of_mean(noise["r_radps"]))
     if found.fit.residual < 3 * expected:
         return _without_turn(trial, windows.rate(heading) - windows.mean(rate))
+    if _hidden_by_rounding(trial, rate, heading, step):
+        return []
     ends = [trial.heading(name) for name in ("r_radps", "psi_rad")]
     figures = {"correlation": found.correlation}
     what = f"r and dpsi/dt are not the same motion (correlation {found.correlation:.2f})"
@@ -66,6 +71,22 @@ class _Comparison:
     @property
     def factor(self) -> float:
         return float(self.fit.values[0])
+
+
+def _hidden_by_rounding(trial: Trial, rate: Vector, heading: Vector, step: float) -> bool:
+    """True if what r and dpsi/dt differ by in wide windows is no more than the rounding of the heading may leave.
+
+    An error that is uniform within half a unit, and one value in each half of a window, leaves sqrt(2/12) unit times
+    the largest value of the window, 4/(3/2 width), in the rate: the slower the ship, the nearer it comes to that.
+    """
+    unit = rounding(trial.signals["psi_rad"])
+    if not unit:
+        return False
+    windows = windows_of(heading, unit, step)
+    found = _comparison(windows, rate, heading, step)
+    return (
+        found is None or found.alike or found.fit.residual < ROUNDED * np.sqrt(2 / 12) * unit * 8 / 3 / windows.width_s
+    )
 
 
 def _headings(trial: Trial, heading: Vector) -> list[Vector]:
