@@ -199,6 +199,21 @@ def test_bad_input_is_one_line_and_nothing_is_written(folder: Path) -> None:
     assert not (folder / "n.toml").exists()
 
 
+def test_a_copy_of_a_trial_that_is_fitted_cannot_be_held_out(folder: Path) -> None:
+    """Under another name, with other digits and a comment: neither for identify nor gap, nor as a repeat."""
+    lines = (folder / "zigzag20.csv").read_text().splitlines()
+    rows = [",".join(f"{float(cell):.5g}" for cell in line.split(",")) for line in lines[1:]]
+    (folder / "another_run.csv").write_text("\n".join(["# a second run", lines[0], *rows]) + "\n")
+    held = ("zigzag20.csv", "--holdout", "turn-35.csv", "another_run.csv", "-o", "copy_out")
+    for command in ("identify", "gap"):
+        result = tank2sim(command, "off.toml", *held, cwd=folder)
+        refused(result, "another_run.csv", "both fitted and held out", "zigzag20.csv")
+        assert not (folder / "copy_out").exists()
+    for command in ("identify", "validate"):
+        result = tank2sim(command, "off.toml", "zigzag20.csv", "another_run.csv", cwd=folder)
+        refused(result, "another_run.csv", "zigzag20.csv again")
+
+
 @pytest.mark.slow
 def test_an_interrupt_keeps_the_best_card_so_far(folder: Path) -> None:
     program = """
