@@ -14,15 +14,15 @@ from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance import read_covariance
 from tank2sim.identification.trials.evaluation import predicted_figures
 from tank2sim.identification.trials.measured import measured
-from tests.identification.trials.made_up_ship import CARD, SPEED, TRUTH, trial, turn, zigzag
+from tests.identification.trials.made_up_ship import CARD, LENGTH, SPEED, TRUTH, trial, turn, zigzag
 
 from .command_line import refused, tank2sim
 
 COLUMNS = {"delta_rad": "delta_deg", "u_mps": "u_mps", "v_mps": "v_mps", "r_radps": "r_degps", "psi_rad": "psi_deg"}
 
 
-def write(folder: Path, name: str, rudder, seed: int = 1, scale: float | None = None) -> Path:
-    made = trial(rudder, name=name, duration=200.0, step=0.5, seed=seed)
+def write(folder: Path, name: str, rudder, seed: int = 1, scale: float | None = None, truth=None) -> Path:
+    made = trial(rudder, name=name, duration=200.0, step=0.5, seed=seed, truth=truth)
     lengths = 1.0 if scale is None else scale
     columns = {"t_s": made.time_s / np.sqrt(lengths)}
     for there, here in COLUMNS.items():
@@ -212,6 +212,32 @@ def test_a_copy_of_a_trial_that_is_fitted_cannot_be_held_out(folder: Path) -> No
     for command in ("identify", "validate"):
         result = tank2sim(command, "off.toml", "zigzag20.csv", "another_run.csv", cwd=folder)
         refused(result, "another_run.csv", "zigzag20.csv again")
+
+
+def test_a_card_of_another_ship_is_refused_unless_forced(folder: Path) -> None:
+    """The same card twice as long: its rudder would have to turn four times the inertia as fast."""
+    text = (folder / "off.toml").read_text()
+    (folder / "longer.toml").write_text(text.replace(f"length_m = {LENGTH}", f"length_m = {2 * LENGTH}"))
+    asked = ("identify", "longer.toml", *FITTED, "--method", "equation_error", "-o", "o.toml", "--json", "o.json")
+    result = tank2sim(*asked, cwd=folder)
+    refused(result, "zigzag20", "longer.toml", "--force")
+    assert not (folder / "o.toml").exists() and not (folder / "o.json").exists()
+    forced = tank2sim(*asked, "--force", cwd=folder)
+    assert forced.returncode == 0, forced.stderr
+    assert forced.stdout.startswith("FORCED")
+    card = read_card(str(folder / "o.toml"))
+    assert "FORCED" in card.text.splitlines()[0] and "FORCED" in card.ship.source
+    assert json.loads((folder / "o.json").read_text())["forced"]
+    right = tank2sim("identify", "off.toml", *asked[2:], "--force", cwd=folder)
+    assert right.returncode == 0 and "FORCED" not in right.stdout + (folder / "o.toml").read_text()
+    assert json.loads((folder / "o.json").read_text())["forced"] == []
+
+
+def test_a_trial_of_another_ship_among_the_trials_is_refused(folder: Path) -> None:
+    write(folder, "stranger", zigzag(20), seed=8, truth={**TRUTH, "Nd": 5 * TRUTH["Nd"], "Nr": 3 * TRUTH["Nr"]})
+    result = tank2sim("identify", "off.toml", *FITTED, "stranger.csv", "-o", "two.toml", cwd=folder)
+    refused(result, "stranger shows", "--force")
+    assert not (folder / "two.toml").exists()
 
 
 @pytest.mark.slow

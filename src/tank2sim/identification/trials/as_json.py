@@ -30,6 +30,7 @@ def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -
     return {
         "method": estimate.method,
         "structure": result.structure,
+        "forced": list(result.forced),
         "manoeuvres": dict(result.manoeuvres),
         "derivatives": {
             name.partition(".")[2]: entry for name, entry in parameters.items() if name.startswith("derivatives.")
@@ -168,6 +169,8 @@ def improved_text(result: Identification, trials: list[str]) -> str:
     """Text of the card found, with the trials told in its source."""
     card = result.card
     how = f"identified by tank2sim ({result.estimate.method}, {result.structure}) from {', '.join(trials)}"
+    if result.forced:
+        how = f"FORCED, although not of this ship by the rudder's moment: {how}"
     changes: dict[str, object] = {"ship.source": f"{card.ship.source}; {how}"}
     if card.ship.notes:
         changes["ship.notes"] = f"Before it was {how}: {card.ship.notes}"

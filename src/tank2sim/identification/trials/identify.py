@@ -22,6 +22,7 @@ from tank2sim.identification.trials.identifiability import Identifiability, iden
 from tank2sim.identification.trials.inference import scaled_prior
 from tank2sim.identification.trials.kalman import kalman
 from tank2sim.identification.trials.measured import Measured
+from tank2sim.identification.trials.other_ship import other_ship
 from tank2sim.identification.trials.output_error import Settings, output_error
 from tank2sim.identification.trials.portable import portable
 from tank2sim.identification.trials.problem import Estimate, Problem, Progress, silent
@@ -75,6 +76,8 @@ class Options:
         Members of a parametric bootstrap of the estimates; 0 for none.
     hold : tuple of str
         Derivatives (``Xuuu``) and parameters of effects (``wind.yaw_coefficient``) that stay as the card has them.
+    force : bool
+        Fit trials also where they look like those of another ship (:mod:`.other_ship`).
     """
 
     method: str = "output_error"
@@ -85,6 +88,7 @@ class Options:
     members: int = 100
     bootstrap: int = 0
     hold: tuple[str, ...] = ()
+    force: bool = False
 
 
 AUTO = "auto"
@@ -115,6 +119,8 @@ class Identification:
         Of the model: the one asked for, or chosen.
     manoeuvres : mapping
         Trial to what it was recognised as, in words.
+    forced : tuple of str
+        What speaks against the trials being of the card's ship, where they were fitted all the same.
     structures : mapping
         Cross-validation of each structure that was tried: none, unless the choice was left to it.
     criteria : Criteria or None
@@ -140,6 +146,7 @@ class Identification:
     criteria: Criteria | None
     bootstrap: Array | None
     manoeuvres: Mapping[str, str]
+    forced: tuple[str, ...]
     notices: tuple[str, ...]
 
 
@@ -168,8 +175,8 @@ def identify(
     Raises
     ------
     InputError
-        The trials do not excite what is to be estimated, lack signals that are needed, or are driven otherwise than
-        those held out.
+        The trials look like those of another ship than the card's, or of two, do not excite what is to be estimated,
+        lack signals that are needed, or are driven otherwise than those held out.
     """
     options = options or Options()
     try:
@@ -194,6 +201,11 @@ def _identified(
     problem = pose(started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold)
     unseen = refuse_unseen(problem)
     problem = problem.without(unseen)
+    against = other_ship(pose(card, trials.trials, trials.driven_by))  # not in a structure that knows less
+    if against and not options.force:
+        names = ", ".join(trial.name for trial in trials.trials)
+        problem_told = f"not trials of the ship of {card.source}: {'; '.join(against)}"
+        raise InputError(names, "", problem_told, "give the card and the trials of one ship, or --force")
     estimate = estimated(problem, options, progress)
     improved = with_speeds(answered(started, estimate), problem)
     whole = started.model.valid_speed_mps is None
@@ -218,6 +230,7 @@ def _identified(
         bootstrap=bootstrapped(
             answer, trials.driven_by, partial(_in_pieces, options=options), options.bootstrap, executor
         ),
+        forced=against,
         manoeuvres=_manoeuvres(improved, (*trials.trials, *(held.trials if held else ()))),
         notices=(
             *trials.notices,
