@@ -12,15 +12,17 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance import read_covariance
-from tests.identification.trials.made_up_ship import CARD, TRUTH, trial, turn, zigzag
+from tank2sim.identification.trials.evaluation import predicted_figures
+from tank2sim.identification.trials.measured import measured
+from tests.identification.trials.made_up_ship import CARD, LENGTH, SPEED, TRUTH, trial, turn, zigzag
 
 from .command_line import refused, tank2sim
 
 COLUMNS = {"delta_rad": "delta_deg", "u_mps": "u_mps", "v_mps": "v_mps", "r_radps": "r_degps", "psi_rad": "psi_deg"}
 
 
-def write(folder: Path, name: str, rudder, seed: int = 1, scale: float | None = None) -> Path:
-    made = trial(rudder, name=name, duration=200.0, step=0.5, seed=seed)
+def write(folder: Path, name: str, rudder, seed: int = 1, scale: float | None = None, truth=None) -> Path:
+    made = trial(rudder, name=name, duration=200.0, step=0.5, seed=seed, truth=truth)
     lengths = 1.0 if scale is None else scale
     columns = {"t_s": made.time_s / np.sqrt(lengths)}
     for there, here in COLUMNS.items():
@@ -51,6 +53,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, value in TRUTH.items():
         text += f"{name} = {value if name.endswith('dot') else value * (1 + 0.2 * rng.choice([-1, 1]))}\n"
     (folder / "off.toml").write_text(text, encoding="utf-8")
+    # The made-up ship's polynomial is her truth at all speeds; a card identified from trials would state theirs.
+    every = text.replace(f"speed_mps = {SPEED}", f"speed_mps = {SPEED}\nvalid_speed_mps = [1.0, 6.0]")
+    (folder / "off_at_all_speeds.toml").write_text(every, encoding="utf-8")
     return folder
 
 
@@ -59,7 +64,8 @@ FITTED = ("zigzag20.csv", "zigzag10.csv", "turn25.csv")
 
 def test_a_card_that_is_off_comes_back_to_the_truth(folder: Path) -> None:
     result = tank2sim(
-        *("identify", "off.toml", *FITTED, "--holdout", "turn-35.csv", "-o", "found.toml", "--json", "found.json"),
+        *("identify", "off_at_all_speeds.toml", *FITTED, "--holdout", "turn-35.csv"),
+        *("-o", "found.toml", "--json", "found.json"),
         cwd=folder,
     )
     assert result.returncode == 0, result.stderr
@@ -120,6 +126,41 @@ def test_a_term_that_is_held_stays_as_the_card_has_it(folder: Path) -> None:
     beside = read_covariance(after)  # which it refuses if its standard errors are not those of the card
     assert beside is not None and "derivatives.Nr" in beside.names
     refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--hold", "Nope", cwd=folder), "--hold", "Nope")
+
+
+def test_the_figures_told_are_those_of_the_card_written(folder: Path) -> None:
+    """Of a hard turn too, in which the ship is slower than in any of the zigzags fitted."""
+    options = ("--method", "equation_error", "--members", "0")
+    files = ("zigzag20.csv", "zigzag10.csv", "--holdout", "turn-35.csv")
+    result = tank2sim("identify", "off.toml", *files, *options, "-o", "w.toml", "--json", "w.json", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    card = read_card(str(folder / "w.toml"))
+    assert isinstance(card, ManoeuvringCard) and card.model.valid_speed_mps is not None
+    told = json.loads((folder / "w.json").read_text())
+    trials = measured([folder / "turn-35.csv"], card).trials
+    again = {one.name: one.predicted for one in predicted_figures(card, trials)}
+    found = {one["figure"]: one["predicted"] for one in told["figures"]["holdout"]}
+    assert len(found) >= 2 and found == pytest.approx(again, rel=1e-9)
+    slowest = min(np.loadtxt(folder / "turn-35.csv", delimiter=",", skiprows=1)[:, 2])
+    assert slowest < card.model.valid_speed_mps[0], "the turn is held out at all its speeds"
+    assert "turn-35" in told["yaw_rate_error_over_windows"]["holdout"]
+
+
+def test_trials_without_velocities_identify_what_they_show(folder: Path) -> None:
+    for name in ("zigzag20", "turn25"):
+        lines = [line.split(",") for line in (folder / f"{name}.csv").read_text().splitlines()]
+        kept = [place for place, head in enumerate(lines[0]) if head not in ("u_mps", "v_mps")]
+        text = "\n".join(",".join(line[place] for place in kept) for line in lines)
+        (folder / f"{name}_gps.csv").write_text(text + "\n")
+    result = tank2sim("identify", "off.toml", "zigzag20_gps.csv", "--json", "z.json", "-o", "z.toml", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    found = json.loads((folder / "z.json").read_text())
+    assert "Xvv" not in found["derivatives"]
+    assert any("nothing of" in warning and "Xvv" in warning for warning in found["warnings"])
+    assert found["derivatives"]["Nd"]["value"] == pytest.approx(TRUTH["Nd"], rel=0.1)
+    before, after = (read_card(str(folder / name)) for name in ("off.toml", "z.toml"))
+    assert isinstance(before, ManoeuvringCard) and isinstance(after, ManoeuvringCard)
+    assert after.derivatives["Xvv"] == before.derivatives["Xvv"]
 
 
 def test_holdout_takes_all_that_follow_it_up_to_the_next_option(folder: Path) -> None:
@@ -206,6 +247,47 @@ def test_a_repaired_unit_gives_the_card_of_the_right_file(folder: Path, name: st
         found[label] = json.loads((folder / f"{label}.json").read_text())["derivatives"]
     for term in ("Nv", "Nr", "Nd", "Yv"):
         assert found["wrong"][term]["value"] == pytest.approx(found["right"][term]["value"], rel=1e-3)
+
+
+def test_a_copy_of_a_trial_that_is_fitted_cannot_be_held_out(folder: Path) -> None:
+    """Under another name, with other digits and a comment: neither for identify nor gap, nor as a repeat."""
+    lines = (folder / "zigzag20.csv").read_text().splitlines()
+    rows = [",".join(f"{float(cell):.5g}" for cell in line.split(",")) for line in lines[1:]]
+    (folder / "another_run.csv").write_text("\n".join(["# a second run", lines[0], *rows]) + "\n")
+    held = ("zigzag20.csv", "--holdout", "turn-35.csv", "another_run.csv", "-o", "copy_out")
+    for command in ("identify", "gap"):
+        result = tank2sim(command, "off.toml", *held, cwd=folder)
+        refused(result, "another_run.csv", "both fitted and held out", "zigzag20.csv")
+        assert not (folder / "copy_out").exists()
+    for command in ("identify", "validate"):
+        result = tank2sim(command, "off.toml", "zigzag20.csv", "another_run.csv", cwd=folder)
+        refused(result, "another_run.csv", "zigzag20.csv again")
+
+
+def test_a_card_of_another_ship_is_refused_unless_forced(folder: Path) -> None:
+    """The same card twice as long: its rudder would have to turn four times the inertia as fast."""
+    text = (folder / "off.toml").read_text()
+    (folder / "longer.toml").write_text(text.replace(f"length_m = {LENGTH}", f"length_m = {2 * LENGTH}"))
+    asked = ("identify", "longer.toml", *FITTED, "--method", "equation_error", "-o", "o.toml", "--json", "o.json")
+    result = tank2sim(*asked, cwd=folder)
+    refused(result, "zigzag20", "longer.toml", "--force")
+    assert not (folder / "o.toml").exists() and not (folder / "o.json").exists()
+    forced = tank2sim(*asked, "--force", cwd=folder)
+    assert forced.returncode == 0, forced.stderr
+    assert forced.stdout.startswith("FORCED")
+    card = read_card(str(folder / "o.toml"))
+    assert "FORCED" in card.text.splitlines()[0] and "FORCED" in card.ship.source
+    assert json.loads((folder / "o.json").read_text())["forced"]
+    right = tank2sim("identify", "off.toml", *asked[2:], "--force", cwd=folder)
+    assert right.returncode == 0 and "FORCED" not in right.stdout + (folder / "o.toml").read_text()
+    assert json.loads((folder / "o.json").read_text())["forced"] == []
+
+
+def test_a_trial_of_another_ship_among_the_trials_is_refused(folder: Path) -> None:
+    write(folder, "stranger", zigzag(20), seed=8, truth={**TRUTH, "Nd": 5 * TRUTH["Nd"], "Nr": 3 * TRUTH["Nr"]})
+    result = tank2sim("identify", "off.toml", *FITTED, "stranger.csv", "-o", "two.toml", cwd=folder)
+    refused(result, "stranger shows", "--force")
+    assert not (folder / "two.toml").exists()
 
 
 @pytest.mark.slow

@@ -549,3 +549,36 @@ def test_the_sign_of_a_rudder_in_radians_is_judged_on_its_degrees(manoeuvre, mar
     record = trial({"t_s": run.t[::5], **signals, "delta_rad": DEG * signals["delta_rad"]}, noise=noise)
     assert [(one.column, one.likely_truth.split()[-1]) for one in audit(record)] == [("delta_deg", "degrees")]
     np.testing.assert_allclose(mended(record)[0].signals["delta_rad"], signals["delta_rad"])
+
+
+def three_digits(degrees):
+    """As ``%.3g`` prints: to 1 deg from 100 deg on, to 0.1 deg from 10 deg on."""
+    unit = 10.0 ** (np.floor(np.log10(np.abs(degrees) + 1e-300)) - 2)
+    return np.round(degrees / unit) * unit
+
+
+def gentle(heading, amplitude, step):
+    """A slow zigzag of `amplitude` deg about a heading, deg, and the course of a ship that does otherwise."""
+    t = np.arange(0.0, 400.0, step)
+    psi = heading + amplitude * np.sin(2 * np.pi * t / 120)
+    rate = amplitude * 2 * np.pi / 120 * np.cos(2 * np.pi * t / 120)
+    other = amplitude * 2 * np.pi / 75 * np.cos(2 * np.pi * t / 75 + 1)
+    return t, psi, rate, other
+
+
+@pytest.mark.parametrize("step", [0.1, 1.0])
+@pytest.mark.parametrize("heading", [0.0, 99.0, 200.0])
+def test_a_heading_printed_with_three_digits_is_the_motion_of_its_rate(heading, step):
+    for amplitude in (1.0, 2.0, 4.0):
+        t, psi, rate, _ = gentle(heading, amplitude, step)
+        signals = {"psi_rad": three_digits(psi) * DEG, "r_radps": rate * DEG, "delta_rad": 0.1 * np.sign(rate)}
+        found = audit(trial({"t_s": t, **signals}, noise={"r_radps": 0.005 * DEG}))
+        assert not [one for one in found if "same motion" in one.what], (amplitude, found)
+
+
+@pytest.mark.parametrize("heading", [0.0, 200.0])
+def test_another_motion_is_found_behind_a_rounded_heading(heading):
+    t, psi, _, other = gentle(heading, 8.0, 1.0)
+    signals = {"psi_rad": three_digits(psi) * DEG, "r_radps": other * DEG, "delta_rad": 0.1 * np.sign(other)}
+    found = audit(trial({"t_s": t, **signals}, noise={"r_radps": 0.005 * DEG}))
+    assert [one for one in found if "same motion" in one.what and one.kind == "fault"]

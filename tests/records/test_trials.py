@@ -143,6 +143,20 @@ def test_a_record_of_the_esso_osaka_may_hold_nan(write):
         read_trial(write((header + "\n".join(rows)).replace("vm_velo", "v")))
 
 
+@pytest.mark.parametrize("blank", [",,,,,,,,,,,,", "nan" + 12 * ",nan", " , ,,,,,,,,,,,"])
+def test_blank_rows_at_the_end_of_an_esso_osaka_record_are_no_rows(tmp_path, data, blank):
+    whole = data / "data/esso_osaka/zigzag/zigzag_31-Jul-2020_13_04_24.csv"
+    lines = whole.read_text(encoding="latin-1").splitlines()[:50]
+    for end, rows in (("blank", [*lines, blank, "", blank]), ("whole", lines)):
+        (tmp_path / f"{end}.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    blank_end, known = (read_trial(tmp_path / f"{end}.csv") for end in ("blank", "whole"))
+    np.testing.assert_array_equal(blank_end.time_s, known.time_s)
+    np.testing.assert_array_equal(blank_end.signals["r_radps"], known.signals["r_radps"])
+    (tmp_path / "inside.csv").write_text("\n".join([*lines[:20], blank, *lines[20:]]) + "\n", encoding="utf-8")
+    with pytest.raises(InputError, match="row 20 has no time"):
+        read_trial(tmp_path / "inside.csv")
+
+
 def test_wind_of_the_esso_osaka_is_where_it_comes_from(data):
     """The true wind, less the ship's own, is the relative one: both directions are where the wind comes from."""
     read = read_trial(data / "data/esso_osaka/turning/turn_14-Sep-2020_13_39_32.csv")

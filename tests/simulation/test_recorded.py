@@ -9,6 +9,7 @@ import pytest
 
 from tank2sim.cards import parse_card, read_card
 from tank2sim.dynamics import build
+from tank2sim.identification.trials.measured import measured
 from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
@@ -51,14 +52,14 @@ def sail(order, duration, noise=0.0, begin_heading=0.4):
     return Trial(Path("made_up.csv"), 2 * STEP * np.arange(len(rows)), signals)
 
 
-def controller(angle, heading, lag, begin=12.0):
-    """A zigzag: the order is reversed `lag` s after the heading is reached."""
+def controller(angle, heading, lag, begin=12.0, off=0.0):
+    """A zigzag: the order is reversed `lag` s after the heading from a course `off` the first heading is reached."""
     state = {"side": np.sign(angle), "due": None}
 
     def order(t, turned, before):
         if t < begin:
             return 0.0
-        if state["due"] is None and state["side"] * turned >= heading:
+        if state["due"] is None and state["side"] * (turned - off) >= heading:
             state["due"] = t + lag
         if state["due"] is not None and t >= state["due"]:
             state["side"], state["due"] = -state["side"], None
@@ -98,6 +99,96 @@ def test_the_zigzag_is_repeated_by_the_ship_that_made_it(model):
     early = replace(what, manoeuvre=replace(what.manoeuvre, lag_s=0.0))
     without = repeat(early, Integrator(model)).figures["overshoots_deg"]
     assert without[0] < again.figures["overshoots_deg"][0] - 0.3
+
+
+@pytest.mark.parametrize(("rudder", "heading"), [(15, 1), (20, 10), (20, 7)])
+@pytest.mark.parametrize("off", [0.0, 0.5])
+def test_course_nominal_heading_and_lag_come_from_all_reversals_together(model, rudder, heading, off):
+    """A late controller, and a ship that is off her course when she begins: neither changes the nominal heading."""
+    rudder, heading, off, lag = np.deg2rad(rudder), np.deg2rad(heading), np.deg2rad(off), 2.5
+    what = recorded(sail(controller(rudder, heading, lag, off=off), 500.0, noise=0.5), model)
+    assert isinstance(what.manoeuvre, Zigzag)
+    assert what.manoeuvre.heading == pytest.approx(heading)
+    assert what.manoeuvre.lag_s == pytest.approx(lag, abs=0.2)
+    assert what.manoeuvre.course == pytest.approx(0.4 + off, abs=np.deg2rad(0.1))
+    assert abs(what.manoeuvre.lag_s - lag) < 4 * what.errors["lag_s"] + STEP  # the controller acts at whole steps
+    assert 0 < what.errors["heading_rad"] < np.deg2rad(0.5)
+
+
+def test_a_rudder_that_is_reversed_by_the_clock_at_any_heading_makes_no_zigzag(model):
+    times = np.array([12.0, 45.0, 60.0, 105.0, 125.0, 135.0, 185.0])
+
+    def order(t, turned, before):
+        return np.deg2rad(20) * (-1.0) ** (np.searchsorted(times, t)) if t >= times[0] else 0.0
+
+    assert recorded(sail(order, 200.0), model) is None
+
+
+@pytest.mark.parametrize(("approach", "every"), [(0.0, 1), (0.0, 10), (1.0, 1), (12.0, 10)])
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_turn_begins_where_its_rudder_begins_to_move(model, side, approach, every):
+    """Also in a record that begins at the execute. At 3 deg/s a rudder of 35 deg is over 12 s later, 58 m farther."""
+    whole = sail(lambda t, turned, before: side * np.deg2rad(35) * (t >= 12.0), 240.0)
+    rows = slice(int((12.0 - approach) / (2 * STEP)), None, every)
+    signals = {name: values[rows] for name, values in whole.signals.items()}
+    what = recorded(replace(whole, time_s=whole.time_s[rows], signals=signals), model)
+    assert what.begin_s == pytest.approx(12.0, abs=0.15)
+    assert what.rudder_rate_radps == pytest.approx(RATE, rel=0.05)
+    assert what.figures["advance_m"] == pytest.approx(recorded(whole, model).figures["advance_m"], abs=1.0)
+
+
+@pytest.mark.parametrize("kind", ["turn", "zigzag"])
+def test_the_step_of_an_order_is_the_execute_and_the_gear_has_a_dead_time(model, kind):
+    dead, due = 3.0, []
+    steered = controller(np.deg2rad(20), np.deg2rad(20), 1.0)
+
+    def late(t, turned, before):
+        due.append(steered(t, turned, before) if kind == "zigzag" else np.deg2rad(30) * (t >= 12.0))
+        return due[-1 - min(len(due) - 1, round(dead / STEP))]
+
+    trial = sail(late, 260.0)
+    trial = replace(trial, signals={**trial.signals, "delta_order_rad": np.array(due[::2])})
+    what = recorded(trial, model)
+    assert what.begin_s == pytest.approx(12.0, abs=0.11)
+    assert what.manoeuvre.wait_s == pytest.approx(dead, abs=0.1)
+    angle_alone = {name: values for name, values in trial.signals.items() if name != "delta_order_rad"}
+    assert recorded(replace(trial, signals=angle_alone), model).begin_s == pytest.approx(12.0 + dead, abs=0.1)
+    figures, again = what.figures, repeat(what, Integrator(model)).figures
+    if kind == "turn":
+        assert again["advance_m"] == pytest.approx(figures["advance_m"], abs=1.0)
+        return
+    assert what.manoeuvre.lag_s == pytest.approx(1.0, abs=0.15)
+    np.testing.assert_allclose(again["overshoots_deg"][:2], figures["overshoots_deg"][:2], atol=0.2)
+    np.testing.assert_allclose(again["execute_times_s"][:2], figures["execute_times_s"][:2], atol=0.3)
+
+
+def test_an_order_alone_is_executed_at_its_step(model):
+    trial = sail(lambda t, turned, before: np.deg2rad(30) * (t >= 12.0), 240.0)
+    order = np.where(trial.time_s >= 12.0, np.deg2rad(30), 0.0)[::5]
+    signals = {name: values[::5] for name, values in trial.signals.items() if name != "delta_rad"}
+    what = recorded(replace(trial, time_s=trial.time_s[::5], signals={**signals, "delta_order_rad": order}), model)
+    assert what.begin_s == 12.0
+    assert what.rudder_rate_radps is None
+
+
+@pytest.mark.parametrize("kind", ["turn", "zigzag"])
+def test_position_and_heading_are_enough(model, kind):
+    """As a satellite receiver gives them, once a second."""
+    steered = controller(np.deg2rad(-20), np.deg2rad(10), 1.0)
+    order = steered if kind == "zigzag" else lambda t, turned, before: np.deg2rad(-30) * (t >= 12.0)
+    whole = sail(order, 300.0, noise=0.5)
+    few = {name: whole.signals[name][::10] for name in ("x_m", "y_m", "psi_rad", "delta_rad")}
+    what = recorded(replace(whole, time_s=whole.time_s[::10], signals=few), model)
+    known = recorded(whole, model)
+    assert type(what.manoeuvre) is type(known.manoeuvre)
+    assert what.begin_s == pytest.approx(12.0, abs=0.2)
+    assert what.start["initial.u"] == pytest.approx(SPEED, rel=0.05)
+    if kind == "turn":
+        assert what.figures["advance_m"] == pytest.approx(known.figures["advance_m"], rel=0.01)
+        return
+    assert what.manoeuvre.heading == pytest.approx(np.deg2rad(10))
+    assert what.manoeuvre.lag_s == pytest.approx(1.0, abs=0.4)
+    np.testing.assert_allclose(what.figures["overshoots_deg"][:2], known.figures["overshoots_deg"][:2], atol=0.3)
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -151,8 +242,9 @@ def test_other_runs_are_neither(model):
     assert recorded(sail(lambda t, turned, before: 0.0, 60.0), model) is None
     assert recorded(sail(lambda t, turned, before: 0.3 * (t > 12), 40.0), model) is None  # turned too little
     trial = sail(controller(np.deg2rad(20), np.deg2rad(10), 0.0), 100.0)
-    less = {name: values for name, values in trial.signals.items() if name != "v_mps"}
-    assert recorded(replace(trial, signals=less), model) is None
+    for missing in ("psi_rad", "x_m"):
+        less = {name: values for name, values in trial.signals.items() if name != missing}
+        assert recorded(replace(trial, signals=less), model) is None
 
 
 def test_each_measured_turn_and_zigzag_is_recognised_from_its_execute(data: Path) -> None:
@@ -168,6 +260,23 @@ def test_each_measured_turn_and_zigzag_is_recognised_from_its_execute(data: Path
         assert what is not None and isinstance(what.manoeuvre, form), name
         assert what.begin_s == pytest.approx(execute, abs=0.3)
         assert math.degrees(what.manoeuvre.rudder) == pytest.approx(rudder, abs=0.2)
+
+
+def test_the_controllers_of_two_basins_are_told_apart(data: Path) -> None:
+    """HSVA's zigzags by their names; lags of one controller agree with each other over all runs, s at full scale."""
+    card = read_card("kvlcc2")
+    ship = build(card)
+    lags = {}
+    for basin, pattern in (("kvlcc2_hsva", "*.dat"), ("kvlcc2_marin", "*zz*.dat")):
+        trials = measured(sorted((data / "data" / basin).glob(pattern)), card).trials
+        found = {trial.name: recorded(trial, ship) for trial in trials}
+        for name, what in found.items():
+            assert math.degrees(what.manoeuvre.heading) == pytest.approx(
+                float(name.split("_Z_")[1][3:5] if "_Z_" in name else 10), abs=1e-6
+            )
+        lags[basin] = [what.manoeuvre.lag_s for what in found.values()]
+    assert np.ptp(lags["kvlcc2_hsva"]) < 0.4 and np.ptp(lags["kvlcc2_marin"]) < 0.4
+    assert np.mean(lags["kvlcc2_hsva"]) > 2.0 and np.mean(lags["kvlcc2_marin"]) < 1.2
 
 
 def test_the_course_of_a_zigzag_is_that_before_the_ship_drifted_off_it(data: Path) -> None:

@@ -73,6 +73,7 @@ from tank2sim.units import in_words
     help="Fit N sets of trials simulated anew with the estimate, for the scatter of the estimates.",
 )
 @click.option("--hold", multiple=True, metavar="NAME", help="Leave a derivative or parameter as the card has it.")
+@click.option("--force", is_flag=True, help="Fit trials also if they look like another ship's; the card says so.")
 @click.option("--trust-card", is_flag=True, help="Take the card's standard errors as they are.")
 @click.option("--plot", "plots", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Plots, page.")
 @json_option
@@ -144,6 +145,7 @@ def _options(given: dict[str, object]) -> Options:
         scale_prior=not given["trust_card"],
         members=int(str(given["members"])),
         bootstrap=int(str(given["bootstrap"])),
+        force=bool(given["force"]),
         hold=tuple(str(name) for name in given["hold"]),  # type: ignore[attr-defined]
     )
 
@@ -177,6 +179,8 @@ def _pictures(
 
 def _show(result: Identification, told: tuple[str, ...]) -> None:
     estimate = result.estimate
+    if result.forced:
+        screen.print(f"FORCED: {'; '.join(result.forced)}", soft_wrap=True, markup=False)
     title = f"{result.card.ship.name}: {len(estimate.free)} coefficients from {len(result.problem.runs)} trials"
     show_table(title, ["", "found", "before", "from trials"], estimate_rows(result))
     if result.bootstrap is not None:
@@ -195,5 +199,9 @@ def _show(result: Identification, told: tuple[str, ...]) -> None:
     if rows := figure_rows(result):
         heads = ["trial", "", "figure", "measured", "before", "now", "error", "95 %"]
         named = [[trial, word, ", ".join(in_words(str(name))), *rest] for trial, word, name, *rest in rows]
-        show_table("Figures, simulated in closed loop from the measured start", heads, named)
+        show_table(
+            "Figures, simulated in closed loop from the measured start, with the rudder rate and lag of each trial",
+            heads,
+            named,
+        )
     show_notices([*result.notices, *result.identifiability.notices, *told])

@@ -13,6 +13,7 @@ from tank2sim.cards import ManoeuvringCard
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.measured import Measured, measured
 from tank2sim.records.reading import looks_like_a_trial
+from tank2sim.records.same_record import refuse_copies
 
 
 class TakesSeveral(click.Command):
@@ -69,10 +70,12 @@ def fitted_and_held(
     Raises
     ------
     InputError
-        A file is at fault (:func:`.measured.measured`), or two have one name, also where one of them is held out.
+        A file is at fault (:func:`.measured.measured`), or two have one name or are one record, also where one of them
+        is held out.
     """
     fitted, held = measured(trial_files(trials), card), measured(trial_files(holdout), card)
     for trial in held.trials:
         if trial.name in {other.name for other in fitted.trials}:
             raise InputError(trial.path, "", "is both fitted and held out", "hold out what is not fitted")
+    refuse_copies(fitted.trials, held.trials)
     return fitted, held

@@ -12,6 +12,8 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
+import numpy as np
+
 from tank2sim.errors import InputError
 from tank2sim.records.number_rows import numbers, read_bytes_as_text
 from tank2sim.records.trials import Trial, unwrapped
@@ -40,7 +42,9 @@ def is_esso_osaka(text: str) -> bool:
 
 
 def read_esso_osaka(path: Path | str) -> Trial:
-    """Read a CSV of these records; times as they stand. Revolutions are in 1/s, negative astern; the rest is in SI.
+    """Read a CSV of these records; times as they stand, blank rows at the end are passed over.
+
+    Revolutions are in 1/s, negative astern; the rest is in SI.
 
     Raises
     ------
@@ -55,6 +59,10 @@ def read_esso_osaka(path: Path | str) -> Trial:
             raise InputError(path, "line 1", f"there is not one column {head}", "give a record as it was published")
     rows = [(line, content.split(",")) for line, content in enumerate(lines[1:], start=2) if content.strip()]
     values = numbers(path, rows, heads)
+    filled = np.flatnonzero(~np.isnan(values).all(axis=1))
+    values = values[: 1 + np.max(filled, initial=-1)]  # spreadsheets leave blank rows
+    if len(values) < 2:
+        raise InputError(path, "", "has no rows of measured values", "give the file as it was published")
     signals = {}
     columns = {}
     for head, heading in _COLUMNS.items():

@@ -38,7 +38,7 @@ def figures_of(manoeuvre: object, trajectory: Trajectory, length: float) -> Figu
         Length between perpendiculars, m.
     """
     match manoeuvre:
-        case Turn(rudder):
+        case Turn(rudder=rudder):
             return _turn(trajectory, math.copysign(1.0, rudder), length)
         case Zigzag():
             return _zigzag(trajectory, manoeuvre, length)
@@ -127,7 +127,8 @@ def _zigzag(run: Trajectory, zigzag: Zigzag, length: float) -> Figures:
     side, heading = math.copysign(1.0, zigzag.rudder), zigzag.heading
     execute = _Execute(run, side)
     course = execute.heading if zigzag.course is None else zigzag.course
-    executes = run.t[1:][np.diff(run["rudder.command"]) != 0]
+    command = run["rudder.command"]
+    executes = run.t[1:][command[:-1] * command[1:] < 0] - zigzag.wait_s
     turns = run.crossings("motion.r", "motion.rdot", 0.0)
     peaks = [later[0] for time in executes if len(later := turns[turns > time])]
     overshoots = [

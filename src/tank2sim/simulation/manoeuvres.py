@@ -66,6 +66,8 @@ def _check_angles(name: str, **angles: float) -> None:
 class Turn:
     """Turning circle: the rudder (rad, positive to starboard) is put over and held.
 
+    It begins to move `wait_s` after the order (a gear's dead time).
+
     Raises
     ------
     InputError
@@ -73,15 +75,17 @@ class Turn:
     """
 
     rudder: float
+    wait_s: float = 0.0
 
     def __post_init__(self) -> None:
         _check_angles("Turn", rudder=self.rudder)
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Run for `duration` s, or until the heading has changed by :data:`TURN_HEADING` (at most 150 L/u0)."""
+        running.run(self.wait_s if duration is None else min(self.wait_s, duration))
         running.order({"rudder.command": self.rudder})
         if duration is not None:
-            running.run(duration)
+            running.run(max(0.0, duration - self.wait_s))
             return
         side = math.copysign(1.0, self.rudder)
         goal = running.state("motion.psi") + side * TURN_HEADING
@@ -93,8 +97,9 @@ class Zigzag:
     """Zigzag: rudder `rudder` until the heading has changed by `heading`, then the other way, and so on.
 
     A negative rudder begins to port; `heading` is positive. The order comes `lag_s` after the heading is reached: the
-    delay of a helmsman or of a model basin's controller (0.1 to 0.6 s at model scale). Headings count from `course`
-    (rad), by default from that at the execute.
+    delay of a helmsman or of a model basin's controller (0.1 to 0.6 s at model scale), and the rudder begins to move
+    `wait_s` after each order (a gear's dead time). Headings count from `course` (rad), by default from that at the
+    execute.
 
     Raises
     ------
@@ -106,6 +111,7 @@ class Zigzag:
     heading: float
     lag_s: float = 0.0
     course: float | None = None
+    wait_s: float = 0.0
 
     def __post_init__(self) -> None:
         _check_angles("Zigzag", rudder=self.rudder, heading=self.heading)
@@ -116,12 +122,13 @@ class Zigzag:
         end = 150 * ship_time if duration is None else duration
         side = math.copysign(1.0, self.rudder)
         executes = 0
+        running.run(min(self.wait_s, end))
         while running.time < end and (duration is not None or executes < ZIGZAG_EXECUTES):
             running.order({"rudder.command": side * abs(self.rudder)})
             goal = begin + side * self.heading
             if not running.run_until("motion.psi", goal, rising=side > 0, at_most=end - running.time):
                 return
-            running.run(max(0.0, min(self.lag_s, end - running.time)))
+            running.run(max(0.0, min(self.lag_s + self.wait_s, end - running.time)))
             side, executes = -side, executes + 1
 
 

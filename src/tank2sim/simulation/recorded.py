@@ -8,26 +8,32 @@ the controller of the trial had.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
+from scipy.optimize import least_squares
+from scipy.signal import savgol_coeffs, savgol_filter
+from scipy.stats import t as student
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.form import SteeringGear
 from tank2sim.cards.reading import revised
+from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Vector
 from tank2sim.dynamics.steering_gear import UNSTATED_LAG
+from tank2sim.records.audit.noise import white_noise
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
+from tank2sim.simulation.rudder_record import HeldRudder, held_rudders, rudder_of
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trajectory import Trajectory
 
-Places = NDArray[np.int64]
+Array = NDArray[np.float64]
 
 NOMINAL_HEADINGS_DEG = (1, 2, 5, 10, 15, 20, 25, 30, 35)
 """Headings at which zigzags are reversed (ITTC 7.5-04-02-01, and the modified ones of SIMMAN)."""
@@ -52,26 +58,26 @@ FED = {
 SMOOTHING = 0.3
 """Recorded signals are smoothed over this many L/u0 before figures are read off (ours: below the time of any peak)."""
 
-FARTHEST_OFF_COURSE = math.radians(2.0)
-"""Farther from its first heading at the execute, a trial did not begin on its course."""
+COURSE_ERROR = math.radians(0.25)
+"""Standard error of a zigzag's course as the heading of the approach shows it, beside what the heading wanders there:
+the courses of MARIN's zigzags lie 0.1 to 0.2 deg off the headings with which their records begin (project choice)."""
+
+LAG = 0.1
+"""Scale of the lags of helmsmen and controllers, in L/u0, known before the record: HSVA's are 0.06, MARIN's 0.02, those
+of the 3 m Esso Osaka 0.03. It decides only where the reversals are too few to show the lag (project choice)."""
+
+CONFIDENT = 0.975
+"""A nominal heading agrees with the reversals if it lies in their two-sided interval of 95 %."""
+
+NO_LAG = 1e-6
+"""A lag below this share of its scale is what a search that ends at its bound leaves of none."""
+
+ASTRAY = 0.2
+"""Reversals whose headings scatter by more than this share of their nominal one are of no zigzag: helmsmen keep to
+some 10 % of it in the 3 m Esso Osaka, in a wind (project choice)."""
 
 HALF_TURNS = 2.0
 """A turn is repeated for this many times as long as the measured one took to turn through 180 deg."""
-
-LEAST_RUDDER = math.radians(2.0)
-"""A rudder that never exceeds this is no manoeuvre."""
-
-STEADY = 0.02
-HELD = 0.05
-"""A rudder is held when it stays within a share STEADY of an angle for a share HELD of the longest such time: choices
-of ours. In the approaches of the 3 m Esso Osaka it stays for 2 % of that at most, at the first angle of zigzags of the
-KVLCC2 for 13 % at least (35/5)."""
-
-STEEPER = 3.0
-"""A rudder on its way does not speed up by this factor: gears have constant rates, or slow down (ours)."""
-
-ROUNDS = 6
-"""Each halves what a record that begins with the rudder on its way leaves of its error: a choice of ours."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +91,8 @@ class Recorded:
     manoeuvre : Turn or Zigzag
         With the rudder as it was reached, and the controller's lag.
     begin_s, end_s : float
-        Execute, and end of what belongs to the manoeuvre (a turn ends when its rudder is taken back), s.
+        Execute (the step of the order where the record has it, else the rudder's first movement), and end of what
+        belongs to the manoeuvre (a turn ends when its rudder is taken back), s.
     rudder_rate_radps : float or None
         Rate at which the rudder went over; None where only its order is known, which the gear of the ship follows.
     start : dict
@@ -94,6 +101,8 @@ class Recorded:
         Other inputs of a model, at their mean.
     figures : Figures
         As measured.
+    errors : dict
+        Standard errors of what the reversals of a zigzag show together: ``heading_rad``, ``course_rad``, ``lag_s``.
     """
 
     trial: Trial
@@ -104,14 +113,17 @@ class Recorded:
     start: dict[str, float]
     inputs: dict[str, float]
     figures: Figures
+    errors: dict[str, float] = field(default_factory=dict)
 
     @property
     def words(self) -> str:
-        """What it was, for people: ``zigzag 20/10, reversed 2.4 s late``."""
+        """What it was, for people: ``zigzag 20/10, reversed 2.4 s late (± 0.1 s)``."""
         rudder = math.degrees(self.manoeuvre.rudder)
         if isinstance(self.manoeuvre, Turn):
             return f"turn {rudder:.3g}"
         late = f"{self.manoeuvre.lag_s:.2g} s late"
+        if "lag_s" in self.errors:
+            late += f" (± {self.errors['lag_s']:.1g} s)"
         return f"zigzag {rudder:.3g}/{math.degrees(self.manoeuvre.heading):.3g}, reversed {late}"
 
 
@@ -121,42 +133,38 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
     Parameters
     ----------
     trial : Trial
-        With a rudder, heading, yaw rate, velocities and positions.
+        With a rudder, heading and positions. Yaw rate and velocities through the water follow from them, less the
+        current of the model, where they were not measured.
     model : Model
         Of a ship of the trial's size: for L/u0 and the names of its variables.
     """
-    needed = ("psi_rad", "r_radps", "u_mps", "v_mps", "x_m", "y_m")
-    if any(name not in trial.signals or np.isnan(trial.signals[name]).all() for name in needed):
-        return None
-    rudder = _filled(trial.time_s, trial.signals.get("delta_rad", trial.signals.get("delta_order_rad")))
-    held = _plateaus(trial.time_s, rudder)
-    if not held:
+    held = held_rudders(trial)
+    values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+    ship_time = float(values["ship.length"] / values["ship.speed"])
+    smooth = _motion(trial, model, ship_time) if held else None
+    if smooth is None:
         return None
     first = held[0]
-    values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
-    ship_time = values["ship.length"] / values["ship.speed"]
-    smooth = {name: _smoothed(trial, name, ship_time) for name in needed}
     turned = np.abs(smooth["psi_rad"] - np.interp(first.execute_s, trial.time_s, smooth["psi_rad"]))
     inside = (trial.time_s >= first.execute_s) & (trial.time_s <= first.end_s)
     manoeuvre: Turn | Zigzag | None = None
+    errors: dict[str, float] = {}
+    wait = float(np.median([one.moves_s - one.execute_s for one in held]))
     if len(held) >= 2 and all(a.angle * b.angle < 0 for a, b in pairwise(held)):
-        manoeuvre = _zigzag(trial, held, smooth)
+        found = _zigzag(trial.time_s, held, smooth, _heading_noise(trial, ship_time), ship_time)
+        if found is not None:
+            manoeuvre, errors = replace(found[0], wait_s=wait), found[1]
         end = float(trial.time_s[-1])
     elif turned[inside].max(initial=0.0) > math.radians(120):
-        manoeuvre, end = Turn(first.angle), first.end_s
+        manoeuvre, end = Turn(first.angle, first.moves_s - first.execute_s), first.end_s
     if manoeuvre is None:
         return None
     track = _trajectory(trial, model, manoeuvre, (first.execute_s, end), (held, smooth))
     figures = figures_of(manoeuvre, track, float(values["ship.length"]))
     start = {f"initial.{name[7:]}": float(track[name][0]) for name in STATES.values()}
-    inputs = {
-        there: float(np.nanmean(trial.signals[name]))
-        for name, there in FED.items()
-        if name in trial.signals and there in model.input_names
-    }
-    start["initial.rudder_angle"] = float(np.interp(first.execute_s, trial.time_s, rudder))
-    rate = first.rate if "delta_rad" in trial.signals else None
-    return Recorded(trial, manoeuvre, first.execute_s, end, rate, start, inputs, figures)
+    start["initial.rudder_angle"] = float(np.interp(first.execute_s, trial.time_s, rudder_of(trial)))
+    inputs = _fed(trial, model)
+    return Recorded(trial, manoeuvre, first.execute_s, end, first.rate, start, inputs, figures, errors)
 
 
 def steerable(card: ManoeuvringCard) -> ManoeuvringCard:
@@ -213,102 +221,159 @@ def repeat(what: Recorded, integrator: Integrator, parameters: dict[str, float] 
     )
 
 
-@dataclass(frozen=True)
-class _Plateau:
-    """A rudder angle that was held: when the rudder began to move there, how fast, and until when it stayed."""
+def _zigzag(
+    time: Vector, held: list[HeldRudder], smooth: dict[str, Vector], noise: float, ship_time: float
+) -> tuple[Zigzag, dict[str, float]] | None:
+    """Rudder, nominal heading, course and lag of a zigzag, and their standard errors; None if it is none.
 
-    angle: float
-    execute_s: float
-    rate: float
-    end_s: float
-
-
-def _plateaus(time: Vector, rudder: Vector) -> list[_Plateau]:
-    found: list[_Plateau] = []
-    before = 0
-    for group in _held(rudder):
-        angle = float(np.median(rudder[group]))
-        stretch = slice(before, int(group[0]) + 1)
-        if found:
-            execute, rate = _execute(time[stretch], rudder[stretch], found[-1].angle, angle)
-        else:
-            execute, rate = _first_execute(time[stretch], rudder[stretch], angle)
-        found.append(_Plateau(angle, execute, min(rate, math.pi), float(time[group[-1]])))
-        before = int(group[-1])
-    return found
-
-
-def _first_execute(time: Vector, rudder: Vector, angle: float) -> tuple[float, float]:
-    """The same from the approach, whose rudder is its median until the execute: the two are found in turn."""
-    origin = float(np.median(rudder))
-    for _ in range(ROUNDS):
-        execute, _ = _execute(time, rudder, origin, angle)
-        origin = float(np.median(rudder[: max(1, int(np.searchsorted(time, execute)))]))
-    return _execute(time, rudder, origin, angle)
-
-
-def _execute(time: Vector, rudder: Vector, origin: float, angle: float) -> tuple[float, float]:
-    """When the rudder began to move from one angle to another, s, and its rate, rad/s, at the end of a stretch."""
-    sign = math.copysign(1.0, angle)
-    course, whole = sign * (rudder - origin), sign * (angle - origin)
-    quarter, most, more = (_last_crossing(time, course, share * whole) for share in (0.25, 0.7, 0.85))
-    rate, last = 0.45 * whole / max(most - quarter, 1e-9), 0.15 * whole / max(more - most, 1e-9)
-    if last > STEEPER * rate:  # it kept the course at more than a quarter of the angle, and left from there
-        rate = last
-    return most - 0.7 * whole / rate, rate
-
-
-def _held(rudder: Vector) -> list[Places]:
-    """Samples of each angle that was held, one side after the other.
-
-    A rudder that keeps the course before the execute may go as far over as later for the manoeuvre, but stays nowhere:
-    what comes before the first angle that is held is of the approach.
+    At each reversal k, ordered at t_k, the heading `lag` s before was that of the reversal:
+    psi(t_k - lag) = course + s_k nominal, s_k = 1 while the rudder was to starboard. Course, nominal heading and lag
+    are fitted to all reversals together by least squares, with the approach's heading as one more reading of the
+    course, and :data:`LAG` as what is known of lags. The nominal heading is then that of a usual zigzag, if one agrees.
+    `noise` is the standard deviation of the smoothed heading, rad.
     """
-    size = float(np.percentile(np.abs(rudder), 95))
-    if size < LEAST_RUDDER:
-        return []
-    side = np.where(np.abs(rudder) > 0.8 * size, np.sign(rudder), 0)
-    places = np.flatnonzero(side)
-    parts = np.split(places, np.flatnonzero((np.diff(side[places]) != 0) | (np.diff(places) > 1)) + 1)
-    runs = [part for part in parts if len(part) >= 3]
-    if not runs:
-        return []
-    steady = [np.count_nonzero(np.abs(rudder[run] - np.median(rudder[run])) < STEADY * size) for run in runs]
-    first = next(number for number, count in enumerate(steady) if count >= HELD * max(steady))
-    kept = runs[first:]
-    turns = [number for number in range(1, len(kept)) if side[kept[number][0]] != side[kept[number - 1][0]]]
-    return [np.concatenate(kept[a:b]) for a, b in pairwise([0, *turns, len(kept)])]
-
-
-def _last_crossing(time: Vector, course: Vector, level: float) -> float:
-    below = np.flatnonzero(course < level)
-    last = int(below[-1]) if len(below) else 0
-    if last + 1 >= len(course):
-        return float(time[last])
-    share = (level - course[last]) / (course[last + 1] - course[last])
-    return float(time[last] + share * (time[last + 1] - time[last]))
-
-
-def _zigzag(trial: Trial, held: list[_Plateau], smooth: dict[str, Vector]) -> Zigzag | None:
-    """Rudder, nominal heading of the reversals, and the lag with which they came."""
-
-    def at(name: str, time: float) -> float:
-        return float(np.interp(time, trial.time_s, smooth[name]))
-
-    # The course is that at the beginning of the record: until the execute a ship with any asymmetry has drifted off it.
-    begin = float(smooth["psi_rad"][0])
-    if abs(at("psi_rad", held[0].execute_s) - begin) > FARTHEST_OFF_COURSE:
-        begin = at("psi_rad", held[0].execute_s)
-    headings = [math.copysign(1, a.angle) * (at("psi_rad", b.execute_s) - begin) for a, b in pairwise(held)]
-    rates = [math.copysign(1, a.angle) * at("r_radps", b.execute_s) for a, b in pairwise(held)]
-    typical = float(np.mean([np.median(headings[side::2]) for side in (0, 1) if headings[side::2]]))
-    nominal = [angle for angle in NOMINAL_HEADINGS_DEG if math.radians(angle - 0.4) <= typical]
-    if not nominal or min(rates) <= 0:
+    times = np.array([one.execute_s for one in held[1:]])
+    sides = np.array([math.copysign(1.0, one.angle) for one in held[:-1]])
+    if np.min(sides * np.interp(times, time, smooth["r_radps"])) <= 0:
         return None
-    heading = math.radians(max(nominal))
-    lag = float(np.median([(h - heading) / r for h, r in zip(headings, rates, strict=True)]))
-    angle = float(np.median([abs(plateau.angle) for plateau in held]))
-    return Zigzag(math.copysign(angle, held[0].angle), heading, max(lag, 0.0), begin)
+    approach = _approach(time, held[0], smooth)
+    reversals = _Reversals(time, smooth["psi_rad"], times, sides, approach, LAG * ship_time)
+    found = _usual(reversals, math.hypot(noise, _dating_noise(time, times, smooth)), round(_degrees(held)))
+    if found is None:
+        return None
+    free, fitted = found
+    angle = math.radians(_degrees(held))
+    errors = {"heading_rad": free.errors[1], "course_rad": fitted.errors[0], "lag_s": fitted.errors[-1]}
+    return Zigzag(math.copysign(angle, held[0].angle), fitted.nominal, fitted.lag, fitted.course), errors
+
+
+def _degrees(held: list[HeldRudder]) -> float:
+    """Rudder of a zigzag, deg."""
+    return math.degrees(float(np.median([abs(one.angle) for one in held])))
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Course, nominal heading and lag; their standard errors (without the nominal one where that was given); the
+    weighted sum of squares, and the sum of squares of the reversals alone, rad2."""
+
+    course: float
+    nominal: float
+    lag: float
+    errors: tuple[float, ...]
+    cost: float
+    squares: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Reversals:
+    """What the reversals of a zigzag are fitted to.
+
+    Parameters
+    ----------
+    time, heading : array (n,)
+        s, rad.
+    times, sides : array (k,)
+        When each reversal was ordered, and the side of the rudder until then.
+    approach : (float, float)
+        Course as the approach shows it, and its standard error, rad.
+    lag_scale : float
+        Of lags before the record, s.
+    """
+
+    time: Vector
+    heading: Vector
+    times: Vector
+    sides: Vector
+    approach: tuple[float, float]
+    lag_scale: float
+
+    def fit(self, noise: float, nominal: float | None = None) -> _Fit:
+        """The least-squares fit for a standard deviation of the headings at reversals, rad; for a `nominal` one if
+        it is given."""
+        course, error = self.approach
+
+        def off(at: Vector, heading: float) -> Vector:
+            before = np.interp(self.times - at[-1], self.time, self.heading)
+            return np.asarray(before - at[0] - self.sides * heading, dtype=np.float64)
+
+        def residuals(at: Vector) -> Vector:
+            heading = at[1] if nominal is None else nominal
+            return np.concatenate([off(at, heading) / noise, [(at[0] - course) / error, at[-1] / self.lag_scale]])
+
+        reached = float(np.mean(self.sides * (np.interp(self.times, self.time, self.heading) - course)))
+        start, scale = np.array([course, reached, 0.1 * self.lag_scale]), np.array([0.01, 0.01, 1.0])
+        lowest = np.array([-np.inf, -np.inf, 0.0])
+        keep = [0, 1, 2] if nominal is None else [0, 2]
+        found = least_squares(residuals, start[keep], bounds=(lowest[keep], np.inf), x_scale=scale[keep])
+        heading = float(found.x[1]) if nominal is None else nominal
+        errors = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))
+        lag = float(found.x[-1])
+        lag = lag if lag > NO_LAG * self.lag_scale else 0.0
+        squares = float(np.sum(off(found.x, heading) ** 2))
+        return _Fit(float(found.x[0]), heading, lag, tuple(map(float, errors)), 2 * float(found.cost), squares)
+
+
+def _usual(reversals: _Reversals, noise: float, rudder_deg: int) -> tuple[_Fit, _Fit] | None:
+    """The fit as it comes out, and that with the nominal heading of a usual zigzag which agrees; None if it is none.
+
+    Tried are, in this order, the rudder's own angle (10/10, 20/20), the usual headings, and whole degrees; if none
+    agrees, it stays as it comes out. With more than three reversals their scatter shows how far they may be off
+    (Student's t); with three or fewer it is what the nominal heading itself leaves.
+    """
+    count = len(reversals.times)
+    spare = count - 3
+    free = reversals.fit(noise)
+    if spare > 0:
+        noise = max(noise, math.sqrt(free.squares / spare))
+        free = reversals.fit(noise)
+    limit = float(student.ppf(CONFIDENT, spare if spare > 0 else np.inf)) ** 2
+    whole = math.floor(math.degrees(free.nominal))
+    choices: tuple[tuple[int, ...], ...] = (
+        (rudder_deg,),
+        NOMINAL_HEADINGS_DEG,
+        (whole, whole + 1) if count > 1 else (),
+    )
+    for angles in choices:
+        agreeing = []
+        for angle in (math.radians(one) for one in angles if one > 0):
+            fitted = reversals.fit(noise, angle)
+            if count == 3:
+                fitted = reversals.fit(max(noise, math.sqrt(fitted.squares)), angle)
+            if fitted.cost - free.cost <= limit and _keeps_to(reversals, fitted):
+                agreeing.append(fitted)
+        if agreeing:
+            return free, min(agreeing, key=lambda one: one.cost)
+    return (free, free) if count > 1 and _keeps_to(reversals, free) else None
+
+
+def _keeps_to(reversals: _Reversals, fitted: _Fit) -> bool:
+    """True if the reversals are those of a zigzag (:data:`ASTRAY`); one alone needs a course to judge it by."""
+    scatter = math.sqrt(fitted.squares / len(reversals.times))
+    if len(reversals.times) == 1:
+        scatter = reversals.approach[1]
+    return scatter <= ASTRAY * fitted.nominal
+
+
+def _heading_noise(trial: Trial, ship_time: float) -> float:
+    """Standard deviation of what smoothing leaves of the heading's noise, rad."""
+    window = _window(trial.time_s, ship_time)
+    left = float(savgol_coeffs(window, 3)[window // 2]) if window >= 5 else 1.0
+    return math.sqrt(left) * trial.noise.get("psi_rad", white_noise(trial.signals["psi_rad"]))
+
+
+def _approach(time: Vector, first: HeldRudder, smooth: dict[str, Vector]) -> tuple[float, float]:
+    """Mean heading before the first execute, and how well it tells the course, rad."""
+    until = max(2, int(np.searchsorted(time, first.execute_s)))
+    heading = smooth["psi_rad"][:until]
+    wandered = max(float(np.std(heading)), 0.5 * abs(float(heading[-1] - heading[0])))
+    return float(np.mean(heading)), math.hypot(COURSE_ERROR, wandered)
+
+
+def _dating_noise(time: Vector, times: Vector, smooth: dict[str, Vector]) -> float:
+    """Standard deviation of the headings at reversals because those are dated to a sample, rad."""
+    rate = float(np.sqrt(np.mean(np.interp(times, time, smooth["r_radps"]) ** 2)))
+    return rate * float(np.median(np.diff(time))) / math.sqrt(12)
 
 
 def _trajectory(
@@ -316,7 +381,7 @@ def _trajectory(
     model: Model,
     manoeuvre: Turn | Zigzag,
     span: tuple[float, float],
-    seen: tuple[list[_Plateau], dict[str, Vector]],
+    seen: tuple[list[HeldRudder], dict[str, Vector]],
 ) -> Trajectory:
     """The record between two times as a trajectory of the model: figures are read off it as off a simulation."""
     held, smooth = seen
@@ -327,23 +392,88 @@ def _trajectory(
         x[:, model.state_names.index(there)] = np.interp(t, trial.time_s, smooth[name])
     u = np.tile(model.input_values(), (len(t), 1))
     command = model.input_names.index("rudder.command")
-    for plateau in held:
-        u[t >= plateau.execute_s, command] = plateau.angle
+    for one in held:
+        u[t >= one.moves_s, command] = one.angle
     y = np.array(model.output(x.T, u.T, np.repeat(model.parameter_values()[:, None], len(t), axis=1))).T
     y[:, model.outputs.index("motion.rdot")] = np.gradient(x[:, model.state_names.index("motion.r")], t)
     return Trajectory(model, t - span[0], x, u, y)
 
 
-def _smoothed(trial: Trial, name: str, ship_time: float) -> Vector:
-    values = _filled(trial.time_s, trial.signals[name])
-    window = int(SMOOTHING * ship_time / float(np.median(np.diff(trial.time_s)))) // 2 * 2 + 1
+def drift_over_ground(model: Model, inputs: Array, psi: Vector) -> Array:
+    """Velocity over the ground of a ship that rests in the water, north and east (n, 2), m/s: that of the current.
+
+    Parameters
+    ----------
+    model : Model
+        With or without a current.
+    inputs : array (n, nu)
+        The model's inputs.
+    psi : array (n,)
+        Heading, rad.
+    """
+    rates = model.expand(ca.vcat([model.symbol(f"motion.{axis}dot") for axis in "xy"]))
+    states = np.zeros((len(psi), len(model.states)))
+    states[:, model.state_names.index("motion.psi")] = psi
+    p = np.repeat(model.parameter_values()[:, None], len(psi), axis=1)
+    return np.array(ca.Function("rest", [model.x, model.u, model.p], [rates])(states.T, inputs.T, p)).T
+
+
+def _motion(trial: Trial, model: Model, ship_time: float) -> dict[str, Vector] | None:
+    """The signals of :data:`STATES` (n,), smooth; None if heading or positions were not measured.
+
+    Yaw rate and velocities that were not measured are slopes of the smoothed heading and positions.
+    """
+    known = {name for name in STATES if name in trial.signals and not np.isnan(trial.signals[name]).all()}
+    if not {"psi_rad", "x_m", "y_m"} <= known:
+        return None
+    time = trial.time_s
+    smooth = {name: _smoothed(time, _filled(time, trial.signals[name]), ship_time) for name in known}
+
+    if "r_radps" not in known:
+        smooth["r_radps"] = _slope(time, smooth["psi_rad"], ship_time)
+    if not {"u_mps", "v_mps"} <= known:
+        fed = {**dict(zip(model.input_names, model.input_values(), strict=True)), **_fed(trial, model)}
+        inputs = np.tile([fed[name] for name in model.input_names], (len(time), 1))
+        drift = drift_over_ground(model, inputs, smooth["psi_rad"])
+        north, east = (_slope(time, smooth[name], ship_time) for name in ("x_m", "y_m"))
+        ground = (north - drift[:, 0], east - drift[:, 1], -smooth["psi_rad"])
+        u, v = earth_velocity(*(ca.DM(values) for values in ground))  # type: ignore[arg-type]
+        derived = {"u_mps": np.array(u).ravel(), "v_mps": np.array(v).ravel()}
+        smooth |= {name: values for name, values in derived.items() if name not in known}
+    return smooth
+
+
+def _fed(trial: Trial, model: Model) -> dict[str, float]:
+    """Other inputs of the model at their mean in the trial."""
+    return {
+        there: float(np.nanmean(trial.signals[name]))
+        for name, there in FED.items()
+        if name in trial.signals and there in model.input_names
+    }
+
+
+def _window(time: Vector, ship_time: float) -> int:
+    """Samples, odd, over which signals are smoothed."""
+    return int(SMOOTHING * ship_time / float(np.median(np.diff(time)))) // 2 * 2 + 1
+
+
+def _smoothed(time: Vector, values: Vector, ship_time: float) -> Vector:
+    window = _window(time, ship_time)
     if window < 5 or window > len(values):
         return values
     smooth: Vector = savgol_filter(values, window, 3)
     return smooth
 
 
-def _filled(time: Vector, values: Vector | None) -> Vector:
-    assert values is not None  # a trial without rudder is refused on reading
+def _slope(time: Vector, values: Vector, ship_time: float) -> Vector:
+    """Time derivative by straight lines through windows: at the ends of a record a higher degree follows the noise."""
+    window = _window(time, ship_time)
+    if window < 3 or window > len(values):
+        return np.asarray(np.gradient(values, time), dtype=np.float64)
+    rise, run = (savgol_filter(signal, window, 1, deriv=1) for signal in (values, time))
+    return np.asarray(rise / run, dtype=np.float64)
+
+
+def _filled(time: Vector, values: Vector) -> Vector:
     known = ~np.isnan(values)
     return np.interp(time, time[known], values[known])

@@ -7,7 +7,7 @@ from tank2sim.errors import InputError
 from tank2sim.identification.trials.equation_error import equation_error
 from tank2sim.identification.trials.identifiability import identifiability, refuse_unseen
 from tank2sim.identification.trials.problem import Estimate
-from tests.identification.trials.made_up_ship import NOISE, problem, trial, turn, zigzag
+from tests.identification.trials.made_up_ship import NOISE, TRUTH, problem, trial, turn, zigzag
 
 YAW = ("Nv", "Nr", "Nd")
 
@@ -92,3 +92,20 @@ def test_a_zigzag_so_small_that_the_noise_hides_it_is_refused():
 def test_two_steady_turns_to_either_side_show_the_rudder():
     runs = [trial(turn(angle), duration=400.0, name=f"turn {angle}") for angle in (20, -20)]
     refuse_unseen(problem(runs, free=YAW))
+
+
+def test_without_velocities_a_zigzag_holds_what_it_does_not_show():
+    """Surge is hidden in the noise of the positions; sway, yaw and rudder are not, and are not given up for it."""
+    asked = problem([trial(zigzag(20))], seen=("motion.r", "motion.psi", "motion.x", "motion.y"))
+    assert refuse_unseen(asked) == ("derivatives.Xvv",)
+    kept = asked.without(refuse_unseen(asked))
+    assert kept.free == tuple(name for name in asked.free if name != "derivatives.Xvv")
+    assert kept.parameters(kept.prior_mean)[kept.model.parameter_names.index("derivatives.Xvv")] == TRUTH["Xvv"]
+    assert len(kept.prior_mean) == len(kept.prior_error) == len(kept.free)
+    assert equation_error(kept).standard_errors.shape == (len(kept.free),)
+
+
+def test_an_acceleration_term_that_was_asked_for_and_does_not_show_is_refused():
+    straight = problem([trial(lambda t: 0.0, name="straight")], free=("Xvv", "Nrdot"))
+    with pytest.raises(InputError, match="shows nothing of Nrdot;"):
+        refuse_unseen(straight)

@@ -11,10 +11,13 @@ from tank2sim.files import BYTE_ORDER_MARK
 from tank2sim.identification.trials.comparison import Comparison, misfit
 from tank2sim.identification.trials.evaluation import Figure, Following, pooled
 from tank2sim.identification.trials.identify import Identification
-from tank2sim.identification.trials.remarks import speeds_of
 
 NO_YAW = 3.0
 """A run whose yaw rate stays below this many times its noise goes straight."""
+
+
+FIGURES_ARE = "simulated in closed loop with the card found, from each trial's measured start, rudder rate and lag"
+"""Of what the figures are: ``simulate`` takes the card's approach speed and steering gear instead."""
 
 
 def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -> dict[str, object]:
@@ -27,6 +30,7 @@ def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -
     return {
         "method": estimate.method,
         "structure": result.structure,
+        "forced": list(result.forced),
         "manoeuvres": dict(result.manoeuvres),
         "derivatives": {
             name.partition(".")[2]: entry for name, entry in parameters.items() if name.startswith("derivatives.")
@@ -37,6 +41,7 @@ def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -
             "fit": _windows(result.fit),
             "holdout": _windows(result.holdout) if result.holdout else None,
         },
+        "figures_are": FIGURES_ARE,
         "figures": {
             "fit": [_figure(figure) for figure in result.fit.figures],
             "holdout": [_figure(figure) for figure in result.holdout.figures] if result.holdout else [],
@@ -164,12 +169,11 @@ def improved_text(result: Identification, trials: list[str]) -> str:
     """Text of the card found, with the trials told in its source."""
     card = result.card
     how = f"identified by tank2sim ({result.estimate.method}, {result.structure}) from {', '.join(trials)}"
+    if result.forced:
+        how = f"FORCED, although not of this ship by the rudder's moment: {how}"
     changes: dict[str, object] = {"ship.source": f"{card.ship.source}; {how}"}
     if card.ship.notes:
         changes["ship.notes"] = f"Before it was {how}: {card.ship.notes}"
-    speeds = speeds_of(result)
-    if card.model.valid_speed_mps is None and speeds is not None:
-        changes["model.valid_speed_mps"] = list(speeds)
     head = (
         f"# {how[0].upper()}{how[1:]}.\n# Comments below are of the card before, but for keys marked as identified.\n"
     )

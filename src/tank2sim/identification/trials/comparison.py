@@ -27,7 +27,9 @@ class Comparison:
     figures: tuple[Figure, ...]
 
 
-def compared(card: ManoeuvringCard, trials: Measured, residual: Mapping[str, float]) -> Comparison:
+def compared(
+    card: ManoeuvringCard, trials: Measured, residual: Mapping[str, float], *, whole: bool = False
+) -> Comparison:
     """A card's model against trials.
 
     Parameters
@@ -37,10 +39,12 @@ def compared(card: ManoeuvringCard, trials: Measured, residual: Mapping[str, flo
     residual : mapping
         Standard deviation that is to be expected of each variable's error: it weighs the signals where the initial
         state of a window is found. Weighed by the noise of the sensors alone, the state would follow one signal.
+    whole : bool
+        Compare also outside the range of speeds that the card states.
     """
-    whole = pose(card, trials.trials, trials.driven_by)
+    posed = pose(card, trials.trials, trials.driven_by, whole=whole)
     # Nothing is estimated here: one free parameter instead of all saves making and compiling their sensitivities.
-    problem = replace(whole, free=whole.free[:1], prior_mean=whole.prior_mean[:1], prior_error=whole.prior_error[:1])
+    problem = replace(posed, free=posed.free[:1], prior_mean=posed.prior_mean[:1], prior_error=posed.prior_error[:1])
     weights = {name: residual.get(name) or 1.0 for name in problem.seen}
     return Comparison(
         following(problem, problem.prior_mean, weights),

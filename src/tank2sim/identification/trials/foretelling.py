@@ -30,11 +30,12 @@ IN_BANDS = {f"overshoots_deg.{number}": f"overshoot_{number}_deg" for number in 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """A problem, what was found, and the card with it."""
+    """A problem, what was found, and the card with it; `whole` if it is compared with runs at all their speeds."""
 
     problem: Problem
     estimate: Estimate
     card: ManoeuvringCard
+    whole: bool = False
 
 
 def held_out(answer: Answer, held: Measured, members: int, executor: Executor | None = None) -> Comparison:
@@ -43,7 +44,7 @@ def held_out(answer: Answer, held: Measured, members: int, executor: Executor | 
     The interval is that of simulations with coefficients drawn from their covariance, under random forces as large and
     as slow as those that the fit left unexplained (:mod:`.prediction`).
     """
-    plain = compared(answer.card, held, answer.estimate.noise)
+    plain = compared(answer.card, held, answer.estimate.noise, whole=answer.whole)
     if not members or not plain.figures:
         return plain
     card = steerable(answer.card)

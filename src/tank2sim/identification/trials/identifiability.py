@@ -110,8 +110,12 @@ def identifiability(problem: Problem, estimate: Estimate) -> Identifiability:
     )
 
 
-def refuse_unseen(problem: Problem) -> None:
-    """Refuse trials that excite nothing for a free parameter.
+def refuse_unseen(problem: Problem) -> tuple[str, ...]:
+    """Free parameters of which trials show nothing; trials without which nothing can be said are refused.
+
+    Sway, yaw and rudder must show in a manoeuvring trial: their linear derivatives are refused if they do not, and so
+    are acceleration derivatives, which are free only where they were asked for. The others are returned, to be held at
+    what was known of them before: a zigzag need not show what the speed does, least of all without a log.
 
     A parameter is seen if a large change (:func:`_large`) would show in the weak form of the equations: move the mean
     accelerations by one standard deviation of the residuals, all windows taken together. What moves no more than its
@@ -121,7 +125,7 @@ def refuse_unseen(problem: Problem) -> None:
     Raises
     ------
     InputError
-        Names the parameters, and what must move to show them.
+        Names the parameters that are refused, and what must move to show them.
     """
     estimate = equation_error(problem, settings=Settings(rounds=2))
     form = WeakForm(problem)
@@ -139,10 +143,17 @@ def refuse_unseen(problem: Problem) -> None:
         least = LEAST_OF_LINEAR if term is not None and _linear(term) else 1.0
         if form.seen[place] and np.sum(shown**2) < least:
             missing.append(name)
-    if missing:
+    needed = [name for name in missing if _needed(parse_term(_short(name)))]
+    if needed:
         runs = ", ".join(run.name for run in problem.runs)
-        told = ", ".join(_short(name) for name in missing)
-        raise InputError(runs, "", f"shows nothing of {told}", _remedy(missing))
+        told = ", ".join(_short(name) for name in needed)
+        raise InputError(runs, "", f"shows nothing of {told}", _remedy(needed))
+    return tuple(missing)
+
+
+def _needed(term: Term | None) -> bool:
+    """True for a derivative without which trials are of no manoeuvre, or that is free only because it was asked for."""
+    return term is not None and (bool(term.acceleration) or (_linear(term) and not term.u))
 
 
 def _large(problem: Problem, values: Vector) -> Vector:

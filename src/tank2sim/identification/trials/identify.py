@@ -22,10 +22,11 @@ from tank2sim.identification.trials.identifiability import Identifiability, iden
 from tank2sim.identification.trials.inference import scaled_prior
 from tank2sim.identification.trials.kalman import kalman
 from tank2sim.identification.trials.measured import Measured
+from tank2sim.identification.trials.other_ship import other_ship
 from tank2sim.identification.trials.output_error import Settings, output_error
 from tank2sim.identification.trials.portable import portable
 from tank2sim.identification.trials.problem import Estimate, Problem, Progress, silent
-from tank2sim.identification.trials.question import answered, pose
+from tank2sim.identification.trials.question import answered, pose, with_speeds
 from tank2sim.identification.trials.recursive import recursive
 from tank2sim.identification.trials.selection import (
     Criteria,
@@ -75,6 +76,8 @@ class Options:
         Members of a parametric bootstrap of the estimates; 0 for none.
     hold : tuple of str
         Derivatives (``Xuuu``) and parameters of effects (``wind.yaw_coefficient``) that stay as the card has them.
+    force : bool
+        Fit trials also where they look like those of another ship (:mod:`.other_ship`).
     """
 
     method: str = "output_error"
@@ -85,6 +88,7 @@ class Options:
     members: int = 100
     bootstrap: int = 0
     hold: tuple[str, ...] = ()
+    force: bool = False
 
 
 AUTO = "auto"
@@ -115,6 +119,8 @@ class Identification:
         Of the model: the one asked for, or chosen.
     manoeuvres : mapping
         Trial to what it was recognised as, in words.
+    forced : tuple of str
+        What speaks against the trials being of the card's ship, where they were fitted all the same.
     structures : mapping
         Cross-validation of each structure that was tried: none, unless the choice was left to it.
     criteria : Criteria or None
@@ -140,6 +146,7 @@ class Identification:
     criteria: Criteria | None
     bootstrap: Array | None
     manoeuvres: Mapping[str, str]
+    forced: tuple[str, ...]
     notices: tuple[str, ...]
 
 
@@ -168,8 +175,8 @@ def identify(
     Raises
     ------
     InputError
-        The trials do not excite what is to be estimated, lack signals that are needed, or are driven otherwise than
-        those held out.
+        The trials look like those of another ship than the card's, or of two, do not excite what is to be estimated,
+        lack signals that are needed, or are driven otherwise than those held out.
     """
     options = options or Options()
     try:
@@ -192,10 +199,17 @@ def _identified(
     structure = simplest(tried) if tried else options.structure
     started = STRUCTURES[structure].start(card)
     problem = pose(started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold)
-    refuse_unseen(problem)
+    unseen = refuse_unseen(problem)
+    problem = problem.without(unseen)
+    against = other_ship(pose(card, trials.trials, trials.driven_by))  # not in a structure that knows less
+    if against and not options.force:
+        names = ", ".join(trial.name for trial in trials.trials)
+        problem_told = f"not trials of the ship of {card.source}: {'; '.join(against)}"
+        raise InputError(names, "", problem_told, "give the card and the trials of one ship, or --force")
     estimate = estimated(problem, options, progress)
-    improved = answered(started, estimate)
-    answer = Answer(problem, estimate, improved)
+    improved = with_speeds(answered(started, estimate), problem)
+    whole = started.model.valid_speed_mps is None
+    answer = Answer(problem, estimate, improved, whole)
     noise = noise_of(trials, problem)
     result = identifiability(problem, estimate)
     held = holdout if holdout is not None and holdout.trials else None
@@ -206,7 +220,7 @@ def _identified(
         estimate=estimate,
         identifiability=result,
         noise=noise,
-        fit=compared(improved, trials, estimate.noise),
+        fit=compared(improved, trials, estimate.noise, whole=whole),
         holdout=held_out(answer, held, options.members, executor) if held else None,
         before=compared(card, trials, estimate.noise),
         before_holdout=compared(card, held, estimate.noise) if held else None,
@@ -216,8 +230,15 @@ def _identified(
         bootstrap=bootstrapped(
             answer, trials.driven_by, partial(_in_pieces, options=options), options.bootstrap, executor
         ),
+        forced=against,
         manoeuvres=_manoeuvres(improved, (*trials.trials, *(held.trials if held else ()))),
-        notices=(*trials.notices, *(held.notices if held else ()), *_told(card), *estimate.notices),
+        notices=(
+            *trials.notices,
+            *(held.notices if held else ()),
+            *_told(card),
+            *_told_unseen(unseen),
+            *estimate.notices,
+        ),
     )
 
 
@@ -290,6 +311,13 @@ def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
     results = following(problem, estimate.values, estimate.noise)
     limits = {name: WHOLE_RUN_MISFIT * deviation for name, deviation in estimate.noise.items()}
     return all(error <= limits[name] for result in results for name, error in result.whole.items())
+
+
+def _told_unseen(names: Sequence[str]) -> Sequence[str]:
+    if not names:
+        return ()
+    told = ", ".join(name.removeprefix("derivatives.") for name in names)
+    return (f"the trials show nothing of {told}: held as the card has them",)
 
 
 def _told(card: ManoeuvringCard) -> Sequence[str]:

@@ -13,6 +13,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.errors import InputError
 from tank2sim.records.audit import Finding, audited
 from tank2sim.records.reading import read_trial
+from tank2sim.records.same_record import refuse_copies
 from tank2sim.records.trials import RUDDERS, Trial, froude_scaled
 
 TYPICAL_SPEED = 95
@@ -49,9 +50,9 @@ def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
     Raises
     ------
     InputError
-        A file is at fault, the audit finds a fault that it cannot repair, two trials have one name, a trial is of
-        another size and does not tell its scale, or the rudder's angle is known in some trials and only its order in
-        others.
+        A file is at fault, the audit finds a fault that it cannot repair, two trials have one name or are one record, a
+        trial is of another size and does not tell its scale, or the rudder's angle is known in some trials and only its
+        order in others.
     """
     trials, notices = [], []
     for path in paths:
@@ -71,6 +72,7 @@ def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
     for trial in trials:
         if names.count(trial.name) > 1:
             raise InputError(trial.path, "", "has the name of another trial", "give each file once, under its own name")
+    refuse_copies(trials)
     by_angle = ["delta_rad" in trial.signals for trial in trials]
     if any(by_angle) and not all(by_angle):
         odd = trials[by_angle.index(False)]

@@ -19,7 +19,7 @@ from tank2sim.dynamics.model import Model, Vector
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem import Problem
 from tank2sim.identification.trials.runs import Run
-from tank2sim.simulation.recorded import SMOOTHING
+from tank2sim.simulation.recorded import SMOOTHING, drift_over_ground
 
 Array = NDArray[np.float64]
 
@@ -116,20 +116,9 @@ def _velocities(model: Model, run: Run, columns: dict[str, Vector], window: int)
     else:
         north, east = _turned(*ground, psi)
         how = "from the velocities over the ground"
-    drift = _current(model, run, psi)
+    drift = drift_over_ground(model, run.inputs, _filled(psi))
     u, v = _turned(north - drift[:, 0], east - drift[:, 1], -psi)
     return {"motion.u": u, "motion.v": v}, how
-
-
-def _current(model: Model, run: Run, psi: Vector) -> Array:
-    """Velocity over the ground of a ship that rests in the water, north and east (n, 2), m/s."""
-    rest = ca.Function(
-        "rest", [model.x, model.u, model.p], [model.expand(ca.vcat([model.symbol(f"motion.{i}dot") for i in "xy"]))]
-    )
-    states = np.zeros((len(psi), len(model.states)))
-    states[:, model.state_names.index("motion.psi")] = _filled(psi)
-    p = np.repeat(model.parameter_values()[:, None], len(psi), axis=1)
-    return np.array(rest(states.T, run.inputs.T, p)).T
 
 
 def _complete_positions(columns: dict[str, Vector], missing: set[str], step: float) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -73,6 +73,12 @@ class Problem:
     def parameters(self, values: Vector) -> Vector:
         """The model's parameter vector with the free ones at `values` (k,)."""
         return self.model.parameter_values(dict(zip(self.free, map(float, values), strict=True)))
+
+    def without(self, names: Collection[str]) -> Problem:
+        """The same question with some of the free parameters held at what was known of them before."""
+        kept = [place for place, name in enumerate(self.free) if name not in names]
+        free = tuple(self.free[place] for place in kept)
+        return replace(self, free=free, prior_mean=self.prior_mean[kept], prior_error=self.prior_error[kept])
 
     def with_runs(self, runs: tuple[Run, ...]) -> Problem:
         """The same question, asked of other runs."""

@@ -72,8 +72,11 @@ def pose(
     *,
     inertia: bool = False,
     hold: Sequence[str] = (),
+    whole: bool = False,
 ) -> Problem:
     """The problem of fitting a card's free parameters to trials, but for those in `hold`.
+
+    Parts of runs at speeds outside the range that the card states are left out, unless runs are to stay `whole`.
 
     Raises
     ------
@@ -95,7 +98,8 @@ def pose(
     seen = seen_in(model, trials)
     if not seen:
         raise InputError(trials[0].path, "header", "none of its signals can be compared", "give u_mps, r_degps, ...")
-    runs = tuple(part for trial in trials for part in _parts(card, model, prepare(model, trial, seen)))
+    prepared = [prepare(model, trial, seen) for trial in trials]
+    runs = tuple(prepared) if whole else tuple(part for run in prepared for part in _parts(card, model, run))
     if not runs:
         low, high = card.model.speed_range_mps
         problem = f"never goes for long at {low:g} to {high:g} m/s, where the card holds"
@@ -137,6 +141,18 @@ def answered(card: ManoeuvringCard, estimate: Estimate) -> ManoeuvringCard:
         scale = float(card.scales.force) if card.model.scaling == "dimensional" else 1.0
         changes[REVOLUTIONS] = rounded(*found[REVOLUTIONS]) * scale
     return revised(card, derivatives, changes, comment="identified from trials")
+
+
+def with_speeds(card: ManoeuvringCard, problem: Problem) -> ManoeuvringCard:
+    """The card with the speeds of the runs as the range in which it holds, if it states none and they are known."""
+    if card.model.valid_speed_mps is not None:
+        return card
+    speeds = np.concatenate([run.column("motion.u") for run in problem.runs])
+    speeds = speeds[~np.isnan(speeds)]
+    if not len(speeds) or speeds.min() <= 0:
+        return card
+    found = [float(f"{speed:.3g}") for speed in (speeds.min(), speeds.max())]
+    return revised(card, {}, {"model.valid_speed_mps": found}, comment="speeds of the trials")
 
 
 def rounded(value: float, error: float) -> float:

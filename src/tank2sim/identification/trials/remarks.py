@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import numpy as np
-
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
@@ -104,13 +102,3 @@ def _stops(card: ManoeuvringCard) -> list[str]:
                 f"{words} loses {100 * (1 - speed[-1] / speed[0]):.0f} % of its speed: it holds only near the trials"
             )
     return told
-
-
-def speeds_of(result: Identification) -> tuple[float, float] | None:
-    """Least and largest speed of the trials fitted, m/s: the range in which the card was identified."""
-    known = [run.column("motion.u") for run in result.problem.runs]
-    speeds = np.concatenate(known)
-    speeds = speeds[~np.isnan(speeds)]
-    if not len(speeds) or speeds.min() <= 0:
-        return None
-    return float(f"{speeds.min():.3g}"), float(f"{speeds.max():.3g}")

@@ -27,8 +27,9 @@ _SAMPLES = 240
 def replays(card: ManoeuvringCard, result: Identification, trials: Measured) -> tuple[tuple[Passage, Passage], ...]:
     """Each trial beside `card`, the one that was given, and beside the card found."""
     both = []
+    whole = card.model.valid_speed_mps is None  # the card found states the speeds of the trials fitted alone
     for one in (card, result.card):
-        problem = pose(one, trials.trials, trials.driven_by)
+        problem = pose(one, trials.trials, trials.driven_by, whole=whole)
         both.append(passages(problem, one, trials.trials, result.estimate.noise))
     return tuple(zip(*both, strict=True))
 

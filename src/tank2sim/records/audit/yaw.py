@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import correlate, correlation_lags
 
 from tank2sim.records.audit.finding import Finding, Mend
-from tank2sim.records.audit.noise import estimated_noise
+from tank2sim.records.audit.noise import estimated_noise, rounding
 from tank2sim.records.audit.rudder import rudder_response
 from tank2sim.records.audit.time_unit import MISCALIBRATED
 from tank2sim.records.audit.weak import Fit, Windows, fit, on_uniform_time, windows_of
@@ -23,6 +23,9 @@ COARSE = 0.3
 """The same for the course of a track over the heading, for the drift angle turns as well."""
 FACTOR = 0.02
 """Scale error of a rate of turn worth a word: above what rate gyros are usually calibrated to. A choice of ours."""
+ROUNDED = 1.5
+"""Times what rounding is expected to leave that is put down to it: errors of rounding are not quite so random (project
+choice)."""
 _ALIKE = 0.9  # correlation from which two signals are taken for the same motion
 UNLIKE = 0.44
 """What a signal leaves of the spread of another that is the same motion: that of a correlation of 0.9."""
@@ -70,6 +73,8 @@ def yaw_findings(trial: Trial) -> list[Finding]:
     expected = np.hypot(windows.noise_of_rate(noise["psi_rad"]), windows.noise_of_mean(noise["r_radps"]))
     if found.fit.residual < 3 * expected:
         return _without_turn(trial, windows.rate(heading) - windows.mean(rate))
+    if _hidden_by_rounding(trial, rate, heading, step):
+        return []
     ends = [trial.heading(name) for name in ("r_radps", "psi_rad")]
     figures = {"correlation": found.correlation}
     what = f"r and dpsi/dt are not the same motion (correlation {found.correlation:.2f})"
@@ -112,6 +117,22 @@ class _Comparison:
     @property
     def factor(self) -> float:
         return float(self.fit.values[0])
+
+
+def _hidden_by_rounding(trial: Trial, rate: Vector, heading: Vector, step: float) -> bool:
+    """True if what r and dpsi/dt differ by in wide windows is no more than the rounding of the heading may leave.
+
+    An error that is uniform within half a unit, and one value in each half of a window, leaves sqrt(2/12) unit times
+    the largest value of the window, 4/(3/2 width), in the rate: the slower the ship, the nearer it comes to that.
+    """
+    unit = rounding(trial.signals["psi_rad"])
+    if not unit:
+        return False
+    windows = windows_of(heading, unit, step)
+    found = _comparison(windows, rate, heading, step)
+    return (
+        found is None or found.alike or found.fit.residual < ROUNDED * np.sqrt(2 / 12) * unit * 8 / 3 / windows.width_s
+    )
 
 
 def _headings(trial: Trial, heading: Vector) -> list[Vector]:

@@ -1,0 +1,104 @@
+"""Whether two trials are one record: renamed, commented, printed with other digits, cut, or with fewer columns."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from tank2sim.errors import InputError
+from tank2sim.records.audit.noise import rounding, white_noise
+from tank2sim.records.csv_table import Vector
+from tank2sim.records.trials import MEASURED, Trial, sampling_step
+
+PRINTED = 1e-3
+"""Share of a signal's spread by which printing it with other digits may change it; two runs of one manoeuvre differ by
+some per cent (HSVA's zigzags by 2 to 12 % in yaw rate). Project choice."""
+
+NOISE = 0.5
+"""Two runs differ by sqrt(2) times the noise of their sensors at least, one record from itself by nothing: half the
+noise lies between."""
+
+ROUNDED = 1.2
+"""Times what rounding to the coarser of two units leaves that is put down to it (project choice)."""
+
+FAR = 0.3
+"""Signals farther apart than this share of their spread are not looked at any closer (project choice)."""
+
+COMMON = 0.5
+"""Share of the shorter record that must lie at the same times to be compared (project choice)."""
+
+
+def refuse_copies(trials: Sequence[Trial], others: Sequence[Trial] | None = None) -> None:
+    """Refuse trials that are one record: among themselves, or fitted and held out if others are given.
+
+    Raises
+    ------
+    InputError
+        Names the second file, and which one it is again.
+    """
+    if others is None:
+        for number, trial in enumerate(trials):
+            for before in trials[:number]:
+                if same_record(trial, before):
+                    problem = f"is the record of {before.path.name} again"
+                    raise InputError(trial.path, "", problem, "give each record once: a copy is no second run")
+        return
+    for held in others:
+        for trial in trials:
+            if same_record(held, trial):
+                problem = f"is both fitted and held out: it is the record of {trial.path.name}"
+                raise InputError(held.path, "", problem, "hold out what is not fitted")
+
+
+def same_record(one: Trial, other: Trial) -> bool:
+    """True if all signals that both measured are the same at the same times, but for their printed digits.
+
+    Times count from the first row of each, or as they are, whichever fits. Both are at the size of one ship. A signal
+    that does not move says nothing.
+    """
+    if sampling_step(one) < sampling_step(other):  # at the rows of the coarser one, between which nothing is drawn
+        one, other = other, one
+    names = [name for name in MEASURED if name in one.signals and name in other.signals]
+    shifts = dict.fromkeys((0.0, float(one.time_s[0] - other.time_s[0])))
+    return bool(names) and any(_same_at(one, other, names, shift) for shift in shifts)
+
+
+def _same_at(one: Trial, other: Trial, names: Sequence[str], shift: float) -> bool:
+    time = other.time_s + shift
+    inside = (one.time_s >= time[0]) & (one.time_s <= time[-1])
+    spans = [float(times[-1] - times[0]) for times in (one.time_s, time)]
+    common = one.time_s[inside]
+    if len(common) < 2 or common[-1] - common[0] < COMMON * min(spans):
+        return False
+    alike = False
+    for name in names:
+        verdict = _alike(one.signals[name][inside], _at(common, time, other.signals[name]))
+        if verdict is False:
+            return False
+        alike = alike or verdict is True
+    return alike
+
+
+def _at(common: Vector, time: Vector, values: Vector) -> Vector:
+    known = ~np.isnan(values)
+    if np.count_nonzero(known) < 2:
+        return np.full(len(common), np.nan)
+    return np.interp(common, time[known], values[known])
+
+
+def _alike(one: Vector, other: Vector) -> bool | None:
+    """None where neither moves."""
+    known = ~np.isnan(one + other)
+    if np.count_nonzero(known) < 2:
+        return None
+    one, other = one[known], other[known]
+    spread = float(np.std(one))
+    if not spread > 0:
+        return None
+    apart = float(np.sqrt(np.mean((one - other) ** 2)))
+    if apart > FAR * spread:
+        return False
+    noise, unit = min(white_noise(one), white_noise(other)), max(rounding(one), rounding(other))
+    return apart <= max(PRINTED * spread, NOISE * noise, ROUNDED * unit / math.sqrt(12))

@@ -1,0 +1,193 @@
+"""The rudder of a recorded manoeuvre: angles that were held, when each was ordered, and how the rudder got there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.dynamics.model import Vector
+from tank2sim.records.trials import Trial
+
+Places = NDArray[np.int64]
+
+LEAST_RUDDER = math.radians(2.0)
+"""A rudder that never exceeds this is no manoeuvre."""
+
+STEADY = 0.02
+HELD = 0.05
+"""A rudder is held when it stays within a share STEADY of an angle for a share HELD of the longest such time: project
+choices. In the approaches of the 3 m Esso Osaka it stays for 2 % of that at most, at the first angle of zigzags of the
+KVLCC2 for 13 % at least (35/5)."""
+
+STEEPER = 3.0
+"""A rudder on its way does not speed up by this factor: gears have constant rates, or slow down (project choice)."""
+
+ROUNDS = 6
+"""Each halves what a record that begins with the rudder on its way leaves of its error: a project choice."""
+
+REACHED = 0.9
+"""Share of an angle at which the rudder counts as there: above the shares by which its rate is read off, below what the
+last part of a gear with a lag makes slow (project choice)."""
+
+LEFT = 0.05
+"""An order has left the one before it when it has changed by this share of the change: a step does so at once, and an
+order that is ramped is dated near its beginning (project choice)."""
+
+
+@dataclass(frozen=True)
+class HeldRudder:
+    """A rudder angle that was held.
+
+    Parameters
+    ----------
+    angle : float
+        As it was reached, rad, positive to starboard.
+    execute_s : float
+        When it was ordered: the step of the order where the record has it, else when the rudder began to move.
+    moves_s : float
+        When the rudder began to move there; the execute where only the order is known.
+    rate : float or None
+        Rate at which the rudder went over, rad/s; None where only the order is known.
+    end_s : float
+        Until when it was held.
+    """
+
+    angle: float
+    execute_s: float
+    moves_s: float
+    rate: float | None
+    end_s: float
+
+
+def held_rudders(trial: Trial) -> list[HeldRudder]:
+    """Angles at which the rudder of a trial was held, one side after the other; none if it was not used.
+
+    The rudder begins to move where the straight part of its way, drawn back, meets the angle that it left. If the
+    record has the order, too, its step is the execute; an order that does not show the same angles is passed over.
+    """
+    moved, ordered = _of_angle(trial), _of_order(trial)
+    if not moved or not ordered:
+        return moved or ordered
+    if len(moved) != len(ordered):
+        return moved
+    pairs = list(zip(moved, ordered, strict=True))
+    if any(move.angle * order.angle <= 0 or order.execute_s > move.end_s for move, order in pairs):
+        return moved
+    return [replace(move, execute_s=order.execute_s) for move, order in pairs]
+
+
+def rudder_of(trial: Trial) -> Vector:
+    """The rudder's angle (n,), rad, without gaps; its order where that alone is known."""
+    angle = _known(trial, "delta_rad")
+    if angle is not None:
+        return np.interp(trial.time_s, *angle)
+    order = _known(trial, "delta_order_rad")
+    assert order is not None  # a trial without rudder is refused on reading
+    return _held_order(trial.time_s, *order)
+
+
+def _known(trial: Trial, name: str) -> tuple[Vector, Vector] | None:
+    """Times and values (m,) of the readings of a signal; None if there are none."""
+    values = trial.signals.get(name)
+    if values is None or np.isnan(values).all():
+        return None
+    known = ~np.isnan(values)
+    return trial.time_s[known], values[known]
+
+
+def _held_order(time: Vector, known: Vector, values: Vector) -> Vector:
+    """An order (n,) that holds until the next."""
+    held: Vector = values[np.clip(np.searchsorted(known, time, side="right") - 1, 0, None)]
+    return held
+
+
+def _of_angle(trial: Trial) -> list[HeldRudder]:
+    if _known(trial, "delta_rad") is None:
+        return []
+    time, rudder = trial.time_s, rudder_of(trial)
+    found: list[HeldRudder] = []
+    before = 0
+    for group in _held(rudder):
+        angle = float(np.median(rudder[group]))
+        there = group[np.abs(rudder[group]) >= REACHED * abs(angle)]
+        stretch = slice(before, int(there[0] if len(there) else group[0]) + 1)
+        if found:
+            moves, rate = _begins(time[stretch], rudder[stretch], found[-1].angle, angle)
+        else:
+            moves, rate = _first_begins(time[stretch], rudder[stretch], angle)
+        found.append(HeldRudder(angle, moves, moves, min(rate, math.pi), float(time[group[-1]])))
+        before = int(group[-1])
+    return found
+
+
+def _of_order(trial: Trial) -> list[HeldRudder]:
+    known = _known(trial, "delta_order_rad")
+    if known is None:
+        return []
+    time, order = trial.time_s, _held_order(trial.time_s, *known)
+    found: list[HeldRudder] = []
+    before = 0
+    for group in _held(order):
+        angle = float(np.median(order[group]))
+        left = found[-1].angle if found else float(np.median(order[before : int(group[0])] if group[0] else order[:1]))
+        way = math.copysign(1.0, angle - left) * (order[before : int(group[0]) + 1] - left)
+        still = np.flatnonzero(way < LEFT * abs(angle - left))
+        execute = float(time[min(before + int(still[-1]) + 1, int(group[0]))] if len(still) else time[before])
+        found.append(HeldRudder(angle, execute, execute, None, float(time[group[-1]])))
+        before = int(group[-1])
+    return found
+
+
+def _first_begins(time: Vector, rudder: Vector, angle: float) -> tuple[float, float]:
+    """The same from the approach, whose rudder is its median until the execute: the two are found in turn."""
+    origin = float(np.median(rudder))
+    for _ in range(ROUNDS):
+        execute, _ = _begins(time, rudder, origin, angle)
+        origin = float(np.median(rudder[: max(1, int(np.searchsorted(time, execute)))]))
+    return _begins(time, rudder, origin, angle)
+
+
+def _begins(time: Vector, rudder: Vector, origin: float, angle: float) -> tuple[float, float]:
+    """When the rudder began to move from one angle to another, s, and its rate, rad/s, at the end of a stretch."""
+    sign = math.copysign(1.0, angle)
+    course, whole = sign * (rudder - origin), sign * (angle - origin)
+    quarter, most, more = (_last_crossing(time, course, share * whole) for share in (0.25, 0.7, 0.85))
+    rate, last = 0.45 * whole / max(most - quarter, 1e-9), 0.15 * whole / max(more - most, 1e-9)
+    if last > STEEPER * rate:  # it kept the course at more than a quarter of the angle, and left from there
+        rate = last
+    return most - 0.7 * whole / rate, rate
+
+
+def _held(rudder: Vector) -> list[Places]:
+    """Samples of each angle that was held, one side after the other.
+
+    A rudder that keeps the course before the execute may go as far over as later for the manoeuvre, but stays nowhere:
+    what comes before the first angle that is held is of the approach.
+    """
+    size = float(np.percentile(np.abs(rudder), 95))
+    if size < LEAST_RUDDER:
+        return []
+    side = np.where(np.abs(rudder) > 0.8 * size, np.sign(rudder), 0)
+    places = np.flatnonzero(side)
+    parts = np.split(places, np.flatnonzero((np.diff(side[places]) != 0) | (np.diff(places) > 1)) + 1)
+    runs = [part for part in parts if len(part) >= 3]
+    if not runs:
+        return []
+    steady = [np.count_nonzero(np.abs(rudder[run] - np.median(rudder[run])) < STEADY * size) for run in runs]
+    first = next(number for number, count in enumerate(steady) if count >= HELD * max(steady))
+    kept = runs[first:]
+    turns = [number for number in range(1, len(kept)) if side[kept[number][0]] != side[kept[number - 1][0]]]
+    return [np.concatenate(kept[a:b]) for a, b in pairwise([0, *turns, len(kept)])]
+
+
+def _last_crossing(time: Vector, course: Vector, level: float) -> float:
+    below = np.flatnonzero(course < level)
+    last = int(below[-1]) if len(below) else 0
+    if last + 1 >= len(course):
+        return float(time[last])
+    share = (level - course[last]) / (course[last + 1] - course[last])
+    return float(time[last] + share * (time[last + 1] - time[last]))

@@ -1,0 +1,61 @@
+"""One record in several disguises, and runs that are alike without being one record."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tank2sim.errors import InputError
+from tank2sim.records.reading import looks_like_a_trial, read_trial
+from tank2sim.records.same_record import refuse_copies, same_record
+from tests.records.motions import motion, trial
+
+MOTIONS = {kind: motion(kind) for kind in ("zigzag", "turn", "straight")}
+
+
+def digits(values, count):
+    unit = 10.0 ** (np.floor(np.log10(np.abs(values) + 1e-300)) - count + 1)
+    return np.round(values / unit) * unit
+
+
+def changed(one, **changes):
+    return replace(one, path=Path("copy.csv"), **changes)
+
+
+@pytest.mark.parametrize("kind", MOTIONS)
+def test_a_record_is_found_in_every_disguise(kind):
+    one = trial(MOTIONS[kind])
+    signals = one.signals
+    disguises = {
+        "renamed": changed(one),
+        "fewer digits": changed(one, signals={name: digits(values, 4) for name, values in signals.items()}),
+        "three digits": changed(one, signals={name: digits(values, 3) for name, values in signals.items()}),
+        "fewer columns": changed(one, signals={name: signals[name] for name in ("delta_rad", "psi_rad", "x_m")}),
+        "another clock": changed(one, time_s=one.time_s + 1000.0),
+        "cut": changed(one, time_s=one.time_s[900:], signals={name: values[900:] for name, values in signals.items()}),
+        "every second row": changed(one, time_s=one.time_s[::2], signals={n: v[::2] for n, v in signals.items()}),
+    }
+    missed = [how for how, copy in disguises.items() if not (same_record(one, copy) and same_record(copy, one))]
+    assert not missed
+    with pytest.raises(InputError, match=r"copy\.csv.*record of made_up\.csv again"):
+        refuse_copies([one, disguises["renamed"]])
+    with pytest.raises(InputError, match=r"copy\.csv.*both fitted and held out"):
+        refuse_copies([one], [disguises["fewer digits"]])
+
+
+@pytest.mark.parametrize("kind", MOTIONS)
+def test_a_second_run_of_the_same_manoeuvre_is_another_record(kind):
+    """The most alike that runs can be: the same motion to the last metre, through sensors of their own."""
+    runs = [trial(MOTIONS[kind], seed=seed) for seed in range(5)]
+    refuse_copies(runs)
+    refuse_copies(runs[:2], runs[2:])
+
+
+def test_measured_records_are_no_copies_of_each_other(data: Path) -> None:
+    folders = [data / "data" / name for name in ("kvlcc2_hsva", "kvlcc2_marin", "gap_cases/case_1", "gap_cases/case_5")]
+    folders += [path for path in (data / "data/esso_osaka").glob("*") if path.is_dir()]
+    for folder in folders:
+        trials = [read_trial(path) for path in sorted(folder.glob("*.*")) if looks_like_a_trial(path)]
+        assert len(trials) > 1
+        refuse_copies(trials)
