@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -110,6 +111,26 @@ def test_a_trial_without_excitation_is_refused_by_the_terms_it_cannot_see(folder
     result = tank2sim("identify", "off.toml", "straight.csv", "-o", "never.toml", cwd=folder)
     refused(result, "straight", "Nr", "Nd")
     assert not (folder / "never.toml").exists()
+
+
+def test_a_card_that_was_never_measured_in_yaw_holds_after_the_fit_as_far_as_the_trials_went(folder: Path) -> None:
+    text = (folder / "off.toml").read_text()
+    narrow = "valid_yaw_rate_prime = 0.0\nvalid_rudder_deg = 12.0\nvalid_drift_deg = 60.0\n"
+    (folder / "narrow.toml").write_text(re.sub(r"(rudder_sign = .*\n)", rf"\1{narrow}", text))
+    files = ("zigzag20.csv", "turn25.csv")
+    arguments = ("identify", "narrow.toml", *files, "--method", "equation_error", "-o", "wide.toml")
+    assert tank2sim(*arguments, cwd=folder).returncode == 0
+    card = read_card(str(folder / "wide.toml"))
+    assert isinstance(card, ManoeuvringCard)
+    rates, rudders = [], []
+    for name in files:
+        heads, *rows = (folder / name).read_text().splitlines()
+        table = dict(zip(heads.split(","), np.array([row.split(",") for row in rows], dtype=float).T, strict=True))
+        rates.append(np.max(np.abs(np.radians(table["r_degps"])) * LENGTH / table["u_mps"]))
+        rudders.append(np.max(np.abs(table["delta_deg"])))
+    assert card.model.valid_yaw_rate_prime == pytest.approx(max(rates), rel=0.15)
+    assert np.degrees(card.model.valid_rudder_rad or 0.0) == pytest.approx(max(rudders), rel=0.02)
+    assert np.degrees(card.model.valid_drift_rad) == pytest.approx(60.0)  # stated further than the trials went: kept
 
 
 def test_a_term_that_is_held_stays_as_the_card_has_it(folder: Path) -> None:

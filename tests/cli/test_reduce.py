@@ -1,13 +1,18 @@
 """``tank2sim reduce``: files written together or not at all, results on screen and as JSON."""
 
 import json
+import math
+import tomllib
 
 import pytest
 from click.testing import CliRunner
 
 from tank2sim.cards import read_card
 from tank2sim.cli.reduce import command
+from tank2sim.dynamics import build
 from tank2sim.errors import InputError
+from tank2sim.simulation.manoeuvres import Turn
+from tank2sim.simulation.run import simulate
 from tests.identification.captive.generator import Campaign, write
 
 
@@ -60,6 +65,23 @@ def test_what_is_estimated_and_what_is_missing_is_said(path, tmp_path):
     filled = run(path, "--fill", "clarke1983", "-o", tmp_path / "card.toml").output
     assert "Estimated, not measured" in filled
     assert "ESTIMATED" in (tmp_path / "card.toml").read_text()
+
+
+def test_the_card_says_how_far_the_tests_went_and_marks_what_goes_beyond(path, tmp_path):
+    card_file = tmp_path / "card.toml"
+    run(path, "-o", card_file, "--fill", "clarke1983")
+    campaign = tomllib.loads(path.read_text())
+    runs, speed, length = campaign["runs"], campaign["test"]["speed_mps"], campaign["model"]["length_m"]
+    sway = max(one.get("amplitude_m", 0.0) * one.get("frequency_radps", 0.0) for one in runs)
+    drift = max(sway / speed, *(abs(math.sin(one.get("drift_rad", 0.0))) for one in runs))
+    card = read_card(card_file)
+    assert card.model.valid_drift_rad == pytest.approx(math.asin(drift), rel=0.05)
+    assert card.model.valid_rudder_rad == pytest.approx(max(one.get("rudder_rad", 0.0) for one in runs), rel=0.01)
+    rate = max(one.get("yaw_rate_amplitude_radps", 0.0) for one in runs) * length / speed
+    assert card.model.valid_yaw_rate_prime == pytest.approx(rate, rel=0.05)
+    hard, gentle = (simulate(build(card), Turn(math.radians(angle))).reading for angle in (35.0, 2.0))
+    assert hard.outside("advance_m") and "rudder to 35 deg (card 10 deg)" in hard.how
+    assert "rudder" not in gentle.how
 
 
 def test_a_card_at_ship_scale_tells_the_reynolds_ratio(path, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -103,6 +104,14 @@ def yaw_rig_card_text(result: YawRigResult) -> str:
     return tomlkit.dumps(document)
 
 
+class TestedRange(NamedTuple):
+    """Largest drift angle and rudder angle (rad) and r' of the tests behind a card."""
+
+    drift_rad: float
+    rudder_rad: float
+    yaw_rate_prime: float
+
+
 class DerivativeEntry(NamedTuple):
     """A derivative (prime, rudder positive to starboard), its standard error, and how it was found."""
 
@@ -125,6 +134,8 @@ class ManoeuvringResult:
         Keys of ``[environment]``, SI.
     speed_mps : float
         u0, about which the forces are expanded.
+    largest : TestedRange
+        How far the tests went.
     rigid_body : mapping
         ``mass``, ``yaw_inertia``, ``x_G``.
     inertia_source : str
@@ -138,6 +149,7 @@ class ManoeuvringResult:
     notes: str
     environment: Mapping[str, float]
     speed_mps: float
+    largest: TestedRange
     rigid_body: Mapping[str, float]
     inertia_source: str
     derivatives: Mapping[str, DerivativeEntry]
@@ -157,6 +169,9 @@ def manoeuvring_card_text(result: ManoeuvringResult) -> str:
             "speed_scale": "instantaneous",
             "yaw_rate_terms": "hydrodynamic",
             "rudder_sign": "starboard",
+            "valid_drift_deg": float(f"{math.degrees(result.largest.drift_rad):.3g}"),
+            "valid_rudder_deg": float(f"{math.degrees(result.largest.rudder_rad):.3g}"),
+            "valid_yaw_rate_prime": float(f"{result.largest.yaw_rate_prime:.3g}"),
         }
     )
     body = _table({key: float(f"{value:.6g}") for key, value in result.rigid_body.items()})

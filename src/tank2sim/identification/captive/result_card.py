@@ -6,7 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tank2sim.cards.writing import DerivativeEntry, ManoeuvringResult, manoeuvring_card_text
+import numpy as np
+
+from tank2sim.cards.writing import DerivativeEntry, ManoeuvringResult, TestedRange, manoeuvring_card_text
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.reduction import ESSENTIAL, Reduction, is_resistance
@@ -177,11 +179,23 @@ def card_text(reduction: Reduction, card: Contents, scale: float = 1.0) -> str:
             notes=_notes(reduction, card, scale),
             environment=environment,
             speed_mps=float(f"{speed:.6g}"),
+            largest=_tested(reduction),
             rigid_body={"mass": card.mass, "yaw_inertia": card.yaw_inertia, "x_G": card.x_G},
             inertia_source=card.inertia_source,
             derivatives=card.entries,
         )
     )
+
+
+def _tested(reduction: Reduction) -> TestedRange:
+    """How far the runs that were used went in drift, rudder and yaw rate."""
+    drift, rudder, rate = [0.0], [0.0], [0.0]
+    for run in reduction.runs:
+        motion, speed = run.motion, run.motion.speed_mps
+        drift.append(float(np.max(np.arcsin(np.minimum(np.abs(motion.v_mps) / speed, 1.0)))))
+        rudder.append(float(np.max(np.abs(motion.delta_rad))))
+        rate.append(float(np.max(np.abs(motion.r_radps) / speed)) * reduction.campaign.model.length_m)
+    return TestedRange(max(drift), max(rudder), max(rate))
 
 
 def _in_figures(particulars: Mapping[str, float | str]) -> dict[str, float | str]:

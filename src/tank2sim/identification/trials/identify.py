@@ -26,7 +26,7 @@ from tank2sim.identification.trials.other_ship import other_ship
 from tank2sim.identification.trials.output_error import Settings, output_error
 from tank2sim.identification.trials.portable import portable
 from tank2sim.identification.trials.problem import Estimate, Problem, Progress, silent
-from tank2sim.identification.trials.question import answered, pose, with_speeds
+from tank2sim.identification.trials.question import answered, pose, with_range
 from tank2sim.identification.trials.recursive import recursive
 from tank2sim.identification.trials.selection import (
     Criteria,
@@ -207,7 +207,7 @@ def _identified(
         problem_told = f"not trials of the ship of {card.source}: {'; '.join(against)}"
         raise InputError(names, "", problem_told, "give the card and the trials of one ship, or --force")
     estimate = estimated(problem, options, progress)
-    improved = with_speeds(answered(started, estimate), problem)
+    improved = with_range(answered(started, estimate), problem)
     whole = started.model.valid_speed_mps is None
     answer = Answer(problem, estimate, improved, whole)
     noise = noise_of(trials, problem)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -12,12 +12,13 @@ from tank2sim.cards.reading import revised
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.model import Model, Vector
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.driving import driven_by_angle, with_ground_velocities
 from tank2sim.identification.trials.problem import Estimate, Problem
 from tank2sim.identification.trials.runs import Run, in_range, prepare, seen_in
 from tank2sim.records.trials import Trial
+from tank2sim.units import from_si
 
 LEAST_PART = 2.0
 """Parts of a run inside the card's range of speeds are used if they last this many L/u0 (ours)."""
@@ -143,16 +144,41 @@ def answered(card: ManoeuvringCard, estimate: Estimate) -> ManoeuvringCard:
     return revised(card, derivatives, changes, comment="identified from trials")
 
 
-def with_speeds(card: ManoeuvringCard, problem: Problem) -> ManoeuvringCard:
-    """The card with the speeds of the runs as the range in which it holds, if it states none and they are known."""
-    if card.model.valid_speed_mps is not None:
-        return card
-    speeds = np.concatenate([run.column("motion.u") for run in problem.runs])
-    speeds = speeds[~np.isnan(speeds)]
-    if not len(speeds) or speeds.min() <= 0:
-        return card
-    found = [float(f"{speed:.3g}") for speed in (speeds.min(), speeds.max())]
-    return revised(card, {}, {"model.valid_speed_mps": found}, comment="speeds of the trials")
+def with_range(card: ManoeuvringCard, problem: Problem) -> ManoeuvringCard:
+    """The card with the range that it holds in after the fit.
+
+    The speeds of the runs, if it states none and they are known; its largest drift, yaw rate and rudder angle where the
+    runs went further than it states.
+    """
+    changes: dict[str, object] = {}
+    columns = {name: np.concatenate([run.column(f"motion.{name}") for run in problem.runs]) for name in "uvr"}
+    speeds = columns["u"][~np.isnan(columns["u"])]
+    if card.model.valid_speed_mps is None and len(speeds) and speeds.min() > 0:
+        changes["model.valid_speed_mps"] = [float(f"{speed:.3g}") for speed in (speeds.min(), speeds.max())]
+    reached = _reached(card, problem, columns)
+    stated = {
+        "valid_drift_rad": card.model.valid_drift_rad,
+        "valid_yaw_rate_prime": card.model.valid_yaw_rate_prime,
+        "valid_rudder_rad": np.inf if card.model.valid_rudder_rad is None else card.model.valid_rudder_rad,
+    }
+    for name, largest in reached.items():
+        if largest > stated[name]:
+            key = name if name in card.text else name.replace("_rad", "_deg")
+            changes[f"model.{key}"] = float(f"{from_si(key, largest):.3g}")
+    return revised(card, {}, changes, comment="range of the trials") if changes else card
+
+
+def _reached(card: ManoeuvringCard, problem: Problem, columns: Mapping[str, Vector]) -> dict[str, float]:
+    """Largest drift angle (rad), r L/U and rudder angle (rad) of the runs: of 99 in 100 instants, for noise."""
+    known = columns["u"] > 0
+    found = {
+        "valid_drift_rad": np.arctan2(np.abs(columns["v"][known]), columns["u"][known]),
+        "valid_yaw_rate_prime": np.abs(columns["r"][known]) * card.ship.length_m / columns["u"][known],
+    }
+    rudder = next(place for place, name in enumerate(problem.model.input_names) if name.startswith("rudder."))
+    found["valid_rudder_rad"] = np.abs(np.concatenate([run.inputs[:, rudder] for run in problem.runs]))
+    finite = {name: values[np.isfinite(values)] for name, values in found.items()}
+    return {name: float(np.quantile(values, 0.99)) for name, values in finite.items() if len(values)}
 
 
 def rounded(value: float, error: float) -> float:
