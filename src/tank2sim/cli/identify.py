@@ -31,6 +31,7 @@ from tank2sim.identification.trials.measured import Measured
 from tank2sim.identification.trials.remarks import remarks
 from tank2sim.identification.trials.replays import replays, replays_as_json
 from tank2sim.identification.trials.structures import STRUCTURES
+from tank2sim.marks import FORCED
 from tank2sim.units import in_words
 
 
@@ -180,7 +181,7 @@ def _pictures(
 def _show(result: Identification, told: tuple[str, ...]) -> None:
     estimate = result.estimate
     if result.forced:
-        screen.print(f"FORCED: {'; '.join(result.forced)}", soft_wrap=True, markup=False)
+        screen.print(f"{FORCED}: {'; '.join(result.forced)}", soft_wrap=True, markup=False)
     title = f"{result.card.ship.name}: {len(estimate.free)} coefficients from {len(result.problem.runs)} trials"
     show_table(title, ["", "found", "before", "from trials"], estimate_rows(result))
     if result.bootstrap is not None:

@@ -11,6 +11,7 @@ from tank2sim.files import BYTE_ORDER_MARK
 from tank2sim.identification.trials.comparison import Comparison, misfit
 from tank2sim.identification.trials.evaluation import Figure, Following, pooled
 from tank2sim.identification.trials.identify import Identification
+from tank2sim.marks import FORCED
 
 NO_YAW = 3.0
 """A run whose yaw rate stays below this many times its noise goes straight."""
@@ -170,7 +171,7 @@ def improved_text(result: Identification, trials: list[str]) -> str:
     card = result.card
     how = f"identified by tank2sim ({result.estimate.method}, {result.structure}) from {', '.join(trials)}"
     if result.forced:
-        how = f"FORCED, although not of this ship by the rudder's moment: {how}"
+        how = f"{FORCED}, although not of this ship by the rudder's moment: {how}"
     changes: dict[str, object] = {"ship.source": f"{card.ship.source}; {how}"}
     if card.ship.notes:
         changes["ship.notes"] = f"Before it was {how}: {card.ship.notes}"
