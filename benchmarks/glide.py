@@ -12,7 +12,7 @@ import time
 from paper_numbers import PaperNumbers
 
 from tank2sim.analysis.glide.design import best_glide, fastest_glide
-from tank2sim.analysis.glide.path import fly
+from tank2sim.analysis.glide.path import GlidePath, fly
 from tank2sim.analysis.glide.steady import (
     SteadyGlide,
     force_residual,
@@ -115,7 +115,8 @@ def _data(card: GliderCard) -> None:
     number("m_h + m_b, kg, beside rho V", 50, 1000 * 0.0628, None, heavy)
 
 
-def main() -> int:
+def of_the_paper() -> tuple[GliderCard, GlidePath]:
+    """Its numbers; the card and the sample path."""
     card = read_card("kulikovsky-velikanov")
     assert isinstance(card, GliderCard)
     steady(card)
@@ -125,6 +126,11 @@ def main() -> int:
     for step, expected in PLACES.items():
         beside(f"after step {step}", "x m, lateral m, height m", expected[:3], path.places[step][1:4], 1e-2)
         beside(f"after step {step}", "heading rad", expected[3:], path.places[step][4:], 1e-3)
+    return card, path
+
+
+def main() -> int:
+    card, path = of_the_paper()
     fast = fastest_glide(card)
     print(f"best glide {1 / math.tan(-best_glide(card).path_angle_rad):.4f} m over the ground per m of depth; fastest")
     print(f"  at {-math.degrees(fast.path_angle_rad):.3f} deg, {fast.horizontal_speed_mps:.4f} m/s over the ground")

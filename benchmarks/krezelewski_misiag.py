@@ -111,11 +111,16 @@ def mechanism(number: PaperNumbers) -> None:
         number(name, value, found[name] * unit(name), 1e-6 * abs(value))
 
 
-def main() -> int:
-    number = PaperNumbers()
+def numbers(number: PaperNumbers) -> None:
+    """Every number."""
     terms(number)
     section_5(number)
     mechanism(number)
+
+
+def main() -> int:
+    number = PaperNumbers()
+    numbers(number)
     return number.end()
 
 

@@ -71,9 +71,7 @@ def main() -> int:
     start = time.perf_counter()
     report = PaperNumbers()
     card = read_steering_card("poznyakov-yudin")
-    turning(card, report)
-    influence(card, report)
-    agreement(card, report)
+    numbers(report)
     print("Tuning to the trial points, 47 deg/min at 15 deg and 61 deg/min at 35 deg")
     found = tuned(card, "inoue-hirano")
     if isinstance(found, TwoPointTuning):
@@ -86,6 +84,14 @@ def main() -> int:
             print(f"  {name}: {words}")
     print(f"{time.perf_counter() - start:.2f} s")
     return report.end()
+
+
+def numbers(report: PaperNumbers) -> None:
+    """Tables 1 to 6, eq. (4) and curve 3."""
+    card = read_steering_card("poznyakov-yudin")
+    turning(card, report)
+    influence(card, report)
+    agreement(card, report)
 
 
 def turning(card: SteeringCard, report: PaperNumbers) -> None:
