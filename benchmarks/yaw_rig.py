@@ -206,8 +206,8 @@ def simulated_numbers(number: PaperNumbers) -> None:
 
     The means over five humps, which `tank2sim yaw` prints, are lower than the figures of the last: with the first
     gains, and those of the first run, the body follows the programme several times worse. With settled gains the
-    figures are those of the independent simulation to 0.3 %; how the gains are tuned decides the rest (from measured speeds in
-    place of the programme's the last hump gives 298.5, 280.3, 503.4).
+    figures are those of the independent simulation to 0.3 %; how the gains are tuned decides the rest (from measured
+    speeds in place of the programme's the last hump gives 298.5, 280.3, 503.4).
     """
     number.heading("Controller (4), noise-free: 1e-4 kg m2, 1e-4 J, rad")
     for name, rig in BODIES.items():
