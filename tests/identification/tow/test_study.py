@@ -178,3 +178,8 @@ def test_table_1_is_known_again(table_1):
     assert tow_paper.are_of_the_paper(table_1)
     assert not tow_paper.are_of_the_paper(table_1.only(3))
     assert not tow_paper.are_of_the_paper(replace(table_1, speed_mps=1.01 * table_1.speed_mps))
+
+
+def test_a_tow_that_ends_early_is_told_with_its_polynomial_continued(study):
+    (note,) = [note for note in study.notes if note.startswith("Tow ")]
+    assert all(words in note for words in ("Tow 4", "45 s", "2682 kg", "50 s", "2687 kg"))

@@ -81,6 +81,8 @@ def test_the_two_interval_formula_is_biased_and_its_bias_is_told(result):
     assert sum(two.bias_from.values()) == pytest.approx(two.bias_kgm2, rel=1e-3)
     assert best.bias_kgm2 is None
     assert any("two-interval formula" in note for note in result.notes)
+    assert len(two.by_hump_kgm2) == result.records[0].programme.humps
+    assert two.total_inertia_kgm2 == pytest.approx(sum(two.by_hump_kgm2) / len(two.by_hump_kgm2))
 
 
 def test_turning_the_other_way_changes_nothing(folder, columns, result):

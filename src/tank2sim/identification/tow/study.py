@@ -20,7 +20,7 @@ from tank2sim.dynamics.surge_theory import (
 )
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import COLLINEAR, Vector
-from tank2sim.identification.tow.equation_error import fit_mean_speed
+from tank2sim.identification.tow.equation_error import discretise, fit_mean_speed, solve_by_qr
 from tank2sim.identification.tow.identify import TowResult
 from tank2sim.identification.tow.models import (
     SIMPLE,
@@ -135,7 +135,7 @@ class TowStudy:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user should know before using the estimates: the warnings, and what the models tell together."""
-        return (*self.result.warnings, *_notes(self))
+        return (*self.result.warnings, *_notes(self), *_continued(self))
 
     def as_json(self) -> dict[str, Any]:
         """The study as plain data: that of the result, and more."""
@@ -229,6 +229,24 @@ def confidence_ellipse(fitted: FittedModel, points: int = 121) -> Ellipse:
     squares, axes = np.linalg.eigh(fit.covariance[:2, :2])
     outline = axes * np.sqrt(np.maximum(squares, 0.0)) @ circle + fit.estimates[:2, None]
     return Ellipse(fitted.model.label, (float(fit.estimates[0]), float(fit.estimates[1])), outline[0], outline[1])
+
+
+def _continued(study: TowStudy) -> Iterator[str]:
+    """Of tows that end before the others: what the paper's way makes of their polynomial continued to the end."""
+    tows, result = study.result.tows, study.result
+    if not study.by_tow:
+        return
+    for number, alone in enumerate(study.by_tow[0].alone):
+        own = tows.only(number)
+        if own.time_s[-1] >= tows.time_s[-1] or not np.isfinite(alone).all():
+            continue
+        speed = fit_mean_speed(own, len(result.speed_polynomial) - 1).polynomial
+        problem = discretise(speed, tows.time_s, result.terms, result.force)
+        yield (
+            f"Tow {number + 1} ends at {own.time_s[-1]:g} s: over that time the paper's way gives M {alone[0]:.0f} kg; "
+            f"with its polynomial continued to the {tows.time_s[-1]:g} s of the others, "
+            f"{solve_by_qr(problem)[0]:.0f} kg."
+        )
 
 
 def _notes(study: TowStudy) -> Iterator[str]:

@@ -143,6 +143,12 @@ def judged(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[str]:
             f"{1e4 * parts['speeds']:+.3g}e-4 because their end speeds differ. Its standard error does not "
             "contain that."
         )
+    if len(two.by_hump_kgm2) > 1:
+        humps = ", ".join(f"{1e4 * value:.4g}" for value in two.by_hump_kgm2)
+        notes.append(
+            f"It is the mean of {humps} e-4 kg m2 (total), hump by hump; while the controller's gains are still being "
+            "tuned, a hump differs."
+        )
     for term, (value, error) in best.friction.items():
         if error is not None and abs(value) < 2 * error:
             notes.append(f"{term} does not differ from zero: {value:.3g} ± {error:.2g} {TERMS[term][1]}.")

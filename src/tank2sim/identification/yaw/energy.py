@@ -210,6 +210,7 @@ def two_intervals(method: str, balance: Balance, fit: EnergyFit) -> YawEstimate:
         dissipation_error_J=_mean_error(lost),
         bias_kgm2=total - float(fit.coefficients[0]),
         bias_from=_bias_parts(fit),
+        by_hump_kgm2=tuple(inertia),
     )
 
 

@@ -28,6 +28,8 @@ class YawEstimate:
         How far a two-interval formula lies from the energy least squares of the same records.
     bias_from : mapping
         Parts of that: ``dissipation`` (not the same in both intervals) and ``speeds`` (w1, w2 not those of w6, w5).
+    by_hump_kgm2 : tuple of float
+        J_zz + lambda661 of each pair of intervals by a two-interval formula, of which the estimate is the mean.
     """
 
     method: str
@@ -39,6 +41,7 @@ class YawEstimate:
     misfit: float | None = None
     bias_kgm2: float | None = None
     bias_from: Mapping[str, float] = field(default_factory=dict)
+    by_hump_kgm2: tuple[float, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """As plain data; the unit of a number stands in its key."""
@@ -54,4 +57,5 @@ class YawEstimate:
         if self.bias_kgm2 is not None:
             told["bias_against_least_squares_kgm2"] = self.bias_kgm2
             told["bias_from_kgm2"] = dict(self.bias_from)
+            told["total_inertia_by_hump_kgm2"] = list(self.by_hump_kgm2)
         return told
