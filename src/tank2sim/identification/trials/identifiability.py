@@ -140,7 +140,7 @@ def refuse_unseen(problem: Problem) -> None:
         if form.seen[place] and np.sum(shown**2) < least:
             missing.append(name)
     if missing:
-        runs = ", ".join(run.name for run in problem.runs)
+        runs = ", ".join(dict.fromkeys(run.origin for run in problem.runs))
         told = ", ".join(_short(name) for name in missing)
         raise InputError(runs, "", f"shows nothing of {told}", _remedy(missing))
 
