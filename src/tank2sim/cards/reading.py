@@ -23,6 +23,10 @@ from tank2sim.errors import InputError
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
 from tank2sim.units import to_si
 
+LARGEST_PRIME = 1e4
+"""Largest derivative or standard error in the prime system. Published ones are below 10; with a thousand times that
+every force of the model stays a number. Project choice: what is beyond is a slip of the pen or of the scaling."""
+
 # Sections whose keys may give an angle in degrees or radians.
 _SECTIONS_WITH_ANGLES = ("model", "steering_gear", "propulsion", "yaw_rig", "programme")
 # Kind of model, which is also the name of its section of coefficients, to the card that is all in SI.
@@ -225,6 +229,14 @@ def _manoeuvring_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard
         assert term is not None
         return value / file_factor(term, scales, rudder_to_port=to_port)
 
+    def bounded(section: str, keys: Mapping[str, str], given: Mapping[str, float]) -> dict[str, float]:
+        prime = {name: inside(name, given[key]) for name, key in keys.items()}
+        for name, value in prime.items():
+            if abs(value) > LARGEST_PRIME:
+                problem = f"is {value:.4g} in the prime system"
+                raise InputError(source, f"{section}.{keys[name]}", problem, f"at most {LARGEST_PRIME:g} was expected")
+        return prime
+
     _refuse_doubled_effects(form.effects, source)
     return ManoeuvringCard(
         source=source,
@@ -233,8 +245,8 @@ def _manoeuvring_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard
         environment=form.environment,
         model=form.model,
         rigid_body=body,
-        derivatives={name: inside(name, form.derivatives[key]) for name, key in places.items()},
-        uncertainty={name: abs(inside(name, form.uncertainty[key])) for name, key in stated.items()},
+        derivatives=bounded("derivatives", places, form.derivatives),
+        uncertainty={name: abs(error) for name, error in bounded("uncertainty", stated, form.uncertainty).items()},
         places=places,
         steering_gear=form.steering_gear,
         propulsion=_prime_propulsion(form.propulsion, scales),

@@ -61,7 +61,7 @@ from tank2sim.units import in_words
 @executor_option
 @click.option(
     "--members",
-    type=click.IntRange(0),
+    type=click.IntRange(0, 100000),
     default=100,
     show_default=True,
     help="Simulations behind the intervals of figures of trials held out.",

@@ -128,7 +128,9 @@ def command(
     """
     asked = asked_of(more)
     if steering := find_steering_card(card):
-        refuse_options("a steering card", {"--figure": figures, "--tune": wishes, "--set": settings, **_options(more)})
+        refuse_options(
+            f"a steering card ({card})", {"--figure": figures, "--tune": wishes, "--set": settings, **_options(more)}
+        )
         show_steering_card(steering, _file(more["json_file"]), _file(more["page"]))
         return
     ship = _ship(card, settings)

@@ -46,10 +46,14 @@ def command(result: Path, page: Path) -> None:
 def _read(path: Path) -> Any:
     remedy = "give what a command wrote with --json"
     try:
-        return json.loads(path.read_text(encoding="utf-8-sig"))
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
+        json.dumps(content, ensure_ascii=False).encode()  # a text may hold half a character, which no page can
+        return content
     except OSError as error:
         raise InputError(path, "", f"cannot be read ({error.strerror})", remedy) from None
     except json.JSONDecodeError as error:
         raise InputError(path, f"line {error.lineno}", f"is no JSON ({error.msg})", remedy) from None
-    except (UnicodeDecodeError, RecursionError):
+    except UnicodeEncodeError:
+        raise InputError(path, "", "holds half of a character (a lone surrogate, \\ud800 to \\udfff)", remedy) from None
+    except (ValueError, RecursionError):  # a ValueError also where an integer has thousands of digits
         raise InputError(path, "", "is no JSON", remedy) from None

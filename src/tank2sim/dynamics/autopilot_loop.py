@@ -26,6 +26,7 @@ def closed_loop_model(ship: Model, autopilot: Model) -> Model:
     joined = {joint.name.removeprefix("joint.") for joint in joints}
     return Model(
         name=f"{ship.name} with {autopilot.name}",
+        source=ship.source,
         description=f"{ship.description}; {autopilot.description}",
         states=(*ship.states, *autopilot.states),
         inputs=tuple(one for one in (*ship.inputs, *autopilot.inputs) if one.name not in joined),

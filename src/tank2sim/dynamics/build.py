@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from dataclasses import replace
 
 from tank2sim.cards.card import Card, GliderCard, ManoeuvringCard, SurgeBodyCard, YawRigCard
 from tank2sim.cards.form import EffectEntry
@@ -16,7 +17,7 @@ from tank2sim.units import from_si
 
 
 def build(card: Card) -> Model:
-    """Build the model that a card describes.
+    """Build the model that a card describes; its messages name the card's file.
 
     Raises
     ------
@@ -24,6 +25,10 @@ def build(card: Card) -> Model:
         The card names a derivative, an effect or a parameter that the model does not know, or its mass matrix is
         singular; the message names the key.
     """
+    return replace(_model(card), source=card.source)
+
+
+def _model(card: Card) -> Model:
     if isinstance(card, SurgeBodyCard):
         surge = card.surge
         coefficients = SurgeCoefficients(

@@ -143,6 +143,8 @@ class Model:
         Step for fixed-step integration (classical Runge-Kutta) at which it is accurate, s.
     notices : tuple of str
         What a user of this model should be told (assumptions taken, keys not used).
+    source : str
+        The file that it was built from, for messages; empty if it is of none.
 
     Raises
     ------
@@ -160,6 +162,7 @@ class Model:
     outputs: tuple[str, ...]
     step_s: float
     notices: tuple[str, ...] = ()
+    source: str = ""
 
     def __post_init__(self) -> None:
         names = [variable.name for variable in self.variables]
@@ -176,6 +179,11 @@ class Model:
         _ = self._sorted_quantities
 
     # -- looking things up -------------------------------------------------------------------------------------------
+
+    @property
+    def origin(self) -> str:
+        """Name of the model with the file it was built from, as messages begin: ``card.toml (Mariner class)``."""
+        return f"{self.source} ({self.name})" if self.source else self.name
 
     @property
     def variables(self) -> tuple[Variable, ...]:
@@ -235,7 +243,7 @@ class Model:
             low, high = variable.accepted_range
             if not low <= value <= high:
                 remedy = f"it lies between {low:g} and {high:g} {variable.unit}: {variable.description}"
-                raise InputError(self.name, variable.name, f"cannot be {value:g} {variable.unit}", remedy)
+                raise InputError(self.origin, variable.name, f"cannot be {value:g} {variable.unit}", remedy)
 
     def parameter_values(self, changed: Mapping[str, float] | None = None) -> Vector:
         """The parameter vector p: start values, with those of `changed` (by name) in place of their own."""

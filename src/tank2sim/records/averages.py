@@ -14,6 +14,7 @@ from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.files import read_text
 from tank2sim.records.campaign_form import CampaignFile
+from tank2sim.records.csv_table import LARGEST
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,8 +101,8 @@ def _number(file: Path, place: tuple[int, str], text: str) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
-        problem = f"{text!r} is no number"
+    if not abs(value) <= LARGEST:
+        problem = f"{text[:30]!r} is no number" + (f" up to {LARGEST:g}" if math.isfinite(value) else "")
         raise InputError(file, f"line {place[0]}, column {place[1]}", problem, "give each condition its value")
     return value
 

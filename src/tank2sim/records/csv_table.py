@@ -29,6 +29,14 @@ _NOT_OF_NUMBERS = re.compile(r"[^0-9eE+\-., \t\n]")
 _EMPTY_CELL = re.compile(r"(?<![^,\n])(?=[,\n])", re.ASCII)
 _QUOTED_LENGTH = 30
 
+SHORTEST_STEP = 1e-9
+"""Least step of a quantity that must rise from row to row (a time, s): below, two rows are one, and slopes are noise of
+the last digit. Project choice, a thousand times faster than any gauge is read."""
+LARGEST = 1e15
+"""Largest size of a number that a record may hold, in the unit of its column. No length, time, force or count of a
+ship is near it (an epoch is 1.8e9 s, or 1.8e12 ms), and squares and products of what is below stay far inside the
+range of a float. Project choice: a float this large still resolves 0.1."""
+
 _RESEMBLES = 0.8
 """Likeness (difflib) from which a comment key is taken for a misspelt one: one letter of four, ``nois`` or ``nosie``
 for ``noise``, while ``note`` and ``source`` stay free text. Project choice."""
@@ -95,7 +103,7 @@ class Table:
         empty = np.flatnonzero(np.isnan(values))
         if empty.size:
             raise InputError(self.path, self.place(int(empty[0]), name), "is empty", "give each row its value")
-        falls = np.flatnonzero(np.diff(values) <= 0)
+        falls = np.flatnonzero(np.diff(values) < SHORTEST_STEP)
         if falls.size:
             row = int(falls[0]) + 1
             problem = f"{values[row]:.10g} does not come after {values[row - 1]:.10g} of the row before"
@@ -114,6 +122,10 @@ class Table:
             return None
         text = self.comments[key].strip()
         number = _number(text)
+        if number is not None and abs(number) > LARGEST:
+            raise InputError(
+                self.path, f"comment {key}", f"{_quoted(text)} is too large", f"at most {LARGEST:g} can be"
+            )
         if number is None:
             problem = f"{_quoted(text)} is no number" if "\n" not in text else "is given more than once"
             raise InputError(self.path, f"comment {key}", problem, f"write one line such as '# {key}: 11.63'")
@@ -218,7 +230,7 @@ def _read_fast(rows: Sequence[str], width: int) -> Vector | None:
         values: Vector = np.loadtxt(body.splitlines(), delimiter=",", ndmin=2, comments=None, dtype=np.float64)
     except ValueError:
         return None
-    return values if values.shape == (len(rows), width) and not np.isinf(values).any() else None
+    return values if values.shape == (len(rows), width) and not (np.abs(values) > LARGEST).any() else None
 
 
 def _read_with_care(path: Path, names: Sequence[str], rows: Sequence[str], lines: NDArray[np.int64]) -> Vector:
@@ -232,7 +244,7 @@ def _read_with_care(path: Path, names: Sequence[str], rows: Sequence[str], lines
             raise InputError(path, place, problem, "give each row one cell a column, empty if it was not recorded")
         for column, cell in enumerate(cells):
             number = _number(cell) if cell else np.nan
-            if number is None:
+            if number is None or abs(number) > LARGEST:
                 _refuse(path, f"{place}, column {names[column]}", cell)
             values[row, column] = number
     return values
@@ -251,7 +263,7 @@ def _refuse(path: Path, place: str, cell: str) -> NoReturn:
     if cell.lstrip("+-").lower() in ("nan", "inf", "infinity", "na", "null", "none", "-", ""):
         raise InputError(path, place, f"{_quoted(cell)} is no number", "leave the cell empty if nothing was recorded")
     if _NUMBER.fullmatch(cell):
-        raise InputError(path, place, f"{_quoted(cell)} is too large", "a finite number was expected")
+        raise InputError(path, place, f"{_quoted(cell)} is too large", f"at most {LARGEST:g} was expected")
     raise InputError(path, place, f"{_quoted(cell)} is no number", "write digits with a decimal point, or nothing")
 
 

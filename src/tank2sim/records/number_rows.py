@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.errors import InputError
+from tank2sim.records.csv_table import LARGEST
 
 Rows = Sequence[tuple[int, Sequence[str]]]
 """Line of the file (from 1) and cells of each row."""
@@ -47,11 +48,13 @@ def numbers(path: Path, rows: Rows, names: Sequence[str]) -> NDArray[np.float64]
             problem = f"the number of cells is {len(cells)}, and that of columns {len(names)}"
             raise InputError(path, f"line {line}", problem, "mend or delete the line")
     values = np.array([[_number(cell) for cell in cells] for _, cells in rows])
-    faulty = np.argwhere(np.isinf(values))
+    faulty = np.argwhere(np.abs(values) > LARGEST)
     if faulty.size:
         row, column = (int(place) for place in faulty[0])
         line, cells = rows[row]
-        problem = f"{cells[column][:30]!r} is no number"
+        problem = f"{cells[column][:30]!r} is no number" + (
+            f" up to {LARGEST:g}" if np.isfinite(values[row, column]) else ""
+        )
         raise InputError(path, f"line {line}, column {names[column]}", problem, "write a number, or nan for none")
     return values
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.errors import InputError
+from tank2sim.records.csv_table import SHORTEST_STEP
 from tank2sim.records.esso_osaka import is_esso_osaka, read_esso_osaka
 from tank2sim.records.number_rows import read_bytes_as_text
 from tank2sim.records.simman import is_simman, read_simman
@@ -46,6 +47,10 @@ def read_trial(path: Path | str, *, rising: bool = True) -> Trial:
     if np.isnan(trial.time_s).any():
         row = int(np.flatnonzero(np.isnan(trial.time_s))[0]) + 1
         raise InputError(path, f"column {trial.heading('t_s')}", f"row {row} has no time", "give each row its time")
+    steps = np.abs(np.diff(trial.time_s))
+    if len(steps) and np.median(steps) < SHORTEST_STEP and steps.max() > 0:
+        problem = f"most rows are less than {SHORTEST_STEP:g} s apart"
+        raise InputError(path, f"column {trial.heading('t_s')}", problem, "give the time in s")
     if rising:
         _refuse_falling_time(trial)
     return trial

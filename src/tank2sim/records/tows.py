@@ -16,6 +16,9 @@ _SPEED = re.compile(r"speed_([1-9]\d*)_mps")
 FEWEST_TIMES = 5
 """Times at which a speed must be known: the release, three for a quadratic, and one to show whether that fits."""
 
+FASTEST_MPS = 100.0
+"""As for the speeds of a card (``tank2sim.cards.form.Speed``)."""
+
 BODY_KEYS = ("length_m", "beam_m", "volume_m3", "water_density_kgpm3", "kinematic_viscosity_m2ps")
 """Comments that describe the body and the water, all positive; they turn drag into coefficients."""
 
@@ -109,6 +112,10 @@ def read_tows(path: Path | str) -> Tows:
     for name, readings in zip(names, speed.T, strict=True):
         if np.isnan(readings).all():
             raise InputError(table.path, f"column {name}", "has no reading", "delete the column")
+        if np.nanmax(np.abs(readings)) > FASTEST_MPS:
+            row = int(np.nanargmax(np.abs(readings)))
+            problem = f"{readings[row]:.6g} m/s is faster than any body is towed"
+            raise InputError(table.path, table.place(row, name), problem, f"give it in m/s, up to {FASTEST_MPS:g}")
     read = ~np.isnan(speed).all(axis=1)
     if np.count_nonzero(read) < FEWEST_TIMES:
         problem = f"has readings at {np.count_nonzero(read)} times only"

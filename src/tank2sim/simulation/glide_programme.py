@@ -23,6 +23,8 @@ from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
 from tank2sim.simulation.trajectory import Trajectory
 
+LARGEST_BUOYANCY_KG = 1e6
+"""Largest net buoyancy of a step, kg: a thousand times the ballast of any glider, against slips of the pen."""
 LONGEST_PROGRAMME_S = 1e6
 """The longest programme, s, 12 days: a bound of ours against slips of the pen."""
 
@@ -100,6 +102,9 @@ def _step(table: Table, row: int, angle: str) -> ProgrammeStep:
         place = table.place(row, "duration_s")
         raise InputError(table.path, place, f"is {duration:g}", "a positive number of seconds was expected")
     buoyancy = value("buoyancy_kg", math.inf)
+    if LARGEST_BUOYANCY_KG < abs(buoyancy) < math.inf:
+        place = table.place(row, "buoyancy_kg")
+        raise InputError(table.path, place, f"is {buoyancy:g}", f"at most {LARGEST_BUOYANCY_KG:g} kg either way can be")
     return ProgrammeStep(
         duration_s=duration,
         angle_rad=value(angle),

@@ -41,8 +41,9 @@ COASTING_END = 0.2
 """A ship whose engine is stopped coasts on without end: her run counts as ended at this share of the approach speed,
 where the rudder has lost most of its hold. A choice of ours."""
 
-LONGEST_RUN_S = 1e7
-"""Longest run, s: beyond a hundred days a manoeuvre is a mistake in units."""
+LONGEST_RUN_S = 2e5
+"""Longest run, s: beyond two days a manoeuvre is a mistake in units, and its motion (two million steps of 40 numbers)
+would fill gigabytes."""
 
 STEADY_CHANGE = 1e-3
 """Steady: over two ship lengths the yaw rate changes by less than this share of itself, or of 0.01 u0/L if less."""
@@ -200,7 +201,7 @@ class Stop:
         """
         if "propeller.speed" not in running.model.input_names:
             problem = "is missing: the ship's engine cannot be stopped or reversed"
-            raise InputError(running.model.name, "propulsion", problem, "add [propulsion] to the card")
+            raise InputError(running.model.origin, "propulsion", problem, "add [propulsion] to the card")
         nominal = running.model["propeller.speed"]
         assert isinstance(nominal, Input)
         running.order(

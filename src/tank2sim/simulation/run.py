@@ -71,10 +71,12 @@ def simulate(
     """
     if "rudder.command" not in model:
         raise InputError(
-            model.name, "", "has no rudder", "manoeuvres need the card of a ship (kind linear or abkowitz)"
+            model.origin, "", "has no rudder", "manoeuvres need the card of a ship (kind linear or abkowitz)"
         )
     if duration_s is not None and not 0 < duration_s < LONGEST_RUN_S:
-        raise InputError("--duration", "", f"is {duration_s:g} s", "a positive number of seconds was expected")
+        raise InputError(
+            "--duration", "", f"is {duration_s:g} s", f"more than 0 and less than {LONGEST_RUN_S:g} s was expected"
+        )
     integrator = integrator or Integrator(model)
     values = dict(zip(model.parameter_names, model.parameter_values(parameters).tolist(), strict=True))
     running = Running(integrator, inputs, parameters)

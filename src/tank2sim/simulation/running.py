@@ -156,7 +156,7 @@ class Running:
             bad = ~(np.isfinite(x).all(axis=1) & np.isfinite(result.y).all(axis=1))
             when = f"t = {t[int(np.argmax(bad))]:.1f} s"
             remedy = "check the card's derivatives, or order less rudder: the model does not hold there"
-            raise InputError(self.model.name, when, RUNAWAY, remedy)
+            raise InputError(self.model.origin, when, RUNAWAY, remedy)
         return result
 
     def _after_step_from(self, x: Vector, measure: Callable[[Vector], float]) -> Callable[[float], float]:
@@ -218,5 +218,5 @@ class Running:
                 break
         if not change < 1e-9:
             raise InputError(
-                self.model.name, "initial.trim", "there is no steady motion near the start", "start without it"
+                self.model.origin, "initial.trim", "there is no steady motion near the start", "start without it"
             )

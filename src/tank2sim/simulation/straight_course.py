@@ -49,7 +49,7 @@ def straight_course(
         The model is no ship, or there is no such course.
     """
     if "rudder.angle" not in model:
-        raise InputError(model.name, "", "has no rudder", "this needs the card of a ship (kind linear or abkowitz)")
+        raise InputError(model.origin, "", "has no rudder", "this needs the card of a ship (kind linear or abkowitz)")
     p = model.parameter_values() if parameters is None else parameters
     u = model.input_values() if inputs is None else inputs.copy()
     x = np.array(model.initial(p)).ravel()
@@ -76,7 +76,7 @@ def straight_course(
     left = np.abs(np.array(residual(with_unknown(solution.x), u, p)).ravel())
     if not np.all(left < 1e-9) or abs(solution.x[1]) > np.pi / 4:
         problem = "no rudder angle below 45 deg holds a straight course"
-        raise InputError(model.name, "", problem, _cause(np.array(slope(x, u, p))[:, unknown]))
+        raise InputError(model.origin, "", problem, _cause(np.array(slope(x, u, p))[:, unknown]))
     x = with_unknown(solution.x)
     u[model.input_names.index("rudder.command")] = solution.x[1]
     return OperatingPoint(x, u, p)

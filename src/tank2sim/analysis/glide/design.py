@@ -92,7 +92,7 @@ def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth
         if not 0 < value < math.inf:
             raise InputError(name, "", f"is {value:g}", "a positive number was expected")
     if not glide.buoyancy_kg or glide.turn_rate_radps:
-        raise InputError(card.ship.name, "range", "a glide without buoyancy or with roll goes nowhere", "give another")
+        raise InputError(card.source, "range", "a glide without buoyancy or with roll goes nowhere", "give another")
     size, steep = abs(glide.buoyancy_kg), abs(glide.path_angle_rad)
     cycles = budget_kg / (2 * size)
     return Range(

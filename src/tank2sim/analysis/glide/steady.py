@@ -163,7 +163,7 @@ def steady_glide(
     if steep < least * (1 - 1e-12):
         with_roll = f" with {math.degrees(roll_rad):g} deg of roll" if roll_rad else ""
         raise InputError(
-            card.ship.name,
+            card.source,
             "path angle",
             f"{math.degrees(path_angle_rad):g} deg cannot be flown{with_roll}: the drag is too large for the lift",
             f"the smallest that can is {math.degrees(least):.3f} deg",
@@ -205,13 +205,13 @@ def glide_at_pitch(
     if beyond(least) > 0:
         smallest = beyond(least) + abs(pitch_rad)
         raise InputError(
-            card.ship.name,
+            card.source,
             "pitch",
             f"at {math.degrees(pitch_rad):g} deg there is no glide of small incidence",
             f"the smallest pitch is {math.degrees(smallest):.3f} deg, on a path of {math.degrees(least):.3f} deg",
         )
     if beyond(_STEEPEST) < 0:
-        raise InputError(card.ship.name, "pitch", f"{math.degrees(pitch_rad):g} deg is a fall", "give less than 89 deg")
+        raise InputError(card.source, "pitch", f"{math.degrees(pitch_rad):g} deg is a fall", "give less than 89 deg")
     steep = float(brentq(beyond, least, _STEEPEST, xtol=1e-15, rtol=1e-14))
     return steady_glide(card, sign * steep, roll_rad=roll_rad, buoyancy_kg=buoyancy)
 
@@ -234,7 +234,7 @@ def glide_as_printed(
     size = (own.lift_slope * tau - own.drag_zero) / under if under > 0 else -1.0
     if size <= 0:
         problem = f"{math.degrees(path_angle_rad):g} deg gives no incidence by (8) as printed"
-        raise InputError(card.ship.name, "path angle", problem, "give another angle, or leave --as-printed out")
+        raise InputError(card.source, "path angle", problem, "give another angle, or leave --as-printed out")
     drag = size * (own.drag_zero + own.drag_quadratic * size)
     lift = lift_coefficient(size, own.lift_slope, own.lift_quadratic)
     half = 0.5 * card.environment.water_density_kgpm3 * own.reference_area_m2
@@ -322,7 +322,7 @@ def _buoyancy(card: GliderCard, path_angle: float, given: float | None) -> float
     if given * path_angle < 0:
         light, goes = ("light", "dive") if given > 0 else ("heavy", "climb")
         problem = f"{given:+g} kg is {light}, and the glider is to {goes} at {math.degrees(path_angle):g} deg"
-        raise InputError(card.ship.name, "buoyancy", problem, "a light glider climbs (+), a heavy one dives (-)")
+        raise InputError(card.source, "buoyancy", problem, "a light glider climbs (+), a heavy one dives (-)")
     if not math.isfinite(given):
-        raise InputError(card.ship.name, "buoyancy", f"{given} kg is no number", "give kilograms")
+        raise InputError(card.source, "buoyancy", f"{given} kg is no number", "give kilograms")
     return given

@@ -86,7 +86,9 @@ def equilibrium(model: Model, glide: SteadyGlide) -> Equilibrium:
     x[places] = np.array(solver(x[places], [])).ravel()
     left = np.abs(np.array(model.rhs(x, u, p)).ravel()[places])
     if not np.all(left < 1e3 * _ACCURACY):
-        raise InputError(model.name, "", "the transient model has no equilibrium near this glide", "give another angle")
+        raise InputError(
+            model.origin, "", "the transient model has no equilibrium near this glide", "give another angle"
+        )
     y = dict(zip(model.outputs, np.array(model.output(x, u, p)).ravel().tolist(), strict=True))
     turn = y["motion.psidot"]
     ground = y["motion.speed"] * math.cos(y["motion.path_angle"])

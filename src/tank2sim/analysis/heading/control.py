@@ -63,5 +63,5 @@ def heading_autopilot(ship: Model) -> Model:
     try:
         gains = heading_gains(stability(ship).nomoto, min([*limits, LARGEST_RUDDER_RAD]))
     except ValueError as error:
-        raise InputError(ship.name, "", str(error), "check Yd and Nd of the card, and its rudder_sign") from None
+        raise InputError(ship.origin, "", str(error), "check Yd and Nd of the card, and its rudder_sign") from None
     return autopilot_model(f"Autopilot of {ship.name}", gains, ship.step_s)

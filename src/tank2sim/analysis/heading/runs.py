@@ -92,7 +92,7 @@ class HeadingLoop:
         made = Trajectory(self.model, time, x, u, y)
         if not made.is_finite():
             remedy = "choose another design, or a smaller course change"
-            raise InputError(self.model.name, "", "the motion leaves all bounds", remedy)
+            raise InputError(self.model.origin, "", "the motion leaves all bounds", remedy)
         return made
 
 

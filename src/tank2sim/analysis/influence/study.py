@@ -74,7 +74,9 @@ class Study:
         for figure, value in zip(self.figures, self.base, strict=True):
             if not math.isfinite(value):
                 remedy = "ask for another, or for another rudder"
-                raise InputError(OPTION, figure.text, f"{card.ship.name} does not show this figure", remedy)
+                raise InputError(
+                    OPTION, figure.text, f"{card.source} ({card.ship.name}) does not show this figure", remedy
+                )
 
     @cached_property
     def _motion(self) -> MotionSlopes:

@@ -204,7 +204,9 @@ def stability_margin(model: Model, speed_mps: float | None = None) -> Margin:
     criterion = Criterion(model)
     value, total, slopes = criterion.at(point)
     if not np.isfinite(value):
-        raise InputError(model.name, "", "the slopes of its forces are no numbers", "check the derivatives of the card")
+        raise InputError(
+            model.origin, "", "the slopes of its forces are no numbers", "check the derivatives of the card"
+        )
     names = model.parameter_names
     influences = [
         _influence(criterion, point, name, float(total[names.index(name)]))

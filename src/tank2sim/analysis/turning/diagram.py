@@ -244,11 +244,11 @@ def steady_turning(model: Model) -> SteadyTurning:
     straight = corrected(equations, guess, yaw)
     if straight is None or not straight[0][0] > 0:
         remedy = "check X0, Xu, Xuu and Xuuu of the card: resistance and thrust balance at no speed near u0"
-        raise InputError(model.name, "", "keeps no steady speed on a straight course", remedy)
+        raise InputError(model.origin, "", "keeps no steady speed on a straight course", remedy)
     largest = largest_rudder(model)
     if not abs(straight[0][-1]) < largest:
         problem = f"needs {math.degrees(straight[0][-1]):.3g} deg of rudder to go straight: more than the gear has"
-        raise InputError(model.name, "", problem, "check Y0 and N0 of the card")
+        raise InputError(model.origin, "", problem, "check Y0 and N0 of the card")
     most = np.full(len(guess), _MOST_ELSE)
     most[:3] = _FASTEST, _FASTEST, _MOST_YAW
     most[-1] = largest

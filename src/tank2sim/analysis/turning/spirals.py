@@ -114,7 +114,7 @@ def reverse_spiral(model: Model, turning: SteadyTurning, nomoto: Nomoto) -> Spir
     running = Running(Integrator(held), calm)
     rudders, steady = _held(running, rates, _ship_time(model))
     if not np.isfinite(rudders).all():
-        raise InputError(model.name, "reverse spiral", "the motion leaves all bounds", "check the card's derivatives")
+        raise InputError(model.origin, "reverse spiral", "the motion leaves all bounds", "check the card's derivatives")
     distance = [_distance(turning, d, r, only_stable=False) for d, r in zip(rudders, rates, strict=True)]
     return SpiralPoints(rudders, rates, steady, np.array(distance))
 

@@ -212,12 +212,12 @@ def tune_to_two_points(model: Model, levers: Levers, first: WantedTurn, second: 
 
 def _refuse_opposed(model: Model, wanted: tuple[WantedTurn, WantedTurn], *turns: SteadyTurn) -> None:
     if abs(wanted[0].rudder_rad - wanted[1].rudder_rad) < 1e-6:
-        raise InputError(model.name, "two points", "have one rudder angle", "give two that are far from each other")
+        raise InputError(model.origin, "two points", "have one rudder angle", "give two that are far from each other")
     for one, turn in zip(wanted, turns, strict=True):
         if one.yaw_rate_radps is not None and one.yaw_rate_radps * turn.yaw_rate_radps <= 0:
             place = f"rudder {math.degrees(one.rudder_rad):.4g} deg"
             problem = f"a yaw rate of {60 * math.degrees(one.yaw_rate_radps):.4g} deg/min is not to its side"
-            raise InputError(model.name, place, problem, "rudder and yaw rate are positive to starboard")
+            raise InputError(model.origin, place, problem, "rudder and yaw rate are positive to starboard")
 
 
 class _System:
@@ -271,7 +271,7 @@ class _System:
     def fault(self, problem: str) -> InputError:
         """An error about the two points."""
         told = " and ".join(_told(one) for one in self.wanted)
-        return InputError(self._model.name, told, problem, "check both points, or change other coefficients first")
+        return InputError(self._model.origin, told, problem, "check both points, or change other coefficients first")
 
 
 def _told(wanted: WantedTurn) -> str:

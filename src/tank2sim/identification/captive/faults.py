@@ -106,6 +106,8 @@ def _impossible_values(campaign: Campaign, run: Run) -> Iterator[InputError]:
 def _other_motion(campaign: Campaign, run: Run) -> Iterator[InputError]:
     """A motion that is not what the type of the run says."""
     speed, length = float(np.mean(run.speed_mps)), campaign.model.length_m
+    if speed <= 0:
+        return  # a fault of the speed, which is told by itself
     sway, yaw = _swing(run.v_mps) / speed, _swing(run.r_radps) * length / speed
     turning = abs(float(np.mean(run.r_radps))) * length / speed
     remedy = "mend its type in the campaign, or the record"
@@ -170,8 +172,8 @@ def _rates(reduced: ReducedRun) -> Iterator[InputError]:
 def _dead(campaign: Campaign, run: Run, force: str) -> Iterator[InputError]:
     """A gauge that shows one value from end to end, where the model's motion or the gauge's usual noise forbids it."""
     values = run.force(force)
-    if np.ptp(values) > 0.0:
-        return
+    if np.ptp(values) > 0.0 or np.min(run.speed_mps) <= 0:
+        return  # without speed there is no drift angle; that fault is told by itself
     angles = (float(np.mean(run.v_mps / run.speed_mps)), float(np.mean(run.delta_rad)))
     # Drift and rudder together may cancel, and a coarse gauge reads nothing at a small angle.
     nothing = float(values[0]) == 0.0 and max(map(abs, angles)) > _NO_SMALL_ANGLE and 0.0 in angles

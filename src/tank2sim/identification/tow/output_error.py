@@ -23,6 +23,10 @@ from tank2sim.simulation.scheme import runge_kutta_step
 
 Predictor = Callable[[Vector], tuple[Vector, Matrix]]
 
+MOST_STEPS = 5000
+"""Steps of the integration over a record: one that lasts longer than so many of the model's steps is of a body that is
+slow in proportion, and takes longer ones. Project choice: a thousandth of the rise of the speed is far below any error
+of reading, and a time in milliseconds under t_s would otherwise compute for hours."""
 _LATEST_START = 0.5
 """Longest start delay that is looked for, in the time of the record: a later start leaves too little of it."""
 
@@ -122,7 +126,8 @@ def speed_predictor(
     chosen = [model.parameter_names.index(f"surge.{name}") for name in names]
     width = len(chosen) + options.start_delay
     intervals = np.diff(times_s, prepend=0.0)
-    counts = np.ceil(intervals / model.step_s - 1e-9).astype(int)
+    step = max(model.step_s, float(times_s[-1]) / MOST_STEPS)
+    counts = np.ceil(intervals / step - 1e-9).astype(int)
     along = _sensitive_step(tuple(names), width).mapaccum(int(counts.sum()))
     mass, row = model.parameter_names.index("surge.total_mass"), model.state_names.index("motion.u")
     places = np.cumsum(counts)

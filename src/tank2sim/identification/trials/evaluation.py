@@ -87,8 +87,8 @@ def following(problem: Problem, values: Vector, noise: Mapping[str, float]) -> t
 def pooled(results: Sequence[Following], signal: str) -> float:
     """Error over windows of all runs together, as a share of the signal."""
     pairs = np.array([result.windows[signal] for result in results if signal in result.windows])
-    if not len(pairs):
-        return np.nan
+    if not len(pairs) or not pairs[:, 1].any():
+        return np.nan  # of a signal that is zero throughout there is no share
     return float(np.sqrt(np.sum(pairs[:, 0] ** 2) / np.sum(pairs[:, 1] ** 2)))
 
 

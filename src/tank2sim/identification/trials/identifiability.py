@@ -145,7 +145,7 @@ def refuse_unseen(problem: Problem) -> tuple[str, ...]:
             missing.append(name)
     needed = [name for name in missing if _needed(parse_term(_short(name)))]
     if needed:
-        runs = ", ".join(run.name for run in problem.runs)
+        runs = ", ".join(dict.fromkeys(run.origin for run in problem.runs))
         told = ", ".join(_short(name) for name in needed)
         raise InputError(runs, "", f"shows nothing of {told}", _remedy(needed))
     return tuple(missing)

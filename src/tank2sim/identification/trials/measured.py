@@ -120,6 +120,8 @@ def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
     candidates = [1.0] if trial.scale is None else [1.0, trial.scale, 1 / trial.scale]
     if speed is None:
         return trial, 1.0
+    if speed == 0:
+        raise InputError(trial.path, "", "the ship lies still in it", "leave it out: nothing of a motion is in it")
     away = [abs(math.log(speed * math.sqrt(factor) / card.model.speed_mps)) for factor in candidates]
     factor = candidates[int(np.argmin(away))]
     if min(away) > math.log(FARTHEST_FROUDE) and trial.scale is None:

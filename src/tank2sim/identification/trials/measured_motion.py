@@ -70,11 +70,11 @@ def measured_motion(problem: Problem, run: Run) -> MeasuredMotion:
     missing = {name for name, column in columns.items() if np.isnan(column).all()}
     window = _window(problem, run)
     if len(run.measured) <= window:
-        raise InputError(run.name, "", f"has only {len(run.measured)} steps", f"at least {window + 1} are needed")
+        raise InputError(run.origin, "", f"has only {len(run.measured)} steps", f"at least {window + 1} are needed")
     notices = []
     if "motion.r" in missing:
         if "motion.psi" in missing:
-            raise InputError(run.name, "header", "has neither yaw rate nor heading", "give r_degps or psi_deg")
+            raise InputError(run.origin, "header", "has neither yaw rate nor heading", "give r_degps or psi_deg")
         columns["motion.r"] = _slope(columns["motion.psi"], window, run.step_s)
         notices.append(f"{run.name}: the yaw rate is the slope of the smoothed heading")
     if "motion.psi" in missing:
@@ -110,7 +110,7 @@ def _velocities(model: Model, run: Run, columns: dict[str, Vector], window: int)
     if np.isnan(ground[0]).all() or np.isnan(ground[1]).all():
         if any(np.isnan(columns[name]).all() for name in ("motion.x", "motion.y")):
             remedy = "give u_mps and v_mps, or x_m, y_m and psi_deg"
-            raise InputError(run.name, "header", "has neither velocities nor positions", remedy)
+            raise InputError(run.origin, "header", "has neither velocities nor positions", remedy)
         north, east = (_slope(columns[name], window, run.step_s) for name in ("motion.x", "motion.y"))
         how = "from the slope of the smoothed positions"
     else:

@@ -114,7 +114,7 @@ def bands(
     found = list(spread(_figures, tasks, executor))
     reached = [one for one in found if one is not None]
     if not reached:
-        raise InputError(model.name, "", "the motion leaves all bounds in every member", "check the estimates")
+        raise InputError(model.origin, "", "the motion leaves all bounds in every member", "check the estimates")
     names = list(dict.fromkeys(name for one in reached for name in one))
     members = {name: np.array([np.nan if one is None else one.get(name, np.nan) for one in found]) for name in names}
     members = {name: column for name, column in members.items() if not np.isnan(column).all()}

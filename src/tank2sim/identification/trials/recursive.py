@@ -216,7 +216,7 @@ def _block(
     along = stand.made.before[rows], stand.made.after[rows]
     made = filter_pass(task.disturbed, batch, task.problem.parameters(at), stand.levels, along)
     if not np.isfinite(made.cost):
-        name = task.problem.runs[run].name
+        name = task.problem.runs[run].origin
         raise InputError(name, "", "the model's motion leaves all bounds", "start from a card nearer to the ship")
     J, last = innovation_tangents(made.tangents, made.gains, tangent)
     return made, J, (made.before[0, -1], made.gains.P[0, -1], last)
@@ -232,7 +232,8 @@ def _estimate(problem: Problem, settings: Settings, steps: list[_Step], costs: l
         weighted = [*(step.kept * one for one in weighted), step.vector + step.matrix @ (values - step.at)]
         covariances.append(sandwich(information, problem.prior_error, _blocks(weighted, steps, group)))
     innovations = np.concatenate([step.innovations for step in steps])
-    deviations = np.sqrt(np.nanmean(innovations**2, axis=0))
+    count = np.count_nonzero(~np.isnan(innovations), axis=0)
+    deviations = np.sqrt(np.nansum(innovations**2, axis=0) / np.where(count > 0, count, np.nan))
     return RecursiveEstimate(
         method="recursive",
         free=problem.free,

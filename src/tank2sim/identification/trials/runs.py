@@ -25,6 +25,9 @@ SEEN = {
 }
 """Signal of a trial to the variable of a model that it measures."""
 
+MOST_INSTANTS_A_ROW = 100
+"""Instants of an even time a row of the file: beyond, 99 % of the record is missing, and one bad time (an epoch among
+seconds) would ask for gigabytes. Project choice: records of what a ship does have gaps of a few per cent."""
 LONGEST_GAP = 3
 """Gaps of up to this many samples are bridged; in longer ones nothing counts as measured (a choice of ours)."""
 
@@ -45,6 +48,8 @@ class Run:
         In the order of `seen`; nan where nothing was measured.
     seen : tuple of str
         Names of the model's variables that are measured.
+    file : str
+        The trial's file, for messages; empty if it has none.
     """
 
     name: str
@@ -53,6 +58,12 @@ class Run:
     inputs: Array
     measured: Array
     seen: tuple[str, ...]
+    file: str = ""
+
+    @property
+    def origin(self) -> str:
+        """The file, as messages begin; the name if there is none."""
+        return self.file or self.name
 
     @property
     def times(self) -> Vector:
@@ -71,7 +82,7 @@ class Run:
         """The instants `begin` to `end` - 1."""
         where = slice(begin, end)
         begin_s = self.begin_s + begin * self.step_s
-        return Run(self.name, begin_s, self.step_s, self.inputs[where], self.measured[where], self.seen)
+        return Run(self.name, begin_s, self.step_s, self.inputs[where], self.measured[where], self.seen, self.file)
 
 
 def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | None = None) -> Run:
@@ -94,6 +105,10 @@ def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | 
     grid: Vector = begin + step * np.arange(count, dtype=float)
     if count < 10:
         raise InputError(trial.path, "", f"is only {trial.time_s[-1] - trial.time_s[0]:g} s long", "leave it out")
+    if count * stride > MOST_INSTANTS_A_ROW * len(trial.time_s):
+        lasts = trial.time_s[-1] - trial.time_s[0]
+        problem = f"lasts {lasts:g} s, and has {len(trial.time_s)} rows, most of them {sampling:g} s apart"
+        raise InputError(trial.path, f"column {trial.heading('t_s')}", problem, "correct the time, or cut the record")
     inputs = np.tile(model.input_values(), (count, 1))
     for name, values in _input_signals(model, trial).items():
         held = name == "rudder.command" and "delta_rad" not in trial.signals
@@ -107,7 +122,7 @@ def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | 
         raise InputError(
             trial.path, "header", "none of the signals to be compared is there", "give u_mps, r_degps, ..."
         )
-    return Run(trial.name, begin, step, inputs, measured, tuple(seen))
+    return Run(trial.name, begin, step, inputs, measured, tuple(seen), str(trial.path))
 
 
 def in_range(run: Run, model: Model, speeds: tuple[float, float], least_s: float) -> tuple[Run, ...]:

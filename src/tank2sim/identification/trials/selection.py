@@ -169,7 +169,7 @@ def cross_validate(
     """
     runs = problem.runs
     if len(runs) < 2:
-        raise InputError(runs[0].name, "", "is the only run", "cross-validation needs two runs at least")
+        raise InputError(runs[0].origin, "", "is the only run", "cross-validation needs two runs at least")
     groups = [*((place,) for place in range(len(runs))), farthest(runs)]
     tasks = [(problem, group, estimator, score) for group in groups]
     *single, last = spread(_fold, tasks, executor)

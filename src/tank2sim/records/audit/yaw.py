@@ -337,6 +337,8 @@ def _course_slope(trial: Trial) -> float | None:
         return None
     going = np.abs(velocity) > 0.3 * np.nanmedian(np.abs(velocity))
     course = unwrapped(np.where(going, np.angle(velocity), np.nan))
+    if np.isnan(course).all():
+        return None
     if not np.nanmax(course) - np.nanmin(course) > 10 * DEGREE:  # beyond any drift of a straight run
         return None
     spread = float(np.nanstd(course))

@@ -134,6 +134,9 @@ def needs_of(kind: str) -> Mapping[str, type]:
 def misshapen(kind: str, result: Mapping[str, Json]) -> str:
     """The first key under which there is something else than the command writes; empty where there is none."""
     forms = _LISTS | dict(needs_of(kind))
+    notices = result.get("notices")
+    if isinstance(notices, list) and not all(isinstance(text, str) for text in notices):
+        return "notices"
     return next((key for key, form in forms.items() if not isinstance(result.get(key, None), form | None)), "")
 
 

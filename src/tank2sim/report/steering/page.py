@@ -69,7 +69,7 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
         The model has no rudder.
     """
     if "rudder.command" not in model.input_names:
-        raise InputError(model.name, "", "has no rudder", "only a ship (kind linear or abkowitz) can be steered")
+        raise InputError(model.origin, "", "has no rudder", "only a ship (kind linear or abkowitz) can be steered")
     if library is None:
         notices = [NO_COMPILER, *notices]
     environment = jinja2.Environment(
