@@ -167,7 +167,10 @@ def test_a_quoted_header_is_written_in_the_trial_format(tmp_path: Path) -> None:
 SWINGS = {
     # headings of the file before, deg; those after 5 deg to port, deg
     "0 to 360, through north": (lambda psi: (psi + 340) % 360, lambda psi: (psi + 335) % 360),
-    "0 to 360, both ends in it": (lambda psi: np.clip(1.2 * psi, 0, 360), lambda psi: (np.clip(1.2 * psi, 0, 360) - 5) % 360),
+    "0 to 360, both ends in it": (
+        lambda psi: np.clip(1.2 * psi, 0, 360),
+        lambda psi: (np.clip(1.2 * psi, 0, 360) - 5) % 360,
+    ),
     "about 0": (lambda psi: (psi + 160) % 360 - 180, lambda psi: (psi + 155) % 360 - 180),
     "about 0, both ends in it": (
         lambda psi: np.clip(1.2 * psi - 180, -180, 180),

@@ -19,7 +19,7 @@ def asked(names: list[str], error: float = STATED) -> Problem:
 @pytest.mark.parametrize("noise", [1e-6, 0.05, 0.2])
 @pytest.mark.parametrize("true", [2.0, 6.0])
 def test_the_scale_is_the_one_that_makes_the_measurements_likeliest(noise: float, true: float) -> None:
-    """Measured are theta + noise, theta scattered by k times the stated error: k^2 = (mean square - noise^2)/error^2."""
+    """Of theta + noise, theta scattered by k times the stated error: k^2 = (mean square - noise^2)/error^2."""
     count = 300
     problem = asked([f"derivatives.Y{n}" for n in range(count)])
     rng = np.random.default_rng(5)
