@@ -285,3 +285,11 @@ def test_the_rate_of_a_pull_out_is_halved_after_the_time_constant_times_ln_2(mar
     assert figures["residual_rate_degps"] == pytest.approx(side * 0.7 * math.exp(-200 / 30))
     short = made_up(mariner, t[:1200], motion_r=np.radians(rate[:1200]), rudder_command=order[:1200])
     assert figures_of(PullOut(side * math.radians(20)), short, 100.0)["time_to_half_rate_s"] is None
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_spiral_goes_from_its_largest_angle_to_the_other_side_and_back(side: int) -> None:
+    there = [side * angle for angle in (5, 4, 3, 2, 1, 0, -1, -2, -3, -4, -5)]
+    spiral = parse_manoeuvre(f"spiral:{5 * side}")
+    assert isinstance(spiral, Spiral)
+    np.testing.assert_allclose(np.degrees(spiral.rudders), [*there, *there[-2::-1]], atol=1e-12)

@@ -13,7 +13,7 @@ from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
-from tank2sim.simulation.recorded import _smoothed, recorded, repeat
+from tank2sim.simulation.recorded import _held, _smoothed, recorded, repeat
 from tests.identification.trials.made_up_ship import CARD, NOISE, SPEED, TRUTH, accelerations
 
 RATE, STEP = np.deg2rad(3.0), 0.05
@@ -193,3 +193,9 @@ def test_recorded_signals_are_smoothed_over_three_tenths_of_the_time_of_a_length
     assert np.var(_smoothed(shown, "r_radps", 20.0)) == pytest.approx(375 / 2145, rel=0.05)
     np.testing.assert_array_equal(_smoothed(shown, "r_radps", 6.0), noise)  # 3 readings: none to spare
     np.testing.assert_allclose(_smoothed(shown, "psi_rad", 20.0), 1e-9 * time**3, atol=1e-9)
+
+
+def test_an_angle_is_held_from_three_readings_on() -> None:
+    """A coarse record: three readings to either side are held, two are on the way."""
+    rudder = np.radians([0, 0, 0, 10, 10, 10, -10, -10, -10, 10, 10, -10, -10, -10, 0])
+    assert [list(places) for places in _held(rudder)] == [[3, 4, 5], [6, 7, 8, 11, 12, 13]]
