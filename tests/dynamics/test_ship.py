@@ -203,3 +203,16 @@ def test_propulsion_balances_at_nominal_revolutions_and_pulls_above(data) -> Non
     m = card.rigid_body.mass - card.derivatives["Xudot"]
     assert udot(1.1 * nominal) == pytest.approx(0.00077 * 0.21 * U0**2 / L / m, rel=1e-9)
     assert udot(-nominal) == pytest.approx(-2 * 0.00077 * U0**2 / L / m, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("lag", "step"),
+    # L/u0 is 20.8 s: a two-hundredth of it is 0.104 s, rounded down 0.1 s; or a fifth of the lag of the gear
+    [(10.0, 0.1), (0.6, 0.1), (0.5, 0.1), (0.45, 0.05), (0.1, 0.02), (0.06, 0.01), (0.02, 0.002)],
+)
+def test_the_step_is_a_two_hundredth_of_the_time_of_a_length_or_a_fifth_of_the_lag_of_the_gear(
+    mariner_card, lag: float, step: float
+) -> None:
+    assert mariner_card.ship.length_m / mariner_card.model.speed_mps == pytest.approx(20.85, abs=0.01)
+    gear = mariner_card.steering_gear.model_copy(update={"time_constant_s": lag})
+    assert build(replace(mariner_card, steering_gear=gear)).step_s == pytest.approx(step)

@@ -97,3 +97,16 @@ def test_the_catalogue_says_what_is_not_published() -> None:
     assert all(form.missing and form.source for form in STEERING_FORMS.values())
     assert any("Table" in words for words in STEERING_FORMS["base"].missing)
     assert any("curve 3" in words for words in STEERING_FORMS["inoue-hirano"].missing)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_japanese_equations_are_those_of_their_term_list(side: int) -> None:
+    """Signs of the list of coefficients: -h beta, r, -h beta |beta|, -h beta |r|, r |r| in Y, and so on."""
+    form = STEERING_FORMS["inoue-hirano"]
+    printed = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 0.5, 0.8)
+    c = {one.name: value for one, value in zip(form.coefficients, printed, strict=True)}
+    b, r, d, h = side * BETA, side * R, side * DELTA, 0.8
+    inflow = -41 * b - 43 * r
+    sway = -2 * h * b + 3 * r - 5 * h * b * abs(b) - 7 * h * b * abs(r) + 11 * r * abs(r) + 13 * d + inflow
+    yaw = 17 * h * b - 19 * r - 23 * r * abs(r) - 29 * h * b * r**2 - 31 * h * b**2 * r + 37 * d + 0.5 * inflow
+    assert _rates("inoue-hirano", c, b, r, d) == pytest.approx((sway, yaw))

@@ -1,6 +1,8 @@
 """The rig's model against the equation written anew, and what turning the other way does."""
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 from tank2sim.cards import YawRigCard, read_card
 from tank2sim.cards.form import TankWalls, YawRig
 from tank2sim.dynamics import build
-from tank2sim.dynamics.yaw_rig import ELLIPSOID_T1, SHIP_T1, yaw_rig_model
+from tank2sim.dynamics.yaw_rig import ELLIPSOID_T1, SHIP_T1, wall_nearness, yaw_rig_model
 from tank2sim.errors import InputError
 from tests.yaw_truth import Truth
 
@@ -91,3 +93,20 @@ def test_the_bundled_card_is_the_papers_ship():
     assert isinstance(card, YawRigCard)
     assert card.yaw_rig.model_copy(update={"walls": None}) == SHIP_T1
     assert build(card).name == card.ship.name
+
+
+@pytest.mark.parametrize(
+    ("heading_deg", "bow", "stern"),
+    # a tank of 10 m by 4 m, the axis 1 m forward and 0.5 m to starboard of its middle, bow and stern 1 m from the axis
+    [(0, 1.5, 1.5), (90, 0.5, 1.5), (-90, 1.5, 0.5), (180, 1.5, 1.5), (30, 1.0, 2.0), (-30, 2.0, 1.0)],
+)
+def test_distances_to_the_walls_are_those_of_bow_and_stern(heading_deg: float, bow: float, stern: float) -> None:
+    walls = SimpleNamespace(length_m=10.0, breadth_m=4.0, x_m=1.0, y_m=0.5, body_length_m=2.0)
+    assert [float(one) for one in wall_nearness(math.radians(heading_deg), walls)] == pytest.approx(
+        [1 / (bow + 1), 1 / (stern + 1)]
+    )
+
+
+def test_an_end_wall_counts_where_it_is_nearer_than_a_side_wall() -> None:
+    walls = SimpleNamespace(length_m=10.0, breadth_m=8.0, x_m=3.0, y_m=0.5, body_length_m=2.0)
+    assert [float(one) for one in wall_nearness(0.0, walls)] == pytest.approx([1 / (1 + 1), 1 / (3 + 1)])

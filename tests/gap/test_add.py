@@ -14,7 +14,7 @@ from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import Model, build
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.add import BUILT_ON_DERIVATIVES, CHANGING_DERIVATIVES, STATED, added, improved_text
+from tank2sim.gap.add import BUILT_ON_DERIVATIVES, CHANGING_DERIVATIVES, STATED, _rounded, added, improved_text
 from tank2sim.units import to_si
 from tests.dynamics.effects.ships import TYPICAL, card_with, mariner_text
 
@@ -287,3 +287,10 @@ def test_the_improved_card_is_linearised(name: str) -> None:
     found = [(name, si(name), {})]
     result = stability(build(read(improved_text(added(read(CARDS["little known"]), found), found, ["turn"]))))
     assert np.all(np.isfinite(result.eigenvalues))
+
+
+def test_a_value_is_rounded_by_its_error_and_without_one_to_ten_digits() -> None:
+    assert _rounded(0.123456789, 0.01) == pytest.approx(0.123456789, abs=0.0006)
+    assert len(str(_rounded(0.123456789, 0.01))) < len("0.123456789")
+    assert _rounded(1.2345678901234, 0.0) == 1.23456789
+    assert math.copysign(1.0, _rounded(-0.0, 0.0)) == 1.0

@@ -162,3 +162,44 @@ def test_a_quoted_header_is_written_in_the_trial_format(tmp_path: Path) -> None:
     again = reread(tmp_path, corrected_text(trial.path, trial, [BIAS]))
     np.testing.assert_allclose(np.delete(degrees(again, "r_radps"), 2), np.delete(RATE, 2), atol=1e-6)
     np.testing.assert_allclose(again.signals["x_m"], X)
+
+
+SWINGS = {
+    # headings of the file before, deg; those after 5 deg to port, deg
+    "0 to 360, through north": (lambda psi: (psi + 340) % 360, lambda psi: (psi + 335) % 360),
+    "0 to 360, both ends in it": (
+        lambda psi: np.clip(1.2 * psi, 0, 360),
+        lambda psi: (np.clip(1.2 * psi, 0, 360) - 5) % 360,
+    ),
+    "about 0": (lambda psi: (psi + 160) % 360 - 180, lambda psi: (psi + 155) % 360 - 180),
+    "about 0, both ends in it": (
+        lambda psi: np.clip(1.2 * psi - 180, -180, 180),
+        lambda psi: (np.clip(1.2 * psi - 180, -180, 180) + 175) % 360 - 180,
+    ),
+    "continuous, more than a turn": (lambda psi: 1.3 * psi, lambda psi: 1.3 * psi - 5),
+    "less than half a turn": (lambda psi: 0.59 * psi, lambda psi: 0.59 * psi - 5),
+    "less than half a turn, to port": (lambda psi: -0.59 * psi, lambda psi: -0.59 * psi - 5),
+    "through south, of no known range": (lambda psi: psi - 200, lambda psi: psi - 205),
+    "beyond a turn, of no known range": (lambda psi: psi + 100, lambda psi: psi + 95),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("radians", [False, True])
+@pytest.mark.parametrize("name", SWINGS)
+def test_headings_stay_in_the_range_that_the_file_has_and_in_none_where_it_has_none(
+    tmp_path: Path, name: str, radians: bool
+) -> None:
+    """A ship that turns through 300 deg at 1.5 deg/s, its compass 5 deg too far to starboard."""
+    before, after = SWINGS[name]
+    swing = np.minimum(1.5 * TIME, 300.0)
+    scale, column = (math.pi / 180, "psi_rad") if radians else (1.0, "psi_deg")
+    trial = written(tmp_path, sheet({column: np.trunc(1000 * scale * before(swing)) / 1000}, head="# a turn\n"))
+    text = corrected_text(trial.path, trial, [("heading_offset", {"angle_rad": math.radians(5.0)}, {})])
+    assert text is not None
+    rows = [line.split(",") for line in text.splitlines() if line[0].isdigit()]
+    shown, expected = np.array([float(row[3]) for row in rows]), scale * after(swing)
+    turn = 360 * scale
+    # where the wrapped heading jumps, three decimals may fall to either side
+    at_the_edge = np.abs(np.abs(shown - expected) - turn) < 2.1e-3
+    assert at_the_edge.sum() <= 2
+    np.testing.assert_allclose(shown[~at_the_edge], expected[~at_the_edge], atol=2.1e-3, rtol=0)

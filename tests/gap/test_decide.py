@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -307,3 +308,27 @@ def test_the_strangest_is_told_first() -> None:
     assert found[0].what == "passage" and {one.what for one in found} >= {"passage", "trial"}
     assert [one.excess for one in found] == sorted((one.excess for one in found), reverse=True)
     assert all(np.isfinite(one.excess) for one in found)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.9])
+def test_noise_of_another_colour_has_no_strange_passage(memory: float) -> None:
+    """Sums of squares of coloured noise vary more: chance still makes one in twenty as strange as once in twenty."""
+    blocks, rng, excess = 400, np.random.default_rng(4), []
+    for _ in range(60):
+        white = rng.standard_normal((blocks + 100, 3))
+        noise = lfilter([math.sqrt(1 - memory**2)], [1.0, -memory], white, axis=0)[100:]
+        motion = SimpleNamespace(names=("a",), blocks=blocks, lengths=[blocks], times=np.arange(blocks)[None, :])
+        likelihood = SimpleNamespace(motion=motion, known=np.ones((1, blocks, 3), dtype=bool))
+        (found,) = module._passages(likelihood, noise[None])
+        excess.append(found.excess)
+    assert np.mean(np.array(excess) > -2 * math.log(0.05)) < 0.25
+    assert np.mean(np.array(excess) > -2 * math.log(3e-3)) < 0.1
+
+
+def test_a_burst_in_white_noise_is_the_strangest_passage() -> None:
+    noise = np.random.default_rng(4).standard_normal((1, 400, 3))
+    noise[0, 200:212] *= 3
+    motion = SimpleNamespace(names=("a",), blocks=400, lengths=[400], times=10.0 * np.arange(400)[None, :])
+    (found,) = module._passages(SimpleNamespace(motion=motion, known=np.ones((1, 400, 3), dtype=bool)), noise)
+    assert found.excess > -2 * math.log(1e-6)
+    assert (found.begin_s, found.end_s) == pytest.approx((2000, 2110), abs=30)

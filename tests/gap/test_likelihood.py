@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import block_diag
 from scipy.optimize import minimize_scalar
 
-from tank2sim.gap import forms
+from tank2sim.gap import forms, recursion
 from tank2sim.gap import likelihood as module
 from tank2sim.gap.fit import Belief, Coefficients, Fit
 from tank2sim.gap.forms import Forms
@@ -282,3 +282,13 @@ def test_about_an_explanation_the_heading_turns_with_the_yaw_rate_that_nobody_mo
     away = np.diff(psi) / moved.step_s - 0.5 * (r[1:] + r[:-1])
     inside = away[begin : begin + (moved.blocks - 1) * moved.fine].reshape(-1, moved.fine)
     assert np.median(np.ptp(inside, axis=1)) < 0.1 * 0.04 * moved.block_s
+
+
+def test_what_is_read_of_a_covariance_is_that_of_the_signals_that_were_seen() -> None:
+    rng = np.random.default_rng(2)
+    root = rng.standard_normal((13, 13))
+    P, reading, known = root @ root.T, rng.standard_normal((4, 6)), np.array([True, False, True, True])
+    expected = np.where(known, P[:, :6] @ reading.T + P[:, 9:13], 0.0)
+    found = recursion._read(P, reading, known)
+    assert found.shape == (13, 4)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)

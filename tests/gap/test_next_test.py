@@ -167,3 +167,10 @@ def test_what_is_left_is_that_of_the_plain_formula() -> None:
     assert _left(d, _Seen(d, J, S))[0] == pytest.approx(expected)
     d[0, 1, 3] = np.nan
     assert np.isnan(_left(d, _Seen(d, J, S))[0])
+
+
+def test_the_straight_run_on_two_headings_turns_after_a_third_of_its_length(mariner_card: ManoeuvringCard) -> None:
+    (found,) = (one for one in candidates(mariner_card, 30.0) if one.name == "straight run on two headings")
+    helmsman = found.helmsman()
+    assert [np.degrees(helmsman(time, 0.0, 0.0)) for time in (0.0, 9.9, 10.1, 29.0)] == pytest.approx([0, 0, 20, 20])
+    assert helmsman(20.0, np.pi / 2, 0.0) == pytest.approx(0.0)

@@ -10,7 +10,7 @@ import pytest
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.gap.kinematics import kinematics
 from tank2sim.gap.result import MissingForce, Passed
-from tank2sim.gap.where import equation_of, explained_share, figures, missing_force, parity, places
+from tank2sim.gap.where import _at_work, equation_of, explained_share, figures, missing_force, parity, places
 from tests.identification.trials import made_up_ship
 
 TIME = np.arange(0.0, 400.0, 0.5)
@@ -139,7 +139,7 @@ def test_a_force_that_is_a_function_of_the_rudder_is_explained_by_the_rudder() -
     force = rng.standard_normal((4000, 3)) * [1e3, 1e3, 1e5]
     force[:, 1] += 5e3 * np.where(np.abs(rudder) > 0.35, np.sign(rudder), 0.0)
     found = found_force(force, np.tile([1e3, 1e3, 1e5], (4000, 1)))
-    assert found is not None and found.equation == "Y" and found.explaining == "rudder"
+    assert found is not None and found.equation == "sway" and found.explaining == "rudder"
     assert found.explained["rudder"] > 0.8 and found.explained["heading"] < 0.2
     assert parity(found.states["rudder"], found.force) > 0.9
 
@@ -216,3 +216,14 @@ def test_without_a_name_kinematics_speak_before_forces(mariner_card: Manoeuvring
     assert equation_of([], mariner_card, force, [motion(current=0.3)]) == "kinematics"
     assert equation_of([], mariner_card, force, [motion(bias=5e-4)]) == "sensor"
     assert equation_of([], mariner_card, None, [motion()]) == ""
+
+
+@pytest.mark.parametrize(("low", "whole"), [(0.8, True), (0.6, False)])
+def test_a_force_is_at_work_where_its_square_is_above_half_of_its_mean_square(low: float, whole: bool) -> None:
+    """Half of the time 1.2, half `low`: 0.64 of a mean of 1.04 is at work, 0.36 of 0.9 is not."""
+    time = np.arange(200.0)
+    force = np.zeros((200, 3))
+    force[:, 1] = np.where(time < 100, 1.2, low)
+    (found,) = _at_work(np.array(["a"] * 200, dtype=object), time, force, np.full((200, 3), 0.05))
+    assert found.equation == "sway" and found.t_start_s == pytest.approx(0.0, abs=5)
+    assert found.t_end_s == pytest.approx(199.0 if whole else 99.0, abs=5)

@@ -11,7 +11,7 @@ from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.simulation.figures import figures_of
-from tank2sim.simulation.manoeuvres import Spiral, Turn, Zigzag, parse_manoeuvre, read_orders
+from tank2sim.simulation.manoeuvres import PullOut, Spiral, Turn, Zigzag, parse_manoeuvre, read_orders
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import trial_csv
@@ -206,3 +206,90 @@ def test_an_order_beyond_the_gear_is_told(mariner) -> None:
 def test_a_duration_beside_the_grid_by_rounding_ends(mariner) -> None:
     run = simulate(mariner, parse_manoeuvre("zigzag:10/10"), duration_s=100.00000000001).trajectory
     assert run.t[-1] == pytest.approx(100.0)
+
+
+def circling(model, duration: float, rate=1.0, speed=1.0, radius: float = 100.0):
+    """Figures of a turn at 5 m/s of a ship of 100 m, yaw rate and speed times what is given over time to the end."""
+    t = np.arange(0, duration + 0.05, 0.1)
+    psi = 5.0 / radius * t
+    motion = {"motion_psi": psi, "motion_x": radius * np.sin(psi), "motion_y": radius * (1 - np.cos(psi))}
+    factors = [part(t[-1] - t) if callable(part) else part for part in (rate, speed)]
+    run = made_up(model, t, motion_r=5.0 / radius * factors[0], motion_speed=5.0 * factors[1], **motion)
+    return figures_of(Turn(0.6), run, 100.0)
+
+
+@pytest.mark.parametrize("signal", ["rate", "speed"])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_turn_is_steady_if_neither_rate_nor_speed_changes_by_a_hundredth_over_two_lengths(
+    mariner, signal: str, sign: int
+) -> None:
+    """Two lengths are 40 s here: a drift of 0.97 % in that time is steady, one of 1.03 % is not."""
+    for percent, steady in ((0.97, True), (1.03, False)):
+        figures = circling(mariner, 200.0, **{signal: lambda left, share=percent / 4000: 1 + sign * share * left})
+        assert (figures["steady_diameter_m"] is not None) == steady, percent
+        assert (figures["steady_rate_degps"] is not None) == steady, percent
+    assert circling(mariner, 200.0)["steady_diameter_m"] == pytest.approx(200.0)
+
+
+def test_what_a_turn_did_before_its_last_two_lengths_does_not_make_it_unsteady(mariner) -> None:
+    for since, steady in ((40.5, True), (39.5, False)):
+        figures = circling(mariner, 200.0, rate=lambda left, since=since: np.where(left > since, 1.05, 1.0))
+        assert (figures["steady_diameter_m"] is not None) == steady, since
+
+
+def test_a_turn_is_not_steady_before_it_has_run_two_lengths(mariner) -> None:
+    """In 39 s and 41 s at 5 m/s a ship of 100 m, having turned about, has run 1.95 and 2.05 lengths."""
+    short, enough = (circling(mariner, duration, radius=30.0) for duration in (39.0, 41.0))
+    assert short["tactical_diameter_m"] == pytest.approx(60.0, rel=1e-6)
+    assert short["steady_diameter_m"] is None
+    assert enough["steady_diameter_m"] == pytest.approx(60.0)
+
+
+def spiralling(model, lag: float) -> dict:
+    """Figures of a spiral, 10 deg to starboard, to port and back in steps of 5 deg, held for 50 s each.
+
+    Steady rates are 0.1 deg/s a degree of rudder, but on the way back `lag` (deg/s) less.
+    """
+    rudders = np.array([10.0, 5, 0, -5, -10, -5, 0, 5, 10])
+    rates = 0.1 * rudders - np.where(np.arange(9) > 4, lag, 0.0)
+    rates[-1] = 1.0
+    t = np.arange(0, 450.5, 0.5)
+    hold = np.minimum(t // 50, 8).astype(int)
+    reached = np.minimum(np.maximum(t - 0.25, 0) // 50, 8).astype(int)  # a row is the end of the hold before
+    run = made_up(
+        model, t, motion_r=np.radians(rates[reached]), rudder_command=np.radians(rudders[hold]), motion_speed=5.0
+    )
+    return figures_of(Spiral(tuple(np.radians(rudders))), run, 100.0)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_spiral_has_a_loop_from_a_twentieth_of_its_largest_rate_on(mariner, sign: int) -> None:
+    none, loop = (spiralling(mariner, sign * lag) for lag in (0.045, 0.056))
+    np.testing.assert_allclose(none["rate_degps"][:5], [1, 0.5, 0, -0.5, -1], atol=1e-12)
+    assert none["loop_height_degps"] == 0.0 and none["loop_width_deg"] == 0.0
+    assert loop["loop_height_degps"] == pytest.approx(0.056)
+    assert loop["loop_width_deg"] == pytest.approx(0.56)  # 0.1 deg/s a degree
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_rate_of_a_pull_out_is_halved_after_the_time_constant_times_ln_2(mariner, side: int) -> None:
+    """Rudder to neutral at 100 s, where it is 0.5 deg; from there the rate decays with 30 s."""
+    t = np.arange(0, 300.05, 0.1)
+    rate = side * 0.7 * np.where(t < 99.95, 1.0, np.exp(-(t - 100) / 30))
+    order = np.radians(np.where(t < 99.95, side * 20.0, 0.5))
+    run = made_up(mariner, t, motion_r=np.radians(rate), rudder_command=order, motion_speed=5.0)
+    figures = figures_of(PullOut(side * math.radians(20)), run, 100.0)
+    assert figures["steady_rate_degps"] == pytest.approx(side * 0.7)
+    assert figures["neutral_rudder_deg"] == pytest.approx(0.5)
+    assert figures["time_to_half_rate_s"] == pytest.approx(30 * math.log(2), abs=0.11)
+    assert figures["residual_rate_degps"] == pytest.approx(side * 0.7 * math.exp(-200 / 30))
+    short = made_up(mariner, t[:1200], motion_r=np.radians(rate[:1200]), rudder_command=order[:1200])
+    assert figures_of(PullOut(side * math.radians(20)), short, 100.0)["time_to_half_rate_s"] is None
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_spiral_goes_from_its_largest_angle_to_the_other_side_and_back(side: int) -> None:
+    there = [side * angle for angle in (5, 4, 3, 2, 1, 0, -1, -2, -3, -4, -5)]
+    spiral = parse_manoeuvre(f"spiral:{5 * side}")
+    assert isinstance(spiral, Spiral)
+    np.testing.assert_allclose(np.degrees(spiral.rudders), [*there, *there[-2::-1]], atol=1e-12)

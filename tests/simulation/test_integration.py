@@ -130,3 +130,25 @@ def test_of_many_steps_every_tenth_and_the_last_are_kept(mariner, compiled: bool
     both = thin.rollouts(np.array([x, x]), u, np.array([p, heavier]), (0.1, 123))
     np.testing.assert_array_equal(both[0], kept)
     np.testing.assert_array_equal(both[1], thin.rollout(x, u, heavier, 0.1, 123, every=10))
+
+
+def test_events_are_as_exact_where_only_every_tenth_step_is_kept(mariner) -> None:
+    zigzag = parse_manoeuvre("zigzag:20/20")
+    parameters = mariner.parameter_values()
+    names = dict(zip(mariner.parameter_names, parameters, strict=True))
+    found = []
+    for every in (1, 10):
+        running = Running(Integrator(mariner, compiled=False, every=every), {}, {})
+        zigzag.drive(running, names["ship.length"] / names["ship.speed"], None)
+        run = running.trajectory()
+        found.append(run.t[1:][np.diff(run["rudder.command"]) != 0])
+    assert len(found[0]) >= 3
+    np.testing.assert_allclose(found[1], found[0], atol=1e-9)
+
+
+def test_what_a_short_run_does_not_show_is_named_in_words(mariner) -> None:
+    (told,) = (
+        one for one in simulate(mariner, parse_manoeuvre("turn:35"), duration_s=60.0).notices if "not show" in one
+    )
+    listed = told.split(": ")[1].split(", ")
+    assert {"advance", "transfer", "tactical diameter", "steady diameter"} <= set(listed)

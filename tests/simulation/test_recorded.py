@@ -14,7 +14,7 @@ from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
-from tank2sim.simulation.recorded import recorded, repeat
+from tank2sim.simulation.recorded import _held, _smoothed, recorded, repeat
 from tests.identification.trials.made_up_ship import CARD, NOISE, SPEED, TRUTH, accelerations
 
 RATE, STEP = np.deg2rad(3.0), 0.05
@@ -292,3 +292,19 @@ def test_the_course_of_a_zigzag_is_that_before_the_ship_drifted_off_it(data: Pat
         assert math.degrees(what.manoeuvre.heading) == pytest.approx(heading)
         assert what.manoeuvre.lag_s < 1.0
         assert what.figures["overshoots_deg"][:2] == pytest.approx(overshoots, abs=0.5)
+
+
+def test_recorded_signals_are_smoothed_over_three_tenths_of_the_time_of_a_length() -> None:
+    """20 s of L/u0 at 2 Hz are 13 readings: a cubic through them keeps 375/2145 of the variance of white noise."""
+    time = np.arange(0, 5000, 0.5)
+    noise = np.random.default_rng(1).standard_normal(time.size)
+    shown = Trial(Path("noise.csv"), time, {"r_radps": noise, "psi_rad": 1e-9 * time**3}, scale=None)
+    assert np.var(_smoothed(shown, "r_radps", 20.0)) == pytest.approx(375 / 2145, rel=0.05)
+    np.testing.assert_array_equal(_smoothed(shown, "r_radps", 6.0), noise)  # 3 readings: none to spare
+    np.testing.assert_allclose(_smoothed(shown, "psi_rad", 20.0), 1e-9 * time**3, atol=1e-9)
+
+
+def test_an_angle_is_held_from_three_readings_on() -> None:
+    """A coarse record: three readings to either side are held, two are on the way."""
+    rudder = np.radians([0, 0, 0, 10, 10, 10, -10, -10, -10, 10, 10, -10, -10, -10, 0])
+    assert [list(places) for places in _held(rudder)] == [[3, 4, 5], [6, 7, 8, 11, 12, 13]]

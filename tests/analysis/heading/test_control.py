@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -91,3 +92,14 @@ def test_a_rudder_that_turns_the_wrong_way_is_told(mariner: Model) -> None:
     wrong = mariner.substitute("derivatives.Nd", -mariner.symbol("derivatives.Nd"))
     with pytest.raises(InputError, match="wrong way"):
         heading_autopilot(wrong.substitute("derivatives.Yd", -wrong.symbol("derivatives.Yd")))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_an_autopilot_without_integral_orders_up_to_its_limit_and_no_further(side: int) -> None:
+    """Kp is 1.2: 20 deg of error ask for 24 deg of rudder, 90 deg for more than the 35 deg that there are."""
+    model = autopilot_model("Autopilot", replace(GAINS, integral=0.0), 0.1)
+    p = model.parameter_values()
+    outputs = [np.array(model.output([], [0.0, 0.0, side * math.radians(error)], p)).ravel() for error in (20, 90)]
+    orders = [math.degrees(order) for order, _ in outputs]
+    assert orders == pytest.approx([side * 24, side * 35])
+    assert not model.states

@@ -182,3 +182,11 @@ def test_a_late_rudder_of_usual_size_shows_in_its_record() -> None:
     effect = EFFECTS["rudder_time_offset"]
     late = corrected(time, {"delta_order_rad": order}, effect, first_values("rudder_time_offset", card))
     assert np.sum(late["delta_order_rad"] != order) == 11  # 0.05 L/u0 = 1.04 s: the last of them asks for 19.96 s
+
+
+@pytest.mark.parametrize(("name", "seconds"), [("rudder_lag", (2.0, 1.0, 4.0)), ("telemotor_lag", (1.0, 0.5, 2.0))])
+def test_lags_of_a_gear_begin_at_seconds_where_a_length_takes_twenty(name: str, seconds: tuple[float, ...]) -> None:
+    (lag,) = EFFECTS[name].parameters
+    found = lag.typical_values(card_with(text=mariner_text(length_m="length_m = 160.0", speed_mps="speed_mps = 8.0")))
+    assert found == pytest.approx(seconds)
+    assert (lag.minimum, lag.maximum) == (0.01, 100.0)

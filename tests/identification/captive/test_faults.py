@@ -161,3 +161,12 @@ def test_one_steady_run_shows_no_derivative_but_the_resistance(sound):
         assert set(reduction.derivatives) == {"X0"}
         choices = {choice.name: choice.reason for choice in reduction.forces["N"].selection.choices}
         assert choices["N0"] == choices["Nv"] == "not excited"
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_sway_faster_than_the_model_is_a_fault_of_its_run(sound, side):
+    """sin(drift) beyond 1: no angle, and no crash either."""
+    run = run_of(sound, "drift_+04")
+    fast = reduced_run(replace(run, v_mps=run.v_mps * 0 + side * 1.5 * run.speed_mps))
+    found = " | ".join(str(fault) for fault in reduced_faults(fast))
+    assert f"drift_+04.csv: column v_mps: has a drift angle of {-90 * side} deg" in found

@@ -347,3 +347,18 @@ def test_speed_and_load_that_change_together_are_told_and_left_out(hmri):
     assert {"Xu", "Xuu", "Ydu"} <= set(more.derivatives)
     assert more.derivatives["Xu"].value < 0
     assert "at constant revolutions" in " ".join(findings(more))
+
+
+@pytest.mark.parametrize("name", ["drift_+08.csv", "rudder_-20.csv"])
+def test_harmonics_are_told_without_dimension(noisy, name):
+    """The mean of a steady run by 1/2 rho L^2 U^2, and L more for a moment."""
+    told = reduction_as_json(noisy, contents(noisy), ())
+    record = next(run for run in noisy.campaign.runs if run.name == name)
+    shown = next(run for run in told["runs"] if run["name"] == name)
+    assert shown["speed_mps"] == pytest.approx(record.speed_mps.mean(), rel=1e-3)
+    force = 0.5 * 1000.0 * noisy.campaign.model.length_m**2 * record.speed_mps.mean() ** 2
+    for letter, values, unit in (("Y", record.Y_N, force), ("N", record.N_Nm, force * noisy.campaign.model.length_m)):
+        mean = shown["harmonics"][letter]["mean"]
+        assert abs(mean["value"]) == pytest.approx(abs(values.mean()) / unit, rel=2e-3)
+        white = values.std() / unit / np.sqrt(len(values))
+        assert 0.1 * white < mean["standard_error"] < 10 * white

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.measured import at_size_of, measured
 from tank2sim.records.trials import Trial, froude_scaled
@@ -94,3 +94,16 @@ def test_wind_that_the_card_cannot_take_is_told(tmp_path: Path, card: Manoeuvrin
     rows = "".join(f"{t},{np.sin(t / 9):.3f},7.7,5,200\n" for t in range(60))
     one = write(tmp_path / "a.csv", "t_s,delta_deg,u_mps,wind_speed_mps,wind_direction_deg", rows)
     assert any("wind was measured" in notice for notice in measured([one], card).notices)
+
+
+def test_wind_is_told_to_be_unused_by_the_effects_that_a_card_has_and_not_by_how_many(
+    tmp_path: Path, card: ManoeuvringCard
+) -> None:
+    rows = "".join(f"{t},{np.sin(t / 9):.3f},7.7,5,200\n" for t in range(60))
+    one = write(tmp_path / "a.csv", "t_s,delta_deg,u_mps,wind_speed_mps,wind_direction_deg", rows)
+    wind = '\n[[effects]]\nname = "wind"\nparameters = {speed_mps = 5.0, direction_deg = 200.0}\n'
+    current = '\n[[effects]]\nname = "current"\nparameters = {speed_mps = 0.5, direction_deg = 120.0}\n'
+    for effects, unused in ((wind, False), (current, True), (wind + current, False)):
+        own = parse_card(card.text + effects, "ship.toml")
+        assert isinstance(own, ManoeuvringCard)
+        assert any("wind was measured" in notice for notice in measured([one], own).notices) == unused, effects

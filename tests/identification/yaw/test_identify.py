@@ -369,3 +369,16 @@ def test_errors_of_j_and_of_k_t_count_once(water, folder):
     assert identify_yaw([stated]).added_inertia("energy_least_squares")[1] == pytest.approx(1e-3, rel=0.05)
     silent = replace(water, constants={**water.constants, "inertia_kgm2": 0.0204})
     assert any("no standard error" in note for note in identify_yaw([silent]).notes)
+
+
+def test_a_current_of_nearly_the_largest_of_the_motor_is_saturation_and_one_below_is_not(tmp_path, columns):
+    """From 99.5 % of the motor's largest current on."""
+    largest = float(np.abs(columns["I"]).max())
+    sides = []
+    for share in (0.998, 0.992):
+        record = read_yaw_record(written(tmp_path / "near.csv", TRUTH, columns, max_current_A=largest / share))
+        try:
+            sides.append(any("saturated" in note for note in identify_yaw([record]).notes))
+        except InputError as error:
+            sides.append("reaches the motor's" in str(error))
+    assert sides == [True, False]

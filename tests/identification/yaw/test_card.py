@@ -1,0 +1,32 @@
+"""What of an added inertia goes into a card."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from tank2sim.errors import InputError
+from tank2sim.identification.yaw.card import known_added_inertia, nrdot_prime
+
+
+def found(value) -> SimpleNamespace:
+    return SimpleNamespace(records=[SimpleNamespace(path=Path("yaw.csv"))], added_inertia=lambda method: value)
+
+
+@pytest.mark.parametrize("value", [(-0.01, 0.02), (0.0, 0.02), (-0.01, None)])
+def test_an_added_inertia_that_no_body_has_is_refused(value) -> None:
+    with pytest.raises(InputError, match=r"yaw\.csv: gives a negative added inertia"):
+        known_added_inertia(found(value), "output_error")
+
+
+def test_an_added_inertia_that_is_not_known_is_refused() -> None:
+    with pytest.raises(InputError, match="does not tell the added inertia"):
+        known_added_inertia(found(None), "output_error")
+
+
+def test_nrdot_is_less_than_zero_and_its_error_has_the_same_scale() -> None:
+    """1/2 rho L^5 is 16000 kg m2 in water of 1000 kg/m3 at 2 m."""
+    assert nrdot_prime(found((0.32, 0.016)), "output_error", 2.0, 1000.0) == pytest.approx((-2e-5, 1e-6))
+    assert nrdot_prime(found((0.32, None)), "output_error", 2.0, 1000.0) == (pytest.approx(-2e-5), None)
