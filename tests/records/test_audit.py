@@ -279,7 +279,7 @@ def test_a_finding_becomes_one_entry_a_column():
 def test_kvlcc2_velocities_are_found_to_be_earth_fixed(data):
     """On each record of HSVA and MARIN, and nothing else is called a fault."""
     files = sorted(data.glob("data/kvlcc2_*/*.dat"))
-    assert len(files) == 10
+    assert files, "the folder holds no record"
     for file in files:
         record = read_trial(file)
         (finding,) = [one for one in audit(record) if one.kind == "fault"]
@@ -295,7 +295,7 @@ def test_kvlcc2_velocities_are_found_to_be_earth_fixed(data):
 
 def test_the_esso_osaka_is_right_as_it_is(data):
     files = sorted(data.glob("data/esso_osaka/*/*.csv"))
-    assert len(files) == 13
+    assert files, "the folder holds no record"
     for file in files:
         assert [one for one in audit(read_trial(file)) if one.kind == "fault"] == [], file
 
