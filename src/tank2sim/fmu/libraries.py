@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 
-from tank2sim.errors import InputError
 from tank2sim.fmu.platforms import Platform, host_platform
 from tank2sim.fmu.sources import SELDOM
 from tank2sim.native.compiler import SHARED_SUFFIX, require_compiler
@@ -63,12 +62,7 @@ def libraries(
         As :func:`require_compilers`.
     """
     if platforms is None:
-        try:
-            own = cached_library(sources, flags=_LINK_FLAGS.get(sys.platform, ()), seldom=SELDOM)
-        except OSError as error:
-            problem = f"made a library that this machine cannot load ({' '.join(str(error).split())})"
-            remedy = "name another compiler in CC, or a folder that allows to run programs in XDG_CACHE_HOME"
-            raise InputError("the C compiler", "", problem, remedy) from None
+        own = cached_library(sources, flags=_LINK_FLAGS.get(sys.platform, ()), seldom=SELDOM)
         return {(host_platform().folder(fmi), SHARED_SUFFIX): own.read_bytes()}
     made = _compiled(sources, platforms, told)
     shared: dict[tuple[str, str], list[bytes]] = {}

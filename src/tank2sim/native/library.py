@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import errno
 import hashlib
 import os
 import shutil
 import stat
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -158,27 +156,12 @@ def cached_library(sources: Mapping[str, str], *, flags: Collection[str] = (), s
     ------
     InputError
         There is no compiler that works, or no room for the library.
-    OSError
-        What the compiler made cannot be loaded on this machine.
     """
 
     def make(folder: Path) -> Path:
         library = folder / f"library{SHARED_SUFFIX}"
         compile_shared(sorted(folder.glob("*.c")), library, flags=flags, seldom=seldom)
-        _require_loadable(library)
         return library
 
     making = [*require_compiler("compiling a model"), *FLAGS, *flags, "seldom:", *sorted(seldom)]
     return kept(sources, making, SHARED_SUFFIX, make)
-
-
-def _require_loadable(library: Path) -> None:
-    """Make sure, before a library is kept, that this machine loads what its compiler made.
-
-    Raises
-    ------
-    OSError
-        It does not: a folder from which nothing may be run, or a compiler for another machine.
-    """
-    if sys.platform != "win32":  # where a library that is loaded cannot be renamed
-        ctypes.CDLL(str(library))
