@@ -116,7 +116,9 @@ def test_in_the_range_of_the_card_the_forces_are_those_of_its_polynomial(speed, 
     coefficients = {name: card.derivatives.get(name, 0.0) for force in "XYN" for name in TERMS[force]}
     for axis, arm in (("X", 1.0), ("Y", 1.0), ("N", L)):
         expected = scale * arm * polynomial(TERMS[axis], coefficients, *primes)
-        assert force(model, f"force.{axis}", state(model, u, v, r, d)) == pytest.approx(expected, rel=1e-11, abs=1e-6)
+        assert force(model, f"force.{axis}", state(model, u, v, r, d)) == pytest.approx(
+            expected, rel=1e-9, abs=1e-4
+        )  # N, N m: sums of terms that nearly cancel
 
 
 def test_validity_is_one_in_the_range_and_nothing_well_outside_it_or_astern() -> None:

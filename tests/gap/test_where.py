@@ -139,7 +139,7 @@ def test_a_force_that_is_a_function_of_the_rudder_is_explained_by_the_rudder() -
     force = rng.standard_normal((4000, 3)) * [1e3, 1e3, 1e5]
     force[:, 1] += 5e3 * np.where(np.abs(rudder) > 0.35, np.sign(rudder), 0.0)
     found = found_force(force, np.tile([1e3, 1e3, 1e5], (4000, 1)))
-    assert found is not None and found.equation == "sway" and found.explaining == "rudder"
+    assert found is not None and found.equation == "Y" and found.explaining == "rudder"
     assert found.explained["rudder"] > 0.8 and found.explained["heading"] < 0.2
     assert parity(found.states["rudder"], found.force) > 0.9
 

@@ -14,7 +14,8 @@ from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
-from tank2sim.simulation.recorded import _held, _smoothed, recorded, repeat
+from tank2sim.simulation.recorded import _smoothed, recorded, repeat
+from tank2sim.simulation.rudder_record import _held
 from tests.identification.trials.made_up_ship import CARD, NOISE, SPEED, TRUTH, accelerations
 
 RATE, STEP = np.deg2rad(3.0), 0.05
@@ -298,10 +299,9 @@ def test_recorded_signals_are_smoothed_over_three_tenths_of_the_time_of_a_length
     """20 s of L/u0 at 2 Hz are 13 readings: a cubic through them keeps 375/2145 of the variance of white noise."""
     time = np.arange(0, 5000, 0.5)
     noise = np.random.default_rng(1).standard_normal(time.size)
-    shown = Trial(Path("noise.csv"), time, {"r_radps": noise, "psi_rad": 1e-9 * time**3}, scale=None)
-    assert np.var(_smoothed(shown, "r_radps", 20.0)) == pytest.approx(375 / 2145, rel=0.05)
-    np.testing.assert_array_equal(_smoothed(shown, "r_radps", 6.0), noise)  # 3 readings: none to spare
-    np.testing.assert_allclose(_smoothed(shown, "psi_rad", 20.0), 1e-9 * time**3, atol=1e-9)
+    assert np.var(_smoothed(time, noise, 20.0)) == pytest.approx(375 / 2145, rel=0.05)
+    np.testing.assert_array_equal(_smoothed(time, noise, 6.0), noise)  # 3 readings: none to spare
+    np.testing.assert_allclose(_smoothed(time, 1e-9 * time**3, 20.0), 1e-9 * time**3, atol=1e-9)
 
 
 def test_an_angle_is_held_from_three_readings_on() -> None:

@@ -155,6 +155,8 @@ def _begins(time: Vector, rudder: Vector, origin: float, angle: float) -> tuple[
     """When the rudder began to move from one angle to another, s, and its rate, rad/s, at the end of a stretch."""
     sign = math.copysign(1.0, angle)
     course, whole = sign * (rudder - origin), sign * (angle - origin)
+    if whole == 0:
+        return float(time[0]), math.inf  # the record begins with the rudder there
     quarter, most, more = (_last_crossing(time, course, share * whole) for share in (0.25, 0.7, 0.85))
     rate, last = 0.45 * whole / max(most - quarter, 1e-9), 0.15 * whole / max(more - most, 1e-9)
     if last > STEEPER * rate:  # it kept the course at more than a quarter of the angle, and left from there

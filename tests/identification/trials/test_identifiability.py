@@ -65,7 +65,7 @@ def test_a_zigzag_shows_the_yaw_terms_and_their_drift():
 def test_a_straight_run_is_refused_for_all_that_turns(noise):
     straight = problem([trial(lambda t: 0.0, noise=noise, name="straight")], free=YAW)
     with pytest.raises(
-        InputError, match=r"straight: shows nothing of Nv, Nr, Nd; add a run in which sway, yaw and rudder"
+        InputError, match=r"straight.csv: shows nothing of Nv, Nr, Nd; add a run in which sway, yaw and rudder"
     ):
         refuse_unseen(straight)
 
