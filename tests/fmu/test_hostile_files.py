@@ -72,7 +72,7 @@ def test_no_process_that_a_library_started_goes_on(ends: bool, tmp_path: Path, m
         "import pathlib, subprocess, sys, time\n"
         f"p = pathlib.Path({str(mark)!r})\nsubprocess.Popen([sys.executable, '-c', {grandchild!r}])\n{wait}"
     )
-    monkeypatch.setattr(process, "_LONGEST_S", 3.0)
+    monkeypatch.setattr(process, "_LONGEST_S", 6.0)
     run = process._run_alone
     if ends:
         assert run([sys.executable, "-c", code], dict(os.environ)) == 0

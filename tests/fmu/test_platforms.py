@@ -39,7 +39,7 @@ FOLDERS = {
 
 # What the compiler makes of the C library of Windows takes minutes: it is kept from one session to the next, as it is
 # for a user. What it makes of our sources is not kept.
-KEPT = os.environ.get("ZIG_GLOBAL_CACHE_DIR") or str(platformdirs.user_cache_path("tank2sim") / "native" / "zig")
+KEPT = os.environ.get("ZIG_GLOBAL_CACHE_DIR") or str(platformdirs.user_cache_path("tank2sim") / "libraries" / "zig")
 
 
 # ---- which platforms ----

@@ -40,7 +40,7 @@ def test_a_cache_that_cannot_be_written_leaves_nothing_behind(tmp_path) -> None:
 def cache(tmp_path, monkeypatch):
     """A cache of its own, in which nothing has been compiled."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    return tmp_path / "tank2sim" / "native"
+    return tmp_path / "tank2sim" / "libraries"
 
 
 SOURCE = {"model.c": '__attribute__((visibility("default"))) int answer(void) { return 42; }\n'}

@@ -32,7 +32,7 @@ def cache_folder() -> Path:
     Where that cannot be written, or others than the user may write into it (what lies there is loaded and run), it is a
     folder that ends with the process.
     """
-    folder = platformdirs.user_cache_path("tank2sim") / "native"
+    folder = platformdirs.user_cache_path("tank2sim") / "libraries"
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if _is_private(folder):
