@@ -10,7 +10,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from tank2sim.cards import linear, read_card
+from tank2sim.cards import linear_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.fmu import check_fmu, write_fmu
 
@@ -19,7 +19,7 @@ def main() -> None:
     mariner = read_card("mariner")
     cards = {
         "Mariner, third order": mariner,
-        "Mariner, linear": linear(mariner),
+        "Mariner, linear": linear_card(mariner),
         "vehicle": read_card("wilinski-zellman"),
     }
     with tempfile.TemporaryDirectory() as folder:

@@ -27,7 +27,7 @@ import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.analysis.ensemble.questions import OfManoeuvre, ShipText
-from tank2sim.analysis.ensemble.results import Asked, manoeuvre_bands
+from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.executors import executing
@@ -99,7 +99,7 @@ def on_all(question: OfManoeuvre, draws: Draws, members: int) -> tuple[Ensemble,
 
 def bands_of_readme(card: ManoeuvringCard) -> None:
     """The bands that the README tells of ``tank2sim simulate mariner --manoeuvre turn:35 --ensemble 100 --seed 3``."""
-    turn, asked = Turn(float(RUDDER)), Asked(100, 3)
+    turn, asked = Turn(float(RUDDER)), EnsembleRequest(100, 3)
     run = simulate(build(card), turn)
     bands = manoeuvre_bands(card, turn, (None, float(run.trajectory.t[-1])), asked).figures
     told = [f"{name} {bands[name].low:.0f} to {bands[name].high:.0f}" for name in ("advance_m", "tactical_diameter_m")]

@@ -44,15 +44,15 @@ from scipy.stats import binomtest
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.errors import InputError
 from tank2sim.files import write_whole
-from tank2sim.gap.as_json import NOISE_FLOOR, in_file
-from tank2sim.gap.decide import ENOUGH, decide
-from tank2sim.gap.find import Options, find_gap
-from tank2sim.gap.hiding import could_hide
-from tank2sim.gap.posing import pose
-from tank2sim.gap.residuals import estimates
-from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE
-from tank2sim.gap.search import search
-from tank2sim.identification.trials.measured import measured
+from tank2sim.gap.diagnosis.residuals import estimates
+from tank2sim.gap.inference.prior import likelihood_from_card
+from tank2sim.gap.outcome.export import NOISE_FLOOR, in_file_units
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY
+from tank2sim.gap.search.detection_limit import could_hide
+from tank2sim.gap.search.explanations import search
+from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, decide
+from tank2sim.gap.workflow import GapOptions, find_gap
+from tank2sim.identification.trials.problem.prepare_trials import measured
 
 FIRST_SEED = 101
 """Thresholds were settled on seeds below this."""
@@ -116,13 +116,13 @@ class Said:
         """One of :data:`OUTCOMES`."""
         truth, named = set(self.there), set(self.named)
         outsider = bool(truth & set(OUTSIDERS))
-        if self.verdict == OUTSIDE:
+        if self.verdict == OUTSIDE_LIBRARY:
             return "right" if outsider else "outside"
-        if self.verdict == NOTHING and not truth:
+        if self.verdict == NO_EFFECT_MISSING and not truth:
             return "right"
         if not outsider and named <= truth and all(self._hidden(name) for name in truth - named):
             return "right" if self.verdict == MISSING and named == truth else "undecided"
-        if self.verdict == NOTHING:
+        if self.verdict == NO_EFFECT_MISSING:
             return "none"
         if self.verdict == AMBIGUOUS and truth and truth in map(set, self.alternatives):
             return "undecided"
@@ -140,7 +140,11 @@ class Said:
     def in_words(self) -> str:
         """The verdict and its names."""
         told = " or ".join("+".join(names) for names in (self.named, *self.alternatives))
-        return told if self.verdict in (MISSING, AMBIGUOUS) else {NOTHING: "none"}.get(self.verdict, self.verdict)
+        return (
+            told
+            if self.verdict in (MISSING, AMBIGUOUS)
+            else {NO_EFFECT_MISSING: "none"}.get(self.verdict, self.verdict)
+        )
 
 
 def settings(part: str, seeds: Sequence[int]) -> Iterator[tuple[str, Setting]]:
@@ -191,9 +195,9 @@ def judged(group: str, setting: Setting, prove: bool) -> Said:
 
 def _decided(group: str, made: Made, card: ManoeuvringCard, files: dict[str, list[Path]]) -> Said:
     begin = time.perf_counter()
-    found = search(pose(card, measured(files["fit"], card)))
+    found = search(likelihood_from_card(card, measured(files["fit"], card)))
     decision = decide(found)
-    hides = could_hide(found, decision.best, ENOUGH)
+    hides = could_hide(found, decision.best, EVIDENCE_NEEDED)
     seconds = time.perf_counter() - begin
     named = estimates(decision.best) if decision.verdict in (MISSING, AMBIGUOUS) else []
     return Said(
@@ -213,7 +217,7 @@ def _decided(group: str, made: Made, card: ManoeuvringCard, files: dict[str, lis
 
 def _proved(group: str, made: Made, card: ManoeuvringCard, files: dict[str, list[Path]]) -> Said:
     begin = time.perf_counter()
-    gap = find_gap(card, measured(files["fit"], card), measured(files["held"], card), Options(workers=1))
+    gap = find_gap(card, measured(files["fit"], card), measured(files["held"], card), GapOptions(workers=1))
     return Said(
         group=group,
         truth=made.parameters,
@@ -230,7 +234,7 @@ def _proved(group: str, made: Made, card: ManoeuvringCard, files: dict[str, list
 
 
 def _in_file(values: Mapping[str, float]) -> dict[str, float]:
-    return dict(in_file(name, float(value)) for name, value in values.items())
+    return dict(in_file_units(name, float(value)) for name, value in values.items())
 
 
 def run(chosen: Sequence[tuple[str, Setting]], args: argparse.Namespace) -> list[Said]:

@@ -20,10 +20,10 @@ import time
 from pathlib import Path
 
 from tank2sim.cards import ManoeuvringCard, read_card
-from tank2sim.gap.as_json import estimate_in_file, in_file
-from tank2sim.gap.find import Options, find_gap
+from tank2sim.gap.outcome.export import estimate_in_file, in_file_units
 from tank2sim.gap.result import Gap
-from tank2sim.identification.trials.measured import measured
+from tank2sim.gap.workflow import GapOptions, find_gap
+from tank2sim.identification.trials.problem.prepare_trials import measured
 
 DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data" / "gap_cases"
 CASES = range(1, 9)
@@ -69,7 +69,7 @@ def _case(case: int, workers: int) -> bool:
     truth, card = _truth(case)
     begin = time.perf_counter()
     fitted, held = (measured(_files(case, truth[part]), card) for part in ("fit", "holdout"))
-    gap = find_gap(card, fitted, held, Options(workers=workers))
+    gap = find_gap(card, fitted, held, GapOptions(workers=workers))
     took = time.perf_counter() - begin
     hidden = " + ".join(truth["parameters"])
     named = " + ".join(one.name for one in gap.effects) or "-"
@@ -89,7 +89,7 @@ def _show_parameters(gap: Gap, truth: dict[str, dict[str, float]]) -> None:
     for one in gap.effects:
         for name, value in one.parameters.items():
             own, found = estimate_in_file(name, value)
-            error = in_file(name, one.standard_errors[name])[1] if name in one.standard_errors else None
+            error = in_file_units(name, one.standard_errors[name])[1] if name in one.standard_errors else None
             spread = f" +- {error:.2g}" if error is not None else ""
             true = truth.get(one.name, {}).get(own)
             beside = f"truth {true:.5g}" if true is not None else "not in the truth"
@@ -107,12 +107,12 @@ def _timed(workers: int) -> None:
     names = truth["fit"] + truth["holdout"]
     none = measured([], card)
     find_gap(
-        card, measured(_files(TIMED, truth["fit"][:1]), card), none, Options(effects=("current",), workers=workers)
+        card, measured(_files(TIMED, truth["fit"][:1]), card), none, GapOptions(effects=("current",), workers=workers)
     )
     begin = time.perf_counter()
     fitted = measured(_files(TIMED, names), card)
     read = time.perf_counter() - begin
-    gap = find_gap(card, fitted, none, Options(workers=workers))
+    gap = find_gap(card, fitted, none, GapOptions(workers=workers))
     took = time.perf_counter() - begin
     named = " + ".join(one.name for one in gap.effects) or "-"
     rows = sum(len(trial.time_s) for trial in fitted.trials)

@@ -32,19 +32,19 @@ from identify_esso_osaka import FIXED, spans
 
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.add import Found, added, in_short
-from tank2sim.gap.as_json import joined
-from tank2sim.gap.correct import corrected
-from tank2sim.gap.find import Options, find_gap
-from tank2sim.gap.posing import pose
-from tank2sim.gap.replay import passed
-from tank2sim.gap.residuals import estimates
+from tank2sim.gap.diagnosis.residuals import estimates
+from tank2sim.gap.inference.prior import likelihood_from_card
+from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
+from tank2sim.gap.outcome.export import joined
+from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card, in_short
+from tank2sim.gap.proof.replay import replay_trials
 from tank2sim.gap.result import Gap, Passed
-from tank2sim.gap.search import search
+from tank2sim.gap.search.explanations import search
+from tank2sim.gap.workflow import GapOptions, find_gap
 from tank2sim.identification.trials import identify as identification
-from tank2sim.identification.trials.measured import Measured, measured
-from tank2sim.identification.trials.question import free_parameters
-from tank2sim.identification.trials.structures import STRUCTURES
+from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
+from tank2sim.identification.trials.problem.problem_from_card import free_parameters
+from tank2sim.identification.trials.problem.structures import STRUCTURES
 from tank2sim.records.trials import Trial, unwrapped, window, with_signals
 
 DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data"
@@ -128,7 +128,7 @@ def _polar(vector: complex) -> str:
 def _identified(card: ManoeuvringCard, trials: Measured, hold: Sequence[str] = ()) -> ManoeuvringCard:
     there = free_parameters(STRUCTURES[STRUCTURE].start(card))
     held = tuple(name.removeprefix("derivatives.") for name in hold if name in there)
-    options = identification.Options(structure=STRUCTURE, members=0, hold=held)
+    options = identification.IdentificationOptions(structure=STRUCTURE, members=0, hold=held)
     return identification.identify(card, trials, options=options).card
 
 
@@ -138,9 +138,11 @@ def _without_wind(windy: ManoeuvringCard, whole: Measured, workers: int) -> None
     blind = replace(whole, trials=tuple(_unmeasured(trial) for trial in whole.trials))
     fitted, held = replace(blind, trials=blind.trials[:-1]), replace(blind, trials=blind.trials[-1:])
     begin = time.perf_counter()
-    gap = find_gap(calm, fitted, held, Options(workers=workers))
+    gap = find_gap(calm, fitted, held, GapOptions(workers=workers))
     _show(gap, time.perf_counter() - begin)
-    alone = next(fit for fit in search(pose(calm, fitted), names=("wind",), most=1).fits if fit.explained.effects)
+    alone = next(
+        fit for fit in search(likelihood_from_card(calm, fitted), names=("wind",), most=1).fits if fit.explained.effects
+    )
     found = estimates(alone)
     values = found[0][1]
     print(f"   wind fitted alone: {_polar(values['speed_mps'] * np.exp(1j * values['direction_rad']))}")
@@ -195,7 +197,7 @@ def _kvlcc2(args: argparse.Namespace) -> None:
 
 def _kvlcc2_gap(card: ManoeuvringCard, fitted: Measured, held: Measured, workers: int) -> None:
     begin = time.perf_counter()
-    gap = find_gap(card, fitted, held, Options(workers=workers))
+    gap = find_gap(card, fitted, held, GapOptions(workers=workers))
     _show(gap, time.perf_counter() - begin)
     whole = replace(fitted, trials=fitted.trials + held.trials)
     models = {"as given": (card, []), **_named(gap, fitted)}
@@ -240,7 +242,7 @@ def _named(gap: Gap, fitted: Measured) -> dict[str, tuple[ManoeuvringCard, list[
     names = gap.rivals[0].effects
     if not names:
         return {}
-    fits = search(pose(gap.card, fitted), names=names, most=len(names)).fits
+    fits = search(likelihood_from_card(gap.card, fitted), names=names, most=len(names)).fits
     best = estimates(next(fit for fit in fits if set(fit.explained.effects) == set(names)))
     for name, values, errors in best:
         print(f"   not named, though it fits best: {name}: {_in_short(name, values, errors)}")
@@ -251,8 +253,12 @@ def _passed(gap: Gap, card: ManoeuvringCard, found: list[Found], trials: Measure
     """Trials simulated freely with a card and what was found on top, faults of sensors taken away."""
     sigmas = {name: sigma for name, (sigma, _) in gap.noise.items()}
     sensors = [one for one in found if EFFECTS[one[0]].acts_on == "sensor"]
-    mended = replace(trials, trials=tuple(corrected(trial, sensors) for trial in trials.trials)) if sensors else None
-    return passed(card, added(card, found), trials, sigmas, False, mended)
+    mended = (
+        replace(trials, trials=tuple(correct_sensor_faults(trial, sensors) for trial in trials.trials))
+        if sensors
+        else None
+    )
+    return replay_trials(card, add_effects_to_card(card, found), trials, sigmas, False, mended)
 
 
 def _table(

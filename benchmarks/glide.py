@@ -13,6 +13,7 @@ from paper_numbers import PaperNumbers
 
 from tank2sim.analysis.glide.design import best_glide, fastest_glide
 from tank2sim.analysis.glide.path import GlidePath, fly
+from tank2sim.analysis.glide.quasi_steady_error import swing_errors
 from tank2sim.analysis.glide.steady import (
     SteadyGlide,
     force_residual,
@@ -21,8 +22,7 @@ from tank2sim.analysis.glide.steady import (
     smallest_angle,
     steady_glide,
 )
-from tank2sim.analysis.glide.swing import swing_errors
-from tank2sim.analysis.glide.transient import compare, equilibrium, quasi_steady_error
+from tank2sim.analysis.glide.transient import compare_with_steady, equilibrium, quasi_steady_error
 from tank2sim.bundled import bundled
 from tank2sim.cards import GliderCard, read_card
 from tank2sim.dynamics import build
@@ -146,7 +146,7 @@ def main() -> int:
         wider = equilibrium(model, glide).turning_radius_m / glide.turning_radius_m - 1
         print(f"  added mass changes the radius at {roll} deg of roll by {100 * wider:+.3f} %")
     begin = time.perf_counter()
-    found = compare(integrator, path)
+    found = compare_with_steady(integrator, path)
     print(f"sample path by the transient model: {found.distance_m[-1]:.2f} m from the end, {100 * found.share:.2f} %")
     print(f"  in {time.perf_counter() - begin:.3f} s for {path.places[-1].time_s:.0f} s")
     for one in quasi_steady_error(card, integrator):

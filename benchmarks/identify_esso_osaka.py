@@ -23,14 +23,14 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
-from tank2sim.dynamics.model import Vector
-from tank2sim.identification.trials.evaluation import following
-from tank2sim.identification.trials.output_error import Settings, output_error
-from tank2sim.identification.trials.problem import Problem
-from tank2sim.identification.trials.question import driven_model, free_parameters
-from tank2sim.identification.trials.runs import Run, prepare
-from tank2sim.identification.trials.structures import STRUCTURES
+from tank2sim.identification.trials.assessment.evaluation import replay_error
+from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
+from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tank2sim.identification.trials.problem.problem_from_card import driven_model, free_parameters
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun, prepare
+from tank2sim.identification.trials.problem.structures import STRUCTURES
 from tank2sim.records.audit import mended
 from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import Trial, unwrapped, window, with_signals
@@ -117,7 +117,7 @@ def spans(trial: Trial, slowest: float) -> Iterator[tuple[float, float]]:
         yield float(trial.time_s[begin]), float(trial.time_s[end])
 
 
-def windows(run: Run) -> Iterator[Run]:
+def windows(run: SampledRun) -> Iterator[SampledRun]:
     """Windows of 100 s, half over each other, the last at the end of the run."""
     last, size = len(run.measured) - 1, round(WINDOW_S / run.step_s)
     if last * run.step_s < LEAST_S:
@@ -139,7 +139,7 @@ def question(card: ManoeuvringCard) -> Problem:
     return Problem(model, tuple(free), values[:, 0], values[:, 1], ())
 
 
-def parts(problem: Problem, trial: Trial, slowest: float, least_s: float) -> list[Run]:
+def parts(problem: Problem, trial: Trial, slowest: float, least_s: float) -> list[SampledRun]:
     return [
         prepare(problem.model, window(trial, begin, end), SEEN, step_s=STEP_S)
         for begin, end in spans(trial, slowest)
@@ -147,19 +147,19 @@ def parts(problem: Problem, trial: Trial, slowest: float, least_s: float) -> lis
     ]
 
 
-def fitted(problem: Problem, trials: Sequence[Trial], slowest: float) -> Vector:
+def fitted(problem: Problem, trials: Sequence[Trial], slowest: float) -> Array:
     """Estimates from the parts of trials in the range."""
     runs = tuple(run for trial in trials for run in parts(problem, trial, slowest, LEAST_PIECE_S))
-    settings = Settings(piece_s=PIECE_S, scale_prior=False, rounds=3)
+    settings = OutputErrorSettings(piece_s=PIECE_S, scale_prior=False, rounds=3)
     return output_error(problem.with_runs(runs), settings=settings).values
 
 
-def add(score: Score, problem: Problem, values: Vector, name: str, scored: list[Run]) -> None:
+def add(score: Score, problem: Problem, values: Array, name: str, scored: list[SampledRun]) -> None:
     """Score windows of one run."""
     if not scored:
         return
     kind = name.partition("_")[0]
-    for one, result in zip(scored, following(problem.with_runs(tuple(scored)), values, WEIGHTS), strict=True):
+    for one, result in zip(scored, replay_error(problem.with_runs(tuple(scored)), values, WEIGHTS), strict=True):
         size = float(np.sqrt(np.nanmean(one.column("motion.r") ** 2)))
         error = result.whole["motion.r"]
         lost = error >= RUNAWAY * size or np.isnan(error)
@@ -191,7 +191,7 @@ def evaluated(card: ManoeuvringCard, trials: Mapping[str, Trial], fit: bool) -> 
     return within, outside
 
 
-def slow(run: Run, slowest: float) -> bool:
+def slow(run: SampledRun, slowest: float) -> bool:
     """Whether the speed falls below the range somewhere in a run."""
     smooth = uniform_filter1d(np.nan_to_num(run.column("motion.u"), nan=slowest), round(SMOOTHING_S / run.step_s))
     return bool(smooth.min() <= slowest)

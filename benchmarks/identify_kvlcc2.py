@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.cards import ManoeuvringCard, read_card
-from tank2sim.identification.trials.comparison import Comparison
-from tank2sim.identification.trials.evaluation import Figure, pooled
-from tank2sim.identification.trials.identify import Options, identify
-from tank2sim.identification.trials.measured import Measured, measured
+from tank2sim.identification.trials.assessment.comparison import Comparison
+from tank2sim.identification.trials.assessment.evaluation import FigureComparison, pooled
+from tank2sim.identification.trials.identify import IdentificationOptions, identify
+from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 
 DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data"
 ZIGZAGS = ("05_01", "10_05", "10_10_P", "10_10_S", "20_10_S", "25_05", "35_05")
@@ -36,7 +36,7 @@ def main() -> None:
     print(f"{'root mean square error':24s}" + "".join(f"{head:>10s}" for head in heads))
     everything = _together(*zigzags.values())
     for structure in STRUCTURES:
-        options = Options(structure=structure)
+        options = IdentificationOptions(structure=structure)
         held = []
         for names in HELD_OUT:
             fitted = _together(*(one for name, one in zigzags.items() if name not in names))
@@ -76,7 +76,7 @@ def _row(name: str, held: list[Comparison], marin: Comparison) -> None:
     print(f"{name:24s}" + "".join(f"{cell:10.2f}" for cell in [*cells, *turn]) + told, flush=True)
 
 
-def _overshoot(figures: list[Figure], number: int) -> float:
+def _overshoot(figures: list[FigureComparison], number: int) -> float:
     errors = [figure.error for figure in figures if figure.name == f"overshoot_{number}_deg"]
     return float(np.sqrt(np.nanmean(np.square(errors))))  # of those that the simulation reached
 

@@ -18,10 +18,10 @@ import numpy as np
 
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.cards.reading import revised
-from tank2sim.identification.trials.evaluation import Following
-from tank2sim.identification.trials.identify import Options, estimated, identify
-from tank2sim.identification.trials.measured import measured
-from tank2sim.identification.trials.question import pose
+from tank2sim.identification.trials.assessment.evaluation import Following
+from tank2sim.identification.trials.identify import IdentificationOptions, estimated, identify
+from tank2sim.identification.trials.problem.prepare_trials import measured
+from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 
 DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data" / "gap_cases"
 OFF, SEEDS, FREE = 0.2, (1, 2, 3), 20
@@ -35,7 +35,9 @@ def main() -> None:
     _speed(_off(card, SEEDS[0]), files["fit"])
     for seed in SEEDS:
         off = _off(card, seed)
-        result = identify(off, measured(files["fit"], off), measured(files["holdout"], off), Options(members=0))
+        result = identify(
+            off, measured(files["fit"], off), measured(files["holdout"], off), IdentificationOptions(members=0)
+        )
         assert result.holdout is not None and result.before_holdout is not None
         print(f"card off by {OFF:.0%}, seed {seed}: position error over its noise, held out")
         for before, now in zip(result.before_holdout.following, result.holdout.following, strict=True):
@@ -57,13 +59,13 @@ def _off(card: ManoeuvringCard, seed: int) -> ManoeuvringCard:
 
 def _speed(card: ManoeuvringCard, files: list[Path]) -> None:
     trials = measured(files, card)
-    problem = pose(card, trials.trials, trials.driven_by)
+    problem = problem_from_card(card, trials.trials, trials.driven_by)
     # the twenty of largest effect: linear terms and what goes with v, r, rudder in second and third order
     places = np.argsort(-np.abs(problem.prior_mean))[:FREE]
     names = tuple(problem.free[place] for place in places)
     fewer = replace(problem, free=names, prior_mean=problem.prior_mean[places], prior_error=problem.prior_error[places])
     begin = time.perf_counter()
-    found = estimated(fewer, Options())
+    found = estimated(fewer, IdentificationOptions())
     samples = sum(len(run.measured) for run in problem.runs)
     print(
         f"output error, {len(problem.runs)} runs, {samples} samples, {FREE} coefficients: "

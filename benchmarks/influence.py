@@ -10,12 +10,12 @@ import os
 import tempfile
 import time
 
+from tank2sim.analysis.influence.card_influence import CardInfluence, influence
 from tank2sim.analysis.influence.figures import parse_figure
-from tank2sim.analysis.influence.of_card import Influence, influence
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, Means
+from tank2sim.analysis.tuning.targets import parse_wish
 from tank2sim.analysis.tuning.tune import tune
-from tank2sim.analysis.tuning.wishes import parse_wish
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 
 FIGURES = ("criterion_C", "steady_radius_m@20", "advance_m@35", "tactical_diameter_m@35", "overshoot1_deg@20/20")
@@ -67,7 +67,7 @@ def ship() -> ManoeuvringCard:
     return card
 
 
-def timed() -> tuple[float, Influence]:
+def timed() -> tuple[float, CardInfluence]:
     begin = time.perf_counter()
     result = influence(Study(ship(), [parse_figure(text) for text in FIGURES]))
     return time.perf_counter() - begin, result

@@ -15,8 +15,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from paper_numbers import PaperNumbers
 
-from tank2sim.dynamics.abkowitz import TERMS
-from tank2sim.dynamics.rigid_body import accelerations, inertia
+from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS
+from tank2sim.dynamics.rigid_body import inertia, rigid_body_accelerations
 from tank2sim.identification.captive import tank_conditions as tank
 from tank2sim.identification.captive.harmonics import reduced_run
 from tank2sim.identification.captive.oscillation import oscillations
@@ -33,12 +33,12 @@ def terms(number: PaperNumbers) -> None:
     """Terms of (3.8)."""
     number.heading("(3.8), terms")
     for equation, force, count in (("a", "X", 16), ("b", "Y", 22), ("c", "N", 22)):
-        number(f"(3.8{equation}), terms of {force}", count, len(TERMS[force]), 0)
+        number(f"(3.8{equation}), terms of {force}", count, len(ABKOWITZ_TERMS[force]), 0)
     number.heading("(3.7) against a solution of the mass matrix, largest difference")
     added = {"Xudot": -20.0, **{name: {**SWAY, **YAW}[name] for name in ("Yvdot", "Yrdot", "Nvdot", "Nrdot")}}
     own = inertia(MASS, X_G, INERTIA, added)
     matrix = np.array([[own.sway, own.sway_yaw], [own.yaw_sway, own.yaw]])
-    apart = np.array(accelerations(own, 3.0, -5.0, 7.0)[1:]) - np.linalg.solve(matrix, [-5.0, 7.0])
+    apart = np.array(rigid_body_accelerations(own, 3.0, -5.0, 7.0)[1:]) - np.linalg.solve(matrix, [-5.0, 7.0])
     number("v', r'", 0, float(np.abs(apart).max()), 1e-12)
 
 
@@ -59,7 +59,7 @@ def section_5(number: PaperNumbers) -> None:
     number("largest zeta = omega U/g", 0.1, tank.LARGEST_FREQUENCY_PARAMETER, 0)
     period = tank.shortest_period_s(SPEED, GRAVITY)
     omega = 2 * math.pi / period
-    number("zeta at the shortest period", 0.1, tank.frequency_parameter(omega, SPEED, GRAVITY), 1e-12)
+    number("zeta at the shortest period", 0.1, tank.brard_number(omega, SPEED, GRAVITY), 1e-12)
     froude_squared = SPEED**2 / (GRAVITY * LENGTH)
     number("omega' Fn^2 there", 0.1, tank.reduced_frequency(omega, SPEED, LENGTH) * froude_squared, 1e-12)
     trim = next(iter(tank.trim(0.04, 4.0))).message

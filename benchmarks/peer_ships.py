@@ -10,14 +10,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import odeint
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq
 
+from tank2sim.arrays import Array
 from tank2sim.cards import parse_card, read_card
-
-Array = NDArray[np.float64]
 
 DURATION_S = 600.0
 RUDDER, HEADING = math.radians(35.0), math.radians(20.0)

@@ -22,17 +22,17 @@ from tank2sim.cards import YawRigCard, read_card
 from tank2sim.cards.form import YawRig
 from tank2sim.dynamics import yaw_theory as theory
 from tank2sim.dynamics.yaw_energy import dissipation_from_work, inertia_from_work
-from tank2sim.dynamics.yaw_programme import PAPER, Similarity, YawProgramme, full_turns
+from tank2sim.dynamics.yaw_programme import PAPER_PROGRAMME, Similarity, YawProgramme, full_turns
 from tank2sim.dynamics.yaw_rig import ELLIPSOID_AIR, ELLIPSOID_T1, SHIP_AIR, SHIP_T1, SHIP_T2
 from tank2sim.identification.yaw.energy import energy_balance, fit_energy
 from tank2sim.identification.yaw.identify import GRAVITY, WATER_TERMS, YawOptions, YawResult, identify_yaw
 from tank2sim.identification.yaw.intervals import Speeds, intervals
 from tank2sim.records.yaw import Medium, YawRecord, read_yaw_record, yaw_record_text
-from tank2sim.simulation.yaw_record import record_of, simulated_record
+from tank2sim.simulation.yaw_record import simulated_record, yaw_record
 from tank2sim.simulation.yaw_rig import Measuring, YawRun, run_yaw_rig
 from tank2sim.simulation.yaw_rig_control import AdaptiveController, Controller, TunedController
 
-TOP = PAPER.max_rate_radps
+TOP = PAPER_PROGRAMME.max_rate_radps
 BODIES = {"ellipsoid T1": ELLIPSOID_T1, "ship T1": SHIP_T1, "ship T2": SHIP_T2}
 PRINTED = {"ellipsoid T1": (330.7, 318.7, 300.4), "ship T1": (450.0, 377.5, 302.0), "ship T2": (690.7, 562.9, 531.1)}
 """lambda661 of Table 1, 1e-4 kg m2, by controllers (6) and (4) and least squares."""
@@ -58,24 +58,26 @@ def programme_numbers(number: PaperNumbers) -> None:
     ratio = Similarity(ship_length_m=38, ship_beam_m=8, length_m=0.67, beam_m=0.2).rate_ratio
     number("sqrt(lambda), rounded in print", 9, ratio, 0.05)
     number("the same by others", 8.968, ratio, 5e-4)
-    number("t_m, s", 13.3, 3 * PAPER.rise_s, 0.05)
+    number("t_m, s", 13.3, 3 * PAPER_PROGRAMME.rise_s, 0.05)
     number("omega_m = pi/12, rad/s", math.pi / 12, math.radians(100 / 60) * 9, 1e-12)
     number("omega_m of the programme, rad/s", math.pi / 12, TOP, 1e-12)
-    number("t3, s", 4.4, PAPER.rise_s, 0.05)
-    number("t8, period, s", 17.78, PAPER.period_s, 0.005)
+    number("t3, s", 4.4, PAPER_PROGRAMME.rise_s, 0.05)
+    number("t8, period, s", 17.78, PAPER_PROGRAMME.period_s, 0.005)
     slip = "pi/160 is omega_m/t_m; the largest acceleration is 9 pi/400"
-    number("largest acceleration, rad/s2", math.pi / 160, PAPER.max_acceleration_radps2, None, slip)
-    number("the same by others, rad/s2", 0.0707, PAPER.max_acceleration_radps2, 5e-5)
+    number("largest acceleration, rad/s2", math.pi / 160, PAPER_PROGRAMME.max_acceleration_radps2, None, slip)
+    number("the same by others, rad/s2", 0.0707, PAPER_PROGRAMME.max_acceleration_radps2, 5e-5)
     number("t3 = omega_m/(3 domega_m), s", 4.4, TOP / (3 * math.pi / 160), 0.05)
     slip = "true with the wrong acceleration alone; t3 is 1.2 omega_m/domega_m"
-    number("the same with the right acceleration, s", 4.4, TOP / (3 * PAPER.max_acceleration_radps2), None, slip)
+    number(
+        "the same with the right acceleration, s", 4.4, TOP / (3 * PAPER_PROGRAMME.max_acceleration_radps2), None, slip
+    )
     reynolds = 0.67**2 / (4 * 1.006e-6) * TOP
     number("Re", 0.25e5, reynolds, None, "L^2 omega_m/(4 nu) is 0.292e5")
     number("Re by others", 0.292e5, reynolds, 50)
-    number("k, rad/s3", 0.0477129, PAPER.steepness, 5e-8)
-    begin, end = PAPER.pairs()[0].accelerating_s
+    number("k, rad/s3", 0.0477129, PAPER_PROGRAMME.steepness, 5e-8)
+    begin, end = PAPER_PROGRAMME.pairs()[0].accelerating_s
     for words, value, at in (("t1 + 0.5 s", 0.06152, begin), ("t2 - 0.5 s", 0.20028, end)):
-        number(f"rate at {words}, rad/s", value, float(PAPER.at(np.array([at])).rate_radps[0]), 6e-6)
+        number(f"rate at {words}, rad/s", value, float(PAPER_PROGRAMME.at(np.array([at])).rate_radps[0]), 6e-6)
 
 
 def theory_numbers(number: PaperNumbers) -> None:
@@ -137,8 +139,8 @@ def table_numbers(number: PaperNumbers) -> None:
     number.heading("B + D of one interval from Table 2, 1e-4 J")
     for name, rig in BODIES.items():
         for settle, value, tolerance in ((0.5, LOST[name][2], 0.05), (0.0, WITHOUT_SETTLING[name], 0.05)):
-            t = np.linspace(*replace(PAPER, settle_s=settle).pairs()[0].accelerating_s, 20001)
-            w = PAPER.at(t).rate_radps
+            t = np.linspace(*replace(PAPER_PROGRAMME, settle_s=settle).pairs()[0].accelerating_s, 20001)
+            w = PAPER_PROGRAMME.at(t).rate_radps
             moment = rig.coulomb_Nm + rig.viscous_Nms * w + rig.quadratic_Nms2 * w**2
             number(f"{name}, t_Delta {settle:g} s", value, 1e4 * float(np.trapezoid(w * moment, t)), tolerance)
     number.heading("(4) above least squares, %")
@@ -151,7 +153,7 @@ def table_numbers(number: PaperNumbers) -> None:
 
 def recorded(run: YawRun, rig: YawRig, medium: Medium = "water") -> YawRecord:
     # The largest current is not told: a run that saturates is looked at, too.
-    record = record_of(run, rig, Path("simulated.csv"), medium=medium)
+    record = yaw_record(run, rig, Path("simulated.csv"), medium=medium)
     return replace(record, constants={"torque_constant_NmpA": rig.torque_constant_NmpA})
 
 
@@ -159,7 +161,7 @@ def identified(
     rig: YawRig,
     controller: Controller,
     measuring: Measuring,
-    programme: YawProgramme = PAPER,
+    programme: YawProgramme = PAPER_PROGRAMME,
     known: YawRig | None = None,
 ) -> tuple[YawRun, YawResult]:
     run = run_yaw_rig(rig, programme, controller, measuring, allow_saturation=True)
@@ -182,7 +184,7 @@ def print_methods() -> None:
         for control, controller in (("(4)", TUNED), ("(6)", AdaptiveController())):
             for condition, measuring in conditions.items():
                 run, result = identified(rig, controller, measuring)
-                settled = run.time_s > 4 * PAPER.period_s
+                settled = run.time_s > 4 * PAPER_PROGRAMME.period_s
                 worst = np.abs(run.error_rad[settled]).max()
                 full = f", saturated from {run.saturation.first_s:.2f} s" if run.saturation else ""
                 print(
@@ -212,7 +214,7 @@ def simulated_numbers(number: PaperNumbers) -> None:
     number.heading("Controller (4), noise-free: 1e-4 kg m2, 1e-4 J, rad")
     for name, rig in BODIES.items():
         tuned = TunedController(inertia_kgm2=rig.inertia_kgm2 + rig.added_inertia_kgm2)
-        run = run_yaw_rig(rig, PAPER, tuned, Measuring(encoder=False), allow_saturation=True)
+        run = run_yaw_rig(rig, PAPER_PROGRAMME, tuned, Measuring(encoder=False), allow_saturation=True)
         record = recorded(run, rig)
         own = [intervals(record, speeds) for speeds in get_args(Speeds)]
         actual, reference = (energy_balance(pairs, WATER_TERMS, rig.torque_constant_NmpA, None) for pairs in own)
@@ -233,7 +235,7 @@ def simulated_numbers(number: PaperNumbers) -> None:
             number(f"{name}, (2), {speeds} speeds, last hump", dissipated, last[speeds][1], 0.015)
         fit = fit_energy(actual, record, reference)
         number(f"{name}, least squares", best, 1e4 * (fit.coefficients[0] - rig.inertia_kgm2), 0.003 * best)
-        inside = np.any([(run.time_s > a) & (run.time_s < b) for a, b in PAPER.pairs()[-1]], axis=0)
+        inside = np.any([(run.time_s > a) & (run.time_s < b) for a, b in PAPER_PROGRAMME.pairs()[-1]], axis=0)
         number(f"{name}, abs(e) in the intervals, last hump", worst, float(np.abs(run.error_rad[inside]).max()), 3e-4)
         inertia, dissipated = last["actual"]
         for control, value in zip(("(6)", "(4)"), PRINTED[name], strict=False):
@@ -252,7 +254,9 @@ def simulated_numbers(number: PaperNumbers) -> None:
 def print_air() -> None:
     print("\nIn air, J_zz, 1e-4 kg m2: Table 2 by least squares and by (4); simulated, energy least squares, (1)")
     for name, rig, printed in (("ellipsoid", ELLIPSOID_AIR, 214.7), ("ship", SHIP_AIR, 187.2)):
-        run = run_yaw_rig(rig, PAPER, replace(TUNED, inertia_kgm2=rig.inertia_kgm2), Measuring(), allow_saturation=True)
+        run = run_yaw_rig(
+            rig, PAPER_PROGRAMME, replace(TUNED, inertia_kgm2=rig.inertia_kgm2), Measuring(), allow_saturation=True
+        )
         result = identify_yaw([recorded(run, rig, "air")], YawOptions(mirror_limit=10.0))
         found = [
             1e4 * result.estimates[method].total_inertia_kgm2 for method in ("energy_least_squares", "two_intervals")
@@ -264,9 +268,9 @@ def print_programmes() -> None:
     print("\nA body mounted off centre (moment of gravity 1e-3 N m), ship T1, encoder: lambda661 without knowing of it")
     rig = SHIP_T1.model_copy(update={"gravity_Nm": 1e-3, "gravity_angle_rad": 1.0})
     programmes = {
-        "unidirectional": PAPER,
-        "reversing": replace(PAPER, kind="reversing", humps=4),
-        "full turns": full_turns(replace(PAPER, max_rate_radps=math.pi / 6, humps=2)),
+        "unidirectional": PAPER_PROGRAMME,
+        "reversing": replace(PAPER_PROGRAMME, kind="reversing", humps=4),
+        "full turns": full_turns(replace(PAPER_PROGRAMME, max_rate_radps=math.pi / 6, humps=2)),
     }
     for name, programme in programmes.items():
         run, _ = identified(rig, TUNED, Measuring(), programme)

@@ -8,16 +8,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from sphinx.application import Sphinx
 
-from tank2sim.analysis.ensemble.results import Asked, manoeuvre_bands
+from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
+from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.run import simulate
-
-Array = NDArray[np.float64]
 
 MEMBERS = 200
 SECONDS = {35.0: 265.0, 20.0: 295.0, 10.0: 395.0}  # by rudder angle, deg: half a circle
@@ -39,7 +37,7 @@ def turn() -> str:
 
 
 def _circle(card: ManoeuvringCard, rudder_deg: float, seconds: float) -> str:
-    found = manoeuvre_bands(card, Turn(math.radians(rudder_deg)), (seconds, seconds), Asked(MEMBERS))
+    found = manoeuvre_bands(card, Turn(math.radians(rudder_deg)), (seconds, seconds), EnsembleRequest(MEMBERS))
     track = found.track
     assert track is not None
     low, middle, high = (line[: track.count] for line in (track.low, track.middle, track.high))

@@ -18,15 +18,15 @@ from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cluster import Cluster, installed
 from tank2sim.errors import InputError
 from tank2sim.executors import executing, processes_to_begin
-from tank2sim.gap.fitting import Fitting, Known, Proposal
-from tank2sim.gap.posing import pose
-from tank2sim.identification.trials.disturbances import disturbances_of
-from tank2sim.identification.trials.equation_error import equation_error
-from tank2sim.identification.trials.measured import Measured
-from tank2sim.identification.trials.portable import portable
-from tank2sim.identification.trials.prediction import Settings, bootstrap
-from tank2sim.identification.trials.question import pose as pose_problem
-from tank2sim.identification.trials.selection import cross_validate, yaw_rate_error
+from tank2sim.gap.inference.fit_all import Fitting, Known, Proposal
+from tank2sim.gap.inference.prior import likelihood_from_card
+from tank2sim.identification.trials.assessment.model_selection import cross_validate, yaw_rate_error
+from tank2sim.identification.trials.assessment.monte_carlo import PredictionSettings, bootstrap
+from tank2sim.identification.trials.assessment.residual_forces import disturbances_of
+from tank2sim.identification.trials.methods.equation_error import equation_error
+from tank2sim.identification.trials.problem.picklable import portable
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.problem_from_card import problem_from_card as pose_problem
 from tank2sim.simulation.ensemble import ensemble
 from tank2sim.simulation.manoeuvres import Turn
 from tests.dask_cluster import Killing, LoopbackCluster, loopback_cluster
@@ -85,7 +85,7 @@ def test_an_identification_is_the_local_one_to_the_bit_when_a_worker_is_lost(car
     """The folds of its cross-validation, and its bootstrap."""
     problem = pose_problem(card, trials.trials, "angle", hold=HELD)
     asked, estimate = portable(problem, card, "angle"), equation_error(problem)
-    work = asked, estimate, equation_error, disturbances_of(problem, estimate.values), Settings(members=8)
+    work = asked, estimate, equation_error, disturbances_of(problem, estimate.values), PredictionSettings(members=8)
     folds, members = cross_validate(asked, equation_error, yaw_rate_error), bootstrap(*work)
     with executing(two.option) as executor:
         folds_there = cross_validate(asked, equation_error, yaw_rate_error, executor)
@@ -97,7 +97,7 @@ def test_an_identification_is_the_local_one_to_the_bit_when_a_worker_is_lost(car
 
 
 def test_explanations_of_a_gap_are_the_local_ones_to_the_bit_when_a_worker_is_lost(card, trials, two) -> None:
-    likelihood = pose(card, trials)
+    likelihood = likelihood_from_card(card, trials)
     starts = {"gyro_bias": np.array([0.001]), "current": np.array([0.2, 1.0]), "rudder_bias": np.array([0.01])}
     proposals = [Proposal({name: starts[name]}, [likelihood.belief.logs], (0, 3)) for name in starts]
     proposals += [Proposal(starts, [likelihood.belief.logs], (0, 3)), Proposal({}, [likelihood.belief.logs], (0, 3))]

@@ -7,9 +7,8 @@ total yaw-rate terms (Y_r, N_r, X_vr, X_rr contain the centrifugal terms). All a
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from tank2sim.arrays import Array
 
 LENGTH_M = 160.93
 BEAM_M = 23.17

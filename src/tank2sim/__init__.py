@@ -1,3 +1,59 @@
-"""tank2sim: from what a towing tank or a sea trial measured to a ship model inside a simulator."""
+"""From what a towing tank or a sea trial measured to a verified ship model inside a simulator.
+
+``import tank2sim as t2s`` gives the names of :data:`__all__`; each is imported when it is first used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tank2sim.api.fmu import FmuCheck, FmuFile, check_fmu
+    from tank2sim.api.manoeuvre import ManoeuvreResult
+    from tank2sim.api.result import Result, ResultTable
+    from tank2sim.api.ship import Ship, load, ships
+    from tank2sim.api.stability import StabilityResult
+    from tank2sim.errors import InputError
 
 __version__ = "0.1.0"
+
+_HOMES = {
+    "FmuCheck": "api.fmu",
+    "FmuFile": "api.fmu",
+    "InputError": "errors",
+    "ManoeuvreResult": "api.manoeuvre",
+    "Result": "api.result",
+    "ResultTable": "api.result",
+    "Ship": "api.ship",
+    "StabilityResult": "api.stability",
+    "check_fmu": "api.fmu",
+    "load": "api.ship",
+    "ships": "api.ship",
+}
+
+__all__ = [
+    "FmuCheck",
+    "FmuFile",
+    "InputError",
+    "ManoeuvreResult",
+    "Result",
+    "ResultTable",
+    "Ship",
+    "StabilityResult",
+    "check_fmu",
+    "load",
+    "ships",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"tank2sim.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

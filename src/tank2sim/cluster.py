@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from distributed import Client
     from distributed import Future as Remote
 
-Result = TypeVar("Result")
+_Result = TypeVar("_Result")
 
-OPTION = "--executor"
+EXECUTOR_OPTION = "--executor"
 
 ANSWERS_WITHIN_S = 10.0
 """A scheduler that has not answered by then is taken to be none (ours)."""
@@ -110,7 +110,7 @@ class Cluster(Executor):
         """Raise InputError if there are no workers, or one of them has other versions than are `wanted`."""
         if not self._client.scheduler_info()["workers"]:
             problem = f"the scheduler at {self._text} has no workers"
-            raise InputError(OPTION, "", problem, "start some with `dask worker host:port`")
+            raise InputError(EXECUTOR_OPTION, "", problem, "start some with `dask worker host:port`")
         try:
             told = _within(PATIENCE_S, lambda: self._client.run(installed, on_error="return"))
         except (OSError, TimeoutError):  # one does not answer now; each is asked again before it works
@@ -119,11 +119,11 @@ class Cluster(Executor):
             if not isinstance(found, OSError):  # such a one has just gone, and another may come
                 _refuse_other(found if isinstance(found, dict) else {}, self.wanted, address)
 
-    def submit(self, fn: Callable[..., Result], /, *args: Any, **kwargs: Any) -> Future[Result]:
+    def submit(self, fn: Callable[..., _Result], /, *args: Any, **kwargs: Any) -> Future[_Result]:
         """As of any executor; raises InputError where the scheduler was lost."""
         if self._client.status == "closed":
             raise self._lost()
-        promised: Future[Result] = Future()
+        promised: Future[_Result] = Future()
         task = pickle.dumps((fn, args, kwargs))
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Sending large graph")
@@ -179,7 +179,7 @@ class Cluster(Executor):
                 with self._one:
                     waiting = list(self._waiting)
                 for promised in waiting:
-                    error = InputError(OPTION, "", trouble, "mend the cluster, or leave the option out")
+                    error = InputError(EXECUTOR_OPTION, "", trouble, "mend the cluster, or leave the option out")
                     self._settle(promised, partial(promised.set_exception, error))
 
     def _trouble(self) -> str:
@@ -195,12 +195,14 @@ class Cluster(Executor):
 
         if isinstance(error, KilledWorker):
             problem = "one piece of work was lost with worker after worker"
-            return InputError(OPTION, "", problem, "see what their logs say; perhaps each has too little memory")
+            return InputError(
+                EXECUTOR_OPTION, "", problem, "see what their logs say; perhaps each has too little memory"
+            )
         return self._lost() if lost else error
 
     def _lost(self) -> InputError:
         problem = f"the scheduler at {self._text} was lost during the work"
-        return InputError(OPTION, "", problem, "start it and its workers anew, or leave the option out")
+        return InputError(EXECUTOR_OPTION, "", problem, "start it and its workers anew, or leave the option out")
 
 
 _ONE_AT_A_TIME = Lock()
@@ -234,7 +236,7 @@ def _client(text: str) -> Client:
             )
     except (OSError, TimeoutError, ValueError):
         problem, remedy = f"no scheduler answers at {text}", "start one there with `dask scheduler`"
-        raise InputError(OPTION, "", problem, f"{remedy}, or leave the option out") from None
+        raise InputError(EXECUTOR_OPTION, "", problem, f"{remedy}, or leave the option out") from None
 
 
 def _refuse_other(there: Mapping[str, str], here: Mapping[str, str], address: str) -> None:
@@ -242,13 +244,13 @@ def _refuse_other(there: Mapping[str, str], here: Mapping[str, str], address: st
         if there.get(name) != wanted:
             problem = f"has {name} {there[name]}, but here it is {wanted}" if name in there else f"lacks this {name}"
             raise InputError(
-                OPTION, f"worker {address}", problem, "install the same on both, and start the worker anew"
+                EXECUTOR_OPTION, f"worker {address}", problem, "install the same on both, and start the worker anew"
             )
 
 
-def _within(seconds: float, make: Callable[[], Result]) -> Result:
+def _within(seconds: float, make: Callable[[], _Result]) -> _Result:
     """What `make` returns or raises; TimeoutError if it does neither in that time."""
-    promised: Future[Result] = Future()
+    promised: Future[_Result] = Future()
 
     def work() -> None:
         try:

@@ -15,15 +15,15 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 
-from tank2sim.cluster import OPTION, connected, working_for_another
+from tank2sim.cluster import EXECUTOR_OPTION, connected, working_for_another
 from tank2sim.errors import InputError
 
 PROCESSES = "processes"
-FORMS = f"{PROCESSES}, or dask://host:port"
+EXECUTOR_FORMS = f"{PROCESSES}, or dask://host:port"
 
 
 def check_executor(text: str) -> str:
-    """The text of the option, if it is one of :data:`FORMS` and can be used here.
+    """The text of the option, if it is one of :data:`EXECUTOR_FORMS` and can be used here.
 
     Raises
     ------
@@ -33,10 +33,10 @@ def check_executor(text: str) -> str:
     if text == PROCESSES:
         return text
     if not re.fullmatch(r"dask://[^/\s:]+:\d{1,5}|dask://\[[0-9a-fA-F:]+\]:\d{1,5}", text):
-        raise InputError(OPTION, "", f"{text!r} is no executor", f"give {FORMS}")
+        raise InputError(EXECUTOR_OPTION, "", f"{text!r} is no executor", f"give {EXECUTOR_FORMS}")
     if importlib.util.find_spec("distributed") is None:
         problem = "Dask, which a cluster needs, is not installed"
-        raise InputError(OPTION, "", problem, "pip install 'tank2sim[dask]', or leave the option out")
+        raise InputError(EXECUTOR_OPTION, "", problem, "pip install 'tank2sim[dask]', or leave the option out")
     return text
 
 
@@ -47,7 +47,7 @@ def executing(text: str = PROCESSES, workers: int | None = None) -> Iterator[Exe
     Parameters
     ----------
     text : str
-        One of :data:`FORMS`.
+        One of :data:`EXECUTOR_FORMS`.
     workers : int, optional
         Processes; by default as many as there are processors. A cluster has those that it has.
 

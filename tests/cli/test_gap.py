@@ -14,8 +14,8 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
-from tank2sim.gap.add import added, improved_text
-from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, Gap, Named
+from tank2sim.gap.outcome.improve_card import add_effects_to_card, card_with_effects_text
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, Gap, Named
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.trial_file import trial_csv
@@ -66,7 +66,7 @@ def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[tuple[object,
                 made_up.passed(trial.name, 8.0, 1.0, held_out=trial in held.trials)
                 for trial in (*fitted.trials, *held.trials)
             )
-            improved = added(card, [(one.name, one.parameters, one.standard_errors) for one in effects])
+            improved = add_effects_to_card(card, [(one.name, one.parameters, one.standard_errors) for one in effects])
             gap = replace(made_up.missing(), card=card, improved=improved, verdict=verdict, effects=effects)
             where = tuple(replace(one, trial=passed[0].name) for one in gap.where)
             gap = replace(gap, passed=passed, where=where, missing_force=None, agreement={}, figures_before=())
@@ -149,7 +149,7 @@ def test_what_an_earlier_run_wrote_does_not_lie_there_as_if_it_were_of_this_one(
     told = json.loads((tmp_path / "gap.json").read_text())
     (tmp_path / "gap.json").write_text(json.dumps({**told, "files": [*told["files"], "improved.covariance.json"]}))
     (tmp_path / "improved.covariance.json").write_text("{}")
-    finding((), NOTHING, test=False)
+    finding((), NO_EFFECT_MISSING, test=False)
     result = tank2sim(*arguments, cwd=folder)
     assert result.returncode == 0, result.stderr
     assert written(tmp_path) == {"gap.json", "improved.toml", "report.html", "corrected/mine.csv"}
@@ -166,14 +166,14 @@ def test_what_no_earlier_run_says_it_wrote_is_left(folder: Path, tmp_path: Path,
     arguments = ("-o", str(tmp_path))
     (tmp_path / "next_test.csv").write_text("mine")
     (tmp_path / "gap.json").write_text('["of another program"]')
-    finding((), NOTHING, test=False)
+    finding((), NO_EFFECT_MISSING, test=False)
     result = tank2sim("gap", "mariner", "turn20.csv", *arguments, cwd=folder)
     assert result.returncode == 0 and (tmp_path / "next_test.csv").read_text() == "mine"
     assert "next_test.csv is not of this run, and was left" in result.stdout
 
     finding((BIAS,))
     assert tank2sim("gap", "mariner", "turn20.csv", *arguments, cwd=folder).returncode == 0
-    finding((), NOTHING, test=False)
+    finding((), NO_EFFECT_MISSING, test=False)
     result = tank2sim("gap", "mariner", str(tmp_path / "corrected/turn20.csv"), *arguments, cwd=folder)
     assert result.returncode == 0 and (tmp_path / "corrected/turn20.csv").exists()
 
@@ -311,7 +311,9 @@ def test_an_improved_card_goes_all_the_way_to_a_checked_fmu(name: str, tmp_path:
     found = [(name, dict(to_si(key, value) for key, value in TYPICAL[name].items()), {})]
     card = read_card("mariner")
     assert isinstance(card, ManoeuvringCard)
-    (tmp_path / "improved.toml").write_text(improved_text(added(card, found), found, ["turn20"]), encoding="utf-8")
+    (tmp_path / "improved.toml").write_text(
+        card_with_effects_text(add_effects_to_card(card, found), found, ["turn20"]), encoding="utf-8"
+    )
     for arguments in (
         ["simulate", "improved.toml", "--manoeuvre", "turn:20"],
         ["stability", "improved.toml"],

@@ -20,7 +20,7 @@ import pytest
 
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
-from tank2sim.gap.add import added
+from tank2sim.gap.outcome.improve_card import add_effects_to_card
 from tank2sim.gap.result import Gap, Named
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
@@ -73,7 +73,9 @@ def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
                 made_up.passed(trial.name, 0.08 * len(trial.time_s), 1.0, held_out=trial in held.trials)
                 for trial in (*fitted.trials, *held.trials)
             )
-            improved = added(card, [(one.name, one.parameters, one.standard_errors) for one in (CURRENT,)])
+            improved = add_effects_to_card(
+                card, [(one.name, one.parameters, one.standard_errors) for one in (CURRENT,)]
+            )
             gap = replace(made_up.missing(), card=card, improved=improved, effects=(CURRENT,), passed=passed)
             return replace(gap, missing_force=None, agreement={}, figures_before=())
 

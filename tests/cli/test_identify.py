@@ -13,8 +13,8 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance import read_covariance
-from tank2sim.identification.trials.evaluation import predicted_figures
-from tank2sim.identification.trials.measured import measured
+from tank2sim.identification.trials.assessment.evaluation import predicted_figures
+from tank2sim.identification.trials.problem.prepare_trials import measured
 from tests.identification.trials.made_up_ship import CARD, LENGTH, SPEED, TRUTH, trial, turn, zigzag
 
 from .command_line import refused, tank2sim

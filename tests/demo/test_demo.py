@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tank2sim.cli.screen import json_text
-from tank2sim.demo.run import PAGE, STEPS, run_demo
+from tank2sim.cli.console import json_text
+from tank2sim.demo.run import DEMO_STEPS, PAGE, run_demo
 
 pytestmark = pytest.mark.slow  # the whole way, which the README's first command goes too
 
@@ -23,7 +23,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, list[str
 
 
 def test_it_tells_each_of_its_steps(demo) -> None:
-    assert len(demo[2]) == STEPS
+    assert len(demo[2]) == DEMO_STEPS
 
 
 def test_it_writes_what_it_lists_and_nothing_else(demo) -> None:

@@ -12,7 +12,7 @@ from scipy.integrate import cumulative_simpson, solve_ivp
 
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
-from tank2sim.dynamics.glider import cautions
+from tank2sim.dynamics.glider import glider_warnings
 from tank2sim.simulation.integrator import Integrator
 
 PROBE = read_card("kulikovsky-velikanov")
@@ -178,7 +178,7 @@ def test_the_card_is_told_to_contradict_itself() -> None:
     assert "0.0628 m3" in told and "+12.8 kg" in told and "0.05 m3" in told
     assert "V^(2/3)" in told and "attitude is prescribed" in told
     right = read_card("kulikovsky-velikanov", {"glider.volume_m3": 0.05, "glider.reference_area_m2": 0.0356})
-    assert cautions(right) == ()
+    assert glider_warnings(right) == ()
 
 
 def test_the_interface_is_that_of_a_glider() -> None:

@@ -16,8 +16,8 @@ from scipy.integrate import quad
 
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics import Model, build
-from tank2sim.dynamics.abkowitz import TERMS, polynomial
-from tank2sim.dynamics.kinks import kinks
+from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, polynomial
+from tank2sim.dynamics.event_indicators import kinks
 from tank2sim.dynamics.low_speed import (
     BLEND,
     DRAG_COEFFICIENT,
@@ -113,9 +113,9 @@ def test_in_the_range_of_the_card_the_forces_are_those_of_its_polynomial(speed, 
     u, v = speed * math.cos(drift), -speed * math.sin(drift)
     primes = v / speed, r * L / speed, d, (u - U0) / speed
     scale = RHO / 2 * L**2 * speed**2
-    coefficients = {name: card.derivatives.get(name, 0.0) for force in "XYN" for name in TERMS[force]}
+    coefficients = {name: card.derivatives.get(name, 0.0) for force in "XYN" for name in ABKOWITZ_TERMS[force]}
     for axis, arm in (("X", 1.0), ("Y", 1.0), ("N", L)):
-        expected = scale * arm * polynomial(TERMS[axis], coefficients, *primes)
+        expected = scale * arm * polynomial(ABKOWITZ_TERMS[axis], coefficients, *primes)
         assert force(model, f"force.{axis}", state(model, u, v, r, d)) == pytest.approx(
             expected, rel=1e-9, abs=1e-4
         )  # N, N m: sums of terms that nearly cancel

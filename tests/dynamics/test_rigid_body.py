@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tank2sim.dynamics.rigid_body import accelerations, inertia, inertial_forces
+from tank2sim.dynamics.rigid_body import inertia, inertial_forces, rigid_body_accelerations
 
 values = st.floats(-5, 5)
 NO_ADDED_MASS = dict.fromkeys(("Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot"), 0.0)
@@ -42,5 +42,5 @@ def test_accelerations_solve_the_mass_matrix(f1, f2, f3) -> None:
             [0, mass * x_G - added["Nvdot"], yaw_inertia - added["Nrdot"]],
         ]
     )
-    solved = accelerations(inertia(mass, x_G, yaw_inertia, added), f1, f2, f3)
+    solved = rigid_body_accelerations(inertia(mass, x_G, yaw_inertia, added), f1, f2, f3)
     np.testing.assert_allclose(solved, np.linalg.solve(matrix, [f1, f2, f3]), atol=1e-12)

@@ -9,7 +9,7 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import build
-from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, TERMS
+from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS, ALL_TERMS
 
 from ..cards.test_reading import SI_CARD
 
@@ -19,7 +19,7 @@ L, U0, RHO = 160.93, 7.7175, 1025.0
 def with_random_derivatives(card: ManoeuvringCard, seed: int, **model: str) -> ManoeuvringCard:
     random = np.random.default_rng(seed)
     derivatives = dict(card.derivatives)
-    for name in (*TERMS["X"], *TERMS["Y"], *TERMS["N"]):
+    for name in (*ABKOWITZ_TERMS["X"], *ABKOWITZ_TERMS["Y"], *ABKOWITZ_TERMS["N"]):
         derivatives[name] = random.normal(scale=1e-3)
     return replace(card, derivatives=derivatives, model=card.model.model_copy(update=model))
 
@@ -77,7 +77,7 @@ STATES = [(7.7175, 0.3, 0.004, 0.1), (6.0, -0.9, 0.011, -0.5), (9.1, 0.7, -0.008
 
 
 def test_the_term_lists_are_those_of_the_paper() -> None:
-    assert [len(TERMS[force]) for force in "XYN"] == [16, 22, 22]
+    assert [len(ABKOWITZ_TERMS[force]) for force in "XYN"] == [16, 22, 22]
     assert len(ACCELERATION_TERMS) == 5 and len(set(ALL_TERMS)) == 65
 
 
@@ -125,7 +125,7 @@ def test_total_and_hydrodynamic_differ_by_m_times_speed_difference(mariner_card)
 
 def test_a_symmetric_ship_turns_alike_to_both_sides(mariner_card) -> None:
     names = ("X0 Xu Xuu Xuuu Xvv Xrr Xdd Xvvu Xrru Xddu Xvr Xvd Xrd Xvru Xvdu Xrdu").split()
-    assert set(names) == set(TERMS["X"])
+    assert set(names) == set(ABKOWITZ_TERMS["X"])
     even = [f + end for f in "YN" for end in ("0", "0u", "0uu")]
     random = with_random_derivatives(mariner_card, 11)
     card = replace(random, derivatives={**random.derivatives, **dict.fromkeys(even, 0.0)})

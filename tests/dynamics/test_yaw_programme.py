@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tank2sim.dynamics.yaw_programme import PAPER, Similarity, YawProgramme, full_turns
+from tank2sim.dynamics.yaw_programme import PAPER_PROGRAMME, Similarity, YawProgramme, full_turns
 from tests.yaw_truth import Truth
 
 PROGRAMMES = st.builds(
@@ -21,16 +21,16 @@ PROGRAMMES = st.builds(
 
 
 def test_numbers_of_the_paper():
-    assert PAPER.steepness == pytest.approx(0.0477129, abs=5e-8)
-    assert PAPER.max_acceleration_radps2 == pytest.approx(9 * math.pi / 400, rel=1e-12)
-    assert PAPER.period_s == pytest.approx(17.78, abs=0.005)
-    (begin, end), _ = PAPER.pairs()[0]
-    np.testing.assert_allclose(PAPER.at(np.array([begin, end])).rate_radps, [0.06152, 0.20028], atol=5e-6)
+    assert PAPER_PROGRAMME.steepness == pytest.approx(0.0477129, abs=5e-8)
+    assert PAPER_PROGRAMME.max_acceleration_radps2 == pytest.approx(9 * math.pi / 400, rel=1e-12)
+    assert PAPER_PROGRAMME.period_s == pytest.approx(17.78, abs=0.005)
+    (begin, end), _ = PAPER_PROGRAMME.pairs()[0]
+    np.testing.assert_allclose(PAPER_PROGRAMME.at(np.array([begin, end])).rate_radps, [0.06152, 0.20028], atol=5e-6)
 
 
 @pytest.mark.parametrize("reversing", [False, True])
 def test_rate_is_the_printed_one(reversing):
-    programme = replace(PAPER, kind="reversing" if reversing else "unidirectional", humps=2)
+    programme = replace(PAPER_PROGRAMME, kind="reversing" if reversing else "unidirectional", humps=2)
     times = np.linspace(0, programme.end_s, 2001)[:-1]
     truth = Truth(reversing=reversing)
     np.testing.assert_allclose(programme.at(times).rate_radps, [truth.rate(t) for t in times], atol=1e-12)
@@ -66,18 +66,18 @@ def test_pairs_are_mirror_images(programme):
 
 
 def test_full_turns_sweep_one_turn():
-    assert full_turns(PAPER).turn_per_interval_rad == pytest.approx(2 * math.pi, rel=1e-12)
+    assert full_turns(PAPER_PROGRAMME).turn_per_interval_rad == pytest.approx(2 * math.pi, rel=1e-12)
 
 
 def test_similarity_is_that_of_the_paper():
     similarity = Similarity(ship_length_m=38, ship_beam_m=8, length_m=0.67, beam_m=0.2)
     assert similarity.rate_ratio == pytest.approx(8.968, abs=5e-4)
     programme = similarity.programme(math.radians(100 / 60), 120.0)
-    assert programme.max_rate_radps == pytest.approx(PAPER.max_rate_radps, rel=0.01)
-    assert programme.rise_s == pytest.approx(PAPER.rise_s, rel=0.01)
+    assert programme.max_rate_radps == pytest.approx(PAPER_PROGRAMME.max_rate_radps, rel=0.01)
+    assert programme.rise_s == pytest.approx(PAPER_PROGRAMME.rise_s, rel=0.01)
 
 
 @pytest.mark.parametrize("changes", [{"settle_s": 2.0}, {"rise_s": 0.0}, {"kind": "reversing", "humps": 3}])
 def test_a_programme_that_is_none_is_refused(changes):
     with pytest.raises(ValueError):
-        replace(PAPER, **changes)
+        replace(PAPER_PROGRAMME, **changes)

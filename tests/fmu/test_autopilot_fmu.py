@@ -13,7 +13,7 @@ from fmpy.validation import validate_fmu
 from tank2sim.analysis.heading.designs import HeadingDesign, design_heading
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.fmu.autopilot import agreement, co_simulate_heading, make_autopilot_fmu
+from tank2sim.fmu.autopilot import co_simulate_heading, loop_difference, make_autopilot_fmu
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def test_the_fmu_of_a_controller_is_valid(pair: tuple[Path, Path]) -> None:
 def test_two_fmus_agree_with_one_model_in_proportion_to_their_step(
     mariner: Model, design: HeadingDesign, pair: tuple[Path, Path]
 ) -> None:
-    found = agreement(mariner, design, pair, math.radians(20.0), steps_s=(2.0, 0.4, 0.1))
+    found = loop_difference(mariner, design, pair, math.radians(20.0), steps_s=(2.0, 0.4, 0.1))
     assert found.order == pytest.approx(1.0, abs=0.1)
     assert 0.005 < found.error_deg[0.1] < 0.02
     # In proportion: what a straight line through two of them leaves at a step of 0 is nothing.

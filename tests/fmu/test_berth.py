@@ -13,13 +13,13 @@ from fmpy.model_description import read_model_description
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.export import write_fmu
 from tank2sim.fmu.running import running
-from tank2sim.fmu.unpacking import Kind, UnpackedFmu
+from tank2sim.fmu.unpacking import FmuType, UnpackedFmu
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
 
 from ..dynamics.effects.ships import N0, TYPICAL, U0, ship
 
-KINDS = get_args(Kind)
+KINDS = get_args(FmuType)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ AT_REST = {"initial.u": 0.0, "current.speed": 0.0, "wind.speed": 0.0, "propeller
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_at_the_berth_all_is_at_rest_and_every_derivative_is_a_number(unpacked_ship, driven, kind: Kind) -> None:
+def test_at_the_berth_all_is_at_rest_and_every_derivative_is_a_number(unpacked_ship, driven, kind: FmuType) -> None:
     with running(unpacked_ship, kind) as fmu:
         fmu.initialise(AT_REST)
         if kind == "ModelExchange":

@@ -20,7 +20,7 @@ from fmpy.validation import validate_fmu
 
 from tank2sim.bundled import bundled_cards
 from tank2sim.dynamics import Model
-from tank2sim.fmu.manoeuvre import Manoeuvre
+from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.running import co_simulate, running
 from tank2sim.fmu.unpacking import UnpackedFmu, unpack
 from tank2sim.simulation.scheme import runge_kutta_step
@@ -71,7 +71,7 @@ def by_fmpy(
             orders = np.array([[order[name] for name in inputs] for order in zigzag()], dtype=float)
             with running(unpacked, "CoSimulation") as fmu:
                 fmu.write(START)
-                rows = co_simulate(fmu, Manoeuvre(np.arange(STEPS + 1) * STEP, orders), inputs, OUTPUTS)
+                rows = co_simulate(fmu, InputSequence(np.arange(STEPS + 1) * STEP, orders), inputs, OUTPUTS)
             made[fmi] = unpacked, rows[1:]
         return made[fmi]
 

@@ -13,11 +13,12 @@ import fmpy
 import numpy as np
 import pytest
 
+from tank2sim.arrays import Array
 from tank2sim.fmu.running import RunningFmu
 from tests.fmu.driving import ERROR, STATES, Instantiate, Status, begun, steps, untyped
 
 if TYPE_CHECKING:
-    from tank2sim.dynamics.model import Vector
+    from tank2sim.arrays import Array
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 FmuFile = Callable[[str, int], Path]
@@ -31,25 +32,25 @@ class FixedSteps:
         self.fmu, self.count, self.events = fmu, fmu.unpacked.description.numberOfContinuousStates, 0
         begun(fmu).update()
 
-    def _read(self, function: Any, count: int) -> Vector:
+    def _read(self, function: Any, count: int) -> Array:
         values = (c_double * count)()
         function(values, count)
         return np.array(values)
 
-    def _rates(self, x: Vector) -> Vector:
+    def _rates(self, x: Array) -> Array:
         self.fmu.instance.setContinuousStates((c_double * self.count)(*x), self.count)
         instance = self.fmu.instance
         return self._read(
             getattr(instance, "getContinuousStateDerivatives", None) or instance.getDerivatives, self.count
         )
 
-    def _moved(self, x: Vector, h: float) -> Vector:
+    def _moved(self, x: Array, h: float) -> Array:
         k1 = self._rates(x)
         k2 = self._rates(x + h / 2 * k1)
         k3 = self._rates(x + h / 2 * k2)
         return np.array(x + h / 6 * (k1 + 2 * k2 + 2 * k3 + self._rates(x + h * k3)))
 
-    def _signs(self, x: Vector) -> list[bool]:
+    def _signs(self, x: Array) -> list[bool]:
         self._rates(x)
         return [bool(value > 0) for value in self._read(self.fmu.instance.getEventIndicators, 2)]
 

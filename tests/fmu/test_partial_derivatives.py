@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.running import RunningFmu
 
@@ -18,7 +18,6 @@ TRIM = pytest.mark.parametrize("trim", [False, True])
 STATE = {"motion.x": 3.0, "motion.y": 1.0, "motion.psi": 0.7, "motion.u": 6.0, "motion.v": -0.5, "motion.r": 0.02}
 INPUTS = {"rudder.command": 0.15, "propeller.speed": 1.2}
 REAL_INPUTS = ["rudder.command", "propeller.speed"]
-Matrix = NDArray[np.float64]
 Instantiate = Callable[..., RunningFmu]
 
 
@@ -31,7 +30,7 @@ def at_a_point(fmu: RunningFmu) -> RunningFmu:
     return fmu
 
 
-def directional(fmu: RunningFmu, unknowns: list[str], knowns: list[str]) -> Matrix:
+def directional(fmu: RunningFmu, unknowns: list[str], knowns: list[str]) -> Array:
     """Jacobian (unknowns, knowns), one directional derivative a column."""
     columns = []
     for known in knowns:
@@ -40,7 +39,7 @@ def directional(fmu: RunningFmu, unknowns: list[str], knowns: list[str]) -> Matr
     return np.array(columns).T
 
 
-def adjoint(fmu: RunningFmu, unknowns: list[str], knowns: list[str]) -> Matrix:
+def adjoint(fmu: RunningFmu, unknowns: list[str], knowns: list[str]) -> Array:
     """The same Jacobian, one adjoint derivative a row."""
     rows = []
     for unknown in unknowns:
@@ -57,7 +56,7 @@ def real_parameters(model: Model) -> list[str]:
     return [parameter.name for parameter in model.parameters if not parameter.boolean]
 
 
-def by_differences(evaluate: Callable[[str, float], list[float]], knowns: list[str], values: list[float]) -> Matrix:
+def by_differences(evaluate: Callable[[str, float], list[float]], knowns: list[str], values: list[float]) -> Array:
     columns = []
     for known, value in zip(knowns, values, strict=True):
         width = 1e-6 * max(1.0, abs(value))
@@ -66,7 +65,7 @@ def by_differences(evaluate: Callable[[str, float], list[float]], knowns: list[s
     return np.array(columns).T
 
 
-def by_writing(fmu: RunningFmu, unknowns: list[str], knowns: list[str]) -> Matrix:
+def by_writing(fmu: RunningFmu, unknowns: list[str], knowns: list[str]) -> Array:
     """The same by writing each known and reading the unknowns."""
     values = fmu.read(knowns)
 
@@ -79,7 +78,7 @@ def by_writing(fmu: RunningFmu, unknowns: list[str], knowns: list[str]) -> Matri
     return by_differences(evaluate, knowns, values)
 
 
-def assert_close(found: Matrix, expected: Matrix) -> None:
+def assert_close(found: Array, expected: Array) -> None:
     scale = np.maximum(np.abs(expected).max(axis=1, keepdims=True), 1e-3)
     np.testing.assert_allclose(found / scale, expected / scale, atol=2e-7)
 

@@ -19,13 +19,13 @@ from tank2sim.bundled import bundled_cards
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
+from tank2sim.fmu.acceptance import passport_files, replay_in_fmu
 from tank2sim.fmu.check import check_fmu
 from tank2sim.fmu.documents import Documents, documents_of
-from tank2sim.fmu.evidence import passport_files, replayed
-from tank2sim.fmu.manoeuvre import Manoeuvre
+from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.passport import PASSPORT_FILE, PASSPORT_PAGE, Replay, passport
-from tank2sim.fmu.provenance import ABSENT, ASSUMED, NOT_STATED, STATED, origins
-from tank2sim.fmu.reference import by_scheme, output_errors
+from tank2sim.fmu.provenance import ABSENT, ASSUMED_ERROR, NOT_STATED, STATED_ERROR, origins
+from tank2sim.fmu.reference import by_scheme, reference_errors
 from tank2sim.fmu.reference_run import INPUTS_FILE, OUTPUTS_FILE, ReferenceRun, read_reference, reference_run
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
@@ -58,7 +58,7 @@ def test_every_coefficient_of_the_card_is_there_with_its_value(
     for name, value in mariner_card.derivatives.items():
         one = found[f"derivatives.{name}"]
         assert one["value"] == value
-        assert (one["standard_error"], one["standard_error_from"]) == (pytest.approx(abs(0.02 * value)), ASSUMED)
+        assert (one["standard_error"], one["standard_error_from"]) == (pytest.approx(abs(0.02 * value)), ASSUMED_ERROR)
         assert "Chislett" in one["source"]
     assert found["ship.mass"]["value"] == pytest.approx(798e-5 * 0.5 * 1025 * 160.93**3)
     assert found["derivatives.Xvvu"]["source"] == ABSENT
@@ -76,7 +76,7 @@ def test_what_low_speed_needs_and_the_card_does_not_state_says_where_it_is_from(
 def test_remarks_and_uncertainties_of_a_card_are_told() -> None:
     known = origins(read_card("kvlcc2"))
     assert "Clarke" in known["derivatives.Yr"].remark
-    assert (known["derivatives.Yr"].standard_error, known["derivatives.Yr"].error_from) == (0.00129, STATED)
+    assert (known["derivatives.Yr"].standard_error, known["derivatives.Yr"].error_from) == (0.00129, STATED_ERROR)
     assert known["derivatives.Yv"].remark == ""
     assert known["steering.max_rate"].error_from == NOT_STATED
     assert "steering.time_constant" not in known  # assumed by the program
@@ -141,7 +141,7 @@ def test_a_library_that_answers_otherwise_is_told(hull: Model, fmu_file: Callabl
     outputs = reference.outputs.copy()
     outputs[-1, hull.outputs.index("motion.u")] *= 1.01
     other = ReferenceRun(reference.title, reference.run, hull.input_names, hull.outputs, outputs)
-    found = replayed(fmu_file("hull", 2).read_bytes(), other, hull, 2)
+    found = replay_in_fmu(fmu_file("hull", 2).read_bytes(), other, hull, 2)
     assert found.output == "motion.u"
     assert found.max_error is not None
     assert found.max_error > 1e-3
@@ -150,7 +150,7 @@ def test_a_library_that_answers_otherwise_is_told(hull: Model, fmu_file: Callabl
 def test_a_motion_that_leaves_all_bounds_has_no_reference(hull: Model) -> None:
     wild = hull.redefine("motion.udot", lambda value: value + hull.symbol("motion.u") ** 3)
     assert reference_run(wild) == (None, {})
-    files = passport_files(wild, Documents(), {}, replayed(b"", None, wild, 2))
+    files = passport_files(wild, Documents(), {}, replay_in_fmu(b"", None, wild, 2))
     assert "leaves all bounds" in files[PASSPORT_PAGE]
     assert json.loads(files[PASSPORT_FILE])["replay"]["max_error"] is None
 
@@ -171,7 +171,7 @@ def test_the_reference_result_is_the_zigzag_of_the_model(mariner: Model, mariner
     heading = found.outputs[:, found.output_names.index("motion.psi")]
     np.testing.assert_allclose(heading, np.interp(found.run.times, run.t, run["motion.psi"]), atol=2e-6)
     columns = dict(zip(found.output_names, found.outputs.T, strict=True))
-    assert max(output_errors(mariner, by_scheme(mariner, found.run), columns).values()) < 1e-11
+    assert max(reference_errors(mariner, by_scheme(mariner, found.run), columns).values()) < 1e-11
 
 
 @FMI
@@ -234,7 +234,7 @@ def test_a_reference_result_that_is_wrong_or_damaged_fails_the_check(
 
 
 def test_inputs_hold_from_a_jump_to_the_next(tmp_path: Path) -> None:
-    run = Manoeuvre(np.array([0.0, 1.0, 1.5, 4.0]), np.array([[1.0], [1.0], [2.0]]))
+    run = InputSequence(np.array([0.0, 1.0, 1.5, 4.0]), np.array([[1.0], [1.0], [2.0]]))
     files = ReferenceRun("x", run, ("a",), ("b",), np.array([[0.0], [1.0], [2.0], [3.0]])).files()
     assert files[INPUTS_FILE].split() == ["time,a", "0,1", "1.5,1", "1.5,2", "4,2"]
     for name, text in files.items():

@@ -23,14 +23,14 @@ from tank2sim.analysis.heading.control import heading_autopilot
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import read_card
 from tank2sim.dynamics import Model, build
+from tank2sim.fmu.acceptance import passport_files
 from tank2sim.fmu.documents import Documents
-from tank2sim.fmu.evidence import passport_files
 from tank2sim.fmu.export import description_text, write_fmu
 from tank2sim.fmu.passport import PASSPORT_PAGE, Replay
 from tank2sim.fmu.provenance import Origin
 from tank2sim.fmu.templates import c_identifier
 from tank2sim.fmu.unpacking import UnpackedFmu
-from tank2sim.simulation.card_range import Reading
+from tank2sim.simulation.card_range import CardRangeReading
 from tank2sim.simulation.run import Run
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
@@ -251,7 +251,7 @@ def test_no_name_breaks_the_description(fmi: int, text: str, models: dict[str, M
 @given(text=TEXT)
 def test_no_name_breaks_the_passport(text: str, models: dict[str, Model]) -> None:
     strange = replace(models["gain"], name=text, description=text, notices=(text,))
-    zigzag = Run(mock.Mock(), {"overshoots_deg": [1.0]}, (text,), Reading({}, {"x": 0.0}, 0.0, text))
+    zigzag = Run(mock.Mock(), {"overshoots_deg": [1.0]}, (text,), CardRangeReading({}, {"x": 0.0}, 0.0, text))
     documents = Documents(source=text, validity=text, origins={"command": Origin(text, text)})
     files = passport_files(strange, documents, {"zigzag_20_20": zigzag}, Replay(problem=text))
     tags = [one.tag for one in page_of(files).iter()]

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 
-from tank2sim.gap.observer import Linear, Noise
+from tank2sim.gap.inference.kalman_filter import Linear, NoiseLevels
 
 
 def van_loan(slope: np.ndarray, intensity: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
@@ -34,7 +34,7 @@ class Dense:
     does so evenly over the block: B, the mean of exp(A s), has it from there.
     """
 
-    def __init__(self, what: Linear, noise: Noise, run: int):
+    def __init__(self, what: Linear, noise: NoiseLevels, run: int):
         _, blocks, ny, _ = what.reading.shape
         self.known = what.known[run].ravel()
         times, levels = np.r_[noise.force_s, noise.slow_s], np.r_[noise.force, noise.slow]

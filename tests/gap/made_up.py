@@ -10,17 +10,17 @@ from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.gap.result import (
     AMBIGUOUS,
     MISSING,
-    NOTHING,
-    OUTSIDE,
+    NO_EFFECT_MISSING,
+    OUTSIDE_LIBRARY,
     Gap,
+    MisfitPlace,
     MissingForce,
     Named,
     NextTest,
     Passed,
-    Place,
     Rival,
 )
-from tank2sim.identification.trials.evaluation import Figure
+from tank2sim.identification.trials.assessment.evaluation import FigureComparison
 
 NOISE = {"motion.x": 0.5, "motion.psi": np.deg2rad(0.2), "motion.r": np.deg2rad(0.05), "motion.u": 0.02}
 TIME = np.linspace(0.0, 99.0, 100)
@@ -37,11 +37,11 @@ def passed(name: str, before: float, after: float, *, held_out: bool = False) ->
     return Passed(name, held_out, TIME, noise, measured, *models)
 
 
-def figures(factor: float) -> tuple[Figure, ...]:
+def figures(factor: float) -> tuple[FigureComparison, ...]:
     return (
-        Figure("turn35", "advance_m", 500.0, 500.0 * factor),
-        Figure("zigzag", "overshoot_1_deg", 8.0, 8.0 * factor),
-        Figure("zigzag", "overshoot_2_deg", 9.0, None),
+        FigureComparison("turn35", "advance_m", 500.0, 500.0 * factor),
+        FigureComparison("zigzag", "overshoot_1_deg", 8.0, 8.0 * factor),
+        FigureComparison("zigzag", "overshoot_2_deg", 9.0, None),
     )
 
 
@@ -80,7 +80,10 @@ def missing() -> Gap:
         effects=(current,),
         alternatives=(),
         rivals=(Rival(("current",), 0.0, 0.97), Rival(("heading_offset",), 14.0, 0.02), Rival((), 5000.0, 0.0)),
-        where=(Place("turn35", "motion.x", 20.0, 80.0, 0.6), Place("zigzag", "motion.psi", 10.0, 40.0, 0.1)),
+        where=(
+            MisfitPlace("turn35", "motion.x", 20.0, 80.0, 0.6),
+            MisfitPlace("zigzag", "motion.psi", 10.0, 40.0, 0.1),
+        ),
         equation="kinematics",
         noise=noise,
         passed=(passed("turn35", 8.0, 1.0), passed("zigzag", 6.0, 1.0), passed("turn20", 9.0, 1.5, held_out=True)),
@@ -102,7 +105,7 @@ def nothing() -> Gap:
     trials = tuple(passed(name, 1.02, 1.02) for name in ("turn35", "zigzag"))
     return replace(
         missing(),
-        verdict=NOTHING,
+        verdict=NO_EFFECT_MISSING,
         effects=(),
         rivals=(Rival((), 0.0, 0.9), Rival(("current",), 6.0, 0.05)),
         where=(),
@@ -133,7 +136,7 @@ def outside() -> Gap:
     gone = {name: np.where(TIME < 50, values, np.nan) for name, values in lost.before.items()}
     return replace(
         found,
-        verdict=OUTSIDE,
+        verdict=OUTSIDE_LIBRARY,
         effects=(),
         equation="sway",
         passed=(replace(lost, before=gone, after=gone), passed("zigzag", 6.0, 6.0)),
@@ -145,4 +148,4 @@ def outside() -> Gap:
     )
 
 
-EVERY = {MISSING: missing, NOTHING: nothing, AMBIGUOUS: ambiguous, OUTSIDE: outside}
+EVERY = {MISSING: missing, NO_EFFECT_MISSING: nothing, AMBIGUOUS: ambiguous, OUTSIDE_LIBRARY: outside}

@@ -13,11 +13,11 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.errors import InputError
-from tank2sim.gap.find import Options
-from tank2sim.gap.fleet.record import NEW, RUN, record_of, stale, with_results
+from tank2sim.gap.fleet.run_record import NEW, RUN, fleet_run_record, stale, with_results
 from tank2sim.gap.fleet.search import Fault, Sought, found_at_once, found_one_by_one
 from tank2sim.gap.fleet.ships import ShipFolder, fleet_in, ship_alone, ship_in
-from tank2sim.identification.trials.measured import Measured
+from tank2sim.gap.workflow import GapOptions
+from tank2sim.identification.trials.problem.prepare_trials import Measured
 
 CARD, TRIAL = 'format = "tank2sim-ship/1"\n', "# a trial\nt_s,delta_deg,u_mps\n0,0,7\n"
 
@@ -122,10 +122,10 @@ def test_a_folder_with_a_card_is_one_ship_but_not_with_others_in_it(tmp_path: Pa
 # -- what need not be computed again -------------------------------------------------------------------------------
 
 
-def wrote(folder: Path, ship: ShipFolder, options: Options) -> Path:
+def wrote(folder: Path, ship: ShipFolder, options: GapOptions) -> Path:
     """A folder as a run leaves it."""
     files = {folder / "gap.json": "{}", folder / "corrected/t.csv": b"t_s\r\n"}
-    record = with_results(record_of(ship, options), files, folder)
+    record = with_results(fleet_run_record(ship, options), files, folder)
     laid(folder, "gap.json", "corrected/t.csv")
     (folder / "gap.json").write_text("{}")
     (folder / "corrected/t.csv").write_bytes(b"t_s\r\n")
@@ -151,12 +151,12 @@ CHANGES: dict[str, tuple[Callable[[Path], object], str]] = {
 def test_a_result_stands_until_what_it_was_computed_from_changes(tmp_path: Path, what: str) -> None:
     ship = ship_in(laid(tmp_path / "ship", "c.toml", "t.csv", "holdout/h.csv"))
     assert ship is not None
-    out = wrote(tmp_path / "out", ship, Options())
+    out = wrote(tmp_path / "out", ship, GapOptions())
     change, words = CHANGES[what]
     change(tmp_path)
     now = ship_in(tmp_path / "ship")
     assert now is not None
-    told = stale(record_of(now, Options()), out)
+    told = stale(fleet_run_record(now, GapOptions()), out)
     assert (words in told) if words else told == ""
 
 
@@ -165,12 +165,12 @@ def test_options_that_change_the_result_make_it_stale_and_others_do_not(
 ) -> None:
     ship = ship_in(laid(tmp_path / "ship", "c.toml", "t.csv"))
     assert ship is not None
-    out = wrote(tmp_path / "out", ship, Options(effects=("current",)))
-    assert stale(record_of(ship, Options(effects=("current",), workers=7)), out) == ""
-    for other in (Options(), Options(("current",), ("wind",)), Options(("current",), max_effects=1)):
-        assert stale(record_of(ship, other), out) == "the options were changed"
-    monkeypatch.setattr("tank2sim.gap.fleet.record.__version__", "99")
-    assert stale(record_of(ship, Options(effects=("current",))), out) == "computed by another version"
+    out = wrote(tmp_path / "out", ship, GapOptions(effects=("current",)))
+    assert stale(fleet_run_record(ship, GapOptions(effects=("current",), workers=7)), out) == ""
+    for other in (GapOptions(), GapOptions(("current",), ("wind",)), GapOptions(("current",), max_effects=1)):
+        assert stale(fleet_run_record(ship, other), out) == "the options were changed"
+    monkeypatch.setattr("tank2sim.gap.fleet.run_record.__version__", "99")
+    assert stale(fleet_run_record(ship, GapOptions(effects=("current",))), out) == "computed by another version"
 
 
 # -- the work ------------------------------------------------------------------------------------------------------
@@ -203,8 +203,8 @@ def test_a_bad_ship_does_not_stop_the_others(mariner_card: ManoeuvringCard, fail
     ships = sought(mariner_card, "a", "bad", "odd", "z")
     with ThreadPoolExecutor(2) as pool:
         for found in (
-            found_one_by_one(ships, Options(), told.append),
-            found_at_once(iter(ships), Options(), told.append, pool),
+            found_one_by_one(ships, GapOptions(), told.append),
+            found_at_once(iter(ships), GapOptions(), told.append, pool),
         ):
             results = {ship.folder.name: result for ship, result in found}
             assert results["a"] == "gap of a" and results["z"] == "gap of z"
@@ -223,7 +223,7 @@ def test_a_lost_executor_ends_the_run_in_one_line(mariner_card: ManoeuvringCard)
             return future
 
     with Lost(1) as pool, pytest.raises(InputError, match=r"a worker was lost while a was sought .*goes on where"):
-        list(found_at_once(sought(mariner_card, "a"), Options(), lambda stage: None, pool))
+        list(found_at_once(sought(mariner_card, "a"), GapOptions(), lambda stage: None, pool))
 
 
 def test_what_is_sent_to_a_worker_needs_no_file_of_this_machine(mariner_card: ManoeuvringCard) -> None:

@@ -10,16 +10,16 @@ import pytest
 from scipy.linalg import block_diag
 from scipy.optimize import minimize_scalar
 
-from tank2sim.gap import forms, recursion
-from tank2sim.gap import likelihood as module
-from tank2sim.gap.fit import Belief, Coefficients, Fit
-from tank2sim.gap.forms import Forms
-from tank2sim.gap.likelihood import COUNTED, LEAST_GAIN, WIDTHS, Likelihood
-from tank2sim.gap.observer import Noise
+from tank2sim.gap.inference import form_error, kalman_kernels
+from tank2sim.gap.inference import likelihood as module
+from tank2sim.gap.inference.fit import Belief, ExplanationFit, NuisanceParameters
+from tank2sim.gap.inference.form_error import Forms
+from tank2sim.gap.inference.kalman_filter import NoiseLevels
+from tank2sim.gap.inference.likelihood import COUNTED, LEAST_GAIN, WIDTHS, Likelihood
 from tests.gap.dense import Dense
 from tests.gap.toy import WHITE, Toy, toy_motion, toy_trials
 
-NOISE = Noise(WHITE, 0.5 * WHITE, np.full(6, 4.0), np.array([0.02, 0.02, 0.01]), np.full(3, 2.0))
+NOISE = NoiseLevels(WHITE, 0.5 * WHITE, np.full(6, 4.0), np.array([0.02, 0.02, 0.01]), np.full(3, 2.0))
 WIDTH = 0.8
 LOGS = np.append(NOISE.logs, np.log(WIDTH))
 NOTHING = np.zeros(0)
@@ -28,10 +28,10 @@ NOTHING = np.zeros(0)
 def judge(motion=None, *, names=("0", "1"), errors=(0.5, 0.3), spread=0.5, mixing=None) -> Likelihood:
     beliefs = Belief(LOGS + 0.1, np.full(len(LOGS), spread))
     mixing = np.diag(errors[: len(names)]) if mixing is None else mixing
-    return Likelihood(motion or toy_motion(), Toy(), Coefficients(names, mixing), beliefs)
+    return Likelihood(motion or toy_motion(), Toy(), NuisanceParameters(names, mixing), beliefs)
 
 
-def fitted(of: Likelihood, toy: Toy, start=None, logs=LOGS) -> Fit:
+def fitted(of: Likelihood, toy: Toy, start=None, logs=LOGS) -> ExplanationFit:
     theta = np.zeros(len(toy.priors)) if start is None else start
     return of.at_best(toy, theta, [logs], [0])
 
@@ -228,7 +228,7 @@ def test_the_best_of_several_noises_is_begun_with() -> None:
 
 def test_known_amplitudes_are_recovered_within_their_errors(monkeypatch) -> None:
     """Over ten sets of noise the squared errors in standard deviations have a mean near one, for an exact formula."""
-    monkeypatch.setattr(forms, "FORM", 1e-6)
+    monkeypatch.setattr(form_error, "FORM", 1e-6)
     toy, away = Toy((None, None)), []
     true = np.array([0.8, -0.6])
     for seed in range(10):
@@ -289,6 +289,6 @@ def test_what_is_read_of_a_covariance_is_that_of_the_signals_that_were_seen() ->
     root = rng.standard_normal((13, 13))
     P, reading, known = root @ root.T, rng.standard_normal((4, 6)), np.array([True, False, True, True])
     expected = np.where(known, P[:, :6] @ reading.T + P[:, 9:13], 0.0)
-    found = recursion._read(P, reading, known)
+    found = kalman_kernels._read(P, reading, known)
     assert found.shape == (13, 4)
     np.testing.assert_allclose(found, expected, rtol=1e-12)

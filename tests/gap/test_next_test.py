@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
-from tank2sim.cards.reading import linear
+from tank2sim.cards.reading import linear_card
 from tank2sim.dynamics import build
-from tank2sim.gap.candidates import candidates, orders_csv
-from tank2sim.gap.next_test import Explanation, _left, _Seen, next_test
+from tank2sim.gap.outcome.next_test import Explanation, _left, _Seen, next_test
+from tank2sim.gap.outcome.next_test_candidates import candidate_manoeuvres, orders_csv
 from tank2sim.gap.result import NextTest
-from tank2sim.identification.trials.question import free_parameters
+from tank2sim.identification.trials.problem.problem_from_card import free_parameters
 from tank2sim.simulation.manoeuvres import read_orders
 from tank2sim.simulation.run import simulate
 from tests.cli.command_line import tank2sim
@@ -101,7 +101,7 @@ def test_what_no_test_can_tell_is_said(mariner_card: ManoeuvringCard) -> None:
 
 
 def test_coloured_readings_tell_less_and_the_nearest_rival_counts(mariner_card: ManoeuvringCard) -> None:
-    card = linear(mariner_card)
+    card = linear_card(mariner_card)
     damped, bare = explanation(card, "linear_yaw_damping", factor=0.1), Explanation("none", card, (), np.zeros((0, 0)))
     near = explanation(card, "linear_yaw_damping", factor=0.09)
     scores = [
@@ -137,13 +137,13 @@ def test_the_orders_run_and_a_zigzag_in_them_is_one(mariner_card: ManoeuvringCar
 def test_candidates_stay_within_the_gear_and_order_revolutions_only_with_propulsion(
     mariner_card: ManoeuvringCard,
 ) -> None:
-    names = [one.name for one in candidates(mariner_card, 20.0)]
+    names = [one.name for one in candidate_manoeuvres(mariner_card, 20.0)]
     assert "turn:35" in names and "slow-down and acceleration" not in names
     text = mariner_card.text.replace("max_angle_deg = 40.0", "max_angle_deg = 25.0")
     assert text != mariner_card.text
     weak = parse_card(text + "\n[propulsion]\nnominal_rpm = 80.0\nXnn = 7e-4\n", "weak.toml")
     assert isinstance(weak, ManoeuvringCard)
-    names = [one.name for one in candidates(weak, 20.0)]
+    names = [one.name for one in candidate_manoeuvres(weak, 20.0)]
     assert "turn:25" in names and "turn:35" not in names and "slow-down and acceleration" in names
 
 
@@ -170,7 +170,7 @@ def test_what_is_left_is_that_of_the_plain_formula() -> None:
 
 
 def test_the_straight_run_on_two_headings_turns_after_a_third_of_its_length(mariner_card: ManoeuvringCard) -> None:
-    (found,) = (one for one in candidates(mariner_card, 30.0) if one.name == "straight run on two headings")
+    (found,) = (one for one in candidate_manoeuvres(mariner_card, 30.0) if one.name == "straight run on two headings")
     helmsman = found.helmsman()
     assert [np.degrees(helmsman(time, 0.0, 0.0)) for time in (0.0, 9.9, 10.1, 29.0)] == pytest.approx([0, 0, 20, 20])
     assert helmsman(20.0, np.pi / 2, 0.0) == pytest.approx(0.0)

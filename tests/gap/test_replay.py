@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import build
-from tank2sim.gap.replay import passed, with_black_box
-from tank2sim.gap.replayer import later
-from tank2sim.identification.trials.measured import Measured
+from tank2sim.gap.proof.open_loop import later
+from tank2sim.gap.proof.replay import replay_trials, with_black_box
+from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.manoeuvres import Zigzag
 from tank2sim.simulation.run import simulate
@@ -58,7 +58,7 @@ def changed(trial: Trial, **signals: np.ndarray | float) -> Trial:
 
 
 def test_the_very_ship_leaves_noise(record: Trial) -> None:
-    (one,) = passed(card(), card(), together(record), NOISE, held_out=True)
+    (one,) = replay_trials(card(), card(), together(record), NOISE, held_out=True)
     assert one.held_out and one.name == "zigzag"
     for name in NOISE:
         assert one.misfit("before", name) == pytest.approx(1.0, abs=0.12), name
@@ -71,7 +71,7 @@ def test_a_current_is_left_in_the_track_alone_and_its_effect_takes_it_away(recor
     t = record.time_s
     drifted = together(changed(record, x_m=0.5 * np.cos(2.0) * t, y_m=0.5 * np.sin(2.0) * t))
     improved = card(effect("current", speed_mps=0.5, direction_rad=2.0))
-    (one,) = passed(card(), improved, drifted, NOISE, held_out=False)
+    (one,) = replay_trials(card(), improved, drifted, NOISE, held_out=False)
     for name in ("motion.u", "motion.v", "motion.r", "motion.psi"):
         assert one.misfit("before", name) < 1.15
     assert one.misfit("before", "motion.x") > 10 < one.misfit("before", "motion.y")
@@ -83,7 +83,7 @@ def test_a_current_is_left_in_the_track_alone_and_its_effect_takes_it_away(recor
 
 def test_a_sensor_at_fault_in_the_card_is_compared_by_what_it_shows(record: Trial) -> None:
     biased = together(changed(record, r_radps=0.001))
-    (one,) = passed(card(), card(effect("gyro_bias", rate_radps=0.001)), biased, NOISE, held_out=False)
+    (one,) = replay_trials(card(), card(effect("gyro_bias", rate_radps=0.001)), biased, NOISE, held_out=False)
     assert one.misfit("before", "motion.r") > 2
     assert one.misfit("after", "motion.r") == pytest.approx(1.0, abs=0.12)
 
@@ -91,7 +91,7 @@ def test_a_sensor_at_fault_in_the_card_is_compared_by_what_it_shows(record: Tria
 def test_corrected_trials_are_followed_and_shown_as_the_faulty_sensor_has_them(record: Trial) -> None:
     biased = together(changed(record, r_radps=0.001))
     given_card = card()
-    (one,) = passed(given_card, given_card, biased, NOISE, held_out=False, corrected=together(record))
+    (one,) = replay_trials(given_card, given_card, biased, NOISE, held_out=False, corrected=together(record))
     assert one.misfit("before", "motion.r") > 2
     assert one.misfit("after", "motion.r") == pytest.approx(1.0, abs=0.12)
     assert np.mean(one.after["motion.r"] - one.before["motion.r"]) == pytest.approx(0.001, rel=0.2)
@@ -99,25 +99,27 @@ def test_corrected_trials_are_followed_and_shown_as_the_faulty_sensor_has_them(r
 
 def test_a_late_rudder_is_replayed_late(record: Trial) -> None:
     early = replace(record, signals={**record.signals, "delta_rad": np.array([ZIGZAG(t + 2.0) for t in record.time_s])})
-    (one,) = passed(card(), card(effect("rudder_time_offset", delay_s=2.0)), together(early), NOISE, held_out=False)
+    (one,) = replay_trials(
+        card(), card(effect("rudder_time_offset", delay_s=2.0)), together(early), NOISE, held_out=False
+    )
     assert one.misfit("before") > 5
     assert one.misfit("after") == pytest.approx(1.0, abs=0.06)
 
 
 def test_a_ship_that_measured_little_is_followed(record: Trial) -> None:
     few = {name: record.signals[name] for name in ("psi_rad", "delta_rad")}
-    (one,) = passed(card(), card(), together(replace(record, signals=few)), NOISE, held_out=False)
+    (one,) = replay_trials(card(), card(), together(replace(record, signals=few)), NOISE, held_out=False)
     assert set(one.noise) == {"motion.psi"}
     assert one.misfit("before") == pytest.approx(1.0, abs=0.1)
     track = {name: record.signals[name] for name in ("x_m", "y_m", "delta_rad")}
-    (one,) = passed(card(), card(), together(replace(record, signals=track)), NOISE, held_out=False)
+    (one,) = replay_trials(card(), card(), together(replace(record, signals=track)), NOISE, held_out=False)
     assert one.misfit("before") == pytest.approx(1.0, abs=0.1)
 
 
 def test_gaps_of_the_record_stay_gaps(record: Trial) -> None:
     u = record.signals["u_mps"].copy()
     u[300:600] = np.nan  # 60 to 120 s
-    (one,) = passed(
+    (one,) = replay_trials(
         card(), card(), together(replace(record, signals={**record.signals, "u_mps": u})), NOISE, held_out=False
     )
     inside = (one.time_s > 61) & (one.time_s < 119)
@@ -127,14 +129,14 @@ def test_gaps_of_the_record_stay_gaps(record: Trial) -> None:
 
 def test_a_motion_that_runs_away_has_no_finite_misfit(record: Trial) -> None:
     wild = card(changes={"Nr = -0.0022": "Nr = 0.05"})
-    (one,) = passed(wild, card(), together(record), NOISE, held_out=False)
+    (one,) = replay_trials(wild, card(), together(record), NOISE, held_out=False)
     assert one.misfit("before") == np.inf and np.isnan(one.before["motion.r"][-1])
     assert one.misfit("after") == pytest.approx(1.0, abs=0.06)
 
 
 def test_a_black_box_stands_beside_both(record: Trial) -> None:
     given_card = card(changes={"Nr = -0.0022": "Nr = -0.0015"})
-    results = passed(given_card, given_card, together(record), NOISE, held_out=False)
+    results = replay_trials(given_card, given_card, together(record), NOISE, held_out=False)
     (one,) = with_black_box(results, card(), together(record), NOISE)
     assert one.misfit("before") > 5
     assert one.misfit("black_box") == pytest.approx(1.0, abs=0.06)
@@ -150,7 +152,7 @@ def test_an_order_that_a_gear_with_a_largest_rate_follows_keeps_its_time(mariner
     signals["delta_order_rad"] = track["rudder.command"][held]
     measured = Measured((Trial(Path("zz.csv"), t, signals),), "order", ())
     fine = {"motion.psi": np.radians(0.1), "motion.r": np.radians(0.02), "motion.x": 0.6, "motion.y": 0.6}
-    (one,) = passed(mariner_card, mariner_card, measured, fine, held_out=False)
+    (one,) = replay_trials(mariner_card, mariner_card, measured, fine, held_out=False)
     assert one.misfit("before") < 0.5
 
 

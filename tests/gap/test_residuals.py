@@ -13,11 +13,11 @@ from gap_truth.lane import lanes_of
 from gap_truth.record import recorded
 
 from tank2sim.cards import ManoeuvringCard, parse_card
-from tank2sim.gap.fit import Fit
-from tank2sim.gap.likelihood import Likelihood
-from tank2sim.gap.posing import pose
-from tank2sim.gap.residuals import each_trial, estimates, force_lacking
-from tank2sim.identification.trials.measured import measured
+from tank2sim.gap.diagnosis.residuals import each_trial, estimates, force_lacking
+from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.inference.likelihood import Likelihood
+from tank2sim.gap.inference.prior import likelihood_from_card
+from tank2sim.identification.trials.problem.prepare_trials import measured
 from tests.gap.dense import Dense
 from tests.gap.test_likelihood import LOGS, NOISE, WIDTH, forms_of, judge
 from tests.gap.toy import Toy, toy_motion
@@ -25,7 +25,7 @@ from tests.gap.toy import Toy, toy_motion
 # -- what each trial says ------------------------------------------------------------------------------------------
 
 
-def by_hand(of: Likelihood, fit: Fit, run: int, place: int) -> tuple[float, float]:
+def by_hand(of: Likelihood, fit: ExplanationFit, run: int, place: int) -> tuple[float, float]:
     """A parameter and its standard error by generalised least squares of one run as one Gaussian vector."""
     toy, part = fit.explained, Dense(of.linear(fit.explained, fit.theta), NOISE, run)
 
@@ -74,7 +74,7 @@ def test_a_trial_that_tells_nothing_is_left_out() -> None:
 
 def test_estimates_are_told_by_effect_and_parameter() -> None:
     toy = Toy((None, None))
-    fit = Fit(toy, np.array([0.5, -0.3]), np.diag([0.04, 0.09]), LOGS, 0.0, np.zeros(0))
+    fit = ExplanationFit(toy, np.array([0.5, -0.3]), np.diag([0.04, 0.09]), LOGS, 0.0, np.zeros(0))
     first, second = estimates(fit)
     assert first == ("gyro_bias", {"size": 0.5}, {"size": pytest.approx(0.2)})
     assert second == ("current", {"size": -0.3}, {"size": pytest.approx(0.3)})
@@ -101,10 +101,10 @@ def short_run(effect: str, parameters: dict[str, float], folder: Path) -> Likeli
     write(Made(lane.setting, {}, {"straight": recorded(lane, integrate([lane]), 0)}), folder)
     card = parse_card(SHIP_TOML, "ship.toml")
     assert isinstance(card, ManoeuvringCard)
-    return pose(card, measured([folder / "straight.csv"], card))
+    return likelihood_from_card(card, measured([folder / "straight.csv"], card))
 
 
-def none_of(likelihood: Likelihood) -> Fit:
+def none_of(likelihood: Likelihood) -> ExplanationFit:
     return likelihood.at_best(likelihood.none, np.zeros(0), [likelihood.belief.logs], [15])
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from tank2sim.dynamics.effects import EffectParameter
-from tank2sim.gap.explained import Asked
-from tank2sim.gap.motion import KNOWN, Motion
+from tank2sim.gap.inference.batch import MEASURED_STATES, MeasuredBatch
+from tank2sim.gap.inference.hypothesis import EstimatedParameter
 
 A = np.zeros((6, 6))
 A[:3, :3] = [[-0.05, 0.0, 0.0], [0.0, -0.2, -0.3], [0.0, 0.1, -0.4]]
@@ -60,7 +60,7 @@ class Toy:
     @property
     def asked(self):
         size = EffectParameter("size", "size", -10.0, 10.0, absent=0.0, typical=(1.0,))
-        return tuple(Asked(name, size, f"{name}.size") for name in self.effects)
+        return tuple(EstimatedParameter(name, size, f"{name}.size") for name in self.effects)
 
     own = ()
 
@@ -112,7 +112,7 @@ class Toy:
 WHITE = np.array([0.02, 0.02, 0.005, 0.005, 0.1, 0.1])
 
 
-def toy_motion(theta=(), coefficients=(), **how) -> Motion:
+def toy_motion(theta=(), coefficients=(), **how) -> MeasuredBatch:
     """The motion of :func:`toy_trials` alone."""
     return toy_trials(theta, coefficients, **how)[0]
 
@@ -142,9 +142,9 @@ def toy_trials(theta=(), coefficients=(), *, seed=1, blocks=(24, 17), fine=5, st
         truths.append(true)
     measured = np.array(measured)
     measured[0, 3:5, 2] = np.nan
-    return Motion(
+    return MeasuredBatch(
         names=("a", "b"),
-        seen=KNOWN,
+        seen=MEASURED_STATES,
         step_s=step,
         fine=fine,
         begin_s=np.zeros(2),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tank2sim.identification.conditioning import correlation, scaled_condition
+from tank2sim.identification.conditioning import correlation_matrix, scaled_condition
 
 
 def test_scaled_condition_does_not_know_units():
@@ -21,8 +21,8 @@ def test_scaled_condition_of_two_columns_follows_their_angle():
 
 def test_correlation_has_ones_on_its_diagonal():
     covariance = np.array([[4.0, -3.0], [-3.0, 9.0]])
-    np.testing.assert_allclose(correlation(covariance), [[1, -0.5], [-0.5, 1]])
+    np.testing.assert_allclose(correlation_matrix(covariance), [[1, -0.5], [-0.5, 1]])
 
 
 def test_an_unknown_without_variance_is_not_correlated():
-    np.testing.assert_array_equal(correlation(np.array([[4.0, 0.0], [0.0, 0.0]])), np.eye(2))
+    np.testing.assert_array_equal(correlation_matrix(np.array([[4.0, 0.0], [0.0, 0.0]])), np.eye(2))

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.records.audit import audit, audited, estimated_noise, mended
+from tank2sim.records.audit import audit, audit_and_repair, mended, record_noise
 from tank2sim.records.audit.rudder import rudder_response
 from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import select_rows
@@ -262,10 +262,10 @@ def test_speed_over_ground_in_knots_is_found():
 def test_white_noise_is_estimated_to_a_few_per_cent_in_spite_of_spikes(seed):
     record = trial(MOTIONS["zigzag"], seed=seed)
     record.signals["u_mps"][::200] += 5.0
-    estimated = estimated_noise(record)
+    estimated = record_noise(record)
     for name, sigma in NOISE.items():
         assert estimated[name] == pytest.approx(sigma, rel=0.08)
-    assert estimated_noise(replace(record, noise={"u_mps": 0.5}))["u_mps"] == 0.5
+    assert record_noise(replace(record, noise={"u_mps": 0.5}))["u_mps"] == 0.5
 
 
 def test_a_finding_becomes_one_entry_a_column():
@@ -534,7 +534,7 @@ def test_no_pattern_of_empty_cells_and_times_breaks_the_audit():
         struck = rng.integers(count, size=rng.integers(4))
         times[struck] = rng.choice([1.7e9, -1e12, 0.0, times[-1] * 3, 1e300], size=len(struck))
         slow = replace(record, time_s=times * rng.choice([1.0, 1e-6, 1e6]), signals=signals)
-        right, findings = audited(slow)
+        right, findings = audit_and_repair(slow)
         assert len(right.time_s) <= count
         json.dumps([entry for one in findings for entry in one.as_json()])
 

@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from tank2sim.report.charts import (
+from tank2sim.report.kit.charts import (
     FrequencyResponse,
     History,
     OutputError,
     PolesZeros,
     Signal,
-    Spiral,
+    SpiralData,
     Tow,
-    Track,
+    TrackData,
     bode_chart,
     error_chart,
     history_chart,
@@ -19,15 +19,15 @@ from tank2sim.report.charts import (
     tow_chart,
     track_chart,
 )
-from tank2sim.report.page import Column, Figure, Illustration, Page, Section, Table, Verdict
+from tank2sim.report.kit.page import Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
 
 TIME = np.arange(0.0, 600.0, 0.1)
 HEADING = 0.01 * TIME
 
 
-def circle(label: str, radius_m: float = 300.0, measured: bool = False) -> Track:
+def circle(label: str, radius_m: float = 300.0, measured: bool = False) -> TrackData:
     x, y = radius_m * np.sin(HEADING), radius_m * (1 - np.cos(HEADING))
-    return Track(label=label, x_m=x, y_m=y, time_s=TIME, measured=measured)
+    return TrackData(label=label, x_m=x, y_m=y, time_s=TIME, measured=measured)
 
 
 def every_chart():
@@ -46,7 +46,7 @@ def every_chart():
         "error": error_chart(
             [OutputError(kind="FMI 2 CS", output="motion.x", error=1e-12, limit=1e-9)], title="Errors"
         ),
-        "spiral": spiral_chart([Spiral(label="direct", rudder_rad=[0.1, -0.1], yaw_rate_radps=[0.01, -0.01])]),
+        "spiral": spiral_chart([SpiralData(label="direct", rudder_rad=[0.1, -0.1], yaw_rate_radps=[0.01, -0.01])]),
     }
 
 
@@ -56,15 +56,17 @@ def example_page(title: str = "Mariner class") -> Page:
     return Page(
         title=title,
         subtitle="Turning and steering",
-        figures=[Figure(label="Tactical diameter", value=561.24, unit="m", verdict=Verdict.PASSED, note="3.5 lengths")],
+        figures=[
+            KeyFigure(label="Tactical diameter", value=561.24, unit="m", verdict=Verdict.PASSED, note="3.5 lengths")
+        ],
         sections=[
-            Section(
+            PageSection(
                 heading="Turning circle",
                 text="First paragraph.\n\nSecond paragraph.",
                 notes=["Outside the valid speeds."],
-                tables=[Table(caption="Figures of the circle.", columns=columns, rows=rows)],
+                tables=[PageTable(caption="Figures of the circle.", columns=columns, rows=rows)],
             ),
-            Section(
+            PageSection(
                 heading="Charts",
                 charts=[
                     Illustration(chart=chart, caption=f"Caption of {name}.") for name, chart in every_chart().items()

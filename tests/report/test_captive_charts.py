@@ -1,18 +1,18 @@
 import numpy as np
 import pytest
 
-from tank2sim.report.captive_charts import (
+from tank2sim.report.captive.charts import (
     Across,
+    ForceLoop,
     ForceSeries,
     Harmonics,
-    Loop,
     Residual,
     force_chart,
     harmonic_chart,
     loop_chart,
     residual_chart,
 )
-from tank2sim.report.charts import chart_png, chart_specification
+from tank2sim.report.kit.charts import chart_png, chart_specification
 
 DRIFT = Across(title="drift angle", unit="rad")
 
@@ -69,7 +69,7 @@ def test_a_fit_is_drawn_from_left_to_right_whatever_its_order():
 
 def test_a_loop_keeps_the_order_of_time_and_its_forces_their_panels():
     motion = [0.1, 0.0, -0.1, 0.0]
-    loop = Loop(
+    loop = ForceLoop(
         label="sway_01",
         motion=motion,
         forces={"Y": [1, 2, 3, 4], "N": [5, 6, 7, 8]},
@@ -90,14 +90,14 @@ def test_a_loop_keeps_the_order_of_time_and_its_forces_their_panels():
 
 
 def test_a_yaw_rate_is_shown_in_degrees_a_second():
-    loop = Loop(label="yaw", motion=[np.pi / 180], forces={"N": [1.0]})
+    loop = ForceLoop(label="yaw", motion=[np.pi / 180], forces={"N": [1.0]})
     specification = chart_specification(loop_chart([loop], Across(title="r", unit="rad/s"), {"N": "N (N m)"}))
     assert rows(specification, specification["vconcat"][0]["layer"][0])[0]["x"] == 1.0
 
 
 def test_a_force_that_no_loop_has_is_refused():
     with pytest.raises(ValueError, match="no loop has the force X"):
-        loop_chart([Loop(label="a", motion=[0], forces={"Y": [0]})], Across(title="v"), {"X": "X (N)"})
+        loop_chart([ForceLoop(label="a", motion=[0], forces={"Y": [0]})], Across(title="v"), {"X": "X (N)"})
 
 
 def test_harmonics_are_bars_in_the_order_of_the_runs_with_the_fit_beside_them():
@@ -137,7 +137,7 @@ def test_residuals_of_all_forces_have_one_symmetric_scale_that_shows_all():
 def test_every_captive_chart_can_be_drawn():
     series = drift_series(half_width=[1, 1, 1], fit_x=[-0.1, 0.1], fit_value=[-9, 9], fit_half_width=[1, 1])
     other = ForceSeries(label="rudder", x=[0.0, 0.1], value=[0.0, 1.0])
-    loop = Loop(label="run", motion=[0, 1], forces={"Y": [0, 1]}, fitted_motion=[0, 1], fitted={"Y": [0, 1]})
+    loop = ForceLoop(label="run", motion=[0, 1], forces={"Y": [0, 1]}, fitted_motion=[0, 1], fitted={"Y": [0, 1]})
     charts = [
         force_chart([series, other], DRIFT, "Y (N)", title="Static"),
         loop_chart([loop], Across(title="v"), {"Y": "Y (N)"}, title="Loops"),

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.gap.result import AMBIGUOUS, MISSING, NOTHING, OUTSIDE, Gap, Passed, Rival
-from tank2sim.report.charts import chart_specification
-from tank2sim.report.gap_cause_charts import agreement_chart, binned, rival_chart
-from tank2sim.report.gap_charts import gap_tracks, misfit_chart, shown_places, signal_misfit
-from tank2sim.report.gap_page import gap_charts, gap_page
-from tank2sim.report.gap_words import verdict_in_words, with_error
-from tank2sim.report.page import Verdict, render_page
-from tank2sim.report.switched_charts import in_noise
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Gap, Passed, Rival
+from tank2sim.report.gap.cause_charts import agreement_chart, binned, rival_chart
+from tank2sim.report.gap.charts import gap_tracks, misfit_chart, shown_places, signal_misfit
+from tank2sim.report.gap.page import gap_charts, gap_page
+from tank2sim.report.gap.text import verdict_in_words, with_error
+from tank2sim.report.kit.before_after import in_noise
+from tank2sim.report.kit.charts import chart_specification
+from tank2sim.report.kit.page import Verdict, render_page
 from tests.gap import made_up
 
 
@@ -46,7 +46,7 @@ def test_every_verdict_has_a_whole_page(verdict) -> None:
     assert sum(len(section.charts) for section in page.sections) == len(drawn)
     assert all(section.text or section.tables or section.charts for section in page.sections)
     assert page.figures[0].value == verdict
-    assert (page.figures[0].verdict is Verdict.CAUTION) == (verdict in (AMBIGUOUS, OUTSIDE))
+    assert (page.figures[0].verdict is Verdict.CAUTION) == (verdict in (AMBIGUOUS, OUTSIDE_LIBRARY))
 
 
 def test_a_named_effect_is_told_in_words_and_in_a_mariners_units() -> None:
@@ -210,7 +210,7 @@ def test_what_was_found_but_not_measured_does_not_break_the_page() -> None:
     turn = gap.passed[0]
     gone = {name: np.full(100, np.nan) for name in turn.measured}
     blind = replace(turn, measured={**gone, "motion.psi": turn.measured["motion.psi"]})
-    page = page_of(replace(gap, passed=(blind,), where=(), verdict=NOTHING, effects=()))
+    page = page_of(replace(gap, passed=(blind,), where=(), verdict=NO_EFFECT_MISSING, effects=()))
     assert len(tables_of(page)["Misfit of each signal, noise units"].rows) == 2
     assert verdict_in_words(replace(gap, verdict=MISSING))
 

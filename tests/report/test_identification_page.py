@@ -12,17 +12,17 @@ from click.testing import CliRunner
 
 from tank2sim.cards import parse_card
 from tank2sim.cli.identify import command
-from tank2sim.identification.trials.evaluation import passages
-from tank2sim.identification.trials.identify import Options, identify
-from tank2sim.identification.trials.inference import scaled_prior
-from tank2sim.identification.trials.measured import Measured
-from tank2sim.identification.trials.question import pose
+from tank2sim.identification.trials.assessment.evaluation import comparison_windows
+from tank2sim.identification.trials.identify import IdentificationOptions, identify
+from tank2sim.identification.trials.methods.posterior import scaled_prior
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.records.trials import Trial
-from tank2sim.report import identification_page as identification_page_module
-from tank2sim.report.charts import chart_specification
-from tank2sim.report.identification_charts import AFTER, BEFORE, MEASURED, Pair, track_grid
-from tank2sim.report.identification_page import MOST_TRIALS, identification_charts, identification_page, pairs_of
-from tank2sim.report.page import Verdict, render_page
+from tank2sim.report.identification import page as identification_page_module
+from tank2sim.report.identification.charts import AFTER, BEFORE, MEASURED, BeforeAfter, track_grid
+from tank2sim.report.identification.page import MOST_TRIALS, identification_charts, identification_page, pairs_of
+from tank2sim.report.kit.charts import chart_specification
+from tank2sim.report.kit.page import Verdict, render_page
 from tests.identification.trials import made_up_ship
 
 OFF = {"Nd": 1.25, "Nr": 0.8, "Yv": 1.2, "Xu": 0.8}
@@ -59,7 +59,7 @@ def found(trials):
     known = parse_card(text_of(OFF), "off.toml")
     fitted = Measured((trials["by_the_clock"],), "angle", ("mended",))
     held = Measured((trials["turn"],), "angle", ())
-    result = identify(known, fitted, held, Options(method="equation_error"))
+    result = identify(known, fitted, held, IdentificationOptions(method="equation_error"))
     pairs = pairs_of(known, result, fitted), pairs_of(known, result, held)
     return result, pairs, identification_charts(result, *pairs)
 
@@ -78,7 +78,7 @@ def rows_of(chart, series, panel=None):
 def test_the_true_card_runs_along_with_the_record(trials, seen_from) -> None:
     truth = parse_card(text_of({"Nd": 1.0}), "true.toml")
     both = tuple(seen_from(trial) for trial in trials.values())
-    turn, clock = passages(pose(truth, both, "angle"), truth, both, {})
+    turn, clock = comparison_windows(problem_from_card(truth, both, "angle"), truth, both, {})
     assert (turn.closed_loop, clock.closed_loop) == (True, False), "a track and a heading are enough to know a turn by"
     limits = {"rudder": 0.02, "motion.psi": 0.01, "motion.r": 5e-4, "motion.beta": 0.005}
     for passage in (turn, clock):
@@ -92,7 +92,7 @@ def test_the_true_card_runs_along_with_the_record(trials, seen_from) -> None:
 def test_speed_and_drift_are_those_of_the_measured_track(trials) -> None:
     """The track's direction, and how fast it is run, tell both without the velocities."""
     truth, turn = parse_card(text_of({"Nd": 1.0}), "true.toml"), trials["turn"]
-    (passage,) = passages(pose(truth, (turn,), "angle"), truth, (turn,), {})
+    (passage,) = comparison_windows(problem_from_card(truth, (turn,), "angle"), truth, (turn,), {})
     north, east = (np.gradient(turn.signals[name], turn.time_s) for name in ("x_m", "y_m"))
     drift = turn.signals["psi_rad"] - np.unwrap(np.arctan2(east, north))
     for name, there in (("motion.beta", drift), ("motion.speed", np.hypot(north, east))):
@@ -129,8 +129,8 @@ def test_without_positions_the_cards_alone_have_tracks(trials) -> None:
     truth = parse_card(text_of({"Nd": 1.0}), "true.toml")
     seen = {name: values for name, values in trials["turn"].signals.items() if name not in ("x_m", "y_m")}
     blind = (replace(trials["turn"], signals=seen),)
-    (passage,) = passages(pose(truth, blind, "angle"), truth, blind, {})
-    chart = track_grid([Pair(before=passage, after=passage)])
+    (passage,) = comparison_windows(problem_from_card(truth, blind, "angle"), truth, blind, {})
+    chart = track_grid([BeforeAfter(before=passage, after=passage)])
     assert rows_of(chart, AFTER) and not rows_of(chart, MEASURED)
 
 
@@ -230,7 +230,7 @@ def _drawn(section):
 def test_of_many_trials_those_are_shown_that_are_followed_worst(found, monkeypatch) -> None:
     result, (fitted, held), _ = found
     monkeypatch.setattr(identification_page_module, "MOST_TRIALS", 2)
-    monkeypatch.setattr(identification_page_module, "PER_SHEET", 1)
+    monkeypatch.setattr(identification_page_module, "_PER_SHEET", 1)
     names = ("b", "c", "a")
     many = [
         replace(held[0], **{side: replace(held[0].after, name=name) for side in ("before", "after")}) for name in names

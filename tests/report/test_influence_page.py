@@ -2,16 +2,16 @@ from __future__ import annotations
 
 import re
 
+from tank2sim.analysis.influence.card_influence import influence
 from tank2sim.analysis.influence.figures import parse_figure
-from tank2sim.analysis.influence.of_card import influence
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.result import Means
+from tank2sim.analysis.tuning.targets import parse_wish
 from tank2sim.analysis.tuning.tune import tune
-from tank2sim.analysis.tuning.wishes import parse_wish
 from tank2sim.cards import read_card
-from tank2sim.report.influence_charts import Coefficients, influence_charts, most_influential
-from tank2sim.report.influence_page import influence_page
-from tank2sim.report.page import render_page
+from tank2sim.report.influence.charts import InfluenceData, influence_charts, most_influential
+from tank2sim.report.influence.page import influence_page
+from tank2sim.report.kit.page import render_page
 
 TEXTS = ("criterion_C", "steady_radius_m@20", "steady_rate_degpmin@20", "K_per_s", "T_prime")
 
@@ -32,7 +32,7 @@ def test_the_page_has_every_parameter_both_coefficients_and_the_tuning() -> None
     assert [(one.label, one.unit) for one in page.figures][2:4] == [("steady rate, 20 deg", "deg/min"), ("K", "1/s")]
     tables = [table for section in page.sections for table in section.tables if "K by the" in table.caption]
     assert [len(table.columns) for table in tables] == [4, 3]  # all that is as wide as the page
-    told = Coefficients.of(result.as_json())
+    told = InfluenceData.of(result.as_json())
     charts = influence_charts(told)
     assert [len(chart.hconcat) for chart in charts] == [3, 2]
     # Nr has the largest K on the criterion with Yv, Nd that on the radius: they stand at the top.

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from tank2sim.report.charts import (
+from tank2sim.report.kit.charts import (
     History,
     Signal,
-    Spiral,
+    SpiralData,
     Tow,
-    Track,
+    TrackData,
     chart_specification,
     history_chart,
     spiral_chart,
@@ -41,7 +41,7 @@ def metres_per_px(specification):
     ids=["round", "north", "east", "straight east", "one place", "with a gap"],
 )
 def test_both_axes_of_a_track_have_one_scale_and_show_all_of_it(x, y):
-    specification = chart_specification(track_chart([Track(label="run", x_m=x, y_m=y)]))
+    specification = chart_specification(track_chart([TrackData(label="run", x_m=x, y_m=y)]))
     across, up = metres_per_px(specification)
     assert across == pytest.approx(up, rel=1e-12)
     encoding = specification["layer"][0]["encoding"]
@@ -52,7 +52,7 @@ def test_both_axes_of_a_track_have_one_scale_and_show_all_of_it(x, y):
 
 
 def test_the_scales_of_a_track_stay_equal_because_both_are_zoomed_together():
-    specification = chart_specification(track_chart([Track(label="run", x_m=[0, 1], y_m=[0, 1])]))
+    specification = chart_specification(track_chart([TrackData(label="run", x_m=[0, 1], y_m=[0, 1])]))
     (window,) = specification["params"]
     assert window["bind"] == "scales"
     assert window["select"]["encodings"] == ["x", "y"]
@@ -60,7 +60,7 @@ def test_the_scales_of_a_track_stay_equal_because_both_are_zoomed_together():
 
 
 def test_north_is_up_and_east_is_right():
-    specification = chart_specification(track_chart([Track(label="run", x_m=[0, 100], y_m=[0, 7])]))
+    specification = chart_specification(track_chart([TrackData(label="run", x_m=[0, 100], y_m=[0, 7])]))
     line = specification["layer"][0]
     last = rows(specification, line)[-1]
     assert last[line["encoding"]["y"]["field"]] == 100
@@ -71,14 +71,17 @@ def test_north_is_up_and_east_is_right():
 
 
 def test_a_track_is_drawn_in_the_order_of_time():
-    specification = chart_specification(track_chart([Track(label="run", x_m=[0, 5, 1], y_m=[0, 9, 2])]))
+    specification = chart_specification(track_chart([TrackData(label="run", x_m=[0, 5, 1], y_m=[0, 9, 2])]))
     line = specification["layer"][0]
     order = line["encoding"]["order"]["field"]
     assert [row["y"] for row in sorted(rows(specification, line), key=lambda row: row[order])] == [0, 9, 2]
 
 
 def test_measured_tracks_are_points_and_simulated_ones_lines():
-    tracks = [Track(label="model", x_m=[0, 1], y_m=[0, 1]), Track(label="trial", x_m=[0, 2], y_m=[0, 2], measured=True)]
+    tracks = [
+        TrackData(label="model", x_m=[0, 1], y_m=[0, 1]),
+        TrackData(label="trial", x_m=[0, 2], y_m=[0, 2], measured=True),
+    ]
     specification = chart_specification(track_chart(tracks))
     marks = {
         layer["mark"]["type"]: {row["run"] for row in rows(specification, layer)}
@@ -91,7 +94,7 @@ def test_a_long_track_is_embedded_short_and_keeps_its_advance():
     angle = 0.01 * TIME
     x = 300 * np.sin(angle)
     x[1234] = 333.0
-    specification = chart_specification(track_chart([Track(label="run", x_m=x, y_m=300 - 300 * np.cos(angle))]))
+    specification = chart_specification(track_chart([TrackData(label="run", x_m=x, y_m=300 - 300 * np.cos(angle))]))
     kept = rows(specification, specification["layer"][0])
     assert len(kept) <= 602
     assert max(row["x"] for row in kept) == 333.0
@@ -151,7 +154,7 @@ def test_a_signal_that_no_run_has_is_refused():
 
 
 def test_two_runs_of_one_name_are_refused():
-    track = Track(label="run", x_m=[0, 1], y_m=[0, 1])
+    track = TrackData(label="run", x_m=[0, 1], y_m=[0, 1])
     with pytest.raises(ValueError, match="one label"):
         track_chart([track, track])
 
@@ -163,7 +166,7 @@ def test_a_gap_in_a_history_is_embedded_as_null():
 
 
 def test_series_differ_in_dashes_as_well_as_in_colour():
-    tracks = [Track(label=f"run {n}", x_m=[0, n], y_m=[0, 1]) for n in range(35)]
+    tracks = [TrackData(label=f"run {n}", x_m=[0, n], y_m=[0, 1]) for n in range(35)]
     encoding = chart_specification(track_chart(tracks))["layer"][0]["encoding"]
     dashes = encoding["strokeDash"]["scale"]["range"]
     looks = {(place % 7, tuple(dash)) for place, dash in enumerate(dashes)}
@@ -192,7 +195,7 @@ def test_a_tow_shows_what_was_measured_as_points_and_the_model_as_a_line():
 
 def test_a_spiral_is_joined_in_its_order_and_shown_in_degrees():
     rudder = np.radians([20, 0, -20, 0, 20])
-    spiral = Spiral(label="direct", rudder_rad=rudder, yaw_rate_radps=np.radians([0.5, 0.2, -0.5, -0.2, 0.5]))
+    spiral = SpiralData(label="direct", rudder_rad=rudder, yaw_rate_radps=np.radians([0.5, 0.2, -0.5, -0.2, 0.5]))
     specification = chart_specification(spiral_chart([spiral]))
     line = next(layer for layer in specification["layer"] if layer["mark"]["type"] == "line")
     drawn = sorted(rows(specification, line), key=lambda row: row[line["encoding"]["order"]["field"]])

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from tank2sim.report.numbers import format_column, format_number, is_number
+from tank2sim.report.kit.numbers import format_column, format_number, is_number_text
 
 
 @pytest.mark.parametrize(
@@ -59,5 +59,5 @@ def test_a_column_keeps_gaps_and_zeros():
 
 
 def test_truth_values_are_no_numbers():
-    assert is_number(np.float32(1)) and is_number(3)
-    assert not is_number(True) and not is_number("3")
+    assert is_number_text(np.float32(1)) and is_number_text(3)
+    assert not is_number_text(True) and not is_number_text("3")

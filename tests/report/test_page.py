@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tank2sim.report.charts import Track, track_chart
-from tank2sim.report.page import Column, Figure, Illustration, Page, Section, Table, Verdict, render_page
+from tank2sim.report.kit.charts import TrackData, track_chart
+from tank2sim.report.kit.page import Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict, render_page
 from tests.report.example import example_page
 
 NASTY = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\" ' & <!-- {{ 7*7 }}"
@@ -77,7 +77,7 @@ def test_the_page_is_the_same_in_every_process(html):
     code = (
         "import hashlib\n"
         "from tests.report.example import example_page\n"
-        "from tank2sim.report.page import render_page\n"
+        "from tank2sim.report.kit.page import render_page\n"
         "print(hashlib.sha256(render_page(example_page()).encode()).hexdigest())"
     )
     command, root = [sys.executable, "-c", code], Path(__file__).parents[2]
@@ -138,18 +138,18 @@ def test_verdicts_are_words_and_not_only_colours(reader):
 
 def test_nothing_a_card_says_becomes_markup():
     chart = track_chart(
-        [Track(label=NASTY, x_m=[0, 1], y_m=[0, 1]), Track(label="b", x_m=[0, 1], y_m=[0, 1])], title=NASTY
+        [TrackData(label=NASTY, x_m=[0, 1], y_m=[0, 1]), TrackData(label="b", x_m=[0, 1], y_m=[0, 1])], title=NASTY
     )
     page = Page(
         title=NASTY,
         subtitle=NASTY,
-        figures=[Figure(label=NASTY, value=NASTY, unit=NASTY, note=NASTY)],
+        figures=[KeyFigure(label=NASTY, value=NASTY, unit=NASTY, note=NASTY)],
         sections=[
-            Section(
+            PageSection(
                 heading=NASTY,
                 text=NASTY,
                 notes=[NASTY],
-                tables=[Table(caption=NASTY, columns=[Column(title=NASTY, unit=NASTY)], rows=[[NASTY]])],
+                tables=[PageTable(caption=NASTY, columns=[Column(title=NASTY, unit=NASTY)], rows=[[NASTY]])],
                 charts=[Illustration(chart=chart, caption=NASTY)],
             )
         ]
@@ -167,26 +167,28 @@ def test_nothing_a_card_says_becomes_markup():
 
 
 def test_the_page_stays_below_6_mb_with_twenty_charts_of_long_runs(charts):
-    section = Section(
+    section = PageSection(
         heading="Many", charts=[Illustration(chart=charts["track"]), Illustration(chart=charts["history"])] * 10
     )
     assert len(render_page(Page(title="Long", sections=[section])).encode()) < 6e6
 
 
 def test_a_page_without_charts_carries_no_library():
-    html = render_page(Page(title="Tables alone", sections=[Section(heading="One", text="Text.")]))
+    html = render_page(Page(title="Tables alone", sections=[PageSection(heading="One", text="Text.")]))
     assert len(html) < 30_000
     assert "<script" not in html
 
 
 def test_a_row_that_does_not_fit_its_table_is_refused():
     with pytest.raises(ValueError, match="1 cells in a row of 2 columns"):
-        Table(caption="Figures", columns=[Column(title="a"), Column(title="b")], rows=[[1.0]])
+        PageTable(caption="Figures", columns=[Column(title="a"), Column(title="b")], rows=[[1.0]])
 
 
 def test_truth_values_and_missing_ones_are_words():
-    table = Table(caption="Checks", columns=[Column(title="valid"), Column(title="n")], rows=[[True, 1], [False, None]])
-    reader = Reader(render_page(Page(title="t", sections=[Section(heading="s", tables=[table])])))
+    table = PageTable(
+        caption="Checks", columns=[Column(title="valid"), Column(title="n")], rows=[[True, 1], [False, None]]
+    )
+    reader = Reader(render_page(Page(title="t", sections=[PageSection(heading="s", tables=[table])])))
     assert reader.words("tbody").split() == ["yes", "1", "no", "–"]
 
 
@@ -194,7 +196,7 @@ def test_truth_values_and_missing_ones_are_words():
     ("count", "across"), [(1, 3), (4, 4), (5, 5), (6, 3), (7, 4), (8, 4), (9, 3), (10, 5), (12, 4)]
 )
 def test_cards_leave_few_gaps_in_their_last_row(count, across):
-    page = Page(title="t", figures=[Figure(label=str(n), value=n, verdict=Verdict.NONE) for n in range(count)])
+    page = Page(title="t", figures=[KeyFigure(label=str(n), value=n, verdict=Verdict.NONE) for n in range(count)])
     html = render_page(page)
     assert f'class="cards across-{across}"' in html
     assert f".cards.across-{across} " in html

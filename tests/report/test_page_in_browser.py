@@ -8,8 +8,8 @@ from html import unescape
 
 import pytest
 
-from tank2sim.report.charts import Track, track_chart
-from tank2sim.report.page import Illustration, Page, Section, render_page
+from tank2sim.report.kit.charts import TrackData, track_chart
+from tank2sim.report.kit.page import Illustration, Page, PageSection, render_page
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 CHROMIUM = next((path for name in NAMES if (path := shutil.which(name))), None)
@@ -74,7 +74,7 @@ def test_the_page_draws_every_chart_without_a_word_in_the_console(page, tmp_path
 
 def wheel_over(chart, folder, *flags):
     """What a chart shows at first, after the wheel alone, and after the wheel with Ctrl."""
-    html = render_page(Page(title="Wheel", sections=[Section(heading="Chart", charts=[Illustration(chart=chart)])]))
+    html = render_page(Page(title="Wheel", sections=[PageSection(heading="Chart", charts=[Illustration(chart=chart)])]))
     place = html.rindex('<script>\n"use strict"')
     html = html[:place] + KEEP_VIEWS + html[place:].replace("</body>", TURN_WHEEL + "</body>")
     seen, console = opened(html, folder, *flags)
@@ -84,7 +84,7 @@ def wheel_over(chart, folder, *flags):
 
 @pytest.mark.parametrize("width", [1200, 420])
 def test_a_track_keeps_equal_scales_when_it_is_zoomed_and_when_the_window_is_narrow(tmp_path, width):
-    track = Track(label="run", x_m=[0, 300, 500], y_m=[0, 50, 900])
+    track = TrackData(label="run", x_m=[0, 300, 500], y_m=[0, 50, 900])
     before, wheel, zoomed = wheel_over(track_chart([track]), tmp_path, f"--window-size={width},900")
     assert before["width"] < width
     assert before["x"] / before["width"] == pytest.approx(before["y"] / before["height"], rel=1e-9)
@@ -103,10 +103,10 @@ def test_stacked_charts_are_zoomed_along_their_common_axis(charts, tmp_path, nam
 def test_a_name_that_is_a_script_is_not_run(tmp_path):
     name = "</script><script>document.body.dataset.run = 1</script><img src=x onerror='document.body.dataset.run = 2'>"
     chart = track_chart(
-        [Track(label=name, x_m=[0, 1], y_m=[0, 1]), Track(label="b", x_m=[0, 1], y_m=[0, 1])], title=name
+        [TrackData(label=name, x_m=[0, 1], y_m=[0, 1]), TrackData(label="b", x_m=[0, 1], y_m=[0, 1])], title=name
     )
     page = Page(
-        title=name, sections=[Section(heading=name, text=name, charts=[Illustration(chart=chart, caption=name)])]
+        title=name, sections=[PageSection(heading=name, text=name, charts=[Illustration(chart=chart, caption=name)])]
     )
     seen, console = opened(render_page(page), tmp_path)
     assert console == []

@@ -11,14 +11,14 @@ import pytest
 from tank2sim.analysis.stability.study import StabilityStudy, stability_study
 from tank2sim.analysis.turning.spirals import SpiralPoints
 from tank2sim.cards import read_card
-from tank2sim.cli.screen import json_text
+from tank2sim.cli.console import json_text
 from tank2sim.dynamics import build
 from tank2sim.files import plain_json
-from tank2sim.report.charts import chart_specification
-from tank2sim.report.page import render_page
+from tank2sim.report.kit.charts import chart_specification
+from tank2sim.report.kit.page import render_page
 from tank2sim.report.results.page import result_page
-from tank2sim.report.stability_charts import DIRECT, STABLE, UNSTABLE, influence_chart, steering_diagram, trim_chart
-from tank2sim.report.stability_page import stability_page
+from tank2sim.report.stability.charts import DIRECT, STABLE, UNSTABLE, influence_chart, steering_diagram, trim_chart
+from tank2sim.report.stability.page import stability_page
 
 
 @pytest.fixture(scope="module")

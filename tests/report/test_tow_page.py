@@ -10,8 +10,8 @@ from tank2sim.identification.tow import paper as tow_paper
 from tank2sim.identification.tow.identify import identify_tow
 from tank2sim.identification.tow.study import study_tows, towed_body
 from tank2sim.records.tows import read_tows
-from tank2sim.report.tow_charts import drag_chart, speed_chart
-from tank2sim.report.tow_page import tow_page
+from tank2sim.report.tow.charts import drag_chart, tow_speed_chart
+from tank2sim.report.tow.page import tow_page
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_residuals_are_readings_less_the_first_fit(table_1):
     measured = {f"tow {n}": speed.tolist() for n, speed in enumerate(table_1.speed_mps.T, start=1)}
     speeds = {"t_s": table_1.time_s.tolist(), "measured_mps": measured}
     speeds |= {"simulated_t_s": [0.0, 50.0], "simulated_mps": {"line": [0.0, 0.175]}}
-    rows = records_of(speed_chart(speeds), "vconcat", 1)
+    rows = records_of(tow_speed_chart(speeds), "vconcat", 1)
     found = {(row["run"], row["t"]): row["v"] for row in rows}
     assert found["tow 3", 20.0] == pytest.approx(0.078 - 0.07)
     assert found["line", 50.0] == 0

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from tank2sim.analysis.practice.validation import TURN_FIGURES, ZIGZAG_FIGURES, Validated, Validation, Verified
-from tank2sim.analysis.stability.imo import Criterion
-from tank2sim.report.charts import chart_specification
-from tank2sim.report.page import Verdict, render_page
-from tank2sim.report.validation_page import Evidence, validation_page
+from tank2sim.analysis.stability.imo import ImoCriterion
+from tank2sim.analysis.validation.study import TURN_FIGURES, ZIGZAG_FIGURES, Validated, Validation, Verified
+from tank2sim.report.kit.charts import chart_specification
+from tank2sim.report.kit.page import Verdict, render_page
+from tank2sim.report.validation.page import ValidationEvidence, validation_page
 from tests.report.browser import measured_in_browser
 
 FIGURES = (
@@ -21,10 +21,10 @@ FIGURES = (
 
 
 @pytest.fixture
-def evidence(mariner_card, mariner) -> Evidence:
+def evidence(mariner_card, mariner) -> ValidationEvidence:
     verified = (Verified("turn", "advance_m", 500.0, 1e-4, 8.0),)
-    criteria = (Criterion("advance", 3.6, 4.5, "L"),)
-    return Evidence(mariner_card, mariner, Validation(FIGURES, 40), verified, criteria, (), ("a notice",))
+    criteria = (ImoCriterion("advance", 3.6, 4.5, "L"),)
+    return ValidationEvidence(mariner_card, mariner, Validation(FIGURES, 40), verified, criteria, (), ("a notice",))
 
 
 def test_each_figure_has_its_verdict(evidence) -> None:
@@ -52,7 +52,9 @@ def test_what_the_procedure_asks_for_is_documented(evidence) -> None:
 
 
 def test_without_trials_the_report_says_that_nothing_is_validated(evidence) -> None:
-    bare = Evidence(evidence.card, evidence.model, Validation((), 0), evidence.verified, evidence.criteria, ())
+    bare = ValidationEvidence(
+        evidence.card, evidence.model, Validation((), 0), evidence.verified, evidence.criteria, ()
+    )
     page = validation_page(bare)
     assert page.figures[0].verdict is Verdict.CAUTION
     assert "not validated" in render_page(page)
@@ -66,7 +68,7 @@ def test_a_trial_that_made_the_card_is_no_validation(evidence) -> None:
 
 
 def test_a_criterion_beyond_the_card_has_no_verdict(evidence) -> None:
-    beyond = (Criterion("advance", 2.4, 4.5, "L", "leaves the card's validity", beyond_card=True),)
+    beyond = (ImoCriterion("advance", 2.4, 4.5, "L", "leaves the card's validity", beyond_card=True),)
     page = validation_page(replace(evidence, criteria=beyond))
     table = next(one for one in page.sections if one.heading == "Standard manoeuvres").tables[0]
     assert table.rows[0][4] == "beyond the card"

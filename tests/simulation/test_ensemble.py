@@ -11,7 +11,7 @@ import pytest
 
 from tank2sim.simulation import ensemble as module
 from tank2sim.simulation.bands import figure_bands, history_bands, small_edge_first
-from tank2sim.simulation.ensemble import Answer, Draws, Ensemble, ensemble
+from tank2sim.simulation.ensemble import Draws, Ensemble, MemberResult, ensemble
 
 COVARIANCE = np.array([[4.0, 1.0], [1.0, 9.0]])
 DRAWS = Draws(
@@ -29,11 +29,11 @@ class Linear:
     """3 a - b, and a line of that slope; those with a beyond 4 cannot be used."""
 
     def prepared(self):
-        def ask(values) -> Answer:
+        def ask(values) -> MemberResult:
             if values["a"] > 4:
-                return Answer({}, trouble="a is too large")
+                return MemberResult({}, trouble="a is too large")
             slope = 3 * values["a"] - values["b"]
-            return Answer({"slope": slope}, np.array([[0.0, slope, 2 * slope]], dtype=np.float32))
+            return MemberResult({"slope": slope}, np.array([[0.0, slope, 2 * slope]], dtype=np.float32))
 
         return lambda members: [ask(values) for values in members]
 

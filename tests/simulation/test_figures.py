@@ -11,7 +11,7 @@ from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.simulation.figures import figures_of
-from tank2sim.simulation.manoeuvres import PullOut, Spiral, Turn, Zigzag, parse_manoeuvre, read_orders
+from tank2sim.simulation.manoeuvres import PullOut, SpiralManoeuvre, Turn, Zigzag, parse_manoeuvre, read_orders
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import trial_csv
@@ -175,7 +175,7 @@ def test_what_is_no_manoeuvre_is_refused(text: str) -> None:
 def test_manoeuvres_are_read_in_degrees() -> None:
     assert parse_manoeuvre("zigzag:-10/20") == Zigzag(math.radians(-10), math.radians(20))
     spiral = parse_manoeuvre("spiral:2")
-    assert isinstance(spiral, Spiral)
+    assert isinstance(spiral, SpiralManoeuvre)
     np.testing.assert_allclose(np.degrees(spiral.rudders), [2, 1, 0, -1, -2, -1, 0, 1, 2])
 
 
@@ -259,7 +259,7 @@ def spiralling(model, lag: float) -> dict:
     run = made_up(
         model, t, motion_r=np.radians(rates[reached]), rudder_command=np.radians(rudders[hold]), motion_speed=5.0
     )
-    return figures_of(Spiral(tuple(np.radians(rudders))), run, 100.0)
+    return figures_of(SpiralManoeuvre(tuple(np.radians(rudders))), run, 100.0)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -291,5 +291,5 @@ def test_the_rate_of_a_pull_out_is_halved_after_the_time_constant_times_ln_2(mar
 def test_a_spiral_goes_from_its_largest_angle_to_the_other_side_and_back(side: int) -> None:
     there = [side * angle for angle in (5, 4, 3, 2, 1, 0, -1, -2, -3, -4, -5)]
     spiral = parse_manoeuvre(f"spiral:{5 * side}")
-    assert isinstance(spiral, Spiral)
+    assert isinstance(spiral, SpiralManoeuvre)
     np.testing.assert_allclose(np.degrees(spiral.rudders), [*there, *there[-2::-1]], atol=1e-12)

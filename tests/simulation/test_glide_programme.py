@@ -9,7 +9,7 @@ import pytest
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.simulation.glide_programme import follow, read_programme
+from tank2sim.simulation.glide_programme import follow_programme, read_programme
 from tank2sim.simulation.integrator import Integrator
 
 MODEL = build(read_card("kulikovsky-velikanov"))
@@ -53,7 +53,7 @@ def test_a_programme_at_fault_is_refused_with_its_place(tmp_path, text, words) -
 def test_the_model_starts_in_steady_glide_and_follows_the_orders() -> None:
     dive = {"buoyancy.command": -0.25, "pitch.command": -0.5, "roll.command": 0.0}
     climb = {"buoyancy.command": 0.1, "pitch.command": 0.6, "roll.command": 0.1}
-    run = follow(Integrator(MODEL, compiled=False), [dive, climb], [20.0, 80.0])
+    run = follow_programme(Integrator(MODEL, compiled=False), [dive, climb], [20.0, 80.0])
     assert run["motion.udot"][0] == pytest.approx(0, abs=1e-12)
     assert run.at("motion.speed", 19.9) == pytest.approx(run["motion.speed"][0], rel=1e-9)
     assert run["pitch.angle"][-1] == pytest.approx(0.6 - 1.1 * math.exp(-80 / 5), abs=1e-6)
@@ -63,6 +63,8 @@ def test_the_model_starts_in_steady_glide_and_follows_the_orders() -> None:
 
 def test_without_buoyancy_it_starts_at_rest_and_then_glides() -> None:
     still = {"buoyancy.command": 0.0, "pitch.command": -0.4859, "roll.command": 0.0}
-    run = follow(Integrator(MODEL, compiled=False), [still, {**still, "buoyancy.command": -0.25}], [10.0, 150.0])
+    run = follow_programme(
+        Integrator(MODEL, compiled=False), [still, {**still, "buoyancy.command": -0.25}], [10.0, 150.0]
+    )
     assert run.at("motion.speed", 10.0) < 1e-7
     assert run["motion.speed"][-1] == pytest.approx(0.2444, abs=1e-3)

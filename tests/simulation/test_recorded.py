@@ -9,7 +9,7 @@ import pytest
 
 from tank2sim.cards import parse_card, read_card
 from tank2sim.dynamics import build
-from tank2sim.identification.trials.measured import measured
+from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator

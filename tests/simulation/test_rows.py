@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from tank2sim.simulation.rows import Chain, Rows
+from tank2sim.simulation.rows import Chain, RowFunction
 
 
 @pytest.fixture(params=["machine code", "casadi"])
@@ -22,7 +22,7 @@ def function():
 def test_each_row_has_its_own_arguments_and_matrices_come_by_columns(compiler):
     rng = np.random.default_rng(1)
     a, b = rng.standard_normal((50, 2)), rng.standard_normal((50, 3))
-    rows = Rows(function())
+    rows = RowFunction(function())
     assert (rows._library is None) == (compiler == "casadi")
     outer, sine = rows(a, b)
     expected = np.einsum("ni,nj->nij", a, b)
@@ -33,14 +33,14 @@ def test_each_row_has_its_own_arguments_and_matrices_come_by_columns(compiler):
 def test_an_argument_without_rows_holds_for_all(compiler):
     rng = np.random.default_rng(2)
     a, b = rng.standard_normal((20, 2)), rng.standard_normal(3)
-    held, own = Rows(function())(a, b), Rows(function())(a, np.tile(b, (20, 1)))
+    held, own = RowFunction(function())(a, b), RowFunction(function())(a, np.tile(b, (20, 1)))
     for one, other in zip(held, own, strict=True):
         np.testing.assert_array_equal(one, other)
 
 
 def test_columns_of_a_larger_table_are_taken_as_they_stand(compiler):
     table = np.random.default_rng(3).standard_normal((5, 20)).T
-    outer, _ = Rows(function())(table[:, :2], table[:, 2:])
+    outer, _ = RowFunction(function())(table[:, :2], table[:, 2:])
     np.testing.assert_allclose(outer[:, 0], table[:, 0] * table[:, 2], rtol=1e-14)
 
 

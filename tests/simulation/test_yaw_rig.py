@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tank2sim.dynamics.yaw_energy import dissipation_from_work, inertia_from_work
-from tank2sim.dynamics.yaw_programme import PAPER
+from tank2sim.dynamics.yaw_programme import PAPER_PROGRAMME
 from tank2sim.dynamics.yaw_rig import ELLIPSOID_T1, SHIP_T1, SHIP_T2
 from tank2sim.errors import InputError
 from tank2sim.simulation.yaw_rig import Measuring, run_yaw_rig
@@ -18,7 +18,7 @@ START = TunedController(inertia_kgm2=0.0505)
 
 @pytest.fixture(scope="module")
 def ellipsoid():
-    return run_yaw_rig(ELLIPSOID_T1, PAPER, START, EXACT)
+    return run_yaw_rig(ELLIPSOID_T1, PAPER_PROGRAMME, START, EXACT)
 
 
 def last_pair(run, rig, *, reference):
@@ -41,12 +41,12 @@ def last_pair(run, rig, *, reference):
     ],
 )
 def test_controller_4_gives_the_papers_table(rig, actual, programmed, lost, error):
-    run = run_yaw_rig(rig, PAPER, START, EXACT)
+    run = run_yaw_rig(rig, PAPER_PROGRAMME, START, EXACT)
     for reference, value, dissipation in ((False, actual, lost[0]), (True, programmed, lost[1])):
         found = last_pair(run, rig, reference=reference)
         assert found[0] == pytest.approx(value, abs=1.0)
         assert found[1] == pytest.approx(dissipation, abs=0.02)
-    settled = run.time_s > 4 * PAPER.period_s
+    settled = run.time_s > 4 * PAPER_PROGRAMME.period_s
     assert np.abs(run.error_rad[settled]).max() == pytest.approx(error, abs=3e-4)
 
 
@@ -64,7 +64,7 @@ def test_first_gains_as_printed_are_exchanged():
 
 
 def test_the_encoder_counts_whole_pulses_and_never_ahead(ellipsoid):
-    run = run_yaw_rig(ELLIPSOID_T1, replace(PAPER, humps=1), START)
+    run = run_yaw_rig(ELLIPSOID_T1, replace(PAPER_PROGRAMME, humps=1), START)
     pulse = 2 * np.pi / 3000
     counts = run.angle_rad / pulse
     np.testing.assert_allclose(counts, np.round(counts), atol=1e-9)
@@ -72,7 +72,9 @@ def test_the_encoder_counts_whole_pulses_and_never_ahead(ellipsoid):
 
 
 def test_turning_to_port_is_the_mirror_image(ellipsoid):
-    port = run_yaw_rig(ELLIPSOID_T1, replace(PAPER, max_rate_radps=-PAPER.max_rate_radps), START, EXACT)
+    port = run_yaw_rig(
+        ELLIPSOID_T1, replace(PAPER_PROGRAMME, max_rate_radps=-PAPER_PROGRAMME.max_rate_radps), START, EXACT
+    )
     np.testing.assert_allclose(port.true_angle_rad, -ellipsoid.true_angle_rad, atol=1e-9)
     np.testing.assert_allclose(port.current_A, -ellipsoid.current_A, atol=1e-9)
 
@@ -80,28 +82,28 @@ def test_turning_to_port_is_the_mirror_image(ellipsoid):
 def test_a_rig_that_saturates_the_motor_says_when():
     weak = ELLIPSOID_T1.model_copy(update={"max_current_A": 0.1})
     with pytest.raises(InputError, match=r"saturates the motor, first at \d+\.\d{3} s .* 0\.1 A can be had"):
-        run_yaw_rig(weak, PAPER, START, EXACT)
-    run = run_yaw_rig(weak, PAPER, START, EXACT, allow_saturation=True)
+        run_yaw_rig(weak, PAPER_PROGRAMME, START, EXACT)
+    run = run_yaw_rig(weak, PAPER_PROGRAMME, START, EXACT, allow_saturation=True)
     assert run.saturation and 0.5 < run.saturation.first_s < 4.5
     assert np.abs(run.true_current_A).max() <= 0.1
 
 
 def test_tuning_as_printed_takes_the_wrong_limits_for_the_inertia():
     printed = replace(START, as_printed=True, inertia_kgm2=0.03)
-    run = run_yaw_rig(ELLIPSOID_T1, replace(PAPER, humps=2), printed, EXACT, allow_saturation=True)
+    run = run_yaw_rig(ELLIPSOID_T1, replace(PAPER_PROGRAMME, humps=2), printed, EXACT, allow_saturation=True)
     right = 0.0505 / (0.055 * 0.051)
     assert abs(run.gains[-1]["K_D"] / right - 1) > 0.1  # the motor works against the water there, and does not brake
 
 
 @pytest.mark.slow
 def test_the_adaptive_controller_raises_its_gain_until_the_error_is_small():
-    run = run_yaw_rig(ELLIPSOID_T1, PAPER, AdaptiveController(), EXACT, allow_saturation=True)
+    run = run_yaw_rig(ELLIPSOID_T1, PAPER_PROGRAMME, AdaptiveController(), EXACT, allow_saturation=True)
     assert 40 < run.memory[1] < 70  # papers.md 3.5: about 50 to 65
-    assert np.abs(run.error_rad[run.time_s > 4 * PAPER.period_s]).max() < 0.015
+    assert np.abs(run.error_rad[run.time_s > 4 * PAPER_PROGRAMME.period_s]).max() < 0.015
 
 
 def test_noise_is_that_asked_for_and_the_same_again():
     noisy = Measuring(current_noise_A=0.01, seed=3)
-    one, again = (run_yaw_rig(ELLIPSOID_T1, replace(PAPER, humps=1), START, noisy) for _ in range(2))
+    one, again = (run_yaw_rig(ELLIPSOID_T1, replace(PAPER_PROGRAMME, humps=1), START, noisy) for _ in range(2))
     assert np.std(one.current_A - one.true_current_A) == pytest.approx(0.01, rel=0.05)
     np.testing.assert_array_equal(one.current_A, again.current_A)

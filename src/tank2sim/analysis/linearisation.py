@@ -8,7 +8,8 @@ import casadi as ca
 import control
 import numpy as np
 
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 from tank2sim.simulation.straight_course import OperatingPoint, straight_course
 
 __all__ = ["OperatingPoint", "jacobians", "signal_name", "state_space", "straight_course"]
@@ -22,7 +23,7 @@ def jacobians(
     inputs: Sequence[str],
     *,
     settled: Sequence[str] = (),
-) -> tuple[Vector, Vector]:
+) -> tuple[Array, Array]:
     """Derivatives (nv, ns) and (nv, ni) of named quantities or states by named states and by named inputs.
 
     States in `settled` are eliminated: they follow the others at once, as if at rest (the Schur complement of their

@@ -1,7 +1,7 @@
 """What is known of a ship: its card, read with precise errors, converted once, written back without loss."""
 
 from tank2sim.cards.card import Card, GliderCard, ManoeuvringCard, SurgeBodyCard, YawRigCard
-from tank2sim.cards.reading import find_card, linear, parse_card, read_card, revised
+from tank2sim.cards.reading import find_card, linear_card, parse_card, read_card, revised
 
 __all__ = [
     "Card",
@@ -10,7 +10,7 @@ __all__ = [
     "SurgeBodyCard",
     "YawRigCard",
     "find_card",
-    "linear",
+    "linear_card",
     "parse_card",
     "read_card",
     "revised",

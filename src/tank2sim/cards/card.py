@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tank2sim.cards.form import (
-    Body,
+    BodySection,
     EffectEntry,
     Environment,
     Glider,
     GliderModel,
-    Programme,
+    ProgrammeSection,
     Propulsion,
     RigidBody,
-    Ship,
     ShipModel,
+    ShipSection,
     SteeringGear,
     Surge,
     SurgeModel,
@@ -53,7 +53,7 @@ class Card:
 
     source: str
     text: str
-    ship: Body
+    ship: BodySection
     environment: Environment
     model: ShipModel | SurgeModel | GliderModel | YawRigModel
 
@@ -90,7 +90,7 @@ class ManoeuvringCard(Card):
         Effects on top of the polynomial, in the order of the file.
     """
 
-    ship: Ship
+    ship: ShipSection
     model: ShipModel
     rigid_body: RigidBody
     derivatives: Mapping[str, float]
@@ -139,5 +139,5 @@ class YawRigCard(Card):
 
     model: YawRigModel
     yaw_rig: YawRig
-    programme: Programme | None = None
+    programme: ProgrammeSection | None = None
     uncertainty: Mapping[str, float] = field(default_factory=dict)

@@ -1,7 +1,7 @@
 """The covariance of a card's numbers: a JSON file beside the card, to which a comment line of the card refers.
 
 ``# covariance: ship.covariance.json`` names the file, relative to the card's folder. It has ``format``
-(:data:`FORMAT`), ``names`` (dotted keys of the card, ``derivatives.Yv``) and ``covariance``, a row for each name, in
+(:data:`_FORMAT`), ``names`` (dotted keys of the card, ``derivatives.Yv``) and ``covariance``, a row for each name, in
 the conventions of the card's own text: scaling, units, sign of the rudder. What it does not name is independent, with
 the standard error of the card.
 """
@@ -18,17 +18,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.cards.card import Card
 from tank2sim.errors import InputError
 from tank2sim.files import BYTE_ORDER_MARK, read_text
 
-Array = NDArray[np.float64]
+_FORMAT = "tank2sim-covariance/1"
 
-FORMAT = "tank2sim-covariance/1"
-
-ROUNDING = 0.006
+_ROUNDING = 0.006
 """Share by which a standard error of the card, three figures, may differ from that of the covariance."""
 
 NEGATIVE = 1e-8
@@ -61,7 +59,7 @@ class Covariance:
         """The JSON of the file: a row of the matrix a line, every figure kept."""
         rows = ",\n  ".join(json.dumps(row) for row in self.matrix.tolist())
         names = json.dumps(list(self.names))
-        return f'{{\n "format": "{FORMAT}",\n "names": {names},\n "covariance": [\n  {rows}\n ]\n}}\n'
+        return f'{{\n "format": "{_FORMAT}",\n "names": {names},\n "covariance": [\n  {rows}\n ]\n}}\n'
 
 
 def covariance_file(card: Path) -> Path:
@@ -146,8 +144,8 @@ def _form(path: Path) -> tuple[list[str], object]:
         content = json.loads(read_text(path))
     except (ValueError, RecursionError) as error:
         raise InputError(path, "", f"is no JSON ({error})", "write it anew with reduce or identify") from None
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise InputError(path, "format", f"is not {FORMAT!r}", "give a file that reduce or identify wrote")
+    if not isinstance(content, dict) or content.get("format") != _FORMAT:
+        raise InputError(path, "format", f"is not {_FORMAT!r}", "give a file that reduce or identify wrote")
     names = content.get("names")
     if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
         raise InputError(path, "names", "is no list of keys of the card", 'give names such as "derivatives.Yv"')
@@ -192,7 +190,7 @@ def _check_errors(card: Card, path: Path, names: Sequence[str], matrix: Array) -
         key = _uncertainty_of(name)
         stated = _at(content, key)
         error = math.sqrt(variance)
-        if isinstance(stated, int | float) and abs(stated - error) > ROUNDING * max(abs(stated), error):
+        if isinstance(stated, int | float) and abs(stated - error) > _ROUNDING * max(abs(stated), error):
             problem = f"is {stated:.4g}, and {path.name} says {error:.4g}"
             raise InputError(card.source, key, problem, "make them agree, or take the line '# covariance: ...' out")
 

@@ -14,10 +14,10 @@ Positive = Annotated[float, Field(gt=0)]
 # the pen or of the unit, and the powers of it in the prime system (up to L^5) leave the range of a float.
 Length = Annotated[float, Field(ge=0.01, le=1000.0)]
 Speed = Annotated[float, Field(ge=0.001, le=100.0)]
-WaterDensity = Annotated[float, Field(ge=1.0, le=20000.0)]
+CardWaterDensity = Annotated[float, Field(ge=1.0, le=20000.0)]
 AirDensity = Annotated[float, Field(ge=1e-3, le=100.0)]
-Gravity = Annotated[float, Field(ge=0.01, le=1000.0)]
-Viscosity = Annotated[float, Field(ge=1e-9, le=1.0)]
+CardGravity = Annotated[float, Field(ge=0.01, le=1000.0)]
+CardViscosity = Annotated[float, Field(ge=1e-9, le=1.0)]
 TimeConstant = Annotated[float, Field(ge=1e-3, le=1000.0)]
 AngularRate = Annotated[float, Field(ge=1e-6, le=1e5)]
 Mass = Annotated[float, Field(ge=1e-6, le=1e12)]
@@ -48,13 +48,13 @@ def _rising_pair(value: object) -> object:
 SpeedRange = Annotated[tuple[float, float], BeforeValidator(_rising_pair)]
 
 
-class Section(BaseModel):
+class CardSection(BaseModel):
     """A section of a card: frozen, every key known, every number finite."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, strict=True)
 
 
-class Body(Section):
+class BodySection(CardSection):
     """``[ship]`` of a body that only surges: principal particulars, SI."""
 
     name: Text
@@ -74,22 +74,22 @@ class Body(Section):
     notes: str | None = None
 
 
-class Ship(Body):
+class ShipSection(BodySection):
     """``[ship]`` of a manoeuvring ship, whose length between perpendiculars is the L of the prime system."""
 
     length_m: Length
 
 
-class Environment(Section):
+class Environment(CardSection):
     """``[environment]``: water, air and gravity; the defaults are those of the card format."""
 
-    water_density_kgpm3: WaterDensity = 1025.0
+    water_density_kgpm3: CardWaterDensity = 1025.0
     air_density_kgpm3: AirDensity = 1.225
-    gravity_mps2: Gravity = 9.80665
-    kinematic_viscosity_m2ps: Viscosity = 1.19e-6
+    gravity_mps2: CardGravity = 9.80665
+    kinematic_viscosity_m2ps: CardViscosity = 1.19e-6
 
 
-class ShipModel(Section):
+class ShipModel(CardSection):
     """``[model]`` of a manoeuvring ship: what kind of equations, and in which conventions the numbers are given."""
 
     kind: Literal["linear", "abkowitz"]
@@ -109,28 +109,28 @@ class ShipModel(Section):
         return self.valid_speed_mps or (0.5 * self.speed_mps, 1.2 * self.speed_mps)
 
 
-class SurgeModel(Section):
+class SurgeModel(CardSection):
     """``[model]`` of a body that only surges (eq. 1.5)."""
 
     kind: Literal["surge"]
     valid_speed_mps: SpeedRange | None = None
 
 
-class GliderModel(Section):
+class GliderModel(CardSection):
     """``[model]`` of an underwater glider."""
 
     kind: Literal["glider"]
     valid_speed_mps: SpeedRange | None = None
 
 
-class YawRigModel(Section):
+class YawRigModel(CardSection):
     """``[model]`` of a body that a motor turns in a tank."""
 
     kind: Literal["yaw_rig"]
     valid_speed_mps: SpeedRange | None = None
 
 
-class RigidBody(Section):
+class RigidBody(CardSection):
     """``[rigid_body]``: mass, yaw inertia about the origin, and position of the centre of gravity."""
 
     mass: Positive
@@ -138,7 +138,7 @@ class RigidBody(Section):
     x_G: float
 
 
-class SteeringGear(Section):
+class SteeringGear(CardSection):
     """``[steering_gear]``: first-order lag, rate and angle limits; absent means none."""
 
     time_constant_s: TimeConstant | None = None
@@ -146,14 +146,14 @@ class SteeringGear(Section):
     max_angle_rad: Annotated[float, Field(gt=0, lt=1.5707963267948966)] | None = None
 
 
-class Propulsion(Section):
+class Propulsion(CardSection):
     """``[propulsion]``: the effect of revolutions on surge, ``Xnn`` in the prime system at the speed of expansion."""
 
     nominal_radps: AngularRate
     Xnn: float
 
 
-class Surge(Section):
+class Surge(CardSection):
     """``[surge]``: coefficients of (1.5), M dv/dt + B1 v^4 + B2 v^3 + B3 v^2 = T."""
 
     total_mass_kg: Mass
@@ -164,7 +164,7 @@ class Surge(Section):
     dry_mass_kg: Mass | None = None
 
 
-class Glider(Section):
+class Glider(CardSection):
     """``[glider]``: mass, size and coefficients of an underwater glider, SI, incidence in rad.
 
     C_L = ``lift_slope`` alpha + ``lift_quadratic`` alpha |alpha|; C_D = ``drag_zero`` + ``drag_quadratic`` alpha^2;
@@ -188,7 +188,7 @@ class Glider(Section):
     roll_time_constant_s: TimeConstant = 5.0
 
 
-class TankWalls(Section):
+class TankWalls(CardSection):
     """``[yaw_rig.walls]``: a rectangular tank, and the coefficients of lambda_66l and f_66l; SI.
 
     Each is c_a/(l_a + 1) + c_f/(l_f + 1), l_a and l_f in m from the ends of the waterline to the nearest wall. (Paper 3
@@ -231,7 +231,7 @@ class TankWalls(Section):
         return self
 
 
-class YawRig(Section):
+class YawRig(CardSection):
     """``[yaw_rig]``: coefficients of (3) of paper 3, motor, current loop and encoder, SI.
 
     Parameters
@@ -277,7 +277,7 @@ class YawRig(Section):
         return self.quadratic_Nms2 if self.braking_quadratic_Nms2 is None else self.braking_quadratic_Nms2
 
 
-class Programme(Section):
+class ProgrammeSection(CardSection):
     """``[programme]`` of the yaw rig: the motion that is run."""
 
     kind: Literal["unidirectional", "reversing", "full_turn"] = "unidirectional"
@@ -287,7 +287,7 @@ class Programme(Section):
     humps: Annotated[int, Field(ge=1, le=1000)] = 5
 
 
-class EffectEntry(Section):
+class EffectEntry(CardSection):
     """One of ``[[effects]]``: its name, parameters (SI) and their standard errors."""
 
     name: Text
@@ -295,11 +295,11 @@ class EffectEntry(Section):
     uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
 
 
-class ShipCard(Section):
+class ShipCard(CardSection):
     """A manoeuvring ship's card, as in its file."""
 
     format: Literal["tank2sim-ship/1"]
-    ship: Ship
+    ship: ShipSection
     environment: Environment = Environment()
     model: ShipModel
     rigid_body: RigidBody
@@ -310,40 +310,40 @@ class ShipCard(Section):
     effects: list[EffectEntry] = []
 
 
-class SurgeCard(Section):
+class SurgeCard(CardSection):
     """The card of a body that only surges, as in its file."""
 
     format: Literal["tank2sim-ship/1"]
-    ship: Body
+    ship: BodySection
     environment: Environment = Environment()
     model: SurgeModel
     surge: Surge
     uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
 
 
-class GliderForm(Section):
+class GliderForm(CardSection):
     """The card of an underwater glider, as in its file."""
 
     format: Literal["tank2sim-ship/1"]
-    ship: Body
+    ship: BodySection
     environment: Environment = Environment()
     model: GliderModel
     glider: Glider
 
 
-class YawRigForm(Section):
+class YawRigForm(CardSection):
     """The card of a body on the yaw rig, as in its file."""
 
     format: Literal["tank2sim-ship/1"]
-    ship: Body
+    ship: BodySection
     environment: Environment = Environment()
     model: YawRigModel
     yaw_rig: YawRig
-    programme: Programme | None = None
+    programme: ProgrammeSection | None = None
     uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
 
 
-FORMS: dict[str, type[ShipCard] | type[SurgeCard] | type[GliderForm] | type[YawRigForm]] = {
+CARD_FORMS: dict[str, type[ShipCard] | type[SurgeCard] | type[GliderForm] | type[YawRigForm]] = {
     "linear": ShipCard,
     "abkowitz": ShipCard,
     "surge": SurgeCard,

@@ -15,7 +15,16 @@ from tomlkit.exceptions import TOMLKitError
 
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards.card import Card, GliderCard, ManoeuvringCard, SurgeBodyCard, YawRigCard
-from tank2sim.cards.form import FORMS, EffectEntry, GliderForm, Propulsion, RigidBody, ShipCard, SurgeCard, YawRigForm
+from tank2sim.cards.form import (
+    CARD_FORMS,
+    EffectEntry,
+    GliderForm,
+    Propulsion,
+    RigidBody,
+    ShipCard,
+    SurgeCard,
+    YawRigForm,
+)
 from tank2sim.cards.form_faults import form_fault, short, suggestion
 from tank2sim.cards.scaling import Scales, file_factor
 from tank2sim.cards.terms import parse_term
@@ -83,14 +92,14 @@ def parse_card(text: str, source: str) -> Card:
     if not isinstance(content.get("model"), dict):
         raise InputError(source, "model", "this section is missing", "a card needs [model] with its kind")
     kind = content["model"].get("kind")
-    if not isinstance(kind, str) or kind not in FORMS:
-        raise InputError(source, "model.kind", f"is {short(kind)}", f"one of {', '.join(FORMS)} was expected")
+    if not isinstance(kind, str) or kind not in CARD_FORMS:
+        raise InputError(source, "model.kind", f"is {short(kind)}", f"one of {', '.join(CARD_FORMS)} was expected")
     spelt: dict[str, str] = {}
     _angles_to_radians(content, source, spelt)
     try:
-        form = FORMS[kind].model_validate(content)
+        form = CARD_FORMS[kind].model_validate(content)
     except ValidationError as error:
-        raise form_fault(error, source, spelt, form=FORMS[kind], what="a card") from None
+        raise form_fault(error, source, spelt, form=CARD_FORMS[kind], what="a card") from None
     if isinstance(form, ShipCard):
         return replace(_manoeuvring_card(form, text, source), spelt=spelt)
     return _si_card(form, kind, text, source)
@@ -153,7 +162,7 @@ def revised(
     return new
 
 
-def linear(card: Card) -> ManoeuvringCard:
+def linear_card(card: Card) -> ManoeuvringCard:
     """The same ship with the linear equations (3.5); derivatives that these have not stay in the text."""
     new = parse_card(changed_text(card.text, card.source, {"model.kind": "linear"}), card.source)
     assert isinstance(new, ManoeuvringCard)

@@ -16,19 +16,19 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError
 
 from tank2sim.bundled import bundled
-from tank2sim.cards.form import Length, Positive, Section, Speed, Text
+from tank2sim.cards.form import CardSection, Length, Positive, Speed, Text
 from tank2sim.cards.form_faults import form_fault
 from tank2sim.errors import InputError
 from tank2sim.files import read_text
 from tank2sim.units import to_si
 
-FORMAT = "tank2sim-steering/1"
+_FORMAT = "tank2sim-steering/1"
 _FILE = "steering.toml"
 
 Rudder = Annotated[float, Field(gt=-1.5707963267948966, lt=1.5707963267948966)]
 
 
-class SteeringShip(Section):
+class SteeringShip(CardSection):
     """``[ship]``: what every model of the card is about, SI."""
 
     name: Text
@@ -38,7 +38,7 @@ class SteeringShip(Section):
     notes: str | None = None
 
 
-class SteeringEntry(Section):
+class SteeringEntry(CardSection):
     """One of ``[[models]]``: a form of the catalogue with coefficients, which may be incomplete."""
 
     name: Text
@@ -50,7 +50,7 @@ class SteeringEntry(Section):
     notes: str | None = None
 
 
-class SteeringPoint(Section):
+class SteeringPoint(CardSection):
     """One of ``[[points]]`` of a steering diagram: a rudder angle, and the yaw rate or the radius it gave.
 
     The first two `measured` ones are those that a model can be tuned to.
@@ -65,7 +65,7 @@ class SteeringPoint(Section):
     drift_rad: float | None = None
 
 
-class PrintedInfluence(Section):
+class PrintedInfluence(CardSection):
     """``[influence]``: printed influence coefficients K % of a radius over the draught, and a printed slip.
 
     Parameters
@@ -96,7 +96,7 @@ class PrintedInfluence(Section):
     misread_as: dict[str, str] = Field(default_factory=dict)
 
 
-class _Form(Section):
+class _Form(CardSection):
     """The file."""
 
     format: Literal["tank2sim-steering/1"]
@@ -148,7 +148,7 @@ def find_steering_card(name: str) -> Path | None:
         content = tomllib.loads(read_text(path))
     except (InputError, ValueError, RecursionError):
         return None  # the reader of ship cards tells the fault
-    return path if str(content.get("format", "")).startswith(FORMAT.partition("/")[0] + "/") else None
+    return path if str(content.get("format", "")).startswith(_FORMAT.partition("/")[0] + "/") else None
 
 
 def read_steering_card(name: str | Path) -> SteeringCard:

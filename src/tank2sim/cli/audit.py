@@ -8,12 +8,13 @@ from typing import Any
 
 import click
 
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.arrays import Array
+from tank2sim.cli.console import json_option, json_text, screen, show_notices, show_table
 from tank2sim.files import write_whole
-from tank2sim.records.audit import Finding, audit, estimated_noise
+from tank2sim.records.audit import Finding, audit, record_noise
 from tank2sim.records.reading import read_trial
 from tank2sim.records.signals.columns import SignalName
-from tank2sim.records.thinning import Vector, drawn_columns
+from tank2sim.records.thinning import drawn_columns
 from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.units import from_si
 
@@ -63,7 +64,7 @@ class _Judged:
         }
 
 
-def _columns(trial: Trial) -> dict[str, Vector]:
+def _columns(trial: Trial) -> dict[str, Array]:
     """Signals by their columns in a trial file."""
     names = {name: SignalName(name) for name in trial.signals}
     return {own.file: own.factor * trial.signals[name] for name, own in names.items()}
@@ -71,7 +72,7 @@ def _columns(trial: Trial) -> dict[str, Vector]:
 
 def _judged(path: Path) -> _Judged:
     trial = read_trial(path, rising=False)
-    return _Judged(trial, audit(trial), estimated_noise(trial))
+    return _Judged(trial, audit(trial), record_noise(trial))
 
 
 def _show(one: _Judged) -> None:

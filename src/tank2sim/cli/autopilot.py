@@ -11,13 +11,13 @@ import click
 from rich.markup import escape
 
 from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
-from tank2sim.analysis.heading.designs import DESIGNS, Weights
+from tank2sim.analysis.heading.designs import DESIGNS, LqrWeights
 from tank2sim.analysis.heading.study import AutopilotStudy, StudySettings, study_autopilot
 from tank2sim.analysis.heading.track_keeping import read_waypoints
 from tank2sim.cards import ManoeuvringCard, read_card
-from tank2sim.cli.changes import parse_changes
+from tank2sim.cli.console import json_option, json_text, screen, show_notices, show_table
+from tank2sim.cli.overrides import parse_changes
 from tank2sim.cli.progress import showing_stages
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.files import plain_json, write_together
@@ -72,8 +72,8 @@ def command(card: str, *, track: Path | None, settings: tuple[str, ...], **more:
     if export:
         contents[export], result["export"] = _exported(model, study, str(more["fmi"]), bool(more["verify"]))
     if page:
-        from tank2sim.report.autopilot_page import piloted_page
-        from tank2sim.report.page import render_page
+        from tank2sim.report.autopilot.page import piloted_page
+        from tank2sim.report.kit.page import render_page
 
         contents[page] = render_page(piloted_page(plain_json(result)))
     if json_file:
@@ -104,7 +104,7 @@ def _settings(waypoints: object, **more: object) -> StudySettings:
     return StudySettings(
         kind=str(more["design"]),
         speed_mps=more["speed"],  # type: ignore[arg-type]  # click has checked them
-        weights=Weights(heading_rad=angle("heading_weight") or 0, rudder_rad=angle("rudder_weight") or 0),
+        weights=LqrWeights(heading_rad=angle("heading_weight") or 0, rudder_rad=angle("rudder_weight") or 0),
         wave_filter_radps=more["wave_filter"],  # type: ignore[arg-type]
         course_change_rad=angle("course_change") or 0,
         weather=weather,  # type: ignore[arg-type]

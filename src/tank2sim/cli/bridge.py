@@ -10,11 +10,11 @@ from typing import Any
 import click
 from rich.markup import escape
 
-from tank2sim.analysis.practice.bridge import ORDERS_AHEAD, Bridge, bridge_of
-from tank2sim.analysis.practice.comparison import differences_of_size
+from tank2sim.analysis.validation.bridge_data import ORDERS_AHEAD, Bridge, bridge_of
+from tank2sim.analysis.validation.comparison import differences_of_size
 from tank2sim.cards import Card, ManoeuvringCard, read_card
-from tank2sim.cli.changes import parse_changes
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices
+from tank2sim.cli.console import json_option, json_text, screen, show_notices
+from tank2sim.cli.overrides import parse_changes
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 

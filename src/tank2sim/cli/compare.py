@@ -7,12 +7,12 @@ from pathlib import Path
 import click
 from rich.markup import escape
 
-from tank2sim.analysis.practice.coefficients import BEYOND
-from tank2sim.analysis.practice.comparison import CardComparison, compare_cards
-from tank2sim.analysis.practice.standard_trials import MEMBERS
+from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS
+from tank2sim.analysis.validation.comparison import CardComparison, compare_cards
+from tank2sim.analysis.validation.standard_trials import MEMBERS
 from tank2sim.cards import read_card
 from tank2sim.cli.bridge import manoeuvring
-from tank2sim.cli.screen import json_option, json_text, screen, show_marked, show_notices, show_table
+from tank2sim.cli.console import json_option, json_text, screen, show_marked, show_notices, show_table
 from tank2sim.files import write_together
 from tank2sim.units import in_words
 
@@ -50,8 +50,8 @@ def command(cards: tuple[str, ...], members: int, page: Path | None, json_file: 
 
 def _page(found: CardComparison) -> str:
     # Drawing is asked for seldom, and its library is slow to load.
-    from tank2sim.report.compare_page import compare_page
-    from tank2sim.report.page import render_page
+    from tank2sim.report.comparison.page import compare_page
+    from tank2sim.report.kit.page import render_page
 
     return render_page(compare_page(found))
 
@@ -64,7 +64,7 @@ def _show(found: CardComparison) -> None:
         apart += f"; {same} more are the reference's own numbers" if (same := found.same(place)) else ""
         screen.print(
             f"[bold]{escape(label)}[/bold] against {escape(found.labels[0])}: of {len(found.in_errors(place))} "
-            f"coefficients {found.beyond(place)} differ by more than {BEYOND:g} standard errors{apart}",
+            f"coefficients {found.beyond(place)} differ by more than {BEYOND_STANDARD_ERRORS:g} standard errors{apart}",
             soft_wrap=True,
         )
         rows = [row for row in found.rows if row.differences[place - 1].standard_errors is not None]

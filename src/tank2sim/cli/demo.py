@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-from tank2sim.cli.screen import json_option, json_text, screen
+from tank2sim.cli.console import json_option, json_text, screen
 from tank2sim.errors import InputError
 from tank2sim.files import writable_folder, write_whole
 from tank2sim.native.compiler import require_compiler
@@ -27,7 +27,11 @@ from tank2sim.native.compiler import require_compiler
 @json_option
 def command(output: Path, json_file: Path | None) -> None:
     """Go the whole way on bundled data: tows to an FMU, the Mariner to checked FMUs, and a page that shows both."""
-    from tank2sim.demo.run import PAGE, STEPS, run_demo  # drawing and control: seconds, for which --help does not wait
+    from tank2sim.demo.run import (  # drawing and control: seconds, for which --help does not wait
+        DEMO_STEPS,
+        PAGE,
+        run_demo,
+    )
 
     require_compiler("the demo")
     if json_file and not json_file.absolute().parent.is_dir():
@@ -36,7 +40,7 @@ def command(output: Path, json_file: Path | None) -> None:
     begin = time.monotonic()
     columns = SpinnerColumn(), BarColumn(bar_width=24), TimeElapsedColumn(), TextColumn("{task.description}")
     with Progress(*columns, console=screen, transient=True) as progress:
-        task = progress.add_task("", total=STEPS)
+        task = progress.add_task("", total=DEMO_STEPS)
 
         def tell(words: str) -> None:
             progress.update(task, description=words, advance=1)

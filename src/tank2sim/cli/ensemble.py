@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from tank2sim.analysis.ensemble.results import Asked, Members, StabilityBands
+from tank2sim.analysis.ensemble.results import EnsembleRequest, Members, StabilityBands
 from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.cards.covariance import (
     HOLDS,
@@ -21,9 +21,9 @@ from tank2sim.cards.covariance import (
     read_covariance,
     referring,
 )
-from tank2sim.cli.screen import screen, show_marked, show_notices, show_table
+from tank2sim.cli.console import screen, show_marked, show_notices, show_table
 from tank2sim.errors import InputError
-from tank2sim.executors import FORMS, PROCESSES, check_executor, executing
+from tank2sim.executors import EXECUTOR_FORMS, PROCESSES, check_executor, executing
 from tank2sim.simulation.bands import Band
 from tank2sim.simulation.ensemble import BATCH
 from tank2sim.units import in_words
@@ -35,7 +35,7 @@ executor_option = click.option(
     default=PROCESSES,
     show_default=True,
     metavar="E",
-    help=f"Who computes what can be computed apart: {FORMS}.",
+    help=f"Who computes what can be computed apart: {EXECUTOR_FORMS}.",
 )
 """``--executor``, the same on every command."""
 
@@ -57,7 +57,7 @@ def ensemble_options(command: Command) -> Command:
     return command
 
 
-def asked_of(given: Mapping[str, object]) -> Asked | None:
+def asked_of(given: Mapping[str, object]) -> EnsembleRequest | None:
     """The ensemble asked for, if any.
 
     Raises
@@ -70,7 +70,7 @@ def asked_of(given: Mapping[str, object]) -> Asked | None:
         if text != PROCESSES:
             raise InputError("--executor", "", "has nothing to do without --ensemble", "give --ensemble N, too")
         return None
-    return Asked(int(str(given["ensemble"])), int(str(given["seed"])))
+    return EnsembleRequest(int(str(given["ensemble"])), int(str(given["seed"])))
 
 
 def with_covariance(text: str, output: Path, covariance: Covariance) -> dict[Path, str | bytes]:
@@ -120,7 +120,7 @@ def uncertain_ship(card: Card) -> ManoeuvringCard:
 
 
 @contextmanager
-def computing(asked: Asked, executor: object) -> Iterator[Executor | None]:
+def computing(asked: EnsembleRequest, executor: object) -> Iterator[Executor | None]:
     """The executor of an ensemble; none for a few members, which are done before processes have begun."""
     if str(executor) == PROCESSES and asked.members <= 2 * BATCH:
         yield None

@@ -12,18 +12,18 @@ import click
 
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import read_card
+from tank2sim.cli.console import json_option, screen, show_notices
 from tank2sim.cli.ensemble import executor_option
-from tank2sim.cli.gap_files import Files, contents, folder_made, put, refuse_early
+from tank2sim.cli.gap_files import GapFiles, folder_made, gap_file_contents, put, refuse_early
 from tank2sim.cli.gap_screen import show_gap
 from tank2sim.cli.progress import showing_stages
-from tank2sim.cli.screen import json_option, screen, show_notices
 from tank2sim.cli.trials import TakesSeveral, fitted_and_held, trial_files
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
-from tank2sim.gap.find import Options, find_gap
 from tank2sim.gap.fleet.search import can_lack
 from tank2sim.gap.fleet.ships import GAP, HOLDOUT, ship_alone
+from tank2sim.gap.workflow import GapOptions, find_gap
 
 
 @click.command("gap", cls=TakesSeveral, several=("--holdout", "--effects", "--without"))
@@ -88,10 +88,10 @@ def _of_folder(
         _one_ship(str(ship.card), (ship.trials, ship.holdout), output, json_file, more)
         show_notices([f"{folder} holds a card itself, and was taken for one ship"])
         return 0
-    from tank2sim.cli.gap_fleet import Asked, run_fleet  # its page is slow to import
+    from tank2sim.cli.gap_fleet import FleetRequest, run_fleet  # its page is slow to import
 
     options = _options(more)
-    return run_fleet(Asked(folder, output, options, str(more["executor"]), bool(more["again"]), json_file))
+    return run_fleet(FleetRequest(folder, output, options, str(more["executor"]), bool(more["again"]), json_file))
 
 
 def _one_ship(
@@ -111,7 +111,7 @@ def _one_ship(
         with _cluster(str(more["executor"])) as executor:
             gap = find_gap(known, fitted, held, options, progress, executor)
         progress("writing")
-        files, notices = contents(gap, fitted, held, output)
+        files, notices = gap_file_contents(gap, fitted, held, output)
         if json_file:
             files[json_file] = files[output / GAP]
         tidied = put(files, output, inputs)
@@ -130,10 +130,10 @@ def _cluster(text: str) -> Iterator[Executor | None]:
         yield executor
 
 
-def _options(given: Mapping[str, object]) -> Options:
+def _options(given: Mapping[str, object]) -> GapOptions:
     names = {option: _names(f"--{option}", given[option]) for option in ("effects", "without")}
     workers = given["workers"]
-    return Options(
+    return GapOptions(
         effects=names["effects"] or None,
         without=names["without"],
         max_effects=int(str(given["max_effects"])),
@@ -152,6 +152,6 @@ def _names(option: str, given: object) -> tuple[str, ...]:
     return given
 
 
-def _told(files: Files, folder: Path) -> set[str]:
+def _told(files: GapFiles, folder: Path) -> set[str]:
     inside = [path.relative_to(folder) for path in files if path.is_relative_to(folder)]
     return {path.parts[0] if len(path.parts) == 1 else f"{path.parts[0]}/" for path in inside}

@@ -11,29 +11,29 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tank2sim.cards import read_card
-from tank2sim.cli.gap_files import contents, folder_made, put, refuse_early
+from tank2sim.cli.console import json_text, show_notices
+from tank2sim.cli.gap_files import folder_made, gap_file_contents, put, refuse_early
 from tank2sim.cli.gap_screen import hundredths, line, wide_table
 from tank2sim.cli.progress import showing_stages
-from tank2sim.cli.screen import json_text, show_notices
 from tank2sim.cli.trials import fitted_and_held
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
 from tank2sim.files import writable_folder, write_together
-from tank2sim.gap.find import Options
-from tank2sim.gap.fitting import Progress
-from tank2sim.gap.fleet.record import NEW, RUN, record_of, stale, with_results
+from tank2sim.gap.fleet.run_record import NEW, RUN, fleet_run_record, stale, with_results
 from tank2sim.gap.fleet.search import Fault, Sought, can_lack, fault_of_program, found_at_once, found_one_by_one
 from tank2sim.gap.fleet.ships import Fleet, ShipFolder, fleet_in
-from tank2sim.gap.fleet.told import FleetTold, ShipTold, ship_told
+from tank2sim.gap.fleet.summary import FleetTold, ShipTold, ship_told
+from tank2sim.gap.inference.fit_all import Progress
 from tank2sim.gap.result import Gap
-from tank2sim.report.fleet_page import fleet_page
-from tank2sim.report.page import render_page
+from tank2sim.gap.workflow import GapOptions
+from tank2sim.report.gap.fleet_page import fleet_page
+from tank2sim.report.kit.page import render_page
 
 JSON, PAGE = "fleet.json", "fleet.html"
 
 
 @dataclass(frozen=True)
-class Asked:
+class FleetRequest:
     """What the command was given.
 
     Parameters
@@ -48,7 +48,7 @@ class Asked:
 
     folder: Path
     output: Path
-    options: Options
+    options: GapOptions
     executor: str
     again: bool
     json_file: Path | None
@@ -75,7 +75,7 @@ class _Course:
     notices: list[str] = field(default_factory=list)
 
 
-def run_fleet(asked: Asked) -> int:
+def run_fleet(asked: FleetRequest) -> int:
     """Compute what is not computed yet, write it ship by ship, and show the fleet; 2 if a ship has no result."""
     check_executor(asked.executor)
     fleet = fleet_in(asked.folder, asked.output)
@@ -93,7 +93,7 @@ def run_fleet(asked: Asked) -> int:
     return 2 if told.faults else 0
 
 
-def _course(fleet: Fleet, asked: Asked) -> _Course:
+def _course(fleet: Fleet, asked: FleetRequest) -> _Course:
     """What is computed already, and what is not."""
     course = _Course(faults=dict(fleet.faults))
     for ship in fleet.ships:
@@ -102,7 +102,7 @@ def _course(fleet: Fleet, asked: Asked) -> _Course:
             refuse_early(output, None, ship.inputs)
             if output.exists() and not output.is_dir():
                 raise InputError(output, "", "is no folder, and her results belong there", "give another with -o")
-            record = record_of(ship, asked.options)
+            record = fleet_run_record(ship, asked.options)
         except InputError as error:
             course.faults[ship.name] = str(error)
             continue
@@ -114,7 +114,7 @@ def _course(fleet: Fleet, asked: Asked) -> _Course:
     return course
 
 
-def _compute(course: _Course, asked: Asked, progress: Progress) -> None:
+def _compute(course: _Course, asked: FleetRequest, progress: Progress) -> None:
     """Compute the ships that are wanted; each is written as soon as she is found."""
     if not course.wanted:
         return
@@ -130,7 +130,7 @@ Find = Callable[..., Iterator[tuple[Sought, Gap | Fault]]]
 
 
 @contextmanager
-def _working(asked: Asked, count: int) -> Iterator[tuple[Find, Executor | None]]:
+def _working(asked: FleetRequest, count: int) -> Iterator[tuple[Find, Executor | None]]:
     """How the ships are sought, and by whom.
 
     One ship alone has the explanations of her search spread over the executor. Of several, each is one task: the
@@ -160,7 +160,7 @@ def _write(ship: Sought, gap: Gap, course: _Course, output: Path) -> Fault | Non
     folder = output / ship.folder.name
     record, why = course.wanted[ship.folder]
     try:
-        files, notices = contents(gap, ship.fitted, ship.held, folder)
+        files, notices = gap_file_contents(gap, ship.fitted, ship.held, folder)
     except InputError as error:
         return Fault(str(error))
     except OSError:

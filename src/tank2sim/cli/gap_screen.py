@@ -10,16 +10,17 @@ from rich.markup import escape
 from rich.measure import Measurement
 from rich.table import Table
 
-from tank2sim.cli.screen import screen, shown
-from tank2sim.gap.acting import acting
-from tank2sim.gap.as_json import estimate_in_file, in_file, joined, measured_in, signal_name
+from tank2sim.api.result import cell_text
+from tank2sim.cli.console import screen
+from tank2sim.gap.diagnosis.error_intervals import acting
+from tank2sim.gap.outcome.export import estimate_in_file, in_file_units, joined, measured_in, signal_display_name
 from tank2sim.gap.result import AMBIGUOUS, Gap, Named
 from tank2sim.units import in_words
 
 
 def show_gap(gap: Gap) -> None:
     """Print what was found of one ship."""
-    from tank2sim.report.gap_words import probabilities_in_words, sizes_of_candidates, verdict_in_words
+    from tank2sim.report.gap.text import probabilities_in_words, sizes_of_candidates, verdict_in_words
 
     line(f"{gap.card.ship.name}: {verdict_in_words(gap)}")
     if rows := [row for one in gap.effects for row in _parameters(one)]:
@@ -33,8 +34,8 @@ def show_gap(gap: Gap) -> None:
         wide_table("What the others would be", ["effect", "parameter", "value", "standard error", "unit"], rows)
     for place in gap.where[:1]:
         line(
-            f"most of the misfit arises in {signal_name(place.signal).file} of {place.trial}, {place.t_start_s:.4g} s "
-            f"to {place.t_end_s:.4g} s ({100 * place.share:.0f} %)"
+            f"most of the misfit arises in {signal_display_name(place.signal).file} of {place.trial}, "
+            f"{place.t_start_s:.4g} s to {place.t_end_s:.4g} s ({100 * place.share:.0f} %)"
         )
     for one in acting(gap)[:1]:
         line(
@@ -63,7 +64,11 @@ def _parameters(one: Named) -> list[list[object]]:
     rows: list[list[object]] = []
     for parameter, value in one.parameters.items():
         own, there = estimate_in_file(parameter, value)
-        error = in_file(parameter, one.standard_errors[parameter])[1] if parameter in one.standard_errors else math.nan
+        error = (
+            in_file_units(parameter, one.standard_errors[parameter])[1]
+            if parameter in one.standard_errors
+            else math.nan
+        )
         words, unit = in_words(own)
         rows.append([one.name, words, there, float(f"{error:.2g}"), unit or "-"])
     return rows
@@ -87,11 +92,11 @@ def wide_table(title: str, heads: Sequence[str], rows: Sequence[Sequence[object]
         table.add_column(head, justify="right" if numeric else "left", no_wrap=True)
     for row in rows:
         told = [None if isinstance(value, float) and not math.isfinite(value) else value for value in row]
-        table.add_row(*(escape(shown(value)) for value in told))
-    width = Measurement.get(screen, screen.options.update(width=WIDE), table).maximum
+        table.add_row(*(escape(cell_text(value)) for value in told))
+    width = Measurement.get(screen, screen.options.update(width=_WIDE), table).maximum
     screen.print(title, style="italic", soft_wrap=True, markup=False)
     Console(width=max(width, screen.width), highlight=False).print(table)
 
 
-WIDE = 1000
+_WIDE = 1000
 """Characters in which any table of ours has room."""

@@ -14,8 +14,8 @@ from tank2sim.analysis.glide.path import GlidePath
 from tank2sim.analysis.glide.steady import SteadyGlide, ballast_kg, force_residual
 from tank2sim.analysis.glide.study import GlideQuestion, GlideStudy, study
 from tank2sim.cards import GliderCard, read_card
-from tank2sim.cli.changes import parse_changes
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.cli.console import json_option, json_text, screen, show_notices, show_table
+from tank2sim.cli.overrides import parse_changes
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.simulation.glide_programme import read_programme
@@ -116,8 +116,8 @@ class _Wanted:
 
 def _page(found: GlideStudy) -> str:
     # Drawing is asked for seldom, and its library is slow to load.
-    from tank2sim.report.glide_page import glide_page
-    from tank2sim.report.page import render_page
+    from tank2sim.report.glide.page import glide_page
+    from tank2sim.report.kit.page import render_page
 
     return render_page(glide_page(found))
 

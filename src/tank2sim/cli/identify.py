@@ -9,11 +9,11 @@ from pathlib import Path
 
 import click
 
-from tank2sim.analysis.ensemble.draws import in_file
+from tank2sim.analysis.ensemble.draws import by_file_name
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
+from tank2sim.cli.console import json_option, json_text, screen, show_notices, show_table
 from tank2sim.cli.ensemble import executor_option, with_covariance
 from tank2sim.cli.progress import showing_progress
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
 from tank2sim.cli.trials import TakesSeveral, fitted_and_held, trial_files
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
@@ -23,14 +23,14 @@ from tank2sim.identification.trials.as_json import (
     figure_rows,
     following_rows,
     identification_as_json,
-    improved_text,
+    identified_card_text,
     structure_rows,
 )
-from tank2sim.identification.trials.identify import AUTO, METHODS, Identification, Options, identify
-from tank2sim.identification.trials.measured import Measured
-from tank2sim.identification.trials.remarks import remarks
-from tank2sim.identification.trials.replays import replays, replays_as_json
-from tank2sim.identification.trials.structures import STRUCTURES
+from tank2sim.identification.trials.assessment.notices import remarks
+from tank2sim.identification.trials.assessment.replays import replays, replays_as_json
+from tank2sim.identification.trials.identify import AUTO, TRIAL_METHODS, Identification, IdentificationOptions, identify
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.structures import STRUCTURES
 from tank2sim.marks import FORCED
 from tank2sim.units import in_words
 
@@ -46,7 +46,7 @@ from tank2sim.units import in_words
     help="Compare with these; do not fit them.",
 )
 @click.option("-o", "--output", type=click.Path(path_type=Path), metavar="CARD.toml", help="Write the card found.")
-@click.option("--method", type=click.Choice(METHODS), default="output_error", show_default=True)
+@click.option("--method", type=click.Choice(TRIAL_METHODS), default="output_error", show_default=True)
 @click.option(
     "--structure",
     type=click.Choice((*STRUCTURES, AUTO)),
@@ -98,11 +98,11 @@ def command(
         result = identify(known, fitted, held, options, progress, executor)
     both = fitted, held
     told = remarks(result)
-    text = improved_text(result, [trial.name for trial in fitted.trials])
+    text = identified_card_text(result, [trial.name for trial in fitted.trials])
     parse_card(text, str(output or "the card found"))
     files: dict[Path, str | bytes] = {}
     if output:
-        found = in_file(result.card, result.estimate.free, result.estimate.covariance)
+        found = by_file_name(result.card, result.estimate.free, result.estimate.covariance)
         files |= with_covariance(text, output, found)
     if isinstance(json_file, Path):
         files[json_file] = json_text({**identification_as_json(result, told), "replays": _replays(known, result, both)})
@@ -120,7 +120,7 @@ def command(
 
 
 @contextmanager
-def _executor(options: Options, given: dict[str, object], *, held: bool) -> Iterator[Executor | None]:
+def _executor(options: IdentificationOptions, given: dict[str, object], *, held: bool) -> Iterator[Executor | None]:
     """For cross-validation and bootstrap, and a cluster for the intervals of what is held out, too."""
     text, workers = check_executor(str(given["executor"])), given["workers"]
     here = text == PROCESSES
@@ -134,11 +134,11 @@ def _executor(options: Options, given: dict[str, object], *, held: bool) -> Iter
         yield executor
 
 
-def _options(given: dict[str, object]) -> Options:
+def _options(given: dict[str, object]) -> IdentificationOptions:
     piece = given["piece"]
     if isinstance(piece, float) and not 0 < piece < float("inf"):
         raise InputError("--piece", "", f"is {piece:g} s", "a positive number of seconds was expected")
-    return Options(
+    return IdentificationOptions(
         method=str(given["method"]),
         structure=str(given["structure"]),
         inertia=bool(given["inertia"]),
@@ -167,9 +167,9 @@ def _pictures(
     result: Identification, known: ManoeuvringCard, trials: tuple[Measured, Measured], folder: Path
 ) -> dict[Path, str | bytes]:
     """A picture of each chart, and the page that has them all."""
-    from tank2sim.report.charts import chart_png
-    from tank2sim.report.identification_page import identification_charts, identification_page, pairs_of
-    from tank2sim.report.page import render_page
+    from tank2sim.report.identification.page import identification_charts, identification_page, pairs_of
+    from tank2sim.report.kit.charts import chart_png
+    from tank2sim.report.kit.page import render_page
 
     writable_folder(folder)
     fitted, held = (pairs_of(known, result, those) if those.trials else () for those in trials)

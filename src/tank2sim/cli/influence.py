@@ -10,22 +10,22 @@ import numpy as np
 from rich.markup import escape
 
 from tank2sim.analysis.ensemble.results import FigureBands, named_bands
-from tank2sim.analysis.influence.figures import Figure, forms, parse_figure
-from tank2sim.analysis.influence.of_card import Influence, influence
+from tank2sim.analysis.influence.card_influence import CardInfluence, influence
+from tank2sim.analysis.influence.figures import InfluenceFigure, forms, parse_figure
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.card import tuned_text
 from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, WITHIN, Means, Tuned
+from tank2sim.analysis.tuning.targets import TARGET_OPTION, Wish, parse_wish
 from tank2sim.analysis.tuning.tune import tune
-from tank2sim.analysis.tuning.wishes import OPTION, Wish, parse_wish
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.cards.steering_card import find_steering_card
-from tank2sim.cli.agreed import parse_agreed, parse_bounds
-from tank2sim.cli.changes import parse_changes
+from tank2sim.cli.console import json_option, json_text, screen, show_marked, show_notices, show_table
 from tank2sim.cli.ensemble import asked_of, computing, ensemble_options, show_bands, with_carried_covariance
-from tank2sim.cli.screen import json_option, json_text, screen, show_marked, show_notices, show_table
+from tank2sim.cli.joint_variation import parse_agreed, parse_bounds
+from tank2sim.cli.overrides import parse_changes
 from tank2sim.cli.steering_card import refuse_options, show_steering_card
+from tank2sim.cli.through_points import ThroughFiles, tune_through
 from tank2sim.cli.trials import TakesSeveral
-from tank2sim.cli.two_points import Files, tune_through
 from tank2sim.errors import InputError
 from tank2sim.files import plain_json, write_together
 from tank2sim.native.compiler import find_compiler
@@ -40,7 +40,7 @@ DEFAULT_FIGURES = (
 )
 """Figures where none is asked: one of each kind that is most looked at (a choice of ours)."""
 
-ALONE = (
+_ALONE = (
     "tuning takes standard errors as if they were independent: its bounds, and what counts as a small move, leave out "
     "the covariance beside the card"
 )
@@ -139,7 +139,7 @@ def command(
         others = {"--figure": figures, "--tune": wishes, "--page": page, "--ensemble": more["ensemble"]}
         of_tuning = {"--hold": more["hold"], "--bound": more["bounds"], "--agreed": more["agreed"]}
         refuse_options("--through", others | of_tuning)
-        tune_through(ship, through, Files(output, json_file))
+        tune_through(ship, through, ThroughFiles(output, json_file))
         return
     if not wishes:
         _refuse_without_wishes({"-o": output, "--hold": more["hold"], "--bound": more["bounds"]})
@@ -148,14 +148,14 @@ def command(
     means = _means(more)
     tuned = tune(study, wanted, means) if wanted else None
     if output and tuned and not tuned.reached:
-        raise InputError(OPTION, "", _contradiction(tuned), "widen --within or state --bound, or wish for less")
+        raise InputError(TARGET_OPTION, "", _contradiction(tuned), "widen --within or state --bound, or wish for less")
     result = influence(study, means.agreed)
     bands = None
     if asked:
         with computing(asked, more["executor"]) as pool:
             bands = named_bands(ship, [one.text for one in study.figures], asked, pool)
     written, of_card = with_carried_covariance(ship, tuned_text(ship, tuned), output) if output and tuned else ({}, [])
-    notices = [*result.notices, *([ALONE] if tuned and result.errors.together else []), *of_card]
+    notices = [*result.notices, *([_ALONE] if tuned and result.errors.together else []), *of_card]
     notices = list(dict.fromkeys([*notices, *([] if find_compiler() else [NO_COMPILER])]))
     told = _told(study, result, tuned, bands) | {"notices": notices} if json_file or page else {}
     contents = {
@@ -184,7 +184,7 @@ def _file(given: object) -> Path | None:
     return given if isinstance(given, Path) else None
 
 
-def _asked(figures: tuple[str, ...], wanted: list[Wish]) -> list[Figure]:
+def _asked(figures: tuple[str, ...], wanted: list[Wish]) -> list[InfluenceFigure]:
     """Figures asked for, and those of the wishes; each once."""
     named = figures or (() if wanted else DEFAULT_FIGURES)
     return list(dict.fromkeys([*(parse_figure(text) for text in named), *(wish.figure for wish in wanted)]))
@@ -219,7 +219,7 @@ def _means(more: dict[str, object]) -> Means:
     )
 
 
-def _told(study: Study, result: Influence, tuned: Tuned | None, bands: FigureBands | None) -> dict[str, object]:
+def _told(study: Study, result: CardInfluence, tuned: Tuned | None, bands: FigureBands | None) -> dict[str, object]:
     """All that was found, as JSON has it."""
     told = result.as_json()
     if tuned:
@@ -229,8 +229,8 @@ def _told(study: Study, result: Influence, tuned: Tuned | None, bands: FigureBan
 
 
 def _page(told: dict[str, object]) -> str:
-    from tank2sim.report.influence_page import influenced_page
-    from tank2sim.report.page import render_page
+    from tank2sim.report.influence.page import influenced_page
+    from tank2sim.report.kit.page import render_page
 
     return render_page(influenced_page(plain_json(told)))
 
@@ -243,7 +243,7 @@ def _contradiction(tuned: Tuned) -> str:
     return f"{what} within the bounds; the nearest is {nearest}"
 
 
-def _show(result: Influence) -> None:
+def _show(result: CardInfluence) -> None:
     screen.print(f"[bold]{escape(result.ship)}[/bold]: {len(result.parameters)} parameters", soft_wrap=True)
     show_table(
         "Figures",
@@ -286,7 +286,7 @@ def _pair(exact: float, difference: float) -> str:
     return " | ".join(f"{round(value, 2) + 0.0:+.2f}" if math.isfinite(value) else "-" for value in (exact, difference))
 
 
-def _largest_shares(result: Influence, row: int) -> str:
+def _largest_shares(result: CardInfluence, row: int) -> str:
     shares = result.shares[row]
     return ", ".join(
         f"{result.parameters[k].short} {100 * shares[k]:.0f} %" for k in np.argsort(-shares)[:3] if shares[k]

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from tank2sim.analysis.practice.bridge import Bridge
+from tank2sim.analysis.validation.bridge_data import Bridge
 from tank2sim.cli.bridge import bridge_options, write_bridge
 
 

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
+from tank2sim.arrays import Array
+
 if TYPE_CHECKING:  # the identification takes long to import, and most commands do without
-    from tank2sim.dynamics.model import Vector
-    from tank2sim.identification.trials.problem import Progress as Told
+    from tank2sim.identification.trials.problem.estimation_problem import Progress as Told
 
 
 @contextmanager
@@ -20,7 +21,7 @@ def showing_progress(what: str) -> Iterator[Told]:
     with showing_stages(what) as show:
         steps = 0
 
-        def told(stage: str, values: Vector, cost: float) -> None:
+        def told(stage: str, values: Array, cost: float) -> None:
             nonlocal steps
             steps += 1
             show(f"{stage}: step {steps}, cost {cost:.6g} (Ctrl-C keeps the best so far)")

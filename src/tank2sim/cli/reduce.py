@@ -10,22 +10,28 @@ from rich.markup import escape
 
 from tank2sim.cards import parse_card
 from tank2sim.cards.covariance import Covariance
+from tank2sim.cli.console import json_option, json_text, screen, show_notices, show_table
 from tank2sim.cli.ensemble import with_covariance
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
 from tank2sim.errors import InputError
 from tank2sim.files import writable_folder, write_together
 from tank2sim.identification.captive.as_json import reduction_as_json
 from tank2sim.identification.captive.covariance import reduction_covariance
-from tank2sim.identification.captive.findings import findings, implausible
-from tank2sim.identification.captive.reduction import Options, Reduction, reduce_campaign
-from tank2sim.identification.captive.result_card import FILLS, Contents, card_text, contents, reynolds_ratio
-from tank2sim.identification.captive.rows import (
+from tank2sim.identification.captive.findings import implausible, reduction_findings
+from tank2sim.identification.captive.reduction import Reduction, ReductionOptions, reduce_campaign
+from tank2sim.identification.captive.result_card import (
+    FILLS,
+    Contents,
+    card_contents,
+    reduced_card_text,
+    reynolds_ratio,
+)
+from tank2sim.identification.captive.tables import (
     derivative_rows,
     prediction_rows,
     terms_left_out,
     terms_not_excited,
 )
-from tank2sim.records.campaigns import FORCES, Campaign, read_campaign
+from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, read_campaign
 
 
 @click.command("reduce")
@@ -55,12 +61,12 @@ def command(
     ratio = scale_of(read, scale)
     if ratio is not None:
         read = at_scale(read, ratio)
-    reduction = reduce_campaign(read, Options(**{key: bool(value) for key, value in more.items()}))
-    card = contents(reduction, fill)
-    warnings = (*findings(reduction), *_fill_notices(card, fill, ratio, read))
+    reduction = reduce_campaign(read, ReductionOptions(**{key: bool(value) for key, value in more.items()}))
+    card = card_contents(reduction, fill)
+    warnings = (*reduction_findings(reduction), *_fill_notices(card, fill, ratio, read))
     files: dict[Path, str | bytes] = {}
     if output:
-        text = card_text(reduction, card, ratio or 1.0)
+        text = reduced_card_text(reduction, card, ratio or 1.0)
         parse_card(text, str(output))  # refuses what is no ship here, before anything is written
         files |= with_covariance(text, output, _covariance(reduction, card))
     if isinstance(json_file, Path):
@@ -137,10 +143,10 @@ def _fill_notices(card: Contents, fill: str | None, ratio: float | None, campaig
 
 def _pictures(reduction: Reduction, card: Contents, warnings: tuple[str, ...], folder: Path) -> dict[Path, str | bytes]:
     """A picture of each chart, and the page that has them all."""
-    from tank2sim.report.captive_page import reduction_page
-    from tank2sim.report.captive_results import reduction_charts
-    from tank2sim.report.charts import chart_png
-    from tank2sim.report.page import render_page
+    from tank2sim.report.captive.page import reduction_page
+    from tank2sim.report.captive.results import reduction_charts
+    from tank2sim.report.kit.charts import chart_png
+    from tank2sim.report.kit.page import render_page
 
     writable_folder(folder)
     charts = reduction_charts(reduction)
@@ -161,9 +167,9 @@ def _show(reduction: Reduction, card: Contents) -> None:
     screen.print(f"Not excited by any run: {', '.join(terms_not_excited(reduction))}", soft_wrap=True, markup=False)
     show_table(
         "Leave-one-out: root mean square error of each run predicted from the others, % of the range",
-        ["runs of type", *FORCES],
+        ["runs of type", *FORCE_COLUMNS],
         [
-            [kind, *(f"{errors[force]:.2g}" if force in errors else "-" for force in FORCES)]
+            [kind, *(f"{errors[force]:.2g}" if force in errors else "-" for force in FORCE_COLUMNS)]
             for kind, errors in prediction_rows(reduction).items()
         ],
     )

@@ -9,7 +9,7 @@ from typing import Any
 import click
 from rich.markup import escape
 
-from tank2sim.cli.screen import screen
+from tank2sim.cli.console import screen
 from tank2sim.errors import InputError
 from tank2sim.files import write_whole
 
@@ -28,7 +28,7 @@ def command(result: Path, page: Path) -> None:
     """Write one self-contained page of RESULT, the JSON that any command wrote with --json."""
     # Drawing is slow to load, and is not needed to refuse a file.
     content = _read(result)
-    from tank2sim.report.page import render_page
+    from tank2sim.report.kit.page import render_page
     from tank2sim.report.results.page import result_page
 
     told = result_page(content, str(result))

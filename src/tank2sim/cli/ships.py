@@ -8,7 +8,7 @@ import click
 
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import read_card
-from tank2sim.cli.screen import json_option, json_text, screen, show_table
+from tank2sim.cli.console import json_option, json_text, screen, show_table
 from tank2sim.files import write_whole
 
 

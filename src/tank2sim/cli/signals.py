@@ -8,15 +8,15 @@ from pathlib import Path
 import click
 from rich.markup import escape
 
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.cli.console import json_option, json_text, screen, show_notices, show_table
 from tank2sim.errors import InputError
 from tank2sim.files import writable_folder, write_together
 from tank2sim.records.reading import read_trial
-from tank2sim.records.signals.analysis import ColumnAnalysis, Settings, TrialAnalysis, analyse
+from tank2sim.records.signals.analysis import ColumnAnalysis, SignalSettings, TrialAnalysis, analyse
 from tank2sim.records.signals.as_json import analysis_as_json, effect_as_json
-from tank2sim.records.signals.columns import DIRECTIONS, HELD, SignalName, find_signal
+from tank2sim.records.signals.columns import DIRECTION_COLUMNS, HELD_COLUMNS, SignalName, find_signal
 from tank2sim.records.signals.effect import Filtered
-from tank2sim.records.signals.requests import FORMS, FilterRequest, parse_filter
+from tank2sim.records.signals.requests import REQUEST_FORMS, FilterRequest, parse_filter
 from tank2sim.records.signals.sampling import Series, even_series
 from tank2sim.records.signals.writing import thinned, trial_text, with_filtered
 from tank2sim.records.trials import Trial
@@ -29,7 +29,7 @@ from tank2sim.records.trials import Trial
               help="Longest gap to bridge, s; by default five steps.")  # fmt: skip
 @click.option("--segment", "segment_s", type=click.FloatRange(min=0, min_open=True), metavar="S",
               help="Length of spectral segments, s; by default eight, longer ones of slow signals.")  # fmt: skip
-@click.option("--filter", "filter_text", metavar="F", help=f"Filter the column: {FORMS}.")
+@click.option("--filter", "filter_text", metavar="F", help=f"Filter the column: {REQUEST_FORMS}.")
 @click.option("--out", type=click.Path(path_type=Path), metavar="FILTERED.csv", help="Write the trial so filtered.")
 @click.option("--plot", type=click.Path(path_type=Path, file_okay=False), metavar="DIR", help="Charts, signals.html.")
 @json_option
@@ -40,7 +40,7 @@ def command(trials: tuple[Path, ...], *, filter_text: str | None, **more: object
     together make the tests reject what is normal.
     """
     out, plot, json_file = (_path(more.pop(key)) for key in ("out", "plot", "json_file"))
-    settings = Settings(**more)  # type: ignore[arg-type]  # click has checked them
+    settings = SignalSettings(**more)  # type: ignore[arg-type]  # click has checked them
     request = parse_filter(filter_text) if filter_text else None
     if out and request is None:
         raise InputError("--out", "", "needs a filter", "say which with --filter, such as --filter lowpass:0.5")
@@ -76,7 +76,7 @@ def _path(value: object) -> Path | None:
     return value
 
 
-def _filtering(trials: list[Trial], request: FilterRequest, settings: Settings) -> _Filtering:
+def _filtering(trials: list[Trial], request: FilterRequest, settings: SignalSettings) -> _Filtering:
     if len(trials) != 1:
         raise InputError("--filter", "", f"filters one trial, and {len(trials)} are given", "filter them one by one")
     trial = trials[0]
@@ -86,7 +86,7 @@ def _filtering(trials: list[Trial], request: FilterRequest, settings: Settings) 
     if request.thins:
         if settings.columns:
             raise InputError("--column", "", f"{request.text} thins the whole trial", "leave --column out")
-        names = [name for name in trial.signals if name not in HELD]
+        names = [name for name in trial.signals if name not in HELD_COLUMNS]
     else:
         names = [find_signal(settings.columns[0], trial)]
     before = [even_series(trial, name, settings.max_gap_s) for name in names]
@@ -108,9 +108,9 @@ def _as_json(analyses: list[TrialAnalysis], filtering: _Filtering | None) -> dic
 
 def _pictures(analyses: list[TrialAnalysis], filtering: _Filtering | None, folder: Path) -> dict[Path, str | bytes]:
     """A picture of each chart, and the page that has them all."""
-    from tank2sim.report.charts import chart_png
-    from tank2sim.report.page import render_page
-    from tank2sim.report.signal_page import picture_name, signals_charts, signals_page
+    from tank2sim.report.kit.charts import chart_png
+    from tank2sim.report.kit.page import render_page
+    from tank2sim.report.signals.page import picture_name, signals_charts, signals_page
 
     writable_folder(folder)
     charts = signals_charts(analyses, (filtering.before, filtering.name, filtering.after) if filtering else None)
@@ -122,7 +122,7 @@ def _pictures(analyses: list[TrialAnalysis], filtering: _Filtering | None, folde
 def _show(analysis: TrialAnalysis) -> None:
     heads = ["", "mean", "std", "corr. (s)", "stationarity", "normal", "peak (Hz)"]
     show_table(analysis.trial.name, heads, [_row(column) for column in analysis.columns])
-    if any(column.series.name in DIRECTIONS for column in analysis.columns):
+    if any(column.series.name in DIRECTION_COLUMNS for column in analysis.columns):
         screen.print("mean and std of directions: on the circle, 0 to 360 deg.")
     screen.print(
         "corr.: correlation time. normal: tested on samples two correlation times apart, their number in brackets.",

@@ -9,12 +9,12 @@ from rich.markup import escape
 
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.cards.steering_card import find_steering_card
-from tank2sim.cli.changes import parse_changes
-from tank2sim.cli.screen import screen, show_notices
+from tank2sim.cli.console import screen, show_notices
+from tank2sim.cli.overrides import parse_changes
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.files import write_whole
-from tank2sim.identification.trials.measured import measured
+from tank2sim.identification.trials.problem.prepare_trials import measured
 
 
 @click.command("steer")
@@ -42,7 +42,7 @@ def command(card: str, page: Path, ghost: Path | None, settings: tuple[str, ...]
     from tank2sim.native.cross import has_compiled
     from tank2sim.report.steering.ghost import ghost_of
     from tank2sim.report.steering.page import steering_page
-    from tank2sim.report.steering.ship import NO_COMPILER, WEB, following, has_compiler, ship_in_page
+    from tank2sim.report.steering.ship import NO_WASM_COMPILER, WEB, has_compiler, ship_following_angle, ship_in_page
 
     _refuse_steering_card(card)
     ship = read_card(card, parse_changes(settings))
@@ -52,7 +52,7 @@ def command(card: str, page: Path, ghost: Path | None, settings: tuple[str, ...]
     trial = measured([ghost], ship) if ghost else None
     beside = ghost_of(trial.trials[0], model) if trial else None
     if beside and beside.by_angle:
-        model = following(model)
+        model = ship_following_angle(model)
     library = None
     if has_compiler():
         if not has_compiled(WEB):
@@ -62,7 +62,7 @@ def command(card: str, page: Path, ghost: Path | None, settings: tuple[str, ...]
     text = steering_page(model, library, beside, told)
     write_whole(page, text, inputs=[Path(ship.source), *([ghost] if ghost else [])])
     screen.print(f"{escape(ship.ship.name)}: {escape(str(page))}, {len(text.encode()) / 1e3:.0f} kB", soft_wrap=True)
-    show_notices([*([] if library else [NO_COMPILER]), *told])
+    show_notices([*([] if library else [NO_WASM_COMPILER]), *told])
 
 
 def _refuse_steering_card(name: str) -> None:

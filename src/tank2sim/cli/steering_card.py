@@ -8,10 +8,10 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from tank2sim.analysis.catalogue.comparison import SteeringComparison, compare
+from tank2sim.analysis.catalogue.comparison import SteeringComparison, compare_steering_models
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning
 from tank2sim.cards.steering_card import SteeringCard, read_steering_card
-from tank2sim.cli.screen import json_text, screen, show_notices, show_table
+from tank2sim.cli.console import json_text, screen, show_notices, show_table
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 
@@ -32,7 +32,7 @@ def refuse_options(what: str, given: Mapping[str, object]) -> None:
 def show_steering_card(path: Path, json_file: Path | None, page: Path | None) -> None:
     """Compare the models of a steering card on the screen, and in JSON and on a page where asked."""
     card = read_steering_card(path)
-    found = compare(card)
+    found = compare_steering_models(card)
     contents: dict[Path, str | bytes] = {}
     if json_file:
         contents[json_file] = json_text(found.as_json())
@@ -43,8 +43,8 @@ def show_steering_card(path: Path, json_file: Path | None, page: Path | None) ->
 
 
 def _page(card: SteeringCard, found: SteeringComparison) -> str:
-    from tank2sim.report.page import render_page
-    from tank2sim.report.steering_catalogue_page import steering_catalogue_page
+    from tank2sim.report.kit.page import render_page
+    from tank2sim.report.steering_card.page import steering_catalogue_page
 
     return render_page(steering_catalogue_page(card, found))
 

@@ -7,14 +7,15 @@ from pathlib import Path
 
 import click
 
+from tank2sim.api.result import cell_text
 from tank2sim.cards import parse_card
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table, shown
+from tank2sim.cli.console import json_option, json_text, screen, show_notices, show_table
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.identification.tow.card import tow_card_text
 from tank2sim.identification.tow.fit import TowFit
 from tank2sim.identification.tow.force import force_words, parse_force
-from tank2sim.identification.tow.identify import METHODS, TowResult, identify_tow, parse_terms
+from tank2sim.identification.tow.identify import TOW_METHODS, TowResult, identify_tow, parse_terms
 from tank2sim.identification.tow.output_error import TowOptions
 from tank2sim.identification.tow.study import TowStudy, study_tows, towed_body
 from tank2sim.records.tows import read_tows
@@ -57,7 +58,7 @@ class _Asked:
 @click.option("--volume-m3", type=float, metavar="V", help="Volume; else that in the file, or of a body that floats.")
 @click.option(
     "--method",
-    type=click.Choice(METHODS),
+    type=click.Choice(TOW_METHODS),
     default="output_error",
     show_default=True,
     help="Whose numbers the card gets.",
@@ -74,7 +75,7 @@ def command(tow: Path, **options: object) -> None:
     study = _study(tow, asked)
     contents: dict[Path, str | bytes] = {}
     if asked.output:
-        contents[asked.output] = card_text(study, asked.method, str(asked.output))
+        contents[asked.output] = method_card_text(study, asked.method, str(asked.output))
     if asked.json_file:
         contents[asked.json_file] = json_text(study.as_json())
     if asked.page:
@@ -87,7 +88,7 @@ def command(tow: Path, **options: object) -> None:
         screen.print(f"{asked.output}: the card has the numbers of {asked.method}", soft_wrap=True, markup=False)
 
 
-def card_text(study: TowStudy, method: str, name: str) -> str:
+def method_card_text(study: TowStudy, method: str, name: str) -> str:
     """Text of the card with one method's numbers.
 
     Raises
@@ -117,8 +118,8 @@ def _study(tow: Path, asked: _Asked) -> TowStudy:
 
 def _page(study: TowStudy) -> str:
     # Drawing is asked for seldom, and its library is slow to load.
-    from tank2sim.report.page import render_page
-    from tank2sim.report.tow_page import tow_page
+    from tank2sim.report.kit.page import render_page
+    from tank2sim.report.tow.page import tow_page
 
     return render_page(tow_page(study))
 
@@ -127,9 +128,9 @@ def _show(result: TowResult) -> None:
     fits = result.fits.values()
     names = dict.fromkeys(name for fit in fits for name in fit.estimates)
     rows: list[list[object]] = [[name, *(_estimate(fit, name) for fit in fits)] for name in names]
-    rows.append(["J of (1.6), N s^1/2", *(shown(fit.J) for fit in fits)])
+    rows.append(["J of (1.6), N s^1/2", *(cell_text(fit.J) for fit in fits)])
     rows.append(["condition number, scaled", *(f"{fit.condition_scaled:.3g}" for fit in fits)])
-    rows.append(["largest speed error, m/s", *(shown(fit.largest_speed_error_mps) for fit in fits)])
+    rows.append(["largest speed error, m/s", *(cell_text(fit.largest_speed_error_mps) for fit in fits)])
     title = f"{result.tows.path.name}: {force_words(result.force)}, m = {result.mass_kg:g} kg"
     show_table(title, ["", *result.fits], rows)
 

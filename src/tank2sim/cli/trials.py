@@ -11,7 +11,7 @@ import click
 
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.measured import Measured, measured
+from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.records.reading import looks_like_a_trial
 from tank2sim.records.same_record import refuse_copies
 

@@ -9,21 +9,22 @@ from typing import Any
 import click
 from rich.markup import escape
 
-from tank2sim.analysis.practice.standard_trials import MEMBERS, ship_of
-from tank2sim.analysis.practice.validation import REQUIRED, Validation, Verified, validate, verify
 from tank2sim.analysis.stability.imo import imo_criteria
+from tank2sim.analysis.validation.standard_trials import MEMBERS, ship_of
+from tank2sim.analysis.validation.study import REQUIRED, Validation, Verified, validate, verify
+from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.cli.bridge import manoeuvring
-from tank2sim.cli.changes import parse_changes
-from tank2sim.cli.screen import json_option, json_text, screen, show_marked, show_notices, show_table
+from tank2sim.cli.console import json_option, json_text, screen, show_marked, show_notices, show_table
+from tank2sim.cli.overrides import parse_changes
 from tank2sim.cli.trials import trial_files
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
-from tank2sim.gap.as_json import signal_name
-from tank2sim.gap.replayed import replayed
+from tank2sim.gap.outcome.export import signal_display_name
+from tank2sim.gap.proof.card_replay import replay_by_card
 from tank2sim.gap.result import Passed
-from tank2sim.identification.trials.measured import Measured, measured
-from tank2sim.records.thinning import Vector, drawn_columns
+from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
+from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.integrator import NO_COMPILER
 from tank2sim.units import in_words
 
@@ -86,10 +87,10 @@ def command(card: str, trials: tuple[Path, ...], **options: Any) -> None:
         contents[json_file] = json_text(result)
     if page := options["page"]:
         # Drawing is asked for seldom, and its library is slow to load.
-        from tank2sim.report.page import render_page
-        from tank2sim.report.validation_page import Evidence, validation_page
+        from tank2sim.report.kit.page import render_page
+        from tank2sim.report.validation.page import ValidationEvidence, validation_page
 
-        evidence = Evidence(ship, ready.model, found, verified, criteria, replays, notices)
+        evidence = ValidationEvidence(ship, ready.model, found, verified, criteria, replays, notices)
         contents[page] = render_page(validation_page(evidence))
     write_together(contents, inputs=[Path(ship.source), *files], outputs=(options["page"], options["json_file"]))
     others = show_marked(notices)
@@ -103,7 +104,7 @@ def _replays(card: ManoeuvringCard, given: Measured) -> tuple[tuple[Passed, ...]
     told: list[str] = []
     for trial in given.trials:
         try:
-            found += replayed(card, Measured((trial,), given.driven_by, ()))
+            found += replay_by_card(card, Measured((trial,), given.driven_by, ()))
         except InputError as error:
             told.append(f"{trial.name}: not replayed: {error.problem}")
     return tuple(found), tuple(told)
@@ -111,9 +112,9 @@ def _replays(card: ManoeuvringCard, given: Measured) -> tuple[tuple[Passed, ...]
 
 def _replay_as_json(one: Passed) -> dict[str, object]:
     """A trial as measured and as simulated, thinned to draw; columns as in a trial file."""
-    names = {name: signal_name(name) for name in one.measured if name in one.before}
+    names = {name: signal_display_name(name) for name in one.measured if name in one.before}
 
-    def columns(values: Mapping[str, Vector]) -> dict[str, list[float]]:
+    def columns(values: Mapping[str, Array]) -> dict[str, list[float]]:
         own = {column.file: column.factor * values[name] for name, column in names.items()}
         return drawn_columns({"t_s": one.time_s, **own}, _REPLAY_SAMPLES)
 

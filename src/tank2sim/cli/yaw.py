@@ -13,7 +13,7 @@ from rich.markup import escape
 
 from tank2sim.cards import ManoeuvringCard, YawRigCard, parse_card, read_card
 from tank2sim.cards.form import YawRig
-from tank2sim.cli.screen import json_option, json_text, screen, show_notices, show_table
+from tank2sim.cli.console import json_option, json_text, screen, show_notices, show_table
 from tank2sim.dynamics.yaw_programme import Similarity, YawProgramme, programme_of
 from tank2sim.dynamics.yaw_theory import FloatingBody, TheoryValue, theory_values
 from tank2sim.errors import InputError
@@ -28,14 +28,14 @@ from tank2sim.identification.yaw.card import (
     with_nrdot,
 )
 from tank2sim.identification.yaw.identify import (
-    METHODS,
+    YAW_METHODS,
     YawOptions,
     YawResult,
     identify_yaw,
     parse_yaw_terms,
     torque_constant,
 )
-from tank2sim.identification.yaw.intervals import TERMS
+from tank2sim.identification.yaw.intervals import ENERGY_TERMS
 from tank2sim.records.yaw import Medium, read_yaw_record, yaw_record_text
 from tank2sim.simulation.yaw_rig_control import AdaptiveController, Controller
 
@@ -85,11 +85,11 @@ class _Asked:
 @click.option("--reference", type=click.Path(path_type=Path), metavar="AIR.csv", help="Take k_t from a body in air ...")
 @click.option("--reference-inertia-kgm2", "reference_inertia", type=_POSITIVE, help="... of this known inertia.")
 @click.option("--rig", metavar="CARD", help="Card of the rig: its walls, gravity, accelerating and braking count.")
-@click.option("--terms", metavar="LIST", help=f"Terms beside the inertia, of {', '.join(list(TERMS)[1:])}.")
+@click.option("--terms", metavar="LIST", help=f"Terms beside the inertia, of {', '.join(list(ENERGY_TERMS)[1:])}.")
 @click.option("--mirror-percent", type=click.FloatRange(0, 1000), default=25.0, show_default=True,
               help="Largest difference of mirror images, % of the largest rate.")  # fmt: skip
 @click.option(
-    "--method", type=click.Choice(METHODS), default=BEST, show_default=True, help="Whose numbers a card gets."
+    "--method", type=click.Choice(YAW_METHODS), default=BEST, show_default=True, help="Whose numbers a card gets."
 )
 @click.option("--card", metavar="SHIP", help="Put N_rdot into this ship's card; else -o writes a card of the rig.")
 @click.option("--theory", metavar="L,B,T,H[,CB]",
@@ -121,8 +121,8 @@ def command(records: tuple[Path, ...], *, simulate: str | None, **options: objec
     if asked.json_file:
         contents[asked.json_file] = json_text({**result.as_json(), "theory": [asdict(own) for own in theory]})
     if asked.page:
-        from tank2sim.report.page import render_page
-        from tank2sim.report.yaw_page import yaw_page
+        from tank2sim.report.kit.page import render_page
+        from tank2sim.report.yaw.page import yaw_page
 
         contents[asked.page] = render_page(yaw_page(result, theory))
     inputs = [*records, *([asked.reference] if asked.reference else [])]

@@ -8,27 +8,27 @@ import control
 import numpy as np
 
 from tank2sim.analysis.linearisation import state_space, straight_course
-from tank2sim.analysis.stability.imo import Criterion, imo_criteria
+from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
 from tank2sim.analysis.stability.straight_line import Stability, stability
-from tank2sim.cards import linear, read_card
-from tank2sim.demo.workshop import Outcome, Workshop, error_words, largest_error, output_errors
+from tank2sim.arrays import Array
+from tank2sim.cards import linear_card, read_card
+from tank2sim.demo.fmu_helpers import DemoOutcome, Workshop, demo_output_errors, error_words, largest_error
 from tank2sim.dynamics import Model, build
-from tank2sim.dynamics.model import Vector
 from tank2sim.fmu.check import CheckReport
-from tank2sim.fmu.manoeuvre import Manoeuvre
+from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.replay import replay
-from tank2sim.report.charts import (
+from tank2sim.report.kit.charts import (
     FrequencyResponse,
     History,
-    Track,
+    TrackData,
     bode_chart,
     chart_png,
     error_chart,
     history_chart,
     track_chart,
 )
-from tank2sim.report.page import Cell, Column, Figure, Illustration, Section, Table, Verdict
-from tank2sim.report.runs import SHIP_SIGNALS, history_of, signals_of, track_of
+from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, PageSection, PageTable, Verdict
+from tank2sim.report.kit.run_series import SHIP_SIGNALS, history_of, signals_of, track_data
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trial_file import trial_csv
@@ -38,10 +38,10 @@ MANOEUVRES = {"turn-35": "turn:35", "zigzag-20-20": "zigzag:20/20"}
 THIRD, FIRST, IN_FMU = "third order", "linear", "third order, FMU through fmpy"
 
 
-def mariner(workshop: Workshop) -> Outcome:
+def mariner(workshop: Workshop) -> DemoOutcome:
     """Export and check four FMUs, simulate two manoeuvres on the desk and in the FMU, judge stability."""
     card = read_card("mariner")
-    cards = {THIRD: card, FIRST: linear(card)}
+    cards = {THIRD: card, FIRST: linear_card(card)}
     models = {name: build(one) for name, one in cards.items()}
     names = {THIRD: "mariner", FIRST: "mariner-linear"}
     checked = [workshop.checked_fmu(cards[kind], models[kind], names[kind], fmi) for kind in names for fmi in (2, 3)]
@@ -67,24 +67,24 @@ def mariner(workshop: Workshop) -> Outcome:
         "imo": [criterion.as_json() for criterion in criteria],
         "checks": [report.as_json() for report in reports],
     }
-    return Outcome(figures, sections, result)
+    return DemoOutcome(figures, sections, result)
 
 
-def _in_fmu(model: Model, path: Path, run: Run) -> dict[str, Vector]:
+def _in_fmu(model: Model, path: Path, run: Run) -> dict[str, Array]:
     """The same orders through the FMU; communication points are the samples of the run, its switches among them."""
     motion = run.trajectory
-    return replay(path, Manoeuvre(motion.t, motion.u[:-1]), model)
+    return replay(path, InputSequence(motion.t, motion.u[:-1]), model)
 
 
 def _manoeuvre_section(
-    workshop: Workshop, name: str, text: str, run: dict[str, Run], fmu: dict[str, Vector]
-) -> Section:
+    workshop: Workshop, name: str, text: str, run: dict[str, Run], fmu: dict[str, Array]
+) -> PageSection:
     third, first = run[THIRD].trajectory, run[FIRST].trajectory
     tracks = track_chart(
         [
-            track_of(f"{THIRD}, CasADi", third),
-            Track(label=IN_FMU, x_m=fmu["motion.x"], y_m=fmu["motion.y"], time_s=third.t),
-            track_of(f"{FIRST}, CasADi", first),
+            track_data(f"{THIRD}, CasADi", third),
+            TrackData(label=IN_FMU, x_m=fmu["motion.x"], y_m=fmu["motion.y"], time_s=third.t),
+            track_data(f"{FIRST}, CasADi", first),
         ],
         title=f"{text}: tracks",
     )
@@ -101,7 +101,7 @@ def _manoeuvre_section(
     workshop.write(f"mariner-{name}-track.png", chart_png(tracks))
     workshop.write(f"mariner-{name}-history.png", chart_png(histories))
     apart = np.hypot(fmu["motion.x"] - third["motion.x"], fmu["motion.y"] - third["motion.y"])
-    return Section(
+    return PageSection(
         heading=f"Mariner: {text}",
         text=f"The FMU, given the same orders through fmpy, stays within {apart.max():.1e} m of the CasADi model.",
         tables=[_figure_table(run)],
@@ -115,7 +115,7 @@ def _manoeuvre_section(
     )
 
 
-def _figure_table(run: dict[str, Run]) -> Table:
+def _figure_table(run: dict[str, Run]) -> PageTable:
     rows: list[list[Cell]] = []
     for name, value in run[THIRD].figures.items():
         words, unit = in_words(name)
@@ -127,10 +127,10 @@ def _figure_table(run: dict[str, Run]) -> Table:
         else:
             rows.append([words, *(_cell(each) for each in both), unit])
     columns = [Column(title="figure"), *(Column(title=kind) for kind in run), Column(title="unit")]
-    return Table(caption="Manoeuvring figures", columns=columns, rows=rows)
+    return PageTable(caption="Manoeuvring figures", columns=columns, rows=rows)
 
 
-def _fmu_section(reports: list[CheckReport]) -> Section:
+def _fmu_section(reports: list[CheckReport]) -> PageSection:
     rows: list[list[Cell]] = [
         [
             report.path.rpartition("/")[2],
@@ -144,12 +144,12 @@ def _fmu_section(reports: list[CheckReport]) -> Section:
         for kind, errors in report.errors.items()
     ]
     heads = ("file", "standard", "kind", "largest error", "limit", "verdict")
-    table = Table(
+    table = PageTable(
         caption="Largest error of any output, relative to its range in the run",
         columns=[Column(title=head, digits=2) for head in heads],
         rows=rows,
     )
-    return Section(
+    return PageSection(
         heading="Four FMUs of the Mariner, checked",
         text=(
             "Each file was validated by FMPy and driven through steps of rudder and a failure of the steering gear. "
@@ -159,15 +159,15 @@ def _fmu_section(reports: list[CheckReport]) -> Section:
         tables=[table],
         charts=[
             Illustration(
-                chart=error_chart(output_errors(reports[:2]), title="Errors of the third-order FMUs by output")
+                chart=error_chart(demo_output_errors(reports[:2]), title="Errors of the third-order FMUs by output")
             )
         ],
     )
 
 
 def _stability_section(
-    models: dict[str, Model], judged: dict[str, Stability], criteria: tuple[Criterion, ...]
-) -> Section:
+    models: dict[str, Model], judged: dict[str, Stability], criteria: tuple[ImoCriterion, ...]
+) -> PageSection:
     point = straight_course(models[THIRD])
     channel = {"inputs": ["rudder.command"], "outputs": ["motion.r"]}
     system = state_space(models[THIRD], point, states=["motion.v", "motion.r", "rudder.angle"], **channel)
@@ -184,12 +184,12 @@ def _stability_section(
     )
     verdicts = {True: Verdict.PASSED, False: Verdict.FAILED, None: Verdict.NONE}
     rows = [[one.name, one.found, one.allowed, one.unit, verdicts[one.passed]] for one in criteria]
-    imo = Table(
+    imo = PageTable(
         caption="IMO MSC.137(76), the worse of the two sides",
         columns=[Column(title=head) for head in ("criterion", "found", "allowed", "unit", "verdict")],
         rows=rows,
     )
-    return Section(
+    return PageSection(
         heading="Mariner: stability",
         text=f"C′ = {judged[THIRD].criterion:.3g}: {_verdict(judged[THIRD])} on a straight course.",
         tables=[_nomoto_table(judged), imo],
@@ -201,33 +201,33 @@ def _verdict(judged: Stability) -> str:
     return "stable" if judged.stable else "unstable"
 
 
-def _nomoto_table(judged: dict[str, Stability]) -> Table:
+def _nomoto_table(judged: dict[str, Stability]) -> PageTable:
     times = [Column(title=name, unit="s") for name in ("T", "T1", "T2", "T3")]
     columns = [Column(title="model"), Column(title="K", unit="1/s"), *times]
     rows = [[kind, *vars(one.nomoto).values()] for kind, one in judged.items()]
-    return Table(caption="Nomoto's coefficients at the speed of expansion", columns=columns, rows=rows)
+    return PageTable(caption="Nomoto's coefficients at the speed of expansion", columns=columns, rows=rows)
 
 
-def _figures(reports: list[CheckReport], turn: Run, zigzag: Run, judged: Stability) -> list[Figure]:
+def _figures(reports: list[CheckReport], turn: Run, zigzag: Run, judged: Stability) -> list[KeyFigure]:
     overshoots = zigzag.figures["overshoots_deg"]
     assert isinstance(overshoots, list)
     same, exact = (largest_error(reports, kind) for kind in ("CoSimulation", "ModelExchange"))
     return [
-        Figure(
+        KeyFigure(
             label="Mariner's FMUs, Co-Simulation",
             value=error_words(same),
             verdict=Verdict.PASSED,
             note="same scheme, relative",
         ),
-        Figure(
+        KeyFigure(
             label="Mariner's FMUs, Model Exchange",
             value=error_words(exact),
             verdict=Verdict.PASSED,
             note="exact solution, relative",
         ),
-        Figure(label="Tactical diameter at 35°", value=_number(turn.figures["tactical_diameter_m"]), unit="m"),
-        Figure(label="First overshoot of 20/20", value=overshoots[0], unit="deg"),
-        Figure(
+        KeyFigure(label="Tactical diameter at 35°", value=_number(turn.figures["tactical_diameter_m"]), unit="m"),
+        KeyFigure(label="First overshoot of 20/20", value=overshoots[0], unit="deg"),
+        KeyFigure(
             label="Straight-line stability",
             value=_verdict(judged),
             verdict=Verdict.PASSED if judged.stable else Verdict.CAUTION,

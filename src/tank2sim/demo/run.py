@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from tank2sim.demo.fmu_helpers import Workshop
 from tank2sim.demo.mariner import mariner
 from tank2sim.demo.towed import towed_vehicle
-from tank2sim.demo.workshop import Workshop
-from tank2sim.report.page import Page, render_page
+from tank2sim.report.kit.page import Page, render_page
 
 PAGE = "report.html"
 
-STEPS = 18
+DEMO_STEPS = 18
 """How often the demo says what it is doing."""
 
 
 def run_demo(folder: Path, tell: Callable[[str], None]) -> dict[str, object]:
-    """Run the demo into an existing folder; `tell` is called at each of :data:`STEPS`. Returns the steps' figures.
+    """Run the demo into an existing folder; `tell` is called at each of :data:`DEMO_STEPS`. Returns the steps' figures.
 
     A demo that is stopped half-way leaves whole files of what it had finished, and a second one replaces them.
 

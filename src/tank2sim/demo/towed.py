@@ -7,19 +7,20 @@ from pathlib import Path
 import altair as alt
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.bundled import bundled
 from tank2sim.cards import parse_card
-from tank2sim.demo.workshop import Outcome, Workshop, error_words, largest_error
+from tank2sim.demo.fmu_helpers import DemoOutcome, Workshop, error_words, largest_error
 from tank2sim.dynamics import build
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.dynamics.model import Model
 from tank2sim.fmu.check import CheckReport
-from tank2sim.fmu.manoeuvre import Manoeuvre
+from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.replay import replay
 from tank2sim.identification.tow.card import tow_card_text
 from tank2sim.identification.tow.identify import TowResult, identify_tow
 from tank2sim.records.tows import Tows, read_tows
-from tank2sim.report.charts import Tow, chart_png, tow_chart
-from tank2sim.report.page import Column, Figure, Illustration, Section, Table, Verdict
+from tank2sim.report.kit.charts import Tow, chart_png, tow_chart
+from tank2sim.report.kit.page import Column, Illustration, KeyFigure, PageSection, PageTable, Verdict
 
 WELL_POSED = ("B3",)
 """Drag terms that these tows can tell (with M); the paper's B1 and B2 beside them cannot be identified."""
@@ -31,7 +32,7 @@ LENGTH_M = 3.8
 """Of the vehicle, paper 1."""
 
 
-def towed_vehicle(workshop: Workshop) -> Outcome:
+def towed_vehicle(workshop: Workshop) -> DemoOutcome:
     """Identify, write the card, export and check the FMU, and tow it through fmpy beside the measured tows."""
     workshop.tell("five tows of an underwater vehicle: identifying mass and drag")
     tows = read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
@@ -54,18 +55,18 @@ def towed_vehicle(workshop: Workshop) -> Outcome:
         "tows": misses,
         "checks": [report.as_json() for report in reports],
     }
-    return Outcome(_figures(chosen, misses, reports), [_section(paper, chosen, misses, chart)], result)
+    return DemoOutcome(_figures(chosen, misses, reports), [_section(paper, chosen, misses, chart)], result)
 
 
-def _towed_again(model: Model, fmu: Path, tows: Tows, force_N: float) -> tuple[Vector, Vector]:
+def _towed_again(model: Model, fmu: Path, tows: Tows, force_N: float) -> tuple[Array, Array]:
     """Times (s) and speeds (m/s) of the FMU under the force of the tows."""
     # A tenth of the readings' interval, so that every reading falls on a communication point.
     times = np.linspace(tows.time_s[0], tows.time_s[-1], 10 * (len(tows.time_s) - 1) + 1)
     held = np.full((len(times) - 1, 1), force_N)
-    return times, replay(fmu, Manoeuvre(times, held), model)["motion.u"]
+    return times, replay(fmu, InputSequence(times, held), model)["motion.u"]
 
 
-def _chart(tows: Tows, times: Vector, speed: Vector) -> alt.LayerChart:
+def _chart(tows: Tows, times: Array, speed: Array) -> alt.LayerChart:
     return tow_chart(
         [
             *(
@@ -78,8 +79,8 @@ def _chart(tows: Tows, times: Vector, speed: Vector) -> alt.LayerChart:
     )
 
 
-def _section(paper: TowResult, chosen: TowResult, misses: list[dict[str, float]], chart: alt.LayerChart) -> Section:
-    return Section(
+def _section(paper: TowResult, chosen: TowResult, misses: list[dict[str, float]], chart: alt.LayerChart) -> PageSection:
+    return PageSection(
         heading="A towed vehicle: from five tows to an FMU",
         text=(
             "An underwater vehicle was towed from rest by a known force (Wilinski and Zellman 1984, Table 1). Its mass "
@@ -101,22 +102,22 @@ def _section(paper: TowResult, chosen: TowResult, misses: list[dict[str, float]]
     )
 
 
-def _figures(chosen: TowResult, misses: list[dict[str, float]], reports: list[CheckReport]) -> list[Figure]:
+def _figures(chosen: TowResult, misses: list[dict[str, float]], reports: list[CheckReport]) -> list[KeyFigure]:
     fit = chosen.fits["output_error"]
     return [
-        Figure(
+        KeyFigure(
             label="Vehicle's mass with added mass",
             value=f"{fit.estimates['total_mass_kg']:.0f} ± {fit.standard_errors['total_mass_kg']:.0f}",
             unit="kg",
             note="from five tows, one standard error",
         ),
-        Figure(
+        KeyFigure(
             label="FMU against the tows",
             value=max(miss["largest_mps"] for miss in misses),
             unit="m/s",
             note="largest difference of any reading",
         ),
-        Figure(
+        KeyFigure(
             label="Vehicle's FMU against CasADi",
             value=error_words(largest_error(reports, "CoSimulation")),
             verdict=Verdict.PASSED,
@@ -125,7 +126,7 @@ def _figures(chosen: TowResult, misses: list[dict[str, float]], reports: list[Ch
     ]
 
 
-def _misses(tows: Tows, times: Vector, speed: Vector) -> list[dict[str, float]]:
+def _misses(tows: Tows, times: Array, speed: Array) -> list[dict[str, float]]:
     """Root mean square and largest difference of the FMU from each tow, m/s."""
     at_readings = np.interp(tows.time_s, times, speed)
     differences = tows.speed_mps - at_readings[:, None]
@@ -140,8 +141,8 @@ def _misses(tows: Tows, times: Vector, speed: Vector) -> list[dict[str, float]]:
     ]
 
 
-def _miss_table(misses: list[dict[str, float]]) -> Table:
-    return Table(
+def _miss_table(misses: list[dict[str, float]]) -> PageTable:
+    return PageTable(
         caption="The FMU beside each tow",
         columns=[
             Column(title="tow", digits=1),
@@ -153,7 +154,7 @@ def _miss_table(misses: list[dict[str, float]]) -> Table:
     )
 
 
-def _estimates(result: TowResult, caption: str) -> Table:
+def _estimates(result: TowResult, caption: str) -> PageTable:
     units = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m"}
     unknowns = next(iter(result.fits.values())).unknowns
     rows = []
@@ -164,4 +165,4 @@ def _estimates(result: TowResult, caption: str) -> Table:
     columns = [Column(title="method")]
     for name in unknowns:
         columns += [Column(title=name, unit=units[name]), Column(title="±", unit=units[name], digits=2)]
-    return Table(caption=caption, columns=[*columns, Column(title="condition", digits=2)], rows=rows)
+    return PageTable(caption=caption, columns=[*columns, Column(title="condition", digits=2)], rows=rows)

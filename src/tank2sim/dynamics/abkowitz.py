@@ -16,7 +16,7 @@ _EVEN_AND_ODD = (
     "0 0u 0uu v vvv vrr vdd vu vuu r rrr vvr rdd ru ruu d ddd vvd rrd du duu vrd".split()  # order of (3.8b)
 )
 
-TERMS: dict[str, tuple[str, ...]] = {
+ABKOWITZ_TERMS: dict[str, tuple[str, ...]] = {
     "X": tuple("X0 Xu Xuu Xuuu Xvv Xrr Xdd Xvvu Xrru Xddu Xvr Xvd Xrd Xvru Xvdu Xrdu".split()),
     "Y": tuple(f"Y{powers}" for powers in _EVEN_AND_ODD),
     "N": tuple(f"N{powers}" for powers in _EVEN_AND_ODD),
@@ -26,7 +26,7 @@ TERMS: dict[str, tuple[str, ...]] = {
 ACCELERATION_TERMS: tuple[str, ...] = ("Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot")
 """Acceleration derivatives kept in (3.7)."""
 
-ALL_TERMS: tuple[str, ...] = (*TERMS["X"], *TERMS["Y"], *TERMS["N"], *ACCELERATION_TERMS)
+ALL_TERMS: tuple[str, ...] = (*ABKOWITZ_TERMS["X"], *ABKOWITZ_TERMS["Y"], *ABKOWITZ_TERMS["N"], *ACCELERATION_TERMS)
 """The 65 derivatives of the third-order model."""
 
 LINEAR_TERMS: dict[str, tuple[str, ...]] = {

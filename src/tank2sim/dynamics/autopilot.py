@@ -69,7 +69,7 @@ def autopilot_model(name: str, gains: HeadingGains, step_s: float) -> Model:
     psi, r, command = inputs = heading_signals()
     Kp, Kd, Ki, band = parameters = _parameters(gains)
     error = heading_error(psi, command)
-    held = HeldRudder(gains.anti_windup_time_s, gains.largest_rudder_rad)
+    held = IntegralState(gains.anti_windup_time_s, gains.largest_rudder_rad)
     demand = Kp.symbol * error.symbol - Kd.symbol * r.symbol
     if gains.integral == 0:
         own, described = held.without_integral(demand), "Heading autopilot: PD with limits"
@@ -80,7 +80,7 @@ def autopilot_model(name: str, gains: HeadingGains, step_s: float) -> Model:
 
 
 @dataclass(frozen=True)
-class HeldRudder:
+class IntegralState:
     """The integral of a controller, its limit and its anti-windup: all that is alike in every design.
 
     Parameters

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from tank2sim.dynamics.autopilot import HeldRudder, heading_error, heading_signals, steered_by, within
-from tank2sim.dynamics.model import Model, Parameter, Quantity, State, Variable, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.autopilot import IntegralState, heading_error, heading_signals, steered_by, within
+from tank2sim.dynamics.model import Model, Parameter, Quantity, State, Variable
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,9 +40,9 @@ class LinearLaw:
         Tt, s; and the limit of the order, rad.
     """
 
-    rates: Vector
-    demand: Vector
-    growth: Vector
+    rates: Array
+    demand: Array
+    growth: Array
     growth_limit_radps: float
     anti_windup_time_s: float
     largest_rudder_rad: float
@@ -71,7 +72,7 @@ def linear_autopilot_model(name: str, description: str, law: LinearLaw, step_s: 
         nominal=law.growth_limit_radps,
         start=law.growth_limit_radps,
     )
-    held = HeldRudder(law.anti_windup_time_s, law.largest_rudder_rad).variables(
+    held = IntegralState(law.anti_windup_time_s, law.largest_rudder_rad).variables(
         _row(law.demand, seen), within(_row(law.growth, seen), most.symbol)
     )
     order = next(one for one in held if one.name == "rudder.command")
@@ -80,7 +81,7 @@ def linear_autopilot_model(name: str, description: str, law: LinearLaw, step_s: 
     return steered_by(name, description, given, held, step_s)
 
 
-def _row(coefficients: Vector, of: ca.SX) -> ca.SX:
+def _row(coefficients: Array, of: ca.SX) -> ca.SX:
     return ca.dot(ca.DM(np.asarray(coefficients)), of)
 
 

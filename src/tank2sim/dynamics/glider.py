@@ -16,9 +16,9 @@ import casadi as ca
 from tank2sim.cards.card import GliderCard
 from tank2sim.dynamics.glider_forces import (
     Attitude,
-    accelerations,
     drag_coefficient,
     forces,
+    glider_accelerations,
     lift_coefficient,
     momentum,
 )
@@ -40,7 +40,7 @@ _PITCH = 0.5
 """Pitch of the dive in which an FMU starts, 28.6 deg: the paper's sample dives at 30 deg have 27.8 deg."""
 
 
-def cautions(card: GliderCard) -> tuple[str, ...]:
+def glider_warnings(card: GliderCard) -> tuple[str, ...]:
     """What to tell of a card: a displaced volume that does not carry its mass, and an area that is V^(2/3).
 
     Both are so in the paper's own data.
@@ -91,7 +91,7 @@ def glider_model(card: GliderCard) -> Model:
         ),
         step_s=_step(card),
         notices=(
-            *cautions(card),
+            *glider_warnings(card),
             "the attitude is prescribed, the glider does not slip sideways, and its added masses are estimates",
         ),
     )
@@ -268,7 +268,7 @@ def _dynamics(symbols: dict[str, ca.SX], card: GliderCard) -> list[Quantity]:
         for name in ("pitch", "roll")
     ]
     others = ca.jacobian(carried, at.pitch) * rates[0] + ca.jacobian(carried, at.roll) * rates[1]
-    udot, wdot, turn = ca.vertsplit(accelerations(at, carried, force, others))
+    udot, wdot, turn = ca.vertsplit(glider_accelerations(at, carried, force, others))
     weight = card.glider.buoyancy_kg * card.environment.gravity_mps2
     worth = (LARGEST_INCIDENCE - abs(incidence)) / (LARGEST_INCIDENCE - SMALL_INCIDENCE)
     course = symbols["motion.psi"]

@@ -81,7 +81,7 @@ def forces(at: Attitude, lift_area: ca.SX, drag_area: ca.SX, buoyancy_N: ca.SX) 
     return at.speed * (lift_area * at.along_lift - drag_area * at.along_path) + ca.vertcat(0, 0, buoyancy_N)
 
 
-def accelerations(at: Attitude, momentum: ca.SX, force: ca.SX, others: ca.SX) -> ca.SX:
+def glider_accelerations(at: Attitude, momentum: ca.SX, force: ca.SX, others: ca.SX) -> ca.SX:
     """du/dt, dw/dt (m/s2) and the rate of the course (rad/s, + to starboard), (3, 1).
 
     dP/dt = F in axes that turn with the course: dP = P_u du + P_w dw + (what pitch and roll do) + dpsi (-P_2, P_1, 0).

@@ -10,9 +10,9 @@ import casadi as ca
 
 from tank2sim.cards.scaling import Scales
 from tank2sim.cards.terms import known_term
-from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, LINEAR_TERMS, TERMS, polynomial
+from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS, LINEAR_TERMS, polynomial
 from tank2sim.dynamics.low_speed import (
-    STILL,
+    STILL_SPEED,
     Forces,
     RudderAtU0,
     hull_forces,
@@ -23,7 +23,7 @@ from tank2sim.dynamics.low_speed import (
 )
 from tank2sim.dynamics.model import Quantity
 from tank2sim.dynamics.propulsion import propeller_force
-from tank2sim.dynamics.rigid_body import Inertia, accelerations, inertia, inertial_forces
+from tank2sim.dynamics.rigid_body import Inertia, inertia, inertial_forces, rigid_body_accelerations
 
 VALIDITY_MARGIN = 0.2
 """Above the card's range of speeds ``validity`` falls from 1 to 0 over this share of the speed of expansion.
@@ -89,7 +89,7 @@ def motion_quantities(hull: Hull) -> tuple[Quantity, ...]:
     X, Y, N = forces[-3:]
     masses = _inertia_quantities(hull)
     matrix = Inertia(*(mass.symbol for mass in masses))
-    motion = accelerations(matrix, X.symbol, Y.symbol, N.symbol)
+    motion = rigid_body_accelerations(matrix, X.symbol, Y.symbol, N.symbol)
     return (*forces, *masses, *_acceleration_quantities(motion), *_water_speed_quantities(hull))
 
 
@@ -101,7 +101,7 @@ def _scales_of_forces(hull: Hull) -> tuple[ca.SX, Scales]:
 
 def _terms(hull: Hull, force: str, with_rudder: bool) -> list[str]:
     """Terms of (3.5) or (3.8) in X, Y or N that hold the rudder's angle, or that do not."""
-    every = (LINEAR_TERMS if hull.linear else TERMS)[force]
+    every = (LINEAR_TERMS if hull.linear else ABKOWITZ_TERMS)[force]
     return [name for name in every if (known_term(name).d > 0) == with_rudder]
 
 
@@ -152,7 +152,7 @@ def _rudder_forces(hull: Hull) -> Forces:
     yaw = _ahead(hull, "N", u0, rudder=1)
     at_bound = _ahead(hull, "N", lowest_speed(hull.symbols), rudder=1)
     # A card whose rudder gives no moment has no ratio: the least is taken.
-    ratio = at_bound * yaw / (yaw**2 + (STILL**2 * at_u0.force) ** 2)
+    ratio = at_bound * yaw / (yaw**2 + (STILL_SPEED**2 * at_u0.force) ** 2)
     linear = RudderAtU0(_ahead(hull, "Y", u0, rudder=1), ratio)
     straight, swinging = rudder_factors(hull.symbols, hull.X_bound, linear)
     low = []
@@ -299,7 +299,7 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
         display_unit="deg",
         nominal=0.1,
         # asin(v/U) without its division by zero at rest
-        value=-ca.atan2(v, ca.sqrt(u**2 + (STILL * hull["ship.speed"]) ** 2)),
+        value=-ca.atan2(v, ca.sqrt(u**2 + (STILL_SPEED * hull["ship.speed"]) ** 2)),
     )
     u0 = hull["ship.speed"]
     yaw_rate = hull["motion.r"] * hull["ship.length"] / speed.symbol

@@ -8,7 +8,7 @@ import casadi as ca
 
 from tank2sim.dynamics.model import Parameter, Quantity, State, Variable
 
-STILL_MPS = 1e-8
+_STILL_MPS = 1e-8
 """Speed over ground below which a ship is at rest, so that speed and course have a slope there: a choice of ours. At
 0.1 m/s it changes the speed by less than 1e-14 of itself."""
 
@@ -18,7 +18,7 @@ def earth_velocity(u: ca.SX, v: ca.SX, psi: ca.SX) -> tuple[ca.SX, ca.SX]:
     return u * ca.cos(psi) - v * ca.sin(psi), u * ca.sin(psi) + v * ca.cos(psi)
 
 
-def kinematics(body: Mapping[str, Variable]) -> tuple[Variable, ...]:
+def planar_kinematics(body: Mapping[str, Variable]) -> tuple[Variable, ...]:
     """Variables of position and heading, and what follows from them over the ground.
 
     Parameters
@@ -120,7 +120,7 @@ def _over_ground(xdot: ca.SX, ydot: ca.SX, psi: ca.SX) -> tuple[Quantity, Quanti
             description="Speed over ground",
             display_unit="knots",
             nominal=5.0,
-            value=ca.sqrt(square + STILL_MPS**2),
+            value=ca.sqrt(square + _STILL_MPS**2),
         ),
         # Heading plus drift instead of atan2(east, north): no jump of a full turn while the ship circles.
         Quantity(
@@ -128,6 +128,6 @@ def _over_ground(xdot: ca.SX, ydot: ca.SX, psi: ca.SX) -> tuple[Quantity, Quanti
             unit="rad",
             description="Course over ground, clockwise from north, within half a turn of the heading (that at rest)",
             display_unit="deg",
-            value=psi + ca.atan2(starboard, forward + STILL_MPS * (square < STILL_MPS**2)),
+            value=psi + ca.atan2(starboard, forward + _STILL_MPS * (square < _STILL_MPS**2)),
         ),
     )

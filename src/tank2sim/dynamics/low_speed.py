@@ -47,7 +47,7 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.effects.particulars import particular
+from tank2sim.dynamics.effects.particulars import model_particular
 from tank2sim.dynamics.model import Parameter
 
 Symbols = Mapping[str, ca.SX]
@@ -65,7 +65,7 @@ BLEND = 0.5
 polynomial soon departs from the truth beyond its range, and as wide as the KVLCC2 needs to turn steadily within it. In
 the hull's surge force it is the cube of that: the Mariner's polynomial would drive her on with a stopped engine."""
 
-STILL = 1e-7
+STILL_SPEED = 1e-7
 """Speed over u0 at which the ship counts as at rest: a choice of ours. Above 0.1 u0 it changes U by less than 1e-12 of
 itself."""
 
@@ -116,7 +116,7 @@ def low_speed_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
 
     def length(key: str, name: str, description: str) -> Parameter:
         estimated = "" if getattr(card.ship, key) else " (estimated: the card states none)"
-        value = particular(card, key)
+        value = model_particular(card, key)
         return Parameter(
             name=name,
             unit="m",
@@ -172,8 +172,8 @@ def share_of_low_speed(s: Symbols) -> ca.SX:
 
 
 def regular_speed(s: Symbols) -> ca.SX:
-    """V, m/s: U, but :data:`STILL` u0 at rest, so that it has a slope there and may be divided by."""
-    return ca.sqrt(s["motion.u"] ** 2 + s["motion.v"] ** 2 + (STILL * s["ship.speed"]) ** 2)
+    """V, m/s: U, but :data:`STILL_SPEED` u0 at rest, so that it has a slope there and may be divided by."""
+    return ca.sqrt(s["motion.u"] ** 2 + s["motion.v"] ** 2 + (STILL_SPEED * s["ship.speed"]) ** 2)
 
 
 def nominal_thrust(s: Symbols, X_bound: ca.SX) -> ca.SX:
@@ -254,11 +254,16 @@ def rudder_factors(s: Symbols, X_bound: ca.SX, rudder: RudderAtU0) -> tuple[ca.S
     thrust = ca.fmax(0, nominal_thrust(s, X_bound)) / (1 - s["low_speed.thrust_deduction"])
     disc = ca.pi / 4 * s["ship.propeller_diameter"] ** 2
     # its root has a slope without thrust, too
-    race = 2 * thrust / ((1 - s["low_speed.wake_fraction"]) ** 2 * s["ship.water_density"] * disc) + (STILL * u0) ** 2
+    race = (
+        2 * thrust / ((1 - s["low_speed.wake_fraction"]) ** 2 * s["ship.water_density"] * disc)
+        + (STILL_SPEED * u0) ** 2
+    )
     k = ca.fmax(LEAST_RUDDER * (bound / u0) ** 2, ca.fmin(rudder.at_bound, 1))
     by_race = k * race / (bound**2 + race)
     # As a quotient of the two bounds' inverses it is regular for a card without Y_d.
-    by_race = by_race / ca.fmax(1, by_race * ca.fabs(rudder.Y_slope) / (thrust + STILL**2 * ca.fabs(rudder.Y_slope)))
+    by_race = by_race / ca.fmax(
+        1, by_race * ca.fabs(rudder.Y_slope) / (thrust + STILL_SPEED**2 * ca.fabs(rudder.Y_slope))
+    )
     by_stream = (k - by_race) / bound**2
     ahead = ca.SX(1)
     if "propeller.speed" in s:

@@ -18,12 +18,11 @@ from typing import TypeVar
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.units import UNITS
 
-Vector = NDArray[np.float64]
 Kind = TypeVar("Kind", bound="Variable")
 
 
@@ -219,7 +218,7 @@ class Model:
         """Names of the parameters in the order of the vector p."""
         return tuple(variable.name for variable in self.parameters)
 
-    def input_values(self, changed: Mapping[str, float] | None = None) -> Vector:
+    def input_values(self, changed: Mapping[str, float] | None = None) -> Array:
         """The input vector u: start values, with those of `changed` (by name) in place of their own.
 
         Raises
@@ -245,7 +244,7 @@ class Model:
                 remedy = f"it lies between {low:g} and {high:g} {variable.unit}: {variable.description}"
                 raise InputError(self.origin, variable.name, f"cannot be {value:g} {variable.unit}", remedy)
 
-    def parameter_values(self, changed: Mapping[str, float] | None = None) -> Vector:
+    def parameter_values(self, changed: Mapping[str, float] | None = None) -> Array:
         """The parameter vector p: start values, with those of `changed` (by name) in place of their own."""
         return _values(self.parameters, changed or {})
 
@@ -423,7 +422,7 @@ class Model:
             raise ValueError(f"quantities define each other in a circle: {error.args[1]}") from None
 
 
-def _values(variables: tuple[Parameter, ...] | tuple[Input, ...], changed: Mapping[str, float]) -> Vector:
+def _values(variables: tuple[Parameter, ...] | tuple[Input, ...], changed: Mapping[str, float]) -> Array:
     unknown = set(changed) - {variable.name for variable in variables}
     if unknown:
         raise KeyError(f"no such variable: {', '.join(sorted(unknown))}")

@@ -51,7 +51,7 @@ def inertia(mass: Scalar, x_G: Scalar, yaw_inertia: Scalar, added: dict[str, Sca
     )
 
 
-def accelerations(inertia: Inertia, f1: Scalar, f2: Scalar, f3: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+def rigid_body_accelerations(inertia: Inertia, f1: Scalar, f2: Scalar, f3: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """(3.7): du/dt, dv/dt, dr/dt from the right-hand sides f1, f2, f3 of X, Y and N."""
     f4 = inertia.determinant
     # The divisions are of masses alone, so that generated code divides once in a step and not at each evaluation.

@@ -11,7 +11,7 @@ from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS, geographic
 from tank2sim.dynamics.hull import Hull, motion_quantities
-from tank2sim.dynamics.kinematics import kinematics, yaw_rate
+from tank2sim.dynamics.kinematics import planar_kinematics, yaw_rate
 from tank2sim.dynamics.low_speed import low_speed_parameters
 from tank2sim.dynamics.model import Model, Parameter, State, Variable
 from tank2sim.dynamics.propulsion import propulsion
@@ -21,10 +21,10 @@ from tank2sim.dynamics.steering_gear import steering_gear
 SINGULAR = "the mass matrix of sway and yaw is singular (f4 = 0)"
 NOT_POSITIVE = "mass with added mass is not positive (m - Xudot, m - Yvdot, J_z - Nrdot, f4)"
 
-STEPS_PER_LENGTH = 200
+_STEPS_PER_LENGTH = 200
 """Integration steps while the ship covers its own length (benchmarks/accuracy.py prints what halving them changes)."""
 
-OUTPUTS = (
+_OUTPUTS = (
     *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "motion.speed", "motion.beta"),
     *("motion.sog", "motion.cog", *GEOGRAPHIC_OUTPUTS),
     *("motion.udot", "motion.vdot", "motion.rdot", "rudder.angle"),
@@ -46,7 +46,7 @@ def ship_model(card: ManoeuvringCard) -> Model:
     gear, gear_notices = steering_gear(card.steering_gear, card.ship.length_m / card.model.speed_mps)
     engine = propulsion(card.propulsion) if card.propulsion else ()
     constants = (*_ship_parameters(card), *low_speed_parameters(card), *_derivative_parameters(card, names))
-    position = kinematics({state.name: state for state in body if isinstance(state, State)})
+    position = planar_kinematics({state.name: state for state in body if isinstance(state, State)})
     symbols = {variable.name: variable.symbol for variable in position}
     position = (*position, *geographic(symbols["motion.x"], symbols["motion.y"]))
     given = (*position, *body, *gear, *engine, *constants)
@@ -67,7 +67,7 @@ def ship_model(card: ManoeuvringCard) -> Model:
         step_s=_step(card),
         notices=(*notices, *gear_notices, *_without_yaw(card)),
     )
-    outputs = (*OUTPUTS, *(["propeller.speed_actual"] if engine else []))
+    outputs = (*_OUTPUTS, *(["propeller.speed_actual"] if engine else []))
     return empty.extend(*given, *motion_quantities(hull), outputs=outputs)
 
 
@@ -134,8 +134,8 @@ def _is_positive(matrix: Inertia) -> bool:
 
 
 def _step(card: ManoeuvringCard) -> float:
-    """Step (s): :data:`STEPS_PER_LENGTH`, and five in a time constant of the gear, rounded down to 1, 2 or 5."""
-    wanted = card.ship.length_m / card.model.speed_mps / STEPS_PER_LENGTH
+    """Step (s): :data:`_STEPS_PER_LENGTH`, and five in a time constant of the gear, rounded down to 1, 2 or 5."""
+    wanted = card.ship.length_m / card.model.speed_mps / _STEPS_PER_LENGTH
     if card.steering_gear and card.steering_gear.time_constant_s:
         wanted = min(wanted, card.steering_gear.time_constant_s / 5)
     decade = 10.0 ** math.floor(math.log10(wanted))

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.dynamics.ellipsoid import lamb_coefficients
 from tank2sim.dynamics.surge import SurgeCoefficients
-
-Vector = NDArray[np.float64]
 
 WATER_KGPM3 = 1000.0
 """Density that the paper calculates with."""
@@ -68,7 +66,7 @@ class TowedBody:
             raise ValueError("the height needs a breadth")
         return 6 * self.volume_m3 / (math.pi * self.length_m * self.beam_m)
 
-    def reynolds(self, speed_mps: Vector) -> Vector:
+    def reynolds(self, speed_mps: Array) -> Array:
         """Re = v L / nu."""
         return np.asarray(speed_mps) * self.length_m / self.viscosity_m2ps
 
@@ -81,7 +79,7 @@ class DragPolynomial:
     A2_spm: float
     A3: float
 
-    def at(self, speed_mps: Vector) -> Vector:
+    def at(self, speed_mps: Array) -> Array:
         """C at speeds >= 0."""
         v = np.asarray(speed_mps)
         return self.A3 + v * (self.A2_spm + v * self.A1_s2pm2)

@@ -13,15 +13,13 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PPoly
 
+from tank2sim.arrays import Array
 from tank2sim.cards.card import YawRigCard
 
-Vector = NDArray[np.float64]
-
-KINDS = ("unidirectional", "reversing")
-Kind = Literal["unidirectional", "reversing"]
+PROGRAMME_KINDS = ("unidirectional", "reversing")
+ProgrammeKind = Literal["unidirectional", "reversing"]
 
 _REST = 4.0
 """Length of a hump with its rest, in rise times: t8 = t7 + t4 - t3."""
@@ -30,9 +28,9 @@ _REST = 4.0
 class Reference(NamedTuple):
     """Programmed angle (rad), rate (rad/s) and acceleration (rad/s2), each (times,)."""
 
-    angle_rad: Vector
-    rate_radps: Vector
-    acceleration_radps2: Vector
+    angle_rad: Array
+    rate_radps: Array
+    acceleration_radps2: Array
 
 
 class MirrorPair(NamedTuple):
@@ -71,7 +69,7 @@ class YawProgramme:
     max_rate_radps: float
     rise_s: float
     settle_s: float = 0.5
-    kind: Kind = "unidirectional"
+    kind: ProgrammeKind = "unidirectional"
     humps: int = 5
     start_s: float = 0.0
 
@@ -112,7 +110,7 @@ class YawProgramme:
         """Angle swept from t1 + t_Delta to t2 - t_Delta: the mean rate there is half of w_m."""
         return abs(self.max_rate_radps) / 2 * (2 / 3 * self.rise_s - 2 * self.settle_s)
 
-    def at(self, time_s: Vector) -> Reference:
+    def at(self, time_s: Array) -> Reference:
         """The programmed motion at times (n,); at rest before the start and after the end."""
         own = np.clip(np.asarray(time_s, dtype=float), self.start_s, self.end_s) - self.start_s
         hump = np.minimum(np.floor(own / self.period_s), self.humps - 1)
@@ -156,7 +154,7 @@ class YawProgramme:
         return self._hump.antiderivative()
 
 
-PAPER = YawProgramme(max_rate_radps=math.pi / 12, rise_s=40 / 9)
+PAPER_PROGRAMME = YawProgramme(max_rate_radps=math.pi / 12, rise_s=40 / 9)
 """The paper's programme: 15 deg/s, t3 = 13.33 s / 3."""
 
 
@@ -170,7 +168,7 @@ def programme_of(card: YawRigCard) -> YawProgramme:
     """
     own = card.programme
     if own is None:
-        return PAPER
+        return PAPER_PROGRAMME
     try:
         programme = YawProgramme(
             max_rate_radps=own.max_rate_radps,
@@ -213,7 +211,9 @@ class Similarity:
         """Model rate over ship rate, (L*/L) sqrt(B/B*): the paper's sqrt(lambda), no scale of lengths."""
         return self.ship_length_m / self.length_m * math.sqrt(self.beam_m / self.ship_beam_m)
 
-    def programme(self, ship_rate_radps: float, ship_time_s: float, like: YawProgramme = PAPER) -> YawProgramme:
+    def programme(
+        self, ship_rate_radps: float, ship_time_s: float, like: YawProgramme = PAPER_PROGRAMME
+    ) -> YawProgramme:
         """The programme whose humps (t7) are the ship's motion of `ship_time_s` with the rate `ship_rate_radps`.
 
         Kind, number and settling are those of the programme `like`; raises as :class:`YawProgramme`.

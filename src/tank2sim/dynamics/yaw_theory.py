@@ -15,7 +15,7 @@ from tank2sim.dynamics.ellipsoid import lamb_coefficients
 
 Stage = Literal["accelerating", "braking"]
 
-WATER_KGPM3 = 1000.0
+_WATER_KGPM3 = 1000.0
 """Density that the paper calculates with."""
 GRAVITY_MPS2 = 9.80665
 
@@ -33,7 +33,7 @@ class FloatingBody:
     draught_m: float
     depth_m: float
     block_coefficient: float | None = None
-    density_kgpm3: float = WATER_KGPM3
+    density_kgpm3: float = _WATER_KGPM3
 
     @property
     def block(self) -> float:

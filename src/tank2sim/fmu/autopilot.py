@@ -13,7 +13,8 @@ import numpy as np
 
 from tank2sim.analysis.heading.designs import HeadingDesign
 from tank2sim.analysis.heading.runs import HeadingLoop
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.export import ExportedFmu, make_fmu
@@ -30,9 +31,9 @@ _SEEN = ("motion.psi", "motion.r")
 class SteeredRun:
     """Two FMUs together, at their communication points (n,): s, and rad."""
 
-    time_s: Vector
-    heading_rad: Vector
-    order_rad: Vector
+    time_s: Array
+    heading_rad: Array
+    order_rad: Array
 
 
 def make_autopilot_fmu(
@@ -108,7 +109,7 @@ def _opened(stack: ExitStack, path: Path, names: Sequence[str]) -> RunningFmu:
 
 
 @dataclass(frozen=True)
-class Agreement:
+class LoopDifference:
     """Largest difference of heading (deg) from the closed loop in one model, by communication step (s)."""
 
     error_deg: Mapping[float, float]
@@ -126,9 +127,9 @@ class Agreement:
         return {"steps": rows, "order": self.order}
 
 
-def agreement(
+def loop_difference(
     ship: Model, design: HeadingDesign, fmus: tuple[Path, Path], heading_rad: float, *, steps_s: Sequence[float]
-) -> Agreement:
+) -> LoopDifference:
     """Hold the co-simulation of two FMUs against the closed loop simulated as one model.
 
     Parameters
@@ -150,21 +151,21 @@ def agreement(
     for step in steps_s:
         run = co_simulate_heading(*fmus, heading_rad, step_s=step, duration_s=duration)
         errors[step] = _difference(run, direct.t, direct["motion.psi"])
-    return Agreement(errors)
+    return LoopDifference(errors)
 
 
-def _difference(run: SteeredRun, time: Vector, heading: Vector) -> float:
+def _difference(run: SteeredRun, time: Array, heading: Array) -> float:
     return float(np.degrees(np.abs(run.heading_rad - np.interp(run.time_s, time, heading)).max()))
 
 
-def verify_together(ship: Model, design: HeadingDesign, made: ExportedFmu) -> Agreement:
+def verify_together(ship: Model, design: HeadingDesign, made: ExportedFmu) -> LoopDifference:
     """The agreement of an autopilot's FMU with a ship's of the same version of FMI, on a change of course by 20 deg.
 
-    Communication steps are 2, 4, 10 and 20 steps of the ship's integration. Raises as :func:`agreement`.
+    Communication steps are 2, 4, 10 and 20 steps of the ship's integration. Raises as :func:`loop_difference`.
     """
     steps = [count * ship.step_s for count in (20, 10, 4, 2)]
     with tempfile.TemporaryDirectory(prefix="tank2sim-") as folder:
         paths = Path(folder) / "ship.fmu", Path(folder) / "autopilot.fmu"
         paths[0].write_bytes(make_fmu(ship, fmi=made.fmi).content)
         paths[1].write_bytes(made.content)
-        return agreement(ship, design, paths, math.radians(20.0), steps_s=steps)
+        return loop_difference(ship, design, paths, math.radians(20.0), steps_s=steps)

@@ -13,17 +13,18 @@ from typing import Any
 
 from fmpy.validation import validate_fmu
 
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.fmu.comparison import description_differences
 from tank2sim.fmu.interface import MAX_STEP, interface
-from tank2sim.fmu.manoeuvre import Manoeuvre, manoeuvre
+from tank2sim.fmu.manoeuvre import InputSequence, manoeuvre
 from tank2sim.fmu.process import Drive, drive_apart
-from tank2sim.fmu.reference import by_scheme, exactly, output_errors, relative_errors
+from tank2sim.fmu.reference import by_scheme, exactly, reference_errors, relative_errors
 from tank2sim.fmu.reference_run import read_reference
-from tank2sim.fmu.unpacking import Kind, UnpackedFmu, unpack
+from tank2sim.fmu.unpacking import FmuType, UnpackedFmu, unpack
 
-LIMITS: dict[Kind, float] = {"ModelExchange": 1e-6, "CoSimulation": 1e-9}
+LIMITS: dict[FmuType, float] = {"ModelExchange": 1e-6, "CoSimulation": 1e-9}
 """Largest error allowed. Co-Simulation is held against the same scheme, Model Exchange against the exact solution."""
 
 
@@ -50,13 +51,13 @@ class CheckReport:
 
     path: str
     fmi: int
-    kinds: tuple[Kind, ...]
+    kinds: tuple[FmuType, ...]
     validation: tuple[str, ...]
     compared: bool
     differences: tuple[str, ...] = ()
-    errors: dict[Kind, dict[str, float]] = field(default_factory=dict)
+    errors: dict[FmuType, dict[str, float]] = field(default_factory=dict)
     max_error: dict[str, float] = field(default_factory=dict)
-    limits: dict[Kind, float] = field(default_factory=lambda: dict(LIMITS))
+    limits: dict[FmuType, float] = field(default_factory=lambda: dict(LIMITS))
     duration_s: float = 0.0
     reference_error: float | None = None
     passed: bool = False
@@ -111,17 +112,19 @@ def check_fmu(path: Path, *, model: Model | None = None) -> CheckReport:
     )
 
 
-def _compare(unpacked: UnpackedFmu, model: Model, run: Manoeuvre) -> tuple[list[str], dict[Kind, dict[str, float]]]:
+def _compare(
+    unpacked: UnpackedFmu, model: Model, run: InputSequence
+) -> tuple[list[str], dict[FmuType, dict[str, float]]]:
     differences = _name_differences(unpacked, model)
     if differences:
         return differences, {}
-    references: dict[Kind, Callable[[Model, Manoeuvre], Vector]] = {
+    references: dict[FmuType, Callable[[Model, InputSequence], Array]] = {
         "ModelExchange": exactly,
         "CoSimulation": by_scheme,
     }
     parameters = {parameter.name: float(parameter.start) for parameter in model.parameters} | {MAX_STEP: model.step_s}
     names = {"inputs": model.input_names, "outputs": model.outputs, "parameters": tuple(parameters)}
-    errors: dict[Kind, dict[str, float]] = {}
+    errors: dict[FmuType, dict[str, float]] = {}
     with ThreadPoolExecutor() as pool:  # the FMU runs in its processes while this one calculates what to expect
         answers = {
             kind: pool.submit(drive_apart, unpacked, Drive(kind=kind, run=run, **names)) for kind in unpacked.kinds
@@ -137,7 +140,7 @@ def _compare(unpacked: UnpackedFmu, model: Model, run: Manoeuvre) -> tuple[list[
                 differences.append(f"{kind}: {answer.problem}")
             if answer.outputs is not None:
                 found = dict(zip(model.outputs, answer.outputs.T, strict=True))
-                errors[kind] = output_errors(model, expected, found)
+                errors[kind] = reference_errors(model, expected, found)
     return differences, errors
 
 
@@ -180,7 +183,7 @@ def _name_differences(unpacked: UnpackedFmu, model: Model) -> list[str]:
     return differences
 
 
-def _parameter_differences(found: Vector, expected: dict[str, float]) -> list[str]:
+def _parameter_differences(found: Array, expected: dict[str, float]) -> list[str]:
     return [
         f"parameter {name} is {value!r} in the FMU and {expected[name]!r} in the model"
         for name, value in zip(expected, found.tolist(), strict=True)
@@ -188,6 +191,6 @@ def _parameter_differences(found: Vector, expected: dict[str, float]) -> list[st
     ]
 
 
-def _within(errors: dict[Kind, dict[str, float]]) -> bool:
+def _within(errors: dict[FmuType, dict[str, float]]) -> bool:
     # Written so that an error that is not a number fails.
     return all(error <= LIMITS[kind] for kind, found in errors.items() for error in found.values())

@@ -38,7 +38,7 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class Structure:
+class FmuStructure:
     """FMI's ModelStructure."""
 
     outputs: tuple[Unknown, ...]
@@ -47,7 +47,7 @@ class Structure:
     indicators: tuple[Unknown, ...]
 
 
-def structure(model: Model, interface: Interface) -> Structure:
+def fmu_structure(model: Model, interface: Interface) -> FmuStructure:
     """Dependencies of outputs and rates on states and inputs, and of initial values on parameters and inputs."""
     knowns = [
         *range(interface.states.begin, interface.states.end),
@@ -64,7 +64,7 @@ def structure(model: Model, interface: Interface) -> Structure:
     }
     outputs = [variable.reference for variable in interface.with_causality("output")]
     rates = range(interface.rates.begin, interface.rates.end)
-    return Structure(
+    return FmuStructure(
         outputs=tuple(while_running[reference] for reference in outputs),
         rates=tuple(while_running[reference] for reference in rates),
         initial_unknowns=_initial_unknowns(model, interface),

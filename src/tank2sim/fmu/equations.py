@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import casadi as ca
 
-from tank2sim.dynamics.kinks import kinks
+from tank2sim.dynamics.event_indicators import kinks
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.interface import other_outputs
 from tank2sim.simulation.scheme import step_and_constants
 
 
-def equations(model: Model) -> tuple[ca.Function, ...]:
+def fmu_equations(model: Model) -> tuple[ca.Function, ...]:
     """The functions that the C template calls, each on whole vectors x, u, p.
 
     ``model_constants(p) -> c`` and with them ``model_step(x, u, p, c, h) -> x``, ``model_rates(x, u, p) -> xdot``,

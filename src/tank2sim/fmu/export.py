@@ -19,7 +19,7 @@ from tank2sim.bundled import bundled
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.files import write_whole
-from tank2sim.fmu.dependencies import structure
+from tank2sim.fmu.dependencies import fmu_structure
 from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.interface import Interface, interface
 from tank2sim.fmu.libraries import Told, libraries, require_compilers
@@ -32,7 +32,7 @@ from tank2sim.fmu.unpacking import CARD_IN_FMU
 from tank2sim.units import UNITS
 
 if TYPE_CHECKING:
-    from tank2sim.fmu.evidence import Evidence
+    from tank2sim.fmu.acceptance import AcceptanceResult
 
 _EXPERIMENT_STEPS = 6000
 _EXPERIMENT_TOLERANCE = 1e-6
@@ -131,8 +131,8 @@ def description_text(model: Model, *, fmi: int) -> str:
     return render(f"modelDescription-fmi{fmi}.xml", _values(model, interface(model), fmi, Documents()))
 
 
-def _gathered(model: Model) -> Evidence:
-    from tank2sim.fmu.evidence import gather  # SciPy, which takes as long to load as a reference run
+def _gathered(model: Model) -> AcceptanceResult:
+    from tank2sim.fmu.acceptance import gather  # SciPy, which takes as long to load as a reference run
 
     return gather(model)
 
@@ -183,7 +183,7 @@ def _values(model: Model, described: Interface, fmi: int, documents: Documents) 
         "fmi": fmi,
         "identifier": c_identifier(model.name),
         "interface": described,
-        "structure": structure(model, described),
+        "structure": fmu_structure(model, described),
         "units": [UNITS[name] for name in sorted({variable.unit for variable in described.variables})],
         "sources": [],
         "experiment": {

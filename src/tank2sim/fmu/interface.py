@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from tank2sim.dynamics.kinks import kinks
+from tank2sim.dynamics.event_indicators import kinks
 from tank2sim.dynamics.model import Input, Model, Parameter, Variable
 from tank2sim.units import UNITS
 
@@ -80,7 +80,7 @@ class Block:
 class Interface:
     """All variables of an FMU, in blocks: time, states, inputs, parameters, largest step, rates, other outputs.
 
-    The event indicators (:func:`tank2sim.dynamics.kinks.kinks`) are the last of the other outputs.
+    The event indicators (:func:`tank2sim.dynamics.event_indicators.kinks`) are the last of the other outputs.
     A state or its rate that is an output of the model stands in its own block, with causality output. Boolean inputs
     and parameters are Boolean variables; a Boolean state or quantity is a real one with value 0 or 1, because in
     Model Exchange FMI lets discrete variables change at events only.

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tank2sim.arrays import Array
+
 if TYPE_CHECKING:  # the processes that drive an FMU import this module, and would wait for CasADi
-    from tank2sim.dynamics.model import Input, Model, Vector
+    from tank2sim.dynamics.model import Input, Model
 
 _STEP_PATTERN = (4.0, 2.5, 1.0)
 """Communication steps in internal steps, again and again: several, a number that is not whole, and one."""
@@ -24,7 +26,7 @@ _STAGGER = 0.02
 
 
 @dataclass(frozen=True)
-class Manoeuvre:
+class InputSequence:
     """Inputs at communication points.
 
     Parameters
@@ -35,8 +37,8 @@ class Manoeuvre:
         Inputs held from each point to the next.
     """
 
-    times: Vector
-    inputs: Vector
+    times: Array
+    inputs: Array
 
     def pieces(self) -> list[tuple[int, int]]:
         """Stretches of communication steps, first and behind last, over which no input changes."""
@@ -45,7 +47,7 @@ class Manoeuvre:
         return list(itertools.pairwise(edges))
 
 
-def manoeuvre(model: Model) -> Manoeuvre:
+def manoeuvre(model: Model) -> InputSequence:
     """A run of 3000 internal steps in which each real input goes one way, the other way and half-way back.
 
     A way is the input's nominal value or half of what its bound leaves, whichever is less (a rudder of 40 deg at most,
@@ -55,10 +57,10 @@ def manoeuvre(model: Model) -> Manoeuvre:
     shares = np.arange(len(steps)) / len(steps)
     columns = [_course(variable, shares - _STAGGER * place) for place, variable in enumerate(model.inputs)]
     inputs = np.column_stack(columns) if columns else np.empty((len(steps), 0))
-    return Manoeuvre(np.concatenate([[0.0], np.cumsum(steps)]), inputs)
+    return InputSequence(np.concatenate([[0.0], np.cumsum(steps)]), inputs)
 
 
-def _course(variable: Input, shares: Vector) -> Vector:
+def _course(variable: Input, shares: Array) -> Array:
     values = np.full(len(shares), float(variable.start))
     if variable.boolean:
         on, off = _BOOLEAN_SCHEDULE

@@ -17,14 +17,14 @@ from tank2sim.simulation.run import Run
 
 PASSPORT_FILE = f"{EXTRA}/passport.json"
 PASSPORT_PAGE = "documentation/passport.html"
-FORMAT = "tank2sim-passport/1"
+_FORMAT = "tank2sim-passport/1"
 
 # What a user sets is no coefficient of the ship.
 _NOT_OF_THE_SHIP = ("initial.", "origin.", "solver.")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Coefficient:
+class PassportCoefficient:
     """A coefficient: the FMU's variable that holds it and what it is, its value in `unit`, and where that is from."""
 
     variable: str
@@ -71,7 +71,7 @@ class Passport:
     source: str
     validity: str
     speed_range_mps: tuple[float, float] | None
-    coefficients: tuple[Coefficient, ...]
+    coefficients: tuple[PassportCoefficient, ...]
     notices: tuple[str, ...]
     figures: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     card_range: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
@@ -79,7 +79,7 @@ class Passport:
 
     def as_json(self) -> str:
         """The passport as JSON text, in ASCII; a number that is not finite is null."""
-        values = {"format": FORMAT, "written_by": f"tank2sim {version('tank2sim')}", **asdict(self)}
+        values = {"format": _FORMAT, "written_by": f"tank2sim {version('tank2sim')}", **asdict(self)}
         return json.dumps(_finite(values), indent=1, allow_nan=False) + "\n"
 
 
@@ -105,8 +105,8 @@ def passport(model: Model, documents: Documents, manoeuvres: Mapping[str, Run], 
     )
 
 
-def _coefficient(variable: Parameter | Input, origin: Origin) -> Coefficient:
-    return Coefficient(
+def _coefficient(variable: Parameter | Input, origin: Origin) -> PassportCoefficient:
+    return PassportCoefficient(
         variable=variable.name,
         description=variable.description,
         value=float(variable.start),

@@ -10,17 +10,15 @@ import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from fmpy.model_description import read_model_description
 
-from tank2sim.fmu.manoeuvre import Manoeuvre
+from tank2sim.arrays import Array
+from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.running import co_simulate, exchange, running
-from tank2sim.fmu.unpacking import Kind, UnpackedFmu
-
-if TYPE_CHECKING:
-    from tank2sim.dynamics.model import Vector
+from tank2sim.fmu.unpacking import FmuType, UnpackedFmu
 
 _LONGEST_S = 900.0
 _ENTRY = "import sys; from tank2sim.fmu.process import drive_here; drive_here(*sys.argv[1:])"
@@ -30,15 +28,15 @@ _ENTRY = "import sys; from tank2sim.fmu.process import drive_here; drive_here(*s
 class Drive:
     """What to drive an FMU through, and the names of the inputs, outputs (ny) and parameters (np) to write and read."""
 
-    kind: Kind
-    run: Manoeuvre
+    kind: FmuType
+    run: InputSequence
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     parameters: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Answer:
+class ProcessResult:
     """What came of it.
 
     Parameters
@@ -51,12 +49,12 @@ class Answer:
         What went wrong, in one line; empty if nothing.
     """
 
-    parameters: Vector | None = None
-    outputs: Vector | None = None
+    parameters: Array | None = None
+    outputs: Array | None = None
     problem: str = ""
 
 
-def drive_apart(unpacked: UnpackedFmu, drive: Drive) -> Answer:
+def drive_apart(unpacked: UnpackedFmu, drive: Drive) -> ProcessResult:
     """Drive an FMU in a process of its own. Whatever the library does there is part of the answer, never raised."""
     with tempfile.TemporaryDirectory(prefix="tank2sim-") as name:
         task, answer = Path(name, "task.npz"), Path(name, "answer.npz")
@@ -68,11 +66,11 @@ def drive_apart(unpacked: UnpackedFmu, drive: Drive) -> Answer:
         try:
             code = _run_alone(command, os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))})
         except subprocess.TimeoutExpired:
-            return Answer(problem=f"the library did not come to an end in {_LONGEST_S:g} s")
+            return ProcessResult(problem=f"the library did not come to an end in {_LONGEST_S:g} s")
         if code != 0 or not answer.exists():
-            return Answer(problem=f"the library ended the process that ran it ({_end(code)})")
+            return ProcessResult(problem=f"the library ended the process that ran it ({_end(code)})")
         with np.load(answer) as found:
-            return Answer(
+            return ProcessResult(
                 parameters=found.get("parameters"), outputs=found.get("outputs"), problem=str(found["problem"])
             )
 
@@ -106,14 +104,14 @@ def _end_group(process: subprocess.Popen[bytes]) -> None:
         subprocess.run(kill, capture_output=True, check=False)
 
 
-def drive_here(folder: str, kind: Kind, task: str, answer: str) -> None:
+def drive_here(folder: str, kind: FmuType, task: str, answer: str) -> None:
     """Drive the FMU in `folder` as the file `task` says and write what came of it to the file `answer`."""
     drive = {"ModelExchange": exchange, "CoSimulation": co_simulate}[kind]
     found: dict[str, Any] = {}
     log: list[str] = []
     problem = ""
     with np.load(task) as given:
-        run = Manoeuvre(given["times"], given["held"])
+        run = InputSequence(given["times"], given["held"])
         inputs, outputs, parameters = (given[key].tolist() for key in ("inputs", "outputs", "parameters"))
     try:
         unpacked = UnpackedFmu(Path(folder), read_model_description(folder, validate=False))

@@ -15,8 +15,8 @@ from tank2sim.dynamics.low_speed import SOURCES
 from tank2sim.units import to_si
 
 NOT_STATED = "not stated"
-ASSUMED = f"assumed: {100 * DEFAULT_RELATIVE_ERROR:g} % of the value (the card states none)"
-STATED = "stated in the card"
+ASSUMED_ERROR = f"assumed: {100 * DEFAULT_RELATIVE_ERROR:g} % of the value (the card states none)"
+STATED_ERROR = "stated in the card"
 ABSENT = "not in the card: the program's default"
 """Source of a coefficient that the card does not give: a derivative is then zero."""
 
@@ -34,7 +34,7 @@ class Origin:
     standard_error : float, optional
         In the unit of the coefficient; None if nothing is known.
     error_from : str
-        Where the standard error is from: :data:`STATED`, :data:`ASSUMED` or :data:`NOT_STATED`.
+        Where the standard error is from: :data:`STATED_ERROR`, :data:`ASSUMED_ERROR` or :data:`NOT_STATED`.
     """
 
     source: str
@@ -97,7 +97,7 @@ def origins(card: Card) -> dict[str, Origin]:
     found = _of_low_speed() | found
     for name in card.derivatives:
         said = _beside(document.get("derivatives"), card.places.get(name, name))
-        whence = STATED if name in card.uncertainty else ASSUMED
+        whence = STATED_ERROR if name in card.uncertainty else ASSUMED_ERROR
         found[f"derivatives.{name}"] = Origin(card.ship.source, said or "", card.standard_error(name), whence)
     return found | dict(_of_effects(card, document))
 
@@ -116,7 +116,7 @@ def _stem(key: str) -> str:
 
 def _surge_error(card: Card, key: str) -> tuple[float | None, str]:
     if isinstance(card, SurgeBodyCard) and key in card.uncertainty:
-        return card.uncertainty[key], STATED
+        return card.uncertainty[key], STATED_ERROR
     return None, NOT_STATED
 
 
@@ -127,7 +127,7 @@ def _of_effects(card: ManoeuvringCard, document: Mapping[str, Any]) -> Iterator[
             said = _beside(table.get("parameters"), name)
             error = entry.uncertainty.get(name)
             value = "default of the effect" if said is None else card.ship.source
-            whence = NOT_STATED if error is None else STATED
+            whence = NOT_STATED if error is None else STATED_ERROR
             source = f"equation of the effect {entry.name}: {effect.source}; value: {value}"
             yield variable, Origin(source, said or "", error, whence)
 

@@ -8,15 +8,16 @@ from collections.abc import Collection, Mapping
 import casadi as ca
 import numpy as np
 
-from tank2sim.dynamics.model import Model, Vector
-from tank2sim.fmu.manoeuvre import Manoeuvre
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.simulation.scheme import runge_kutta_step
 
 _TOLERANCE = 1e-11
 _STEP_COUNT_ROUNDING = 1e-9
 
 
-def by_scheme(model: Model, run: Manoeuvre) -> Vector:
+def by_scheme(model: Model, run: InputSequence) -> Array:
     """Outputs (K + 1, ny) at the communication points, by the internal steps that Co-Simulation takes.
 
     A communication step H is divided into the fewest equal classical Runge-Kutta steps no longer than ``model.step_s``.
@@ -34,7 +35,7 @@ def by_scheme(model: Model, run: Manoeuvre) -> Vector:
     return _outputs(model, run, np.column_stack([start, path[:, np.cumsum(counts) - 1]]))
 
 
-def exactly(model: Model, run: Manoeuvre) -> Vector:
+def exactly(model: Model, run: InputSequence) -> Array:
     """Outputs (K + 1, ny) at the communication points, integrated adaptively between changes of input.
 
     Small enough steps are found where the right-hand side has a kink (limits of rate and angle), which a fixed step,
@@ -48,8 +49,8 @@ def exactly(model: Model, run: Manoeuvre) -> Vector:
     path[:, 0] = np.array(model.initial(parameters)).ravel()
     for first, behind in run.pieces() if model.states else []:
 
-        def rate(_: float, scaled: Vector, held: Vector = run.inputs[first]) -> Vector:
-            rates: Vector = np.array(model.rhs(scaled * nominal, held, parameters)).ravel() / nominal
+        def rate(_: float, scaled: Array, held: Array = run.inputs[first]) -> Array:
+            rates: Array = np.array(model.rhs(scaled * nominal, held, parameters)).ravel() / nominal
             return rates
 
         times = run.times[first : behind + 1]
@@ -63,7 +64,7 @@ def exactly(model: Model, run: Manoeuvre) -> Vector:
     return _outputs(model, run, path)
 
 
-def output_errors(model: Model, expected: Vector, found: Mapping[str, Vector]) -> dict[str, float]:
+def reference_errors(model: Model, expected: Array, found: Mapping[str, Array]) -> dict[str, float]:
     """:func:`relative_errors` of a model's outputs, `expected` (K + 1, ny) in their order."""
     columns = dict(zip(model.outputs, expected.T, strict=True))
     angles = {name for name in model.outputs if model[name].unit == "rad" and name not in model.state_names}
@@ -71,7 +72,7 @@ def output_errors(model: Model, expected: Vector, found: Mapping[str, Vector]) -
 
 
 def relative_errors(
-    expected: Mapping[str, Vector], found: Mapping[str, Vector], nominals: Mapping[str, float], angles: Collection[str]
+    expected: Mapping[str, Array], found: Mapping[str, Array], nominals: Mapping[str, float], angles: Collection[str]
 ) -> dict[str, float]:
     """Name to the largest error, relative to the larger of the signal's range in the run and its nominal value.
 
@@ -93,8 +94,8 @@ def relative_errors(
     return errors
 
 
-def _outputs(model: Model, run: Manoeuvre, states: Vector) -> Vector:
+def _outputs(model: Model, run: InputSequence, states: Array) -> Array:
     inputs = np.vstack([run.inputs[:1], run.inputs]).T
     parameters = np.tile(model.parameter_values()[:, None], len(run.times))
-    outputs: Vector = np.array(model.output.map(len(run.times))(ca.DM(states), ca.DM(inputs), ca.DM(parameters))).T
+    outputs: Array = np.array(model.output.map(len(run.times))(ca.DM(states), ca.DM(inputs), ca.DM(parameters))).T
     return outputs

@@ -14,9 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.fmu.manoeuvre import Manoeuvre, manoeuvre
+from tank2sim.fmu.manoeuvre import InputSequence, manoeuvre
 from tank2sim.fmu.reference import by_scheme
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
@@ -51,10 +52,10 @@ class ReferenceRun:
     """
 
     title: str
-    run: Manoeuvre
+    run: InputSequence
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
-    outputs: Vector
+    outputs: Array
 
     def files(self) -> dict[str, str]:
         """Name in the FMU to the text of its CSV files; 13 digits, so that what is read back differs by 1e-13."""
@@ -101,41 +102,41 @@ def read_reference(folder: Path) -> ReferenceRun | None:
     times = answered[:, 0]
     # The last row that is not later than the beginning of a step holds over the step.
     held = given[np.searchsorted(given[:, 0], times[:-1], side="right") - 1, 1:]
-    return ReferenceRun("reference result", Manoeuvre(times, held), input_names, output_names, answered[:, 1:])
+    return ReferenceRun("reference result", InputSequence(times, held), input_names, output_names, answered[:, 1:])
 
 
-def _answered(title: str, run: Manoeuvre, model: Model) -> ReferenceRun | None:
+def _answered(title: str, run: InputSequence, model: Model) -> ReferenceRun | None:
     outputs = by_scheme(model, run)
     names = model.input_names, model.outputs
     return ReferenceRun(title, run, *names, outputs) if np.isfinite(outputs).all() else None
 
 
-def _at_points(trajectory: Trajectory) -> Manoeuvre:
+def _at_points(trajectory: Trajectory) -> InputSequence:
     """The orders of a run at communication points of equal distance, and at those where an order is given."""
     step, end = trajectory.model.step_s, float(trajectory.t[-1])
     distance = step * math.ceil(end / step / _MOST_POINTS)
     changes = trajectory.t[1:][(np.diff(trajectory.u, axis=0) != 0).any(axis=1)]
     grid = distance * np.arange(math.ceil(end / distance), dtype=float)
-    points: Vector = np.unique(np.concatenate([grid, changes, [end]]))
+    points: Array = np.unique(np.concatenate([grid, changes, [end]]))
     points = np.asarray(points[np.append(True, np.diff(points) > 1e-6 * step)])
     rows = np.searchsorted(trajectory.t, points[:-1] + 1e-9 * step, side="right") - 1
-    return Manoeuvre(points, trajectory.u[rows])
+    return InputSequence(points, trajectory.u[rows])
 
 
-def _with_jumps(run: Manoeuvre) -> Vector:
+def _with_jumps(run: InputSequence) -> Array:
     """Rows of time and inputs at the ends of each stretch over which the inputs are held."""
     ends = [(run.times[point], run.inputs[first]) for first, behind in run.pieces() for point in (first, behind)]
     return np.array([[time, *row] for time, row in ends])
 
 
-def _csv(names: tuple[str, ...], table: Vector) -> str:
+def _csv(names: tuple[str, ...], table: Array) -> str:
     text = io.StringIO()
     text.write(",".join(["time", *names]) + "\n")
     np.savetxt(text, table, fmt="%.14g", delimiter=",")
     return text.getvalue()
 
 
-def _read(path: Path) -> tuple[tuple[str, ...], Vector]:
+def _read(path: Path) -> tuple[tuple[str, ...], Array]:
     try:
         header, *rows = path.read_text(encoding="ascii").splitlines()
         names = tuple(header.split(",")[1:])

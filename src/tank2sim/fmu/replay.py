@@ -7,13 +7,14 @@ import io
 import tempfile
 from pathlib import Path
 
-from tank2sim.dynamics.model import Model, Vector
-from tank2sim.fmu.manoeuvre import Manoeuvre
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.running import co_simulate, running
 from tank2sim.fmu.unpacking import unpack
 
 
-def replay(path: Path, run: Manoeuvre, model: Model) -> dict[str, Vector]:
+def replay(path: Path, run: InputSequence, model: Model) -> dict[str, Array]:
     """Outputs (K + 1,) by name, at the communication points of a run, in Co-Simulation.
 
     Raises

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import fmpy.fmi2
 import fmpy.fmi3
 import numpy as np
 from fmpy.sundials import CVodeSolver
 
-from tank2sim.fmu.manoeuvre import Manoeuvre
-from tank2sim.fmu.unpacking import Kind, UnpackedFmu
-
-if TYPE_CHECKING:
-    from tank2sim.dynamics.model import Vector
+from tank2sim.arrays import Array
+from tank2sim.fmu.manoeuvre import InputSequence
+from tank2sim.fmu.unpacking import FmuType, UnpackedFmu
 
 _TOLERANCE = 1e-10
 _MOST_SOLVER_STEPS = 1_000_000
@@ -72,11 +70,11 @@ class RunningFmu:
 
 @contextmanager
 def running(
-    unpacked: UnpackedFmu, kind: Kind, *, logging: bool = False, log: list[str] | None = None
+    unpacked: UnpackedFmu, kind: FmuType, *, logging: bool = False, log: list[str] | None = None
 ) -> Iterator[RunningFmu]:
     """An instance of an FMU, freed at the end whatever happens; what it logs is added to `log`, if given."""
     interface = unpacked.description.modelExchange if kind == "ModelExchange" else unpacked.description.coSimulation
-    classes: dict[tuple[int, Kind], Any] = {
+    classes: dict[tuple[int, FmuType], Any] = {
         (2, "ModelExchange"): fmpy.fmi2.FMU2Model,
         (2, "CoSimulation"): fmpy.fmi2.FMU2Slave,
         (3, "ModelExchange"): fmpy.fmi3.FMU3Model,
@@ -107,7 +105,7 @@ def running(
         instance.freeInstance()
 
 
-def co_simulate(fmu: RunningFmu, run: Manoeuvre, inputs: Sequence[str], outputs: Sequence[str]) -> Vector:
+def co_simulate(fmu: RunningFmu, run: InputSequence, inputs: Sequence[str], outputs: Sequence[str]) -> Array:
     """Outputs (K + 1, ny) at the communication points of a Co-Simulation."""
     fmu.initialise(dict(zip(inputs, run.inputs[0], strict=True)))
     rows = [fmu.read(outputs)]
@@ -121,7 +119,7 @@ def co_simulate(fmu: RunningFmu, run: Manoeuvre, inputs: Sequence[str], outputs:
     return np.array(rows)
 
 
-def exchange(fmu: RunningFmu, run: Manoeuvre, inputs: Sequence[str], outputs: Sequence[str]) -> Vector:
+def exchange(fmu: RunningFmu, run: InputSequence, inputs: Sequence[str], outputs: Sequence[str]) -> Array:
     """Outputs (K + 1, ny) at the communication points of a Model Exchange, integrated by FMPy's CVode."""
     fmu.initialise(dict(zip(inputs, run.inputs[0], strict=True)))
     fmu.update()

@@ -9,7 +9,7 @@ import fmpy
 
 from tank2sim.bundled import bundled
 from tank2sim.dynamics.model import Model
-from tank2sim.fmu.equations import equations
+from tank2sim.fmu.equations import fmu_equations
 from tank2sim.fmu.interface import Interface
 from tank2sim.fmu.templates import render
 from tank2sim.native.generate import generate_c, work_sizes
@@ -42,7 +42,7 @@ def c_sources(model: Model, interface: Interface, fmi: int, token: str) -> dict[
     texts = {name: bundled("fmu_templates", name).read_text(encoding="utf-8") for name in (*_COMMON, *_OF_VERSION[fmi])}
     texts |= {name: _header(name) for name in _HEADERS[fmi]}
     texts["variables.c"] = render("variables.c", {"interface": interface})
-    functions = equations(model)
+    functions = fmu_equations(model)
     for name in ("equations.c", *SELDOM):
         chosen = [function for function in functions if _file_of(function.name()) == name]
         texts[name] = (_ONCE if name == _START else "") + generate_c(chosen, name.removesuffix(".c"))

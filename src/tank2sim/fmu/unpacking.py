@@ -15,7 +15,7 @@ from fmpy.model_description import read_model_description
 
 from tank2sim.errors import InputError
 
-Kind = Literal["ModelExchange", "CoSimulation"]
+FmuType = Literal["ModelExchange", "CoSimulation"]
 
 CARD_IN_FMU = "resources/ship.toml"
 """Where an FMU keeps the card of its ship, so that a check can build the model again."""
@@ -47,9 +47,9 @@ class UnpackedFmu:
         return int(self.description.fmiVersion[0])
 
     @property
-    def kinds(self) -> tuple[Kind, ...]:
+    def kinds(self) -> tuple[FmuType, ...]:
         """What the FMU offers of Model Exchange and Co-Simulation."""
-        offers: dict[Kind, Any] = {
+        offers: dict[FmuType, Any] = {
             "ModelExchange": self.description.modelExchange,
             "CoSimulation": self.description.coSimulation,
         }

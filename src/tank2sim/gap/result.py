@@ -6,18 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.identification.trials.evaluation import Figure
-
-Array = NDArray[np.float64]
+from tank2sim.identification.trials.assessment.evaluation import FigureComparison
 
 MISSING = "missing effect"
-NOTHING = "no missing effect"
+NO_EFFECT_MISSING = "no missing effect"
 AMBIGUOUS = "ambiguous"
-OUTSIDE = "outside the library"
-VERDICTS = (MISSING, NOTHING, AMBIGUOUS, OUTSIDE)
+OUTSIDE_LIBRARY = "outside the library"
+GAP_VERDICTS = (MISSING, NO_EFFECT_MISSING, AMBIGUOUS, OUTSIDE_LIBRARY)
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ class Rival:
 
 
 @dataclass(frozen=True)
-class Place:
+class MisfitPlace:
     """Where a part of the misfit is.
 
     Parameters
@@ -248,7 +246,7 @@ class Gap:
     improved : ManoeuvringCard
         With the effect; the given card where no effect of the ship was named (nothing, or a sensor's fault).
     verdict : str
-        One of :data:`VERDICTS`.
+        One of :data:`GAP_VERDICTS`.
     effects : tuple of Named
     alternatives : tuple of tuples of str
         Explanations that these data cannot tell from the named one.
@@ -279,12 +277,12 @@ class Gap:
     effects: tuple[Named, ...]
     alternatives: tuple[tuple[str, ...], ...]
     rivals: tuple[Rival, ...]
-    where: tuple[Place, ...]
+    where: tuple[MisfitPlace, ...]
     equation: str
     noise: Mapping[str, tuple[float, str]]
     passed: tuple[Passed, ...]
-    figures_before: tuple[Figure, ...]
-    figures_after: tuple[Figure, ...]
+    figures_before: tuple[FigureComparison, ...]
+    figures_after: tuple[FigureComparison, ...]
     missing_force: MissingForce | None
     could_hide: Mapping[str, Mapping[str, float]]
     agreement: Mapping[str, Mapping[str, tuple[float, float]]]

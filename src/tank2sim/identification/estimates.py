@@ -78,7 +78,7 @@ class Particulars:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class NamedEstimate:
     """An estimated number (prime), its standard error, and where the formula is from."""
 
     value: float
@@ -86,7 +86,7 @@ class Estimate:
     source: str
 
 
-def estimate(particulars: Particulars, names: Iterable[str]) -> dict[str, Estimate]:
+def estimate(particulars: Particulars, names: Iterable[str]) -> dict[str, NamedEstimate]:
     """Estimates of derivatives by their names, as far as there is a published formula.
 
     Parameters
@@ -112,32 +112,32 @@ def estimate(particulars: Particulars, names: Iterable[str]) -> dict[str, Estima
 
 def _clarke(
     bracket: Callable[[float, float, float], float], coupling: bool = False
-) -> Callable[[Particulars], Estimate]:
+) -> Callable[[Particulars], NamedEstimate]:
     """An estimate -pi (T/L)^2 times a bracket of B/L, B/T and C_B."""
 
-    def value(ship: Particulars) -> Estimate:
+    def value(ship: Particulars) -> NamedEstimate:
         unit = math.pi * (ship.draught_m / ship.length_m) ** 2
         number = -unit * bracket(ship.beam_m / ship.length_m, ship.beam_m / ship.draught_m, ship.block)
-        return Estimate(number, unit * COUPLING_ERROR if coupling else RELATIVE_ERROR * abs(number), CLARKE)
+        return NamedEstimate(number, unit * COUPLING_ERROR if coupling else RELATIVE_ERROR * abs(number), CLARKE)
 
     return value
 
 
-def _surge(ship: Particulars) -> Estimate:
+def _surge(ship: Particulars) -> NamedEstimate:
     """X_udot = -2.7 rho V^(5/3)/L^2, V the displaced volume (Söding 1982)."""
     volume = ship.mass_prime / 2  # over L^3
     value = -2 * 2.7 * volume ** (5 / 3)
-    return Estimate(value, SURGE_ERROR * abs(value), SODING)
+    return NamedEstimate(value, SURGE_ERROR * abs(value), SODING)
 
 
-def _yaw_inertia(ship: Particulars) -> Estimate:
+def _yaw_inertia(ship: Particulars) -> NamedEstimate:
     """J_z' = m' (0.25^2 + x_G'^2), about the origin."""
     radius, arm = 0.25, ship.x_G_m / ship.length_m
     error = 2 * GYRATION_ERROR * ship.mass_prime * radius**2
-    return Estimate(ship.mass_prime * (radius**2 + arm**2), error, GYRATION)
+    return NamedEstimate(ship.mass_prime * (radius**2 + arm**2), error, GYRATION)
 
 
-ESTIMATED: Mapping[str, Callable[[Particulars], Estimate]] = {
+ESTIMATED: Mapping[str, Callable[[Particulars], NamedEstimate]] = {
     "Yvdot": _clarke(lambda bl, bt, cb: 1 + 0.16 * cb * bt - 5.1 * bl**2),
     "Yrdot": _clarke(lambda bl, bt, cb: 0.67 * bl - 0.0033 * bt**2, coupling=True),
     "Nvdot": _clarke(lambda bl, bt, cb: 1.1 * bl - 0.041 * bt, coupling=True),

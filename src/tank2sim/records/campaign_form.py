@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
-from tank2sim.cards.form import Positive, Section, Text
+from tank2sim.cards.form import CardSection, Positive, Text
 from tank2sim.cards.form_faults import form_fault
 from tank2sim.errors import InputError
 from tank2sim.units import to_si
@@ -29,17 +29,17 @@ OSCILLATING: tuple[RunType, ...] = ("pure_sway", "pure_yaw", "yaw_with_drift")
 """Types of run in which the model oscillates; in the others it is towed steadily."""
 
 NotNegative = Annotated[float, Field(ge=0)]
-Gravity = Annotated[float, Field(gt=9.7, lt=9.9)]
+TestGravity = Annotated[float, Field(gt=9.7, lt=9.9)]
 """On Earth: 9.764 m/s2 (Huascaran) to 9.834 (Arctic Ocean), EGM2008; wider by half a percent."""
-WaterDensity = Annotated[float, Field(gt=900, lt=1100)]
+TestWaterDensity = Annotated[float, Field(gt=900, lt=1100)]
 """kg/m3. Fresh water has 958 (boiling) to 1000, sea water up to 1030, the Dead Sea 1240: a project choice that refuses
 g/cm3 and t/m3, and air."""
-Viscosity = Annotated[float, Field(gt=1e-7, lt=1e-5)]
+TestViscosity = Annotated[float, Field(gt=1e-7, lt=1e-5)]
 """m2/s. Water has 0.3e-6 (boiling) to 1.8e-6 (freezing): refuses centistokes."""
 Angle = Annotated[float, Field(gt=-1.5707963267948966, lt=1.5707963267948966)]
 
 
-class ModelSection(Section):
+class ModelSection(CardSection):
     """``[model]``: the ship model as tested, SI.
 
     Parameters
@@ -69,7 +69,7 @@ class ModelSection(Section):
     propeller_diameter_m: Positive | None = None
 
 
-class TankTest(Section):
+class TankTest(CardSection):
     """``[test]``: how it was tested.
 
     Parameters
@@ -90,8 +90,8 @@ class TankTest(Section):
         Motions left free, such as ``["heave", "pitch"]``.
     """
 
-    water_density_kgpm3: WaterDensity = 1000.0
-    gravity_mps2: Gravity = 9.80665
+    water_density_kgpm3: TestWaterDensity = 1000.0
+    gravity_mps2: TestGravity = 9.80665
     speed_mps: Positive
     force_convention: Literal["on_model", "on_gauge", "hydrodynamic"]
     rudder_sign: Literal["starboard", "port"] = "starboard"
@@ -99,10 +99,10 @@ class TankTest(Section):
     propeller_radps: NotNegative | None = None
     force_delay_s: Annotated[float, Field(gt=-10, lt=10)] = 0.0
     free_motions: list[str] | str | bool | None = None
-    kinematic_viscosity_m2ps: Viscosity | None = None
+    kinematic_viscosity_m2ps: TestViscosity | None = None
 
 
-class TankSection(Section):
+class TankSection(CardSection):
     """``[tank]``: the basin."""
 
     length_m: Positive | None = None
@@ -110,7 +110,7 @@ class TankSection(Section):
     depth_m: Positive | None = None
 
 
-class UncertaintySection(Section):
+class UncertaintySection(CardSection):
     """``[uncertainty]``: Type B standard uncertainties (one standard deviation) that no scatter of the runs shows.
 
     ITTC 7.5-02-06-04. Each is one error common to the whole campaign; absent means not stated, and none is added.
@@ -140,15 +140,15 @@ class UncertaintySection(Section):
     force_delay_s: NotNegative = 0.0
 
 
-class FullScaleSection(Section):
+class FullScaleSection(CardSection):
     """``[full_scale]``: the water the ship sails in, for a card at ship scale."""
 
-    water_density_kgpm3: WaterDensity = 1025.0
-    gravity_mps2: Gravity = 9.80665
-    kinematic_viscosity_m2ps: Viscosity = 1.19e-6
+    water_density_kgpm3: TestWaterDensity = 1025.0
+    gravity_mps2: TestGravity = 9.80665
+    kinematic_viscosity_m2ps: TestViscosity = 1.19e-6
 
 
-class RunSheet(Section):
+class RunSheet(CardSection):
     """One of ``[[runs]]``: what the test sheet says of a run; what was measured stands in its file."""
 
     file: Text
@@ -162,7 +162,7 @@ class RunSheet(Section):
     notes: str | None = None
 
 
-class Columns(Section):
+class AverageColumns(CardSection):
     """``[averages.columns]``: quantity to the heading of its column."""
 
     drift_rad: str | None = None
@@ -174,16 +174,16 @@ class Columns(Section):
     N: str
 
 
-class AveragesSection(Section):
+class AveragesSection(CardSection):
     """``[averages]``: a table of static conditions, one a row, in place of ``[[runs]]``."""
 
     file: Text
     scaling: Literal["prime", "dimensional"]
     rudder_sign: Literal["starboard", "port"] | None = None
-    columns: Columns
+    columns: AverageColumns
 
 
-class CampaignFile(Section):
+class CampaignFile(CardSection):
     """The whole of ``campaign.toml``."""
 
     format: Literal["tank2sim-campaign/1"] = "tank2sim-campaign/1"

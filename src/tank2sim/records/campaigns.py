@@ -1,6 +1,6 @@
 """Captive campaigns: what a towing tank measured on a model that a carriage drives, read and brought to one convention.
 
-Inside the program a :class:`Run` has, whatever its file says:
+Inside the program a :class:`CaptiveRun` has, whatever its file says:
 
 - SI units and radians; the rudder positive to starboard; ``drift_rad`` is beta = -asin(v/U);
 - ``X_N``, ``Y_N``, ``N_Nm`` in the *hydrodynamic* sense: positive as the water pushes the model (forward, to
@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.files import read_text
@@ -36,16 +37,16 @@ from tank2sim.records.campaign_form import (
     UncertaintySection,
     campaign_file,
 )
-from tank2sim.records.csv_table import Table, Vector, read_table
+from tank2sim.records.csv_table import CsvTable, read_table
 
-FORCES = ("X", "Y", "N")
+FORCE_COLUMNS = ("X", "Y", "N")
 _FEWEST_READINGS = 16
 """Readings of three gauges that cannot agree by chance, however coarse the gauges are."""
 _FORCE_COLUMNS = {"X": "X_N", "Y": "Y_N", "N": "N_Nm"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Run:
+class CaptiveRun:
     """One captive run.
 
     Parameters
@@ -73,16 +74,16 @@ class Run:
     name: str
     type: RunType
     sheet: RunSheet
-    time_s: Vector
-    v_mps: Vector
-    r_radps: Vector
-    speed_mps: Vector
-    delta_rad: Vector
-    X_N: Vector
-    Y_N: Vector
-    N_Nm: Vector
-    y_m: Vector | None = None
-    psi_rad: Vector | None = None
+    time_s: Array
+    v_mps: Array
+    r_radps: Array
+    speed_mps: Array
+    delta_rad: Array
+    X_N: Array
+    Y_N: Array
+    N_Nm: Array
+    y_m: Array | None = None
+    psi_rad: Array | None = None
     propeller_radps: float | None = None
     force_delay_s: float = 0.0
 
@@ -102,9 +103,9 @@ class Run:
         count = len(self.time_s)
         return float(self.time_s[-1] - self.time_s[0]) * count / (count - 1) if count > 1 else 0.0
 
-    def force(self, name: str) -> Vector:
+    def force(self, name: str) -> Array:
         """``X``, ``Y`` (N) or ``N`` (N m), (rows,)."""
-        values: Vector = getattr(self, _FORCE_COLUMNS[name])
+        values: Array = getattr(self, _FORCE_COLUMNS[name])
         return values
 
 
@@ -132,7 +133,7 @@ class Campaign:
     tank: TankSection
     uncertainty: UncertaintySection
     full_scale: FullScaleSection | None
-    runs: tuple[Run, ...]
+    runs: tuple[CaptiveRun, ...]
     faults: tuple[InputError, ...] = ()
     remarks: tuple[str, ...] = field(default=())
 
@@ -146,7 +147,7 @@ class Campaign:
         """Scales of the prime system at the test speed."""
         return Scales(self.test.water_density_kgpm3, self.model.length_m, self.test.speed_mps)
 
-    def runs_of(self, *types: RunType) -> tuple[Run, ...]:
+    def runs_of(self, *types: RunType) -> tuple[CaptiveRun, ...]:
         """The runs of the given types."""
         return tuple(run for run in self.runs if run.type in types)
 
@@ -172,7 +173,7 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
     """
     path = Path(path)
     form, factors = campaign_file(_parsed(path), path)
-    runs: list[Run] = []
+    runs: list[CaptiveRun] = []
     faults: list[InputError] = []
     remarks: list[str] = []
     if (form.averages is None) == (not form.runs):
@@ -207,16 +208,16 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
     )
 
 
-def _copies(runs: list[Run]) -> dict[str, InputError]:
+def _copies(runs: list[CaptiveRun]) -> dict[str, InputError]:
     """Runs whose readings are those of a run before, to the last digit: name to fault.
 
     One record may be a part of the other, at its beginning or its end. Noise never repeats itself; records without
     noise, of a computed campaign or a dead gauge, are no evidence.
     """
     found: dict[str, InputError] = {}
-    seen: dict[tuple[str, bytes], list[tuple[Run, NDArray[np.float64]]]] = {}
+    seen: dict[tuple[str, bytes], list[tuple[CaptiveRun, NDArray[np.float64]]]] = {}
     for run in runs:
-        readings = np.column_stack([run.force(force) for force in FORCES])
+        readings = np.column_stack([run.force(force) for force in FORCE_COLUMNS])
         if run.is_average or len(readings) < _FEWEST_READINGS or not np.ptp(readings, axis=0).all():
             continue
         ends = [("first", readings[0].tobytes()), ("last", readings[-1].tobytes())]
@@ -257,7 +258,7 @@ def _refuse_doubled_names(form: CampaignFile, path: Path) -> None:
             raise InputError(path, f"runs.{number}.file", f"{name} stands twice", "give each run once")
 
 
-def _read_run(sheet: RunSheet, form: CampaignFile, folder: Path) -> Run:
+def _read_run(sheet: RunSheet, form: CampaignFile, folder: Path) -> CaptiveRun:
     table = read_table(folder / sheet.file).si()
     time = table.increasing("t_s") - float(table.column("t_s")[0])
     to_port = form.test.rudder_sign == "port"
@@ -276,7 +277,7 @@ def _read_run(sheet: RunSheet, form: CampaignFile, folder: Path) -> Run:
     rate = _optional(table, "r_radps")
     if rate is None:
         rate = np.zeros(len(time)) if sheet.type not in ("pure_yaw", "yaw_with_drift") else _rate_of(table, psi, time)
-    return Run(
+    return CaptiveRun(
         name=sheet.file,
         type=sheet.type,
         sheet=sheet,
@@ -293,7 +294,7 @@ def _read_run(sheet: RunSheet, form: CampaignFile, folder: Path) -> Run:
     )
 
 
-def _filled(table: Table, name: str) -> Vector:
+def _filled(table: CsvTable, name: str) -> Array:
     values = table.column(name)
     empty = np.flatnonzero(np.isnan(values))
     if empty.size:
@@ -301,11 +302,11 @@ def _filled(table: Table, name: str) -> Vector:
     return values
 
 
-def _optional(table: Table, name: str) -> Vector | None:
+def _optional(table: CsvTable, name: str) -> Array | None:
     return _filled(table, name) if name in table.columns else None
 
 
-def _sway_velocity(table: Table, sheet: RunSheet, motion: tuple[Vector, Vector | None, Vector]) -> Vector:
+def _sway_velocity(table: CsvTable, sheet: RunSheet, motion: tuple[Array, Array | None, Array]) -> Array:
     """v as measured; else from the position (pure sway), or from the drift angle of the sheet."""
     time, y, speed = motion
     measured = _optional(table, "v_mps")
@@ -314,22 +315,22 @@ def _sway_velocity(table: Table, sheet: RunSheet, motion: tuple[Vector, Vector |
     if sheet.type == "pure_sway":
         if y is None:
             raise InputError(table.path, "header", "there is neither v_mps nor y_m", "add one of them")
-        velocity: Vector = np.gradient(y, time)
+        velocity: Array = np.gradient(y, time)
         return velocity
     if sheet.drift_rad is None and sheet.type in ("static_drift", "drift_and_rudder", "yaw_with_drift"):
         raise InputError(table.path, "header", "there is no v_mps, and the campaign gives no drift", "give one of them")
-    steady: Vector = -speed * np.sin(sheet.drift_rad or 0.0)
+    steady: Array = -speed * np.sin(sheet.drift_rad or 0.0)
     return steady
 
 
-def _rate_of(table: Table, psi: Vector | None, time: Vector) -> Vector:
+def _rate_of(table: CsvTable, psi: Array | None, time: Array) -> Array:
     if psi is None:
         raise InputError(table.path, "header", "there is neither r_radps nor psi_rad", "add one of them")
-    rate: Vector = np.gradient(np.unwrap(psi), time)
+    rate: Array = np.gradient(np.unwrap(psi), time)
     return rate
 
 
-def _averaged_run(condition: Condition, form: CampaignFile) -> Run:
+def _averaged_run(condition: Condition, form: CampaignFile) -> CaptiveRun:
     assert form.averages is not None
     kind: RunType = "drift_and_rudder"
     if condition.rudder_rad == 0.0:
@@ -338,7 +339,7 @@ def _averaged_run(condition: Condition, form: CampaignFile) -> Run:
         kind = "static_rudder"
     sense = -1.0 if form.test.force_convention == "on_model" else 1.0
     sheet = RunSheet(file=form.averages.file, type=kind, drift_rad=condition.drift_rad, rudder_rad=condition.rudder_rad)
-    return Run(
+    return CaptiveRun(
         name=condition.name,
         type=kind,
         sheet=sheet,

@@ -17,11 +17,10 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import read_text
 from tank2sim.units import to_si
-
-Vector = NDArray[np.float64]
 
 _KEY = re.compile(r"([A-Za-z_][\w.-]*)\s*:(?!//)\s*(.*)", re.DOTALL)  # not the colon of https://
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -44,7 +43,7 @@ _ALMOST_KEY = re.compile(r"([A-Za-z_][\w.-]*(?:[ \t]+[A-Za-z_][\w.-]*)?)\s*[:=](
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class CsvTable:
     """Columns of numbers as in a file.
 
     Parameters
@@ -64,7 +63,7 @@ class Table:
     """
 
     path: Path
-    columns: dict[str, Vector]
+    columns: dict[str, Array]
     lines: NDArray[np.int64]
     comments: dict[str, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
@@ -78,7 +77,7 @@ class Table:
         """Where a cell is, for messages: ``line 12, column psi_deg``."""
         return f"line {self.lines[row]}, column {self.heading(name)}"
 
-    def column(self, name: str) -> Vector:
+    def column(self, name: str) -> Array:
         """Values of a column, (rows,).
 
         Raises
@@ -91,7 +90,7 @@ class Table:
             raise InputError(self.path, "header", f"there is no column {name}", f"add it; the columns are {present}")
         return self.columns[name]
 
-    def increasing(self, name: str) -> Vector:
+    def increasing(self, name: str) -> Array:
         """Values of a column, (rows,), that must be there in each row and rise from row to row (a time).
 
         Raises
@@ -150,7 +149,7 @@ class Table:
                 problem = f"{_quoted(shown)} resembles a key and is none"
                 raise InputError(self.path, f"comment {key}", problem, f"write '# {spellings[near[0]]}: ...'")
 
-    def si(self) -> Table:
+    def si(self) -> CsvTable:
         """The table in SI and radians, its columns renamed by :func:`tank2sim.units.to_si` (psi_deg to psi_rad).
 
         Raises
@@ -158,7 +157,7 @@ class Table:
         InputError
             Two columns are one quantity in two units.
         """
-        columns: dict[str, Vector] = {}
+        columns: dict[str, Array] = {}
         headings: dict[str, str] = {}
         for name, values in self.columns.items():
             si_name, factor = to_si(name, 1.0)
@@ -170,7 +169,7 @@ class Table:
         return replace(self, columns=columns, headings=headings)
 
 
-def read_table(path: Path | str) -> Table:
+def read_table(path: Path | str) -> CsvTable:
     """Read a CSV table of numbers.
 
     A byte order mark, CRLF, blank lines, and spaces around names and numbers do not matter.
@@ -197,7 +196,7 @@ def read_table(path: Path | str) -> Table:
         values = _read_with_care(path, names, rows, lines)
     comments, remarks = _comments([line for line in stripped if line.startswith("#")])
     columns = {name: np.ascontiguousarray(values[:, place]) for place, name in enumerate(names)}
-    return Table(path, columns, lines, comments, remarks)
+    return CsvTable(path, columns, lines, comments, remarks)
 
 
 def _header(path: Path, number: int, line: str) -> list[str]:
@@ -217,7 +216,7 @@ def _header(path: Path, number: int, line: str) -> list[str]:
     return names
 
 
-def _read_fast(rows: Sequence[str], width: int) -> Vector | None:
+def _read_fast(rows: Sequence[str], width: int) -> Array | None:
     """Values (rows, width) by numpy's compiled reader; None if anything at all is unusual."""
     body = "\n".join(rows) + "\n"
     if _NOT_OF_NUMBERS.search(body):
@@ -227,13 +226,13 @@ def _read_fast(rows: Sequence[str], width: int) -> Vector | None:
     if ",," in body or ",\n" in body or "\n," in body or body.startswith(","):
         body = _EMPTY_CELL.sub("nan", body)
     try:
-        values: Vector = np.loadtxt(body.splitlines(), delimiter=",", ndmin=2, comments=None, dtype=np.float64)
+        values: Array = np.loadtxt(body.splitlines(), delimiter=",", ndmin=2, comments=None, dtype=np.float64)
     except ValueError:
         return None
     return values if values.shape == (len(rows), width) and not (np.abs(values) > LARGEST).any() else None
 
 
-def _read_with_care(path: Path, names: Sequence[str], rows: Sequence[str], lines: NDArray[np.int64]) -> Vector:
+def _read_with_care(path: Path, names: Sequence[str], rows: Sequence[str], lines: NDArray[np.int64]) -> Array:
     """Values (rows, width) cell by cell, or the error that names the first cell at fault."""
     values = np.empty((len(rows), len(names)))
     for row, line in enumerate(rows):

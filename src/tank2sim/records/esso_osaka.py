@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.errors import InputError
-from tank2sim.records.number_rows import numbers, read_bytes_as_text
+from tank2sim.records.number_rows import number_rows, read_bytes_as_text
 from tank2sim.records.trials import Trial, unwrapped
 from tank2sim.units import to_si
 
@@ -58,7 +58,7 @@ def read_esso_osaka(path: Path | str) -> Trial:
         if heads.count(head) != 1:
             raise InputError(path, "line 1", f"there is not one column {head}", "give a record as it was published")
     rows = [(line, content.split(",")) for line, content in enumerate(lines[1:], start=2) if content.strip()]
-    values = numbers(path, rows, heads)
+    values = number_rows(path, rows, heads)
     filled = np.flatnonzero(~np.isnan(values).all(axis=1))
     values = values[: 1 + np.max(filled, initial=-1)]  # spreadsheets leave blank rows
     if len(values) < 2:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tank2sim.errors import InputError
 from tank2sim.records.csv_table import LARGEST
 
-Rows = Sequence[tuple[int, Sequence[str]]]
+NumberRows = Sequence[tuple[int, Sequence[str]]]
 """Line of the file (from 1) and cells of each row."""
 
 
@@ -33,7 +33,7 @@ def read_bytes_as_text(path: Path | str) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
-def numbers(path: Path, rows: Rows, names: Sequence[str]) -> NDArray[np.float64]:
+def number_rows(path: Path, rows: NumberRows, names: Sequence[str]) -> NDArray[np.float64]:
     """Values (rows, columns), nan where a cell is empty or says so.
 
     Raises

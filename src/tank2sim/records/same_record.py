@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.records.audit.noise import rounding, white_noise
-from tank2sim.records.csv_table import Vector
-from tank2sim.records.trials import MEASURED, Trial, sampling_step
+from tank2sim.records.trials import MEASURED_COLUMNS, Trial, sampling_step
 
 PRINTED = 1e-3
 """Share of a signal's spread by which printing it with other digits may change it; two runs of one manoeuvre differ by
@@ -20,10 +20,10 @@ NOISE = 0.5
 """Two runs differ by sqrt(2) times the noise of their sensors at least, one record from itself by nothing: half the
 noise lies between."""
 
-ROUNDED = 1.2
+_ROUNDED = 1.2
 """Times what rounding to the coarser of two units leaves that is put down to it (project choice)."""
 
-FAR = 0.3
+_FAR = 0.3
 """Signals farther apart than this share of their spread are not looked at any closer (project choice)."""
 
 COMMON = 0.5
@@ -60,7 +60,7 @@ def same_record(one: Trial, other: Trial) -> bool:
     """
     if sampling_step(one) < sampling_step(other):  # at the rows of the coarser one, between which nothing is drawn
         one, other = other, one
-    names = [name for name in MEASURED if name in one.signals and name in other.signals]
+    names = [name for name in MEASURED_COLUMNS if name in one.signals and name in other.signals]
     shifts = dict.fromkeys((0.0, float(one.time_s[0] - other.time_s[0])))
     return bool(names) and any(_same_at(one, other, names, shift) for shift in shifts)
 
@@ -81,14 +81,14 @@ def _same_at(one: Trial, other: Trial, names: Sequence[str], shift: float) -> bo
     return alike
 
 
-def _at(common: Vector, time: Vector, values: Vector) -> Vector:
+def _at(common: Array, time: Array, values: Array) -> Array:
     known = ~np.isnan(values)
     if np.count_nonzero(known) < 2:
         return np.full(len(common), np.nan)
     return np.interp(common, time[known], values[known])
 
 
-def _alike(one: Vector, other: Vector) -> bool | None:
+def _alike(one: Array, other: Array) -> bool | None:
     """None where neither moves."""
     known = ~np.isnan(one + other)
     if np.count_nonzero(known) < 2:
@@ -98,7 +98,7 @@ def _alike(one: Vector, other: Vector) -> bool | None:
     if not spread > 0:
         return None
     apart = float(np.sqrt(np.mean((one - other) ** 2)))
-    if apart > FAR * spread:
+    if apart > _FAR * spread:
         return False
     noise, unit = min(white_noise(one), white_noise(other)), max(rounding(one), rounding(other))
-    return apart <= max(PRINTED * spread, NOISE * noise, ROUNDED * unit / math.sqrt(12))
+    return apart <= max(PRINTED * spread, NOISE * noise, _ROUNDED * unit / math.sqrt(12))

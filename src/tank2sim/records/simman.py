@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.csv_table import Vector
-from tank2sim.records.number_rows import Rows, numbers, read_bytes_as_text
-from tank2sim.records.trials import SIGNALS, Trial, unwrapped
+from tank2sim.records.number_rows import NumberRows, number_rows, read_bytes_as_text
+from tank2sim.records.trials import TRIAL_SIGNALS, Trial, unwrapped
 from tank2sim.units import to_si
 
 KVLCC2_SCALE = 45.714
@@ -68,13 +68,13 @@ def read_simman(path: Path | str) -> Trial:
     if laboratory is None:
         raise InputError(path, "line 1", "names neither MARIN nor HSVA", "give a record as it was published")
     header, rows = _split(text)
-    values = numbers(path, rows, laboratory.columns)
+    values = number_rows(path, rows, laboratory.columns)
     named = {
         name: factor * column
         for (name, factor), column in zip((to_si(head, 1.0) for head in laboratory.columns), values.T, strict=True)
     }
     columns = {to_si(head, 1.0)[0]: head for head in laboratory.columns}
-    signals: dict[str, Vector] = {name: column for name, column in named.items() if name in SIGNALS}
+    signals: dict[str, Array] = {name: column for name, column in named.items() if name in TRIAL_SIGNALS}
     signals["psi_rad"] = unwrapped(signals["psi_rad"])
     signals["delta_rad"] = 0.0 - signals["delta_rad"]
     notices = [laboratory.left_out, laboratory.values, "the rudder is positive to port in the file, to starboard here"]
@@ -101,7 +101,7 @@ def _laboratory(text: str) -> _Laboratory | None:
     return next((laboratory for name, laboratory in known.items() if first.startswith(name)), None)
 
 
-def _split(text: str) -> tuple[str, Rows]:
+def _split(text: str) -> tuple[str, NumberRows]:
     """Header and rows: the header ends where a line begins with a number and has ten or more cells."""
     header: list[str] = []
     rows: list[tuple[int, list[str]]] = []
@@ -122,7 +122,7 @@ def _begins_rows(cells: list[str]) -> bool:
         return False
 
 
-def _uniform_time(path: Path, rows: Rows) -> tuple[Vector, str]:
+def _uniform_time(path: Path, rows: NumberRows) -> tuple[Array, str]:
     """Times of equal step that agree with every time printed, and what is told of them.
 
     A time printed as 1.23E+02 lies within half a unit of its last digit, evenly: the step is the least-squares one
@@ -133,7 +133,7 @@ def _uniform_time(path: Path, rows: Rows) -> tuple[Vector, str]:
     half = np.array([_half_a_digit(cells[0]) for _, cells in rows])
     count = np.arange(len(rows))
     step = float(np.sum(count * (printed - printed[0]) / half**2) / np.sum((count / half) ** 2))
-    time: Vector = printed[0] + step * count
+    time: Array = printed[0] + step * count
     missed = np.flatnonzero(np.abs(time - printed) > half + 0.5 * step)
     if step <= 0 or missed.size:
         place = f"line {rows[int(missed[0])][0] if missed.size else rows[0][0]}, column t_s"

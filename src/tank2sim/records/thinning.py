@@ -8,11 +8,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Vector = NDArray[np.float64]
+from tank2sim.arrays import Array
+
 Indices = NDArray[np.int64]
 
 
-def thin_line(columns: Sequence[Vector], limit: int) -> Indices:
+def thin_line(columns: Sequence[Array], limit: int) -> Indices:
     """Samples to keep of a line that is drawn through all of them.
 
     The samples are cut into equal buckets, and of each bucket the lowest and the highest of every column stay, so no
@@ -47,7 +48,7 @@ def thin_line(columns: Sequence[Vector], limit: int) -> Indices:
     return np.array(sorted(kept))
 
 
-def thin_points(columns: Sequence[Vector], limit: int) -> Indices:
+def thin_points(columns: Sequence[Array], limit: int) -> Indices:
     """Samples to keep of points that are drawn singly: evenly spread ones, and the extremes of every column.
 
     Parameters and result are those of :func:`thin_line`; up to two extremes a column come on top of `limit`.

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.csv_table import Table, Vector, read_table
+from tank2sim.records.csv_table import CsvTable, read_table
 
 _SPEED = re.compile(r"speed_([1-9]\d*)_mps")
 FEWEST_TIMES = 5
@@ -45,7 +46,7 @@ class Tows:
 
     path: Path
     names: tuple[str, ...]
-    time_s: Vector
+    time_s: Array
     speed_mps: NDArray[np.float64]
     force_N: float | None = None
     mass_kg: float | None = None
@@ -58,9 +59,9 @@ class Tows:
         return counts
 
     @property
-    def mean_speed_mps(self) -> Vector:
+    def mean_speed_mps(self) -> Array:
         """Mean over the tows that were read at each time, (times,)."""
-        mean: Vector = np.nanmean(self.speed_mps, axis=1)
+        mean: Array = np.nanmean(self.speed_mps, axis=1)
         return mean
 
     @property
@@ -125,7 +126,7 @@ def read_tows(path: Path | str) -> Tows:
     return Tows(table.path, names, time[read], speed[read], force, mass, body)
 
 
-def _check_name(table: Table, name: str) -> None:
+def _check_name(table: CsvTable, name: str) -> None:
     if _SPEED.fullmatch(name):
         return
     if name.startswith("speed") and not name.endswith("_mps"):
@@ -135,7 +136,7 @@ def _check_name(table: Table, name: str) -> None:
     raise InputError(table.path, f"column {name}", problem, remedy)
 
 
-def _positive(table: Table, key: str) -> float | None:
+def _positive(table: CsvTable, key: str) -> float | None:
     value = table.comment_number(key)
     if value is not None and value <= 0:
         raise InputError(table.path, f"comment {key}", f"is {value:g}", "a positive number was expected")

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.csv_table import Table, Vector, read_table
-from tank2sim.records.trials import MEASURED, RUDDERS, SIGNALS, Trial, unwrapped
+from tank2sim.records.csv_table import CsvTable, read_table
+from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Trial, unwrapped
 from tank2sim.units import to_si
 
 COMMENT_KEYS = ("rudder_sign", "noise", "scale")
@@ -36,8 +37,8 @@ def read_trial_csv(path: Path | str) -> Trial:
     empty = np.flatnonzero(np.isnan(time))
     if empty.size:
         raise InputError(table.path, table.place(int(empty[0]), "t_s"), "is empty", "give each row its time")
-    signals = {name: values for name, values in table.columns.items() if name in SIGNALS}
-    left_out = [name for name in table.columns if name != "t_s" and name not in SIGNALS]
+    signals = {name: values for name, values in table.columns.items() if name in TRIAL_SIGNALS}
+    left_out = [name for name in table.columns if name != "t_s" and name not in TRIAL_SIGNALS]
     for name in left_out:
         _refuse_slip(table, name)
     _check_content(table, signals)
@@ -57,22 +58,22 @@ def read_trial_csv(path: Path | str) -> Trial:
     return Trial(table.path, time, signals, _noise(table), scale, tuple(notices), columns)
 
 
-def _refuse_slip(table: Table, name: str) -> None:
+def _refuse_slip(table: CsvTable, name: str) -> None:
     """Refuse what looks like a signal of the format misspelt or with a unit that it cannot have."""
     stem = name.rpartition("_")[0] or name
-    same = [signal for signal in SIGNALS if signal.rpartition("_")[0] == stem]
-    near = same or difflib.get_close_matches(name, SIGNALS, n=1, cutoff=0.85)
+    same = [signal for signal in TRIAL_SIGNALS if signal.rpartition("_")[0] == stem]
+    near = same or difflib.get_close_matches(name, TRIAL_SIGNALS, n=1, cutoff=0.85)
     if near:
         remedy = f"call it as {near[0]} (or with another unit of that kind), or delete the column"
         raise InputError(table.path, f"column {table.heading(name)}", "is no signal of a trial", remedy)
 
 
-def _check_content(table: Table, signals: dict[str, Vector]) -> None:
+def _check_content(table: CsvTable, signals: dict[str, Array]) -> None:
     if not any(name in signals for name in RUDDERS):
         present = ", ".join(table.heading(name) for name in table.columns)
         remedy = f"add delta_deg (angle) or delta_order_deg (order); the columns are {present}"
         raise InputError(table.path, "header", "there is no rudder", remedy)
-    if not any(name in signals for name in MEASURED):
+    if not any(name in signals for name in MEASURED_COLUMNS):
         remedy = "add at least one measured column, such as r_degps, psi_deg or u_mps"
         raise InputError(table.path, "header", "nothing measured is in it", remedy)
     if len(table.lines) < 2:
@@ -82,14 +83,14 @@ def _check_content(table: Table, signals: dict[str, Vector]) -> None:
             raise InputError(table.path, f"column {table.heading(name)}", "has no value", "delete the column")
 
 
-def _rudder_sign(table: Table) -> str:
+def _rudder_sign(table: CsvTable) -> str:
     sign = table.comments.get("rudder_sign", "starboard").strip()
     if sign not in ("port", "starboard"):
         raise InputError(table.path, "comment rudder_sign", f"is {sign!r}", "write port or starboard")
     return sign
 
 
-def _noise(table: Table) -> dict[str, float]:
+def _noise(table: CsvTable) -> dict[str, float]:
     """Stated standard deviations by signal, SI."""
     stated: dict[str, float] = {}
     if "noise" not in table.comments:
@@ -105,7 +106,7 @@ def _noise(table: Table) -> dict[str, float]:
         if len(words) != 2 or not 0 < value < np.inf:
             remedy = "write such as '# noise: u_mps 0.03, psi_deg 0.1', with positive standard deviations"
             raise InputError(table.path, "comment noise", f"{part.strip()!r} is not understood", remedy)
-        if name not in SIGNALS or name not in table.columns:
+        if name not in TRIAL_SIGNALS or name not in table.columns:
             raise InputError(table.path, "comment noise", f"there is no column {words[0]}", "name a measured column")
         stated[name] = value
     return stated

@@ -9,17 +9,17 @@ from pathlib import Path
 
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.csv_table import Vector
 
 RUDDERS = ("delta_rad", "delta_order_rad")
 """Angle and order of the rudder: a trial has one of them or both."""
-MEASURED = (
+MEASURED_COLUMNS = (
     *("u_mps", "v_mps", "u_ground_mps", "v_ground_mps", "sog_mps", "cog_rad", "r_radps", "psi_rad", "x_m", "y_m"),
     *("phi_rad", "wind_speed_mps", "wind_direction_rad", "wind_rel_speed_mps", "wind_rel_direction_rad"),
 )
 """What sensors tell of the motion and the wind."""
-SIGNALS = (*RUDDERS, "n_radps", *MEASURED)
+TRIAL_SIGNALS = (*RUDDERS, "n_radps", *MEASURED_COLUMNS)
 """Every signal of the trial format, in SI."""
 
 
@@ -51,8 +51,8 @@ class Trial:
     """
 
     path: Path
-    time_s: Vector
-    signals: Mapping[str, Vector]
+    time_s: Array
+    signals: Mapping[str, Array]
     noise: Mapping[str, float] = field(default_factory=dict)
     scale: float | None = None
     notices: tuple[str, ...] = ()
@@ -95,7 +95,7 @@ def select_rows(trial: Trial, rows: np.ndarray) -> Trial:
     return replace(trial, time_s=trial.time_s[rows], signals=signals)
 
 
-def with_signals(trial: Trial, changes: Mapping[str, Vector | None], notice: str) -> Trial:
+def with_signals(trial: Trial, changes: Mapping[str, Array | None], notice: str) -> Trial:
     """The trial with some signals changed or added, or left out where the change is None, and a notice that says so.
 
     The stated noise of what is left out goes with it.
@@ -127,7 +127,7 @@ def froude_scaled(trial: Trial, length_ratio: float) -> Trial:
     return replace(trial, time_s=trial.time_s * math.sqrt(length_ratio), signals=signals, noise=noise, length_m=length)
 
 
-def unwrapped(angle: Vector) -> Vector:
+def unwrapped(angle: Array) -> Array:
     """A wrapped angle (n,), rad, made continuous; nan stays, and the angle goes the shorter way past it."""
     known = np.isfinite(angle)
     continuous = angle.copy()

@@ -9,9 +9,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from tank2sim.dynamics.yaw_programme import KINDS, PAPER, YawProgramme, full_turns
+from tank2sim.arrays import Array
+from tank2sim.dynamics.yaw_programme import PAPER_PROGRAMME, PROGRAMME_KINDS, YawProgramme, full_turns
 from tank2sim.errors import InputError
-from tank2sim.records.csv_table import Table, Vector, read_table
+from tank2sim.records.csv_table import CsvTable, read_table
 from tank2sim.units import to_si
 
 Medium = Literal["air", "water"]
@@ -58,9 +59,9 @@ class YawRecord:
     """
 
     path: Path
-    time_s: Vector
-    angle_rad: Vector
-    current_A: Vector
+    time_s: Array
+    angle_rad: Array
+    current_A: Array
     medium: Medium
     programme: YawProgramme
     stated: bool
@@ -123,7 +124,7 @@ def yaw_record_text(record: YawRecord) -> str:
     return "\n".join([*head, "t_s,phi_rad,current_A", *body]) + "\n"
 
 
-def _complete(table: Table, name: str) -> Vector:
+def _complete(table: CsvTable, name: str) -> Array:
     values = table.column(name)
     empty = np.flatnonzero(np.isnan(values))
     if empty.size:
@@ -131,18 +132,18 @@ def _complete(table: Table, name: str) -> Vector:
     return values
 
 
-def _positive(table: Table, key: str) -> float | None:
+def _positive(table: CsvTable, key: str) -> float | None:
     value = table.comment_number(key)
     if value is not None and value <= 0:
         raise InputError(table.path, f"comment {key}", f"is {value:g}", "a positive number was expected")
     return value
 
 
-def _programme(table: Table, time: Vector) -> tuple[YawProgramme, list[str]]:
+def _programme(table: CsvTable, time: Array) -> tuple[YawProgramme, list[str]]:
     """The programme, and what the file does not tell of it."""
     kind = table.comments.get("programme", "unidirectional").strip().lower()
-    if kind not in (*KINDS, "full_turn"):
-        expected = ", ".join((*KINDS, "full_turn"))
+    if kind not in (*PROGRAMME_KINDS, "full_turn"):
+        expected = ", ".join((*PROGRAMME_KINDS, "full_turn"))
         raise InputError(table.path, "comment programme", f"is {kind!r}", f"one of {expected} was expected")
     rate = _rate(table)
     start = table.comment_number("start_s") or 0.0
@@ -151,9 +152,9 @@ def _programme(table: Table, time: Vector) -> tuple[YawProgramme, list[str]]:
     missing += ["rise_s"] if rise is None and kind != "full_turn" else []
     try:
         programme = YawProgramme(
-            max_rate_radps=PAPER.max_rate_radps if rate is None else rate,
-            rise_s=PAPER.rise_s if rise is None else rise,
-            settle_s=PAPER.settle_s if settle is None else settle,
+            max_rate_radps=PAPER_PROGRAMME.max_rate_radps if rate is None else rate,
+            rise_s=PAPER_PROGRAMME.rise_s if rise is None else rise,
+            settle_s=PAPER_PROGRAMME.settle_s if settle is None else settle,
             start_s=start,
             humps=1,
         )
@@ -165,7 +166,7 @@ def _programme(table: Table, time: Vector) -> tuple[YawProgramme, list[str]]:
     return whole, missing
 
 
-def _rate(table: Table) -> float | None:
+def _rate(table: CsvTable) -> float | None:
     """The programme's rate in rad/s, from whichever unit it is told in; its sign is that of the turn."""
     for key in ("max_rate_degps", "max_rate_radps"):
         value = table.comment_number(key)
@@ -176,7 +177,7 @@ def _rate(table: Table) -> float | None:
     return None
 
 
-def _humps(table: Table, time: Vector, programme: YawProgramme, kind: str) -> int:
+def _humps(table: CsvTable, time: Array, programme: YawProgramme, kind: str) -> int:
     """How many humps the file has, told or counted; their last braking interval is within it."""
     length = programme.pairs()[0].braking_s[1] - programme.start_s
     fit = math.floor((time[-1] - programme.start_s - length) / programme.period_s + 1e-9) + 1

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.simulation.ensemble import Ensemble
-
-Array = NDArray[np.float64]
 
 QUANTILES = (0.05, 0.50, 0.95)
 """Lower end, middle and upper end of a band."""
@@ -25,7 +24,7 @@ FOLLOWED = 10.0
 """Steps of the leading track within which a member beside it is to pass the next normal: it does within one, longer or
 shorter by its distance over the radius of the track; a lap, which is not to be left out, has more (ours)."""
 
-ROUNDED = 0.001
+_ROUNDED = 0.001
 """Part of a step by which a track may fall short of a normal or pass it backwards: positions are kept in single
 precision (ours)."""
 
@@ -198,7 +197,7 @@ def _followed(
     here, at = last[0].copy(), last[1].copy()
     point, along = normal
     ahead = (here - point) @ along
-    rounded = ROUNDED * step
+    rounded = _ROUNDED * step
     here[ahead > rounded] = np.nan
     going = np.flatnonzero(ahead < -rounded)
     left = np.full(len(tracks), FOLLOWED * step)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tank2sim.dynamics.model import Vector
+from tank2sim.arrays import Array
 from tank2sim.marks import EXTRAPOLATED
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.trajectory import Trajectory
@@ -28,7 +28,7 @@ _FIRST_HEADING = ("initial_turning_time_s", "initial_turning_distance_m", "initi
 
 
 @dataclass(frozen=True)
-class Reading:
+class CardRangeReading:
     """Figures of a run, and which of them were settled inside the range that the card was measured in.
 
     Parameters
@@ -73,11 +73,11 @@ class Reading:
         }
 
 
-NOTHING_READ = Reading({}, {})
+NOTHING_READ = CardRangeReading({}, {})
 """That of a run that could not be made."""
 
 
-def reading(figures: Figures, run: Trajectory, parameters: Mapping[str, float]) -> Reading:
+def reading(figures: Figures, run: Trajectory, parameters: Mapping[str, float]) -> CardRangeReading:
     """The figures of a run with the times at which they are settled; `parameters` are all of the model, by name."""
     row = left_at(run)
     left = None if row is None else float(run.t[row])
@@ -90,7 +90,7 @@ def reading(figures: Figures, run: Trajectory, parameters: Mapping[str, float]) 
         for place, (begun, later) in enumerate(zip(executes, waits, strict=False), start=1):
             settled[f"overshoot_{place}_deg"] = settled[f"overshoot_time_{place}_s"] = begun + later
         settled |= {f"execute_time_{place}_s": time for place, time in enumerate(executes, start=1)}
-    return Reading(single_figures(figures), settled, left, "" if left is None else _how(run, parameters))
+    return CardRangeReading(single_figures(figures), settled, left, "" if left is None else _how(run, parameters))
 
 
 def single_figures(figures: Figures) -> Numbers:
@@ -125,7 +125,7 @@ def _how(run: Trajectory, values: Mapping[str, float]) -> str:
     return range_left(values, run["motion.speed"], rate, drift, run["rudder.angle"])
 
 
-def range_left(values: Mapping[str, float], speed: Vector, rate: Vector, drift: Vector, rudder: Vector) -> str:
+def range_left(values: Mapping[str, float], speed: Array, rate: Array, drift: Array, rudder: Array) -> str:
     """What of a motion leaves the range of the card, with both ranges, in words; empty if nothing does.
 
     Parameters

@@ -17,9 +17,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tank2sim.dynamics.model import Vector
+from tank2sim.arrays import Array
 
-Array = NDArray[np.float64]
 Histories = NDArray[np.float32]
 
 BATCH = 32
@@ -55,10 +54,10 @@ class Draws:
     """
 
     names: tuple[str, ...]
-    mean: Vector
+    mean: Array
     root: Array
-    lowest: Vector
-    highest: Vector
+    lowest: Array
+    highest: Array
     seed: int
 
     def member(self, number: int) -> dict[str, float]:
@@ -90,7 +89,7 @@ class Drawn(NamedTuple):
     trouble: str = ""
 
 
-class Answer(NamedTuple):
+class MemberResult(NamedTuple):
     """What one member answers: figures by name, histories (signals, times), nan where it shows none; why a member
     cannot be used, if so; and, put in by :func:`ensemble`, the parameters for which it was drawn anew."""
 
@@ -100,7 +99,7 @@ class Answer(NamedTuple):
     beyond: tuple[str, ...] = ()
 
 
-Ask = Callable[[Sequence[Mapping[str, float]]], Sequence[Answer]]
+Ask = Callable[[Sequence[Mapping[str, float]]], Sequence[MemberResult]]
 """From the parameters of members, all of the same names, to the answer of each, which does not depend on the others."""
 
 
@@ -206,19 +205,19 @@ class _Task:
     count: int
 
 
-def _in_order(tasks: list[_Task], executor: Executor | None) -> Iterator[Answer]:
+def _in_order(tasks: list[_Task], executor: Executor | None) -> Iterator[MemberResult]:
     batches = map(_answers, tasks) if executor is None else executor.map(_answers, tasks)
     for batch in batches:
         yield from batch
 
 
-def _answers(task: _Task) -> list[Answer]:
+def _answers(task: _Task) -> list[MemberResult]:
     ask = _prepared(task.question)
     numbers = range(task.first, task.first + task.count)
     drawn = [task.draws.drawn(number) for number in numbers]
     found = []
     for number, one, answer in zip(numbers, drawn, ask([one.values for one in drawn]), strict=True):
-        told = Answer({}, trouble=one.trouble) if one.trouble else answer
+        told = MemberResult({}, trouble=one.trouble) if one.trouble else answer
         histories = told.histories if number < KEPT else None
         found.append(told._replace(histories=histories, beyond=one.beyond))
     return found

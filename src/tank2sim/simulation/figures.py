@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tank2sim.dynamics.model import Vector
-from tank2sim.simulation.manoeuvres import PullOut, Spiral, Stop, Turn, Zigzag
+from tank2sim.arrays import Array
+from tank2sim.simulation.manoeuvres import PullOut, SpiralManoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.trajectory import Trajectory
 
 Figures = dict[str, object]
@@ -44,7 +44,7 @@ def figures_of(manoeuvre: object, trajectory: Trajectory, length: float) -> Figu
             return _zigzag(trajectory, manoeuvre, length)
         case PullOut(rudder):
             return _pull_out(trajectory, rudder)
-        case Spiral(rudders):
+        case SpiralManoeuvre(rudders):
             return _spiral(trajectory, rudders)
         case Stop():
             return _stop(trajectory, manoeuvre, length)
@@ -61,7 +61,7 @@ def _ending(run: Trajectory) -> Figures:
     }
 
 
-def _first(times: Vector) -> float | None:
+def _first(times: Array) -> float | None:
     return float(times[0]) if len(times) else None
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.errors import InputError
-from tank2sim.records.csv_table import Table, read_table
+from tank2sim.records.csv_table import CsvTable, read_table
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
 from tank2sim.simulation.trajectory import Trajectory
@@ -47,7 +47,7 @@ class ProgrammeStep:
 
 
 @dataclass(frozen=True)
-class Programme:
+class GlideProgramme:
     """Steps one after the other, and the file or name they come from."""
 
     source: str
@@ -59,7 +59,7 @@ class Programme:
         return math.fsum(step.duration_s for step in self.steps)
 
 
-def read_programme(path: Path | str) -> Programme:
+def read_programme(path: Path | str) -> GlideProgramme:
     """Read a programme.
 
     Raises
@@ -81,14 +81,14 @@ def read_programme(path: Path | str) -> Programme:
         raise InputError(table.path, "header", problem, "give one of them")
     durations = table.column("duration_s")
     steps = tuple(_step(table, row, angles[0]) for row in range(len(durations)))
-    programme = Programme(str(table.path), steps)
+    programme = GlideProgramme(str(table.path), steps)
     if programme.duration_s > LONGEST_PROGRAMME_S:
         problem = f"lasts {programme.duration_s:g} s"
         raise InputError(table.path, "column duration_s", problem, f"at most {LONGEST_PROGRAMME_S:g} s can be flown")
     return programme
 
 
-def _step(table: Table, row: int, angle: str) -> ProgrammeStep:
+def _step(table: CsvTable, row: int, angle: str) -> ProgrammeStep:
     def value(name: str, default: float | None = None) -> float:
         given = float(table.columns[name][row]) if name in table.columns else math.nan
         if not math.isnan(given):
@@ -115,7 +115,9 @@ def _step(table: Table, row: int, angle: str) -> ProgrammeStep:
     )
 
 
-def follow(integrator: Integrator, orders: Sequence[Mapping[str, float]], durations_s: Sequence[float]) -> Trajectory:
+def follow_programme(
+    integrator: Integrator, orders: Sequence[Mapping[str, float]], durations_s: Sequence[float]
+) -> Trajectory:
     """The motion of a glider model under orders that hold for their durations, from the steady glide of the first.
 
     Without buoyancy in the first it starts at rest.

@@ -11,9 +11,9 @@ from collections.abc import Callable
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
 from tank2sim.native.generate import generate_c
@@ -78,7 +78,6 @@ void outputs(long n, const double* u, const double* p, const double* x, double* 
 }}
 """
 
-Array = NDArray[np.float64]
 Loop = Callable[..., None]
 
 NO_COMPILER = "no C compiler that works was found: CasADi evaluates the model itself, many times slower"
@@ -112,7 +111,7 @@ class Integrator:
                 self.compiled = False
         self._rollout, self._rollouts, self._outputs = self._in_casadi()
 
-    def rollout(self, x: Vector, u: Vector, p: Vector, h: float, n: int, *, every: int = 1) -> Vector:
+    def rollout(self, x: Array, u: Array, p: Array, h: float, n: int, *, every: int = 1) -> Array:
         """States (ceil(n / every) + 1, nx) at the beginning `x` (nx,), then after each `every` steps, and the last.
 
         `n` steps of `h` s with the inputs `u` (nu,) held.
@@ -122,7 +121,7 @@ class Integrator:
         self._rollout(n, every, h, u, p, states)
         return states
 
-    def rollouts(self, starts: Array, u: Vector, p: Array, steps: tuple[float, int]) -> Array:
+    def rollouts(self, starts: Array, u: Array, p: Array, steps: tuple[float, int]) -> Array:
         """States (m, ceil(n / every) + 1, nx) of m ships from `starts` (m, nx), each with its parameters `p` (m, np).
 
         `steps` are their length, s, and their number n; the inputs `u` (nu,) are held. Each is as in :meth:`rollout`.
@@ -133,12 +132,12 @@ class Integrator:
         self._rollouts(len(starts), n, self.every, h, u, np.ascontiguousarray(p), states)
         return states
 
-    def step(self, x: Vector, u: Vector, p: Vector, h: float) -> Vector:
+    def step(self, x: Array, u: Array, p: Array, h: float) -> Array:
         """State (nx,) after one step of `h` s."""
-        following: Vector = self.rollout(x, u, p, h, 1)[1]
+        following: Array = self.rollout(x, u, p, h, 1)[1]
         return following
 
-    def outputs(self, x: Vector, u: Vector, p: Vector) -> Vector:
+    def outputs(self, x: Array, u: Array, p: Array) -> Array:
         """Outputs (n, ny) at states `x` (n, nx) and inputs `u` (n, nu)."""
         y = np.empty((len(x), len(self.model.outputs)))
         self._outputs(len(x), np.ascontiguousarray(u), p, np.ascontiguousarray(x), y)
@@ -170,7 +169,7 @@ class Integrator:
         loops: dict[int, ca.Function] = {}
         step = runge_kutta_step(self.model)
 
-        def rollout(n: int, every: int, h: float, u: Vector, p: Vector, kept: Vector) -> None:
+        def rollout(n: int, every: int, h: float, u: Array, p: Array, kept: Array) -> None:
             done, x = 0, np.empty((n + 1, kept.shape[1]))
             x[0] = kept[0]
             while done < n:  # loops of 1, 2, 4, ... steps, so that few different ones are ever made
@@ -187,7 +186,7 @@ class Integrator:
             for p, kept in zip(parameters, states, strict=True):
                 rollout(n, every, h, u, p, kept)
 
-        def outputs(n: int, u: Vector, p: Vector, x: Vector, y: Vector) -> None:
+        def outputs(n: int, u: Array, p: Array, x: Array, y: Array) -> None:
             y[:] = np.array(self.model.output(x.T, u.T, ca.repmat(p, 1, n))).T
 
         return rollout, rollouts, outputs

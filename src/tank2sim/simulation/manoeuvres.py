@@ -14,12 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from tank2sim.dynamics.model import Input, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Input
 from tank2sim.errors import InputError
 from tank2sim.records.csv_table import read_table
 from tank2sim.simulation.running import Running
 
-FORMS = (
+MANOEUVRE_FORMS = (
     "turn:35, turn:-35, zigzag:20/20, zigzag:-10/10, pullout:20, spiral, spiral:20, stop, stop:-60 (rpm), "
     "file:orders.csv"
 )
@@ -47,6 +48,11 @@ would fill gigabytes."""
 
 STEADY_CHANGE = 1e-3
 """Steady: over two ship lengths the yaw rate changes by less than this share of itself, or of 0.01 u0/L if less."""
+
+
+def _degrees(angle: float) -> str:
+    """An angle (rad) in deg, without what rounding to radians leaves."""
+    return f"{math.degrees(angle):.10g}"
 
 
 def _check_angles(name: str, **angles: float) -> None:
@@ -80,6 +86,11 @@ class Turn:
 
     def __post_init__(self) -> None:
         _check_angles("Turn", rudder=self.rudder)
+
+    @property
+    def words(self) -> str:
+        """As :func:`parse_manoeuvre` reads it, in deg."""
+        return f"turn:{_degrees(self.rudder)}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Run for `duration` s, or until the heading has changed by :data:`TURN_HEADING` (at most 150 L/u0)."""
@@ -117,6 +128,11 @@ class Zigzag:
     def __post_init__(self) -> None:
         _check_angles("Zigzag", rudder=self.rudder, heading=self.heading)
 
+    @property
+    def words(self) -> str:
+        """As :func:`parse_manoeuvre` reads it, in deg."""
+        return f"zigzag:{_degrees(self.rudder)}/{_degrees(self.heading)}"
+
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Run for `duration` s, or to the heading's return after the fifth execute (at most 150 L/u0)."""
         begin = running.state("motion.psi") if self.course is None else self.course
@@ -152,6 +168,11 @@ class PullOut:
     def __post_init__(self) -> None:
         _check_angles("PullOut", rudder=self.rudder)
 
+    @property
+    def words(self) -> str:
+        """As :func:`parse_manoeuvre` reads it, in deg."""
+        return f"pullout:{_degrees(self.rudder)}"
+
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Turn until steady (at most 60 L/u0), then `duration` s (by default 40 L/u0) with the neutral rudder."""
         neutral = running.neutral_rudder()
@@ -162,10 +183,15 @@ class PullOut:
 
 
 @dataclass(frozen=True)
-class Spiral:
+class SpiralManoeuvre:
     """Direct (Dieudonne) spiral: a series of rudder angles to port and back to starboard, each held until steady."""
 
     rudders: tuple[float, ...]
+
+    @property
+    def words(self) -> str:
+        """As :func:`parse_manoeuvre` reads it, in deg."""
+        return f"spiral:{_degrees(self.rudders[0])}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Hold each rudder until steady, at most `duration` s (by default 100 L/u0)."""
@@ -186,6 +212,11 @@ class Stop:
     """
 
     revolutions: float | None = None
+
+    @property
+    def words(self) -> str:
+        """As :func:`parse_manoeuvre` reads it, in rpm."""
+        return "stop" if self.revolutions is None else f"stop:{self.revolutions * 60 / math.tau:.10g}"
 
     def final_speed(self, approach: float) -> float:
         """Surge velocity (m/s) at which the ship has stopped: 0, or :data:`COASTING_END` of that of the approach."""
@@ -228,9 +259,14 @@ class Orders:
         The file, for messages.
     """
 
-    times: Vector
-    inputs: dict[str, Vector]
+    times: Array
+    inputs: dict[str, Array]
     source: str
+
+    @property
+    def words(self) -> str:
+        """As :func:`parse_manoeuvre` reads it."""
+        return f"file:{self.source}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Run to the last order's time, or for `duration` s (needed if there is only one order)."""
@@ -252,11 +288,11 @@ class Orders:
         running.run(end - running.time)
 
 
-Manoeuvre = Turn | Zigzag | PullOut | Spiral | Stop | Orders
+Manoeuvre = Turn | Zigzag | PullOut | SpiralManoeuvre | Stop | Orders
 
 
 def parse_manoeuvre(text: str) -> Manoeuvre:
-    """The manoeuvre that a command line means: one of :data:`FORMS`, angles in deg, positive to starboard, rpm ahead.
+    """Parse a manoeuvre: one of :data:`MANOEUVRE_FORMS`, angles in deg, positive to starboard, rpm ahead.
 
     Raises
     ------
@@ -273,11 +309,11 @@ def parse_manoeuvre(text: str) -> Manoeuvre:
         "turn": (number, lambda a: Turn(math.radians(a[0]))),
         "zigzag": (f"{number}/{number}", lambda a: Zigzag(math.radians(a[0]), math.radians(a[1]))),
         "pullout": (number, lambda a: PullOut(math.radians(a[0]))),
-        "spiral": (f"(?:{number})?", lambda a: Spiral(_spiral_rudders(a[0] if a else SPIRAL_RUDDERS_DEG[0]))),
+        "spiral": (f"(?:{number})?", lambda a: SpiralManoeuvre(_spiral_rudders(a[0] if a else SPIRAL_RUDDERS_DEG[0]))),
     }
     found = re.fullmatch(makers[kind][0], rest) if kind in makers else None
     if found is None:
-        raise InputError("--manoeuvre", "", f"{text!r} is no manoeuvre", f"one of: {FORMS}")
+        raise InputError("--manoeuvre", "", f"{text!r} is no manoeuvre", f"one of: {MANOEUVRE_FORMS}")
     angles = [float(group) for group in found.groups() if group is not None]
     if any(not 0 < abs(angle) < 90 for angle in angles) or (kind == "zigzag" and angles[1] < 0):
         remedy = (
@@ -296,32 +332,42 @@ def read_orders(path: Path) -> Orders:
         A column is missing or unknown, time does not rise from 0, or a value is missing.
     """
     table = read_table(path)
-    columns = table.si().columns
+    found = orders_from_columns(table.si().columns, path)
+    if not any(key.lower() == "rudder_sign" for key in table.comments):
+        table.refuse_misspelt_keys(("rudder_sign",))
+    if _rudder_sign(path, table.comments) == "port":
+        found.inputs["rudder.command"] = -found.inputs["rudder.command"]
+    return found
+
+
+def orders_from_columns(columns: Mapping[str, Array], source: Path | str) -> Orders:
+    """Orders from columns (n,) in SI: ``t_s``, ``delta_order_rad`` to starboard, ``n_radps``; `source` is for messages.
+
+    Raises
+    ------
+    InputError
+        A column is missing or unknown, time does not rise from 0, or a value is missing.
+    """
     names = {"delta_order_rad": "rudder.command", "delta_rad": "rudder.command", "n_radps": "propeller.speed"}
     for name in columns:
         if name not in {"t_s", *names}:
-            raise InputError(path, f"column {name}", "is no order", "orders are t_s, delta_order_deg and n_rpm")
+            raise InputError(source, f"column {name}", "is no order", "orders are t_s, delta_order_deg and n_rpm")
     rudders = {"delta_order_rad", "delta_rad"} & set(columns)
     if "t_s" not in columns or not rudders:
-        raise InputError(path, "header", "lacks t_s or delta_order_deg", "orders are t_s, delta_order_deg and n_rpm")
+        raise InputError(source, "header", "lacks t_s or delta_order_deg", "orders are t_s, delta_order_deg and n_rpm")
     if len(rudders) > 1:
-        raise InputError(path, "header", "has two rudder columns", "give delta_order_deg alone")
+        raise InputError(source, "header", "has two rudder columns", "give delta_order_deg alone")
     times = columns["t_s"]
     if times[0] != 0 or np.any(np.diff(times) <= 0):
-        raise InputError(path, "column t_s", "does not rise from 0", "begin at 0 and give each time once")
+        raise InputError(source, "column t_s", "does not rise from 0", "begin at 0 and give each time once")
     if times[-1] > LONGEST_RUN_S:
         raise InputError(
-            path, "column t_s", f"ends at {times[-1]:g} s", f"at most {LONGEST_RUN_S:g} s can be simulated"
+            source, "column t_s", f"ends at {times[-1]:g} s", f"at most {LONGEST_RUN_S:g} s can be simulated"
         )
     for name, values in columns.items():
         if np.isnan(values).any():
-            raise InputError(path, f"column {name}", "has an empty cell", "give every order")
-    if not any(key.lower() == "rudder_sign" for key in table.comments):
-        table.refuse_misspelt_keys(("rudder_sign",))
-    port = _rudder_sign(path, table.comments) == "port"
-    inputs = {names[name]: values for name, values in columns.items() if name in names}
-    inputs["rudder.command"] = inputs["rudder.command"] * (-1.0 if port else 1.0)
-    return Orders(times, inputs, str(path))
+            raise InputError(source, f"column {name}", "has an empty cell", "give every order")
+    return Orders(times, {names[name]: values for name, values in columns.items() if name in names}, str(source))
 
 
 def _rudder_sign(path: Path, comments: Mapping[str, str]) -> str:
@@ -336,7 +382,7 @@ def _rudder_sign(path: Path, comments: Mapping[str, str]) -> str:
 def _parse_stop(text: str) -> Stop:
     found = re.fullmatch(r"stop(?::([+-]?\d+(?:\.\d+)?))?", text)
     if found is None:
-        raise InputError("--manoeuvre", "", f"{text!r} is no manoeuvre", f"one of: {FORMS}")
+        raise InputError("--manoeuvre", "", f"{text!r} is no manoeuvre", f"one of: {MANOEUVRE_FORMS}")
     if found[1] is None:
         return Stop()
     revolutions = float(found[1]) * math.tau / 60

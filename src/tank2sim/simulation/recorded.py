@@ -13,27 +13,25 @@ from itertools import pairwise
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.signal import savgol_coeffs, savgol_filter
 from scipy.stats import t as student
 
+from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.form import SteeringGear
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics.kinematics import earth_velocity
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.steering_gear import UNSTATED_LAG
 from tank2sim.records.audit.noise import white_noise
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
-from tank2sim.simulation.rudder_record import HeldRudder, held_rudders, rudder_of
+from tank2sim.simulation.rudder_record import HeldAngle, held_rudders, rudder_of
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 NOMINAL_HEADINGS_DEG = (1, 2, 5, 10, 15, 20, 25, 30, 35)
 """Headings at which zigzags are reversed (ITTC 7.5-04-02-01, and the modified ones of SIMMAN)."""
@@ -222,7 +220,7 @@ def repeat(what: Recorded, integrator: Integrator, parameters: dict[str, float] 
 
 
 def _zigzag(
-    time: Vector, held: list[HeldRudder], smooth: dict[str, Vector], noise: float, ship_time: float
+    time: Array, held: list[HeldAngle], smooth: dict[str, Array], noise: float, ship_time: float
 ) -> tuple[Zigzag, dict[str, float]] | None:
     """Rudder, nominal heading, course and lag of a zigzag, and their standard errors; None if it is none.
 
@@ -247,7 +245,7 @@ def _zigzag(
     return Zigzag(math.copysign(angle, held[0].angle), fitted.nominal, fitted.lag, fitted.course), errors
 
 
-def _degrees(held: list[HeldRudder]) -> float:
+def _degrees(held: list[HeldAngle]) -> float:
     """Rudder of a zigzag, deg."""
     return math.degrees(float(np.median([abs(one.angle) for one in held])))
 
@@ -281,10 +279,10 @@ class _Reversals:
         Of lags before the record, s.
     """
 
-    time: Vector
-    heading: Vector
-    times: Vector
-    sides: Vector
+    time: Array
+    heading: Array
+    times: Array
+    sides: Array
     approach: tuple[float, float]
     lag_scale: float
 
@@ -293,11 +291,11 @@ class _Reversals:
         it is given."""
         course, error = self.approach
 
-        def off(at: Vector, heading: float) -> Vector:
+        def off(at: Array, heading: float) -> Array:
             before = np.interp(self.times - at[-1], self.time, self.heading)
             return np.asarray(before - at[0] - self.sides * heading, dtype=np.float64)
 
-        def residuals(at: Vector) -> Vector:
+        def residuals(at: Array) -> Array:
             heading = at[1] if nominal is None else nominal
             return np.concatenate([off(at, heading) / noise, [(at[0] - course) / error, at[-1] / self.lag_scale]])
 
@@ -362,7 +360,7 @@ def _heading_noise(trial: Trial, ship_time: float) -> float:
     return math.sqrt(left) * trial.noise.get("psi_rad", white_noise(trial.signals["psi_rad"]))
 
 
-def _approach(time: Vector, first: HeldRudder, smooth: dict[str, Vector]) -> tuple[float, float]:
+def _approach(time: Array, first: HeldAngle, smooth: dict[str, Array]) -> tuple[float, float]:
     """Mean heading before the first execute, and how well it tells the course, rad."""
     until = max(2, int(np.searchsorted(time, first.execute_s)))
     heading = smooth["psi_rad"][:until]
@@ -370,7 +368,7 @@ def _approach(time: Vector, first: HeldRudder, smooth: dict[str, Vector]) -> tup
     return float(np.mean(heading)), math.hypot(COURSE_ERROR, wandered)
 
 
-def _dating_noise(time: Vector, times: Vector, smooth: dict[str, Vector]) -> float:
+def _dating_noise(time: Array, times: Array, smooth: dict[str, Array]) -> float:
     """Standard deviation of the headings at reversals because those are dated to a sample, rad."""
     rate = float(np.sqrt(np.mean(np.interp(times, time, smooth["r_radps"]) ** 2)))
     return rate * float(np.median(np.diff(time))) / math.sqrt(12)
@@ -381,7 +379,7 @@ def _trajectory(
     model: Model,
     manoeuvre: Turn | Zigzag,
     span: tuple[float, float],
-    seen: tuple[list[HeldRudder], dict[str, Vector]],
+    seen: tuple[list[HeldAngle], dict[str, Array]],
 ) -> Trajectory:
     """The record between two times as a trajectory of the model: figures are read off it as off a simulation."""
     held, smooth = seen
@@ -399,7 +397,7 @@ def _trajectory(
     return Trajectory(model, t - span[0], x, u, y)
 
 
-def drift_over_ground(model: Model, inputs: Array, psi: Vector) -> Array:
+def drift_over_ground(model: Model, inputs: Array, psi: Array) -> Array:
     """Velocity over the ground of a ship that rests in the water, north and east (n, 2), m/s: that of the current.
 
     Parameters
@@ -418,7 +416,7 @@ def drift_over_ground(model: Model, inputs: Array, psi: Vector) -> Array:
     return np.array(ca.Function("rest", [model.x, model.u, model.p], [rates])(states.T, inputs.T, p)).T
 
 
-def _motion(trial: Trial, model: Model, ship_time: float) -> dict[str, Vector] | None:
+def _motion(trial: Trial, model: Model, ship_time: float) -> dict[str, Array] | None:
     """The signals of :data:`STATES` (n,), smooth; None if heading or positions were not measured.
 
     Yaw rate and velocities that were not measured are slopes of the smoothed heading and positions.
@@ -452,20 +450,20 @@ def _fed(trial: Trial, model: Model) -> dict[str, float]:
     }
 
 
-def _window(time: Vector, ship_time: float) -> int:
+def _window(time: Array, ship_time: float) -> int:
     """Samples, odd, over which signals are smoothed."""
     return int(SMOOTHING * ship_time / float(np.median(np.diff(time)))) // 2 * 2 + 1
 
 
-def _smoothed(time: Vector, values: Vector, ship_time: float) -> Vector:
+def _smoothed(time: Array, values: Array, ship_time: float) -> Array:
     window = _window(time, ship_time)
     if window < 5 or window > len(values):
         return values
-    smooth: Vector = savgol_filter(values, window, 3)
+    smooth: Array = savgol_filter(values, window, 3)
     return smooth
 
 
-def _slope(time: Vector, values: Vector, ship_time: float) -> Vector:
+def _slope(time: Array, values: Array, ship_time: float) -> Array:
     """Time derivative by straight lines through windows: at the ends of a record a higher degree follows the noise."""
     window = _window(time, ship_time)
     if window < 3 or window > len(values):
@@ -474,6 +472,6 @@ def _slope(time: Vector, values: Vector, ship_time: float) -> Vector:
     return np.asarray(rise / run, dtype=np.float64)
 
 
-def _filled(time: Vector, values: Vector) -> Vector:
+def _filled(time: Array, values: Array) -> Array:
     known = ~np.isnan(values)
     return np.interp(time, time[known], values[known])

@@ -1,7 +1,7 @@
 """A CasADi function over many rows of arguments, or over a chain of states, in machine code where there is a compiler.
 
-:class:`Rows` evaluates ``f(a, b, ...) -> (y, ...)`` for each row of its arguments; :class:`Chain` feeds the one result
-back as the first argument, as integration does. Without a compiler CasADi's own loops do the same.
+:class:`RowFunction` evaluates ``f(a, b, ...) -> (y, ...)`` for each row of its arguments; :class:`Chain` feeds the one
+result back as the first argument, as integration does. Without a compiler CasADi's own loops do the same.
 """
 
 from __future__ import annotations
@@ -11,14 +11,12 @@ from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
 from tank2sim.native.generate import generate_c
 from tank2sim.native.library import cached_library
-
-Array = NDArray[np.float64]
 
 # Work arrays are on the stack: their sizes are known when this text is made. A stride of 0 holds an argument.
 _LOOP = """
@@ -42,7 +40,7 @@ void loop(long n, const double** arguments, const long* strides, double** result
 """
 
 
-class Rows:
+class RowFunction:
     """Evaluates a function of vectors for each row of its arguments.
 
     Parameters
@@ -88,7 +86,7 @@ class Rows:
         )
 
 
-class Chain(Rows):
+class Chain(RowFunction):
     """Evaluates a function whose one result is its next first argument."""
 
     def run(self, start: Array, *arguments: Array) -> Array:

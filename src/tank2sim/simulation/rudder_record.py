@@ -9,16 +9,16 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from tank2sim.dynamics.model import Vector
+from tank2sim.arrays import Array
 from tank2sim.records.trials import Trial
 
 Places = NDArray[np.int64]
 
-LEAST_RUDDER = math.radians(2.0)
+_LEAST_RUDDER = math.radians(2.0)
 """A rudder that never exceeds this is no manoeuvre."""
 
-STEADY = 0.02
-HELD = 0.05
+_STEADY = 0.02
+_HELD = 0.05
 """A rudder is held when it stays within a share STEADY of an angle for a share HELD of the longest such time: project
 choices. In the approaches of the 3 m Esso Osaka it stays for 2 % of that at most, at the first angle of zigzags of the
 KVLCC2 for 13 % at least (35/5)."""
@@ -26,10 +26,10 @@ KVLCC2 for 13 % at least (35/5)."""
 STEEPER = 3.0
 """A rudder on its way does not speed up by this factor: gears have constant rates, or slow down (project choice)."""
 
-ROUNDS = 6
+_ROUNDS = 6
 """Each halves what a record that begins with the rudder on its way leaves of its error: a project choice."""
 
-REACHED = 0.9
+_REACHED = 0.9
 """Share of an angle at which the rudder counts as there: above the shares by which its rate is read off, below what the
 last part of a gear with a lag makes slow (project choice)."""
 
@@ -39,7 +39,7 @@ order that is ramped is dated near its beginning (project choice)."""
 
 
 @dataclass(frozen=True)
-class HeldRudder:
+class HeldAngle:
     """A rudder angle that was held.
 
     Parameters
@@ -63,7 +63,7 @@ class HeldRudder:
     end_s: float
 
 
-def held_rudders(trial: Trial) -> list[HeldRudder]:
+def held_rudders(trial: Trial) -> list[HeldAngle]:
     """Angles at which the rudder of a trial was held, one side after the other; none if it was not used.
 
     The rudder begins to move where the straight part of its way, drawn back, meets the angle that it left. If the
@@ -80,7 +80,7 @@ def held_rudders(trial: Trial) -> list[HeldRudder]:
     return [replace(move, execute_s=order.execute_s) for move, order in pairs]
 
 
-def rudder_of(trial: Trial) -> Vector:
+def rudder_of(trial: Trial) -> Array:
     """The rudder's angle (n,), rad, without gaps; its order where that alone is known."""
     angle = _known(trial, "delta_rad")
     if angle is not None:
@@ -90,7 +90,7 @@ def rudder_of(trial: Trial) -> Vector:
     return _held_order(trial.time_s, *order)
 
 
-def _known(trial: Trial, name: str) -> tuple[Vector, Vector] | None:
+def _known(trial: Trial, name: str) -> tuple[Array, Array] | None:
     """Times and values (m,) of the readings of a signal; None if there are none."""
     values = trial.signals.get(name)
     if values is None or np.isnan(values).all():
@@ -99,37 +99,37 @@ def _known(trial: Trial, name: str) -> tuple[Vector, Vector] | None:
     return trial.time_s[known], values[known]
 
 
-def _held_order(time: Vector, known: Vector, values: Vector) -> Vector:
+def _held_order(time: Array, known: Array, values: Array) -> Array:
     """An order (n,) that holds until the next."""
-    held: Vector = values[np.clip(np.searchsorted(known, time, side="right") - 1, 0, None)]
+    held: Array = values[np.clip(np.searchsorted(known, time, side="right") - 1, 0, None)]
     return held
 
 
-def _of_angle(trial: Trial) -> list[HeldRudder]:
+def _of_angle(trial: Trial) -> list[HeldAngle]:
     if _known(trial, "delta_rad") is None:
         return []
     time, rudder = trial.time_s, rudder_of(trial)
-    found: list[HeldRudder] = []
+    found: list[HeldAngle] = []
     before = 0
     for group in _held(rudder):
         angle = float(np.median(rudder[group]))
-        there = group[np.abs(rudder[group]) >= REACHED * abs(angle)]
+        there = group[np.abs(rudder[group]) >= _REACHED * abs(angle)]
         stretch = slice(before, int(there[0] if len(there) else group[0]) + 1)
         if found:
             moves, rate = _begins(time[stretch], rudder[stretch], found[-1].angle, angle)
         else:
             moves, rate = _first_begins(time[stretch], rudder[stretch], angle)
-        found.append(HeldRudder(angle, moves, moves, min(rate, math.pi), float(time[group[-1]])))
+        found.append(HeldAngle(angle, moves, moves, min(rate, math.pi), float(time[group[-1]])))
         before = int(group[-1])
     return found
 
 
-def _of_order(trial: Trial) -> list[HeldRudder]:
+def _of_order(trial: Trial) -> list[HeldAngle]:
     known = _known(trial, "delta_order_rad")
     if known is None:
         return []
     time, order = trial.time_s, _held_order(trial.time_s, *known)
-    found: list[HeldRudder] = []
+    found: list[HeldAngle] = []
     before = 0
     for group in _held(order):
         angle = float(np.median(order[group]))
@@ -137,21 +137,21 @@ def _of_order(trial: Trial) -> list[HeldRudder]:
         way = math.copysign(1.0, angle - left) * (order[before : int(group[0]) + 1] - left)
         still = np.flatnonzero(way < LEFT * abs(angle - left))
         execute = float(time[min(before + int(still[-1]) + 1, int(group[0]))] if len(still) else time[before])
-        found.append(HeldRudder(angle, execute, execute, None, float(time[group[-1]])))
+        found.append(HeldAngle(angle, execute, execute, None, float(time[group[-1]])))
         before = int(group[-1])
     return found
 
 
-def _first_begins(time: Vector, rudder: Vector, angle: float) -> tuple[float, float]:
+def _first_begins(time: Array, rudder: Array, angle: float) -> tuple[float, float]:
     """The same from the approach, whose rudder is its median until the execute: the two are found in turn."""
     origin = float(np.median(rudder))
-    for _ in range(ROUNDS):
+    for _ in range(_ROUNDS):
         execute, _ = _begins(time, rudder, origin, angle)
         origin = float(np.median(rudder[: max(1, int(np.searchsorted(time, execute)))]))
     return _begins(time, rudder, origin, angle)
 
 
-def _begins(time: Vector, rudder: Vector, origin: float, angle: float) -> tuple[float, float]:
+def _begins(time: Array, rudder: Array, origin: float, angle: float) -> tuple[float, float]:
     """When the rudder began to move from one angle to another, s, and its rate, rad/s, at the end of a stretch."""
     sign = math.copysign(1.0, angle)
     course, whole = sign * (rudder - origin), sign * (angle - origin)
@@ -164,14 +164,14 @@ def _begins(time: Vector, rudder: Vector, origin: float, angle: float) -> tuple[
     return most - 0.7 * whole / rate, rate
 
 
-def _held(rudder: Vector) -> list[Places]:
+def _held(rudder: Array) -> list[Places]:
     """Samples of each angle that was held, one side after the other.
 
     A rudder that keeps the course before the execute may go as far over as later for the manoeuvre, but stays nowhere:
     what comes before the first angle that is held is of the approach.
     """
     size = float(np.percentile(np.abs(rudder), 95))
-    if size < LEAST_RUDDER:
+    if size < _LEAST_RUDDER:
         return []
     side = np.where(np.abs(rudder) > 0.8 * size, np.sign(rudder), 0)
     places = np.flatnonzero(side)
@@ -179,14 +179,14 @@ def _held(rudder: Vector) -> list[Places]:
     runs = [part for part in parts if len(part) >= 3]
     if not runs:
         return []
-    steady = [np.count_nonzero(np.abs(rudder[run] - np.median(rudder[run])) < STEADY * size) for run in runs]
-    first = next(number for number, count in enumerate(steady) if count >= HELD * max(steady))
+    steady = [np.count_nonzero(np.abs(rudder[run] - np.median(rudder[run])) < _STEADY * size) for run in runs]
+    first = next(number for number, count in enumerate(steady) if count >= _HELD * max(steady))
     kept = runs[first:]
     turns = [number for number in range(1, len(kept)) if side[kept[number][0]] != side[kept[number - 1][0]]]
     return [np.concatenate(kept[a:b]) for a, b in pairwise([0, *turns, len(kept)])]
 
 
-def _last_crossing(time: Vector, course: Vector, level: float) -> float:
+def _last_crossing(time: Array, course: Array, level: float) -> float:
     below = np.flatnonzero(course < level)
     last = int(below[-1]) if len(below) else 0
     if last + 1 >= len(course):

@@ -9,7 +9,7 @@ import numpy as np
 
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.simulation.card_range import Reading, reading
+from tank2sim.simulation.card_range import CardRangeReading, reading
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
 from tank2sim.simulation.manoeuvres import LONGEST_RUN_S, Manoeuvre, Orders
@@ -37,7 +37,7 @@ class Run:
     trajectory: Trajectory
     figures: Figures
     notices: tuple[str, ...]
-    reading: Reading
+    reading: CardRangeReading
 
 
 def simulate(

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 import numpy as np
-from scipy.optimize import brentq
 
-from tank2sim.dynamics.model import Vector
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.simulation.bracketed_root import bracketed_root
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.straight_course import straight_course
 from tank2sim.simulation.trajectory import Trajectory
@@ -54,12 +54,12 @@ class Running:
         self._time = 0.0
         self._steps_done = 0
         self._every = integrator.every
-        self._x: Vector = np.array(self.model.initial(self._p)).ravel()
+        self._x: Array = np.array(self.model.initial(self._p)).ravel()
         if "initial.trim" in self.model and self._p[self.model.parameter_names.index("initial.trim")]:
             self._trim()
-        self._t_parts: list[Vector] = []
-        self._x_parts: list[Vector] = []
-        self._u_parts: list[Vector] = []
+        self._t_parts: list[Array] = []
+        self._x_parts: list[Array] = []
+        self._u_parts: list[Array] = []
 
     @property
     def _tolerance(self) -> float:
@@ -109,7 +109,7 @@ class Running:
         place = self.model.state_names.index(state)
         sign = 1.0 if rising else -1.0
 
-        def beyond(x: Vector) -> float:
+        def beyond(x: Array) -> float:
             return sign * (float(x[place]) - level)
 
         end = self._time + at_most
@@ -131,7 +131,7 @@ class Running:
                 with self._step_by_step():
                     return self.run_until(state, level, rising=rising, at_most=end - self._time)
             gap = float(times[last + 1] - times[last])
-            h = brentq(self._after_step_from(states[last], beyond), 0.0, gap, xtol=1e-13)
+            h = bracketed_root(self._after_step_from(states[last], beyond), 0.0, gap)
             # Take the chunk back, and go to the event instead.
             del self._t_parts[parts:], self._x_parts[parts:], self._u_parts[parts:]
             self._time, self._x, self._steps_done = begin_time, begin_x, steps
@@ -159,7 +159,7 @@ class Running:
             raise InputError(self.model.origin, when, RUNAWAY, remedy)
         return result
 
-    def _after_step_from(self, x: Vector, measure: Callable[[Vector], float]) -> Callable[[float], float]:
+    def _after_step_from(self, x: Array, measure: Callable[[Array], float]) -> Callable[[float], float]:
         return lambda h: measure(self._integrator.step(x, self._u, self._p, h))
 
     def _advance_to(self, end: float) -> None:
@@ -174,7 +174,7 @@ class Running:
             whole = int(np.floor((end - self._time) / h + 1e-9))
         if whole > 0:
             states = self._integrator.rollout(self._x, self._u, self._p, h, whole, every=self._every)
-            times: Vector = np.asarray((self._steps_done + np.arange(0, whole, self._every)) * h, dtype=float)
+            times: Array = np.asarray((self._steps_done + np.arange(0, whole, self._every)) * h, dtype=float)
             times[0] = self._time
             self._keep(times, states[:-1])
             self._x = states[-1]
@@ -200,7 +200,7 @@ class Running:
         self._x = self._integrator.step(self._x, self._u, self._p, h)
         self._time += h
 
-    def _keep(self, times: Vector, states: Vector) -> None:
+    def _keep(self, times: Array, states: Array) -> None:
         self._t_parts.append(times)
         self._x_parts.append(states)
         self._u_parts.append(np.repeat(self._u[None, :], len(times), axis=0))

@@ -10,13 +10,11 @@ from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
-from tank2sim.dynamics.model import Model, Vector
-from tank2sim.simulation.rows import Chain, Rows
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.simulation.rows import Chain, RowFunction
 from tank2sim.simulation.scheme import runge_kutta_step
-
-Array = NDArray[np.float64]
 
 
 class Sensitivity:
@@ -40,18 +38,18 @@ class Sensitivity:
         seen_values = model.expand(ca.vcat([model.symbol(name) for name in seen]))
         shown = [seen_values, *(ca.jacobian(seen_values, by) for by in (model.x, theta))]
         self._steps = Chain(runge_kutta_step(model))
-        self._slopes = Rows(ca.Function("slopes", arguments, [ca.densify(value) for value in slopes], cse))
-        self._shown = Rows(ca.Function("shown", arguments, [ca.densify(value) for value in shown], cse))
+        self._slopes = RowFunction(ca.Function("slopes", arguments, [ca.densify(value) for value in slopes], cse))
+        self._shown = RowFunction(ca.Function("shown", arguments, [ca.densify(value) for value in shown], cse))
 
-    def motion(self, start: Vector, inputs: Array, p: Vector, h: float) -> Array:
+    def motion(self, start: Array, inputs: Array, p: Array, h: float) -> Array:
         """States (n + 1, nx) from `start` (nx,), each row of `inputs` (n, nu) held for `h` s."""
         return self._steps.run(start, inputs, p, np.array([h]))
 
-    def shown(self, states: Array, inputs: Array, p: Vector) -> Array:
+    def shown(self, states: Array, inputs: Array, p: Array) -> Array:
         """What is seen (n, ny) at `states` (n, nx) with `inputs` (n, nu)."""
         return self._shown(states, inputs, p)[0]
 
-    def derivatives(self, states: Array, inputs: Array, p: Vector, h: float) -> tuple[Array, Array, Array]:
+    def derivatives(self, states: Array, inputs: Array, p: Array, h: float) -> tuple[Array, Array, Array]:
         """States at the ends, and what is seen, derived by initial state and parameters.
 
         Parameters
@@ -86,7 +84,7 @@ class Sensitivity:
         by[..., nx:] += D.reshape(pieces, rows, k, ny).transpose(0, 1, 3, 2)
         return seen.reshape(pieces, rows, ny), by, S[:, -1]
 
-    def tangents(self, states: Array, inputs: Array, p: Vector, h: float | Array) -> Array:
+    def tangents(self, states: Array, inputs: Array, p: Array, h: float | Array) -> Array:
         """State after a step from each of `states` (n, nx), derived by it and by the parameters, (n, nx, nx + k).
 
         Each step takes `h` s, or its own of `h` (n,).

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import root
 
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
 
@@ -22,13 +22,13 @@ class OperatingPoint:
         States, inputs and parameters of the model.
     """
 
-    x: Vector
-    u: Vector
-    p: Vector
+    x: Array
+    u: Array
+    p: Array
 
 
 def straight_course(
-    model: Model, speed_mps: float | None = None, *, inputs: Vector | None = None, parameters: Vector | None = None
+    model: Model, speed_mps: float | None = None, *, inputs: Array | None = None, parameters: Array | None = None
 ) -> OperatingPoint:
     """Straight course of a ship at a speed: the sway velocity and the rudder at which Y and N vanish with r = 0.
 
@@ -62,10 +62,12 @@ def straight_course(
     residual = ca.Function("residual", arguments, [accelerations])
     slope = ca.Function("slope", arguments, [ca.jacobian(accelerations, model.x)])
 
-    def with_unknown(values: Vector) -> Vector:
+    def with_unknown(values: Array) -> Array:
         full = x.copy()
         full[unknown] = values
         return full
+
+    from scipy.optimize import root  # slow to import, and most simulations do without
 
     solution = root(
         lambda values: np.array(residual(with_unknown(values), u, p)).ravel(),
@@ -82,7 +84,7 @@ def straight_course(
     return OperatingPoint(x, u, p)
 
 
-def _cause(slopes: Vector) -> str:
+def _cause(slopes: Array) -> str:
     """Why there is no straight course, from the slopes (2, 2) of sway and yaw acceleration by v and by the rudder."""
     by_sway, by_rudder = np.abs(slopes).max(axis=0)
     if not by_sway:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import brentq
 
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.simulation.bracketed_root import bracketed_root
 from tank2sim.units import UNITS
 
 TIMES_BEYOND = 10.0
@@ -35,17 +36,17 @@ class Trajectory:
     """
 
     model: Model
-    t: Vector
-    x: Vector
-    u: Vector
-    y: Vector
+    t: Array
+    x: Array
+    u: Array
+    y: Array
 
-    def __getitem__(self, name: str) -> Vector:
+    def __getitem__(self, name: str) -> Array:
         """A state, output or input (n,), by its name."""
         return self._columns[name]
 
     @cached_property
-    def _columns(self) -> dict[str, Vector]:
+    def _columns(self) -> dict[str, Array]:
         model = self.model
         # Of one name an output comes before a state, and that before an input.
         parts = (model.input_names, self.u), (model.state_names, self.x), (model.outputs, self.y)
@@ -57,7 +58,7 @@ class Trajectory:
         near = slice(max(after - 2, 0), min(after, len(self.t) - 2) + 2)
         return _through(self.t[near].tolist(), self[name][near].tolist(), time)
 
-    def crossings(self, name: str, rate: str, level: float) -> Vector:
+    def crossings(self, name: str, rate: str, level: float) -> Array:
         """Times at which a signal crosses a level, from its values and those of its time derivative `rate`.
 
         Between samples it is the cubic through both (Hermite), whose error is of the fourth order in their distance.
@@ -65,12 +66,14 @@ class Trajectory:
         offset, slope = self[name] - level, self[rate]
         before = np.flatnonzero((offset[:-1] < 0) != (offset[1:] < 0))
         times = [
-            brentq(_hermite(*(part[k : k + 2].tolist() for part in (self.t, offset, slope))), self.t[k], self.t[k + 1])
+            bracketed_root(
+                _hermite(*(p[k : k + 2].tolist() for p in (self.t, offset, slope))), self.t[k], self.t[k + 1]
+            )
             for k in before
         ]
         return np.array(times)
 
-    def columns(self) -> dict[str, Vector]:
+    def columns(self) -> dict[str, Array]:
         """All signals by name, inputs first; time as ``time``."""
         names = (*self.model.input_names, *self.model.outputs)
         rest = tuple(name for name in self.model.state_names if name not in names)

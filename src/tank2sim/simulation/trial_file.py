@@ -6,7 +6,8 @@ import io
 
 import numpy as np
 
-from tank2sim.records.thinning import Vector, drawn_columns
+from tank2sim.arrays import Array
+from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import from_si
 
@@ -24,7 +25,7 @@ _COLUMNS = {
 }
 
 
-def trial_columns(trajectory: Trajectory) -> dict[str, Vector]:
+def trial_columns(trajectory: Trajectory) -> dict[str, Array]:
     """Columns (n,) of a run by their names in the trial format, ``t_s`` first, as far as the model has them."""
     model = trajectory.model
     known = {*model.outputs, *model.state_names, *model.input_names}

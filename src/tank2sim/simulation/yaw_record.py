@@ -13,7 +13,7 @@ from tank2sim.simulation.yaw_rig import Measuring, YawRun, run_yaw_rig
 from tank2sim.simulation.yaw_rig_control import Controller, TunedController
 
 
-def record_of(
+def yaw_record(
     run: YawRun, rig: YawRig, path: Path, constants: Mapping[str, float] | None = None, *, medium: Medium = "water"
 ) -> YawRecord:
     """The record of a run; `constants` are told in it besides the torque constant and the largest current."""
@@ -74,7 +74,7 @@ def simulated_record(
             told["inertia_error_kgm2"] = error
     if card.ship.length_m is not None:
         told["length_m"] = card.ship.length_m
-    return record_of(run, rig, path, told, medium=medium)
+    return yaw_record(run, rig, path, told, medium=medium)
 
 
 def rig_in_air(rig: YawRig) -> YawRig:

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.cards.form import YawRig
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.yaw_programme import Reference, YawProgramme
 from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.errors import InputError
@@ -70,21 +71,21 @@ class YawRun:
     """
 
     programme: YawProgramme
-    time_s: Vector
-    angle_rad: Vector
-    current_A: Vector
-    true_angle_rad: Vector
-    true_rate_radps: Vector
-    true_current_A: Vector
+    time_s: Array
+    angle_rad: Array
+    current_A: Array
+    true_angle_rad: Array
+    true_rate_radps: Array
+    true_current_A: Array
     gains: tuple[dict[str, float], ...]
     memory: tuple[float, ...]
     saturation: Saturation | None
     reference: Reference = field(repr=False)
 
     @property
-    def error_rad(self) -> Vector:
+    def error_rad(self) -> Array:
         """Tracking error e = phi_ref - phi of the true angle."""
-        error: Vector = self.reference.angle_rad - self.true_angle_rad
+        error: Array = self.reference.angle_rad - self.true_angle_rad
         return error
 
 
@@ -108,7 +109,7 @@ def run_yaw_rig(
     model = yaw_rig_model("yaw rig", rig)
     law = controller.law(h, rig.current_lag_s, rig.torque_constant_NmpA)
     steps = round(programme.end_s / h)
-    time: Vector = np.arange(steps + 1, dtype=np.float64) * h
+    time: Array = np.arange(steps + 1, dtype=np.float64) * h
     reference = programme.at(time)
     gains = tuple(law.gains.values())
     sample = _closed_loop(model, law.step, len(law.start), len(law.gains), measuring)
@@ -131,8 +132,8 @@ def run_yaw_rig(
 
 
 class _Path(NamedTuple):
-    time_s: Vector
-    states: Vector
+    time_s: Array
+    states: Array
     reference: Reference
     gains: tuple[dict[str, float], ...]
     saturation: Saturation | None
@@ -180,7 +181,7 @@ def _humps(programme: YawProgramme, steps: int, h: float) -> list[tuple[int, int
 
 
 def _tuned(
-    controller: TunedController, rig: YawRig, programme: YawProgramme, time: Vector, current: Vector
+    controller: TunedController, rig: YawRig, programme: YawProgramme, time: Array, current: Array
 ) -> tuple[float, float] | None:
     """Gains from the last pair of intervals that has been run; None if there is none.
 
@@ -203,14 +204,14 @@ def _tuned(
     return controller.tuned_gains((works[0], works[1]), (*rates[0], square[0]), rig.current_lag_s)
 
 
-def _saturation(time: Vector, asked_A: Vector, limit_A: float) -> Saturation | None:
+def _saturation(time: Array, asked_A: Array, limit_A: float) -> Saturation | None:
     beyond = np.flatnonzero(np.abs(asked_A) > limit_A)
     if not beyond.size:
         return None
     return Saturation(float(time[beyond[0]]), float(beyond.size * (time[1] - time[0])))
 
 
-def _refuse(saturation: Saturation, asked_A: Vector, rig: YawRig) -> None:
+def _refuse(saturation: Saturation, asked_A: Array, rig: YawRig) -> None:
     problem = (
         f"saturates the motor, first at {saturation.first_s:.3f} s and for {saturation.total_s:.3g} s in all: "
         f"up to {np.abs(asked_A).max():.3g} A is asked for, and {rig.max_current_A:g} A can be had"

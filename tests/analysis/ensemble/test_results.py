@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.ensemble import results
-from tank2sim.analysis.ensemble.draws import draws_of, in_file
-from tank2sim.analysis.ensemble.questions import SIGNALS, OfCriteria, OfManoeuvre, ShipText, by_number
+from tank2sim.analysis.ensemble.draws import by_file_name, draws_of
+from tank2sim.analysis.ensemble.questions import ENSEMBLE_SIGNALS, OfCriteria, OfManoeuvre, ShipText, by_number
 from tank2sim.analysis.ensemble.results import (
-    Asked,
+    EnsembleRequest,
     bands_without_poles,
     chance,
     manoeuvre_bands,
     named_bands,
     stability_bands,
 )
-from tank2sim.analysis.stability.imo import Criterion, imo_criteria
+from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cards.covariance import Covariance, covariance_file, referring
 from tank2sim.dynamics import build
@@ -51,7 +51,7 @@ def test_members_are_the_ship_with_other_numbers_simulated_one_by_one(mariner_ca
             # The ensemble keeps one step of ten.
             assert found.figures[name][member] == pytest.approx(value, rel=2e-4, nan_ok=True), name
         assert found.histories is not None
-        for row, (variable, factor) in enumerate(SIGNALS.values()):
+        for row, (variable, factor) in enumerate(ENSEMBLE_SIGNALS.values()):
             one = factor * np.interp(times, run.trajectory.t, run.trajectory[variable])
             # Between steps kept, a second apart, lines are straight: seen where the rudder moves at its full rate.
             np.testing.assert_allclose(
@@ -73,7 +73,7 @@ def test_a_figure_linear_in_the_numbers_has_the_spread_of_the_covariance(tmp_pat
         d = card.derivatives
         # "total" terms of the Mariner's card: Yr and Nr contain m and m x_G already.
         slope = np.array([d["Nr"], -d["Yr"]])
-        bands = named_bands(one, ["criterion_C"], Asked(400, 3))
+        bands = named_bands(one, ["criterion_C"], EnsembleRequest(400, 3))
         assert bands.deviations["criterion_C"] == pytest.approx(math.sqrt(slope @ cov @ slope), rel=0.1)
 
 
@@ -98,7 +98,7 @@ def test_a_covariance_goes_into_a_file_of_other_conventions_and_back(tmp_path, m
     assert 'rudder_sign = "port"' in text
     card = parse_card(text, str(ship))
     assert isinstance(card, ManoeuvringCard)
-    written = in_file(card, names, matrix)
+    written = by_file_name(card, names, matrix)
     assert written.names == ("derivatives.Yv", "derivatives.Nd", "effects.0.parameters.direction_deg")
     # A rudder to port turns the sign of Nd; the direction is in degrees.
     deg = math.degrees(1.0)
@@ -114,7 +114,7 @@ def test_a_covariance_goes_into_a_file_of_other_conventions_and_back(tmp_path, m
 
 def test_members_without_a_mass_matrix_and_runaways_are_counted(mariner_card: ManoeuvringCard) -> None:
     card = changed(mariner_card, Yvdot=0.02)
-    bands = manoeuvre_bands(card, Turn(TWENTY), (200.0, 200.0), Asked(40, 1))
+    bands = manoeuvre_bands(card, Turn(TWENTY), (200.0, 200.0), EnsembleRequest(40, 1))
     assert 5 < sum(bands.asked.unusable.values()) < 35
     assert any("positive" in notice for notice in bands.asked.notices)
     assert bands.figures["time_90_s"].shown <= bands.asked.usable == 40 - sum(bands.asked.unusable.values())
@@ -123,19 +123,19 @@ def test_members_without_a_mass_matrix_and_runaways_are_counted(mariner_card: Ma
 def test_the_chance_of_a_criterion_is_the_share_that_meets_it() -> None:
     values = np.concatenate([np.full(60, 1.0), np.full(30, 3.0), np.full(10, np.nan)])
     found = chance(
-        Criterion("c", 1.0, 2.0, "L"), Ensemble(105, 0, {"c": np.append(values, [np.nan] * 5)}, None, {"x": 5})
+        ImoCriterion("c", 1.0, 2.0, "L"), Ensemble(105, 0, {"c": np.append(values, [np.nan] * 5)}, None, {"x": 5})
     )
     assert found.met == pytest.approx(0.6) and found.left_open == 10
     # Wilson's interval of 60 of 100, as tabled.
     assert found.between == pytest.approx((0.5020, 0.6906), abs=1e-4)
-    assert chance(Criterion("c", 1.0, 2.0, "L"), Ensemble(3, 0, {})).met is None
+    assert chance(ImoCriterion("c", 1.0, 2.0, "L"), Ensemble(3, 0, {})).met is None
 
 
 def test_the_chance_of_meeting_a_limit_at_the_median_is_a_half(mariner_card, mariner) -> None:
     criteria = [one for one in imo_criteria(mariner) if one.name == "advance"]
     assert criteria[0].found is not None
     at_median = replace(criteria[0], allowed=criteria[0].found)
-    found = stability_bands(mariner_card, [at_median], Asked(16, 2))
+    found = stability_bands(mariner_card, [at_median], EnsembleRequest(16, 2))
     (one,) = found.chances
     assert one.met is not None and abs(one.met - 0.5) < 0.35 and found.stable == 1.0
     assert one.band is not None and one.band.low < criteria[0].found < one.band.high
@@ -143,7 +143,7 @@ def test_the_chance_of_meeting_a_limit_at_the_median_is_a_half(mariner_card, mar
 
 def test_slow_motions_alone_give_no_probability_of_stability(mariner_card) -> None:
     roll = "\n[[effects]]\nname = 'roll_coupling'\n[effects.parameters]\nYphi = 0.001\nNphi = 0.02\n"
-    found = stability_bands(parse_card(mariner_card.text + roll, "roll.toml"), [], Asked(2, 0))
+    found = stability_bands(parse_card(mariner_card.text + roll, "roll.toml"), [], EnsembleRequest(2, 0))
     assert found.stable is None and any("motion.phi" in one for one in found.asked.notices)
 
 

@@ -14,7 +14,7 @@ from tank2sim.analysis.glide.steady import glide_as_printed, steady_glide
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.errors import InputError
-from tank2sim.simulation.glide_programme import Programme, ProgrammeStep, read_programme
+from tank2sim.simulation.glide_programme import GlideProgramme, ProgrammeStep, read_programme
 
 PROBE = read_card("kulikovsky-velikanov")
 SAMPLE = read_programme(bundled("models", "kulikovsky-velikanov", "programme.csv"))
@@ -58,10 +58,10 @@ def test_the_path_as_printed_multiplies_the_radius_once_only() -> None:
     step = ProgrammeStep(duration_s=20.0, angle_rad=math.radians(-30), roll_rad=math.radians(5))
     glide = glide_as_printed(PROBE, step.angle_rad, roll_rad=step.roll_rad)
     change = glide.speed_mps * 20.0 / glide.turning_radius_m
-    place = fly(PROBE, Programme("made", (step,)), as_printed=True).places[-1]
+    place = fly(PROBE, GlideProgramme("made", (step,)), as_printed=True).places[-1]
     assert place.north_m == pytest.approx(glide.turning_radius_m * math.sin(change))
     assert place.east_m == pytest.approx(1 - math.cos(change))
-    straight = fly(PROBE, Programme("made", (replace(step, roll_rad=0.0),)), as_printed=True)
+    straight = fly(PROBE, GlideProgramme("made", (replace(step, roll_rad=0.0),)), as_printed=True)
     assert straight.places[-1].north_m == pytest.approx(20.0 * straight.glides[0].speed_mps)
 
 

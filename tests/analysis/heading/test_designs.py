@@ -13,8 +13,8 @@ from scipy.linalg import solve_continuous_are
 
 from tank2sim.analysis.heading.control import DAMPING, SLOWNESS, heading_gains
 from tank2sim.analysis.heading.designs import (
+    LqrWeights,
     SteeringPlant,
-    Weights,
     _without_integral,
     design_heading,
     steering_plant,
@@ -52,7 +52,7 @@ def test_the_poles_of_a_pd_are_where_they_were_placed(mariner: Model, K: float, 
 
 @pytest.mark.parametrize("heading_deg", [5.0, 2.0])
 def test_the_regulator_is_that_of_riccati_s_equation(mariner: Model, heading_deg: float) -> None:
-    weights = Weights(heading_rad=math.radians(heading_deg), rudder_rad=math.radians(10.0))
+    weights = LqrWeights(heading_rad=math.radians(heading_deg), rudder_rad=math.radians(10.0))
     gains = design_heading(mariner, "lqr", weights=weights).gains
     plant = steering_plant(mariner)
     w, bad = plant.frequency_radps, weights.heading_rad

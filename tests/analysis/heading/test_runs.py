@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 from scipy.signal import StateSpace, lsim, welch
 
 from tank2sim.analysis.heading.designs import design_heading, steering_plant
+from tank2sim.analysis.heading.disturbances import Weather, in_weather, wave_yaw_acceleration, weather_for
 from tank2sim.analysis.heading.runs import HeadingLoop, course_change, course_keeping, without_anti_windup
-from tank2sim.analysis.heading.weather import Weather, in_weather, wave_yaw_acceleration, weather_for
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
 from tank2sim.dynamics.model import Model

@@ -6,7 +6,7 @@ import pytest
 
 from tank2sim.analysis.heading.margins import growing_effects
 from tank2sim.analysis.heading.study import StudySettings, study_autopilot
-from tank2sim.cards import linear, parse_card, read_card
+from tank2sim.cards import linear_card, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.files import read_exact_text
@@ -40,7 +40,7 @@ def test_a_ship_that_is_unstable_in_yaw_alone_has_no_growing_effect(card) -> Non
 
 
 def test_a_linear_card_has_margins_at_its_own_speed_alone() -> None:
-    card = linear(read_card("mariner"))
+    card = linear_card(read_card("mariner"))
     ship = build(card)
     found = study_autopilot(card, ship, StudySettings(speed_mps=card.model.speed_mps))
     assert [one.speed_mps for one in found.margins] == [card.model.speed_mps]

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from tank2sim.analysis.influence.figures import KINDS, forms, parse_figure
-from tank2sim.analysis.tuning.wishes import parse_wish
+from tank2sim.analysis.influence.figures import FIGURE_KINDS, forms, parse_figure
+from tank2sim.analysis.tuning.targets import parse_wish
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 
@@ -40,7 +40,7 @@ def test_what_is_no_figure_is_refused_with_what_there_is(text, words) -> None:
 
 
 def test_the_help_names_every_figure() -> None:
-    assert all(name in forms() for name in KINDS)
+    assert all(name in forms() for name in FIGURE_KINDS)
 
 
 def test_both_ways_to_write_a_wish_mean_the_same() -> None:

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from tank2sim.analysis.influence.card_influence import influence
 from tank2sim.analysis.influence.figures import parse_figure
-from tank2sim.analysis.influence.of_card import influence
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.stability.straight_line import stability
-from tank2sim.cards import linear, parse_card, read_card
+from tank2sim.cards import linear_card, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tests.analysis.stability.test_straight_line import SYMMETRIC
@@ -32,7 +32,7 @@ def study_of(card, *texts: str) -> Study:
 
 @pytest.fixture(scope="module")
 def linear_study() -> Study:
-    return study_of(linear(read_card("mariner", SYMMETRIC)), *LINEAR_FIGURES)
+    return study_of(linear_card(read_card("mariner", SYMMETRIC)), *LINEAR_FIGURES)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from tank2sim.analysis.stability.imo import imo_criteria
 from tank2sim.analysis.stability.margin import stability_margin
 from tank2sim.analysis.stability.response import steering_responses
 from tank2sim.analysis.stability.straight_line import nomoto, stability
-from tank2sim.cards import linear, parse_card, read_card
+from tank2sim.cards import linear_card, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Stop
@@ -96,7 +96,7 @@ def test_a_straight_course_is_straight_also_for_an_asymmetric_ship(mariner) -> N
 
 def test_linear_and_third_order_models_agree_at_the_speed_of_expansion() -> None:
     card = read_card("mariner", SYMMETRIC)
-    third, first = stability(build(card)), stability(build(linear(card)))
+    third, first = stability(build(card)), stability(build(linear_card(card)))
     assert first.criterion == pytest.approx(third.criterion)
     np.testing.assert_allclose(first.eigenvalues, third.eigenvalues, rtol=1e-9)
 

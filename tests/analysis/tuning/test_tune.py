@@ -8,9 +8,9 @@ import pytest
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.card import tuned_text
 from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, Means, Tuned
+from tank2sim.analysis.tuning.targets import Wish, parse_wish
 from tank2sim.analysis.tuning.tune import tune
-from tank2sim.analysis.tuning.wishes import Wish, parse_wish
-from tank2sim.cards import linear, parse_card, read_card
+from tank2sim.cards import linear_card, parse_card, read_card
 from tank2sim.errors import InputError
 from tests.analysis.stability.test_straight_line import SYMMETRIC
 
@@ -176,5 +176,5 @@ def test_figures_of_manoeuvres_are_reached_too(by) -> None:
 
 
 def test_a_linear_card_is_tuned_to_its_criterion() -> None:
-    _, found = tuned_to(linear(read_card("mariner", SYMMETRIC)), ["criterion_C=7e-6", "K_prime=3.5"], by=FEWEST)
+    _, found = tuned_to(linear_card(read_card("mariner", SYMMETRIC)), ["criterion_C=7e-6", "K_prime=3.5"], by=FEWEST)
     assert found.reached and 1 <= len(found.moves) <= 3

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.stability.straight_line import stability
-from tank2sim.analysis.turning.continuation import EDGE, OUTSIDE, Bounds, follow
+from tank2sim.analysis.turning.continuation import EDGE, OUTSIDE, Bounds, follow_branch
 from tank2sim.analysis.turning.diagram import TurningEquations, hull_states, steady_turning
 from tank2sim.cards import parse_card, read_card
 from tank2sim.dynamics import build
@@ -23,7 +23,9 @@ def test_a_curve_is_followed_all_the_way_round_a_circle() -> None:
     def circle(y):
         return np.array([y @ y - 1.0]), 2 * y[None, :]
 
-    found = follow(circle, np.array([1.0, 0.0]), np.array([0.0, 1.0]), Bounds(np.full(2, -2.0), np.full(2, 2.0), 300))
+    found = follow_branch(
+        circle, np.array([1.0, 0.0]), np.array([0.0, 1.0]), Bounds(np.full(2, -2.0), np.full(2, 2.0), 300)
+    )
     angle = np.unwrap(np.arctan2(found.points[:, 1], found.points[:, 0]))
     np.testing.assert_allclose(np.linalg.norm(found.points, axis=1), 1.0, atol=1e-10)
     assert np.all(np.diff(angle) > 0) and angle[-1] > 2 * np.pi
@@ -33,9 +35,9 @@ def test_a_curve_ends_on_the_limit_of_lambda_and_within_its_bounds() -> None:
     def line(y):
         return np.array([y[0] - 3 * y[1]]), np.array([[1.0, -3.0]])
 
-    on_edge = follow(line, np.zeros(2), np.ones(2), Bounds(np.full(2, -2.0), np.array([9.0, 0.5])))
+    on_edge = follow_branch(line, np.zeros(2), np.ones(2), Bounds(np.full(2, -2.0), np.array([9.0, 0.5])))
     assert on_edge.ended == EDGE and on_edge.points[-1] == pytest.approx([1.5, 0.5], abs=1e-12)
-    outside = follow(line, np.zeros(2), np.ones(2), Bounds(np.full(2, -2.0), np.array([0.9, 0.5])))
+    outside = follow_branch(line, np.zeros(2), np.ones(2), Bounds(np.full(2, -2.0), np.array([0.9, 0.5])))
     assert outside.ended == OUTSIDE and np.all(outside.points[:, 0] <= 0.9)
 
 

@@ -15,7 +15,7 @@ from tank2sim.analysis.turning.two_point_tuning import (
     levers_of_ship,
     tune_to_two_points,
 )
-from tank2sim.cards import ManoeuvringCard, linear, read_card
+from tank2sim.cards import ManoeuvringCard, linear_card, read_card
 from tank2sim.cards.steering_card import read_steering_card
 from tank2sim.dynamics import Model, build
 from tank2sim.errors import InputError
@@ -101,7 +101,7 @@ def test_the_inertia_inside_a_total_yaw_derivative_is_not_scaled(mariner_card: M
 
 
 def test_a_linear_ship_meets_two_points_in_proportion_and_no_others(mariner_card: ManoeuvringCard) -> None:
-    card = linear(mariner_card)
+    card = linear_card(mariner_card)
     model = build(card)
     levers = levers_of_ship(card, model)
     slope = TurningPoints(model).turn_at(0.1)[0].yaw_rate_radps / 0.1

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.dynamics.effects.particulars import particular
+from tank2sim.dynamics.effects.particulars import model_particular
 
 from .ships import MASS, STATES, TYPICAL, L, card_with, forces, mariner_text, ship
 
@@ -59,10 +59,10 @@ def test_an_estimate_is_told_once() -> None:
 
 def test_estimates_go_by_what_the_card_states() -> None:
     card = card_with(text=MINIMAL.replace("[ship]\n", "[ship]\nbeam_m = 30.0\n"))
-    assert particular(card, "draught_m") == pytest.approx(12.0)
-    assert particular(card, "projected_area_front_m2") == pytest.approx(540.0)
+    assert model_particular(card, "draught_m") == pytest.approx(12.0)
+    assert model_particular(card, "projected_area_front_m2") == pytest.approx(540.0)
     # the Mariner's own dimensions and mass give the fullness of a cargo liner
-    assert particular(card_with(text=mariner_text(block_coefficient="")), "block_coefficient") == pytest.approx(
+    assert model_particular(card_with(text=mariner_text(block_coefficient="")), "block_coefficient") == pytest.approx(
         0.6, abs=0.03
     )
 

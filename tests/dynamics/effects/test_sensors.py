@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tank2sim.dynamics import Model
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.dynamics.effects.sensors import corrected
+from tank2sim.dynamics.effects.sensors import correct_reading
 from tank2sim.fmu.interface import interface
 
 from .ships import TYPICAL, ship, values
@@ -128,7 +128,7 @@ def test_a_record_is_mended_to_what_was_measured(name: str, seed: int, size: flo
     given = {one.name: size * min(one.maximum, -one.minimum) for one in effect.parameters}
     true = dict(zip(NAMES, random.normal(size=(6, 40)) * [[8], [1], [0.02], [3], [900], [900]], strict=True))
     record = {**shown(name, given, true), "phi_rad": true["psi_rad"]}
-    found = corrected(np.arange(40.0), record, effect, given)
+    found = correct_reading(np.arange(40.0), record, effect, given)
     assert set(found) == set(record)
     for signal, column in true.items():
         scale = np.max(np.abs(column)) + (abs(given.get("forward_m", 0.0)) if signal in ("v_mps", "x_m", "y_m") else 0)
@@ -138,14 +138,14 @@ def test_a_record_is_mended_to_what_was_measured(name: str, seed: int, size: flo
 
 def test_gaps_stay_gaps_and_signals_that_were_not_recorded_are_not_needed_or_named() -> None:
     time, gap = np.arange(3.0), np.array([5.0, np.nan, 6.0])
-    mended = corrected(time, {"u_mps": gap}, EFFECTS["log_scale"], {"factor": 0.25})
+    mended = correct_reading(time, {"u_mps": gap}, EFFECTS["log_scale"], {"factor": 0.25})
     np.testing.assert_allclose(mended["u_mps"], [4.0, np.nan, 4.8])
     still = {"psi_rad": np.ones(3)}
-    assert corrected(time, still, EFFECTS["gyro_bias"], {"rate_radps": 0.1}).keys() == still.keys()
+    assert correct_reading(time, still, EFFECTS["gyro_bias"], {"rate_radps": 0.1}).keys() == still.keys()
     with pytest.raises(ValueError, match="log_misalignment cannot be corrected without v_mps"):
-        corrected(time, {"u_mps": gap}, EFFECTS["log_misalignment"], {"angle_rad": 0.1})
+        correct_reading(time, {"u_mps": gap}, EFFECTS["log_misalignment"], {"angle_rad": 0.1})
     with pytest.raises(ValueError, match="antenna_lever_arm cannot be corrected without psi_rad"):
-        corrected(time, {"x_m": gap}, EFFECTS["antenna_lever_arm"], {"forward_m": 9.0, "starboard_m": 0.0})
+        correct_reading(time, {"x_m": gap}, EFFECTS["antenna_lever_arm"], {"forward_m": 9.0, "starboard_m": 0.0})
 
 
 def steps(time: np.ndarray) -> np.ndarray:
@@ -158,7 +158,7 @@ def test_the_ship_answers_late_to_the_record_of_its_orders(delay: float) -> None
     """The record shows at t what the ship got at t + delay: orders come back exactly, sample for sample."""
     time = 0.1 * np.arange(120)
     record = {"delta_order_rad": steps(time + delay), "delta_rad": np.sin(time + delay), "n_radps": time}
-    found = corrected(time, record, EFFECTS["rudder_time_offset"], {"delay_s": delay})
+    found = correct_reading(time, record, EFFECTS["rudder_time_offset"], {"delay_s": delay})
     np.testing.assert_array_equal(found["delta_order_rad"], steps(time))
     inner = (time - delay >= 0) & (time - delay <= time[-1])
     np.testing.assert_allclose(found["delta_rad"][inner], np.sin(time)[inner], atol=1e-12)
@@ -168,9 +168,9 @@ def test_the_ship_answers_late_to_the_record_of_its_orders(delay: float) -> None
 def test_an_order_is_held_between_samples_and_never_interpolated() -> None:
     time = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
     record = {"delta_order_rad": np.array([0.0, 0.0, 0.3, 0.3, -0.3])}
-    found = corrected(time, record, EFFECTS["rudder_time_offset"], {"delay_s": 0.4})["delta_order_rad"]
+    found = correct_reading(time, record, EFFECTS["rudder_time_offset"], {"delay_s": 0.4})["delta_order_rad"]
     np.testing.assert_array_equal(found, [0.0, 0.0, 0.0, 0.3, 0.3])
-    early = corrected(time, record, EFFECTS["rudder_time_offset"], {"delay_s": -1.4})["delta_order_rad"]
+    early = correct_reading(time, record, EFFECTS["rudder_time_offset"], {"delay_s": -1.4})["delta_order_rad"]
     np.testing.assert_array_equal(early, [0.0, 0.3, 0.3, -0.3, -0.3])
 
 

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.analysis.ensemble.results import Asked, manoeuvre_bands
+from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
 from tank2sim.cards import parse_card, read_card
 from tank2sim.cards.covariance import Covariance
 from tank2sim.cli.ensemble import with_covariance
 from tank2sim.dynamics import build
 from tank2sim.identification.captive.covariance import reduction_covariance
-from tank2sim.identification.captive.reduction import Options, reduce_campaign
-from tank2sim.identification.captive.result_card import card_text, contents
+from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
+from tank2sim.identification.captive.result_card import card_contents, reduced_card_text
 from tank2sim.records.campaigns import read_campaign
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
@@ -44,7 +44,7 @@ SETTINGS = {
 def errors_over_standard_errors(campaign, folder):
     """Name of each derivative that the reduction gives and the ship has, to its error over its standard error."""
     written = write(campaign, folder)
-    found = reduce_campaign(read_campaign(written.path), Options(keep_going=True)).derivatives
+    found = reduce_campaign(read_campaign(written.path), ReductionOptions(keep_going=True)).derivatives
     true = {name: value for name, value in written.derivatives.items() if value and name in found}
     return {name: (found[name].value - value) / found[name].standard_error for name, value in true.items()}
 
@@ -77,7 +77,7 @@ def test_readings_that_are_not_independent_are_not_counted_as_if_they_were(tmp_p
         slow = Campaign(seed=seed, size="linear", correlation_time_s=1.0, vibration=False)
         for rate, found in errors.items():
             written = write(replace(slow, rate_hz=rate), tmp_path / f"{seed} {rate:g}")
-            derivatives = reduce_campaign(read_campaign(written.path), Options(keep_going=True)).derivatives
+            derivatives = reduce_campaign(read_campaign(written.path), ReductionOptions(keep_going=True)).derivatives
             found += [derivatives[name].standard_error for name in ("Yv", "Nv", "Yr", "Nr", "Yvdot", "Nrdot")]
     ratio = np.exp(np.mean(np.log(errors[20.0]) - np.log(errors[10.0])))
     assert ratio > 0.85  # independent readings would give 0.71
@@ -97,11 +97,11 @@ def turn_inside_its_band(folder, seed):
     """Whether the 90 % band of a turn, of the card of a noisy campaign, holds the figures of the true ship."""
     written = write(Campaign(seed=seed, rate_hz=10.0, noise=3.0, zero_error=3.0), folder)
     reduction = reduce_campaign(read_campaign(written.path))
-    card = contents(reduction, "clarke1983")
+    card = card_contents(reduction, "clarke1983")
     names = [name for name in card.entries if name in reduction.derivatives]
     covariance = Covariance(tuple(f"derivatives.{name}" for name in names), reduction_covariance(reduction, names))
     path = folder / "card.toml"
-    text = card_text(reduction, card, 50.0)
+    text = reduced_card_text(reduction, card, 50.0)
     for estimated in card.estimated:  # of what was not measured both ships have the same, without any doubt
         text = re.sub(rf"(\[uncertainty\].*?^{estimated} = )\S+", r"\g<1>1e-15", text, flags=re.DOTALL | re.MULTILINE)
     for file, content in with_covariance(text, path, covariance).items():
@@ -116,7 +116,7 @@ def turn_inside_its_band(folder, seed):
     turn = parse_manoeuvre(TURN)
     figures = simulate(build(ship), turn).figures
     own = simulate(build(found), turn).trajectory
-    bands = manoeuvre_bands(found, turn, (None, float(own.t[-1])), Asked(100, 1)).as_json()["figures"]
+    bands = manoeuvre_bands(found, turn, (None, float(own.t[-1])), EnsembleRequest(100, 1)).as_json()["figures"]
     return [bands[name]["p5"] <= figures[name] <= bands[name]["p95"] for name in FIGURES]
 
 

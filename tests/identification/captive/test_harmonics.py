@@ -7,20 +7,20 @@ import pytest
 
 from tank2sim.identification.captive.harmonics import reduced_run
 from tank2sim.records.campaign_form import RunSheet
-from tank2sim.records.campaigns import Run
+from tank2sim.records.campaigns import CaptiveRun
 
 FREQUENCY = 0.7
 SIGMA = 0.3
 
 
-def sway(periods: int, seed: int = 0, slope: float = 0.0, sigma: float = SIGMA) -> Run:
+def sway(periods: int, seed: int = 0, slope: float = 0.0, sigma: float = SIGMA) -> CaptiveRun:
     """Y is 2 + 5 cos - 3 sin of the phase of the velocity, white noise, and a line that rises by `slope` a second."""
     step = 2 * np.pi / FREQUENCY / 200
     time = step * np.arange(200 * periods)
     phase = FREQUENCY * time
     noise = sigma * np.random.default_rng(seed).standard_normal(time.size)
     zero = np.zeros_like(time)
-    return Run(
+    return CaptiveRun(
         name="sway.csv",
         type="pure_sway",
         sheet=RunSheet(file="sway.csv", type="pure_sway", frequency_radps=FREQUENCY),

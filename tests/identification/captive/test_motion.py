@@ -6,7 +6,7 @@ import pytest
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.motion import measured_frequency, run_motion
 from tank2sim.records.campaign_form import RunSheet
-from tank2sim.records.campaigns import Run
+from tank2sim.records.campaigns import CaptiveRun
 
 
 def sway(frequency=0.7, amplitude=0.1, duration=60.0, phase=0.4, noise=0.0, said=0.5):
@@ -15,7 +15,7 @@ def sway(frequency=0.7, amplitude=0.1, duration=60.0, phase=0.4, noise=0.0, said
     zero = np.zeros_like(time)
     y = amplitude * np.sin(frequency * time + phase) + noise * rng.standard_normal(len(time))
     v = amplitude * frequency * np.cos(frequency * time + phase) + noise * rng.standard_normal(len(time))
-    return Run(
+    return CaptiveRun(
         name="sway.csv",
         type="pure_sway",
         sheet=RunSheet(file="sway.csv", type="pure_sway", frequency_radps=said),

@@ -11,11 +11,11 @@ from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.as_json import reduction_as_json
-from tank2sim.identification.captive.findings import findings
-from tank2sim.identification.captive.reduction import Options, reduce_campaign
+from tank2sim.identification.captive.findings import reduction_findings
+from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
 from tank2sim.identification.captive.repeats import repeats
-from tank2sim.identification.captive.result_card import card_text, contents, reynolds_ratio
-from tank2sim.identification.captive.rows import prediction_errors
+from tank2sim.identification.captive.result_card import card_contents, reduced_card_text, reynolds_ratio
+from tank2sim.identification.captive.tables import prediction_errors
 from tank2sim.identification.captive.type_b import type_b_shifts
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import Campaign, write
@@ -70,7 +70,7 @@ def test_the_campaigns_with_known_truth_are_met_within_three_standard_errors(dat
     )
     assert np.max(np.abs(ratios)) < 3
     assert 0.6 < np.sqrt(np.mean(ratios**2)) < 1.4
-    card = contents(found)
+    card = card_contents(found)
     assert card.mass == pytest.approx(truth["mass"], rel=1e-4)
     assert card.yaw_inertia == pytest.approx(truth["yaw_inertia"], rel=1e-4)
 
@@ -106,7 +106,7 @@ def test_tests_that_contradict_each_other_are_told(tmp_path):
     written = write(Campaign(seed=4, rate_hz=10.0), tmp_path)
     campaign = read_campaign(written.path)
     runs = [replace(run, Y_N=1.25 * run.Y_N) if run.type == "static_drift" else run for run in campaign.runs]
-    told = findings(reduce_campaign(replace(campaign, runs=tuple(runs))))
+    told = reduction_findings(reduce_campaign(replace(campaign, runs=tuple(runs))))
     assert any(sentence.startswith("Yv is") and "paper's order" in sentence for sentence in told)
 
 
@@ -138,7 +138,7 @@ def test_terms_of_small_angles_are_left_out_with_the_reason_unless_asked_for(tmp
     left_out = {name for name, reason in reasons(found).items() if reason == "not determined"}
     assert left_out  # the rudder reaches 10 deg
     assert not left_out & set(found.derivatives)
-    assert left_out <= set(reduce_campaign(found.campaign, Options(all_terms=True)).derivatives)
+    assert left_out <= set(reduce_campaign(found.campaign, ReductionOptions(all_terms=True)).derivatives)
 
 
 def test_a_term_that_does_not_differ_from_zero_is_kept_with_its_error(noisy):
@@ -173,14 +173,16 @@ def test_symmetry_is_tested_when_asked_for(tmp_path):
         replace(run, Y_N=run.Y_N + 0.02 * float(campaign.scales.force) * (run.v_mps / run.speed_mps) ** 2)
         for run in campaign.runs
     ]
-    options = Options(test_symmetry=True)
+    options = ReductionOptions(test_symmetry=True)
     sound = reduce_campaign(campaign, options)
     skewed = reduce_campaign(replace(campaign, runs=tuple(even)), options)
     assert sound.forces["Y"].asymmetry.chance > 1e-3
     assert skewed.forces["Y"].asymmetry.chance < 1e-6
     test = skewed.forces["Y"].asymmetry
     assert test.values[test.names.index("Yvv")] == pytest.approx(0.02, rel=0.2)
-    assert any("Symmetry of Y to port and starboard does not hold" in sentence for sentence in findings(skewed))
+    assert any(
+        "Symmetry of Y to port and starboard does not hold" in sentence for sentence in reduction_findings(skewed)
+    )
 
 
 def test_fast_oscillations_are_flagged_and_left_out_unless_asked_for(tmp_path):
@@ -189,8 +191,8 @@ def test_fast_oscillations_are_flagged_and_left_out_unless_asked_for(tmp_path):
     fast = {run.name for run in found.campaign.runs if run.name.startswith(("sway_2", "yaw_2"))}
     assert set(found.not_used) == fast
     assert all("omega U/g is 0.12" in reason for reason in found.not_used.values())
-    assert any(f"{len(fast)} runs left out" in sentence for sentence in findings(found))
-    kept = reduce_campaign(found.campaign, Options(keep_fast=True))
+    assert any(f"{len(fast)} runs left out" in sentence for sentence in reduction_findings(found))
+    kept = reduce_campaign(found.campaign, ReductionOptions(keep_fast=True))
     assert not kept.not_used
     assert len(kept.runs) == len(written.runs)
 
@@ -215,20 +217,20 @@ def test_a_trend_with_frequency_is_found_and_the_value_is_that_at_zero_frequency
     assert abs(trend.slope - slope) < 3 * trend.standard_error
     derivative = found.derivatives["Yvdot"]
     assert abs(derivative.value - written.derivatives["Yvdot"]) < 3 * derivative.standard_error
-    assert any(sentence.startswith("Yvdot changes with the frequency") for sentence in findings(found))
+    assert any(sentence.startswith("Yvdot changes with the frequency") for sentence in reduction_findings(found))
     assert not any(trend.used for trend in reduce_campaign(campaign).forces["Y"].trends)
 
 
 def test_a_run_that_does_not_belong_to_the_others_is_named(noisy):
     runs = [replace(run, N_Nm=1.3 * run.N_Nm) if run.name == "both_+08_-20.csv" else run for run in noisy.campaign.runs]
-    told = findings(reduce_campaign(replace(noisy.campaign, runs=tuple(runs))))
+    told = reduction_findings(reduce_campaign(replace(noisy.campaign, runs=tuple(runs))))
     assert any(sentence.startswith("both_+08_-20.csv: N does not fit the other runs") for sentence in told)
-    assert not any("does not fit the other runs" in sentence for sentence in findings(noisy))
+    assert not any("does not fit the other runs" in sentence for sentence in reduction_findings(noisy))
 
 
 def test_leaving_one_run_out_predicts_it_from_the_others(noisy):
     row = next(row for row in noisy.forces["Y"].left_out if row.run == "drift_+08.csv")
-    without = reduce_campaign(noisy.campaign.without({"drift_+08.csv"}), Options(all_terms=True))
+    without = reduce_campaign(noisy.campaign.without({"drift_+08.csv"}), ReductionOptions(all_terms=True))
     v = -math.sin(math.radians(8))
     values = without.derivatives
     predicted = sum(values[name].value * v**power for name, power in (("Y0", 0), ("Yv", 1), ("Yvvv", 3)))
@@ -272,11 +274,11 @@ def test_yaw_tests_need_the_yaw_inertia(tmp_path):
 
 
 def test_the_card_says_what_the_reduction_says(noisy):
-    card = contents(noisy)
-    text = card_text(noisy, card)
+    card = card_contents(noisy)
+    text = reduced_card_text(noisy, card)
     read = parse_card(text, "card.toml")
     result = json.loads(
-        json.dumps(reduction_as_json(noisy, card, findings(noisy)), default=lambda v: np.asarray(v).tolist())
+        json.dumps(reduction_as_json(noisy, card, reduction_findings(noisy)), default=lambda v: np.asarray(v).tolist())
     )
     assert {name: entry["value"] for name, entry in result["derivatives"].items()} == dict(read.derivatives)
     assert {n: entry["standard_error"] for n, entry in result["derivatives"].items()} == dict(read.uncertainty)
@@ -290,8 +292,8 @@ def test_the_card_says_what_the_reduction_says(noisy):
 
 
 def test_a_card_at_ship_scale_follows_froude(noisy):
-    card = contents(noisy)
-    model, ship = (parse_card(card_text(noisy, card, scale), "card.toml") for scale in (1.0, 36.0))
+    card = card_contents(noisy)
+    model, ship = (parse_card(reduced_card_text(noisy, card, scale), "card.toml") for scale in (1.0, 36.0))
     assert ship.derivatives == model.derivatives
     assert ship.rigid_body == model.rigid_body
     assert ship.ship.length_m == pytest.approx(36 * model.ship.length_m, rel=1e-5)
@@ -303,7 +305,7 @@ def test_a_card_at_ship_scale_follows_froude(noisy):
 
 
 def test_what_is_missing_is_filled_from_a_named_estimate_and_marked(hmri):
-    bare, filled = contents(hmri), contents(hmri, "clarke1983")
+    bare, filled = card_contents(hmri), card_contents(hmri, "clarke1983")
     assert set(bare.missing) == {"Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot", "Yr", "Nr"} == set(filled.estimated)
     assert not filled.missing
     for name in filled.estimated:
@@ -311,11 +313,11 @@ def test_what_is_missing_is_filled_from_a_named_estimate_and_marked(hmri):
         assert entry.how.startswith("ESTIMATED")
         assert entry.standard_error > 0.25 * abs(entry.value)
     assert filled.entries["Yv"] == bare.entries["Yv"]
-    assert "ESTIMATED: Clarke" in card_text(hmri, filled)
+    assert "ESTIMATED: Clarke" in reduced_card_text(hmri, filled)
 
 
 def test_a_towed_model_gets_its_thrust_with_the_fill(noisy):
-    entries = contents(noisy, "clarke1983").entries
+    entries = card_contents(noisy, "clarke1983").entries
     resistance = noisy.derivatives["X0"].value
     # at 80 % of the speed and constant thrust X' is X0' (1 - (1/0.8)^2)
     change = (0.8 - 1.0) / 0.8
@@ -339,20 +341,20 @@ def test_the_real_table_has_the_signs_of_a_ship(hmri):
 
 def test_speed_and_load_that_change_together_are_told_and_left_out(hmri):
     assert len(hmri.not_used) == 20
-    told = " ".join(findings(hmri))
+    told = " ".join(reduction_findings(hmri))
     assert "speed and propeller load change together" in told
     assert not any("u" in name.removesuffix("udot") for name in hmri.derivatives)
-    more = reduce_campaign(hmri.campaign, Options(off_speed=True))
+    more = reduce_campaign(hmri.campaign, ReductionOptions(off_speed=True))
     assert not more.not_used
     assert {"Xu", "Xuu", "Ydu"} <= set(more.derivatives)
     assert more.derivatives["Xu"].value < 0
-    assert "at constant revolutions" in " ".join(findings(more))
+    assert "at constant revolutions" in " ".join(reduction_findings(more))
 
 
 @pytest.mark.parametrize("name", ["drift_+08.csv", "rudder_-20.csv"])
 def test_harmonics_are_told_without_dimension(noisy, name):
     """The mean of a steady run by 1/2 rho L^2 U^2, and L more for a moment."""
-    told = reduction_as_json(noisy, contents(noisy), ())
+    told = reduction_as_json(noisy, card_contents(noisy), ())
     record = next(run for run in noisy.campaign.runs if run.name == name)
     shown = next(run for run in told["runs"] if run["name"] == name)
     assert shown["speed_mps"] == pytest.approx(record.speed_mps.mean(), rel=1e-3)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tank2sim.errors import InputError
-from tank2sim.identification.captive.findings import findings, implausible
-from tank2sim.identification.captive.reduction import Options, reduce_campaign
+from tank2sim.identification.captive.findings import implausible, reduction_findings
+from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import Campaign, write
 
@@ -46,7 +46,7 @@ def test_a_delay_of_the_forces_is_estimated_and_reported_first(tmp_path, delay, 
     assert error.force == "XYN"
     assert abs(error.size - delay) < 4 * error.standard_error
     assert error.standard_error < 0.1 * abs(delay)
-    assert findings(found)[0] == error.message
+    assert reduction_findings(found)[0] == error.message
     wrong = ratios(found, written, ("Yvdot", "Yrdot", "Nvdot", "Nrdot"))
     assert max(map(abs, wrong.values())) < 1.96, wrong
     assert found.derivatives["Yrdot"].type_b["force_delay"] > 5 * found.derivatives["Yrdot"].type_a
@@ -91,8 +91,8 @@ def test_a_force_that_depends_on_the_frequency_is_no_delay(tmp_path):
 
 def test_a_campaign_of_one_frequency_says_that_it_cannot_show_a_delay(tmp_path, sound):
     one, _ = reduced(replace(SOUND, frequency_parameters=(0.05,), force_delay_s=0.03), tmp_path)
-    assert any("whether the forces lag the motion" in sentence for sentence in findings(one))
-    assert not any("whether the forces lag the motion" in sentence for sentence in findings(sound[0]))
+    assert any("whether the forces lag the motion" in sentence for sentence in reduction_findings(one))
+    assert not any("whether the forces lag the motion" in sentence for sentence in reduction_findings(sound[0]))
 
 
 @pytest.mark.parametrize("force", ["Y", "N"])
@@ -107,7 +107,7 @@ def test_a_gauge_that_errs_in_one_kind_of_run_is_named(sound, kind, force):
     assert error.force == force
     assert error.size == pytest.approx(0.05, abs=0.02)
     assert error.runs == kind
-    assert findings(found)[0] == error.message
+    assert reduction_findings(found)[0] == error.message
     wrong = ratios(found, sound[1], [name for name in ("Yv", "Yr", "Yd", "Nv", "Nr", "Nd") if name[0] == force])
     assert max(map(abs, wrong.values())) < 3.0, wrong
 
@@ -125,7 +125,7 @@ def test_kinds_of_run_that_no_other_can_check_are_named(tmp_path):
     assert {"static_rudder", "pure_yaw"} <= set(found.forces["Y"].unchecked)
     assert any(
         sentence.startswith("Not known is whether the gauges") and "static_rudder" in sentence
-        for sentence in findings(found)
+        for sentence in reduction_findings(found)
     )
 
 
@@ -203,7 +203,7 @@ def test_half_the_mass_is_reported_first(tmp_path, seed):
         found = reduce_campaign(read_campaign(written.path))
         told = implausible(found)
         assert bool(told) == (mass < written.ship.mass_kg)
-        assert findings(found)[: len(told)] == told
+        assert reduction_findings(found)[: len(told)] == told
     assert any("added mass" in sentence for sentence in told)
 
 
@@ -231,7 +231,7 @@ def test_a_run_copied_under_another_name_is_refused_with_both_names(tmp_path, cu
     assert error.value.source == "again.csv"
     rest = read_campaign(written.path, keep_going=True)
     assert {run.name for run in rest.runs} == {f"{run.name}.csv" for run in written.runs}
-    assert reduce_campaign(rest, Options(keep_going=True)).faults[0].source == "again.csv"
+    assert reduce_campaign(rest, ReductionOptions(keep_going=True)).faults[0].source == "again.csv"
 
 
 def test_repeated_runs_and_computed_ones_are_no_copies(tmp_path):

@@ -9,12 +9,12 @@ from numpy.polynomial import Polynomial
 from scipy import stats
 
 from tank2sim.bundled import bundled
-from tank2sim.cli.screen import json_text
+from tank2sim.cli.console import json_text
 from tank2sim.errors import InputError
 from tank2sim.identification.tow import paper as tow_paper
 from tank2sim.identification.tow.equation_error import discretise, solve_by_qr
 from tank2sim.identification.tow.identify import identify_tow
-from tank2sim.identification.tow.models import SIMPLE, SIMPLE_LATE, TowModel, compare_models, mass_range
+from tank2sim.identification.tow.model_selection import SIMPLE, SIMPLE_LATE, TowModel, compare_models, mass_range
 from tank2sim.identification.tow.output_error import TowOptions, fit_speeds, simulated_speeds
 from tank2sim.identification.tow.study import speed_polynomials, study_tows, towed_body
 from tank2sim.records.tows import Tows, read_tows

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State, Variable
-from tank2sim.identification.trials.problem import Problem
-from tank2sim.identification.trials.runs import Run
+from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
 TRUTH = {
     "Xu": -0.04,
@@ -91,7 +91,9 @@ def orders(seconds: int, angle: float, period: float) -> np.ndarray:
     return angle * np.sign(np.sin(2 * np.pi * (time + 0.5) / period)) * (time > 10)
 
 
-def trial(rng: np.random.Generator, delta: np.ndarray, push: np.ndarray, noise: np.ndarray) -> tuple[Run, np.ndarray]:
+def trial(
+    rng: np.random.Generator, delta: np.ndarray, push: np.ndarray, noise: np.ndarray
+) -> tuple[SampledRun, np.ndarray]:
     """One run of the ship, pushed about and measured badly; and the true accelerations (n, 3) that pushed her."""
     n, fine = len(delta), 10
     kept = np.exp(-STEP / fine / TIME)
@@ -119,7 +121,7 @@ def trial(rng: np.random.Generator, delta: np.ndarray, push: np.ndarray, noise: 
     for k in range(n - 1):  # stop at each change of the rudder
         states[k + 1] = solve_ivp(rates, (k * STEP, (k + 1) * STEP), states[k], max_step=0.25, rtol=1e-6).y[:, -1]
     measured = states[:, [3, 4, 5, 2, 0, 1]] + noise * rng.normal(size=(n, 6))
-    run = Run(f"angle {delta.max():.2f} of {n} s", 0.0, STEP, delta[:, None], measured, SEEN)
+    run = SampledRun(f"angle {delta.max():.2f} of {n} s", 0.0, STEP, delta[:, None], measured, SEEN)
     return run, force[:-1].reshape(n, fine, 3).mean(axis=1)
 
 

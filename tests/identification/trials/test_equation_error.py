@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.equation_error import Settings, equation_error
-from tank2sim.identification.trials.weak_form import WeakForm
+from tank2sim.identification.trials.methods.equation_error import EquationErrorSettings, equation_error
+from tank2sim.identification.trials.methods.weak_form import WeakForm
 from tests.identification.trials.made_up_ship import (
     ESTIMATED,
     TRUTH,
@@ -79,7 +79,7 @@ def _ordered(signals):
 
 
 def test_without_noise_the_coefficients_come_back(quiet):
-    found = equation_error(problem(quiet), settings=Settings(scale_prior=False))
+    found = equation_error(problem(quiet), settings=EquationErrorSettings(scale_prior=False))
     np.testing.assert_allclose(found.values, EXACT, rtol=0.01)
 
 

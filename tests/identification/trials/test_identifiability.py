@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.equation_error import equation_error
-from tank2sim.identification.trials.identifiability import identifiability, refuse_unseen
-from tank2sim.identification.trials.problem import Estimate
+from tank2sim.identification.trials.assessment.identifiability import identifiability, refuse_unseen
+from tank2sim.identification.trials.methods.equation_error import equation_error
+from tank2sim.identification.trials.problem.estimation_problem import Estimate
 from tests.identification.trials.made_up_ship import NOISE, TRUTH, problem, trial, turn, zigzag
 
 YAW = ("Nv", "Nr", "Nd")

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from tank2sim.identification.trials.disturbed import Disturbed, Tangents
-from tank2sim.identification.trials.filtering import Variances, gains, innovation_tangents, smoothed
-from tank2sim.identification.trials.kalman import Settings, kalman
-from tank2sim.identification.trials.kalman_search import task_of
-from tank2sim.identification.trials.output_error import Settings as OutputErrorSettings
-from tank2sim.identification.trials.output_error import output_error
-from tank2sim.identification.trials.problem import Problem
+from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman
+from tank2sim.identification.trials.methods.kalman_gains import Variances, gains, innovation_tangents, smooth_states
+from tank2sim.identification.trials.methods.kalman_search import task_of
+from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
+from tank2sim.identification.trials.methods.process_noise import Disturbed, Tangents
+from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tests.identification.trials.pushed_ship import NOISE, PUSH, SEEN, TIME, TRUTH, VALUES, model, pushed_problem
 
 SEEDS = range(5)
@@ -56,7 +55,7 @@ def test_filter_and_smoother_are_those_of_dense_gaussian_algebra():
     white = (found.whitener[0] @ e[..., None])[..., 0]
     density = multivariate_normal(np.zeros(n * ny), S).logpdf(y.ravel()) * -2 - n * ny * np.log(2 * np.pi)
     assert (white**2).sum() + found.log_determinant == pytest.approx(density, rel=1e-9)
-    states, errors = smoothed(A[None], C[None], found, before[None], e[None])
+    states, errors = smooth_states(A[None], C[None], found, before[None], e[None])
     np.testing.assert_allclose(states.ravel(), mean, atol=1e-9)
     np.testing.assert_allclose(errors.ravel(), spread, atol=1e-9)
 
@@ -166,7 +165,7 @@ def test_a_run_says_the_same_beside_a_longer_one(pushed):
 
 
 def test_white_process_noise_has_no_time_constant(pushed):
-    found = kalman(pushed[0][0], settings=Settings(white=True))
+    found = kalman(pushed[0][0], settings=KalmanSettings(white=True))
     assert [one.time_s for one in found.process_noise.values()] == [0.0, 0.0, 0.0]
     assert found.cost[-1] > pushed[0][2].cost[-1] + 10  # the pushes of this ship have a memory
     assert np.all(np.abs(found.values - VALUES) < 4 * found.standard_errors)
@@ -183,7 +182,7 @@ def test_the_drift_of_a_sensor_is_found():
         measured = run.measured.copy()
         measured[:, SEEN.index("motion.psi")] += drift
         runs.append(replace(run, measured=measured))
-    found = kalman(problem.with_runs(tuple(runs)), settings=Settings(drifting=True))
+    found = kalman(problem.with_runs(tuple(runs)), settings=KalmanSettings(drifting=True))
     assert found.drift["motion.psi"].deviation == pytest.approx(size, rel=0.4)
     assert found.drift["motion.psi"].time_s == pytest.approx(time_s, rel=0.6)
     for name in ("motion.u", "motion.v", "motion.r", "motion.x", "motion.y"):

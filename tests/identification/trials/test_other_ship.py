@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from tank2sim.cards import read_card
-from tank2sim.identification.trials.measured import measured
-from tank2sim.identification.trials.other_ship import other_ship
-from tank2sim.identification.trials.question import pose
-from tank2sim.identification.trials.structures import STRUCTURES
+from tank2sim.identification.trials.assessment.other_ship import other_ship
+from tank2sim.identification.trials.problem.prepare_trials import measured
+from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
+from tank2sim.identification.trials.problem.structures import STRUCTURES
 from tests.identification.trials.made_up_ship import TRUTH, problem, trial, turn, zigzag
 
 
@@ -36,7 +36,7 @@ def test_measured_ships_and_ships_with_an_unknown_effect_raise_no_alarm(data: Pa
     asked += [(read_card(str(case / "ship.toml")), sorted(case.glob("*.csv"))) for case in cases]
     for card, files in asked:
         trials = measured(files, card)
-        assert other_ship(pose(card, trials.trials, trials.driven_by)) == (), files[0].parent
+        assert other_ship(problem_from_card(card, trials.trials, trials.driven_by)) == (), files[0].parent
 
 
 def test_a_mariner_is_no_tanker(data: Path) -> None:
@@ -44,4 +44,6 @@ def test_a_mariner_is_no_tanker(data: Path) -> None:
         [data / f"data/gap_cases/case_1/zigzag{angle}.csv" for angle in ("20_20", "10_10")], read_card("kvlcc2")
     )
     for name in ("card", "cross_flow"):
-        assert other_ship(pose(STRUCTURES[name].start(read_card("kvlcc2")), trials.trials, trials.driven_by))
+        assert other_ship(
+            problem_from_card(STRUCTURES[name].start(read_card("kvlcc2")), trials.trials, trials.driven_by)
+        )

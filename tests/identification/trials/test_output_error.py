@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.identification.trials.equation_error import equation_error
-from tank2sim.identification.trials.output_error import INTERRUPTED, Settings, output_error
+from tank2sim.identification.trials.methods.equation_error import equation_error
+from tank2sim.identification.trials.methods.output_error import INTERRUPTED, OutputErrorSettings, output_error
 from tests.identification.trials.made_up_ship import (
     NOISE,
     TRUTH,
@@ -19,7 +19,7 @@ from tests.identification.trials.made_up_ship import (
 
 FREE = ("Xu", "Xvr", "Yv", "Yr", "Yd", "Nv", "Nr", "Nd")
 EXACT = np.array([TRUTH[name] for name in FREE])
-PIECES = Settings(piece_s=60.0)
+PIECES = OutputErrorSettings(piece_s=60.0)
 
 
 def pair(seed=0, duration=150.0, **more):
@@ -61,7 +61,7 @@ def test_noise_of_the_sensors_is_found(found):
 
 
 def test_whole_runs_and_pieces_agree(noisy, found):
-    whole = output_error(problem(noisy, free=FREE), settings=Settings())
+    whole = output_error(problem(noisy, free=FREE), settings=OutputErrorSettings())
     assert np.all(np.abs(whole.values - found.values) < 3 * found.standard_errors)
     assert np.all(whole.standard_errors < 1.5 * found.standard_errors)
 

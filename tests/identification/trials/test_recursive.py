@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tank2sim.identification.trials.kalman import kalman
-from tank2sim.identification.trials.recursive import Settings, recursive
+from tank2sim.identification.trials.methods.kalman import kalman
+from tank2sim.identification.trials.methods.recursive import RecursiveSettings, recursive
 from tests.identification.trials.pushed_ship import NOISE, PUSH, TRUTH, VALUES, orders, pushed_problem, trial
 
 
@@ -15,7 +15,7 @@ def problem():
 
 @pytest.fixture(scope="module")
 def found(problem):
-    return recursive(problem, settings=Settings(passes=4))
+    return recursive(problem, settings=RecursiveSettings(passes=4))
 
 
 def test_it_converges_to_the_batch_estimate(problem, found):
@@ -26,14 +26,14 @@ def test_it_converges_to_the_batch_estimate(problem, found):
 
 
 def test_one_pass_comes_near(problem, found):
-    once = recursive(problem, settings=Settings(passes=1))
+    once = recursive(problem, settings=RecursiveSettings(passes=1))
     assert np.mean(((once.values - VALUES) / problem.prior_error) ** 2) < 0.5 * 0.25  # the prior is half an error off
     assert abs(once.values[list(TRUTH).index("Nd")] / TRUTH["Nd"] - 1) < 0.1
 
 
 @pytest.mark.slow
 def test_intervals_contain_the_truth_as_often_as_they_say():
-    each = [recursive(pushed_problem(seed)[0], settings=Settings(passes=2)) for seed in range(3)]
+    each = [recursive(pushed_problem(seed)[0], settings=RecursiveSettings(passes=2)) for seed in range(3)]
     scaled = np.array([(one.values - VALUES) / one.standard_errors for one in each])
     assert 0.85 <= np.mean(np.abs(scaled) < 1.96) <= 1.0
 
@@ -60,25 +60,25 @@ def test_what_the_trials_do_not_show_does_not_settle():
 
 
 def test_forgetting_widens_and_follows_the_last_run(problem, found):
-    forgetful = recursive(problem, settings=Settings(forgetting=0.8))
+    forgetful = recursive(problem, settings=RecursiveSettings(forgetting=0.8))
     assert np.all(forgetful.standard_errors > found.standard_errors)
     assert np.all(forgetful.standard_errors <= 1.001 * problem.prior_error)  # the prior is not forgotten
 
 
 def test_a_slower_gain_forgets_the_beginning():
-    gains = [Settings(power=0.7).kept(number) for number in (2, 10, 100)]
+    gains = [RecursiveSettings(power=0.7).kept(number) for number in (2, 10, 100)]
     assert gains[0] < gains[1] < gains[2] < 1
-    assert Settings().kept(7) == pytest.approx(1.0)
+    assert RecursiveSettings().kept(7) == pytest.approx(1.0)
     # Robbins and Monro: what is kept makes the weight of the newest block t**-power of the whole
     total = 0.0
     for number in range(1, 31):
-        total = Settings(power=0.7).kept(number) * total + 1.0
+        total = RecursiveSettings(power=0.7).kept(number) * total + 1.0
     assert 1 / total == pytest.approx(30**-0.7)
 
 
 def test_progress_is_told_and_can_stop(problem):
     told = []
-    recursive(problem, settings=Settings(passes=1), progress=lambda stage, values, cost: told.append(stage))
+    recursive(problem, settings=RecursiveSettings(passes=1), progress=lambda stage, values, cost: told.append(stage))
     assert told == ["recursive"] * 3
 
     def stop(*_):
@@ -93,4 +93,4 @@ def test_progress_is_told_and_can_stop(problem):
 )
 def test_settings_out_of_range_are_refused(wrong):
     with pytest.raises(ValueError, match="is"):
-        Settings(**wrong)
+        RecursiveSettings(**wrong)

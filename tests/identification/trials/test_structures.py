@@ -7,9 +7,9 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics import build
-from tank2sim.identification.trials.problem import Estimate
-from tank2sim.identification.trials.question import answered, free_parameters, rounded
-from tank2sim.identification.trials.structures import STRUCTURES, prior_of_absent
+from tank2sim.identification.trials.problem.estimation_problem import Estimate
+from tank2sim.identification.trials.problem.problem_from_card import answered, free_parameters, rounded
+from tank2sim.identification.trials.problem.structures import STRUCTURES, prior_of_absent
 
 
 @pytest.fixture(scope="module")

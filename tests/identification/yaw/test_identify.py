@@ -8,7 +8,7 @@ import pytest
 
 from tank2sim.cards import parse_card
 from tank2sim.cards.form import TankWalls
-from tank2sim.dynamics.yaw_programme import PAPER
+from tank2sim.dynamics.yaw_programme import PAPER_PROGRAMME
 from tank2sim.dynamics.yaw_rig import SHIP_T1, UNKNOWN_RIG
 from tank2sim.errors import InputError
 from tank2sim.identification.yaw.card import rig_card_text
@@ -22,7 +22,7 @@ from tank2sim.identification.yaw.identify import (
 )
 from tank2sim.identification.yaw.intervals import intervals, known_work
 from tank2sim.records.yaw import read_yaw_record, yaw_record_text
-from tank2sim.simulation.yaw_record import record_of
+from tank2sim.simulation.yaw_record import yaw_record
 from tank2sim.simulation.yaw_rig import Measuring, run_yaw_rig
 from tank2sim.simulation.yaw_rig_control import TunedController
 from tests.yaw_truth import Truth, mirrored, record, written
@@ -205,8 +205,10 @@ def test_reversing_programmes_are_paired_through_the_same_angles(folder):
 
 
 def test_an_encoder_costs_accuracy_and_the_standard_error_says_so():
-    run = run_yaw_rig(SHIP_T1, PAPER, TunedController(inertia_kgm2=0.0505), Measuring(current_noise_A=0.003, seed=5))
-    made = record_of(run, SHIP_T1, Path("rig.csv"), {"inertia_kgm2": SHIP_T1.inertia_kgm2})
+    run = run_yaw_rig(
+        SHIP_T1, PAPER_PROGRAMME, TunedController(inertia_kgm2=0.0505), Measuring(current_noise_A=0.003, seed=5)
+    )
+    made = yaw_record(run, SHIP_T1, Path("rig.csv"), {"inertia_kgm2": SHIP_T1.inertia_kgm2})
     found = identify_yaw([made])
     true = SHIP_T1.inertia_kgm2 + SHIP_T1.added_inertia_kgm2
     best = found.estimates["energy_least_squares"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tank2sim.errors import InputError
-from tank2sim.records.signals.filtering import Pass, butterworth, decimate, savitzky_golay, smoothing_spline
+from tank2sim.records.signals.filtering import FilterType, butterworth, decimate, savitzky_golay, smoothing_spline
 from tank2sim.records.signals.requests import parse_filter
 from tank2sim.records.signals.trends import detrend
 from tests.records.signals.made import series, white
@@ -29,12 +29,12 @@ def measured(frequency_hz, filtered):
 
 
 FILTERS = {
-    "lowpass": lambda one: butterworth(one, Pass.LOW, [0.5]),
-    "lowpass causal": lambda one: butterworth(one, Pass.LOW, [0.5], causal=True),
-    "highpass": lambda one: butterworth(one, Pass.HIGH, [0.2]),
-    "highpass causal": lambda one: butterworth(one, Pass.HIGH, [0.2], order=3, causal=True),
-    "bandpass": lambda one: butterworth(one, Pass.BAND, [0.1, 1.0]),
-    "bandpass causal": lambda one: butterworth(one, Pass.BAND, [0.1, 1.0], order=2, causal=True),
+    "lowpass": lambda one: butterworth(one, FilterType.LOW, [0.5]),
+    "lowpass causal": lambda one: butterworth(one, FilterType.LOW, [0.5], causal=True),
+    "highpass": lambda one: butterworth(one, FilterType.HIGH, [0.2]),
+    "highpass causal": lambda one: butterworth(one, FilterType.HIGH, [0.2], order=3, causal=True),
+    "bandpass": lambda one: butterworth(one, FilterType.BAND, [0.1, 1.0]),
+    "bandpass causal": lambda one: butterworth(one, FilterType.BAND, [0.1, 1.0], order=2, causal=True),
     "savgol": lambda one: savitzky_golay(one, 21, 3),
     "savgol rate": lambda one: savitzky_golay(one, 21, 3, derivative=1),
     "savgol acceleration": lambda one: savitzky_golay(one, 21, 4, derivative=2),
@@ -65,15 +65,15 @@ def test_a_derivative_is_that_of_the_sine():
 
 
 def test_minus_3_db_one_way_and_minus_6_both_ways():
-    assert abs(measured(0.5, butterworth(wave(0.5), Pass.LOW, [0.5], causal=True))) == pytest.approx(
+    assert abs(measured(0.5, butterworth(wave(0.5), FilterType.LOW, [0.5], causal=True))) == pytest.approx(
         math.sqrt(0.5), rel=1e-3
     )
-    assert abs(measured(0.5, butterworth(wave(0.5), Pass.LOW, [0.5]))) == pytest.approx(0.5, rel=1e-3)
+    assert abs(measured(0.5, butterworth(wave(0.5), FilterType.LOW, [0.5]))) == pytest.approx(0.5, rel=1e-3)
 
 
 @pytest.mark.parametrize(
     ("kind", "edges", "word"),
-    [(Pass.LOW, [0.5], "delays"), (Pass.HIGH, [0.2], "brings"), (Pass.BAND, [0.1, 1.0], None)],
+    [(FilterType.LOW, [0.5], "delays"), (FilterType.HIGH, [0.2], "brings"), (FilterType.BAND, [0.1, 1.0], None)],
 )
 def test_the_sentence_tells_the_delay_that_a_sine_gets(kind, edges, word):
     sentence = butterworth(wave(0.3), kind, edges, causal=True).effect.sentence
@@ -90,7 +90,7 @@ def test_the_sentence_tells_the_delay_that_a_sine_gets(kind, edges, word):
 def test_group_delay_is_how_much_later_a_packet_comes():
     time = STEP * np.arange(4000)
     packet = np.exp(-(((time - 100.0) / 15.0) ** 2)) * np.sin(2 * np.pi * 0.3 * time)
-    filtered = butterworth(series(packet, STEP), Pass.LOW, [0.5], causal=True)
+    filtered = butterworth(series(packet, STEP), FilterType.LOW, [0.5], causal=True)
     energy = filtered.series.values**2
     later = float(np.sum(time * energy) / np.sum(energy)) - 100.0
     told = float(np.interp(0.3, filtered.effect.frequency_hz, filtered.effect.delay_s))
@@ -166,6 +166,6 @@ def test_numbers_that_do_not_fit_the_record_are_refused(text, told):
 def test_side_lobes_upside_down_are_half_a_turn_and_no_more():
     effect = savitzky_golay(wave(0.3), 21, 3).effect
     assert set(np.round(np.rad2deg(effect.phase_rad), 3)) == {0.0, 180.0}
-    causal = butterworth(wave(0.3), Pass.HIGH, [0.2], causal=True).effect
+    causal = butterworth(wave(0.3), FilterType.HIGH, [0.2], causal=True).effect
     assert np.rad2deg(causal.phase_rad[0]) == pytest.approx(360.0, abs=10.0)  # order 4 leads by a turn at zero
     assert np.rad2deg(causal.phase_rad[-1]) == pytest.approx(0.0, abs=1.0)

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import pytest
 
-from tank2sim.analysis.practice.bridge import Bridge, bridge_of
+from tank2sim.analysis.validation.bridge_data import Bridge, bridge_of
 from tank2sim.cards import read_card
 from tank2sim.report.bridge.boxes import OUTSIDE, draughts, particulars, steering, stopping, telegraph, turning, zigzags
 from tank2sim.report.bridge.drawings import circles_drawing, clock, knots

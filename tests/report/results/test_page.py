@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tank2sim.errors import InputError
-from tank2sim.report.page import Verdict, render_page
-from tank2sim.report.results.drawn import needs_of
-from tank2sim.report.results.kinds import KINDS, kind_of
+from tank2sim.report.kit.json_values import alike, quantities, rows_of, titled, words
+from tank2sim.report.kit.page import Verdict, render_page
 from tank2sim.report.results.page import result_page
-from tank2sim.report.results.values import alike, quantities, rows_of, titled, words
+from tank2sim.report.results.renderers import needs_of
+from tank2sim.report.results.result_types import RESULT_TYPES, kind_of
 from tests.report.test_page_in_browser import CHROMIUM, opened
 
 GAP = {
@@ -141,7 +141,7 @@ def test_what_no_command_wrote_is_refused(result):
 
 
 def test_every_kind_is_told_apart():
-    for kind in KINDS:
+    for kind in RESULT_TYPES:
         assert kind_of(dict.fromkeys(kind.keys), "x.json").title == kind.title
 
 
@@ -231,11 +231,11 @@ def test_signals_have_a_row_each_in_one_table_a_statistic():
 
 
 DAMAGES = st.sampled_from(["text", 5, True, [1, 2], {"a": 5}, [{}], ["x"] * 20, [None], {"a": {}}])
-NEEDED = {kind.title: [*kind.keys, *needs_of(kind.title), "notices", "figures", "effects"] for kind in KINDS}
+NEEDED = {kind.title: [*kind.keys, *needs_of(kind.title), "notices", "figures", "effects"] for kind in RESULT_TYPES}
 
 
 @settings(max_examples=25, deadline=None)
-@given(data=st.data(), kind=st.sampled_from(KINDS), damage=DAMAGES)
+@given(data=st.data(), kind=st.sampled_from(RESULT_TYPES), damage=DAMAGES)
 def test_a_damaged_key_is_an_error_of_the_file_and_never_one_of_the_program(data, kind, damage):
     """Whatever stands under any key of any kind, the page is drawn or the key is told."""
     whole = {key: form() for key, form in needs_of(kind.title).items()}
@@ -250,12 +250,12 @@ def test_a_damaged_key_is_an_error_of_the_file_and_never_one_of_the_program(data
 
 
 @pytest.mark.parametrize("damage", ["text", 5])
-@pytest.mark.parametrize(("kind", "key"), [(one.title, key) for one in KINDS for key in needs_of(one.title)])
+@pytest.mark.parametrize(("kind", "key"), [(one.title, key) for one in RESULT_TYPES for key in needs_of(one.title)])
 def test_text_or_a_number_in_place_of_what_is_drawn_is_told_by_its_key(kind, key, damage):
     form = needs_of(kind)[key]
     if form is object or isinstance(damage, form):
         return
-    known = next(one for one in KINDS if one.title == kind)
+    known = next(one for one in RESULT_TYPES if one.title == kind)
     whole = {name: own() for name, own in needs_of(kind).items()}
     with pytest.raises(InputError, match=f"^x.json: {key}: has not the form") as caught:
         result_page({**dict.fromkeys(known.keys), **whole, key: damage}, "x.json")

@@ -16,7 +16,7 @@ from tank2sim.errors import InputError
 from tank2sim.records.reading import read_trial
 from tank2sim.report.steering.ghost import ghost_of
 from tank2sim.report.steering.page import steering_page
-from tank2sim.report.steering.ship import WEB, controls, following, has_compiler, ship_in_page
+from tank2sim.report.steering.ship import WEB, controls, has_compiler, ship_following_angle, ship_in_page
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
 from tests.report.test_page_in_browser import CHROMIUM, opened
@@ -200,7 +200,7 @@ def test_the_mean_wind_of_a_trial_is_that_at_the_start(mariner, pond, tmp_path):
 
 
 def test_what_surrounds_the_ship_has_the_bounds_of_a_card(pond):
-    found = {one.name: one for one in controls(following(pond))}
+    found = {one.name: one for one in controls(ship_following_angle(pond))}
     assert set(found) == {"rudder.command", "propeller.speed", "wind.speed", "wind.direction"}
     assert found["wind.speed"].maximum == pytest.approx(60 * 3600 / 1852)
     assert found["wind.direction"].label == "Wind from"
@@ -357,7 +357,7 @@ class TestInABrowser:
         rows = np.column_stack(list(columns.values()))
         np.savetxt(file, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
         ghost = ghost_of(read_trial(file), mariner)
-        model = following(mariner)
+        model = ship_following_angle(mariner)
         steps = "click('follow'); click('finish'); click('save'); click('zigzag'); click('finish'); click('save');"
         _, (voyage, zigzag) = sailed(steering_page(model, ship_in_page(model), ghost), tmp_path, steps)
         last = np.flatnonzero(voyage["t_s"] <= run.t[-1] + 1e-4)[-1]

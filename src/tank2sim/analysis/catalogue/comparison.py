@@ -135,7 +135,7 @@ class SteeringComparison:
         return {"models": models, "points": points}
 
 
-def compare(card: SteeringCard, rudder_deg: float | None = None) -> SteeringComparison:
+def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None) -> SteeringComparison:
     """Compare the models of a card at a rudder angle, by default that of its ``[influence]``, else 20 deg.
 
     Raises

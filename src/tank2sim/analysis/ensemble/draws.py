@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tank2sim.analysis.influence.errors import JointErrors, joint_errors
 from tank2sim.analysis.influence.parameters import CardParameter, card_parameters, study_model
+from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.covariance import Covariance
 from tank2sim.simulation.ensemble import Draws
-
-Array = NDArray[np.float64]
 
 
 def draws_of(card: ManoeuvringCard, seed: int) -> tuple[Draws, list[str]]:
@@ -45,7 +43,7 @@ def draws_with(errors: JointErrors, seed: int) -> Draws:
     )
 
 
-def in_file(card: ManoeuvringCard, names: Sequence[str], matrix: Array) -> Covariance:
+def by_file_name(card: ManoeuvringCard, names: Sequence[str], matrix: Array) -> Covariance:
     """A covariance of parameters of the model as the card's file has them; what is not on the card is left out."""
     found = {one.name: one for one in card_parameters(card, study_model(card))}
     rows = [place for place, name in enumerate(names) if name in found]

@@ -11,13 +11,14 @@ import numpy as np
 from tank2sim.analysis.influence.figures import parse_figure
 from tank2sim.analysis.influence.parameters import study_model
 from tank2sim.analysis.stability.imo import imo_criteria
+from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import parse_card
 from tank2sim.dynamics import build
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import mass_fault
 from tank2sim.errors import InputError
-from tank2sim.simulation.ensemble import Answer, Ask
+from tank2sim.simulation.ensemble import Ask, MemberResult
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
@@ -25,9 +26,9 @@ from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import RUNAWAY
 from tank2sim.simulation.trajectory import Trajectory
 
-AskOne = Callable[[Mapping[str, float]], Answer]
+AskOne = Callable[[Mapping[str, float]], MemberResult]
 
-SIGNALS: Mapping[str, tuple[str, float]] = {
+ENSEMBLE_SIGNALS: Mapping[str, tuple[str, float]] = {
     "x_m": ("motion.x", 1.0),
     "y_m": ("motion.y", 1.0),
     "psi_deg": ("motion.psi", math.degrees(1.0)),
@@ -41,7 +42,7 @@ SIGNALS: Mapping[str, tuple[str, float]] = {
 EVERY = 10
 """Of so many steps one is kept: a twentieth of a ship length (:class:`tank2sim.simulation.integrator.Integrator`)."""
 
-LONGEST = 200_000
+_LONGEST = 200_000
 """Steps of the longest run that a whole batch makes at once: the batch then takes some 40 MB (ours)."""
 
 # Of all outputs those that figures are read off: the others would take longer than the motion itself.
@@ -73,19 +74,19 @@ class ShipText:
 
 @dataclass(frozen=True, eq=False)
 class OfManoeuvre:
-    """Figures of a manoeuvre, and :data:`SIGNALS` at `times` (n,), s."""
+    """Figures of a manoeuvre, and :data:`ENSEMBLE_SIGNALS` at `times` (n,), s."""
 
     ship: ShipText
     manoeuvre: Manoeuvre
     duration_s: float | None
-    times: Vector
+    times: Array
 
     def prepared(self) -> Ask:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         model = _reading_off(study_model(self.ship.card()), *_READ_OFF.get(type(self.manoeuvre), ()))
         integrator = Integrator(model, every=EVERY)
         steps = (self.duration_s or math.inf) / model.step_s
-        whole = steps <= LONGEST and abs(steps - round(steps)) < 1e-9 * steps
+        whole = steps <= _LONGEST and abs(steps - round(steps)) < 1e-9 * steps
         if isinstance(self.manoeuvre, Turn) and whole:
             return self._held(integrator, self.manoeuvre, round(steps))
         return _each(self._driven(integrator))
@@ -95,15 +96,15 @@ class OfManoeuvre:
         model = integrator.model
         own = _parameters(model)
 
-        def ask(values: Mapping[str, float]) -> Answer:
+        def ask(values: Mapping[str, float]) -> MemberResult:
             if fault := mass_fault(own | dict(values)):
-                return Answer({}, trouble=fault)
+                return MemberResult({}, trouble=fault)
             duration = self.duration_s
             try:
                 run = simulate(model, self.manoeuvre, duration_s=duration, parameters=values, integrator=integrator)
             except InputError as error:
-                return Answer({}, trouble=error.problem)
-            return Answer(by_number(run.figures), _sampled(run.trajectory, self.times))
+                return MemberResult({}, trouble=error.problem)
+            return MemberResult(by_number(run.figures), _sampled(run.trajectory, self.times))
 
         return ask
 
@@ -114,7 +115,7 @@ class OfManoeuvre:
         t = np.append(np.arange(0, steps, EVERY), steps) * h
         inputs = np.tile(u, (len(t), 1))
 
-        def ask(members: Sequence[Mapping[str, float]]) -> list[Answer]:
+        def ask(members: Sequence[Mapping[str, float]]) -> list[MemberResult]:
             whole = [own | dict(values) for values in members]
             p = np.array([list(values.values()) for values in whole])
             states = integrator.rollouts(np.array(model.initial(p.T)).T, u, p, (h, steps))
@@ -123,10 +124,10 @@ class OfManoeuvre:
                 run = Trajectory(model, t, x, inputs, integrator.outputs(x, inputs, parameters))
                 fault = mass_fault(values) or ("" if run.is_finite() else RUNAWAY)
                 if fault:
-                    found.append(Answer({}, trouble=fault))
+                    found.append(MemberResult({}, trouble=fault))
                     continue
                 figures = figures_of(turn, run, own["ship.length"])
-                found.append(Answer(by_number(figures), _sampled(run, self.times)))
+                found.append(MemberResult(by_number(figures), _sampled(run, self.times)))
             return found
 
         return ask
@@ -147,15 +148,15 @@ class OfFigures:
         study = Study(self.ship.card(), [parse_figure(text) for text in self.figures])
         names, own = [one.name for one in study.parameters], _parameters(study.model)
 
-        def ask(values: Mapping[str, float]) -> Answer:
+        def ask(values: Mapping[str, float]) -> MemberResult:
             if fault := mass_fault(own | dict(values)):
-                return Answer({}, trouble=fault)
+                return MemberResult({}, trouble=fault)
             given = dict(zip(names, study.values.tolist(), strict=True)) | dict(values)
             try:
                 found = study.figures_at(np.array([given[name] for name in names]))
             except InputError as error:
-                return Answer({}, trouble=error.problem)
-            return Answer(dict(zip(self.figures, found.tolist(), strict=True)))
+                return MemberResult({}, trouble=error.problem)
+            return MemberResult(dict(zip(self.figures, found.tolist(), strict=True)))
 
         return _each(ask)
 
@@ -172,13 +173,13 @@ class OfCriteria:
         model = _reading_off(whole, *(name for names in _READ_OFF.values() for name in names))
         integrator, own = Integrator(model, every=EVERY), _parameters(model)
 
-        def ask(values: Mapping[str, float]) -> Answer:
+        def ask(values: Mapping[str, float]) -> MemberResult:
             # What is an input (a current) is calm in these trials.
             given = {name: value for name, value in values.items() if name in own}
             if fault := mass_fault(own | given):
-                return Answer({}, trouble=fault)
+                return MemberResult({}, trouble=fault)
             criteria = imo_criteria(model, given, integrator)
-            return Answer({one.name: math.nan if one.found is None else one.found for one in criteria})
+            return MemberResult({one.name: math.nan if one.found is None else one.found for one in criteria})
 
         return _each(ask)
 
@@ -205,10 +206,10 @@ def _parameters(model: Model) -> dict[str, float]:
 
 def _reading_off(model: Model, *names: str) -> Model:
     states = set(model.state_names)
-    wanted = [*names, "motion.speed", *(name for name, _ in SIGNALS.values())]
+    wanted = [*names, "motion.speed", *(name for name, _ in ENSEMBLE_SIGNALS.values())]
     return replace(model, outputs=tuple(dict.fromkeys(name for name in wanted if name not in states)))
 
 
-def _sampled(run: Trajectory, times: Vector) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
-    rows = [factor * np.interp(times, run.t, run[name], right=np.nan) for name, factor in SIGNALS.values()]
+def _sampled(run: Trajectory, times: Array) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
+    rows = [factor * np.interp(times, run.t, run[name], right=np.nan) for name, factor in ENSEMBLE_SIGNALS.values()]
     return np.array(rows, dtype=np.float32)

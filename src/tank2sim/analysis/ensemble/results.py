@@ -8,13 +8,13 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.analysis.ensemble.questions import SIGNALS, OfCriteria, OfFigures, OfManoeuvre, ShipText
+from tank2sim.analysis.ensemble.questions import ENSEMBLE_SIGNALS, OfCriteria, OfFigures, OfManoeuvre, ShipText
 from tank2sim.analysis.ensemble.steering import Grid, SteeringBands, steering_bands
-from tank2sim.analysis.stability.imo import Criterion
+from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.stability.straight_line import answering_states
+from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
@@ -22,8 +22,6 @@ from tank2sim.simulation.bands import STILL_RUNNING, Band, BandOverTime, TrackBa
 from tank2sim.simulation.ensemble import KEPT, Ensemble, ensemble
 from tank2sim.simulation.manoeuvres import Manoeuvre
 from tank2sim.units import in_words
-
-Array = NDArray[np.float64]
 
 TIMES = 201
 """Times of the bands of histories and tracks, over the run of the card itself (ours)."""
@@ -37,7 +35,7 @@ on both sides enclose everything but where the members are."""
 
 
 @dataclass(frozen=True)
-class Asked:
+class EnsembleRequest:
     """An ensemble as it is asked for: how many members, from which seed."""
 
     members: int
@@ -108,7 +106,7 @@ class Chance:
         Of what was found.
     """
 
-    criterion: Criterion
+    criterion: ImoCriterion
     met: float | None
     between: tuple[float, float] | None
     left_open: int
@@ -170,7 +168,7 @@ def manoeuvre_bands(
     card: ManoeuvringCard,
     manoeuvre: Manoeuvre,
     run_s: tuple[float | None, float],
-    asked: Asked,
+    asked: EnsembleRequest,
     executor: Executor | None = None,
 ) -> ManoeuvreBands:
     """Bands of a manoeuvre; `run_s` is the duration asked for, and how long the run of the card itself took."""
@@ -180,7 +178,7 @@ def manoeuvre_bands(
     found = ensemble(question, draws, asked.members, executor)
     if asked.members > KEPT:
         told.append(f"bands of tracks and histories are of the first {KEPT} members; figures are of all")
-    shown, histories, track = history_bands(found, times, tuple(SIGNALS))
+    shown, histories, track = history_bands(found, times, tuple(ENSEMBLE_SIGNALS))
     if 0 < len(shown) < len(times):
         share = f"{100 * STILL_RUNNING:g} % of the members"
         told.append(f"bands over time end at {shown[-1]:.4g} s, up to which {share} run; figures are of all")
@@ -193,8 +191,8 @@ def manoeuvre_bands(
 
 def stability_bands(
     card: ManoeuvringCard,
-    criteria: Sequence[Criterion],
-    asked: Asked,
+    criteria: Sequence[ImoCriterion],
+    asked: EnsembleRequest,
     executor: Executor | None = None,
     curves: tuple[float | None, Grid] | None = None,
 ) -> StabilityBands:
@@ -224,7 +222,7 @@ def stability_bands(
 
 
 def named_bands(
-    card: ManoeuvringCard, figures: Sequence[str], asked: Asked, executor: Executor | None = None
+    card: ManoeuvringCard, figures: Sequence[str], asked: EnsembleRequest, executor: Executor | None = None
 ) -> FigureBands:
     """Bands of figures by name (:mod:`tank2sim.analysis.influence.figures`)."""
     draws, told = draws_of(card, asked.seed)
@@ -256,7 +254,7 @@ def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
     return {name: band for name, band in bands.items() if name not in gone}, [f"{told}they go through infinity"]
 
 
-def chance(criterion: Criterion, found: Ensemble) -> Chance:
+def chance(criterion: ImoCriterion, found: Ensemble) -> Chance:
     """The chance of a criterion, from what members found for it by its name."""
     values = found.figures.get(criterion.name, np.zeros(0))
     shown = values[np.isfinite(values)]

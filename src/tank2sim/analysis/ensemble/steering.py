@@ -9,27 +9,25 @@ from dataclasses import dataclass
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 
 from tank2sim.analysis.ensemble.questions import ShipText
 from tank2sim.analysis.linearisation import state_space, straight_course
 from tank2sim.analysis.stability.response import SteeringResponse
 from tank2sim.analysis.stability.straight_line import steering_states
 from tank2sim.analysis.turning.diagram import SteadyTurning, largest_rudder, steady_turning
+from tank2sim.arrays import Array
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import mass_fault
 from tank2sim.errors import InputError
 from tank2sim.simulation.bands import QUANTILES, STILL_RUNNING, Band, BandOverTime, figure_bands
-from tank2sim.simulation.ensemble import Answer, Ask, Draws, Ensemble, ensemble
-
-Array = NDArray[np.float64]
+from tank2sim.simulation.ensemble import Ask, Draws, Ensemble, MemberResult, ensemble
 
 CURVES = 200
 """Members of the bands of curves: the first ones. Each takes half a second, and the share below a quantile is known
 from them to 1.5 % (ours)."""
 
-POINTS = 121
+_POINTS = 121
 """Points of every curve (ours)."""
 
 FROM_STARBOARD, FROM_PORT, MAGNITUDE, PHASE, STEP = (
@@ -58,9 +56,11 @@ class Grid:
     def of(model: Model, response: SteeringResponse) -> Grid:
         """The rudder that the gear allows, and what the response of the ship herself is drawn over."""
         largest = largest_rudder(model) * (1 - 1e-9)
-        omega = np.geomspace(response.omega_radps[0], response.omega_radps[-1], POINTS)
+        omega = np.geomspace(response.omega_radps[0], response.omega_radps[-1], _POINTS)
         phase = float(np.degrees(np.unwrap(np.angle(response.response)))[-1])
-        return Grid(np.linspace(-largest, largest, POINTS), omega, np.linspace(0.0, response.time_s[-1], POINTS), phase)
+        return Grid(
+            np.linspace(-largest, largest, _POINTS), omega, np.linspace(0.0, response.time_s[-1], _POINTS), phase
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,23 +76,23 @@ class OfSteering:
         model = build(self.ship.card())
         known = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
 
-        def ask(values: Mapping[str, float]) -> Answer:
+        def ask(values: Mapping[str, float]) -> MemberResult:
             # What is an input (a current) is calm in these curves.
             given = {name: value for name, value in values.items() if name in known}
             if fault := mass_fault(known | given):
-                return Answer({}, trouble=fault)
+                return MemberResult({}, trouble=fault)
             return self._answer(model.with_values(given))
 
         return lambda members: [ask(values) for values in members]
 
-    def _answer(self, model: Model) -> Answer:
+    def _answer(self, model: Model) -> MemberResult:
         try:
             turning = steady_turning(model)
             rows = [*branches(turning, self.grid.rudder_rad), *_responses(model, self.speed_mps, self.grid)]
         except InputError as error:
-            return Answer({}, trouble=error.problem)
+            return MemberResult({}, trouble=error.problem)
         width = math.degrees(turning.loop.width_rad) if turning.loop else 0.0
-        return Answer({"loop_width_deg": width}, np.array(rows, dtype=np.float32))
+        return MemberResult({"loop_width_deg": width}, np.array(rows, dtype=np.float32))
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,16 +19,16 @@ from typing import NamedTuple
 import numpy as np
 
 from tank2sim.analysis.glide.steady import SteadyGlide, glide_as_printed, glide_at_pitch, steady_glide
+from tank2sim.arrays import Array
 from tank2sim.cards.card import GliderCard
-from tank2sim.dynamics.model import Vector
 from tank2sim.errors import InputError
 from tank2sim.records.thinning import drawn_columns
-from tank2sim.simulation.glide_programme import Programme, ProgrammeStep
+from tank2sim.simulation.glide_programme import GlideProgramme, ProgrammeStep
 
 _POINTS_OF_AN_ARC = 60
 
 
-class Place(NamedTuple):
+class PathPoint(NamedTuple):
     """Time (s), north, east, height (m) and heading (rad, clockwise, continuous)."""
 
     time_s: float
@@ -54,7 +54,7 @@ class GlidePath:
 
     glides: tuple[SteadyGlide, ...]
     durations_s: tuple[float, ...]
-    places: tuple[Place, ...]
+    places: tuple[PathPoint, ...]
 
     @property
     def length_m(self) -> float:
@@ -68,9 +68,9 @@ class GlidePath:
             for one in self.glides
         ]
 
-    def sampled(self) -> Vector:
-        """The path in points close enough to draw it, (n, 5) in the order of :class:`Place`."""
-        rows: list[Place] = [self.places[0]]
+    def sampled(self) -> Array:
+        """The path in points close enough to draw it, (n, 5) in the order of :class:`PathPoint`."""
+        rows: list[PathPoint] = [self.places[0]]
         for glide, duration, begin in zip(self.glides, self.durations_s, self.places, strict=False):
             parts = _POINTS_OF_AN_ARC if glide.turn_rate_radps else 1
             rows += [_after(begin, glide, duration * part / parts) for part in range(1, parts + 1)]
@@ -102,7 +102,7 @@ class GlidePath:
         ]
 
 
-def fly(card: GliderCard, programme: Programme, *, as_printed: bool = False) -> GlidePath:
+def fly(card: GliderCard, programme: GlideProgramme, *, as_printed: bool = False) -> GlidePath:
     """The path of a programme.
 
     Raises
@@ -116,7 +116,7 @@ def fly(card: GliderCard, programme: Programme, *, as_printed: bool = False) -> 
 
 def path_of(glides: Sequence[SteadyGlide], durations_s: Sequence[float]) -> GlidePath:
     """The path of glides that last for their durations, from the origin, heading north."""
-    places = [Place(0.0, 0.0, 0.0, 0.0, 0.0)]
+    places = [PathPoint(0.0, 0.0, 0.0, 0.0, 0.0)]
     for glide, duration in zip(glides, durations_s, strict=True):
         places.append(_after(places[-1], glide, duration))
     return GlidePath(tuple(glides), tuple(durations_s), tuple(places))
@@ -135,7 +135,7 @@ def _glide(card: GliderCard, source: str, step: ProgrammeStep, as_printed: bool)
         raise InputError(source, place, error.problem, error.remedy) from None
 
 
-def _after(begin: Place, glide: SteadyGlide, duration: float) -> Place:
+def _after(begin: PathPoint, glide: SteadyGlide, duration: float) -> PathPoint:
     change = glide.turn_rate_radps * duration
     height = begin.height_m + glide.climb_mps * duration
     cos, sin = math.cos(begin.heading_rad), math.sin(begin.heading_rad)
@@ -148,7 +148,7 @@ def _after(begin: Place, glide: SteadyGlide, duration: float) -> Place:
         radius = math.copysign(glide.turning_radius_m, change)
         ahead, aside = radius * math.sin(change), radius * (1 - math.cos(change))
         across = 1 - math.cos(change) if glide.as_printed else aside
-    return Place(
+    return PathPoint(
         begin.time_s + duration,
         begin.north_m + ahead * cos - across * sin,
         begin.east_m + ahead * sin + across * cos,

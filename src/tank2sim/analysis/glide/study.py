@@ -7,14 +7,20 @@ from dataclasses import dataclass, field
 
 from tank2sim.analysis.glide.design import Range, best_glide, fastest_glide, glide_polar, glide_range
 from tank2sim.analysis.glide.path import GlidePath, fly
+from tank2sim.analysis.glide.quasi_steady_error import SwingError, swing_errors
 from tank2sim.analysis.glide.steady import SteadyGlide, ballast_kg, force_residual, glide_as_printed, steady_glide
-from tank2sim.analysis.glide.swing import SwingError, swing_errors
-from tank2sim.analysis.glide.transient import Compared, ProgrammeError, compare, equilibrium, quasi_steady_error
+from tank2sim.analysis.glide.transient import (
+    Compared,
+    ProgrammeError,
+    compare_with_steady,
+    equilibrium,
+    quasi_steady_error,
+)
 from tank2sim.cards.card import GliderCard
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.simulation.glide_programme import Programme
+from tank2sim.simulation.glide_programme import GlideProgramme
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
 
 
@@ -40,7 +46,7 @@ class GlideQuestion:
     angles_rad: tuple[float, ...] = ()
     roll_rad: float = 0.0
     buoyancy_kg: float | None = None
-    programme: Programme | None = None
+    programme: GlideProgramme | None = None
     as_printed: bool = False
     budget_kg: float | None = None
     depth_m: float | None = None
@@ -149,7 +155,7 @@ def study(card: GliderCard, asked: GlideQuestion) -> GlideStudy:
         printed=printed,
         path=path,
         printed_path=printed_path,
-        compared=compare(integrator, path) if path and integrator else None,
+        compared=compare_with_steady(integrator, path) if path and integrator else None,
         ranges=tuple(_ranges(card, asked, (best, fastest, *glides))),
         polar=glide_polar(card),
         errors=quasi_steady_error(card, integrator) if asked.views and integrator else (),

@@ -12,11 +12,12 @@ import numpy as np
 from tank2sim.analysis.glide.path import GlidePath, path_of
 from tank2sim.analysis.glide.steady import SteadyGlide, smallest_angle, steady_glide
 from tank2sim.analysis.linearisation import OperatingPoint
+from tank2sim.arrays import Array
 from tank2sim.cards.card import GliderCard
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.records.thinning import drawn_columns
-from tank2sim.simulation.glide_programme import follow
+from tank2sim.simulation.glide_programme import follow_programme
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.trajectory import Trajectory
 
@@ -27,7 +28,7 @@ _ACCURACY = 1e-12  # m/s2, of the accelerations at an equilibrium
 
 
 @dataclass(frozen=True)
-class Equilibrium:
+class GlideEquilibrium:
     """A steady glide of the transient model.
 
     Parameters
@@ -48,7 +49,7 @@ class Equilibrium:
     turning_radius_m: float
 
 
-def equilibrium(model: Model, glide: SteadyGlide) -> Equilibrium:
+def equilibrium(model: Model, glide: SteadyGlide) -> GlideEquilibrium:
     """The equilibrium of the transient model under the pitch, roll and buoyancy of a glide, by CasADi's Newton solver.
 
     `glide` is the first guess. Its u and w come to rest; on a straight path it is the same glide, in a turn the added
@@ -93,7 +94,7 @@ def equilibrium(model: Model, glide: SteadyGlide) -> Equilibrium:
     turn = y["motion.psidot"]
     ground = y["motion.speed"] * math.cos(y["motion.path_angle"])
     radius = abs(ground / turn) if abs(turn) > 1e-15 else math.inf
-    return Equilibrium(
+    return GlideEquilibrium(
         OperatingPoint(x, u, p), y["motion.speed"], y["motion.path_angle"], y["motion.incidence"], turn, radius
     )
 
@@ -114,7 +115,7 @@ class Compared:
 
     path: GlidePath
     motion: Trajectory
-    distance_m: Vector
+    distance_m: Array
 
     @property
     def share(self) -> float:
@@ -147,9 +148,9 @@ class Compared:
         return drawn_columns({"t_s": times, **held}, len(times))
 
 
-def compare(integrator: Integrator, path: GlidePath) -> Compared:
-    """Fly the glides of a path with the transient model. Raises as :func:`follow`."""
-    motion = follow(integrator, path.orders(), path.durations_s)
+def compare_with_steady(integrator: Integrator, path: GlidePath) -> Compared:
+    """Fly the glides of a path with the transient model. Raises as :func:`follow_programme`."""
+    motion = follow_programme(integrator, path.orders(), path.durations_s)
     distance = []
     for place in path.places:
         flown = [motion.at(name, place.time_s) for name in ("motion.x", "motion.y", "motion.z")]
@@ -172,9 +173,9 @@ class ProgrammeError:
     """
 
     label: str
-    duration_s: Vector
-    distance_m: Vector
-    share: Vector
+    duration_s: Array
+    distance_m: Array
+    share: Array
 
     def as_json(self) -> dict[str, object]:
         """As JSON has it."""
@@ -199,7 +200,7 @@ def quasi_steady_error(
     errors = []
     for label, pair in kinds.items():
         glides = [steady_glide(card, angle, roll_rad=rolled) for angle, rolled in (*pair, *pair)]
-        found = [compare(integrator, path_of(glides, [duration] * len(glides))) for duration in durations_s]
+        found = [compare_with_steady(integrator, path_of(glides, [duration] * len(glides))) for duration in durations_s]
         distance = np.array([float(one.distance_m.max()) for one in found])
         errors.append(ProgrammeError(label, np.array(durations_s), distance, np.array([one.share for one in found])))
     return tuple(errors)

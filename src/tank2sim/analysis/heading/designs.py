@@ -18,9 +18,10 @@ from tank2sim.analysis.heading.control import (
 )
 from tank2sim.analysis.linearisation import state_space, straight_course
 from tank2sim.analysis.stability.straight_line import Stability, stability
+from tank2sim.arrays import Array
 from tank2sim.dynamics.autopilot import HeadingGains, autopilot_model
 from tank2sim.dynamics.autopilot_linear import LinearLaw, linear_autopilot_model
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
 NOTCH_DAMPING = 0.1
@@ -31,7 +32,7 @@ DESIGNS = ("pd", "pid", "lqr", "robust")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Weights:
+class LqrWeights:
     """What the LQR weighs against each other (Bryson & Ho, 1975): errors that are equally bad, rad.
 
     Equal ones make a heading error worth as much rudder, as in the design by pole placement (a choice of ours).
@@ -82,8 +83,8 @@ class SteeringPlant:
 
     found: Stability
     frequency_radps: float
-    A: Vector
-    B: Vector
+    A: Array
+    B: Array
     largest_rudder_rad: float
     step_s: float
 
@@ -93,7 +94,7 @@ def design_heading(
     kind: str = "pid",
     *,
     speed_mps: float | None = None,
-    weights: Weights | None = None,
+    weights: LqrWeights | None = None,
     wave_filter_radps: float | None = None,
 ) -> HeadingDesign:
     """Design a heading controller.
@@ -127,7 +128,7 @@ def design_heading(
         case "pd" | "pid":
             return _placed(plant, name, integral=kind == "pid")
         case "lqr":
-            return _quadratic(plant, name, weights or Weights())
+            return _quadratic(plant, name, weights or LqrWeights())
         case "robust":
             from tank2sim.analysis.heading.robust import robust_design
 
@@ -213,7 +214,7 @@ def _without_integral(plant: SteeringPlant, gains: HeadingGains) -> HeadingGains
     return replace(gains, proportional=float(Kp), derivative=float(Kd), integral=0.0)
 
 
-def _quadratic(plant: SteeringPlant, name: str, weights: Weights) -> HeadingDesign:
+def _quadratic(plant: SteeringPlant, name: str, weights: LqrWeights) -> HeadingDesign:
     """LQR of [sway, yaw rate, heading, rudder, integral of heading]; sway and rudder by a model that runs along.
 
     Least integral of (psi/psi0)^2 + (r/(w psi0))^2 + (z/(psi0/(a w)))^2 + (order/delta0)^2, psi0 and delta0 the

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from tank2sim.analysis.linearisation import OperatingPoint, state_space, straight_course
 from tank2sim.analysis.stability.straight_line import settled_states
+from tank2sim.arrays import Array
 from tank2sim.dynamics.autopilot_loop import closed_loop_model
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.dynamics.model import Model
 from tank2sim.records.thinning import drawn_columns
 
 _HELD = ("motion.x", "motion.y", "motion.u")
@@ -87,7 +88,7 @@ class LoopResponse:
     the `heading` by its order, closed."""
 
     speed_mps: float
-    omega_radps: Vector
+    omega_radps: Array
     loop: NDArray[np.complex128]
     heading: NDArray[np.complex128]
 
@@ -128,7 +129,7 @@ def _at_rest(autopilot: Model, inputs: list[str]) -> control.StateSpace:
     return state_space(autopilot, rest, inputs=inputs, outputs=["rudder.command"])
 
 
-def _states(autopilot: Model, held: float) -> Vector:
+def _states(autopilot: Model, held: float) -> Array:
     """States of an autopilot that holds a rudder (rad) by its integral."""
     # At exactly 0 two limits of the anti-windup meet, and no slope is right.
     integral = held if abs(held) > _OFF_THE_KINK else _OFF_THE_KINK
@@ -160,7 +161,7 @@ def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) 
     """
     loop = loop_transfer(ship, autopilot, speed_mps)
     whole = closed_loop_transfer(ship, autopilot, speed_mps)
-    omega = frequencies(loop)
+    omega = margin_frequencies(loop)
     gain, phase, nearest, _, crossover, _ = control.stability_margins(
         control.frd(loop, omega, smooth=True), returnall=True
     )
@@ -201,7 +202,7 @@ def growing_effects(ship: Model, speed_mps: float | None = None) -> tuple[str, .
     return tuple(name for name, place in zip(own, theirs, strict=True) if np.any(shares[place, growing] > _TAKES_PART))
 
 
-def frequencies(loop: control.StateSpace) -> Vector:
+def margin_frequencies(loop: control.StateSpace) -> Array:
     """Frequencies (4000,) in rad/s that show all of a loop: two decades beyond its crossover either way."""
     coarse = np.logspace(-6, 3, 2000)
     above = np.flatnonzero(np.abs(loop(1j * coarse)) > 1)

@@ -27,7 +27,7 @@ SHIFT = 0.2
 """Every mode of the loop decays faster."""
 INTEGRAL = 0.3
 """Zero b of the integral; above the shift, so that it can be moved."""
-BANDWIDTH = 0.8
+_BANDWIDTH = 0.8
 """Where W1 wants the sensitivity below 1."""
 PEAK = 1.5
 """What W1 allows as its peak."""
@@ -82,7 +82,7 @@ def _synthesis(plant: SteeringPlant) -> tuple[control.StateSpace, float]:
     integral = control.ss([[0]], [[1]], [[INTEGRAL]], [[1]])
     together = control.series(integral, ship)
     shifted = control.ss(together.A + SHIFT * np.eye(together.nstates), together.B, together.C, together.D)
-    W1 = control.tf([1 / PEAK, BANDWIDTH], [1, LEAST_ERROR * BANDWIDTH])
+    W1 = control.tf([1 / PEAK, _BANDWIDTH], [1, LEAST_ERROR * _BANDWIDTH])
     W2 = control.tf([1, 0.2 * RUDDER_FREQUENCY], [0.01, RUDDER_FREQUENCY])
     try:
         found, _, reached = control.mixsyn(shifted, control.ss(W1), control.ss(W2), None)

@@ -9,14 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
+from tank2sim.arrays import Array
 from tank2sim.dynamics.autopilot_loop import closed_loop_model
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.simulation.rows import Chain, Rows
+from tank2sim.simulation.rows import Chain, RowFunction
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.trajectory import Trajectory
 
-SETTLED = 0.02
+_SETTLED = 0.02
 """Share of a course change within which it is settled, as in textbooks."""
 
 
@@ -33,15 +34,15 @@ class HeadingLoop:
     def __init__(self, ship: Model, autopilot: Model):
         self.model = closed_loop_model(ship, autopilot)
         self._chain = Chain(runge_kutta_step(self.model))
-        self._outputs = Rows(self.model.output)
+        self._outputs = RowFunction(self.model.output)
 
-    def start(self, parameters: Mapping[str, float] | None = None) -> Vector:
+    def start(self, parameters: Mapping[str, float] | None = None) -> Array:
         """State (nx,) at the beginning."""
         return np.asarray(self.model.initial(self.model.parameter_values(parameters)), dtype=float).ravel()
 
     def advance(
-        self, state: Vector, inputs: Mapping[str, float | Vector], steps: int, parameters: Mapping[str, float] | None
-    ) -> tuple[Vector, Vector]:
+        self, state: Array, inputs: Mapping[str, float | Array], steps: int, parameters: Mapping[str, float] | None
+    ) -> tuple[Array, Array]:
         """States (steps + 1, nx) and inputs (steps, nu); an input is held, or (steps,) gives one for each step."""
         u = np.tile(self.model.input_values(), (steps, 1))
         for name, values in inputs.items():
@@ -51,11 +52,11 @@ class HeadingLoop:
 
     def run(
         self,
-        inputs: Mapping[str, float | Vector],
+        inputs: Mapping[str, float | Array],
         duration_s: float,
         *,
         parameters: Mapping[str, float] | None = None,
-        begin: Vector | None = None,
+        begin: Array | None = None,
     ) -> Trajectory:
         """Simulate from the model's start, or from the state `begin` (nx,), classical Runge-Kutta at the model's step.
 
@@ -69,8 +70,8 @@ class HeadingLoop:
         return self.trajectory(x, u, parameters)
 
     def kept_course(
-        self, inputs: Mapping[str, float | Vector], duration_s: float, parameters: Mapping[str, float] | None = None
-    ) -> Vector:
+        self, inputs: Mapping[str, float | Array], duration_s: float, parameters: Mapping[str, float] | None = None
+    ) -> Array:
         """State (nx,) of a ship that has kept the course 0 for a time, at the speed and place of the model's start.
 
         An asymmetric ship needs rudder for it, which the controller has found by then: it is no part of what follows.
@@ -80,11 +81,11 @@ class HeadingLoop:
             start, {**inputs, "heading.command": 0.0}, round(duration_s / self.model.step_s), parameters
         )
         again = [self.model.state_names.index(f"motion.{name}") for name in ("u", "x", "y")]
-        state: Vector = x[-1].copy()
+        state: Array = x[-1].copy()
         state[again] = start[again]
         return state
 
-    def trajectory(self, x: Vector, u: Vector, parameters: Mapping[str, float] | None = None) -> Trajectory:
+    def trajectory(self, x: Array, u: Array, parameters: Mapping[str, float] | None = None) -> Trajectory:
         """States (n + 1, nx) and inputs (n, nu) with their times and outputs. Raises as :meth:`run`."""
         u = np.vstack([u, u[-1]])
         (y,) = self._outputs(x, u, self.model.parameter_values(parameters))
@@ -107,7 +108,7 @@ class CourseChange:
         From 10 to 90 % of the change; None if it does not come so far.
     overshoot_deg : float
     settling_time_s : float or None
-        After which it stays within :data:`SETTLED` of the change; None if it does not.
+        After which it stays within :data:`_SETTLED` of the change; None if it does not.
     largest_rudder_deg : float
     rate_limited_s : float
         Time that the rudder moves as fast as it can.
@@ -162,7 +163,7 @@ def without_anti_windup(autopilot: Model) -> dict[str, float]:
 def course_change(run: Trajectory, ordered_rad: float) -> CourseChange:
     """Figures of a run in which ``heading.command`` steps from the heading at the start by `ordered_rad` at t = 0."""
     heading = (run["motion.psi"] - run["motion.psi"][0]) / ordered_rad
-    outside = np.flatnonzero(np.abs(heading - 1) > SETTLED)
+    outside = np.flatnonzero(np.abs(heading - 1) > _SETTLED)
     settled = len(outside) and outside[-1] + 1 < len(heading)
     first = _reached(run.t, heading, 0.1)
     last = _reached(run.t, heading, 0.9)
@@ -196,7 +197,7 @@ def course_keeping(run: Trajectory, course_rad: float, from_s: float) -> CourseK
     )
 
 
-def _reached(time: Vector, values: Vector, level: float) -> float | None:
+def _reached(time: Array, values: Array, level: float) -> float | None:
     """Time at which a signal first reaches a level, linear between samples."""
     over = np.flatnonzero(values >= level)
     if not over.size or over[0] == 0:
@@ -206,7 +207,7 @@ def _reached(time: Vector, values: Vector, level: float) -> float | None:
     return float(time[k - 1] + share * (time[k] - time[k - 1]))
 
 
-def _rate_limited(run: Trajectory) -> Vector:
+def _rate_limited(run: Trajectory) -> Array:
     """For each step (n - 1,), whether the rudder moved at its largest rate."""
     limits = [one.start for one in run.model.parameters if one.name in _RATE_LIMITS]
     moved = np.abs(np.diff(run["rudder.angle"])) / run.model.step_s

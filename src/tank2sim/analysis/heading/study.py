@@ -9,7 +9,8 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 
 from tank2sim.analysis.heading.control import LARGEST_RUDDER_RAD
-from tank2sim.analysis.heading.designs import HeadingDesign, Weights, design_heading
+from tank2sim.analysis.heading.designs import HeadingDesign, LqrWeights, design_heading
+from tank2sim.analysis.heading.disturbances import Weather, in_weather, wave_yaw_acceleration, weather_for
 from tank2sim.analysis.heading.margins import (
     LargestSteps,
     LoopMargins,
@@ -28,10 +29,10 @@ from tank2sim.analysis.heading.runs import (
     without_anti_windup,
 )
 from tank2sim.analysis.heading.track_keeping import Guidance, TrackRun, keep_track
-from tank2sim.analysis.heading.weather import Weather, in_weather, wave_yaw_acceleration, weather_for
+from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import histories
@@ -77,12 +78,12 @@ class StudySettings:
 
     kind: str = "pid"
     speed_mps: float | None = None
-    weights: Weights = field(default_factory=Weights)
+    weights: LqrWeights = field(default_factory=LqrWeights)
     wave_filter_radps: float | None = None
     course_change_rad: float = math.radians(20.0)
     large_change_rad: float = math.radians(90.0)
     weather: Mapping[str, float | None] = field(default_factory=dict)
-    waypoints: Vector | None = None
+    waypoints: Array | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -119,7 +120,7 @@ class AutopilotStudy:
     changes: Mapping[str, CourseChange]
     keeping: CourseKeeping
     tracks: Mapping[str, TrackRun]
-    waypoints: Vector | None
+    waypoints: Array | None
     notices: tuple[str, ...]
 
     @property
@@ -203,7 +204,7 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     runs, changes = _changes(loop, design, settings, ahead, start, _CHANGE_TIMES * unit)
     steps = round(_KEEPING_TIMES * unit / loop.model.step_s)
     waves = wave_yaw_acceleration(weather, loop.model.step_s, steps)
-    weathered: dict[str, float | Vector] = {**inputs, YAW_DISTURBANCE: waves, "heading.command": 0.0}
+    weathered: dict[str, float | Array] = {**inputs, YAW_DISTURBANCE: waves, "heading.command": 0.0}
     runs["keeping"] = loop.run(weathered, steps * loop.model.step_s, parameters=start)
     kept = course_keeping(runs["keeping"], 0.0, runs["keeping"].t[-1] / 2)
     tracks = _tracks(loop, settings.waypoints, inputs)
@@ -228,7 +229,7 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     )
 
 
-def _tracks(loop: HeadingLoop, waypoints: Vector | None, inputs: Mapping[str, float]) -> dict[str, TrackRun]:
+def _tracks(loop: HeadingLoop, waypoints: Array | None, inputs: Mapping[str, float]) -> dict[str, TrackRun]:
     """Runs along waypoints by guidance without and with an integral; none without waypoints."""
     if waypoints is None:
         return {}

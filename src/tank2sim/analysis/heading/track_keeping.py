@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.analysis.heading.runs import HeadingLoop
-from tank2sim.dynamics.model import Vector
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.records.csv_table import read_table
 from tank2sim.records.thinning import drawn_columns
@@ -81,10 +81,10 @@ class TrackRun:
     """A track as it was sailed: the motion, and at each guidance step (n,) the leg (from 0) and cross-track error."""
 
     trajectory: Trajectory
-    time_s: Vector
-    leg: Vector
-    along_share: Vector
-    error_m: Vector
+    time_s: Array
+    leg: Array
+    along_share: Array
+    error_m: Array
     figures: TrackKeeping
 
     def as_json(self) -> dict[str, list[float]]:
@@ -94,7 +94,7 @@ class TrackRun:
         return drawn_columns({"t_s": self.time_s, "x_m": x_m, "y_m": y_m, "cross_track_error_m": self.error_m})
 
 
-def read_waypoints(path: Path | str) -> Vector:
+def read_waypoints(path: Path | str) -> Array:
     """Waypoints (n, 2), x north and y east in m, from a CSV with columns ``x_m`` and ``y_m``.
 
     Raises
@@ -134,7 +134,7 @@ def line_of_sight(error: float, integral: float, lookahead: float, gain: float =
 
 
 def keep_track(
-    loop: HeadingLoop, waypoints: Vector, guidance: Guidance, inputs: Mapping[str, float | Vector] | None = None
+    loop: HeadingLoop, waypoints: Array, guidance: Guidance, inputs: Mapping[str, float | Array] | None = None
 ) -> TrackRun:
     """Sail along waypoints from the first, on the course of the first leg at the start.
 
@@ -173,7 +173,7 @@ def keep_track(
     return sailed.run(trajectory, total)
 
 
-def _refuse_short_legs(waypoints: Vector, radius: float) -> None:
+def _refuse_short_legs(waypoints: Array, radius: float) -> None:
     legs = np.hypot(*np.diff(waypoints, axis=0).T)
     short = np.flatnonzero(legs <= radius)
     if short.size:
@@ -185,7 +185,7 @@ def _refuse_short_legs(waypoints: Vector, radius: float) -> None:
 class _Sailed:
     """A track on the way: which leg, the integral, and what was met at each guidance step."""
 
-    def __init__(self, waypoints: Vector, guidance: Guidance, length: float, speed: float):
+    def __init__(self, waypoints: Array, guidance: Guidance, length: float, speed: float):
         self._points = waypoints
         self._lookahead = guidance.lookahead_lengths * length
         self._radius = guidance.acceptance_lengths * length
@@ -196,7 +196,7 @@ class _Sailed:
         self.time = 0.0
         self.finished = False
 
-    def heading(self, position: Vector, step: float) -> float:
+    def heading(self, position: Array, step: float) -> float:
         """Heading to order at a position (2,), to be held for `step` s."""
         along, error, size, course = self._on_leg(position)
         while along >= size or math.hypot(size - along, error) < self._radius:
@@ -211,7 +211,7 @@ class _Sailed:
         self.time += step
         return course + turned
 
-    def _on_leg(self, position: Vector) -> tuple[float, float, float, float]:
+    def _on_leg(self, position: Array) -> tuple[float, float, float, float]:
         begin, end = self._points[self._leg], self._points[self._leg + 1]
         size, course = math.hypot(*(end - begin)), math.atan2(end[1] - begin[1], end[0] - begin[0])
         north, east = position - begin

@@ -15,14 +15,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from tank2sim.analysis.linearisation import straight_course
 from tank2sim.analysis.stability.straight_line import settled_states, steering_constants
 from tank2sim.analysis.turning.diagram import hull_states
-from tank2sim.dynamics.model import Model, Vector
-
-Array = NDArray[np.float64]
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 
 _ACCURACY = 1e-9
 """Residuals, scaled to about one, at which a state of rest is found; Newton's last step is far below it."""
@@ -37,7 +35,7 @@ class _Problem:
     shown: ca.SX
 
 
-class Equilibrium:
+class EquilibriumFigures:
     """A state of rest of a model and what is read off it.
 
     Parameters
@@ -65,14 +63,14 @@ class Equilibrium:
         self._values = ca.Function("values", [z, u, p], [found, values])
         self._slopes = ca.Function("slopes", [z, u, p], [ca.jacobian(values, p)])
 
-    def at(self, near: Array, inputs: Mapping[str, float], p: Vector) -> tuple[Array, Array] | None:
+    def at(self, near: Array, inputs: Mapping[str, float], p: Array) -> tuple[Array, Array] | None:
         """Unknowns (nz,) and values (n,) at the state of rest next to `near`; None if there is none."""
         u = self._model.input_values(inputs)
         z, values = (np.array(one).ravel() for one in self._values(near, u, p))
         left = np.array(self._residual(z, u, p))
         return (z, values) if np.all(np.abs(left) < _ACCURACY) and np.isfinite(values).all() else None
 
-    def slopes(self, z: Array, inputs: Mapping[str, float], p: Vector) -> Array:
+    def slopes(self, z: Array, inputs: Mapping[str, float], p: Array) -> Array:
         """Slopes (n, np) of the values by all parameters, at a state of rest."""
         return np.array(self._slopes(z, self._model.input_values(inputs), p))
 
@@ -82,7 +80,7 @@ def turning_states(model: Model) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*hull_states(model), *(state.name for state in model.states if state.steady))))
 
 
-def steady_turns(model: Model) -> Equilibrium:
+def steady_turns(model: Model) -> EquilibriumFigures:
     """Steady turns of a ship: unknowns are its :func:`turning_states` over their nominal sizes.
 
     Shown are ``u``, ``v`` and ``r`` as functions of rudder order (the input) and parameters, and by ``place`` how much
@@ -107,7 +105,7 @@ def steady_turns(model: Model) -> Equilibrium:
     residual, felt = ca.substitute([scaled, felt], [model.x], [x])
     u, v, r = (fixed[name] for name in ("motion.u", "motion.v", "motion.r"))
     problem = _Problem(unknown, residual, ca.vertcat(u, v, r, felt))
-    return Equilibrium(model, problem, ("u", "v", "r", "place"))
+    return EquilibriumFigures(model, problem, ("u", "v", "r", "place"))
 
 
 def turn_figures(u: float, v: float, r: float, side: float, approach: float) -> tuple[dict[str, float], Array]:
@@ -134,7 +132,7 @@ def turn_figures(u: float, v: float, r: float, side: float, approach: float) -> 
     return figures, np.array([by_radius, 2 * by_radius, by_rate, by_drift, by_speed, -100 / approach * by_speed])
 
 
-def straight_courses(model: Model) -> tuple[Equilibrium, Array]:
+def straight_courses(model: Model) -> tuple[EquilibriumFigures, Array]:
     """The straight course at the speed of expansion with Nomoto's coefficients and the criterion, and where it is.
 
     Unknowns are v/u0 and the rudder angle. What is shown has the names of
@@ -152,7 +150,7 @@ def straight_courses(model: Model) -> tuple[Equilibrium, Array]:
     at = dict(zip(model.state_names, point.x.tolist(), strict=True))
     speed = model.parameter_values()[model.parameter_names.index("ship.speed")]
     near = np.array([at["motion.v"] / speed, at["rudder.angle"]])
-    return Equilibrium(model, _Problem(unknown, residual, values), tuple(shown)), near
+    return EquilibriumFigures(model, _Problem(unknown, residual, values), tuple(shown)), near
 
 
 def _linear_figures(model: Model) -> dict[str, ca.SX]:

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tank2sim.analysis.influence.parameters import CardParameter, standard_errors_in_words
+from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.covariance import read_covariance
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,11 +13,11 @@ from tank2sim.simulation.manoeuvres import Turn, Zigzag
 STRAIGHT, STEADY, TURN, ZIGZAG = "straight course", "steady turn", "turning circle", "zigzag"
 """Where a figure is read off: a linearised straight course, an equilibrium, or a simulated manoeuvre."""
 
-OPTION = "--figure"
+FIGURE_OPTION = "--figure"
 
 
 @dataclass(frozen=True)
-class Kind:
+class FigureKind:
     """A kind of figure: its name with the unit at its end, where it is read off, and what it is."""
 
     name: str
@@ -25,34 +25,34 @@ class Kind:
     description: str
 
 
-KINDS: dict[str, Kind] = {
+FIGURE_KINDS: dict[str, FigureKind] = {
     kind.name: kind
     for kind in (
-        Kind("K_per_s", STRAIGHT, "Nomoto's K"),
-        Kind("T_s", STRAIGHT, "Nomoto's T = T1 + T2 - T3"),
-        Kind("T1_s", STRAIGHT, "time constant of the slower mode"),
-        Kind("T2_s", STRAIGHT, "time constant of the faster mode"),
-        Kind("T3_s", STRAIGHT, "time constant of the zero"),
-        Kind("K_prime", STRAIGHT, "K L/U"),
-        Kind("T_prime", STRAIGHT, "T U/L"),
-        Kind("criterion_C", STRAIGHT, "criterion of straight-line stability, prime system"),
-        Kind("steady_radius_m", STEADY, "radius of the steady turn, U/|r|"),
-        Kind("steady_diameter_m", STEADY, "its diameter"),
-        Kind("steady_rate_degpmin", STEADY, "yaw rate of the steady turn, positive to the side of the rudder"),
-        Kind("steady_drift_deg", STEADY, "drift angle of the steady turn, positive when the bow points inwards"),
-        Kind("steady_speed_mps", STEADY, "speed in the steady turn"),
-        Kind("speed_loss_percent", STEADY, "loss of speed in the steady turn"),
-        Kind("advance_m", TURN, "advance at 90 deg"),
-        Kind("transfer_m", TURN, "transfer at 90 deg"),
-        Kind("tactical_diameter_m", TURN, "tactical diameter at 180 deg"),
-        Kind("advance_lengths", TURN, "advance over L"),
-        Kind("tactical_diameter_lengths", TURN, "tactical diameter over L"),
-        Kind("time_90_s", TURN, "time to 90 deg"),
-        Kind("time_180_s", TURN, "time to 180 deg"),
-        *(Kind(f"overshoot{n}_deg", ZIGZAG, f"overshoot {n}") for n in (1, 2, 3, 4)),
-        Kind("initial_turning_m", ZIGZAG, "distance to the second execute"),
-        Kind("initial_turning_lengths", ZIGZAG, "the same over L"),
-        Kind("initial_turning_s", ZIGZAG, "time to the second execute"),
+        FigureKind("K_per_s", STRAIGHT, "Nomoto's K"),
+        FigureKind("T_s", STRAIGHT, "Nomoto's T = T1 + T2 - T3"),
+        FigureKind("T1_s", STRAIGHT, "time constant of the slower mode"),
+        FigureKind("T2_s", STRAIGHT, "time constant of the faster mode"),
+        FigureKind("T3_s", STRAIGHT, "time constant of the zero"),
+        FigureKind("K_prime", STRAIGHT, "K L/U"),
+        FigureKind("T_prime", STRAIGHT, "T U/L"),
+        FigureKind("criterion_C", STRAIGHT, "criterion of straight-line stability, prime system"),
+        FigureKind("steady_radius_m", STEADY, "radius of the steady turn, U/|r|"),
+        FigureKind("steady_diameter_m", STEADY, "its diameter"),
+        FigureKind("steady_rate_degpmin", STEADY, "yaw rate of the steady turn, positive to the side of the rudder"),
+        FigureKind("steady_drift_deg", STEADY, "drift angle of the steady turn, positive when the bow points inwards"),
+        FigureKind("steady_speed_mps", STEADY, "speed in the steady turn"),
+        FigureKind("speed_loss_percent", STEADY, "loss of speed in the steady turn"),
+        FigureKind("advance_m", TURN, "advance at 90 deg"),
+        FigureKind("transfer_m", TURN, "transfer at 90 deg"),
+        FigureKind("tactical_diameter_m", TURN, "tactical diameter at 180 deg"),
+        FigureKind("advance_lengths", TURN, "advance over L"),
+        FigureKind("tactical_diameter_lengths", TURN, "tactical diameter over L"),
+        FigureKind("time_90_s", TURN, "time to 90 deg"),
+        FigureKind("time_180_s", TURN, "time to 180 deg"),
+        *(FigureKind(f"overshoot{n}_deg", ZIGZAG, f"overshoot {n}") for n in (1, 2, 3, 4)),
+        FigureKind("initial_turning_m", ZIGZAG, "distance to the second execute"),
+        FigureKind("initial_turning_lengths", ZIGZAG, "the same over L"),
+        FigureKind("initial_turning_s", ZIGZAG, "time to the second execute"),
     )
 }
 """All kinds of figures by name."""
@@ -70,17 +70,17 @@ def forms() -> str:
     """All figures with their arguments, for the help of a command."""
     parts = []
     for family, (example, words) in ARGUMENTS.items():
-        names = ", ".join(kind.name for kind in KINDS.values() if kind.family == family)
+        names = ", ".join(kind.name for kind in FIGURE_KINDS.values() if kind.family == family)
         parts.append(f"{family} ({words}{', as ' + example if example else ''}): {names}")
     return "; ".join(parts)
 
 
 @dataclass(frozen=True)
-class Figure:
+class InfluenceFigure:
     """A figure of a ship: what kind, at which rudder (and heading) in rad, and how the user wrote it."""
 
     text: str
-    kind: Kind
+    kind: FigureKind
     angles: tuple[float, ...] = ()
 
     @property
@@ -91,7 +91,7 @@ class Figure:
         return Zigzag(*self.angles) if self.kind.family == ZIGZAG else Turn(*self.angles)
 
 
-def parse_figure(text: str, option: str = OPTION) -> Figure:
+def parse_figure(text: str, option: str = FIGURE_OPTION) -> InfluenceFigure:
     """The figure that a command line means: ``criterion_C``, ``steady_radius_m@20``, ``overshoot1_deg@20/20``.
 
     Raises
@@ -100,9 +100,9 @@ def parse_figure(text: str, option: str = OPTION) -> Figure:
         There is no such figure, or its argument is missing, too much or out of bounds.
     """
     name, at, argument = text.strip().partition("@")
-    kind = KINDS.get(name)
+    kind = FIGURE_KINDS.get(name)
     if kind is None:
-        close = difflib.get_close_matches(name, KINDS, n=1)
+        close = difflib.get_close_matches(name, FIGURE_KINDS, n=1)
         remedy = f"did you mean {close[0]}?" if close else f"there are: {forms()}"
         raise InputError(option, text, "is no figure", remedy)
     example, words = ARGUMENTS[kind.family]
@@ -115,4 +115,4 @@ def parse_figure(text: str, option: str = OPTION) -> Figure:
     if any(not 0 < abs(angle) < 90 for angle in angles) or (len(angles) == 2 and angles[1] < 0):
         remedy = "the rudder lies between 0 and 90 deg to either side, the heading of a zigzag between 0 and 90 deg"
         raise InputError(option, text, "has an angle out of bounds", remedy)
-    return Figure(text.strip(), kind, tuple(math.radians(angle) for angle in angles))
+    return InfluenceFigure(text.strip(), kind, tuple(math.radians(angle) for angle in angles))

@@ -22,15 +22,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from tank2sim.dynamics.kinks import kinks
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.event_indicators import kinks
+from tank2sim.dynamics.model import Model
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
-from tank2sim.simulation.rows import Rows
+from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.sensitivity import Sensitivity
 from tank2sim.simulation.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 Sloped = tuple[float, Array]
 """A value and its slopes (k,) by the parameters."""
 
@@ -80,10 +80,10 @@ class MotionSlopes:
         self._start = ca.Function("start_by", [self.model.p], [ca.densify(start)])
         found = [quantity.value for quantity in kinks(self.model)]
         # A comparison of parameters alone cannot change sign on the way.
-        self._kinks = Rows(ca.Function("indicators", arguments, [ca.densify(ca.vcat(found))])) if found else None
+        self._kinks = RowFunction(ca.Function("indicators", arguments, [ca.densify(ca.vcat(found))])) if found else None
 
     def figures(
-        self, run: Trajectory, manoeuvre: Turn | Zigzag, p: Vector, length: float, names: Collection[str]
+        self, run: Trajectory, manoeuvre: Turn | Zigzag, p: Array, length: float, names: Collection[str]
     ) -> dict[str, Sloped]:
         """Figures by their names in :mod:`tank2sim.analysis.influence.figures`, as far as the run shows them.
 
@@ -96,7 +96,7 @@ class MotionSlopes:
             return self._turn(run, axes, p, [math.pi / 2, math.pi] if half else [math.pi / 2])
         return self._zigzag(run, manoeuvre, axes, p, overshoots_in(names))
 
-    def _turn(self, run: Trajectory, axes: _Axes, p: Vector, changes: Sequence[float]) -> dict[str, Sloped]:
+    def _turn(self, run: Trajectory, axes: _Axes, p: Array, changes: Sequence[float]) -> dict[str, Sloped]:
         found: dict[str, Sloped] = {}
         crossings = [run.crossings("motion.psi", "motion.r", axes.heading + axes.side * change) for change in changes]
         places = [("motion.psi", float(times[0])) for times in crossings if len(times)]
@@ -110,7 +110,7 @@ class MotionSlopes:
                 found |= {"tactical_diameter_lengths": axes.over_length(found["tactical_diameter_m"])}
         return found
 
-    def _zigzag(self, run: Trajectory, zigzag: Zigzag, axes: _Axes, p: Vector, overshoots: int) -> dict[str, Sloped]:
+    def _zigzag(self, run: Trajectory, zigzag: Zigzag, axes: _Axes, p: Array, overshoots: int) -> dict[str, Sloped]:
         executes = run.t[_orders(run)]
         turns = run.crossings("motion.r", "motion.rdot", 0.0)
         peaks = [float(later[0]) for time in executes[:overshoots] if len(later := turns[turns > time])]
@@ -132,7 +132,7 @@ class MotionSlopes:
             found[f"overshoot{number + 1}_deg"] = (math.degrees(beyond), to_side * np.degrees(event.x_by[psi]))
         return found
 
-    def events(self, run: Trajectory, places: Sequence[tuple[str, float]], p: Vector) -> list[Event]:
+    def events(self, run: Trajectory, places: Sequence[tuple[str, float]], p: Array) -> list[Event]:
         """Events of a run, each given by the state whose crossing of a level it is, and its time."""
         if not places:
             return []
@@ -155,7 +155,7 @@ class MotionSlopes:
             found.append(Event(time, course.x[row], time_by, slopes[row] + np.outer(rate, time_by)))
         return found
 
-    def _forward(self, course: _Course, wanted: dict[int, None], p: Vector) -> dict[int, Array]:
+    def _forward(self, course: _Course, wanted: dict[int, None], p: Array) -> dict[int, Array]:
         """S (nx, k) at wanted rows, before what is ordered there."""
         nx = self.model.x.numel()
         psi = self.model.state_names.index("motion.psi")
@@ -178,10 +178,10 @@ class MotionSlopes:
                     found[row + 1] = S
         return found
 
-    def _rate(self, x: Array, u: Array, p: Vector) -> Array:
+    def _rate(self, x: Array, u: Array, p: Array) -> Array:
         return np.array(self.model.rhs(x, u, p)).ravel()
 
-    def _with_samples(self, course: _Course, times: Sequence[float], p: Vector) -> _Course:
+    def _with_samples(self, course: _Course, times: Sequence[float], p: Array) -> _Course:
         """The course with samples at more times, each one step from the sample before it."""
         near = 1e-7 * self.model.step_s
         new = [time for time in sorted(set(times)) if np.min(np.abs(course.t - time)) > near]
@@ -198,7 +198,7 @@ class MotionSlopes:
             np.insert(course.u, before + 1, course.u[before], axis=0),
         )
 
-    def _kink_times(self, course: _Course, p: Vector) -> list[float]:
+    def _kink_times(self, course: _Course, p: Array) -> list[float]:
         """Times at which the right-hand side has a kink, within steps."""
         if self._kinks is None:
             return []
@@ -212,7 +212,7 @@ class MotionSlopes:
                 found.append(float(course.t[row]) + brentq(indicator, 0.0, gap, xtol=1e-9 * gap))
         return found
 
-    def _indicator(self, course: _Course, row: int, column: int, p: Vector) -> Callable[[float], float]:
+    def _indicator(self, course: _Course, row: int, column: int, p: Array) -> Callable[[float], float]:
         assert self._kinks is not None
         function, x, u = self._kinks.function, course.x[row], course.u[row]
 

@@ -7,27 +7,24 @@ from collections.abc import Collection, Sequence
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tank2sim.analysis.influence.equilibria import (
-    Equilibrium,
+    EquilibriumFigures,
     steady_turns,
     straight_courses,
     turn_figures,
     turning_states,
 )
-from tank2sim.analysis.influence.figures import OPTION, STEADY, STRAIGHT, Figure
+from tank2sim.analysis.influence.figures import FIGURE_OPTION, STEADY, STRAIGHT, InfluenceFigure
 from tank2sim.analysis.influence.motion import HALF_TURN, MotionSlopes, overshoots_in
 from tank2sim.analysis.influence.parameters import CardParameter, card_parameters, study_model
+from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.model import Vector
 from tank2sim.errors import InputError
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import Run, simulate
-
-Array = NDArray[np.float64]
 
 NO_TURN = 1e-4
 """A ship whose steady yaw rate is less than this share of u0/L goes straight: a circle of 10 000 lengths (ours)."""
@@ -56,7 +53,7 @@ class Study:
         The card is at fault, or does not show one of the figures.
     """
 
-    def __init__(self, card: ManoeuvringCard, figures: Sequence[Figure]):
+    def __init__(self, card: ManoeuvringCard, figures: Sequence[InfluenceFigure]):
         self.card, self.figures = card, tuple(figures)
         self.model = study_model(card)
         self.parameters: tuple[CardParameter, ...] = card_parameters(card, self.model)
@@ -75,7 +72,7 @@ class Study:
             if not math.isfinite(value):
                 remedy = "ask for another, or for another rudder"
                 raise InputError(
-                    OPTION, figure.text, f"{card.source} ({card.ship.name}) does not show this figure", remedy
+                    FIGURE_OPTION, figure.text, f"{card.source} ({card.ship.name}) does not show this figure", remedy
                 )
 
     @cached_property
@@ -83,11 +80,11 @@ class Study:
         return MotionSlopes(self._integrator, [one.name for one in self.parameters])
 
     @cached_property
-    def _turning(self) -> Equilibrium:
+    def _turning(self) -> EquilibriumFigures:
         return steady_turns(self.model)
 
     @cached_property
-    def _straight(self) -> tuple[Equilibrium, Array]:
+    def _straight(self) -> tuple[EquilibriumFigures, Array]:
         return straight_courses(self.model)
 
     @property
@@ -114,7 +111,7 @@ class Study:
                     slopes[row] = slope if slope is not None else np.nan
         return found, slopes
 
-    def _family(self, figure: Figure, values: Array, sloped: bool) -> dict[str, tuple[float, Array | None]]:
+    def _family(self, figure: InfluenceFigure, values: Array, sloped: bool) -> dict[str, tuple[float, Array | None]]:
         """All figures that are read off where this one is, with their slopes if asked."""
         p = self.model.parameter_values()
         p[self._places] = values
@@ -127,7 +124,7 @@ class Study:
             return self._steady(manoeuvre, figure.text, p, sloped)
         return self._simulated(manoeuvre, p, sloped)
 
-    def _linear(self, p: Vector, sloped: bool) -> dict[str, tuple[float, Array | None]]:
+    def _linear(self, p: Array, sloped: bool) -> dict[str, tuple[float, Array | None]]:
         course, near = self._straight
         found = course.at(near, {}, p)
         if found is None:
@@ -136,7 +133,7 @@ class Study:
         slopes = course.slopes(z, {}, p)[:, self._places] if sloped else [None] * len(shown)
         return {name: (float(v), by) for name, v, by in zip(course.names, shown, slopes, strict=True)}
 
-    def _steady(self, turn: Turn, text: str, p: Vector, sloped: bool) -> dict[str, tuple[float, Array | None]]:
+    def _steady(self, turn: Turn, text: str, p: Array, sloped: bool) -> dict[str, tuple[float, Array | None]]:
         if turn.rudder not in self._rest_near:
             self._rest_near[turn.rudder] = self._first_turn(turn, text, p)
         side = math.copysign(1.0, turn.rudder)
@@ -153,7 +150,7 @@ class Study:
         slopes = by_motion @ self._turning.slopes(z, order, p)[:3, self._places]
         return {name: (value, by) for (name, value), by in zip(named.items(), slopes, strict=True)}
 
-    def _first_turn(self, turn: Turn, text: str, p: Vector) -> Array:
+    def _first_turn(self, turn: Turn, text: str, p: Array) -> Array:
         """The steady turn to which a turning circle leads, which is refined and followed from there on."""
         run = self._run(turn, p).trajectory
         names = turning_states(self.model)
@@ -165,13 +162,13 @@ class Study:
         if found is None or not rate > NO_TURN * self._speed / self._length:
             degrees = f"{math.degrees(turn.rudder):.4g} deg of rudder"
             problem = f"{self.card.ship.name} does not turn steadily to the side of {degrees}"
-            raise InputError(OPTION, text, problem, "ask at more rudder")
+            raise InputError(FIGURE_OPTION, text, problem, "ask at more rudder")
         if found[1][3] > PLACE_FELT:
             problem = f"{self.card.ship.name} feels where she is or heads (wind or waves): no turn is steady"
-            raise InputError(OPTION, text, problem, "take that effect off the card, or ask for advance_m@35")
+            raise InputError(FIGURE_OPTION, text, problem, "take that effect off the card, or ask for advance_m@35")
         return found[0]
 
-    def _simulated(self, manoeuvre: Turn | Zigzag, p: Vector, sloped: bool) -> dict[str, tuple[float, Array | None]]:
+    def _simulated(self, manoeuvre: Turn | Zigzag, p: Array, sloped: bool) -> dict[str, tuple[float, Array | None]]:
         names = {one.kind.name for one in self.figures if one.manoeuvre == manoeuvre and one.kind.family != STEADY}
         run = self._run(manoeuvre, p, self._long_enough.get(manoeuvre))
         found = named_figures(run.figures)
@@ -184,7 +181,7 @@ class Study:
             return dict(self._motion.figures(run.trajectory, manoeuvre, p, self._length, names))
         return {name: (value, None) for name, value in found.items()}
 
-    def _run(self, manoeuvre: Turn | Zigzag, p: Vector, duration_s: float | None = None) -> Run:
+    def _run(self, manoeuvre: Turn | Zigzag, p: Array, duration_s: float | None = None) -> Run:
         values = dict(zip(self.model.parameter_names, p.tolist(), strict=True))
         model, integrator = self.model, self._integrator
         run = simulate(model, manoeuvre, parameters=values, integrator=integrator, duration_s=duration_s)

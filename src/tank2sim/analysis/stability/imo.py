@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.simulation.card_range import NOTHING_READ, Reading, entry_name
+from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading, entry_name
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import FULL_ASTERN, Manoeuvre, Stop, Turn, Zigzag
@@ -35,7 +35,7 @@ _TURNED = math.radians(90.0)
 
 
 @dataclass(frozen=True)
-class Criterion:
+class ImoCriterion:
     """One criterion: what was found, what is allowed, in `unit`; `found` is None where the trial did not show it.
 
     `remark` says why nothing was found, or what the reader of the verdict should know; `beyond_card` is true if a trial
@@ -112,7 +112,7 @@ class _Trial:
 
     figures: Figures
     trouble: str
-    reading: Reading = NOTHING_READ
+    reading: CardRangeReading = NOTHING_READ
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def _wrong_way(manoeuvre: Manoeuvre, run: Trajectory) -> str:
 
 def imo_criteria(
     model: Model, changed: Mapping[str, float] | None = None, integrator: Integrator | None = None
-) -> tuple[Criterion, ...]:
+) -> tuple[ImoCriterion, ...]:
     """Turning, initial turning, yaw checking and stopping of a ship at her speed of expansion (5.3.1 to 5.3.4).
 
     The worse of starboard and port is taken. A trial that cannot be run leaves its criteria open, with the reason.
@@ -174,9 +174,9 @@ def imo_criteria(
     )
     (of_twenty,) = trials.worst([Zigzag(twenty, twenty), Zigzag(-twenty, twenty)], ("overshoots_deg", 0))
 
-    def criterion(name: str, found: _Worse, allowed: float, unit: str, remark: str = "") -> Criterion:
+    def criterion(name: str, found: _Worse, allowed: float, unit: str, remark: str = "") -> ImoCriterion:
         told = "; ".join(one for one in (found.remark, remark) if one)
-        return Criterion(name, found.value, allowed, unit, told, found.beyond)
+        return ImoCriterion(name, found.value, allowed, unit, told, found.beyond)
 
     return (
         criterion("advance", advance, 4.5, "L"),
@@ -189,19 +189,19 @@ def imo_criteria(
     )
 
 
-def _stopping(trials: _Trials) -> Criterion:
+def _stopping(trials: _Trials) -> ImoCriterion:
     """Track reach of full astern stopping, as far as the card has propulsion."""
     name = "stopping, full astern, track reach"
     if "propeller.speed" not in trials.model.input_names:
         remark = "the card has no [propulsion]: its engine cannot be reversed"
-        return Criterion(name, None, STOPPING, "L", remark)
+        return ImoCriterion(name, None, STOPPING, "L", remark)
     (worse,) = trials.worst([Stop()], ("track_reach_lengths", None))
     found = worse.value
     remark = f"at {FULL_ASTERN:.0%} of the nominal revolutions astern, reached at once: an assumption of the simulation"
     if found is not None and STOPPING < found <= STOPPING_OF_LARGE_SHIPS:
         remark += "; up to 20 L may be allowed to a ship of large displacement"
     remark = "; ".join(one for one in (worse.remark, remark if found is not None else "") if one)
-    return Criterion(name, found, STOPPING, "L", remark, worse.beyond)
+    return ImoCriterion(name, found, STOPPING, "L", remark, worse.beyond)
 
 
 def _number(figure: object, place: int | None) -> float | None:

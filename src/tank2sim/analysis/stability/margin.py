@@ -18,7 +18,8 @@ import numpy as np
 from tank2sim.analysis.linearisation import OperatingPoint, straight_course
 from tank2sim.analysis.stability.straight_line import speed_acts
 from tank2sim.analysis.turning.diagram import hull_states
-from tank2sim.dynamics.model import Model, Parameter, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model, Parameter
 from tank2sim.errors import InputError
 
 SPEEDS = 25
@@ -34,7 +35,7 @@ _BODY = ("ship.mass", "ship.x_G")
 
 
 @dataclass(frozen=True)
-class Influence:
+class MarginInfluence:
     """What one coefficient does to C'.
 
     Parameters
@@ -97,11 +98,11 @@ class Margin:
     damping_lever: float
     sway_lever: float
     percent: float
-    slopes: Vector
-    influences: tuple[Influence, ...]
-    speeds_mps: Vector
-    criteria: Vector
-    speed_slopes: Vector
+    slopes: Array
+    influences: tuple[MarginInfluence, ...]
+    speeds_mps: Array
+    criteria: Array
+    speed_slopes: Array
 
     @property
     def lever(self) -> float:
@@ -127,7 +128,7 @@ class Margin:
         }
 
 
-class Criterion:
+class StabilityCriterion:
     """C' of a model as a function of speed and parameters, with its exact total derivatives."""
 
     def __init__(self, model: Model):
@@ -148,13 +149,13 @@ class Criterion:
         newton = [residual, ca.densify(ca.jacobian(residual, unknown))]
         self._course = ca.Function("course", arguments, newton, {"cse": True})
 
-    def at(self, point: OperatingPoint) -> tuple[float, Vector, Vector]:
+    def at(self, point: OperatingPoint) -> tuple[float, Array, Array]:
         """C', its total derivative by the parameters and at last by the speed (np + 1,), and the slopes (2, 2)."""
         value, total, slopes = self._value(point.x, point.u, point.p)
         return float(value), np.array(total).ravel(), np.array(slopes)
 
     def moved(
-        self, point: OperatingPoint, *, speed: float | None = None, p: Vector | None = None
+        self, point: OperatingPoint, *, speed: float | None = None, p: Array | None = None
     ) -> OperatingPoint | None:
         """The straight course near another one, at another speed or with other parameters; None if there is none."""
         x, p = point.x.copy(), point.p if p is None else p
@@ -201,7 +202,7 @@ def stability_margin(model: Model, speed_mps: float | None = None) -> Margin:
         The model is no ship, or holds no straight course.
     """
     point = straight_course(model, speed_mps)
-    criterion = Criterion(model)
+    criterion = StabilityCriterion(model)
     value, total, slopes = criterion.at(point)
     if not np.isfinite(value):
         raise InputError(
@@ -232,15 +233,15 @@ def _ratio(upper: float, lower: float) -> float:
     return float(upper / lower) if lower else float("nan")
 
 
-def _influence(criterion: Criterion, point: OperatingPoint, name: str, slope: float) -> Influence:
+def _influence(criterion: StabilityCriterion, point: OperatingPoint, name: str, slope: float) -> MarginInfluence:
     place = criterion.model.parameter_names.index(name)
     value, present = float(point.p[place]), criterion.at(point)[0]
     percent = 100 * CHANGE * slope * value / abs(present) if present else float("nan")
     strong = abs(percent) > _NOTHING
-    return Influence(name, value, slope, percent, _neutral(criterion, point, place) if strong else None)
+    return MarginInfluence(name, value, slope, percent, _neutral(criterion, point, place) if strong else None)
 
 
-def _neutral(criterion: Criterion, point: OperatingPoint, place: int) -> float | None:
+def _neutral(criterion: StabilityCriterion, point: OperatingPoint, place: int) -> float | None:
     """The value of a parameter at which C' = 0, by Newton's method along the straight course."""
     value = float(point.p[place])
     size, now = abs(value), point
@@ -262,7 +263,7 @@ def _neutral(criterion: Criterion, point: OperatingPoint, place: int) -> float |
     return None
 
 
-def _over_speed(criterion: Criterion, point: OperatingPoint) -> tuple[Vector, Vector, Vector]:
+def _over_speed(criterion: StabilityCriterion, point: OperatingPoint) -> tuple[Array, Array, Array]:
     model = criterion.model
     if not criterion.by_speed:
         return np.zeros(0), np.zeros(0), np.zeros(0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.analysis.linearisation import straight_course
-from tank2sim.analysis.stability.imo import Criterion, imo_criteria
+from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
 from tank2sim.analysis.stability.margin import Margin, stability_margin
 from tank2sim.analysis.stability.response import SteeringResponse, steering_responses
 from tank2sim.analysis.stability.straight_line import Stability, stability
@@ -18,10 +18,10 @@ from tank2sim.analysis.turning.spirals import SpiralPoints, direct_spiral, rever
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
-FAR = 0.05
+_FAR = 0.05
 """A steady point of a spiral that lies further from the diagram than this share of its largest yaw rate is told."""
 
-SAME_SPEED = 0.01
+_SAME_SPEED = 0.01
 """Speeds that differ by less than this share are one (ours)."""
 
 
@@ -51,7 +51,7 @@ class StabilityStudy:
     characteristic: SteeringCharacteristic | None
     direct: SpiralPoints | None
     reverse: SpiralPoints | None
-    imo: tuple[Criterion, ...]
+    imo: tuple[ImoCriterion, ...]
     notices: tuple[str, ...]
 
     def as_json(self) -> dict[str, object]:
@@ -127,7 +127,7 @@ def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[str]
         )
     if not slowest <= found.speed_mps <= fastest:
         told.append(f"{found.speed_mps:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
-    if abs(found.speed_mps / own - 1) > SAME_SPEED:
+    if abs(found.speed_mps / own - 1) > _SAME_SPEED:
         told.append(f"steady turns, spirals and the IMO criteria are those at the card's speed, {own:.4g} m/s")
     return told
 
@@ -181,7 +181,7 @@ def _spirals(model: Model, turning: SteadyTurning) -> tuple[SpiralPoints | None,
     for name, points in (("spiral", direct), ("reverse spiral", reverse)):
         if points is None:
             continue
-        off = int(np.sum(points.steady & ~(points.distance_radps < FAR * most)))
+        off = int(np.sum(points.steady & ~(points.distance_radps < _FAR * most)))
         if off:
             told.append(
                 f"{off} steady points of the {name} lie on no branch of the diagram: the ship has turns that are not "

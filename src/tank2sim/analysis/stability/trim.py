@@ -22,7 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.analysis.stability.margin import Margin
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 
 PAPER_CHANGE = 0.075
 """Change of Y_r or N_r by 1 % of trim (paper 2, section 5)."""
@@ -51,8 +52,8 @@ class TrimEffect:
     """
 
     readings: Mapping[str, tuple[float, float]]
-    trims: Vector
-    criteria: Vector
+    trims: Array
+    criteria: Array
     draught_m: float
     changes: Mapping[str, float]
 

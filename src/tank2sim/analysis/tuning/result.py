@@ -6,13 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from tank2sim.analysis.influence.parameters import CardParameter
-from tank2sim.analysis.tuning.wishes import Wish
-
-Array = NDArray[np.float64]
+from tank2sim.analysis.tuning.targets import Wish
+from tank2sim.arrays import Array
 
 FEWEST, UNCERTAIN = "fewest", "uncertain"
 

@@ -25,13 +25,13 @@ from scipy.optimize import Bounds, LinearConstraint, least_squares, milp, minimi
 from tank2sim.analysis.influence.parameters import CardParameter, agreed_by_name, find_parameter
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.result import FEWEST, Means, Move, Tuned
-from tank2sim.analysis.tuning.wishes import AT_LEAST, AT_MOST, EQUAL, Wish
+from tank2sim.analysis.tuning.targets import AT_LEAST, AT_MOST, EQUAL, Wish
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 
-Array = NDArray[np.float64]
 Slice = NDArray[np.int64]
 
-REACHED = 1e-5
+_REACHED = 1e-5
 """A wish is reached to this share of its value: far below what a trial tells."""
 
 _MOVED = 1e-6  # standard errors below which a parameter has not moved
@@ -59,10 +59,10 @@ def tune(study: Study, wishes: Sequence[Wish], means: Means) -> Tuned:
     """
     problem = _Problem(study, wishes, means)
     z, contradiction = problem.start(), tuple[Wish, ...]()
-    if problem.largest(z) > REACHED:
+    if problem.largest(z) > _REACHED:
         free = problem.influential(z)
         nearest = problem.nearest(z, free)
-        if problem.largest(nearest) > REACHED:
+        if problem.largest(nearest) > _REACHED:
             z, contradiction = problem.least_as_near(nearest, free), problem.contradiction()
         else:
             z = problem.fewest(nearest) if means.by == FEWEST else problem.least_as_near(nearest, free)
@@ -212,7 +212,7 @@ class _Problem:
         )
         found = _with(z, free, np.clip(solved.x, self._lowest[free], self._highest[free]))
         # What the search leaves (it stops by its own measure) one more refinement takes away.
-        return found if self.largest(found) <= REACHED else self._refined(found, z, free)
+        return found if self.largest(found) <= _REACHED else self._refined(found, z, free)
 
     def least_as_near(self, z: Array, free: Slice) -> Array:
         """The smallest moves of `free` that come as near to the wishes as moves `z` do.
@@ -220,7 +220,7 @@ class _Problem:
         What is not reached is held at what is; of figures that hang together (a radius and its diameter, a wish that
         is given twice) one is enough, and more would leave the search without a solution.
         """
-        figures, missed = self.figures(z), np.abs(self.missing(z)) > REACHED
+        figures, missed = self.figures(z), np.abs(self.missing(z)) > _REACHED
         if not np.all(np.isfinite(figures)):
             return z
         loose = [row for row, wish in enumerate(self.wishes) if wish.relation != EQUAL and not missed[row]]
@@ -234,7 +234,7 @@ class _Problem:
 
     def _refined(self, found: Array, fallback: Array, free: Slice) -> Array:
         refined = self.nearest(found, free)
-        return refined if self.largest(refined) <= REACHED else fallback
+        return refined if self.largest(refined) <= _REACHED else fallback
 
     def fewest(self, whole: Array) -> Array:
         """Moves of as few unknowns as possible that reach the wishes; `whole`, with all of them, if no set does."""
@@ -244,7 +244,7 @@ class _Problem:
             if free is None:
                 break
             at = self.nearest(self.start(), free)
-            if self.largest(at) <= REACHED:
+            if self.largest(at) <= _REACHED:
                 return self.least(at, free)
             tried.append(free)  # to first order it was enough: next time from where it came to
         return whole
@@ -254,7 +254,7 @@ class _Problem:
         off, slopes = self._off(at), self._slopes(at)
         m = len(at)
         aim = slopes @ at - off
-        lower, upper = aim - REACHED, aim + REACHED
+        lower, upper = aim - _REACHED, aim + _REACHED
         lower[[wish.relation == AT_MOST for wish in self.wishes]] = -np.inf
         upper[[wish.relation == AT_LEAST for wish in self.wishes]] = np.inf
         one, none = np.eye(m), np.zeros((m, m))
@@ -293,7 +293,7 @@ class _Problem:
             if not rest:
                 break
             z = self.nearest(self.start(), everything, rest)
-            if np.max(np.abs(self.missing(z)[rest])) > REACHED:
+            if np.max(np.abs(self.missing(z)[rest])) > _REACHED:
                 kept = rest
         return tuple(self.wishes[row] for row in kept)
 

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from tank2sim.analysis.turning.diagram import SteadyTurning
-
-Array = NDArray[np.float64]
+from tank2sim.arrays import Array
 
 FITTED_RUDDER = math.radians(20.0)
 """The cubics are fitted up to this rudder, that of a spiral: hard over no cubic follows a ship. A choice of ours."""
@@ -27,7 +26,7 @@ _RATES = 201
 
 
 @dataclass(frozen=True)
-class Cubic:
+class CubicCharacteristic:
     """Rudder angle (rad) as a cubic in yaw rate (rad/s): coefficients (4,) from the constant up, and its error.
 
     `rms_rad` and `largest_rad` are the root mean square and the largest error of the rudder angle where it was fitted,
@@ -67,8 +66,8 @@ class SteeringCharacteristic:
 
     yaw_rate_radps: Array
     rudder_rad: Array
-    bech: Cubic
-    norrbin: Cubic
+    bech: CubicCharacteristic
+    norrbin: CubicCharacteristic
     slope_s: float
     fitted_radps: float
 
@@ -121,7 +120,7 @@ def steering_characteristic(turning: SteadyTurning) -> SteeringCharacteristic | 
     )
 
 
-def _cubic(rate: Array, rudder: Array, inside: NDArray[np.bool_], kept: Array) -> Cubic:
+def _cubic(rate: Array, rudder: Array, inside: NDArray[np.bool_], kept: Array) -> CubicCharacteristic:
     """The nearest cubic whose first coefficients are `kept`."""
     largest = float(np.max(np.abs(rate)))
     powers = np.vander(rate / largest, 4, increasing=True)
@@ -132,7 +131,9 @@ def _cubic(rate: Array, rudder: Array, inside: NDArray[np.bool_], kept: Array) -
     coefficients = np.concatenate([kept, rest])
     error = np.abs(powers @ (coefficients * scales) - rudder)
     beyond = float(error[~inside].max()) if not inside.all() else None
-    return Cubic(coefficients, float(np.sqrt(np.mean(error[inside] ** 2))), float(error[inside].max()), beyond)
+    return CubicCharacteristic(
+        coefficients, float(np.sqrt(np.mean(error[inside] ** 2))), float(error[inside].max()), beyond
+    )
 
 
 def _single_valued(turning: SteadyTurning) -> tuple[int, int]:

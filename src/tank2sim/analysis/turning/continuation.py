@@ -13,10 +13,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Equations = Callable[[Array], tuple[Array, Array]]
+from tank2sim.arrays import Array
+
+ContinuationEquations = Callable[[Array], tuple[Array, Array]]
 """Residual (n,) and its Jacobian (n, n + 1) at a point (n + 1,)."""
 
 LARGEST_STEP = 0.04
@@ -54,7 +54,7 @@ class Bounds:
     steps: int = 3000
 
 
-def corrected(equations: Equations, guess: Array, row: Array) -> tuple[Array, Array, int] | None:
+def corrector_step(equations: ContinuationEquations, guess: Array, row: Array) -> tuple[Array, Array, int] | None:
     """The solution near `guess` in the plane through it whose normal is `row` (n + 1,): point, Jacobian, iterations.
 
     None if Newton's method does not come to one.
@@ -85,7 +85,7 @@ def tangent(jacobian: Array, along: Array) -> Array | None:
     return direction if np.isfinite(direction).all() else None
 
 
-def follow(equations: Equations, start: Array, direction: Array, bounds: Bounds) -> Curve:
+def follow_branch(equations: ContinuationEquations, start: Array, direction: Array, bounds: Bounds) -> Curve:
     """The curve from a point on it (n + 1,), to the side of `direction` (n + 1,)."""
     found = tangent(equations(start)[1], direction)
     if found is None:
@@ -112,11 +112,11 @@ def follow(equations: Equations, start: Array, direction: Array, bounds: Bounds)
 
 
 def _next(
-    equations: Equations, point: Array, direction: Array, step: float
+    equations: ContinuationEquations, point: Array, direction: Array, step: float
 ) -> tuple[tuple[Array, Array] | None, float]:
     """Point and tangent a step further, and the length of the step to try after it."""
     while step > LEAST_STEP:
-        found = corrected(equations, point + step * direction, direction)
+        found = corrector_step(equations, point + step * direction, direction)
         further = tangent(found[1], direction) if found else None
         if found and further is not None and np.arccos(np.clip(further @ direction, -1, 1)) < LARGEST_BEND:
             return (found[0], further), min(LARGEST_STEP, step * (1.6 if found[2] <= 3 else 1.0))
@@ -124,12 +124,14 @@ def _next(
     return None, step
 
 
-def _on_edge(equations: Equations, before: Array, after: Array, direction: Array, bounds: Bounds) -> list[Array]:
+def _on_edge(
+    equations: ContinuationEquations, before: Array, after: Array, direction: Array, bounds: Bounds
+) -> list[Array]:
     """Point and tangent where lambda is at its limit, between two points; nothing if there is none."""
     edge = bounds.most[-1] if after[-1] >= bounds.most[-1] else bounds.least[-1]
     share = (edge - before[-1]) / (after[-1] - before[-1])
     guess = before + share * (after - before)
     guess[-1] = edge
-    found = corrected(equations, guess, np.eye(len(before))[-1])
+    found = corrector_step(equations, guess, np.eye(len(before))[-1])
     further = tangent(found[1], direction) if found else None
     return [found[0], further] if found and further is not None else []

@@ -24,13 +24,14 @@ from scipy.interpolate import CubicHermiteSpline
 
 from tank2sim.analysis.linearisation import straight_course
 from tank2sim.analysis.turning import continuation
-from tank2sim.analysis.turning.continuation import Array, Bounds, Curve, corrected, follow
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.analysis.turning.continuation import Bounds, Curve, corrector_step, follow_branch
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.marks import EXTRAPOLATED
 from tank2sim.simulation.card_range import range_left
 
-LARGEST_RUDDER = math.radians(35.0)
+_LARGEST_RUDDER = math.radians(35.0)
 """The diagram goes to 35 deg of rudder (MSC.137(76)), or as far as the gear allows."""
 
 _MOTION = ("motion.u", "motion.v", "motion.r")
@@ -41,7 +42,7 @@ sixth of her length: what goes beyond has left every ship's range. A choice of o
 
 
 @dataclass(frozen=True)
-class Fold:
+class TurningFold:
     """Where the diagram turns back: beyond this rudder (rad) the ship leaves the branch. `place` is its row."""
 
     place: int
@@ -50,7 +51,7 @@ class Fold:
 
 
 @dataclass(frozen=True)
-class Loop:
+class HysteresisLoop:
     """The hysteresis loop of a ship that is unstable on a straight course.
 
     `width_rad` is the rudder between the two folds around the straight course; `height_radps` the difference of the
@@ -94,8 +95,8 @@ class SteadyTurning:
     slope: Array
     arc: Array
     straight: int
-    folds: tuple[Fold, ...]
-    loop: Loop | None
+    folds: tuple[TurningFold, ...]
+    loop: HysteresisLoop | None
     ended: tuple[str, str]
     notices: tuple[str, ...]
 
@@ -162,7 +163,7 @@ def hull_states(model: Model, motion: Sequence[str] = _MOTION) -> tuple[str, ...
     return tuple(found)
 
 
-def calm_inputs(model: Model) -> Vector:
+def calm_inputs(model: Model) -> Array:
     """Inputs (nu,) in calm water: no current, no wind, revolutions as they start."""
     return model.input_values({name: 0.0 for name in model.input_names if name in ("current.speed", "wind.speed")})
 
@@ -241,7 +242,7 @@ def steady_turning(model: Model) -> SteadyTurning:
     at = dict(zip(model.state_names, point.x.tolist(), strict=True))
     guess = np.array([at[name] for name in (*equations.names, "rudder.angle")]) / equations.scale
     yaw = np.eye(len(guess))[equations.names.index("motion.r")]
-    straight = corrected(equations, guess, yaw)
+    straight = corrector_step(equations, guess, yaw)
     if straight is None or not straight[0][0] > 0:
         remedy = "check X0, Xu, Xuu and Xuuu of the card: resistance and thrust balance at no speed near u0"
         raise InputError(model.origin, "", "keeps no steady speed on a straight course", remedy)
@@ -253,14 +254,14 @@ def steady_turning(model: Model) -> SteadyTurning:
     most[:3] = _FASTEST, _FASTEST, _MOST_YAW
     most[-1] = largest
     bounds = Bounds(-most, most)
-    curves = [follow(equations, straight[0], side * yaw, bounds) for side in (-1.0, 1.0)]
+    curves = [follow_branch(equations, straight[0], side * yaw, bounds) for side in (-1.0, 1.0)]
     return _diagram(equations, curves[0], curves[1])
 
 
 def largest_rudder(model: Model) -> float:
-    """:data:`LARGEST_RUDDER`, or the largest that the gear allows, rad."""
+    """:data:`_LARGEST_RUDDER`, or the largest that the gear allows, rad."""
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-    return min(LARGEST_RUDDER, float(values.get("steering.max_angle", LARGEST_RUDDER)))
+    return min(_LARGEST_RUDDER, float(values.get("steering.max_angle", _LARGEST_RUDDER)))
 
 
 def _diagram(equations: TurningEquations, port: Curve, starboard: Curve) -> SteadyTurning:
@@ -276,7 +277,7 @@ def _diagram(equations: TurningEquations, port: Curve, starboard: Curve) -> Stea
     growth[places] = 0.0
     rudder, rate = states["rudder.angle"], states["motion.r"]
     heel = next((values for name, values in states.items() if name.endswith(".phi")), None)
-    folds = tuple(Fold(place, float(rudder[place]), float(rate[place])) for place in places)
+    folds = tuple(TurningFold(place, float(rudder[place]), float(rate[place])) for place in places)
     found = SteadyTurning(
         rudder_rad=rudder,
         yaw_rate_radps=rate,
@@ -326,7 +327,7 @@ def _judged(model: Model, found: SteadyTurning) -> SteadyTurning:
     if not found.stable[found.straight] and found.slope[found.straight, 0] < 0 and before and after:
         rates = [rate for rate, stable in found.turns_at(float(found.rudder_rad[found.straight])) if stable]
         height = max(rates) - min(rates) if len(rates) > 1 else None
-        loop = Loop(abs(before[-1].rudder_rad - after[0].rudder_rad), height)
+        loop = HysteresisLoop(abs(before[-1].rudder_rad - after[0].rudder_rad), height)
     return replace(found, loop=loop, notices=(*_how_it_ends(found), *_out_of_range(model, found)))
 
 

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from tank2sim.analysis.turning.continuation import EDGE, Array, Bounds, corrected, follow
+from tank2sim.analysis.turning.continuation import EDGE, Bounds, corrector_step, follow_branch
 from tank2sim.analysis.turning.diagram import calm_inputs, hull_states
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
 _MOST, _MOST_YAW = 10.0, 12.0
@@ -116,7 +117,7 @@ class TurningPoints:
         most[-1], least[-1] = (rudder_rad, -math.pi) if side > 0 else (math.pi, rudder_rad)
         if side * straight[-1] > side * rudder_rad + 1e-9:
             raise self._fault(rudder_rad, "holds the ship on the other side of her straight course")
-        curve = follow(self._equations(p), straight, side * self.yaw, Bounds(least, most))
+        curve = follow_branch(self._equations(p), straight, side * self.yaw, Bounds(least, most))
         last: Array = curve.points[-1]
         if curve.ended != EDGE or abs(last[-1] - rudder_rad) > 1e-9:  # the far edge is none of the turn's
             raise self._fault(rudder_rad, "makes no steady turn that follows from the straight course")
@@ -127,7 +128,7 @@ class TurningPoints:
     def near(self, y: Array, parameters: Mapping[str, float]) -> SteadyTurn | None:
         """The steady turn next to one with unknowns y, at the same rudder and other parameters, or None."""
         p = self.model.parameter_values(parameters)
-        found = corrected(self._equations(p), y, np.eye(len(y))[-1])
+        found = corrector_step(self._equations(p), y, np.eye(len(y))[-1])
         return None if found is None else self._turn(found[0], p)
 
     def diagram(self, largest_rad: float, parameters: Mapping[str, float] | None = None) -> list[SteadyTurn]:
@@ -137,7 +138,7 @@ class TurningPoints:
         most = np.full(len(self.scale), _MOST)
         least = -most
         most[-1], least[-1] = (largest_rad, -math.pi) if side > 0 else (math.pi, largest_rad)
-        curve = follow(self._equations(p), self._straight(p), side * self.yaw, Bounds(least, most))
+        curve = follow_branch(self._equations(p), self._straight(p), side * self.yaw, Bounds(least, most))
         return [self._turn(y, p) for y in curve.points if abs(y @ self.yaw) > _LEAST_YAW]
 
     def holds_course(self, parameters: Mapping[str, float] | None = None) -> bool:
@@ -146,19 +147,19 @@ class TurningPoints:
         slopes = self._equations(p)(self._straight(p))[1][:, :-1]
         return bool(np.linalg.eigvals(slopes).real.max() < 0)
 
-    def _equations(self, p: Vector) -> _At:
+    def _equations(self, p: Array) -> _At:
         return _At(self._function, p)
 
-    def _straight(self, p: Vector) -> Array:
+    def _straight(self, p: Array) -> Array:
         """The straight course: steady, with a yaw rate of zero."""
         start = np.array(self.model.initial(p)).ravel()
         places = [self.model.state_names.index(name) for name in (*self.names, "rudder.angle")]
-        found = corrected(self._equations(p), start[places] / self.scale * (1 - self.yaw), self.yaw)
+        found = corrector_step(self._equations(p), start[places] / self.scale * (1 - self.yaw), self.yaw)
         if found is None:
             raise InputError(self.model.origin, "", "keeps no straight course", "check the card's coefficients")
         return found[0]
 
-    def _turn(self, y: Array, p: Vector) -> SteadyTurn:
+    def _turn(self, y: Array, p: Array) -> SteadyTurn:
         rate, speed, drift = np.array(self._shown(y, p)).ravel().tolist()
         return SteadyTurn(float(y[-1]), rate, drift, speed)
 
@@ -172,7 +173,7 @@ class _At:
     """The equations at given parameters, as the continuation takes them."""
 
     function: ca.Function
-    p: Vector
+    p: Array
 
     def __call__(self, y: Array) -> tuple[Array, Array]:
         residual, jacobian = self.function(y, self.p)

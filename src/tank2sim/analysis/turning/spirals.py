@@ -17,30 +17,29 @@ from numpy.typing import NDArray
 
 from tank2sim.analysis.stability.straight_line import Nomoto
 from tank2sim.analysis.turning.diagram import SteadyTurning, largest_rudder
+from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Input, Model, Quantity, State
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
-from tank2sim.simulation.manoeuvres import SPIRAL_RUDDERS_DEG, Spiral
+from tank2sim.simulation.manoeuvres import SPIRAL_RUDDERS_DEG, SpiralManoeuvre
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import Running
-
-Array = NDArray[np.float64]
 
 RATES = 21
 """Yaw rates of a reverse spiral, evenly between the turns at the largest rudders of the direct one."""
 
-BANDWIDTH = 1.0
+_BANDWIDTH = 1.0
 """Natural frequency of the yaw-rate loop, in u0/L, with damping 1: slow against the gear, fast against the hull's own
 growth. A choice of ours."""
 
 STEADY_RUDDER = math.radians(0.002)
-"""Steady: over two ship lengths the rudder moves by less, and the yaw rate is within :data:`HELD` of its order. A
+"""Steady: over two ship lengths the rudder moves by less, and the yaw rate is within :data:`_HELD` of its order. A
 choice of ours, far less than a dial shows."""
 
-HELD = 1e-3
+_HELD = 1e-3
 """Share of the largest yaw rate by which the one held may miss its order."""
 
-LONGEST = 60.0
+_LONGEST = 60.0
 """A yaw rate is held at most so many L/u0."""
 
 
@@ -85,7 +84,7 @@ def direct_spiral(model: Model, turning: SteadyTurning, integrator: Integrator |
     there = [math.radians(angle) for angle in SPIRAL_RUDDERS_DEG if abs(math.radians(angle)) <= largest * (1 + 1e-9)]
     rudders = (*there, *there[-2::-1])
     calm = {name: 0.0 for name in model.input_names if name in ("current.speed", "wind.speed")}
-    trajectory = simulate(model, Spiral(rudders), inputs=calm, integrator=integrator).trajectory
+    trajectory = simulate(model, SpiralManoeuvre(rudders), inputs=calm, integrator=integrator).trajectory
     changes = np.flatnonzero(np.diff(trajectory["rudder.command"]) != 0)
     ends = np.append(changes[len(changes) - len(rudders) + 1 :] + 1, len(trajectory.t) - 1)
     rates = trajectory["motion.r"][ends]
@@ -122,9 +121,9 @@ def reverse_spiral(model: Model, turning: SteadyTurning, nomoto: Nomoto) -> Spir
 def with_rate_controller(model: Model, nomoto: Nomoto) -> Model:
     """The ship with its rudder ordered by a PI controller of the yaw rate, input ``yaw_rate.order`` (rad/s).
 
-    On T r' + r = K delta both poles lie at :data:`BANDWIDTH` u0/L: Kp = (2 w T - 1)/K, Ki = w^2 T/K.
+    On T r' + r = K delta both poles lie at :data:`_BANDWIDTH` u0/L: Kp = (2 w T - 1)/K, Ki = w^2 T/K.
     """
-    w = BANDWIDTH / _ship_time(model)
+    w = _BANDWIDTH / _ship_time(model)
     proportional = (2 * w * nomoto.T_s - 1) / nomoto.K_per_s
     integral = w**2 * nomoto.T_s / nomoto.K_per_s
     order = Input(name="yaw_rate.order", unit="rad/s", description="Yaw rate to hold, positive to starboard")
@@ -150,10 +149,10 @@ def with_rate_controller(model: Model, nomoto: Nomoto) -> Model:
 def _held(running: Running, rates: Sequence[float] | Array, ship_time: float) -> tuple[Array, NDArray[np.bool_]]:
     """Rudder angle (n,) at which each yaw rate (n,) is held, and whether it had come to rest."""
     rudders, steady = [], []
-    nearly = HELD * float(np.max(np.abs(rates)))
+    nearly = _HELD * float(np.max(np.abs(rates)))
     for rate in rates:
         running.order({"yaw_rate.order": float(rate)})
-        end, before, calm = running.time + LONGEST * ship_time, math.inf, False
+        end, before, calm = running.time + _LONGEST * ship_time, math.inf, False
         while end - running.time > ship_time and not calm:
             running.run(2 * ship_time)
             now = running.state("rudder.angle")

@@ -30,8 +30,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tank2sim.analysis.turning.continuation import Array
 from tank2sim.analysis.turning.points import SteadyTurn, TurningPoints
+from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.terms import parse_term
 from tank2sim.dynamics.model import Model

@@ -2,10 +2,10 @@
 
 from tank2sim.dynamics.effects import (
     derivatives,
+    dynamic_effects,
     gear,
     hull,
     loaded_rudder,
-    memory,
     propeller,
     rudder,
     sensors,
@@ -49,8 +49,8 @@ EFFECTS: dict[str, Effect] = {
         derivatives.SHALLOW_WATER,
         derivatives.WATER_DEPTH,
         derivatives.TRIM,
-        memory.ROLL_COUPLING,
-        memory.FLOW_MEMORY,
+        dynamic_effects.ROLL_COUPLING,
+        dynamic_effects.FLOW_MEMORY,
         sensors.GYRO_BIAS,
         sensors.GYRO_SCALE,
         sensors.HEADING_OFFSET,

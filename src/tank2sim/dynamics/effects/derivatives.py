@@ -9,10 +9,10 @@ import casadi as ca
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Equations, Symbols
+from tank2sim.dynamics.effects.effect import Effect, EffectEquations, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import scales
-from tank2sim.dynamics.effects.particulars import particular, with_particulars
-from tank2sim.dynamics.effects.sizes import lengths
+from tank2sim.dynamics.effects.froude_scale import lengths
+from tank2sim.dynamics.effects.particulars import model_particular, with_particulars
 from tank2sim.dynamics.model import Model
 
 USUAL_CHANGE = 0.15
@@ -51,18 +51,18 @@ def hydrodynamic(model: Model, name: str, card: ManoeuvringCard) -> ca.SX:
     return symbol - inertial[name] if name in inertial else symbol
 
 
-def _magnified(names: Iterable[str]) -> Equations:
+def _magnified(names: Iterable[str]) -> EffectEquations:
     """Equations that magnify derivatives by 1 + ``factor``."""
     wanted = tuple(names)
 
-    def equations(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+    def equations(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
         factor = given["factor"]
         return with_changes(model, {name: factor * hydrodynamic(model, name, card) for name in wanted}, card)
 
     return equations
 
 
-def _added(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _added(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Derivatives change by the parameters that bear their names."""
     return with_changes(model, given, card)
 
@@ -163,7 +163,7 @@ MAGNIFIED_BY_SHALLOW_WATER = (*ACCELERATION_TERMS, *(name for name in ALL_TERMS 
 """Added masses, and the terms of Y and N that are odd in v and r and have no rudder."""
 
 
-def _in_shallow_water(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _in_shallow_water(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Added masses and the odd sway and yaw terms of the hull, times 1 + magnification.
 
     Under a small keel clearance the flow goes round the ends instead of below, and all these rise together, to
@@ -198,10 +198,10 @@ AGROUND = 0.95
 
 
 def _least_depth(card: ManoeuvringCard) -> float:
-    return particular(card, "draught_m") / AGROUND
+    return model_particular(card, "draught_m") / AGROUND
 
 
-def _at_depth(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _at_depth(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Y_v, N_v, N_r times f = 1/(1 - h)^n - h with h = T/H, as input ``water.depth`` says.
 
     n = 0.40 Cb B/T for Y_v, 0.425 Cb B/T for N_v, 1.5 - 14.28 T/L for N_r: Kijima, Katsuno, Nakiri and Furukawa (1990),
@@ -229,7 +229,7 @@ WATER_DEPTH = Effect(
 )
 
 
-def _trimmed(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _trimmed(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Linear derivatives of a hull trimmed by tau at an unchanged mean draught T:
 
         Y_v (1 + 2/3 tau/T), Y_r (1 + 0.80 tau/T), N_v - 0.27 Y_v tau/T, N_r (1 + 0.30 tau/T)

@@ -116,20 +116,20 @@ class EffectParameter:
         )
 
 
-Symbols = Mapping[str, ca.SX]
+EffectSymbols = Mapping[str, ca.SX]
 """The symbols of an effect's parameters and inputs, by name without unit (:attr:`EffectParameter.stem`)."""
 
-Equations = Callable[[Model, Symbols, ManoeuvringCard], Model]
+EffectEquations = Callable[[Model, EffectSymbols, ManoeuvringCard], Model]
 
-Readings = Callable[[Symbols, Symbols], Mapping[str, ca.SX]]
+Readings = Callable[[EffectSymbols, EffectSymbols], Mapping[str, ca.SX]]
 """``readings(motion, given)``: what sensors show, by the name of the variable that they measure; `motion` holds the
-symbols of :data:`MEASURED`, `given` those of the effect's parameters."""
+symbols of :data:`MEASURED_BEFOREHAND`, `given` those of the effect's parameters."""
 
-MEASURED = ("motion.u", "motion.v", "motion.r", "motion.psi", "motion.x", "motion.y")
+MEASURED_BEFOREHAND = ("motion.u", "motion.v", "motion.r", "motion.psi", "motion.x", "motion.y")
 """Variables that a sensor may show wrongly."""
 
 
-def unchanged(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def unchanged(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """The equations of an effect that does not reach the ship."""
     return model
 
@@ -165,7 +165,7 @@ class Effect:
     description: str
     source: str
     parameters: tuple[EffectParameter, ...]
-    equations: Equations = unchanged
+    equations: EffectEquations = unchanged
     readings: Readings | None = None
     delays: Mapping[str, str] = field(default_factory=dict)
 
@@ -211,7 +211,9 @@ class Effect:
         changed = self.equations(model.extend(*variables.values()), symbols, card)
         if self.readings is None:
             return changed
-        return with_readings(changed, self.readings({name: model.symbol(name) for name in MEASURED}, symbols))
+        return with_readings(
+            changed, self.readings({name: model.symbol(name) for name in MEASURED_BEFOREHAND}, symbols)
+        )
 
 
 def with_readings(model: Model, shown: Mapping[str, ca.SX]) -> Model:
@@ -258,7 +260,7 @@ def with_steps_for(model: Model, name: str, share: float = 1.0) -> Model:
     return replace(model, step_s=step)
 
 
-def particular(card: ManoeuvringCard, key: str, remedy: str) -> float:
+def card_particular(card: ManoeuvringCard, key: str, remedy: str) -> float:
     """A number of the card's ``[ship]``; raises InputError that names the key if the card has none."""
     value = getattr(card.ship, key)
     if value is None:

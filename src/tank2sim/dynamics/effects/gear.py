@@ -8,8 +8,8 @@ from dataclasses import replace
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols, with_steps_for
-from tank2sim.dynamics.effects.sizes import passages, rates
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
+from tank2sim.dynamics.effects.froude_scale import rates, time_scale_passages
 from tank2sim.dynamics.model import Model, Quantity, State
 from tank2sim.dynamics.steering_gear import assumed_lag_notice
 
@@ -18,7 +18,7 @@ def _limited(value: ca.SX, limit: ca.SX) -> ca.SX:
     return ca.fmax(-limit, ca.fmin(limit, value))
 
 
-def _with_rate_limit(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_rate_limit(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """abs(d delta/dt) <= k, in place of the card's own limit."""
     limit = given["max_rate"]
     if "steering.max_rate" in model:
@@ -45,7 +45,7 @@ RUDDER_RATE_LIMIT = Effect(
 )
 
 
-def _with_lag(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """d delta/dt = (order - delta)/T, with T in place of the card's time constant."""
     assumed = assumed_lag_notice(card.ship.length_m / card.model.speed_mps)
     lagging = model.substitute("steering.time_constant", given["time_constant"])
@@ -64,7 +64,7 @@ RUDDER_LAG = Effect(
             "time constant of the steering gear",
             0.01,
             100.0,
-            typical=passages(0.1, 0.05, 0.2),  # 1 to 4 s where L/u0 is 20 s (ours)
+            typical=time_scale_passages(0.1, 0.05, 0.2),  # 1 to 4 s where L/u0 is 20 s (ours)
         ),
     ),
     equations=_with_lag,
@@ -81,7 +81,7 @@ CONTACT = 0.005
 second on a ship of 160 m (ours); the play operator is its limit at 0."""
 
 
-def _with_backlash(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_backlash(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Play between the gear and the rudder: the rudder stays until the gear has crossed the play, then follows.
 
         d delta/dt = e/T_c,   e what g - delta exceeds half the play b by, either way
@@ -137,7 +137,7 @@ RUDDER_BACKLASH = Effect(
 )
 
 
-def _with_dead_band(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_dead_band(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """The gear acts on that part of order - delta which exceeds the band b: it stops b short of its order.
 
     The dead zone of a servo valve with overlap; unlike :data:`RUDDER_BACKLASH` the rudder is not late at first.
@@ -164,7 +164,7 @@ RUDDER_DEAD_BAND = Effect(
 )
 
 
-def _with_telemotor_lag(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_telemotor_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """dq/dt = (order - q)/T, and the gear follows q: the first of the two stages of a steering gear.
 
     van Amerongen (1982): telemotor before rudder servo. In model tests it is the lag of the controller.
@@ -208,7 +208,7 @@ TELEMOTOR_LAG = Effect(
             "time constant before the steering gear",
             0.01,
             100.0,
-            typical=passages(0.05, 0.025, 0.1),  # half those of the gear itself (ours)
+            typical=time_scale_passages(0.05, 0.025, 0.1),  # half those of the gear itself (ours)
         ),
     ),
     equations=_with_telemotor_lag,

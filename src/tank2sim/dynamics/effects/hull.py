@@ -6,18 +6,18 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import scales, with_forces
+from tank2sim.dynamics.effects.froude_scale import speeds
 from tank2sim.dynamics.effects.particulars import with_particulars
-from tank2sim.dynamics.effects.sizes import speeds
 from tank2sim.dynamics.model import Model
 
-STRIPS = 12
+_STRIPS = 12
 """Stations of the Gauss-Legendre sum along the hull: wherever the pivot lies, both integrals are then within 0.03 % of
 the largest the same end speed can give (tests compare with the integral in closed form)."""
 
 
-def _with_cross_flow_drag(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_cross_flow_drag(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Y, N = -1/2 rho T C_D integral of (1, x) abs(v + x r) (v + x r) dx from -L/2 to L/2.
 
     Norrbin (1971), Theory and observations on the use of a mathematical model for ship manoeuvring, SSPA 68; Faltinsen
@@ -27,7 +27,7 @@ def _with_cross_flow_drag(model: Model, given: Symbols, card: ManoeuvringCard) -
     model, (draught,) = with_particulars(model, card, "draught_m")
     half = model.symbol("ship.length") / 2
     Y = N = ca.SX(0)
-    for station, weight in zip(*np.polynomial.legendre.leggauss(STRIPS), strict=True):
+    for station, weight in zip(*np.polynomial.legendre.leggauss(_STRIPS), strict=True):
         x = half * float(station)
         across = model.symbol("motion.v") + x * model.symbol("motion.r")
         drag = half * float(weight) * ca.fabs(across) * across
@@ -56,7 +56,7 @@ CROSS_FLOW_DRAG = Effect(
 )
 
 
-def _with_fouling(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_fouling(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """X = 1/2 rho L^2 X' u abs(u), X' negative: growth and roughness, as the allowance of ITTC 7.5-02-03-01.4."""
     u = model.symbol("motion.u")
     return with_forces(model, X=scales(model, ca.SX(1)).force * given["X"] * u * ca.fabs(u))
@@ -81,7 +81,7 @@ HULL_FOULING = Effect(
 )
 
 
-def _with_hump(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_hump(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """X = 1/2 rho L^2 u^2 X' exp(-1/2 ((u - u_h)/w)^2), X' negative: a hump of the resistance by waves at u_h.
 
     The waves of bow and stern add up at some speeds and cancel at others: Havelock (1909); Faltinsen (2005),
@@ -127,7 +127,7 @@ HUMP_RESISTANCE = Effect(
 )
 
 
-def _turning_unlike(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _turning_unlike(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Y, N = 1/2 rho L^2 V^2 (Y_rr, L N_rr) r'^2 = 1/2 rho L^4 (Y_rr, L N_rr) r^2: alike to both sides, so unlike.
 
     Even terms in Y and N are those that a symmetric ship has not: Abkowitz (1964); SIMMAN 2008 tactical diameters.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import scales
 from tank2sim.dynamics.model import Model
 
@@ -14,7 +14,7 @@ LEAST_INFLOW = 0.05
 astern, and must not divide by zero there (a choice of ours)."""
 
 
-def _in_loaded_slipstream(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _in_loaded_slipstream(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Rudder forces by angle of attack and inflow speed, in place of all terms of the polynomial that hold the rudder.
 
     w = U + k (u0 n/n0 - U) is the inflow speed over its share at u0 and n0; alpha = delta + atan(gamma (v + l L r)/w);

@@ -32,13 +32,13 @@ def _beam(card: ManoeuvringCard) -> float:
 
 
 def _draught(card: ManoeuvringCard) -> float:
-    return BEAMS_IN_DRAUGHT * particular(card, "beam_m")
+    return BEAMS_IN_DRAUGHT * model_particular(card, "beam_m")
 
 
 def _block(card: ManoeuvringCard) -> float:
     """C_B = m/(rho L B T), with the mass of the card's equations of motion."""
     scales = card.scales
-    box = card.ship.length_m * particular(card, "beam_m") * particular(card, "draught_m")
+    box = card.ship.length_m * model_particular(card, "beam_m") * model_particular(card, "draught_m")
     return float(min(max(card.rigid_body.mass * scales.mass / (scales.density * box), FINEST), FULLEST))
 
 
@@ -50,13 +50,13 @@ _ESTIMATES: dict[str, tuple[str, str, str, Callable[[ManoeuvringCard], float]]] 
         "propeller diameter",
         "m",
         f"{DIAMETER_IN_DRAUGHTS:g} of the draught",
-        lambda card: DIAMETER_IN_DRAUGHTS * particular(card, "draught_m"),
+        lambda card: DIAMETER_IN_DRAUGHTS * model_particular(card, "draught_m"),
     ),
     "projected_area_front_m2": (
         "area above the water seen from ahead",
         "m2",
         f"{FRONT_IN_BEAMS:g} of the beam squared",
-        lambda card: FRONT_IN_BEAMS * particular(card, "beam_m") ** 2,
+        lambda card: FRONT_IN_BEAMS * model_particular(card, "beam_m") ** 2,
     ),
     "projected_area_side_m2": (
         "area above the water seen from the side",
@@ -67,7 +67,7 @@ _ESTIMATES: dict[str, tuple[str, str, str, Callable[[ManoeuvringCard], float]]] 
 }
 
 
-def particular(card: ManoeuvringCard, key: str) -> float:
+def model_particular(card: ManoeuvringCard, key: str) -> float:
     """A number of the card's ``[ship]``, or an estimate of it (SI).
 
     Parameters
@@ -82,7 +82,7 @@ def particular(card: ManoeuvringCard, key: str) -> float:
 
 
 def estimated_from(key: str) -> str:
-    """In a few words, what :func:`particular` takes for a number that the card does not state."""
+    """In a few words, what :func:`model_particular` takes for a number that the card does not state."""
     return f"{_ESTIMATES[key][2]}, typical"
 
 
@@ -92,8 +92,8 @@ def with_particulars(model: Model, card: ManoeuvringCard, *keys: str) -> tuple[M
         name, unit, *_ = _ESTIMATES[key]
         if getattr(card.ship, key) is not None:
             continue
-        told = f"the card states no {key}: the {name} is taken as {particular(card, key):.3g} {unit}".rstrip()
+        told = f"the card states no {key}: the {name} is taken as {model_particular(card, key):.3g} {unit}".rstrip()
         notice = f"{told} ({estimated_from(key)})"
         if notice not in model.notices:
             model = model.extend(notices=[notice])
-    return model, tuple(particular(card, key) for key in keys)
+    return model, tuple(model_particular(card, key) for key in keys)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols, with_steps_for
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
 from tank2sim.dynamics.effects.forces import scales, with_forces
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
 from tank2sim.dynamics.propulsion import propeller_force
@@ -45,7 +45,7 @@ def _relative_revolutions(model: Model) -> ca.SX:
     return model.symbol("propeller.speed_actual") / model.symbol("propulsion.nominal_speed")
 
 
-def _with_side_force(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_side_force(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Y, N = 1/2 rho L^2 u0^2 (Y', L N') n abs(n)/n0^2.
 
     The blades meet the upper and the lower half of the wake unlike: Saunders (1957), Hydrodynamics in Ship Design;
@@ -67,7 +67,7 @@ PROPELLER_SIDE_FORCE = Effect(
 )
 
 
-def _with_walk(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_walk(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Y, N = 1/2 rho L^2 u0^2 (Y', L N') min(n, 0)^2/n0^2: only while the propeller turns astern.
 
     Then its jet meets one side of the stern: Brix (ed.) (1993), Manoeuvring Technical Manual; a right-handed propeller
@@ -91,7 +91,7 @@ PROPELLER_WALK = Effect(
 )
 
 
-def _with_loading_side_force(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_loading_side_force(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Y, N = 1/2 rho L^2 U^2 (Y', L N') eta, with the propeller loading eta = (n/n0) u0/U - 1.
 
     An asymmetry that vanishes where the propeller holds the speed and grows as the ship slows: the form is ours, after
@@ -132,7 +132,7 @@ LOADING_SIDE_FORCE = Effect(
 )
 
 
-def _with_droop(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_droop(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """n = order (1 - droop (1 - u/u0)): the engine is not held at its revolutions when the ship slows.
 
     First order in the loss of speed of an engine at constant torque or power, whose propeller load rises in a turn: the
@@ -167,7 +167,7 @@ ENGINE_DROOP = Effect(
 )
 
 
-def _with_engine_lag(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_engine_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """dn/dt = (order - n)/T: the engine's gear between telegraph and propeller, of the first order.
 
     ITTC 7.5-02-06-03 asks for the time constant of the engine beside that of the steering gear. A diesel that must be

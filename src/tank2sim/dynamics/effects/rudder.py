@@ -7,7 +7,7 @@ import math
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.model import Model
 
 STALL_WIDTH = math.radians(5.0)
@@ -22,7 +22,7 @@ def with_rudder_force(model: Model, multiplier: ca.SX) -> Model:
     return model
 
 
-def _biased(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _biased(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """The hull sees delta + d0: the rudder stands off its dial."""
     return model.redefine("rudder.effective", lambda angle: angle + given["angle"])
 
@@ -46,7 +46,7 @@ RUDDER_BIAS = Effect(
 )
 
 
-def _more_effective(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _more_effective(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """(1 + factor) F_delta, F_delta all terms of X, Y, N that hold the rudder."""
     return with_rudder_force(model, 1 + given["factor"])
 
@@ -70,7 +70,7 @@ RUDDER_EFFECTIVENESS = Effect(
 )
 
 
-def _in_slipstream(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _in_slipstream(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """F_delta (1 + gain (1 - u/u0)): the propeller keeps up the flow over the rudder while the ship loses speed.
 
     First order in the loss of speed of the slipstream of momentum theory: Brix (ed.) (1993), Manoeuvring Technical
@@ -99,7 +99,7 @@ RUDDER_SLIPSTREAM = Effect(
 )
 
 
-def _stalled(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _stalled(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """F_delta (1 - loss s), s = 3 a^2 - 2 a^3 rising from 0 to 1 over :data:`STALL_WIDTH` above the angle of stall."""
     beyond = (ca.fabs(model.symbol("rudder.effective")) - given["angle"]) / STALL_WIDTH
     a = ca.fmax(0, ca.fmin(1, beyond))

@@ -10,12 +10,12 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from tank2sim.dynamics.effects.effect import MEASURED, Effect, EffectParameter, Symbols
-from tank2sim.dynamics.effects.sizes import lengths, passages, rates
+from tank2sim.dynamics.effects.effect import MEASURED_BEFOREHAND, Effect, EffectParameter, EffectSymbols
+from tank2sim.dynamics.effects.froude_scale import lengths, rates, time_scale_passages
 
-Columns = Mapping[str, NDArray[np.float64]]
+_Columns = Mapping[str, NDArray[np.float64]]
 
-SIGNALS = dict(zip(MEASURED, ("u_mps", "v_mps", "r_radps", "psi_rad", "x_m", "y_m"), strict=True))
+_SIGNALS = dict(zip(MEASURED_BEFOREHAND, ("u_mps", "v_mps", "r_radps", "psi_rad", "x_m", "y_m"), strict=True))
 """Variable of the model to the signal of a trial that measures it."""
 
 RUDDER_SIGNALS = {"delta_order_rad": True, "delta_rad": False}
@@ -23,7 +23,7 @@ RUDDER_SIGNALS = {"delta_order_rad": True, "delta_rad": False}
 angle)."""
 
 
-def _biased_gyro(motion: Symbols, given: Symbols) -> dict[str, ca.SX]:
+def _biased_gyro(motion: EffectSymbols, given: EffectSymbols) -> dict[str, ca.SX]:
     """r + b."""
     return {"motion.r": motion["motion.r"] + given["rate"]}
 
@@ -47,7 +47,7 @@ GYRO_BIAS = Effect(
 )
 
 
-def _scaled_gyro(motion: Symbols, given: Symbols) -> dict[str, ca.SX]:
+def _scaled_gyro(motion: EffectSymbols, given: EffectSymbols) -> dict[str, ca.SX]:
     """(1 + s) r."""
     return {"motion.r": (1 + given["factor"]) * motion["motion.r"]}
 
@@ -65,7 +65,7 @@ GYRO_SCALE = Effect(
 )
 
 
-def _turned_compass(motion: Symbols, given: Symbols) -> dict[str, ca.SX]:
+def _turned_compass(motion: EffectSymbols, given: EffectSymbols) -> dict[str, ca.SX]:
     """psi + b."""
     return {"motion.psi": motion["motion.psi"] + given["angle"]}
 
@@ -89,7 +89,7 @@ HEADING_OFFSET = Effect(
 )
 
 
-def _off_centre_antenna(motion: Symbols, given: Symbols) -> dict[str, ca.SX]:
+def _off_centre_antenna(motion: EffectSymbols, given: EffectSymbols) -> dict[str, ca.SX]:
     """(x, y) + R(psi) a, a = (forward, starboard)."""
     cosine, sine = ca.cos(motion["motion.psi"]), ca.sin(motion["motion.psi"])
     forward, starboard = given["forward"], given["starboard"]
@@ -121,7 +121,7 @@ ANTENNA_LEVER_ARM = Effect(
 )
 
 
-def _scaled_log(motion: Symbols, given: Symbols) -> dict[str, ca.SX]:
+def _scaled_log(motion: EffectSymbols, given: EffectSymbols) -> dict[str, ca.SX]:
     """(1 + s) (u, v)."""
     return {name: (1 + given["factor"]) * motion[name] for name in ("motion.u", "motion.v")}
 
@@ -145,7 +145,7 @@ LOG_SCALE = Effect(
 )
 
 
-def _turned_log(motion: Symbols, given: Symbols) -> dict[str, ca.SX]:
+def _turned_log(motion: EffectSymbols, given: EffectSymbols) -> dict[str, ca.SX]:
     """(u cos a + v sin a, v cos a - u sin a)."""
     cosine, sine = ca.cos(given["angle"]), ca.sin(given["angle"])
     u, v = motion["motion.u"], motion["motion.v"]
@@ -171,7 +171,7 @@ LOG_MISALIGNMENT = Effect(
 )
 
 
-def _log_forward(motion: Symbols, given: Symbols) -> dict[str, ca.SX]:
+def _log_forward(motion: EffectSymbols, given: EffectSymbols) -> dict[str, ca.SX]:
     """v + x r."""
     return {"motion.v": motion["motion.v"] + given["forward"] * motion["motion.r"]}
 
@@ -206,15 +206,15 @@ RUDDER_TIME_OFFSET = Effect(
             -60.0,
             60.0,
             absent=0.0,
-            typical=passages(0.05),  # 1 s where L/u0 is 20 s (ours)
+            typical=time_scale_passages(0.05),  # 1 s where L/u0 is 20 s (ours)
         ),
     ),
     delays={"rudder.command": "delay_s"},
 )
 
 
-def corrected(
-    time_s: NDArray[np.float64], signals: Columns, effect: Effect, values: Mapping[str, float]
+def correct_reading(
+    time_s: NDArray[np.float64], signals: _Columns, effect: Effect, values: Mapping[str, float]
 ) -> dict[str, NDArray[np.float64]]:
     """The signals of a trial as they would be without a fault of its sensors.
 
@@ -223,7 +223,7 @@ def corrected(
     time_s : array, (rows,)
         Rising.
     signals : mapping
-        Arrays (rows,), SI: those of :data:`SIGNALS`, ``delta_rad``, ``delta_order_rad``, and any others.
+        Arrays (rows,), SI: those of :data:`_SIGNALS`, ``delta_rad``, ``delta_order_rad``, and any others.
     effect : Effect
         A sensor's.
     values : mapping
@@ -252,27 +252,27 @@ def corrected(
     return found
 
 
-def _measured(signals: Columns, effect: Effect, values: Mapping[str, float]) -> dict[str, NDArray[np.float64]]:
+def _measured(signals: _Columns, effect: Effect, values: Mapping[str, float]) -> dict[str, NDArray[np.float64]]:
     """What sensors measured where they show `signals`: the readings s = A x + b, solved for x."""
     assert effect.readings is not None
-    motion = {name: ca.SX.sym(name) for name in MEASURED}
+    motion = {name: ca.SX.sym(name) for name in MEASURED_BEFOREHAND}
     given = {one.stem: ca.SX(values[one.name]) for one in effect.parameters}
     readings = effect.readings(motion, given)
-    names = [name for name in readings if SIGNALS[name] in signals]
+    names = [name for name in readings if _SIGNALS[name] in signals]
     if not names:
         return {}
     x, shown = ca.vcat([motion[name] for name in names]), ca.SX.sym("shown", len(names))
     expression = ca.vcat([readings[name] for name in names])
     rest = ca.substitute(expression, x, ca.SX.zeros(len(names)))
     solution = ca.solve(ca.jacobian(expression, x), shown - rest)
-    others = [name for name in MEASURED if name not in names and ca.depends_on(solution, motion[name])]
+    others = [name for name in MEASURED_BEFOREHAND if name not in names and ca.depends_on(solution, motion[name])]
     for name in others:
-        if SIGNALS[name] not in signals:
-            raise ValueError(f"{effect.name} cannot be corrected without {SIGNALS[name]}")
+        if _SIGNALS[name] not in signals:
+            raise ValueError(f"{effect.name} cannot be corrected without {_SIGNALS[name]}")
     solve = ca.Function("measured", [shown, *(motion[name] for name in others)], [solution])
-    rows: list[Any] = [np.vstack([signals[SIGNALS[name]] for name in names])]
-    rows += [signals[SIGNALS[name]].reshape(1, -1) for name in others]
-    return {SIGNALS[name]: row for name, row in zip(names, np.array(solve(*rows)), strict=True)}
+    rows: list[Any] = [np.vstack([signals[_SIGNALS[name]] for name in names])]
+    rows += [signals[_SIGNALS[name]].reshape(1, -1) for name in others]
+    return {_SIGNALS[name]: row for name, row in zip(names, np.array(solve(*rows)), strict=True)}
 
 
 def _held(time_s: NDArray[np.float64], column: NDArray[np.float64], asked: NDArray[np.float64]) -> NDArray[np.float64]:

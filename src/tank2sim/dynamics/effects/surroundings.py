@@ -8,18 +8,18 @@ from collections.abc import Callable
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, Symbols
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import scales, with_forces
+from tank2sim.dynamics.effects.froude_scale import DIRECTION_SIGNS, lengths, speeds, wave_speeds
 from tank2sim.dynamics.effects.particulars import AREA_ERROR, with_particulars
-from tank2sim.dynamics.effects.sizes import DIRECTIONS, lengths, speeds, wave_speeds
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model
 
-STILL_MPS = 1e-6
+_STILL_MPS = 1e-6
 """Added to the square of a relative speed, so that its root has a slope at rest; far below any speed of air."""
 
 
-def _with_current(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_current(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Water that moves uniformly over the ground: dx/dt and dy/dt gain its velocity.
 
     u and v are through the water; a uniform steady current is only another inertial frame, so that no force changes.
@@ -51,7 +51,7 @@ CURRENT = Effect(
             -2 * math.pi,
             2 * math.pi,
             input_name="current.direction",
-            typical=DIRECTIONS,
+            typical=DIRECTION_SIGNS,
         ),
     ),
     equations=_with_current,
@@ -73,7 +73,7 @@ def air_over_ship(model: Model, speed: ca.SX, direction: ca.SX) -> tuple[ca.SX, 
     return earth_velocity(north, east, -model.symbol("motion.psi"))
 
 
-def _with_wind(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_wind(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Wind force on hull and superstructure, with V_R and gamma_R (from, clockwise from the bow) of the relative wind:
 
         X = -1/2 rho_air V_R^2 c_X A_F cos(gamma_R)
@@ -91,7 +91,7 @@ def _with_wind(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
     model, (front, side) = with_particulars(model, card, "projected_area_front_m2", "projected_area_side_m2")
 
     def force(forward: ca.SX, starboard: ca.SX) -> ca.SX:
-        speed = ca.sqrt(forward**2 + starboard**2 + STILL_MPS**2)
+        speed = ca.sqrt(forward**2 + starboard**2 + _STILL_MPS**2)
         X = 0.5 * density * front * given["surge_coefficient"] * speed * forward
         Y = 0.5 * density * side * given["sway_coefficient"] * speed * starboard
         # sin(2 gamma) = 2 sin cos, forward = -V cos, starboard = -V sin
@@ -130,7 +130,7 @@ WIND = Effect(
             -2 * math.pi,
             2 * math.pi,
             input_name="wind.direction",
-            typical=DIRECTIONS,
+            typical=DIRECTION_SIGNS,
         ),
         # Spreads: half the ranges of Fossen (2011) above; that of the centroid is ours.
         EffectParameter(
@@ -179,7 +179,7 @@ WIND = Effect(
 )
 
 
-def _with_wave_drift(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_wave_drift(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Mean second-order force of short irregular waves that the side and a round bow reflect:
 
         X = -rho g Hs^2/16 B c_X |cos(chi)| cos(chi)
@@ -222,7 +222,7 @@ WAVE_DRIFT = Effect(
             "direction from which the waves come, clockwise from north",
             -2 * math.pi,
             2 * math.pi,
-            typical=DIRECTIONS,
+            typical=DIRECTION_SIGNS,
         ),
         # Spreads: waves that are not short are reflected in part, and hulls differ (ours).
         EffectParameter(
@@ -237,7 +237,7 @@ WAVE_DRIFT = Effect(
 )
 
 
-def _with_bank_suction(model: Model, given: Symbols, card: ManoeuvringCard) -> Model:
+def _with_bank_suction(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Y, N = 1/2 rho L^2 u^2 Y', 1/2 rho L^3 u^2 N': a ship that runs along a bank or wall at one distance.
 
     Norrbin (1974), Bank effects on a ship moving through a short dredged channel: force and moment are proportional to

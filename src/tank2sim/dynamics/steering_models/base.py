@@ -14,25 +14,29 @@ from collections.abc import Mapping
 
 import casadi as ca
 
-from tank2sim.dynamics.steering_models.form import Coefficient, SteeringForm
+from tank2sim.dynamics.steering_models.form import SteeringCoefficient, SteeringForm
 
-PAPER = "Poznyakov, S. I. and Yudin, Yu. I. (2007), Vestnik MGTU, on comparing ship models by influence coefficients"
+PAPER_4 = "Poznyakov, S. I. and Yudin, Yu. I. (2007), Vestnik MGTU, on comparing ship models by influence coefficients"
 
 EQUATION_1 = (
-    Coefficient(name="C_y_b", description="Coefficient of -beta in Y"),
-    Coefficient(name="C_y_w", description="Coefficient of r in Y"),
-    Coefficient(name="C_y_bb", description="Coefficient of -beta |beta| in Y"),
-    Coefficient(name="C_y_d", description="Coefficient of the rudder angle in Y"),
-    Coefficient(name="C_m_b", description="Coefficient of beta in N: the static yaw moment"),
-    Coefficient(name="C_m_w", description="Coefficient of -r in N: the yaw damping"),
-    Coefficient(name="C_m_bbw", description="Coefficient of -beta^2 r in N"),
-    Coefficient(name="C_m_d", description="Coefficient of the rudder angle in N"),
+    SteeringCoefficient(name="C_y_b", description="Coefficient of -beta in Y"),
+    SteeringCoefficient(name="C_y_w", description="Coefficient of r in Y"),
+    SteeringCoefficient(name="C_y_bb", description="Coefficient of -beta |beta| in Y"),
+    SteeringCoefficient(name="C_y_d", description="Coefficient of the rudder angle in Y"),
+    SteeringCoefficient(name="C_m_b", description="Coefficient of beta in N: the static yaw moment"),
+    SteeringCoefficient(name="C_m_w", description="Coefficient of -r in N: the yaw damping"),
+    SteeringCoefficient(name="C_m_bbw", description="Coefficient of -beta^2 r in N"),
+    SteeringCoefficient(name="C_m_d", description="Coefficient of the rudder angle in N"),
 )
 """The coefficients of (1)."""
 
 _OF_TABLE_2 = (
-    Coefficient(name="C_m_ww", description="Coefficient of -r |r| in N, a term read out of Table 2", default=0.0),
-    Coefficient(name="C_m_wwb", description="Coefficient of -beta r^2 in N, a term read out of Table 2", default=0.0),
+    SteeringCoefficient(
+        name="C_m_ww", description="Coefficient of -r |r| in N, a term read out of Table 2", default=0.0
+    ),
+    SteeringCoefficient(
+        name="C_m_wwb", description="Coefficient of -beta r^2 in N, a term read out of Table 2", default=0.0
+    ),
 )
 
 
@@ -51,7 +55,7 @@ def _rates(c: Mapping[str, ca.SX], beta: ca.SX, r: ca.SX, delta: ca.SX) -> tuple
 BASE = SteeringForm(
     name="base",
     title="base model",
-    source=f"{PAPER}, eq. (1); Yudin and Poznyakov (2006), Vestnik MGTU 9(2), 234-240",
+    source=f"{PAPER_4}, eq. (1); Yudin and Poznyakov (2006), Vestnik MGTU 9(2), 234-240",
     coefficients=(*EQUATION_1, *_OF_TABLE_2),
     rates=_rates,
     missing=(

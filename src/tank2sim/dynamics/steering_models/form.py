@@ -21,7 +21,7 @@ Rates = Callable[[Mapping[str, ca.SX], ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Coefficient:
+class SteeringCoefficient:
     """A coefficient of a steering model, without unit.
 
     Parameters
@@ -64,7 +64,7 @@ class SteeringForm:
     name: str
     title: str
     source: str
-    coefficients: tuple[Coefficient, ...]
+    coefficients: tuple[SteeringCoefficient, ...]
     rates: Rates
     static_moment: tuple[str, ...] = ("C_m_b",)
     damping: tuple[str, ...] = ("C_m_w",)

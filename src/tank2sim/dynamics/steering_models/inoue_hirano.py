@@ -16,8 +16,8 @@ from collections.abc import Mapping
 
 import casadi as ca
 
-from tank2sim.dynamics.steering_models.base import PAPER
-from tank2sim.dynamics.steering_models.form import Coefficient, SteeringForm
+from tank2sim.dynamics.steering_models.base import PAPER_4
+from tank2sim.dynamics.steering_models.form import SteeringCoefficient, SteeringForm
 
 
 def _rates(c: Mapping[str, ca.SX], beta: ca.SX, r: ca.SX, delta: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -47,25 +47,29 @@ def _rates(c: Mapping[str, ca.SX], beta: ca.SX, r: ca.SX, delta: ca.SX) -> tuple
 INOUE_HIRANO = SteeringForm(
     name="inoue-hirano",
     title="Japanese model (Inoue, Hirano)",
-    source=f"{PAPER}, eq. (2) restored and Table 4; Gofman, A. D. (1988), Sudostroenie; term list of Inoue, Hirano, "
+    source=f"{PAPER_4}, eq. (2) restored and Table 4; Gofman, A. D. (1988), Sudostroenie; term list of Inoue, Hirano, "
     "Kijima and Takashina (1981), International Shipbuilding Progress 28, from memory",
     coefficients=(
-        Coefficient(name="C_y_b", description="Coefficient of -h beta in Y"),
-        Coefficient(name="C_y_w", description="Coefficient of r in Y"),
-        Coefficient(name="C_y_bb", description="Coefficient of -h beta |beta| in Y"),
-        Coefficient(name="C_y_bw", description="Coefficient of -h beta |r| in Y"),
-        Coefficient(name="C_y_ww", description="Coefficient of r |r| in Y"),
-        Coefficient(name="C_y_d", description="Coefficient of the rudder angle in Y"),
-        Coefficient(name="C_m_b", description="Coefficient of h beta in N: the static yaw moment"),
-        Coefficient(name="C_m_w", description="Coefficient of -r in N: the yaw damping"),
-        Coefficient(name="C_m_ww", description="Coefficient of -r |r| in N"),
-        Coefficient(name="C_m_bww", description="Coefficient of -h beta r^2 in N"),
-        Coefficient(name="C_m_bbw", description="Coefficient of -h beta^2 r in N"),
-        Coefficient(name="C_m_d", description="Coefficient of the rudder angle in N"),
-        Coefficient(name="C_y_pb", description="Coefficient of -beta in the force of the rudder, by the inflow"),
-        Coefficient(name="C_y_pw", description="Coefficient of -r in the force of the rudder, by the inflow"),
-        Coefficient(name="l_p", description="Lever of the inflow's part of the rudder force, C_m^d / C_y^d"),
-        Coefficient(name="drift_share", description="h: share of the printed coefficients of powers of beta that acts"),
+        SteeringCoefficient(name="C_y_b", description="Coefficient of -h beta in Y"),
+        SteeringCoefficient(name="C_y_w", description="Coefficient of r in Y"),
+        SteeringCoefficient(name="C_y_bb", description="Coefficient of -h beta |beta| in Y"),
+        SteeringCoefficient(name="C_y_bw", description="Coefficient of -h beta |r| in Y"),
+        SteeringCoefficient(name="C_y_ww", description="Coefficient of r |r| in Y"),
+        SteeringCoefficient(name="C_y_d", description="Coefficient of the rudder angle in Y"),
+        SteeringCoefficient(name="C_m_b", description="Coefficient of h beta in N: the static yaw moment"),
+        SteeringCoefficient(name="C_m_w", description="Coefficient of -r in N: the yaw damping"),
+        SteeringCoefficient(name="C_m_ww", description="Coefficient of -r |r| in N"),
+        SteeringCoefficient(name="C_m_bww", description="Coefficient of -h beta r^2 in N"),
+        SteeringCoefficient(name="C_m_bbw", description="Coefficient of -h beta^2 r in N"),
+        SteeringCoefficient(name="C_m_d", description="Coefficient of the rudder angle in N"),
+        SteeringCoefficient(
+            name="C_y_pb", description="Coefficient of -beta in the force of the rudder, by the inflow"
+        ),
+        SteeringCoefficient(name="C_y_pw", description="Coefficient of -r in the force of the rudder, by the inflow"),
+        SteeringCoefficient(name="l_p", description="Lever of the inflow's part of the rudder force, C_m^d / C_y^d"),
+        SteeringCoefficient(
+            name="drift_share", description="h: share of the printed coefficients of powers of beta that acts"
+        ),
     ),
     rates=_rates,
     rudder=("C_y_d", "C_m_d", "C_y_pb", "C_y_pw"),

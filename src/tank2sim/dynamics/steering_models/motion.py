@@ -6,15 +6,15 @@ from collections.abc import Mapping
 
 import casadi as ca
 
-from tank2sim.dynamics.kinematics import kinematics, yaw_rate
+from tank2sim.dynamics.kinematics import planar_kinematics, yaw_rate
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State
 from tank2sim.dynamics.steering_gear import steering_gear
 from tank2sim.dynamics.steering_models.form import SteeringForm
 
-STEPS_PER_LENGTH = 200
+_STEPS_PER_LENGTH = 200
 """Integration steps while the ship covers its own length, as of the other ships."""
 
-OUTPUTS = (
+_OUTPUTS = (
     *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "motion.speed", "motion.beta"),
     *("motion.rdot", "motion.betadot", "rudder.angle"),
 )
@@ -55,7 +55,7 @@ def steering_model(
     gear, notices = steering_gear(None, length_m / speed_mps)
     given = (*states, *constants, *gear)
     motion = (*states, *_quantities(form, {variable.name: variable.symbol for variable in given}))
-    position = kinematics({variable.name: variable for variable in motion})
+    position = planar_kinematics({variable.name: variable for variable in motion})
     empty = Model(
         name=name,
         description=f"{name}: {form.title}, steering at a constant speed",
@@ -64,10 +64,10 @@ def steering_model(
         parameters=(),
         quantities=(),
         outputs=(),
-        step_s=length_m / speed_mps / STEPS_PER_LENGTH,
+        step_s=length_m / speed_mps / _STEPS_PER_LENGTH,
         notices=(*notices, "the speed of a steering model does not fall in a turn"),
     )
-    return empty.extend(*position, *motion, *gear, *constants, outputs=OUTPUTS)
+    return empty.extend(*position, *motion, *gear, *constants, outputs=_OUTPUTS)
 
 
 def _ship(length_m: float, speed_mps: float) -> tuple[Parameter, ...]:

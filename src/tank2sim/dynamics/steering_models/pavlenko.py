@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from tank2sim.dynamics.steering_models.base import EQUATION_1, PAPER, equation_1
+from tank2sim.dynamics.steering_models.base import EQUATION_1, PAPER_4, equation_1
 from tank2sim.dynamics.steering_models.form import SteeringForm
 
 PAVLENKO = SteeringForm(
     name="pavlenko",
     title="model of Pavlenko",
-    source=f"{PAPER}, which names Pavlenko, V. G. (1991), Khodkost i upravlyaemost sudov, Transport, Moscow",
+    source=f"{PAPER_4}, which names Pavlenko, V. G. (1991), Khodkost i upravlyaemost sudov, Transport, Moscow",
     coefficients=EQUATION_1,
     rates=equation_1,
     missing=(

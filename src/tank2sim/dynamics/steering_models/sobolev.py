@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from tank2sim.dynamics.steering_models.base import EQUATION_1, PAPER, equation_1
+from tank2sim.dynamics.steering_models.base import EQUATION_1, PAPER_4, equation_1
 from tank2sim.dynamics.steering_models.form import SteeringForm
 
 SOBOLEV = SteeringForm(
     name="sobolev",
     title="model of Sobolev",
-    source=f"{PAPER}, which names Sobolev, G. V. (1976), Upravlyaemost korablya i avtomatizatsiya sudovozhdeniya, "
+    source=f"{PAPER_4}, which names Sobolev, G. V. (1976), Upravlyaemost korablya i avtomatizatsiya sudovozhdeniya, "
     "Sudostroenie, Leningrad",
     coefficients=EQUATION_1,
     rates=equation_1,

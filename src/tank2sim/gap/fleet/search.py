@@ -14,11 +14,11 @@ from itertools import islice
 
 from tank2sim.cards.card import Card, ManoeuvringCard
 from tank2sim.errors import InputError
-from tank2sim.gap.find import Options, find_gap
-from tank2sim.gap.fitting import Progress
 from tank2sim.gap.fleet.ships import ShipFolder
+from tank2sim.gap.inference.fit_all import Progress
 from tank2sim.gap.result import Gap
-from tank2sim.identification.trials.measured import Measured
+from tank2sim.gap.workflow import GapOptions, find_gap
+from tank2sim.identification.trials.problem.prepare_trials import Measured
 
 AHEAD = 256
 """Ships that are read and handed out before the first of them is done: a bound on memory (ours)."""
@@ -65,7 +65,7 @@ class Fault:
 
 
 def found_one_by_one(
-    ships: Iterable[Sought], options: Options, progress: Progress, executor: Executor | None = None
+    ships: Iterable[Sought], options: GapOptions, progress: Progress, executor: Executor | None = None
 ) -> Iterator[tuple[Sought, Gap | Fault]]:
     """What each ship lacks, one after the other.
 
@@ -96,7 +96,7 @@ def found_one_by_one(
 
 
 def found_at_once(
-    ships: Iterable[Sought], options: Options, progress: Progress, executor: Executor
+    ships: Iterable[Sought], options: GapOptions, progress: Progress, executor: Executor
 ) -> Iterator[tuple[Sought, Gap | Fault]]:
     """What each ship lacks, as of :func:`found_one_by_one`, in the order in which the executor has done with them.
 
@@ -144,13 +144,13 @@ def _executor_kept(name: str) -> Iterator[None]:
         raise InputError("--executor", "", problem, remedy) from None
 
 
-def _found_there(ship: Sought, options: Options) -> Gap | Fault:
+def _found_there(ship: Sought, options: GapOptions) -> Gap | Fault:
     """In another process, which has the whole search to itself."""
     return _found(ship, replace(options, workers=1))
 
 
 def _found(
-    ship: Sought, options: Options, progress: Progress = lambda text: None, executor: Executor | None = None
+    ship: Sought, options: GapOptions, progress: Progress = lambda text: None, executor: Executor | None = None
 ) -> Gap | Fault:
     try:
         return find_gap(ship.card, ship.fitted, ship.held, options, progress, executor)

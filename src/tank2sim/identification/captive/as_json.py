@@ -12,7 +12,7 @@ from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
 from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.result_card import Contents
-from tank2sim.identification.captive.rows import by_the_papers_order, prediction_errors
+from tank2sim.identification.captive.tables import by_the_papers_order, prediction_errors
 from tank2sim.records.campaigns import Campaign
 
 

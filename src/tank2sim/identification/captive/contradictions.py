@@ -12,13 +12,13 @@ from dataclasses import replace
 import numpy as np
 
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.cross_validation import LeftOut, leave_one_out
 from tank2sim.identification.captive.harmonics import ReducedRun
-from tank2sim.identification.captive.leaving_out import LeftOut, leave_one_out
 from tank2sim.identification.captive.prior import with_prior
 from tank2sim.identification.captive.regression import Spread
 from tank2sim.identification.captive.selection import told_apart, usual_zero
 from tank2sim.records.campaign_form import OSCILLATING
-from tank2sim.records.campaigns import FORCES, Campaign
+from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign
 
 _TIMES_USUAL = 8.0
 """Least misfit of a contradicted run, in those usual in the campaign. Sound runs of made-up campaigns reach 6 beside
@@ -42,7 +42,7 @@ def contradicted(campaign: Campaign, runs: Sequence[ReducedRun]) -> dict[str, In
         Those that the derivatives are to rest on.
     """
     found: dict[str, InputError] = {}
-    for force in FORCES:
+    for force in FORCE_COLUMNS:
         rest = list(runs)
         while (worst := _worst(campaign, rest, force)) is not None:
             row, times, share = worst

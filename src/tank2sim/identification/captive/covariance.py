@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.identification.captive.reduction import Reduction, common_shifts
-
-Array = NDArray[np.float64]
 
 
 def reduction_covariance(reduction: Reduction, names: Sequence[str]) -> Array:

@@ -13,14 +13,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.cards.scaling import Scales
 from tank2sim.cards.terms import Term, parse_term
-from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, TERMS
+from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS
 from tank2sim.dynamics.rigid_body import inertia, inertial_forces
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.harmonics import ReducedRun
-from tank2sim.identification.captive.motion import Motion
-from tank2sim.identification.conditioning import Matrix, Vector
+from tank2sim.identification.captive.motion import CaptiveMotion
 from tank2sim.records.campaigns import Campaign
 
 SPEED_RANGE = 0.03
@@ -32,12 +32,12 @@ _ACTIVE = 1e-3
 
 def candidate_terms(force: str) -> tuple[Term, ...]:
     """Terms of (3.8) and acceleration terms of one force, in their order."""
-    names = (*TERMS[force], *(name for name in ACCELERATION_TERMS if name[0] == force))
+    names = (*ABKOWITZ_TERMS[force], *(name for name in ACCELERATION_TERMS if name[0] == force))
     return tuple(term for term in map(parse_term, names) if term is not None)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Equations:
+class CampaignEquations:
     """Weighted equations of one force over a campaign: rows are coefficients of runs, columns are terms.
 
     Parameters
@@ -69,34 +69,34 @@ class Equations:
 
     force: str
     names: tuple[str, ...]
-    design: Matrix
-    values: Vector
-    zero: Vector
-    gauge: Vector
+    design: Array
+    values: Array
+    zero: Array
+    gauge: Array
     run_of_row: NDArray[np.int64]
     runs: tuple[ReducedRun, ...]
     unit: float
-    roots: tuple[Matrix, ...]
+    roots: tuple[Array, ...]
     prior: Mapping[str, float] = field(default_factory=dict)
 
-    def held(self, prior: Mapping[str, float]) -> Equations:
+    def held(self, prior: Mapping[str, float]) -> CampaignEquations:
         """The same equations with some terms held loosely about zero."""
         return replace(self, prior=prior)
 
     @property
-    def prior_rows(self) -> Matrix:
+    def prior_rows(self) -> Array:
         """The prior as weighted equations with zero on their right, (terms held, columns)."""
         places = [place for place, name in enumerate(self.names) if name in self.prior]
         rows = np.zeros((len(places), len(self.names)))
         rows[np.arange(len(places)), places] = [1.0 / self.prior[self.names[place]] for place in places]
         return rows
 
-    def of_terms(self, names: Sequence[str]) -> Equations:
+    def of_terms(self, names: Sequence[str]) -> CampaignEquations:
         """The same equations with some columns only."""
         places = [self.names.index(name) for name in names]
         return replace(self, names=tuple(names), design=self.design[:, places])
 
-    def of_runs(self, places: Sequence[int]) -> Equations:
+    def of_runs(self, places: Sequence[int]) -> CampaignEquations:
         """The equations of some runs only."""
         rows = np.flatnonzero(np.isin(self.run_of_row, places))
         renumbered = {place: number for number, place in enumerate(places)}
@@ -118,9 +118,9 @@ class Equations:
         return starts
 
     @cached_property
-    def zero_sizes(self) -> Vector:
+    def zero_sizes(self) -> Array:
         """Squared norm of each run's rows of `zero`, (runs,)."""
-        sizes: Vector = self.run_sums(self.zero**2)
+        sizes: Array = self.run_sums(self.zero**2)
         return sizes
 
     def run_sums(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -128,7 +128,9 @@ class Equations:
         return np.add.reduceat(rows, self.first_rows, axis=0)
 
 
-def equations(campaign: Campaign, runs: Sequence[ReducedRun], force: str, names: Sequence[str]) -> Equations:
+def campaign_equations(
+    campaign: Campaign, runs: Sequence[ReducedRun], force: str, names: Sequence[str]
+) -> CampaignEquations:
     """The equations of a force for the named terms (or trend terms, ``Yv w2``).
 
     Raises
@@ -155,7 +157,7 @@ def equations(campaign: Campaign, runs: Sequence[ReducedRun], force: str, names:
         gauges.append(weighted[:, -1])
         roots.append(root)
         places += [place] * count
-    return Equations(
+    return CampaignEquations(
         force=force,
         names=tuple(names),
         design=np.vstack(blocks),
@@ -169,13 +171,13 @@ def equations(campaign: Campaign, runs: Sequence[ReducedRun], force: str, names:
     )
 
 
-def axial_speed(motion: Motion) -> Vector:
+def axial_speed(motion: CaptiveMotion) -> Array:
     """u = U cos(beta), (rows,), m/s."""
-    axial: Vector = np.sqrt(motion.speed_mps**2 - motion.v_mps**2)
+    axial: Array = np.sqrt(motion.speed_mps**2 - motion.v_mps**2)
     return axial
 
 
-def rigid_body_force(campaign: Campaign, motion: Motion) -> Mapping[str, Vector]:
+def rigid_body_force(campaign: Campaign, motion: CaptiveMotion) -> Mapping[str, Array]:
     """What is added to a measured force (hydrodynamic sense) to leave the water's, N and N m: (3.1) of paper 2.
 
     Zero if the campaign's forces have the inertia removed already.
@@ -197,7 +199,7 @@ def rigid_body_force(campaign: Campaign, motion: Motion) -> Mapping[str, Vector]
     }
 
 
-def _history(campaign: Campaign, motion: Motion, name: str) -> Vector:
+def _history(campaign: Campaign, motion: CaptiveMotion, name: str) -> Array:
     """Force of a term whose prime value is 1, (rows,), N or N m."""
     spelt, _, trend = name.partition(" ")
     term = parse_term(spelt)
@@ -213,7 +215,7 @@ def _history(campaign: Campaign, motion: Motion, name: str) -> Vector:
         ) * np.ones(len(motion.time_s))
     if trend:
         history = history * (motion.frequency_radps * model.length_m / u0) ** 2
-    result: Vector = history
+    result: Array = history
     return result
 
 
@@ -237,7 +239,7 @@ def excited(campaign: Campaign, runs: Sequence[ReducedRun], term: Term) -> bool:
     return bool(np.any(products > _ACTIVE * bound))
 
 
-def _largest_motions(motion: Motion, u0: float, length: float) -> list[float]:
+def _largest_motions(motion: CaptiveMotion, u0: float, length: float) -> list[float]:
     """Of v', r', rudder, and of the change of speed U (that of u by the drift angle alone tells nothing of Du)."""
     change = abs(motion.mean_speed_mps / u0 - 1)
     v, r, delta = motion.largest

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tank2sim.identification.captive.cautions import Oscillation, cautions_of_result, cautions_of_test
 from tank2sim.identification.captive.oscillation import cubic_findings
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
 from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.systematic import can_show_delay
+from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
 
 _SHEET = 0.05
 _UNEXPLAINED = 2.0
@@ -19,7 +19,7 @@ _ASYMMETRIC = 0.01
 _REPEATED_ENOUGH = 3
 
 
-def findings(reduction: Reduction) -> tuple[str, ...]:
+def reduction_findings(reduction: Reduction) -> tuple[str, ...]:
     """Everything to be told of a reduction, the gravest first."""
     found = [
         *implausible(reduction),
@@ -86,7 +86,7 @@ def _missing(reduction: Reduction) -> Iterator[str]:
 def _physics(reduction: Reduction) -> Iterator[str]:
     campaign = reduction.campaign
     runs = tuple(
-        Oscillation(row.run, "sway" if row.letter == "v" else "yaw", row.frequency_radps)
+        OscillationMotion(row.run, "sway" if row.letter == "v" else "yaw", row.frequency_radps)
         for row in reduction.oscillations
     )
     for caution in cautions_of_test(campaign, runs):

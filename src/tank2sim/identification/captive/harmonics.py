@@ -16,9 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import digamma, polygamma
 
-from tank2sim.identification.captive.motion import Motion, harmonic_basis, run_motion
-from tank2sim.identification.conditioning import Matrix, Vector
-from tank2sim.records.campaigns import FORCES, Run
+from tank2sim.arrays import Array
+from tank2sim.identification.captive.motion import CaptiveMotion, harmonic_basis, run_motion
+from tank2sim.records.campaigns import FORCE_COLUMNS, CaptiveRun
 
 FORCE_HARMONICS = 5
 """Harmonics of the forces that are fitted."""
@@ -31,7 +31,7 @@ _FLOOR = 1e-6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Fit:
+class HarmonicFit:
     """Harmonics of one force in one run.
 
     Parameters
@@ -48,11 +48,11 @@ class Fit:
         Degrees of freedom of each density.
     """
 
-    coefficients: Vector
-    covariance: Matrix
-    residual: Vector
-    density: Vector
-    freedom: Vector
+    coefficients: Array
+    covariance: Array
+    residual: Array
+    density: Array
+    freedom: Array
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -73,25 +73,25 @@ class ReducedRun:
         ``X``, ``Y``, ``N`` to its fit.
     """
 
-    run: Run
-    motion: Motion
+    run: CaptiveRun
+    motion: CaptiveMotion
     labels: tuple[str, ...]
-    basis: Matrix
-    fits: Mapping[str, Fit]
+    basis: Array
+    fits: Mapping[str, HarmonicFit]
 
     @property
     def regressed(self) -> int:
         """How many coefficients, from the first, go into the derivatives."""
         return 1 + 2 * REGRESSED_HARMONICS if self.run.oscillates else 1
 
-    def projected(self, histories: Matrix) -> Matrix:
+    def projected(self, histories: Array) -> Array:
         """The coefficients that given histories (rows, n) would have: (regressed, n); exactly linear."""
         gram = self.basis.T @ self.basis
         coefficients = np.linalg.solve(gram, self.basis.T @ histories)[: self.regressed]
         return np.asarray(coefficients, dtype=np.float64)
 
 
-def reduced_run(run: Run) -> ReducedRun:
+def reduced_run(run: CaptiveRun) -> ReducedRun:
     """A run as mean, harmonics and trend of its forces.
 
     Raises
@@ -110,18 +110,18 @@ def reduced_run(run: Run) -> ReducedRun:
         labels.append("trend")
     basis = np.hstack(columns)
     inverse = np.asarray(np.linalg.inv(basis.T @ basis), dtype=np.float64)
-    fits = {name: _fit(run.force(name)[motion.kept], basis, inverse, motion) for name in FORCES}
+    fits = {name: _fit(run.force(name)[motion.kept], basis, inverse, motion) for name in FORCE_COLUMNS}
     return ReducedRun(run=run, motion=motion, labels=tuple(labels), basis=basis, fits=fits)
 
 
-def _fit(values: Vector, basis: Matrix, inverse: Matrix, motion: Motion) -> Fit:
+def _fit(values: Array, basis: Array, inverse: Array, motion: CaptiveMotion) -> HarmonicFit:
     coefficients = inverse @ (basis.T @ values)
     residual = values - basis @ coefficients
     floor = (_FLOOR * float(np.max(np.abs(values))) + 1e-30) ** 2
     density, freedom = _densities(residual, basis.shape[1], motion.periods)
     density = np.maximum(density, floor)
     root = np.sqrt(density)
-    return Fit(
+    return HarmonicFit(
         coefficients=coefficients,
         covariance=inverse * np.outer(root, root),
         residual=residual,
@@ -141,7 +141,7 @@ def moderated(runs: Sequence[ReducedRun]) -> tuple[ReducedRun, ...]:
     records = [place for place, run in enumerate(runs) if not run.run.is_average]
     if len(records) < 3:
         return tuple(runs)
-    for force in FORCES:
+    for force in FORCE_COLUMNS:
         fits = [runs[place].fits[force] for place in records]
         usual, weight = _usual_density(
             np.concatenate([f.density for f in fits]), np.concatenate([f.freedom for f in fits])
@@ -158,7 +158,7 @@ def moderated(runs: Sequence[ReducedRun]) -> tuple[ReducedRun, ...]:
     return tuple(result)
 
 
-def _usual_density(density: Vector, freedom: Vector) -> tuple[float, float]:
+def _usual_density(density: Array, freedom: Array) -> tuple[float, float]:
     """The campaign's usual density and its weight in degrees of freedom, from the scatter of the logarithms."""
     half = freedom / 2
     logs = np.log(density) - digamma(half) + np.log(half)
@@ -181,7 +181,7 @@ def _inverse_trigamma(value: float) -> float:
     return x
 
 
-def _densities(residual: Vector, columns: int, periods: int) -> tuple[Vector, Vector]:
+def _densities(residual: Array, columns: int, periods: int) -> tuple[Array, Array]:
     """Spectral density of the residual at the frequency of each column, (columns,), as a variance; and its degrees of
     freedom."""
     count = len(residual)

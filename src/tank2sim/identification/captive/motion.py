@@ -14,9 +14,9 @@ from functools import cached_property
 
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.identification.conditioning import Matrix, Vector
-from tank2sim.records.campaigns import Run
+from tank2sim.records.campaigns import CaptiveRun
 
 MOTION_HARMONICS = 3
 """Harmonics of the mechanism's motion that are kept."""
@@ -28,7 +28,7 @@ _FEW_PERIODS = 2.5
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Motion:
+class CaptiveMotion:
     """Smooth motion of a run over whole periods; SI, radians, rudder to starboard.
 
     Parameters
@@ -48,15 +48,15 @@ class Motion:
     """
 
     kept: slice
-    time_s: Vector
+    time_s: Array
     frequency_radps: float
     periods: int
-    v_mps: Vector
-    r_radps: Vector
-    speed_mps: Vector
-    delta_rad: Vector
-    vdot_mps2: Vector
-    rdot_radps2: Vector
+    v_mps: Array
+    r_radps: Array
+    speed_mps: Array
+    delta_rad: Array
+    vdot_mps2: Array
+    rdot_radps2: Array
 
     @cached_property
     def mean_speed_mps(self) -> float:
@@ -74,17 +74,17 @@ class Motion:
         """Whether the sway velocity, and the yaw rate, change at all."""
         return bool(np.any(self.vdot_mps2)), bool(np.any(self.rdot_radps2))
 
-    def amplitude(self, values: Vector) -> float:
+    def amplitude(self, values: Array) -> float:
         """Half the range of a history."""
         return 0.5 * float(np.ptp(values))
 
 
-def leading(run: Run) -> Vector:
+def leading(run: CaptiveRun) -> Array:
     """The velocity that a type of run is about: v in pure sway, r in yaw."""
     return run.v_mps if run.type == "pure_sway" else run.r_radps
 
 
-def run_motion(run: Run) -> Motion:
+def run_motion(run: CaptiveRun) -> CaptiveMotion:
     """The motion of a run.
 
     Raises
@@ -95,13 +95,13 @@ def run_motion(run: Run) -> Motion:
     return _oscillating(run) if run.oscillates else _steady(run)
 
 
-def _steady(run: Run) -> Motion:
+def _steady(run: CaptiveRun) -> CaptiveMotion:
     count = len(run.time_s)
 
-    def level(values: Vector) -> Vector:
+    def level(values: Array) -> Array:
         return np.full(count, float(np.mean(values)))
 
-    return Motion(
+    return CaptiveMotion(
         kept=slice(0, count),
         time_s=run.time_s,
         frequency_radps=0.0,
@@ -115,7 +115,7 @@ def _steady(run: Run) -> Motion:
     )
 
 
-def _oscillating(run: Run) -> Motion:
+def _oscillating(run: CaptiveRun) -> CaptiveMotion:
     if len(run.time_s) < _FEWEST_PER_PERIOD:
         raise InputError(run.name, "", f"has {len(run.time_s)} readings only", "a whole period of them is needed")
     if np.ptp(leading(run)) == 0.0:
@@ -137,7 +137,7 @@ def _oscillating(run: Run) -> Motion:
     time = time - run.force_delay_s
     basis = harmonic_basis(time, frequency, MOTION_HARMONICS)
     slope = _derivative_basis(basis, frequency)
-    return Motion(
+    return CaptiveMotion(
         kept=kept,
         time_s=time,
         frequency_radps=frequency,
@@ -151,7 +151,7 @@ def _oscillating(run: Run) -> Motion:
     )
 
 
-def harmonic_basis(time: Vector, frequency: float, harmonics: int) -> Matrix:
+def harmonic_basis(time: Array, frequency: float, harmonics: int) -> Array:
     """Columns 1, cos(wt), sin(wt), cos(2wt), ..., (rows, 1 + 2 harmonics)."""
     angles = frequency * np.outer(time, np.arange(1, harmonics + 1))
     basis = np.ones((len(time), 1 + 2 * harmonics))
@@ -159,7 +159,7 @@ def harmonic_basis(time: Vector, frequency: float, harmonics: int) -> Matrix:
     return basis
 
 
-def _derivative_basis(basis: Matrix, frequency: float) -> Matrix:
+def _derivative_basis(basis: Array, frequency: float) -> Array:
     """Time derivative of :func:`harmonic_basis`, column by column."""
     slope = np.zeros_like(basis)
     orders = frequency * np.arange(1, basis.shape[1] // 2 + 1)
@@ -167,13 +167,13 @@ def _derivative_basis(basis: Matrix, frequency: float) -> Matrix:
     return slope
 
 
-def _fitted(values: Vector, basis: Matrix) -> Vector:
+def _fitted(values: Array, basis: Array) -> Array:
     # Over whole periods the columns are nearly orthogonal: the normal equations lose nothing, and are fast.
-    solution: Vector = np.asarray(np.linalg.solve(basis.T @ basis, basis.T @ values), dtype=np.float64)
+    solution: Array = np.asarray(np.linalg.solve(basis.T @ basis, basis.T @ values), dtype=np.float64)
     return solution
 
 
-def measured_frequency(run: Run) -> float:
+def measured_frequency(run: CaptiveRun) -> float:
     """omega, rad/s, of an oscillating run: least squares of all its motion signals on harmonics of one frequency.
 
     The highest line of the spectrum starts a Gauss-Newton iteration in which each signal counts by its
@@ -192,7 +192,7 @@ def measured_frequency(run: Run) -> float:
     return float(frequency)
 
 
-def _oscillating_signals(run: Run) -> list[Vector]:
+def _oscillating_signals(run: CaptiveRun) -> list[Array]:
     signals = [leading(run)]
     other = run.y_m if run.type == "pure_sway" else run.psi_rad
     if other is not None and np.ptp(other) > 0:
@@ -200,7 +200,7 @@ def _oscillating_signals(run: Run) -> list[Vector]:
     return signals
 
 
-def _spectral_line(time: Vector, values: Vector) -> float:
+def _spectral_line(time: Array, values: Array) -> float:
     """Frequency of the highest line of a signal's spectrum, padded so that lines lie close, rad/s."""
     count = len(values)
     padded = 4 * count
@@ -218,12 +218,12 @@ def _spectral_line(time: Vector, values: Vector) -> float:
     return float(min(trials, key=lambda trial: _misfit(values, harmonic_basis(time, trial, 1))))
 
 
-def _misfit(values: Vector, basis: Matrix) -> float:
+def _misfit(values: Array, basis: Array) -> float:
     residual = values - basis @ _fitted(values, basis)
     return float(residual @ residual)
 
 
-def _frequency_step(time: Vector, signals: Sequence[Vector], frequency: float) -> float:
+def _frequency_step(time: Array, signals: Sequence[Array], frequency: float) -> float:
     """Gauss-Newton step of the frequency."""
     basis = harmonic_basis(time, frequency, MOTION_HARMONICS)
     normal = np.asarray(np.linalg.pinv(basis.T @ basis), dtype=np.float64)
@@ -239,7 +239,7 @@ def _frequency_step(time: Vector, signals: Sequence[Vector], frequency: float) -
     return total / weight if weight > 0 else 0.0
 
 
-def _whole_periods(run: Run, frequency: float) -> tuple[slice, int]:
+def _whole_periods(run: CaptiveRun, frequency: float) -> tuple[slice, int]:
     """The last rows of the record that span a whole number of periods, and how many periods."""
     period = 2 * math.pi / frequency
     periods = math.floor(run.duration_s / period + _WHOLE)

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.identification.captive import tank_conditions
 from tank2sim.identification.captive.equations import rigid_body_force
 from tank2sim.identification.captive.harmonics import ReducedRun
-from tank2sim.identification.conditioning import Vector
 from tank2sim.records.campaigns import Campaign
 
 _DIFFER = 3.0
@@ -26,7 +26,7 @@ _DISTINCT = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
-class Oscillation:
+class OscillationDerivatives:
     """One run's derivatives by (4.4), prime and "hydrodynamic".
 
     Parameters
@@ -58,7 +58,7 @@ class Oscillation:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cubic:
+class CubicByTwoWays:
     """A third-order term found in two ways: (value, standard error), None if the runs do not allow it."""
 
     name: str
@@ -74,19 +74,19 @@ class Cubic:
         return (one - other) / float(np.hypot(error, its_error))
 
 
-def oscillations(campaign: Campaign, runs: Sequence[ReducedRun]) -> tuple[Oscillation, ...]:
+def oscillations(campaign: Campaign, runs: Sequence[ReducedRun]) -> tuple[OscillationDerivatives, ...]:
     """Each oscillating run by itself."""
     return tuple(_oscillation(campaign, run) for run in runs if run.run.oscillates)
 
 
-def frequency_parameter(campaign: Campaign, run: ReducedRun) -> float:
+def run_frequency_parameter(campaign: Campaign, run: ReducedRun) -> float:
     """omega U/g of an oscillating run (paper 2, section 5); 0 of a steady one."""
-    return tank_conditions.frequency_parameter(
+    return tank_conditions.brard_number(
         run.motion.frequency_radps, run.motion.mean_speed_mps, campaign.test.gravity_mps2
     )
 
 
-def _oscillation(campaign: Campaign, run: ReducedRun) -> Oscillation:
+def _oscillation(campaign: Campaign, run: ReducedRun) -> OscillationDerivatives:
     motion, model = run.motion, campaign.model
     speed, length, frequency = motion.mean_speed_mps, model.length_m, motion.frequency_radps
     letter = "v" if run.run.type == "pure_sway" else "r"
@@ -101,20 +101,20 @@ def _oscillation(campaign: Campaign, run: ReducedRun) -> Oscillation:
         unit = 0.5 * campaign.test.water_density_kgpm3 * length**2 * speed**2 * (length if force == "N" else 1.0)
         fit = run.fits[force]
         water = (fit.coefficients[: run.regressed] + run.projected(own[force][:, None])[:, 0]) / unit
-        error: Vector = np.sqrt(np.diag(fit.covariance))[: run.regressed] / unit
+        error: Array = np.sqrt(np.diag(fit.covariance))[: run.regressed] / unit
         # velocity is a cos(wt), acceleration -a w sin(wt); in the prime system w L/U
         values[f"{force}{letter}"], errors[f"{force}{letter}"] = water[1] / amplitude, error[1] / amplitude
         scale = -amplitude * reduced
         values[f"{force}{letter}dot"], errors[f"{force}{letter}dot"] = water[2] / scale, error[2] / abs(scale)
         third[f"{force}{3 * letter}"] = (4 * water[5] / amplitude**3, 4 * error[5] / amplitude**3)
-    return Oscillation(
+    return OscillationDerivatives(
         run=run.run.name,
         type=run.run.type,
         letter=letter,
         frequency_radps=frequency,
         amplitude=amplitude,
         reduced_frequency=reduced,
-        frequency_parameter=frequency_parameter(campaign, run),
+        frequency_parameter=run_frequency_parameter(campaign, run),
         values={name: float(value) for name, value in values.items()},
         standard_errors={name: float(error) for name, error in errors.items()},
         third={name: (float(value), float(error)) for name, (value, error) in third.items()},
@@ -127,7 +127,7 @@ def distinct(values: Sequence[float]) -> int:
     return sum(place == 0 or value > ordered[place - 1] * (1 + _DISTINCT) for place, value in enumerate(ordered))
 
 
-def cubics(found: Sequence[Oscillation]) -> tuple[Cubic, ...]:
+def cubics(found: Sequence[OscillationDerivatives]) -> tuple[CubicByTwoWays, ...]:
     """Third-order terms of pure sway and pure yaw from the third harmonic, and from the amplitude."""
     result = []
     for kind in ("pure_sway", "pure_yaw"):
@@ -140,7 +140,7 @@ def cubics(found: Sequence[Oscillation]) -> tuple[Cubic, ...]:
             mean = float(np.sum(weight * third[:, 0]) / np.sum(weight))
             linear = name[:2]
             result.append(
-                Cubic(
+                CubicByTwoWays(
                     name=name,
                     from_third_harmonic=(mean, float(np.sum(weight) ** -0.5)),
                     from_amplitude=_from_amplitude(rows, linear),
@@ -149,7 +149,7 @@ def cubics(found: Sequence[Oscillation]) -> tuple[Cubic, ...]:
     return tuple(result)
 
 
-def _from_amplitude(rows: Sequence[Oscillation], name: str) -> tuple[float, float] | None:
+def _from_amplitude(rows: Sequence[OscillationDerivatives], name: str) -> tuple[float, float] | None:
     """Third-order term from the slope of the damping against the square of the amplitude, one level a frequency."""
     amplitude = np.array([row.amplitude for row in rows])
     if distinct([abs(value) for value in amplitude]) < 2:
@@ -170,7 +170,7 @@ def _from_amplitude(rows: Sequence[Oscillation], name: str) -> tuple[float, floa
     return slope, float(np.linalg.norm(inverse[-1]))
 
 
-def cubic_findings(found: Sequence[Cubic]) -> list[str]:
+def cubic_findings(found: Sequence[CubicByTwoWays]) -> list[str]:
     """Sentences on third-order terms that the third harmonic and the amplitude give differently."""
     told = []
     for cubic in found:

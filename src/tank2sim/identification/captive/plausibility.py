@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from tank2sim.identification.captive.caution import Caution
 from tank2sim.identification.captive.expected_signs import EXPECTED_SIGNS, ExpectedSign
+from tank2sim.identification.captive.physics_warning import Caution
 
 ADDED_SHARE = (0.1, 3.0)
 """Added mass and added yaw inertia of ships over their own lie between; about 0.9 and 0.7 are usual."""

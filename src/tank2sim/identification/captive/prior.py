@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from tank2sim.identification.captive.equations import Equations
+from tank2sim.identification.captive.equations import CampaignEquations
 from tank2sim.identification.captive.regression import Spread, solve
 
 RATIOS: Mapping[str, tuple[str, float]] = {
@@ -34,7 +34,7 @@ Round figures, above the largest of the Mariner (Chislett & Strom-Tejsen 1965: Y
 Nvvv/Nv 6.2, Nvvd/Nd 3.5, Yvvd/Yd 4.3, Yddd/Yd 0.32). Terms that are not here are free."""
 
 
-def with_prior(equations: Equations, spread: Spread) -> Equations:
+def with_prior(equations: CampaignEquations, spread: Spread) -> CampaignEquations:
     """The equations with third-order terms of Y and N held loosely about zero, by their linear terms as found."""
     found = solve(equations, spread)
     held = {}

@@ -13,34 +13,34 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tank2sim.errors import InputError
-from tank2sim.identification.captive.cautions import body_of
 from tank2sim.identification.captive.contradictions import contradicted
+from tank2sim.identification.captive.cross_validation import LeftOut, leave_one_out
 from tank2sim.identification.captive.equations import SPEED_RANGE
-from tank2sim.identification.captive.faults import record_faults, reduced_faults
 from tank2sim.identification.captive.harmonics import ReducedRun, moderated, reduced_run
-from tank2sim.identification.captive.leaving_out import LeftOut, leave_one_out
-from tank2sim.identification.captive.order import (
+from tank2sim.identification.captive.oscillation import (
+    CubicByTwoWays,
+    OscillationDerivatives,
+    cubics,
+    oscillations,
+    run_frequency_parameter,
+)
+from tank2sim.identification.captive.regression import Solution, efficient_solution
+from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
+from tank2sim.identification.captive.selection import Selection, select
+from tank2sim.identification.captive.stepwise import (
     Disagreement,
     Stepwise,
     disagreements,
     scatter_within_tests,
     stepwise,
 )
-from tank2sim.identification.captive.oscillation import (
-    Cubic,
-    Oscillation,
-    cubics,
-    frequency_parameter,
-    oscillations,
-)
-from tank2sim.identification.captive.regression import Solution, efficient_solution
-from tank2sim.identification.captive.selection import Selection, select
 from tank2sim.identification.captive.symmetry import Asymmetry, asymmetry
 from tank2sim.identification.captive.systematic import SystematicError, force_delays, gauge_gains
 from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER, impossible_body
 from tank2sim.identification.captive.trends import Trend, trends
 from tank2sim.identification.captive.type_b import type_b_shifts
-from tank2sim.records.campaigns import FORCES, Campaign, together
+from tank2sim.identification.captive.warnings import body_of
+from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, together
 
 DISAGREEMENT_LIMIT = 3.5
 """Standard errors by which the two ways may differ before it is told."""
@@ -51,7 +51,7 @@ ESSENTIAL = ("Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot", "Yv", "Nv", "Yr", "Nr"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class ReductionOptions:
     """What the user asks for.
 
     Parameters
@@ -162,14 +162,14 @@ class Reduction:
     """
 
     campaign: Campaign
-    options: Options
+    options: ReductionOptions
     runs: tuple[ReducedRun, ...]
     not_used: Mapping[str, str]
     faults: tuple[InputError, ...]
     forces: Mapping[str, ForceResult]
     derivatives: Mapping[str, Derivative]
-    oscillations: tuple[Oscillation, ...]
-    cubics: tuple[Cubic, ...]
+    oscillations: tuple[OscillationDerivatives, ...]
+    cubics: tuple[CubicByTwoWays, ...]
     missing: tuple[str, ...]
 
     @property
@@ -178,7 +178,7 @@ class Reduction:
         return tuple(dict.fromkeys(error for result in self.forces.values() for error in result.systematic))
 
 
-def reduce_campaign(campaign: Campaign, options: Options | None = None) -> Reduction:
+def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None) -> Reduction:
     """Derivatives from a campaign.
 
     Raises
@@ -187,7 +187,7 @@ def reduce_campaign(campaign: Campaign, options: Options | None = None) -> Reduc
         Runs are at fault and `keep_going` is not asked for (all are told); no run is left; or a key that the runs need
         is missing; or a number of ``[model]``, or the sign of the resistance, cannot be.
     """
-    options = options or Options()
+    options = options or ReductionOptions()
     _refuse_impossible_body(campaign)
     runs, faults = _sound_runs(campaign)
     if faults and not options.keep_going:
@@ -202,10 +202,12 @@ def reduce_campaign(campaign: Campaign, options: Options | None = None) -> Reduc
         told = [*map(str, faults), *(f"{name}, for {reason}" for name, reason in not_used.items())]
         remedy = f"the first was left out: {told[0]}" if told else "give it runs"
         raise InputError(campaign.path, "runs", "no run can be used", remedy)
-    selections = {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCES}
+    selections = {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCE_COLUMNS}
     delays = force_delays({force: selection.equations for force, selection in selections.items()})
     forces = {force: _force_result(campaign, selection, delays, options) for force, selection in selections.items()}
-    derivatives = {name: found for force in FORCES for name, found in _derivatives(campaign, forces[force]).items()}
+    derivatives = {
+        name: found for force in FORCE_COLUMNS for name, found in _derivatives(campaign, forces[force]).items()
+    }
     _refuse_thrust(campaign, derivatives)
     alone = oscillations(campaign, runs)
     return Reduction(
@@ -264,12 +266,12 @@ def _sound_runs(campaign: Campaign) -> tuple[list[ReducedRun], list[InputError]]
 
 
 def _used_runs(
-    campaign: Campaign, runs: Sequence[ReducedRun], options: Options
+    campaign: Campaign, runs: Sequence[ReducedRun], options: ReductionOptions
 ) -> tuple[list[ReducedRun], dict[str, str]]:
     used: list[ReducedRun] = []
     not_used: dict[str, str] = {}
     for run in runs:
-        speed, fast = run.motion.mean_speed_mps, frequency_parameter(campaign, run)
+        speed, fast = run.motion.mean_speed_mps, run_frequency_parameter(campaign, run)
         if fast >= LARGEST_FREQUENCY_PARAMETER and not options.keep_fast:
             not_used[run.run.name] = (
                 f"omega U/g is {fast:.3g}, and coefficients fall steeply from {LARGEST_FREQUENCY_PARAMETER:g} on"
@@ -282,7 +284,7 @@ def _used_runs(
 
 
 def _force_result(
-    campaign: Campaign, selected: Selection, delays: Sequence[SystematicError], options: Options
+    campaign: Campaign, selected: Selection, delays: Sequence[SystematicError], options: ReductionOptions
 ) -> ForceResult:
     selection, found = trends(campaign, selected)
     solution = selection.solution

@@ -22,8 +22,9 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import chdtrc
 
-from tank2sim.identification.captive.equations import Equations
-from tank2sim.identification.conditioning import Matrix, Vector, column_norms, scaled_condition
+from tank2sim.arrays import Array
+from tank2sim.identification.captive.equations import CampaignEquations
+from tank2sim.identification.conditioning import column_norms, scaled_condition
 
 _NOISE_RANGE = (math.log(1e-3), math.log(1e4))
 """Natural logarithms of the factor on the within-run covariance."""
@@ -66,37 +67,37 @@ class Spread:
     gain_variance: float = 0.0
     weights: Spread | None = None
 
-    def zeros(self, equations: Equations) -> Vector:
+    def zeros(self, equations: CampaignEquations) -> Array:
         """Variance of the zero error of each run, (runs,)."""
         return np.array([self.by_type.get(run.run.type, self.zero_variance) for run in equations.runs])
 
-    def weighted(self, equations: Equations, columns: Matrix) -> Matrix:
+    def weighted(self, equations: CampaignEquations, columns: Array) -> Array:
         """Columns (rows, n) multiplied by an inverse root of the covariance of the equations."""
-        result: Matrix = columns / math.sqrt(self.noise)
+        result: Array = columns / math.sqrt(self.noise)
         for direction, sizes, variances in self._common_errors(equations):
             share = 1.0 - np.sqrt(self.noise / (self.noise + variances * sizes))
             along = equations.run_sums(direction[:, None] * result) * (share / sizes)[:, None]
             result = result - direction[:, None] * along[equations.run_of_row]
         return result
 
-    def run_root(self, equations: Equations, place: int) -> Matrix:
+    def run_root(self, equations: CampaignEquations, place: int) -> Array:
         """A root of the covariance of one run's coefficients, in ``Equations.unit``."""
         start, size = int(equations.first_rows[place]), len(equations.roots[place])
-        root: Matrix = math.sqrt(self.noise) * equations.roots[place]
+        root: Array = math.sqrt(self.noise) * equations.roots[place]
         for direction, sizes, variances in self._common_errors(equations):
             own, length = direction[start : start + size], float(sizes[place])
             along = math.sqrt(1.0 + float(variances[place]) * length / self.noise) - 1.0
             root = root @ (np.eye(size) + np.outer(own, own) * along / length)
         return root
 
-    def log_determinant(self, equations: Equations) -> float:
+    def log_determinant(self, equations: CampaignEquations) -> float:
         """Of the covariance of the weighted equations."""
         total = len(equations.values) * math.log(self.noise)
         for _, sizes, variances in self._common_errors(equations):
             total += float(np.sum(np.log1p(variances * sizes / self.noise)))
         return total
 
-    def _common_errors(self, equations: Equations) -> Iterator[tuple[Vector, Vector, Vector]]:
+    def _common_errors(self, equations: CampaignEquations) -> Iterator[tuple[Array, Array, Array]]:
         """What errs together in a run: direction (rows,), its squared norm in each run, and its variance (runs,).
 
         The covariance is noise R (I + g g' gain/noise) R', R R' = I + z z' zero/noise, g the inverse of R times the
@@ -132,22 +133,22 @@ class Solution:
     """
 
     names: tuple[str, ...]
-    values: Vector
-    covariance: Matrix
+    values: Array
+    covariance: Array
     spread: Spread
     condition: float
-    inflation: Vector
+    inflation: Array
 
     @property
-    def standard_errors(self) -> Vector:
+    def standard_errors(self) -> Array:
         """(terms,)."""
-        errors: Vector = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        errors: Array = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         return errors
 
     @property
-    def ratios(self) -> Vector:
+    def ratios(self) -> Array:
         """Value over standard error, (terms,)."""
-        ratios: Vector = self.values / np.maximum(self.standard_errors, 1e-300)
+        ratios: Array = self.values / np.maximum(self.standard_errors, 1e-300)
         return ratios
 
     def value(self, name: str) -> float:
@@ -159,7 +160,7 @@ class Solution:
         return float(self.standard_errors[self.names.index(name)])
 
 
-def solve(equations: Equations, spread: Spread) -> Solution:
+def solve(equations: CampaignEquations, spread: Spread) -> Solution:
     """Weighted least squares by QR; the covariance is that of a known spread, whatever the weights."""
     weights = spread.weights
     solution = efficient_solution(equations, weights or spread)
@@ -169,7 +170,7 @@ def solve(equations: Equations, spread: Spread) -> Solution:
     return replace(solution, spread=spread, covariance=solution.covariance @ scatter @ solution.covariance)
 
 
-def scatters(equations: Equations, spread: Spread) -> Matrix:
+def scatters(equations: CampaignEquations, spread: Spread) -> Array:
     """Covariance of what each run adds to the right of the weighted normal equations, (runs, terms, terms)."""
     design = (spread.weights or spread).weighted(equations, equations.design)
     ends = [*equations.first_rows[1:], len(equations.values)]
@@ -180,18 +181,18 @@ def scatters(equations: Equations, spread: Spread) -> Matrix:
     return found
 
 
-def run_covariance(equations: Equations, spread: Spread, place: int) -> Matrix:
+def run_covariance(equations: CampaignEquations, spread: Spread, place: int) -> Array:
     """Covariance of the weighted equations of one run, (rows, rows): unity if the weights are those of the spread."""
     size = len(equations.roots[place])
     if spread.weights is None:
         return np.eye(size)
     # Both are roots of covariances of the same coefficients, one by its weights and one as it is.
     root = np.linalg.solve(spread.weights.run_root(equations, place), spread.run_root(equations, place))
-    covariance: Matrix = np.asarray(root @ root.T, dtype=np.float64)
+    covariance: Array = np.asarray(root @ root.T, dtype=np.float64)
     return covariance
 
 
-def efficient_solution(equations: Equations, spread: Spread) -> Solution:
+def efficient_solution(equations: CampaignEquations, spread: Spread) -> Solution:
     """Generalised least squares by QR: weighted by the whole of a known spread, gain errors, too."""
     design, values = weighted_system(equations, spread)
     if not equations.names:
@@ -211,14 +212,14 @@ def efficient_solution(equations: Equations, spread: Spread) -> Solution:
     )
 
 
-def weighted_system(equations: Equations, spread: Spread) -> tuple[Matrix, Vector]:
+def weighted_system(equations: CampaignEquations, spread: Spread) -> tuple[Array, Array]:
     """Design and right-hand side of unit variance, the rows of the prior last."""
     weighted = spread.weighted(equations, np.column_stack([equations.design, equations.values]))
     prior = equations.prior_rows
     return np.vstack([weighted[:, :-1], prior]), np.concatenate([weighted[:, -1], np.zeros(len(prior))])
 
 
-def fitted_spread(equations: Equations, *, by_type: bool = True) -> Spread:
+def fitted_spread(equations: CampaignEquations, *, by_type: bool = True) -> Spread:
     """The spread that restricted maximum likelihood finds for these terms.
 
     One zero variance serves all types of run, unless the likelihood speaks clearly for one each: the tests at large
@@ -241,11 +242,11 @@ def fitted_spread(equations: Equations, *, by_type: bool = True) -> Spread:
     return _with_gain(equations, own if clearly else common, single)
 
 
-def _best(equations: Equations, start: Mapping[str, float], single: bool) -> tuple[Spread, float]:
+def _best(equations: CampaignEquations, start: Mapping[str, float], single: bool) -> tuple[Spread, float]:
     """The likeliest spread without gain errors, with a zero variance for each type of run in `start` (one type, "":
     all), and -2 log of its likelihood."""
 
-    def spread(logs: Vector) -> Spread:
+    def spread(logs: Array) -> Spread:
         variances = {kind: value * math.exp(log) for (kind, value), log in zip(start.items(), logs[1:], strict=True)}
         usual = math.exp(sum(math.log(value) for value in variances.values()) / len(variances))
         return Spread(1.0 if single else math.exp(logs[0]), usual, {} if "" in variances else variances)
@@ -253,12 +254,12 @@ def _best(equations: Equations, start: Mapping[str, float], single: bool) -> tup
     return _likeliest(equations, spread, [_NOISE_RANGE] + [_ZERO_RANGE] * len(start))
 
 
-def _with_gain(equations: Equations, base: Spread, single: bool) -> Spread:
+def _with_gain(equations: CampaignEquations, base: Spread, single: bool) -> Spread:
     """The likeliest spread with gain errors, weighted by one without; that itself if the likelihood knows of none."""
     if _criterion(equations, replace(base, gain_variance=_LEAST_GAIN)) >= _criterion(equations, base):
         return base
 
-    def spread(logs: Vector) -> Spread:
+    def spread(logs: Array) -> Spread:
         noise = base.noise * (1.0 if single else math.exp(logs[0]))
         factor = math.exp(logs[1])
         by_type = {kind: variance * factor for kind, variance in base.by_type.items()}
@@ -268,7 +269,7 @@ def _with_gain(equations: Equations, base: Spread, single: bool) -> Spread:
 
 
 def _likeliest(
-    equations: Equations, spread: Callable[[Vector], Spread], bounds: list[tuple[float, float]]
+    equations: CampaignEquations, spread: Callable[[Array], Spread], bounds: list[tuple[float, float]]
 ) -> tuple[Spread, float]:
     """The spread of greatest likelihood by its logarithms, from zero within their bounds, and -2 log of that."""
     found = minimize(
@@ -281,7 +282,7 @@ def _likeliest(
     return spread(found.x), float(found.fun)
 
 
-def _criterion(equations: Equations, spread: Spread) -> float:
+def _criterion(equations: CampaignEquations, spread: Spread) -> float:
     """-2 log of the restricted likelihood."""
     design, values = weighted_system(equations, spread)
     norms = column_norms(design)
@@ -291,7 +292,7 @@ def _criterion(equations: Equations, spread: Spread) -> float:
     return spread.log_determinant(equations) + information + float(residual @ residual)
 
 
-def _starting_zero(equations: Equations) -> float:
+def _starting_zero(equations: CampaignEquations) -> float:
     """Mean square misfit of the runs' means in an ordinary fit."""
     means = equations.first_rows
     roots = np.array([root[0, 0] for root in equations.roots])

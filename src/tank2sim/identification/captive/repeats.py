@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from tank2sim.cards.scaling import Scales
 from tank2sim.identification.captive.harmonics import ReducedRun
-from tank2sim.records.campaigns import FORCES, Campaign
+from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign
 
 _ANGLE_RAD = math.radians(0.2)
 _RELATIVE = 0.02
@@ -44,7 +44,7 @@ def repeats(campaign: Campaign, runs: Sequence[ReducedRun]) -> Repeats | None:
         return None
     freedom = sum(len(group) - 1 for group in groups)
     deviation = {}
-    for force in FORCES:
+    for force in FORCE_COLUMNS:
         total = 0.0
         for group in groups:
             means = [_mean(campaign, run, force) for run in group]

@@ -48,7 +48,7 @@ class Contents:
     inertia_source: str
 
 
-def contents(reduction: Reduction, fill: str | None = None) -> Contents:
+def card_contents(reduction: Reduction, fill: str | None = None) -> Contents:
     """What a card of a reduction has.
 
     Parameters
@@ -145,7 +145,7 @@ def _yaw_inertia(campaign: Campaign) -> tuple[float, str]:
     return model.mass_kg * ((0.25 * model.length_m) ** 2 + model.x_G_m**2), f"ESTIMATED: {GYRATION}"
 
 
-def card_text(reduction: Reduction, card: Contents, scale: float = 1.0) -> str:
+def reduced_card_text(reduction: Reduction, card: Contents, scale: float = 1.0) -> str:
     """The card's text at model scale, or Froude-scaled to a ship `scale` times as long.
 
     Prime numbers hold at every scale; length and speed follow lambda and lambda^0.5 (paper 2, section 5).

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from tank2sim.cards.terms import Term, parse_term
-from tank2sim.identification.captive.equations import Equations, candidate_terms, equations, excited
+from tank2sim.identification.captive.equations import CampaignEquations, campaign_equations, candidate_terms, excited
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.prior import with_prior
 from tank2sim.identification.captive.regression import Solution, Spread, fitted_spread, solve
@@ -66,7 +66,7 @@ class Selection:
     Of the terms in the regression those that the tests do not determine have ``kept`` false: they are not reported.
     """
 
-    equations: Equations
+    equations: CampaignEquations
     spread: Spread
     choices: tuple[Choice, ...]
 
@@ -99,7 +99,7 @@ def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_te
     Raises
     ------
     InputError
-        As :func:`tank2sim.identification.captive.equations.equations`.
+        As :func:`tank2sim.identification.captive.equations.campaign_equations`.
     """
     choices: dict[str, Choice] = {}
     used = told_apart(campaign, runs, force, choices)
@@ -113,7 +113,9 @@ def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_te
     return replace(selection, choices=tuple(sorted(choices.values(), key=lambda choice: order.index(choice.name))))
 
 
-def told_apart(campaign: Campaign, runs: Sequence[ReducedRun], force: str, choices: dict[str, Choice]) -> Equations:
+def told_apart(
+    campaign: Campaign, runs: Sequence[ReducedRun], force: str, choices: dict[str, Choice]
+) -> CampaignEquations:
     """The equations of all terms that the runs excite and can tell apart; the fate of the others goes to `choices`."""
     active = []
     for term in candidate_terms(force):
@@ -121,7 +123,7 @@ def told_apart(campaign: Campaign, runs: Sequence[ReducedRun], force: str, choic
             active.append(term.name)
         else:
             choices[term.name] = Choice(term.name, False, "not excited", f"no run moves so that {term.name} acts")
-    full = equations(campaign, runs, force, active)
+    full = campaign_equations(campaign, runs, force, active)
     return full.of_terms(_told_apart(full, choices))
 
 
@@ -152,7 +154,7 @@ def _order(term: Term) -> int:
     return term.v + term.r + term.d + term.u
 
 
-def _told_apart(full: Equations, choices: dict[str, Choice]) -> list[str]:
+def _told_apart(full: CampaignEquations, choices: dict[str, Choice]) -> list[str]:
     """Terms that the campaign can tell apart, taken from the simplest to the most mixed: each that joins must leave
     the condition number bearable."""
     kept: list[str] = []
@@ -181,7 +183,7 @@ def _told_apart(full: Equations, choices: dict[str, Choice]) -> list[str]:
     return [name for name in full.names if name in kept]
 
 
-def _conditions(full: Equations) -> int:
+def _conditions(full: CampaignEquations) -> int:
     """How many distinct conditions there are: an oscillating run counts once for each of its coefficients."""
     steady = {
         tuple(np.round([m.v_mps[0] / m.speed_mps[0], m.delta_rad[0], m.speed_mps[0]], 2).tolist())
@@ -198,6 +200,6 @@ def _simplicity(name: str) -> tuple[int, ...]:
     return (not _always(name), _order(term), term.u, mixed, term.d, term.r)
 
 
-def usual_zero(full: Equations) -> float:
+def usual_zero(full: CampaignEquations) -> float:
     """A zero error that makes every mean as good as the others: what can be told apart hangs on the tests alone."""
     return float(np.median([root[0, 0] for root in full.roots])) ** 2

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from tank2sim.cards.terms import parse_term
-from tank2sim.identification.captive.equations import equations, excited
+from tank2sim.identification.captive.equations import campaign_equations, excited
 from tank2sim.identification.captive.regression import solve
 from tank2sim.identification.captive.selection import Selection
 from tank2sim.identification.conditioning import COLLINEAR
@@ -52,12 +52,12 @@ def asymmetry(campaign: Campaign, selection: Selection) -> Asymmetry:
         assert term is not None
         if not excited(campaign, runs, term):
             continue
-        trial = equations(campaign, runs, force, [*kept, *other, term.name]).held(prior)
+        trial = campaign_equations(campaign, runs, force, [*kept, *other, term.name]).held(prior)
         if solve(trial, selection.spread).condition <= COLLINEAR:
             other.append(term.name)
     if not other:
         return Asymmetry(names=(), values=(), standard_errors=(), chance=1.0)
-    solution = solve(equations(campaign, runs, force, [*kept, *other]).held(prior), selection.spread)
+    solution = solve(campaign_equations(campaign, runs, force, [*kept, *other]).held(prior), selection.spread)
     values, covariance = solution.values[len(kept) :], solution.covariance[len(kept) :, len(kept) :]
     return Asymmetry(
         names=tuple(other),

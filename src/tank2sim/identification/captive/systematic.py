@@ -15,19 +15,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from tank2sim.identification.captive.equations import Equations
+from tank2sim.arrays import Array
+from tank2sim.identification.captive.equations import CampaignEquations
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import distinct
 from tank2sim.identification.captive.regression import Solution, Spread, fitted_spread, solve
-from tank2sim.identification.conditioning import SINGULAR, Matrix, Vector
+from tank2sim.identification.conditioning import SINGULAR_CONDITION
 
-SHOWN = 4.0
+_SHOWN = 4.0
 """Standard errors from which such an error is reported: of the some 20 that are looked for chance shows one in 800
 campaigns."""
 LEAST_PHASE_RAD = 0.003
 """Phase by which a delay turns the fastest oscillation before it is reported. A project choice: 0.003 of the damping
 force is then in the added mass, a third of a percent."""
-LEAST_GAIN = 0.02
+_LEAST_GAIN = 0.02
 """Relative error of a gauge in one kind of run before it is reported. A project choice: gauges are calibrated to 0.1 to
 1 %, and what (3.8) does not follow is of that size."""
 VISIBLE_GAIN = 0.1
@@ -93,7 +94,7 @@ class SystematicError:
             "the standard errors hold what it changes."
         )
 
-    def shifts(self, equations: Equations, solution: Solution) -> dict[str, float]:
+    def shifts(self, equations: CampaignEquations, solution: Solution) -> dict[str, float]:
         """What each term of a force (prime) moves by if the error is corrected."""
         if equations.force not in self.force:
             return {}
@@ -102,7 +103,7 @@ class SystematicError:
         return {name: float(shift) for name, shift in zip(equations.names, moved, strict=True)}
 
 
-def force_delays(forces: Mapping[str, Equations]) -> tuple[SystematicError, ...]:
+def force_delays(forces: Mapping[str, CampaignEquations]) -> tuple[SystematicError, ...]:
     """The delay of all gauges behind the motion, or of one, that oscillations at several frequencies show.
 
     Parameters
@@ -131,7 +132,7 @@ def can_show_delay(runs: Sequence[ReducedRun]) -> bool:
 
 
 def gauge_gains(
-    equations: Equations, spread: Spread, rival: float
+    equations: CampaignEquations, spread: Spread, rival: float
 ) -> tuple[tuple[SystematicError, ...], tuple[str, ...]]:
     """The kind of run in which a gauge departs most from what all other kinds imply, if it does; and the kinds of which
     that cannot be said, since no other kind gives their derivatives.
@@ -152,15 +153,15 @@ def gauge_gains(
     for kind in dict.fromkeys(kinds.tolist()):
         joined = _joined(equations, {"gain": np.where(kinds == kind, predicted, 0.0)})
         solution = solve(joined, spread)
-        if solution.condition < SINGULAR and abs(solution.value("gain")) > max(
-            LEAST_GAIN, _SUSPECT * solution.error("gain")
+        if solution.condition < SINGULAR_CONDITION and abs(solution.value("gain")) > max(
+            _LEAST_GAIN, _SUSPECT * solution.error("gain")
         ):
             # Scatter within kinds still holds what a gauge in error does: that beside the error is what counts.
             solution = solve(joined, fitted_spread(joined, by_type=False))
         size, error = solution.value("gain"), solution.error("gain")
-        if solution.condition > SINGULAR or SHOWN * error > VISIBLE_GAIN:
+        if solution.condition > SINGULAR_CONDITION or _SHOWN * error > VISIBLE_GAIN:
             unknown.append(kind)
-        elif abs(size) > max(SHOWN * error, rival * error, LEAST_GAIN):
+        elif abs(size) > max(_SHOWN * error, rival * error, _LEAST_GAIN):
             gains[kind] = size, error
     if not gains:
         return (), tuple(unknown)
@@ -177,7 +178,7 @@ def gauge_gains(
     return (found,), tuple(unknown)
 
 
-def advanced(equations: Equations, delay_s: float) -> Equations:
+def advanced(equations: CampaignEquations, delay_s: float) -> CampaignEquations:
     """The equations with the forces of the oscillating runs as they were a delay later: corrected for it."""
     change = np.zeros_like(equations.gauge)
     for rows, run, root in _oscillating(equations):
@@ -186,7 +187,7 @@ def advanced(equations: Equations, delay_s: float) -> Equations:
     return replace(equations, values=equations.values + change, gauge=equations.gauge + change)
 
 
-def _regauged(equations: Equations, kind: str, gain: float) -> Equations:
+def _regauged(equations: CampaignEquations, kind: str, gain: float) -> CampaignEquations:
     """The equations with what a gauge read too much in one kind of run taken off."""
     here = np.array([run.run.type == kind for run in equations.runs])[equations.run_of_row]
     change = np.where(here, -gain / (1.0 + gain) * equations.gauge, 0.0)
@@ -199,16 +200,16 @@ def _one_delay(delays: Sequence[tuple[float, float]], fastest_radps: float) -> t
         return None
     values, weights = np.array([value for value, _ in delays]), np.array([error**-2.0 for _, error in delays])
     mean, error = float(weights @ values / weights.sum()), float(weights.sum() ** -0.5)
-    if abs(mean) < max(SHOWN * error, LEAST_PHASE_RAD / max(fastest_radps, 1e-12)):
+    if abs(mean) < max(_SHOWN * error, LEAST_PHASE_RAD / max(fastest_radps, 1e-12)):
         return None
     chance = float(chdtrc(len(values) - 1, weights @ (values - mean) ** 2)) if len(values) > 1 else 1.0
-    apart = np.abs(values - mean) * np.sqrt(weights) > SHOWN
+    apart = np.abs(values - mean) * np.sqrt(weights) > _SHOWN
     if chance < _ALIKE and np.any(apart & (np.abs(values - mean) > _NEARLY * abs(mean))):
         return None
     return mean, error
 
 
-def _delays(equations: Equations) -> list[tuple[float, float]]:
+def _delays(equations: CampaignEquations) -> list[tuple[float, float]]:
     """The delay of one gauge in runs of sway and in runs of yaw by themselves, as far as they show it."""
     motions = {motion: kinds for motion, kinds in _MOTIONS.items() if _several_frequencies(equations.runs, kinds)}
     if not motions:
@@ -225,7 +226,7 @@ def _delays(equations: Equations) -> list[tuple[float, float]]:
             found = {motion: delay + steps[motion] for motion, delay in found.items()}
             if all(abs(step) < 0.1 * solution.error(motion) for motion, step in steps.items()):
                 break
-        shown = any(abs(delay) > SHOWN * solution.error(motion) for motion, delay in found.items())
+        shown = any(abs(delay) > _SHOWN * solution.error(motion) for motion, delay in found.items())
         if last or not shown:
             break
         spread = None  # that of the uncorrected forces has the delay in it
@@ -236,7 +237,9 @@ def _several_frequencies(runs: Sequence[ReducedRun], kinds: Sequence[str]) -> bo
     return distinct([run.motion.frequency_radps for run in runs if run.run.type in kinds]) > 1
 
 
-def _with_slopes(equations: Equations, motions: Mapping[str, Sequence[str]], delays: Mapping[str, float]) -> Equations:
+def _with_slopes(
+    equations: CampaignEquations, motions: Mapping[str, Sequence[str]], delays: Mapping[str, float]
+) -> CampaignEquations:
     """The equations corrected for a delay of each motion, with a small further one of each as unknown."""
     corrected = equations
     for motion, kinds in motions.items():
@@ -244,7 +247,7 @@ def _with_slopes(equations: Equations, motions: Mapping[str, Sequence[str]], del
     return _joined(corrected, {motion: _slope(corrected, kinds) for motion, kinds in motions.items()})
 
 
-def _some_advanced(equations: Equations, kinds: Sequence[str], delay_s: float) -> Equations:
+def _some_advanced(equations: CampaignEquations, kinds: Sequence[str], delay_s: float) -> CampaignEquations:
     here = np.array([run.run.type in kinds for run in equations.runs])[equations.run_of_row]
     whole = advanced(equations, delay_s)
     return replace(
@@ -254,7 +257,7 @@ def _some_advanced(equations: Equations, kinds: Sequence[str], delay_s: float) -
     )
 
 
-def _slope(equations: Equations, kinds: Sequence[str]) -> Vector:
+def _slope(equations: CampaignEquations, kinds: Sequence[str]) -> Array:
     """What a delay of 1 s of the gauge in some kinds of run adds to the equations: less its rate of change, (rows,)."""
     column = np.zeros_like(equations.gauge)
     for rows, run, root in _oscillating(equations):
@@ -265,14 +268,14 @@ def _slope(equations: Equations, kinds: Sequence[str]) -> Vector:
     return column
 
 
-def _oscillating(equations: Equations) -> Iterator[tuple[slice, ReducedRun, Matrix]]:
+def _oscillating(equations: CampaignEquations) -> Iterator[tuple[slice, ReducedRun, Array]]:
     for place, (run, root) in enumerate(zip(equations.runs, equations.roots, strict=True)):
         if run.run.oscillates:
             start = int(equations.first_rows[place])
             yield slice(start, start + len(root)), run, root
 
 
-def _rate(count: int, frequency_radps: float) -> Matrix:
+def _rate(count: int, frequency_radps: float) -> Array:
     """Takes mean and harmonics (count,) of a force to those of its rate of change."""
     matrix = np.zeros((count, count))
     for place in range(1, count, 2):
@@ -281,7 +284,7 @@ def _rate(count: int, frequency_radps: float) -> Matrix:
     return matrix
 
 
-def _turned(count: int, phase_rad: float) -> Matrix:
+def _turned(count: int, phase_rad: float) -> Array:
     """Takes mean and harmonics (count,) of a force to those of the force a phase later: harmonic k turns by k times."""
     matrix = np.eye(count)
     for place in range(1, count, 2):
@@ -291,7 +294,7 @@ def _turned(count: int, phase_rad: float) -> Matrix:
     return matrix
 
 
-def _joined(equations: Equations, columns: Mapping[str, Vector]) -> Equations:
+def _joined(equations: CampaignEquations, columns: Mapping[str, Array]) -> CampaignEquations:
     """The equations with more unknowns."""
     return replace(
         equations,
@@ -300,7 +303,7 @@ def _joined(equations: Equations, columns: Mapping[str, Vector]) -> Equations:
     )
 
 
-def _predicted(equations: Equations, spread: Spread) -> Vector:
+def _predicted(equations: CampaignEquations, spread: Spread) -> Array:
     """The gauge's coefficients as the derivatives predict them: no noise in them, (rows,)."""
-    residual: Vector = equations.values - equations.design @ solve(equations, spread).values
+    residual: Array = equations.values - equations.design @ solve(equations, spread).values
     return equations.gauge - residual

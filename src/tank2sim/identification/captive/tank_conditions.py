@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from tank2sim.identification.captive.caution import Caution, lacking
+from tank2sim.identification.captive.physics_warning import Caution, lacking
 
 SHORTEST_MODEL_M = 4.0
 """Paper 2: between models of 4 m and 2 m most coefficients differ by about 10 %."""
@@ -66,7 +66,7 @@ SIMILARITY = {"m'": (0.02, "relative"), "J_z'": (0.05, "relative"), "x_G'": (0.0
 
 
 @dataclass(frozen=True)
-class Oscillation:
+class OscillationMotion:
     """Motion of one run: ``sway`` or ``yaw``, and its angular frequency (rad/s) as measured."""
 
     run: str
@@ -83,7 +83,7 @@ class Tank:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Body:
+class CarriedBody:
     """The body that the gauges carry, in the water density of the test; SI."""
 
     length_m: float
@@ -143,7 +143,7 @@ class FroudeScaling:
         return math.pow(self.length, 1.5) / self.viscosity
 
 
-def frequency_parameter(frequency_radps: float, speed_mps: float, gravity_mps2: float) -> float:
+def brard_number(frequency_radps: float, speed_mps: float, gravity_mps2: float) -> float:
     """zeta = omega U/g, which is also omega' Fn^2 (paper 2, section 5)."""
     return frequency_radps * speed_mps / gravity_mps2
 
@@ -177,9 +177,11 @@ def model_length(length_m: float) -> Iterator[Caution]:
         )
 
 
-def frequency_parameters(runs: tuple[Oscillation, ...], speed_mps: float, gravity_mps2: float) -> Iterator[Caution]:
+def frequency_parameters(
+    runs: tuple[OscillationMotion, ...], speed_mps: float, gravity_mps2: float
+) -> Iterator[Caution]:
     """Runs with omega U/g of 0.1 or more; those are to be left out."""
-    values = {run.run: frequency_parameter(run.frequency_radps, speed_mps, gravity_mps2) for run in runs}
+    values = {run.run: brard_number(run.frequency_radps, speed_mps, gravity_mps2) for run in runs}
     high = tuple(name for name, value in values.items() if value >= LARGEST_FREQUENCY_PARAMETER)
     if high:
         yield Caution(
@@ -191,7 +193,7 @@ def frequency_parameters(runs: tuple[Oscillation, ...], speed_mps: float, gravit
         )
 
 
-def flow_memory(runs: tuple[Oscillation, ...], speed_mps: float, length_m: float) -> Iterator[Caution]:
+def flow_memory(runs: tuple[OscillationMotion, ...], speed_mps: float, length_m: float) -> Iterator[Caution]:
     """Runs so fast that the force depends on the motion before, one caution a kind of motion."""
     for motion, limit in LARGEST_REDUCED_FREQUENCY.items():
         values = {
@@ -245,7 +247,7 @@ def similarity(model: Mapping[str, float | None], ship: Mapping[str, float | Non
             )
 
 
-def tank_resonance(runs: tuple[Oscillation, ...], tank: Tank, gravity_mps2: float) -> Iterator[Caution]:
+def tank_resonance(runs: tuple[OscillationMotion, ...], tank: Tank, gravity_mps2: float) -> Iterator[Caution]:
     """Runs of which the motion or its third harmonic is near a transverse standing wave of the tank.
 
     A model on the centreline that sways or yaws excites the waves that are odd across the tank, modes 1, 3, 5.
@@ -304,7 +306,7 @@ def depth_froude(speed_mps: float, depth_m: float | None, gravity_mps2: float) -
         yield Caution("depth Froude number", message + "waves of the model.")
 
 
-def impossible_body(body: Body) -> Iterator[tuple[str, str]]:
+def impossible_body(body: CarriedBody) -> Iterator[tuple[str, str]]:
     """What no floating body has: the key under ``[model]``, and what is wrong. Most often a wrong unit."""
     if body.block is not None and not _within(body.block, POSSIBLE_BLOCKS):
         yield (
@@ -330,7 +332,7 @@ def impossible_body(body: Body) -> Iterator[tuple[str, str]]:
         yield "x_G_m", f"is {body.x_G_m:.4g}: the centre of gravity is off the ship, {body.length_m:g} m long"
 
 
-def carried_mass(body: Body, block_coefficient: float | None = None) -> Iterator[Caution]:
+def carried_mass(body: CarriedBody, block_coefficient: float | None = None) -> Iterator[Caution]:
     """A mass that does not fit the hull, a yaw inertia or a centre of gravity that does not fit a ship."""
     block = body.block
     if block is not None and not _within(block, BLOCK_COEFFICIENTS):

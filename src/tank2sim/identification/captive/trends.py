@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from tank2sim.identification.captive.equations import Equations, equations
+from tank2sim.identification.captive.equations import CampaignEquations, campaign_equations
 from tank2sim.identification.captive.oscillation import distinct
 from tank2sim.identification.captive.regression import fitted_spread, solve
 from tank2sim.identification.captive.selection import Choice, Selection
 from tank2sim.identification.conditioning import COLLINEAR
 from tank2sim.records.campaigns import Campaign
 
-SHOWN = 3.5
+_SHOWN = 3.5
 """Standard errors from which a slope counts as shown: with eight slopes in a campaign chance reaches it once in 250."""
 _FEWEST_FREQUENCIES = 3
 
@@ -58,14 +58,14 @@ def trends(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[T
     ]
     if not candidates:
         return selection, ()
-    full = equations(campaign, used.runs, used.force, [*used.names, *map(_slope, candidates)]).held(used.prior)
+    full = campaign_equations(campaign, used.runs, used.force, [*used.names, *map(_slope, candidates)]).held(used.prior)
     names = list(used.names)
     shown: list[str] = []
     while True:
         found = [_trend(full, names, name, selection) for name in candidates if name not in shown]
         told = [trend for trend in found if trend is not None]
         best = max(told, key=_ratio, default=None)
-        if best is None or _ratio(best) < SHOWN:
+        if best is None or _ratio(best) < _SHOWN:
             break
         shown.append(best.name)
         names.append(_slope(best.name))
@@ -85,7 +85,7 @@ def _slope(name: str) -> str:
     return f"{name} w2"
 
 
-def _trend(full: Equations, names: Sequence[str], name: str, selection: Selection) -> Trend | None:
+def _trend(full: CampaignEquations, names: Sequence[str], name: str, selection: Selection) -> Trend | None:
     """The trend of one term beside the named terms; None if the runs cannot tell it from them."""
     part = full.of_terms([*names, _slope(name)])
     solution = solve(part, selection.spread)

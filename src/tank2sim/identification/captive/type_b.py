@@ -11,15 +11,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from tank2sim.identification.captive.equations import Equations, equations
+from tank2sim.identification.captive.equations import CampaignEquations, campaign_equations
 from tank2sim.identification.captive.harmonics import ReducedRun
-from tank2sim.identification.captive.motion import Motion
+from tank2sim.identification.captive.motion import CaptiveMotion
 from tank2sim.identification.captive.regression import Solution, solve
 from tank2sim.identification.captive.systematic import advanced
 from tank2sim.records.campaigns import Campaign
 
 
-def type_b_shifts(campaign: Campaign, used: Equations, solution: Solution) -> dict[str, dict[str, float]]:
+def type_b_shifts(campaign: Campaign, used: CampaignEquations, solution: Solution) -> dict[str, dict[str, float]]:
     """What each term of a force (prime) moves by, with its sign, for each stated error of one standard deviation.
 
     `solution` is that of the equations `used`.
@@ -35,12 +35,12 @@ def type_b_shifts(campaign: Campaign, used: Equations, solution: Solution) -> di
     return found
 
 
-def _with_error(campaign: Campaign, used: Equations, source: str, size: float) -> Equations:
+def _with_error(campaign: Campaign, used: CampaignEquations, source: str, size: float) -> CampaignEquations:
     """The equations as they would be if the error were of one standard deviation."""
     if source == "force_delay_s":
         return advanced(used, size)
     changed, altered = _altered(campaign, used.runs, source, size)
-    return equations(changed, altered, used.force, used.names).held(used.prior)
+    return campaign_equations(changed, altered, used.force, used.names).held(used.prior)
 
 
 def _altered(
@@ -53,7 +53,7 @@ def _altered(
         return _model(campaign, "yaw_inertia_kgm2", 1 + size), list(runs)
     if source == "calibration_relative":
         return campaign, [_scaled(run, 1 + size) for run in runs]
-    changes: dict[str, Callable[[Motion], Motion]] = {
+    changes: dict[str, Callable[[CaptiveMotion], CaptiveMotion]] = {
         "alignment_rad": lambda motion: replace(motion, v_mps=motion.v_mps - motion.speed_mps * np.sin(size)),
         "rudder_rad": lambda motion: replace(motion, delta_rad=motion.delta_rad + size),
         "speed_relative": lambda motion: replace(motion, speed_mps=motion.speed_mps * (1 + size)),

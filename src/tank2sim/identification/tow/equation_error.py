@@ -17,9 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from tank2sim.arrays import Array
 from tank2sim.dynamics.surge import DRAG_POWERS
 from tank2sim.errors import InputError
-from tank2sim.identification.conditioning import Matrix, Vector, column_norms
+from tank2sim.identification.conditioning import column_norms
 from tank2sim.identification.tow.force import as_force
 from tank2sim.records.tows import Tows
 
@@ -45,7 +46,7 @@ class SpeedFit:
     polynomial: Polynomial
     span_s: float
     scatter_mps: float
-    covariance: Matrix
+    covariance: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,44 +67,44 @@ class EquationError:
         M, if it is known; the drag terms alone are then unknown. All estimates hold it in their first place still.
     """
 
-    time_s: Vector
-    weights: Vector
-    basis: Matrix
+    time_s: Array
+    weights: Array
+    basis: Array
     terms: tuple[str, ...]
-    force_N: Vector
+    force_N: Array
     mass_kg: float | None = None
 
     @property
-    def known(self) -> Vector:
+    def known(self) -> Array:
         """The leading estimates that are known: none, or M."""
         return np.array([] if self.mass_kg is None else [self.mass_kg])
 
     @property
-    def inner_products(self) -> Matrix:
+    def inner_products(self) -> Array:
         """b_ij of (1.12), (1 + terms, 1 + terms)."""
         return self.basis.T @ (self.weights[:, None] * self.basis)
 
     @property
-    def force_products(self) -> Vector:
+    def force_products(self) -> Array:
         """b_i0 of (1.12), (1 + terms,)."""
         return (self.weights * self.force_N) @ self.basis
 
     @property
-    def design(self) -> Matrix:
+    def design(self) -> Array:
         """Basis with each node weighted by the root of its weight: its normal matrix is b_ij."""
         return np.sqrt(self.weights)[:, None] * self.basis
 
     @property
-    def free_design(self) -> Matrix:
+    def free_design(self) -> Array:
         """The columns of :attr:`design` of what is unknown."""
         return self.design[:, len(self.known) :]
 
     @property
-    def target(self) -> Vector:
+    def target(self) -> Array:
         """Right-hand side that belongs to :attr:`design`, (nodes,)."""
         return np.sqrt(self.weights) * self.force_N
 
-    def J(self, estimates: Vector) -> float:
+    def J(self, estimates: Array) -> float:
         """J of (1.6), N s^(1/2), for (M, B...), (1 + terms,)."""
         return float(np.linalg.norm(self.design @ estimates - self.target))
 
@@ -135,7 +136,7 @@ def fit_mean_speed(tows: Tows, degree: int = 2) -> SpeedFit:
     return SpeedFit(polynomial, span, float(np.sqrt(variance)), spread @ spread.T)
 
 
-def simpson_nodes(times_s: Vector) -> tuple[Vector, Vector]:
+def simpson_nodes(times_s: Array) -> tuple[Array, Array]:
     """Nodes and weights of Simpson's rule over the recorded time, in an even number of intervals.
 
     The intervals are as long as the sampling step (the median), or slightly shorter to make them even in number; there
@@ -152,7 +153,7 @@ def simpson_nodes(times_s: Vector) -> tuple[Vector, Vector]:
 
 def discretise(
     speed: Polynomial,
-    times_s: Vector,
+    times_s: Array,
     terms: tuple[str, ...],
     force: float | Polynomial,
     *,
@@ -179,26 +180,26 @@ def discretise(
     return EquationError(time, weights, basis, terms, as_force(force)(time), mass_kg)
 
 
-def solve_normal_equations(problem: EquationError) -> Vector:
+def solve_normal_equations(problem: EquationError) -> Array:
     """(M, B...) from (1.12), as in the paper."""
     known, products = problem.known, problem.inner_products
     first = len(known)
     right = problem.force_products[first:] - products[first:, :first] @ known
-    estimates: Vector = np.concatenate([known, np.linalg.solve(products[first:, first:], right)])
+    estimates: Array = np.concatenate([known, np.linalg.solve(products[first:, first:], right)])
     return estimates
 
 
-def solve_by_qr(problem: EquationError) -> Vector:
+def solve_by_qr(problem: EquationError) -> Array:
     """(M, B...) from the same least-squares problem by QR, which halves the digits lost to its condition."""
     known = problem.known
     norms = column_norms(problem.free_design)
     q, r = np.linalg.qr(problem.free_design / norms)
     right = problem.target - problem.design[:, : len(known)] @ known
-    estimates: Vector = np.concatenate([known, np.linalg.solve(r, q.T @ right) / norms])
+    estimates: Array = np.concatenate([known, np.linalg.solve(r, q.T @ right) / norms])
     return estimates
 
 
-def covariance(problem: EquationError, estimates: Vector, speed: SpeedFit) -> Matrix:
+def covariance(problem: EquationError, estimates: Array, speed: SpeedFit) -> Array:
     """Covariance (1 + terms, 1 + terms) of the least-squares estimates, from the scatter of the readings.
 
     The scatter is carried to first order through the polynomial and the solution. It is assumed that (1.5) with these

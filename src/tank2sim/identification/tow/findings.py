@@ -9,7 +9,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy import stats
 
-from tank2sim.identification.conditioning import COLLINEAR, Vector, scaled_condition
+from tank2sim.arrays import Array
+from tank2sim.identification.conditioning import COLLINEAR, scaled_condition
 from tank2sim.identification.tow.fit import TowFit
 from tank2sim.identification.tow.output_error import simulated_speeds
 from tank2sim.records.tows import Tows
@@ -19,7 +20,7 @@ _TWO_SIDED_95 = 1.96
 _SIGNIFICANCE = 0.05
 
 
-def findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping[str, TowFit]) -> Iterator[str]:
+def tow_findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping[str, TowFit]) -> Iterator[str]:
     """Sentences on terms that are not identifiable, values that cannot be, and misfits beyond the scatter.
 
     Parameters
@@ -138,7 +139,7 @@ def _polynomial_findings(tows: Tows, speed: Polynomial, fit: TowFit) -> Iterator
         )
 
 
-def _worst_misfit(tows: Tows, speeds: Vector, estimates: int) -> int | None:
+def _worst_misfit(tows: Tows, speeds: Array, estimates: int) -> int | None:
     """Row at which speeds (times,) leave the mean of the tows most, if they leave it more than scatter explains.
 
     The test is the F test of lack of fit, the scatter of the tows about their mean being the pure error. None also

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.dynamics.surge import SurgeCoefficients, drag
-from tank2sim.identification.conditioning import Matrix, Vector, correlation, scaled_condition
+from tank2sim.identification.conditioning import correlation_matrix, scaled_condition
 
 KEYS = {"M": "total_mass_kg", "B1": "B1_kgs2pm3", "B2": "B2_kgspm2", "B3": "B3_kgpm", "delay": "start_delay_s"}
 """Unknown of (1.5) to its name with unit, as in :class:`SurgeCoefficients`, the card and the JSON."""
@@ -43,10 +44,10 @@ class TowFit:
 
     method: str
     terms: tuple[str, ...]
-    values: Vector
-    covariance: Matrix | None
+    values: Array
+    covariance: Array | None
     mass_kg: float
-    design: Matrix
+    design: Array
     J: float
     largest_speed_error_mps: float
 
@@ -99,9 +100,9 @@ class TowFit:
         return {**named, "added_mass_kg": float(errors[0])}
 
     @property
-    def correlation(self) -> Matrix | None:
+    def correlation(self) -> Array | None:
         """Correlations of the values, (unknowns, unknowns)."""
-        return None if self.covariance is None else correlation(self.covariance)
+        return None if self.covariance is None else correlation_matrix(self.covariance)
 
     @property
     def condition(self) -> float:
@@ -113,10 +114,10 @@ class TowFit:
         """Condition number of the normal matrix with a diagonal of ones: free of the units."""
         return scaled_condition(self.design) ** 2
 
-    def drag_N(self, speed_mps: Vector) -> Vector:
+    def drag_N(self, speed_mps: Array) -> Array:
         """Drag in N at speeds in m/s."""
         c = self.coefficients
-        force: Vector = drag(speed_mps, c.B1_kgs2pm3, c.B2_kgspm2, c.B3_kgpm)
+        force: Array = drag(speed_mps, c.B1_kgs2pm3, c.B2_kgspm2, c.B3_kgpm)
         return force
 
     def as_json(self) -> dict[str, Any]:

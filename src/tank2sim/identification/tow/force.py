@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.identification.conditioning import Vector
 
 
 def as_force(force: float | Polynomial) -> Polynomial:
@@ -31,7 +31,7 @@ def parse_force(text: str) -> Polynomial:
     return Polynomial(coefficients)
 
 
-def checked_force(force: Polynomial, times_s: Vector) -> Polynomial:
+def checked_force(force: Polynomial, times_s: Array) -> Polynomial:
     """The force, if it pulls forward from the release to the last reading.
 
     Raises
@@ -49,7 +49,7 @@ def checked_force(force: Polynomial, times_s: Vector) -> Polynomial:
     return force
 
 
-def mean_force(force: Polynomial, times_s: Vector) -> float:
+def mean_force(force: Polynomial, times_s: Array) -> float:
     """Mean of T(t) from the release to the last reading, N."""
     end = float(times_s[-1])
     return float(force.integ()(end)) / end

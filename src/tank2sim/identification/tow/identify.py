@@ -20,17 +20,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from tank2sim.arrays import Array
 from tank2sim.dynamics.surge import DRAG_POWERS
 from tank2sim.errors import InputError
-from tank2sim.identification.conditioning import SINGULAR, Matrix, Vector, scaled_condition
+from tank2sim.identification.conditioning import SINGULAR_CONDITION, scaled_condition
 from tank2sim.identification.tow import equation_error, output_error
-from tank2sim.identification.tow.findings import findings
+from tank2sim.identification.tow.findings import tow_findings
 from tank2sim.identification.tow.fit import TowFit
 from tank2sim.identification.tow.force import as_force, checked_force, force_words, mean_force
 from tank2sim.identification.tow.output_error import AT_ONCE, TowOptions
 from tank2sim.records.tows import Tows
 
-METHODS = ("paper", "qr", "output_error")
+TOW_METHODS = ("paper", "qr", "output_error")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -139,7 +140,7 @@ def identify_tow(
     _check_solvable(tows, problem)
     solutions = _solutions(tows, speed, problem, pull, options)
     fits = {name: _fit(name, solution, (tows, mass, pull), problem) for name, solution in solutions.items()}
-    notes = _notes(tows, force, mass, set(METHODS) - set(fits))
+    notes = _notes(tows, force, mass, set(TOW_METHODS) - set(fits))
     return TowResult(
         tows=tows,
         force=pull,
@@ -148,14 +149,14 @@ def identify_tow(
         speed_polynomial=tuple(float(value) for value in speed.polynomial.coef),
         fits=fits,
         options=options,
-        warnings=(*notes, *findings(tows, pull, speed.polynomial, fits)),
+        warnings=(*notes, *tow_findings(tows, pull, speed.polynomial, fits)),
     )
 
 
 class _Solution(NamedTuple):
-    values: Vector
-    design: Matrix
-    covariance: Matrix | None = None
+    values: Array
+    design: Array
+    covariance: Array | None = None
 
 
 def _solutions(
@@ -258,6 +259,6 @@ def _check_solvable(tows: Tows, problem: equation_error.EquationError) -> None:
     if problem.mass_kg is None and gain < 1e-6 * tows.top_speed_mps:
         silent = "the speed does not change, so that the tows tell nothing of the mass"
         raise InputError(tows.path, "", silent, "give tows that accelerate from rest")
-    if scaled_condition(problem.free_design) > SINGULAR:
+    if scaled_condition(problem.free_design) > SINGULAR_CONDITION:
         unknowns = ", ".join(("M", *problem.terms)[len(problem.known) :])
         raise InputError(tows.path, "", f"the equations for {unknowns} are singular", "take fewer terms (--terms B3)")

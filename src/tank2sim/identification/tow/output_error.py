@@ -13,15 +13,16 @@ from numpy.polynomial import Polynomial
 from scipy import stats
 from scipy.optimize import least_squares
 
+from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.surge import DRAG_POWERS, SurgeCoefficients, surge_model
 from tank2sim.errors import InputError
-from tank2sim.identification.conditioning import Matrix, Vector, column_norms, scaled_condition
+from tank2sim.identification.conditioning import column_norms, scaled_condition
 from tank2sim.identification.tow.force import as_force, mean_force
 from tank2sim.records.tows import Tows
 from tank2sim.simulation.scheme import runge_kutta_step
 
-Predictor = Callable[[Vector], tuple[Vector, Matrix]]
+Predictor = Callable[[Array], tuple[Array, Array]]
 
 MOST_STEPS = 5000
 """Steps of the integration over a record: one that lasts longer than so many of the model's steps is of a body that is
@@ -65,9 +66,9 @@ class OutputErrorFit:
         Fitted speed less reading.
     """
 
-    estimates: Vector
-    design: Matrix
-    residuals_mps: Vector
+    estimates: Array
+    design: Array
+    residuals_mps: Array
 
     @property
     def scatter_mps(self) -> float:
@@ -80,17 +81,17 @@ class OutputErrorFit:
         return len(self.residuals_mps) - len(self.estimates)
 
     @property
-    def covariance(self) -> Matrix:
+    def covariance(self) -> Array:
         """Covariance of the estimates, for readings that err independently and alike and a model that is true."""
         norms = column_norms(self.design)
         inverse = np.linalg.pinv(self.design / norms) / norms[:, None]
-        covariance: Matrix = self.scatter_mps**2 * inverse @ inverse.T
+        covariance: Array = self.scatter_mps**2 * inverse @ inverse.T
         return covariance
 
     @property
-    def half_widths(self) -> Vector:
+    def half_widths(self) -> Array:
         """Half-widths of the 95 % intervals of the estimates, by Student's t, (unknowns,)."""
-        half: Vector = stats.t.ppf(0.975, self.freedom) * np.sqrt(np.diag(self.covariance))
+        half: Array = stats.t.ppf(0.975, self.freedom) * np.sqrt(np.diag(self.covariance))
         return half
 
     @property
@@ -107,7 +108,7 @@ class OutputErrorFit:
 
 
 def speed_predictor(
-    times_s: Vector, force: float | Polynomial, terms: tuple[str, ...], options: TowOptions = AT_ONCE
+    times_s: Array, force: float | Polynomial, terms: tuple[str, ...], options: TowOptions = AT_ONCE
 ) -> Predictor:
     """Speeds of (1.5) from rest, and their sensitivities.
 
@@ -132,7 +133,7 @@ def speed_predictor(
     mass, row = model.parameter_names.index("surge.total_mass"), model.state_names.index("motion.u")
     places = np.cumsum(counts)
 
-    def predict(estimates: Vector) -> tuple[Vector, Matrix]:
+    def predict(estimates: Array) -> tuple[Array, Array]:
         parameters = model.parameter_values()
         if options.total_mass_kg is not None:
             parameters[mass] = options.total_mass_kg
@@ -175,8 +176,8 @@ def _sensitive_step(names: tuple[str, ...], width: int) -> ca.Function:
 
 
 def simulated_speeds(
-    coefficients: SurgeCoefficients, force: float | Polynomial, times_s: Vector, start_delay_s: float = 0.0
-) -> Vector:
+    coefficients: SurgeCoefficients, force: float | Polynomial, times_s: Array, start_delay_s: float = 0.0
+) -> Array:
     """Speed (times,) in m/s of (1.5) from rest, at times >= 0 that rise."""
     values = [coefficients.total_mass_kg, coefficients.B1_kgs2pm3, coefficients.B2_kgspm2, coefficients.B3_kgpm]
     predict = speed_predictor(times_s, force, tuple(DRAG_POWERS), TowOptions(start_delay=True))
@@ -203,7 +204,7 @@ def fit_speeds(
         raise InputError(tows.path, "", problem, "give more readings, or take fewer terms (--terms B3)")
 
     @functools.lru_cache(maxsize=2)  # residuals and Jacobian are asked for at one point, one after the other
-    def at(*scaled: float) -> tuple[Vector, Matrix]:
+    def at(*scaled: float) -> tuple[Array, Array]:
         speeds, sensitivities = predict(np.array(scaled) * scale)
         return speeds[row_of_reading] - readings, sensitivities[row_of_reading] * scale
 
@@ -224,7 +225,7 @@ def fit_speeds(
     return OutputErrorFit(best * scale, design / scale, residuals)
 
 
-def _search(tows: Tows, force_N: float, terms: tuple[str, ...], options: TowOptions) -> tuple[Vector, Vector, Vector]:
+def _search(tows: Tows, force_N: float, terms: tuple[str, ...], options: TowOptions) -> tuple[Array, Array, Array]:
     """Scale of each unknown, and start and upper bound in that scale; the lower bound is 0 where an upper one is."""
     # The mass that gives the last mean speed without drag, and drag terms as large as the force at the top speed.
     mass = force_N * tows.time_s[-1] / max(tows.mean_speed_mps[-1], 1e-3 * tows.top_speed_mps)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import stats
 
+from tank2sim.arrays import Array
 from tank2sim.dynamics.surge_theory import (
     VISCOSITY_M2PS,
     WATER_KGPM3,
@@ -19,10 +20,10 @@ from tank2sim.dynamics.surge_theory import (
     masses_by_theory,
 )
 from tank2sim.errors import InputError
-from tank2sim.identification.conditioning import COLLINEAR, Vector
+from tank2sim.identification.conditioning import COLLINEAR
 from tank2sim.identification.tow.equation_error import discretise, fit_mean_speed, solve_by_qr
 from tank2sim.identification.tow.identify import TowResult
-from tank2sim.identification.tow.models import (
+from tank2sim.identification.tow.model_selection import (
     SIMPLE,
     SIMPLE_LATE,
     FittedModel,
@@ -56,8 +57,8 @@ class Ellipse(NamedTuple):
 
     label: str
     centre: tuple[float, float]
-    mass_kg: Vector
-    B3_kgpm: Vector
+    mass_kg: Array
+    B3_kgpm: Array
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -101,10 +102,10 @@ class TowStudy:
         usable = [one for one in self.models if one.plausible and one.determined]
         return min(usable, key=lambda one: one.fit.aic, default=None)
 
-    def simulated(self) -> tuple[Vector, dict[str, Vector]]:
+    def simulated(self) -> tuple[Array, dict[str, Array]]:
         """Times (n,), s, and speeds (n,), m/s, of the best usable model and of the methods, each motion once."""
         result, time = self.result, np.linspace(0.0, float(self.result.tows.time_s[-1]), 301)
-        found: dict[str, Vector] = {}
+        found: dict[str, Array] = {}
         if self.best is not None:
             label = f"best usable: {self.best.model.label}"
             found[label] = simulated_speeds(self.best.coefficients, result.force, time, self.best.delay_s)

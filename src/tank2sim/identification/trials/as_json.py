@@ -8,8 +8,8 @@ import numpy as np
 
 from tank2sim.cards.reading import changed_text
 from tank2sim.files import BYTE_ORDER_MARK
-from tank2sim.identification.trials.comparison import Comparison, misfit
-from tank2sim.identification.trials.evaluation import Figure, Following, pooled
+from tank2sim.identification.trials.assessment.comparison import Comparison, misfit
+from tank2sim.identification.trials.assessment.evaluation import FigureComparison, Following, pooled
 from tank2sim.identification.trials.identify import Identification
 from tank2sim.marks import FORCED
 
@@ -166,7 +166,7 @@ def figure_rows(result: Identification) -> list[list[object]]:
     return rows
 
 
-def improved_text(result: Identification, trials: list[str]) -> str:
+def identified_card_text(result: Identification, trials: list[str]) -> str:
     """Text of the card found, with the trials told in its source."""
     card = result.card
     how = f"identified by tank2sim ({result.estimate.method}, {result.structure}) from {', '.join(trials)}"
@@ -197,7 +197,7 @@ def _yaw_error(one: Following, noise: float) -> str:
     return f"{100 * one.relative('motion.r'):.3g} %"
 
 
-def _figure(figure: Figure) -> dict[str, object]:
+def _figure(figure: FigureComparison) -> dict[str, object]:
     return {
         "trial": figure.trial,
         "figure": figure.name,

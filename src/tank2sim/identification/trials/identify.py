@@ -8,38 +8,40 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
-from tank2sim.dynamics.model import Vector
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.comparison import Comparison, compared, noise_of
-from tank2sim.identification.trials.equation_error import equation_error
-from tank2sim.identification.trials.evaluation import following
-from tank2sim.identification.trials.foretelling import Answer, bootstrapped, criteria_or_none, held_out
-from tank2sim.identification.trials.identifiability import Identifiability, identifiability, refuse_unseen
-from tank2sim.identification.trials.inference import scaled_prior
-from tank2sim.identification.trials.kalman import kalman
-from tank2sim.identification.trials.measured import Measured
-from tank2sim.identification.trials.other_ship import other_ship
-from tank2sim.identification.trials.output_error import Settings, output_error
-from tank2sim.identification.trials.portable import portable
-from tank2sim.identification.trials.problem import Estimate, Problem, Progress, silent
-from tank2sim.identification.trials.question import answered, pose, with_range
-from tank2sim.identification.trials.recursive import recursive
-from tank2sim.identification.trials.selection import (
+from tank2sim.identification.trials.assessment.comparison import Comparison, compare_card, noise_of
+from tank2sim.identification.trials.assessment.evaluation import replay_error
+from tank2sim.identification.trials.assessment.identifiability import Identifiability, identifiability, refuse_unseen
+from tank2sim.identification.trials.assessment.model_selection import (
     Criteria,
     CrossValidation,
     cross_validate,
     simplest,
     yaw_rate_error,
 )
-from tank2sim.identification.trials.structures import STRUCTURES
+from tank2sim.identification.trials.assessment.other_ship import other_ship
+from tank2sim.identification.trials.assessment.prediction_intervals import (
+    FittedProblem,
+    bootstrapped,
+    criteria_or_none,
+    held_out,
+)
+from tank2sim.identification.trials.methods.equation_error import equation_error
+from tank2sim.identification.trials.methods.kalman import kalman
+from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
+from tank2sim.identification.trials.methods.posterior import scaled_prior
+from tank2sim.identification.trials.methods.recursive import recursive
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, Progress, silent
+from tank2sim.identification.trials.problem.picklable import portable
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.problem_from_card import answered, problem_from_card, with_range
+from tank2sim.identification.trials.problem.structures import STRUCTURES
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.recorded import recorded
-
-Array = NDArray[np.float64]
 
 PIECE = 5.0
 """Length of the pieces of output error, in L/u0: on the KVLCC2 30 s of model time, in which the model's error stays
@@ -51,19 +53,19 @@ LEAST_PIECE = 0.5
 WHOLE_RUN_MISFIT = 3.0
 """Whole runs are fitted when the model follows them, too: to this many times the noise, in every signal (ours)."""
 
-METHODS: tuple[str, ...] = ("output_error", "equation_error", "kalman", "recursive")
+TRIAL_METHODS: tuple[str, ...] = ("output_error", "equation_error", "kalman", "recursive")
 
 
 @dataclass(frozen=True)
-class Options:
+class IdentificationOptions:
     """How trials are fitted.
 
     Parameters
     ----------
     method : str
-        One of :data:`METHODS`.
+        One of :data:`TRIAL_METHODS`.
     structure : str
-        One of :data:`tank2sim.identification.trials.structures.STRUCTURES`, or :data:`AUTO`.
+        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, or :data:`AUTO`.
     inertia : bool
         Estimate acceleration derivatives, too.
     piece_s : float, optional
@@ -154,7 +156,7 @@ def identify(
     card: ManoeuvringCard,
     trials: Measured,
     holdout: Measured | None = None,
-    options: Options | None = None,
+    options: IdentificationOptions | None = None,
     progress: Progress = silent,
     executor: Executor | None = None,
 ) -> Identification:
@@ -178,7 +180,7 @@ def identify(
         The trials look like those of another ship than the card's, or of two, do not excite what is to be estimated,
         lack signals that are needed, or are driven otherwise than those held out.
     """
-    options = options or Options()
+    options = options or IdentificationOptions()
     try:
         return _identified(card, trials, holdout, options, (progress, executor))
     except np.linalg.LinAlgError:
@@ -191,17 +193,17 @@ def _identified(
     card: ManoeuvringCard,
     trials: Measured,
     holdout: Measured | None,
-    options: Options,
+    options: IdentificationOptions,
     how: tuple[Progress, Executor | None],
 ) -> Identification:
     progress, executor = how
     tried = cross_validated(card, trials, options, executor) if options.structure == AUTO else {}
     structure = simplest(tried) if tried else options.structure
     started = STRUCTURES[structure].start(card)
-    problem = pose(started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold)
+    problem = problem_from_card(started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold)
     unseen = refuse_unseen(problem)
     problem = problem.without(unseen)
-    against = other_ship(pose(card, trials.trials, trials.driven_by))  # not in a structure that knows less
+    against = other_ship(problem_from_card(card, trials.trials, trials.driven_by))  # not in a structure that knows less
     if against and not options.force:
         names = ", ".join(trial.name for trial in trials.trials)
         problem_told = f"not trials of the ship of {card.source}: {'; '.join(against)}"
@@ -209,7 +211,7 @@ def _identified(
     estimate = estimated(problem, options, progress)
     improved = with_range(answered(started, estimate), problem)
     whole = started.model.valid_speed_mps is None
-    answer = Answer(problem, estimate, improved, whole)
+    answer = FittedProblem(problem, estimate, improved, whole)
     noise = noise_of(trials, problem)
     result = identifiability(problem, estimate)
     held = holdout if holdout is not None and holdout.trials else None
@@ -220,10 +222,10 @@ def _identified(
         estimate=estimate,
         identifiability=result,
         noise=noise,
-        fit=compared(improved, trials, estimate.noise, whole=whole),
+        fit=compare_card(improved, trials, estimate.noise, whole=whole),
         holdout=held_out(answer, held, options.members, executor) if held else None,
-        before=compared(card, trials, estimate.noise),
-        before_holdout=compared(card, held, estimate.noise) if held else None,
+        before=compare_card(card, trials, estimate.noise),
+        before_holdout=compare_card(card, held, estimate.noise) if held else None,
         structure=structure,
         structures=tried,
         criteria=criteria_or_none(answer),
@@ -248,7 +250,7 @@ def _manoeuvres(card: ManoeuvringCard, trials: Sequence[Trial]) -> dict[str, str
     return {name: what.words for name, what in known.items() if what is not None}
 
 
-def estimated(problem: Problem, options: Options, progress: Progress = silent) -> Estimate:
+def estimated(problem: Problem, options: IdentificationOptions, progress: Progress = silent) -> Estimate:
     """The estimate by the method asked for; output error begins at what equation error found, if that is better."""
     if options.method == "kalman":
         return kalman(problem, progress=progress)
@@ -262,7 +264,7 @@ def estimated(problem: Problem, options: Options, progress: Progress = silent) -
         raise InputError(
             "--piece", "", f"is {length:g} s", f"{least:.3g} s or more ({LEAST_PIECE:g} L/u0) tell anything"
         )
-    settings = Settings(piece_s=length, scale_prior=options.scale_prior)
+    settings = OutputErrorSettings(piece_s=length, scale_prior=options.scale_prior)
     in_pieces = output_error(problem, _start(problem), settings, progress)
     if in_pieces.notices or not _follows_whole_runs(problem, in_pieces):
         return in_pieces
@@ -270,27 +272,31 @@ def estimated(problem: Problem, options: Options, progress: Progress = silent) -
 
 
 def cross_validated(
-    card: ManoeuvringCard, trials: Measured, options: Options, executor: Executor | None = None
+    card: ManoeuvringCard, trials: Measured, options: IdentificationOptions, executor: Executor | None = None
 ) -> dict[str, CrossValidation]:
     """Each structure fitted without some of the trials, and its yaw-rate error on them."""
     results = {}
     for name, structure in STRUCTURES.items():
         started = structure.start(card)
-        problem = pose(started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold)
+        problem = problem_from_card(
+            started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold
+        )
         asked = portable(problem, started, trials.driven_by)
         results[name] = cross_validate(asked, partial(_in_pieces, options=options), yaw_rate_error, executor)
     return results
 
 
-def _in_pieces(problem: Problem, options: Options) -> Estimate:
+def _in_pieces(problem: Problem, options: IdentificationOptions) -> Estimate:
     """What a fold is fitted by: pieces only, and fewer rounds, for it is compared with its like."""
     if options.method != "output_error":
         return estimated(problem, options)
     length = options.piece_s or PIECE * problem.ship_time
-    return output_error(problem, _start(problem), Settings(length, scale_prior=options.scale_prior, rounds=3))
+    return output_error(
+        problem, _start(problem), OutputErrorSettings(length, scale_prior=options.scale_prior, rounds=3)
+    )
 
 
-def _start(problem: Problem) -> Vector | None:
+def _start(problem: Problem) -> Array | None:
     """Values from which output error begins: those of the weak form, which needs no start; None without velocities."""
     try:
         return equation_error(problem).values
@@ -298,7 +304,7 @@ def _start(problem: Problem) -> Vector | None:
         return None
 
 
-def _recursive(problem: Problem, options: Options, progress: Progress) -> Estimate:
+def _recursive(problem: Problem, options: IdentificationOptions, progress: Progress) -> Estimate:
     """The recursive estimator, which takes its prior as it is: widened first by what the weak form says of it."""
     if not options.scale_prior:
         return recursive(problem, progress=progress)
@@ -308,7 +314,7 @@ def _recursive(problem: Problem, options: Options, progress: Progress) -> Estima
 
 
 def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
-    results = following(problem, estimate.values, estimate.noise)
+    results = replay_error(problem, estimate.values, estimate.noise)
     limits = {name: WHOLE_RUN_MISFIT * deviation for name, deviation in estimate.noise.items()}
     return all(error <= limits[name] for result in results for name, error in result.whole.items())
 

@@ -16,7 +16,7 @@ from tank2sim.dynamics.yaw_rig import UNKNOWN_RIG
 from tank2sim.errors import InputError
 from tank2sim.files import BYTE_ORDER_MARK
 from tank2sim.identification.yaw.estimate import YawEstimate
-from tank2sim.identification.yaw.identify import METHODS, YawResult
+from tank2sim.identification.yaw.identify import YAW_METHODS, YawResult
 
 TANK_WATER_KGPM3 = 1000.0
 """Density of the tank's water where no record tells it; fresh water, as the paper calculates with."""
@@ -164,5 +164,5 @@ def _gravity(estimate: YawEstimate, known: YawRig) -> dict[str, float]:
     return {"gravity_Nm": float(f"{moment:.6g}"), "gravity_angle_rad": float(f"{angle:.6g}")}
 
 
-BEST = METHODS[0]
+BEST = YAW_METHODS[0]
 """The method whose numbers a card gets unless another is asked for."""

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tank2sim.arrays import Array
 from tank2sim.cards.form import YawRig
 from tank2sim.dynamics.yaw_energy import dissipation_from_work, inertia_from_work
 from tank2sim.errors import InputError
@@ -26,9 +26,7 @@ from tank2sim.identification.yaw.estimate import YawEstimate
 from tank2sim.identification.yaw.intervals import Interval, motor_work, work_rows
 from tank2sim.records.yaw import YawRecord
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Pair = tuple[Interval, Interval]
+IntervalPair = tuple[Interval, Interval]
 
 PARTS = 6
 """Subintervals of an interval: with six, each of some 0.3 s in the paper's programme, the four terms of (3) are well
@@ -54,28 +52,32 @@ class Balance:
     """
 
     terms: tuple[str, ...]
-    rows: Matrix
-    work_J: Vector
-    pairs: tuple[Pair, ...]
+    rows: Array
+    work_J: Array
+    pairs: tuple[IntervalPair, ...]
     parts: int
 
-    def whole(self, values: Vector) -> Matrix:
+    def whole(self, values: Array) -> Array:
         """Sums over the parts of each interval of one number a subinterval, (pairs, 2)."""
-        sums: Matrix = values.reshape(len(self.pairs), 2, self.parts).sum(axis=2)
+        sums: Array = values.reshape(len(self.pairs), 2, self.parts).sum(axis=2)
         return sums
 
 
 class EnergyFit(NamedTuple):
     """Coefficients of the terms with their covariance, what is left (J, (n,)), and the balance they are of."""
 
-    coefficients: Vector
-    covariance: Matrix
-    residuals_J: Vector
+    coefficients: Array
+    covariance: Array
+    residuals_J: Array
     balance: Balance
 
 
 def energy_balance(
-    pairs: Sequence[Pair], terms: tuple[str, ...], torque_constant_NmpA: float, rig: YawRig | None, parts: int = PARTS
+    pairs: Sequence[IntervalPair],
+    terms: tuple[str, ...],
+    torque_constant_NmpA: float,
+    rig: YawRig | None,
+    parts: int = PARTS,
 ) -> Balance:
     """The balance of every subinterval of mirror pairs; `rig` tells what is known beyond (3)."""
     rows, work = [], []
@@ -117,20 +119,20 @@ def fit_energy(balance: Balance, record: YawRecord, programmed: Balance | None =
     return EnergyFit(coefficients, covariance * np.outer(scale, scale), residuals, balance)
 
 
-def _inverse(rows: Matrix, instruments: Matrix) -> Matrix:
+def _inverse(rows: Array, instruments: Array) -> Array:
     """(Z'X)^-1 Z'; with Z = X that of least squares."""
     norms, other = column_norms(rows), column_norms(instruments)
     scaled = (instruments / other).T
-    inverse: Matrix = np.linalg.solve(scaled @ (rows / norms), scaled) / norms[:, None]
+    inverse: Array = np.linalg.solve(scaled @ (rows / norms), scaled) / norms[:, None]
     return inverse
 
 
-def _clustered(inverse: Matrix, residuals: Vector, balance: Balance) -> Matrix:
+def _clustered(inverse: Array, residuals: Array, balance: Balance) -> Array:
     """Covariance from the scatter of whole intervals, each taken as one draw (Liang & Zeger 1986)."""
     count = 2 * len(balance.pairs)
     each = (inverse * residuals).reshape(len(balance.terms), count, balance.parts).sum(axis=2)
     more = count / max(1, count - 1)
-    covariance: Matrix = more * each @ each.T
+    covariance: Array = more * each @ each.T
     return covariance
 
 
@@ -149,8 +151,8 @@ def least_squares_estimate(method: str, fit: EnergyFit, ideal: Interval) -> YawE
 def estimate_from(
     method: str,
     terms: tuple[str, ...],
-    values: Vector,
-    covariance: Matrix,
+    values: Array,
+    covariance: Array,
     ideal: Interval,
     misfit: float | None = None,
 ) -> YawEstimate:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from tank2sim.identification.yaw.intervals import TERMS
+from tank2sim.identification.yaw.intervals import ENERGY_TERMS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,7 +21,7 @@ class YawEstimate:
     dissipation_J, dissipation_error_J : float
         B + D over one interval.
     friction : mapping
-        Other terms of :data:`tank2sim.identification.yaw.intervals.TERMS` to (value, standard error), in SI.
+        Other terms of :data:`tank2sim.identification.yaw.intervals.ENERGY_TERMS` to (value, standard error), in SI.
     misfit : float or None
         Root mean square of what is left: J for methods of energy, rad for those of the angle.
     bias_kgm2 : float or None
@@ -52,7 +52,7 @@ class YawEstimate:
             "dissipation_standard_error_J": self.dissipation_error_J,
         }
         for term, (value, error) in self.friction.items():
-            unit = TERMS[term][1]
+            unit = ENERGY_TERMS[term][1]
             told[f"{term}_{unit}"], told[f"{term}_standard_error_{unit}"] = value, error
         if self.bias_kgm2 is not None:
             told["bias_against_least_squares_kgm2"] = self.bias_kgm2

@@ -13,19 +13,13 @@ from scipy.stats import f as f_test
 from tank2sim.cards.form import YawRig
 from tank2sim.dynamics.yaw_rig import UNKNOWN_RIG
 from tank2sim.errors import InputError
-from tank2sim.identification.yaw.checks import (
+from tank2sim.identification.yaw.diagnostics import (
     check_current,
     check_explained,
     check_mirror,
     check_sign,
     check_turn,
     judged,
-)
-from tank2sim.identification.yaw.drawn import (
-    angle_residual_as_json,
-    balance_as_json,
-    record_histories,
-    residuals_as_json,
 )
 from tank2sim.identification.yaw.energy import (
     EnergyFit,
@@ -36,11 +30,17 @@ from tank2sim.identification.yaw.energy import (
     two_intervals,
 )
 from tank2sim.identification.yaw.estimate import YawEstimate
-from tank2sim.identification.yaw.intervals import TERMS, Interval, intervals, mirror_difference
+from tank2sim.identification.yaw.intervals import ENERGY_TERMS, Interval, intervals, mirror_difference
 from tank2sim.identification.yaw.output_error import AngleFit, fit_angle
+from tank2sim.identification.yaw.plot_data import (
+    angle_residual_as_json,
+    balance_as_json,
+    record_histories,
+    residuals_as_json,
+)
 from tank2sim.records.yaw import Medium, YawRecord
 
-METHODS = (
+YAW_METHODS = (
     "energy_least_squares",
     "as_many_equations",
     "two_intervals",
@@ -154,7 +154,7 @@ class YawResult:
 
     def as_json(self) -> dict[str, Any]:
         """The result as plain data; ``added_inertia_kgm2`` and ``dissipation_J`` by method, the rest in ``methods``;
-        histories, balance and residuals to draw (:mod:`tank2sim.identification.yaw.drawn`)."""
+        histories, balance and residuals to draw (:mod:`tank2sim.identification.yaw.plot_data`)."""
         added = {method: self.added_inertia(method) for method in self.estimates}
         methods = {}
         for method, estimate in self.estimates.items():
@@ -219,7 +219,7 @@ def torque_constant(reference: YawResult, known_inertia_kgm2: float) -> tuple[fl
     if reference.medium != "air":
         path = reference.records[0].path
         raise InputError(path, "", "is of a body in water", "give a record in air ('# medium: air')")
-    best = reference.estimates[METHODS[0]]
+    best = reference.estimates[YAW_METHODS[0]]
     error = (best.inertia_error_kgm2 or 0.0) / best.total_inertia_kgm2
     return reference.torque_constant_NmpA * known_inertia_kgm2 / best.total_inertia_kgm2, error
 
@@ -234,10 +234,10 @@ def parse_yaw_terms(text: str) -> tuple[str, ...]:
     """
     words = [word.strip() for word in text.split(",") if word.strip() not in ("", "inertia")]
     for word in words:
-        if word not in TERMS or words.count(word) > 1:
-            known = ", ".join(term for term in TERMS if term != "inertia")
+        if word not in ENERGY_TERMS or words.count(word) > 1:
+            known = ", ".join(term for term in ENERGY_TERMS if term != "inertia")
             raise InputError("--terms", "", f"{word!r} is no term, or stands twice", f"take any of {known}, once each")
-    return ("inertia", *(term for term in TERMS if term in words))
+    return ("inertia", *(term for term in ENERGY_TERMS if term in words))
 
 
 def _result(records: tuple[YawRecord, ...], medium: Medium, options: YawOptions, air: YawResult | None) -> YawResult:
@@ -281,7 +281,7 @@ def _result(records: tuple[YawRecord, ...], medium: Medium, options: YawOptions,
         torque_constant_NmpA=constant,
         torque_constant_error=options.torque_constant_error,
         body=body,
-        estimates={name: estimates[name] for name in METHODS if name in estimates},
+        estimates={name: estimates[name] for name in YAW_METHODS if name in estimates},
         fit=fit,
         ideal=ideal,
         angle=angle,
@@ -361,7 +361,7 @@ def _body(
         given = BodyInertia(value_kgm2=options.inertia_kgm2, error_kgm2=options.inertia_error_kgm2, source="as given")
         return given, _lacking(given)
     if air is not None:
-        best = air.estimates[METHODS[0]]
+        best = air.estimates[YAW_METHODS[0]]
         names = ", ".join(record.path.name for record in air.records)
         return BodyInertia(
             value_kgm2=best.total_inertia_kgm2,

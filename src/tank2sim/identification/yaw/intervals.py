@@ -14,15 +14,14 @@ from typing import Literal
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_lsq_spline
 
+from tank2sim.arrays import Array
 from tank2sim.cards.form import YawRig
 from tank2sim.dynamics.yaw_rig import wall_terms
 from tank2sim.errors import InputError
 from tank2sim.records.yaw import YawRecord
 
-Vector = NDArray[np.float64]
 Speeds = Literal["actual", "reference"]
 
 KNOTS_S = (0.5, 0.35, 0.25, 0.17, 0.1)
@@ -52,15 +51,15 @@ class Interval:
         Of the pair it belongs to.
     """
 
-    time_s: Vector
-    angle_rad: Vector
-    rate_radps: Vector
-    acceleration_radps2: Vector
-    current_A: Vector
+    time_s: Array
+    angle_rad: Array
+    rate_radps: Array
+    acceleration_radps2: Array
+    current_A: Array
     braking: bool
     number: int
 
-    def integral(self, values: Vector) -> float:
+    def integral(self, values: Array) -> float:
         """Integral over the interval by the trapezoidal rule."""
         return float(np.trapezoid(values, self.time_s))
 
@@ -73,8 +72,8 @@ class Interval:
         inside = (self.time_s > low + 1e-9) & (self.time_s < low + length - 1e-9)
         time = np.concatenate([[low], self.time_s[inside], [low + length]])
 
-        def cut(values: Vector) -> Vector:
-            at_times: Vector = np.interp(time, self.time_s, values)
+        def cut(values: Array) -> Array:
+            at_times: Array = np.interp(time, self.time_s, values)
             return at_times
 
         return replace(
@@ -98,7 +97,7 @@ def _swept(power: int) -> Work:
     return lambda own: own.integral(np.abs(own.rate_radps) ** power)
 
 
-TERMS: dict[str, tuple[Work, str]] = {
+ENERGY_TERMS: dict[str, tuple[Work, str]] = {
     "inertia": (_change_of_square, "kgm2"),
     "coulomb": (_swept(1), "Nm"),
     "viscous": (_swept(2), "Nms"),
@@ -186,7 +185,7 @@ def smooth_angle(record: YawRecord, ends: tuple[float, float]) -> BSpline:
     return min(splines, key=lambda spline: _cross_validation(spline, middle, value))
 
 
-def _spline(time: Vector, angle: Vector, knot_s: float) -> BSpline | None:
+def _spline(time: Array, angle: Array, knot_s: float) -> BSpline | None:
     """Least-squares spline with knots so far apart; None if the points are too few, or leave out a piece."""
     pieces = max(1, round((time[-1] - time[0]) / knot_s))
     if len(time) < STEPS_PER_COEFFICIENT * (pieces + _DEGREE):
@@ -199,7 +198,7 @@ def _spline(time: Vector, angle: Vector, knot_s: float) -> BSpline | None:
         return None
 
 
-def _cross_validation(spline: BSpline, time: Vector, angle: Vector) -> float:
+def _cross_validation(spline: BSpline, time: Array, angle: Array) -> float:
     """n RSS / (n - c m)^2, c the sum of the correlations of one error with all others (Altman 1990)."""
     left = angle - spline(time)
     free = len(time) - _CORRELATION * len(spline.c)
@@ -238,9 +237,9 @@ def mirror_difference(pair: tuple[Interval, Interval]) -> float:
     speeding, braking = pair
     x = np.linspace(0, 1, 101)
 
-    def at(own: Interval, share: Vector) -> Vector:
+    def at(own: Interval, share: Array) -> Array:
         time = own.time_s[0] + share * (own.time_s[-1] - own.time_s[0])
-        rate: Vector = np.abs(np.interp(time, own.time_s, own.rate_radps))
+        rate: Array = np.abs(np.interp(time, own.time_s, own.rate_radps))
         return rate
 
     one, other = at(speeding, x), at(braking, 1 - x)
@@ -249,4 +248,4 @@ def mirror_difference(pair: tuple[Interval, Interval]) -> float:
 
 def work_rows(own: Interval, terms: Mapping[str, float] | tuple[str, ...], parts: int) -> list[list[float]]:
     """Work per unit of each term in each part of an interval."""
-    return [[TERMS[term][0](own.part(place, parts)) for term in terms] for place in range(parts)]
+    return [[ENERGY_TERMS[term][0](own.part(place, parts)) for term in terms] for place in range(parts)]

@@ -16,10 +16,11 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 from scipy.stats import t as student
 
+from tank2sim.arrays import Array
 from tank2sim.cards.form import YawRig
 from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.errors import InputError
-from tank2sim.identification.conditioning import Matrix, Vector, column_norms
+from tank2sim.identification.conditioning import column_norms
 from tank2sim.identification.yaw.energy import estimate_from
 from tank2sim.identification.yaw.estimate import YawEstimate
 from tank2sim.identification.yaw.intervals import Interval, smooth_angle
@@ -51,9 +52,9 @@ _NAMES = {
 
 @dataclass(frozen=True, eq=False)
 class _Hump:
-    time_s: Vector
-    angle_rad: Vector
-    current_A: Vector
+    time_s: Array
+    angle_rad: Array
+    current_A: Array
     start: tuple[float, float]
     noise_A2: float
     """Variance of the error of the current's mean over a step."""
@@ -64,8 +65,8 @@ class AngleFit:
     """What the fitted model leaves of the angle: times (s), residuals (rad), in the order of the humps."""
 
     estimate: YawEstimate
-    time_s: Vector
-    residual_rad: Vector
+    time_s: Array
+    residual_rad: Array
 
 
 def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, ideal: Interval) -> AngleFit | None:
@@ -90,7 +91,7 @@ def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, i
     count = len(terms)
     begin = np.concatenate([values / scale, *(hump.start for hump in humps)])
 
-    def evaluate(unknown: Vector) -> tuple[Vector, Matrix]:
+    def evaluate(unknown: Array) -> tuple[Array, Array]:
         left, slopes = [], []
         for place, hump in enumerate(humps):
             at = count + 2 * place
@@ -101,9 +102,9 @@ def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, i
             slopes.append(wide)
         return np.concatenate(left), np.vstack(slopes)
 
-    last: list[tuple[Vector, Vector, Matrix]] = []
+    last: list[tuple[Array, Array, Array]] = []
 
-    def kept(unknown: Vector) -> tuple[Vector, Matrix]:
+    def kept(unknown: Array) -> tuple[Array, Array]:
         if not last or not np.array_equal(last[0][0], unknown):
             last[:] = [(unknown.copy(), *evaluate(unknown))]
         return last[0][1], last[0][2]
@@ -119,7 +120,7 @@ def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, i
     return AngleFit(estimate=estimate, time_s=np.concatenate([h.time_s for h in humps]), residual_rad=found.fun)
 
 
-def _searched(evaluate: Callable[[Vector], tuple[Vector, Matrix]], begin: Vector, count: int) -> OptimizeResult | None:
+def _searched(evaluate: Callable[[Array], tuple[Array, Array]], begin: Array, count: int) -> OptimizeResult | None:
     """The search from `begin`; from friction below zero the integration may run away, and then once more from none."""
     upright = begin.copy()
     upright[1:count] = np.maximum(upright[1:count], 0.0)
@@ -141,7 +142,7 @@ def _decay(best: dict[str, float], ideal: Interval) -> float:
     return max(0.0, best.get("viscous", 0.0) + 2 * rate * best.get("quadratic", 0.0)) / abs(best["inertia"])
 
 
-def _from_current(parts: list[Matrix], humps: list[_Hump], gain: tuple[float, float]) -> Vector:
+def _from_current(parts: list[Array], humps: list[_Hump], gain: tuple[float, float]) -> Array:
     """Variances that the noise of the current gives, which the model takes for moments that were there."""
     variances = np.zeros(len(parts[0]))
     for part, hump in zip(parts, humps, strict=True):
@@ -153,7 +154,7 @@ def _from_current(parts: list[Matrix], humps: list[_Hump], gain: tuple[float, fl
     return variances
 
 
-def _covariance(residuals: Vector, design: Matrix, humps: list[_Hump], gain: tuple[float, float]) -> Matrix:
+def _covariance(residuals: Array, design: Array, humps: list[_Hump], gain: tuple[float, float]) -> Array:
     """Covariance; the residuals hang together over seconds, and from hump to hump.
 
     The largest of four, term by term: residuals taken as independent, with what the noise of the current does beside;
@@ -163,7 +164,7 @@ def _covariance(residuals: Vector, design: Matrix, humps: list[_Hump], gain: tup
     """
     norms = column_norms(design)
     inverse = np.linalg.pinv(design / norms) / norms[:, None]
-    alone: Matrix = inverse @ inverse.T * float(residuals @ residuals) / max(1, len(residuals) - design.shape[1])
+    alone: Array = inverse @ inverse.T * float(residuals @ residuals) / max(1, len(residuals) - design.shape[1])
     ends = np.cumsum([len(hump.angle_rad) for hump in humps])[:-1]
     parts = np.split(inverse * residuals, ends, axis=1)
     folded = np.zeros((len(inverse), max(part.shape[1] for part in parts)))
@@ -179,13 +180,13 @@ def _covariance(residuals: Vector, design: Matrix, humps: list[_Hump], gain: tup
         few = float(student.ppf(_ONE_SIGMA, len(humps) - 1)) ** 2
         variances.append(few * len(humps) / (len(humps) - 1) * np.sum(draws**2, axis=1))
     wider = np.sqrt(np.max(variances, axis=0) / np.diag(alone))
-    widened: Matrix = alone * np.outer(wider, wider)
+    widened: Array = alone * np.outer(wider, wider)
     return widened
 
 
-def _newey_west(scores: Matrix, lags: int) -> Matrix:
+def _newey_west(scores: Array, lags: int) -> Array:
     """Covariance of the sum of the columns, with Bartlett's weights up to so many lags."""
-    covariance: Matrix = scores @ scores.T
+    covariance: Array = scores @ scores.T
     for lag in range(1, lags + 1):
         cross = scores[:, lag:] @ scores[:, :-lag].T
         covariance = covariance + (1 - lag / (lags + 1)) * (cross + cross.T)
@@ -204,7 +205,7 @@ def _humps(record: YawRecord) -> list[_Hump]:
         first = begin + _AWAKE * programme.rise_s
         last = min(begin + (3 - _AWAKE) * programme.rise_s, float(time[-1]))
         # Counted, with room for rounding: a step more or less moves the result by a good part of its error.
-        own: Vector = first + step * np.arange(int((last - first) / step + 1e-6), dtype=np.float64)
+        own: Array = first + step * np.arange(int((last - first) / step + 1e-6), dtype=np.float64)
         if len(own) < 10:
             raise InputError(record.path, "column t_s", f"has fewer than 10 rows in hump {number + 1}", "sample faster")
         spline = smooth_angle(record, (first, first + programme.rise_s))
@@ -251,7 +252,7 @@ def _predictor(rig: YawRig, terms: tuple[str, ...]):  # type: ignore[no-untyped-
     first = np.hstack([np.zeros((2, len(terms))), np.eye(2)])
     loops: dict[int, ca.Function] = {}
 
-    def predict(values: Vector, start: Vector, hump: _Hump) -> tuple[Vector, Matrix]:
+    def predict(values: Array, start: Array, hump: _Hump) -> tuple[Array, Array]:
         count = len(hump.current_A)
         loops.setdefault(count, step.mapaccum(count))
         begin = np.hstack([start[:, None], first])

@@ -1,7 +1,7 @@
 """The audit of trials: what is wrong with the data, found by consistency alone."""
 
 from tank2sim.records.audit.finding import Finding
-from tank2sim.records.audit.noise import estimated_noise
-from tank2sim.records.audit.run import audit, audited, mended
+from tank2sim.records.audit.noise import record_noise
+from tank2sim.records.audit.run import audit, audit_and_repair, mended
 
-__all__ = ["Finding", "audit", "audited", "estimated_noise", "mended"]
+__all__ = ["Finding", "audit", "audit_and_repair", "mended", "record_noise"]

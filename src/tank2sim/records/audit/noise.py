@@ -7,8 +7,8 @@ import math
 import numpy as np
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from tank2sim.records.csv_table import Vector
-from tank2sim.records.trials import MEASURED, Trial
+from tank2sim.arrays import Array
+from tank2sim.records.trials import MEASURED_COLUMNS, Trial
 
 WINDOW, DEGREE = 7, 3
 """Samples and degree of the Savitzky-Golay filter: a cubic through seven samples follows a ship at any usual rate, and
@@ -16,7 +16,7 @@ leaves enough of the noise (0.67 of its variance) to measure it. A choice of our
 _MAD = 1.4826  # of the median absolute deviation to the standard deviation of normal noise
 
 
-def estimated_noise(trial: Trial) -> dict[str, float]:
+def record_noise(trial: Trial) -> dict[str, float]:
     """Standard deviation of the white part of the noise of each measured signal, SI; what the file states is used.
 
     A signal is compared with its Savitzky-Golay smoothing (a cubic through seven samples, Savitzky & Golay 1964). Of
@@ -27,12 +27,14 @@ def estimated_noise(trial: Trial) -> dict[str, float]:
     figure is a lower bound for coloured noise.
     """
     return {
-        name: trial.noise.get(name, white_noise(values)) for name, values in trial.signals.items() if name in MEASURED
+        name: trial.noise.get(name, white_noise(values))
+        for name, values in trial.signals.items()
+        if name in MEASURED_COLUMNS
     }
 
 
-def white_noise(values: Vector) -> float:
-    """Standard deviation of the white part of the noise of a signal (n,), see :func:`estimated_noise`."""
+def white_noise(values: Array) -> float:
+    """Standard deviation of the white part of the noise of a signal (n,), see :func:`record_noise`."""
     known = values[np.isfinite(values)]
     if known.size < WINDOW:
         return 0.0
@@ -42,7 +44,7 @@ def white_noise(values: Vector) -> float:
     return max(apart / math.sqrt(left), resolution(known) / math.sqrt(12.0))
 
 
-def resolution(values: Vector) -> float:
+def resolution(values: Array) -> float:
     """Step to which a signal (n,) is rounded: the median of its steps other than zero, if neighbours often repeat.
 
     One in ten neighbours alike is taken for rounding (or a held value); of values as fine as their noise fewer are.
@@ -54,7 +56,7 @@ def resolution(values: Vector) -> float:
     return float(np.median(changes))
 
 
-def rounding(values: Vector) -> float:
+def rounding(values: Array) -> float:
     """Coarsest unit to which a signal (n,) is rounded, 0 if none shows: of numbers printed with three digits it is 1
     from 100 on, and 0.1 below.
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
+from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding
-from tank2sim.records.audit.noise import estimated_noise
-from tank2sim.records.audit.weak import FEWEST, fit, on_uniform_time, windows_for, windows_of
-from tank2sim.records.csv_table import Vector
+from tank2sim.records.audit.noise import record_noise
+from tank2sim.records.audit.weak import FEWEST_WINDOWS, fit, on_uniform_time, windows_for, windows_of
 from tank2sim.records.trials import RUDDERS, Trial, with_signals
 
 SIDEWAYS = np.pi / 2
@@ -16,7 +16,7 @@ SIDEWAYS = np.pi / 2
 
 FAR_OVER = np.deg2rad(8.0)
 """Rudder that leaves the spiral loop of any usual course-unstable ship: she then turns with her rudder."""
-STEADY = 0.9
+_STEADY = 0.9
 """Cosine between rudder and rate of turn from which a turn is steady. A choice of ours, as the one above."""
 
 
@@ -72,7 +72,7 @@ def rudder_response(trial: Trial, name: str | None = None) -> float:
     rudder = np.where(ahead, signals[present[0]], np.nan)
     yaw = signals.get("r_radps", signals.get("psi_rad"))
     assert yaw is not None
-    noise = estimated_noise(trial)
+    noise = record_noise(trial)
     if "r_radps" in signals:
         windows = windows_for(noise["r_radps"], _rms(yaw) / 10, step, len(yaw))
         r, change = windows.mean(yaw), windows.rate(yaw)
@@ -87,16 +87,16 @@ def rudder_response(trial: Trial, name: str | None = None) -> float:
     return steady
 
 
-def _steady_turn(rate: Vector, rudder: Vector) -> float:
+def _steady_turn(rate: Array, rudder: Array) -> float:
     whole = np.isfinite(rate) & np.isfinite(rudder)
     rate, rudder = rate[whole], rudder[whole]
-    if rate.size < FEWEST or _rms(rudder) < FAR_OVER:
+    if rate.size < FEWEST_WINDOWS or _rms(rudder) < FAR_OVER:
         return 0.0
     likeness = float(np.sum(rate * rudder) / max(_rms(rate) * _rms(rudder) * rate.size, 1e-300))
-    return float(np.sign(likeness)) if abs(likeness) > STEADY else 0.0
+    return float(np.sign(likeness)) if abs(likeness) > _STEADY else 0.0
 
 
-def _rms(values: Vector) -> float:
+def _rms(values: Array) -> float:
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(np.square(known)))) if known.size else 0.0
 

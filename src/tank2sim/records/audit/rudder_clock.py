@@ -7,20 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
+from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding
 from tank2sim.records.audit.weak import on_uniform_time
-from tank2sim.records.csv_table import Vector
 from tank2sim.records.trials import Trial
 
-DEGREE = np.pi / 180
-MOVED, AT_REST = 5 * DEGREE, 1 * DEGREE
+_DEGREE = np.pi / 180
+MOVED, AT_REST = 5 * _DEGREE, 1 * _DEGREE
 """A rudder that goes so far, and noise within which it rests. Project choice: any execute, and any usual sensor."""
 REST_ROWS, REACH_ROWS, MOVES = 6, 20, 3
 """Rows at rest before a movement, rows in which the yaw rate comes half-way, and movements: fewer show no clock."""
 LATE = 0.17
 """Lateness, as a share of the time in which the yaw rate comes half-way, that is no fault of the short-time expansion:
 free-running models with right clocks (KVLCC2 of HSVA and MARIN, Esso Osaka) stay below 0.15."""
-BETTER = 2.0
+_BETTER = 2.0
 """Ratio of the sums of squares without and with the shift; wind alone gives up to 1.4. Project choice."""
 
 
@@ -56,7 +56,7 @@ def rudder_clock_findings(trial: Trial) -> list[Finding]:
     best = int(np.argmin(left))
     late = float(shifts[best]) * step
     unshifted = float(left[np.argmin(np.abs(shifts))])
-    if late < LATE * reach * step or unshifted < BETTER * left[best] or best == len(shifts) - 1:
+    if late < LATE * reach * step or unshifted < _BETTER * left[best] or best == len(shifts) - 1:
         return []
     what = f"the yaw rate answers {late:.3g} s before the rudder moves, in {len(moves)} movements"
     truth = f"the rudder is late by about {late:.2g} s (its clock, or a filter in the sensor)"
@@ -64,7 +64,7 @@ def rudder_clock_findings(trial: Trial) -> list[Finding]:
     return [Finding(trial.path, (trial.heading("delta_rad"),), what, truth, "note", evidence)]
 
 
-def _moves(rudder: Vector, rate: Vector) -> list[_Move]:
+def _moves(rudder: Array, rate: Array) -> list[_Move]:
     """Movements out of a rest, each with a window as long before as after it, up to the next."""
     starts: list[tuple[int, int, int]] = []
     rest, row = 0, 1
@@ -82,7 +82,7 @@ def _moves(rudder: Vector, rate: Vector) -> list[_Move]:
     return [move for start, end in zip(starts, ends, strict=True) if (move := _move(start, end, rate)) is not None]
 
 
-def _end_of_move(rising: Vector, row: int) -> int:
+def _end_of_move(rising: Array, row: int) -> int:
     last = row
     while row + 1 < len(rising) and row - last < REST_ROWS:
         row += 1
@@ -91,7 +91,7 @@ def _end_of_move(rising: Vector, row: int) -> int:
     return last
 
 
-def _move(start: tuple[int, int, int], end: int, rate: Vector) -> _Move | None:
+def _move(start: tuple[int, int, int], end: int, rate: Array) -> _Move | None:
     rest, row, last = start
     if row - rest < REST_ROWS or end - last < REST_ROWS:
         return None
@@ -106,7 +106,7 @@ def _move(start: tuple[int, int, int], end: int, rate: Vector) -> _Move | None:
     return _Move(max(rest, row - reach), row, min(end, row + reach), reach)
 
 
-def _left(move: _Move, rudder: Vector, rate: Vector, step: float, shift: int) -> float:
+def _left(move: _Move, rudder: Array, rate: Array, step: float, shift: int) -> float:
     """Sum of squares that the answer to the rudder, taken `shift` rows later in the record, leaves of r."""
     rows = np.arange(move.begin, move.end)
     taken = np.clip(rows + shift, 0, len(rudder) - 1)
@@ -121,6 +121,6 @@ def _left(move: _Move, rudder: Vector, rate: Vector, step: float, shift: int) ->
     return float(np.sum((wanted - table @ found) ** 2))
 
 
-def _integral(values: Vector, step: float) -> Vector:
-    integral: Vector = cumulative_trapezoid(values, dx=step, initial=0.0)
+def _integral(values: Array, step: float) -> Array:
+    integral: Array = cumulative_trapezoid(values, dx=step, initial=0.0)
     return integral

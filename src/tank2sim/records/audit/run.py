@@ -42,7 +42,7 @@ def audit(trial: Trial) -> tuple[Finding, ...]:
     positions in body and earth axes with both signs; the rudder against the turn and against its order. A column that
     is found to be something else is taken for that in the checks that follow, so that one fault is told once.
     """
-    return audited(trial)[1]
+    return audit_and_repair(trial)[1]
 
 
 def mended(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
@@ -51,11 +51,11 @@ def mended(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
     The notices of the trial tell each change. Findings without a safe mend (:class:`Finding`) are not among those
     returned: biases, scales and clocks stay as measured.
     """
-    repaired, findings = audited(trial)
+    repaired, findings = audit_and_repair(trial)
     return repaired, tuple(finding for finding in findings if finding.safe and finding.mend is not None)
 
 
-def audited(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
+def audit_and_repair(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
     """The trial as :func:`mended` gives it, and all that is wrong with it, as :func:`audit` does.
 
     After a fault that is not repaired (:attr:`.Finding.open`) nothing more is: what follows may depend on it, and is

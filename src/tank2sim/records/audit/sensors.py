@@ -11,13 +11,13 @@ from scipy.ndimage import find_objects, label, median_filter
 from scipy.signal import savgol_coeffs
 from scipy.stats import norm
 
+from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding, Mend
-from tank2sim.records.audit.noise import DEGREE, WINDOW, estimated_noise, white_noise
+from tank2sim.records.audit.noise import DEGREE, WINDOW, record_noise, white_noise
 from tank2sim.records.audit.weak import FALSE_ALARM
-from tank2sim.records.csv_table import Vector
-from tank2sim.records.trials import MEASURED, Trial, sampling_step, with_signals
+from tank2sim.records.trials import MEASURED_COLUMNS, Trial, sampling_step, with_signals
 
-MOTIONS = tuple(name for name in MEASURED if not name.startswith("wind"))
+MOTIONS = tuple(name for name in MEASURED_COLUMNS if not name.startswith("wind"))
 """Signals that inertia makes smooth; wind may jump."""
 SPIKE_SAMPLES = 3
 """A spike is this many samples long at most; what lasts longer is a step."""
@@ -28,9 +28,9 @@ PULSE = np.deg2rad(5.0)
 """Least spike of a rudder angle, whose noise is often none; a steering gear does not go and come back in three rows.
 Project choice."""
 
-ROUNDING = 1e-9
+_ROUNDING = 1e-9
 """Share of a signal below which its noise is that of the arithmetic: the signal was calculated, not measured."""
-SHORT = 0.05
+_SHORT = 0.05
 """Share of a record up to which failed readings of one sensor are noted rather than called its fault: they are left
 out, and nothing is lost. A choice of ours."""
 
@@ -38,7 +38,7 @@ out, and nothing is lost. A choice of ours."""
 def sensor_findings(trial: Trial) -> list[Finding]:
     """Faults of single sensors; failed values are mended by leaving them out (nan)."""
     findings = []
-    noise = estimated_noise(trial)
+    noise = record_noise(trial)
     for name, values in trial.signals.items():
         findings += _missing(trial, name, values)
         if name in MOTIONS and np.nanmax(values) == np.nanmin(values):
@@ -51,7 +51,7 @@ def sensor_findings(trial: Trial) -> list[Finding]:
     return findings
 
 
-def _missing(trial: Trial, name: str, values: Vector) -> list[Finding]:
+def _missing(trial: Trial, name: str, values: Array) -> list[Finding]:
     missing = np.isnan(values)
     if not missing.any():
         return []
@@ -76,7 +76,7 @@ def _runs(true: NDArray[np.bool_]) -> list[slice]:
     return [found[0] for found in find_objects(label(true)[0]) if found is not None]
 
 
-def _stuck(trial: Trial, name: str, values: Vector) -> list[Finding]:
+def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
     """Runs of one value that chance does not explain.
 
     With p the share of neighbours alike outside the longest run, a run of k repeats begins somewhere among n values
@@ -99,7 +99,7 @@ def _stuck(trial: Trial, name: str, values: Vector) -> list[Finding]:
     least = np.log(len(values) / FALSE_ALARM) / -np.log(chance)
     bends = np.abs(np.diff(values, n=2))
     # of white noise the bends are 1.7 times the steps, of a curve less; rounding alone is no noise
-    noisy = np.median(bends[bends > 0]) > np.median(moving) and white_noise(values) > ROUNDING * np.nanmax(abs(values))
+    noisy = np.median(bends[bends > 0]) > np.median(moving) and white_noise(values) > _ROUNDING * np.nanmax(abs(values))
     usual = float(np.quantile(moving, 0.9))
     long_enough = [run for run in runs if run.stop - run.start > max(least, 9)]
     stuck = [run for run in long_enough if noisy or _jumps(values, run, usual)]
@@ -116,7 +116,7 @@ def _stuck(trial: Trial, name: str, values: Vector) -> list[Finding]:
     return [Finding(trial.path, (trial.heading(name),), what, truth, kind, evidence, mend, safe=True, places_s=places)]
 
 
-def _jumps(values: Vector, run: slice, usual: float) -> bool:
+def _jumps(values: Array, run: slice, usual: float) -> bool:
     """Whether the signal is elsewhere when a run of repeats ends."""
     after = values[run.stop + 1 : run.stop + 12]
     if after.size < 2:
@@ -128,7 +128,7 @@ def _jumps(values: Vector, run: slice, usual: float) -> bool:
 def _stands_still(trial: Trial, name: str, noise: dict[str, float]) -> list[Finding]:
     """A signal of one value: in a measured record, where the others have noise, the sensor was not read."""
     others = [other for other in MOTIONS if other in trial.signals and other != name]
-    measured = [noise[other] > ROUNDING * float(np.nanmax(np.abs(trial.signals[other]))) for other in others]
+    measured = [noise[other] > _ROUNDING * float(np.nanmax(np.abs(trial.signals[other]))) for other in others]
     if not any(measured):
         return []
     what = "has one value from beginning to end"
@@ -140,7 +140,7 @@ def _stands_still(trial: Trial, name: str, noise: dict[str, float]) -> list[Find
     return [Finding(trial.path, (trial.heading(name),), what, truth, mend=without, safe=True)]
 
 
-def _spikes(trial: Trial, name: str, values: Vector, noise: float, least: float = 0.0) -> list[Finding]:
+def _spikes(trial: Trial, name: str, values: Array, noise: float, least: float = 0.0) -> list[Finding]:
     """Values far from the median of their neighbours (Hampel 1974), on both sides."""
     known = np.flatnonzero(np.isfinite(values))
     if known.size < 4 * WINDOW:
@@ -168,12 +168,12 @@ def _spikes(trial: Trial, name: str, values: Vector, noise: float, least: float 
     return [Finding(trial.path, (trial.heading(name),), what, truth, kind, evidence, mend, safe=True, places_s=places)]
 
 
-def _isolated(values: Vector, far: NDArray[np.bool_]) -> list[slice]:
+def _isolated(values: Array, far: NDArray[np.bool_]) -> list[slice]:
     """The runs of values far away that are as short as a spike, and stand out."""
     return [run for run in _runs(far) if run.stop - run.start <= SPIKE_SAMPLES and _stands_out(values, run, far)]
 
 
-def _stands_out(values: Vector, run: slice, far: NDArray[np.bool_]) -> bool:
+def _stands_out(values: Array, run: slice, far: NDArray[np.bool_]) -> bool:
     """Whether the steps into and out of a run are twice any step near it: the top of a smooth curve is no spike.
 
     Steps from and to other values far away do not count, for spikes may lie close together.
@@ -188,8 +188,8 @@ def _stands_out(values: Vector, run: slice, far: NDArray[np.bool_]) -> bool:
     return bool(min(edges) > 2 * steps[~touched].max())
 
 
-def _kind(rows: int, values: Vector) -> Literal["fault", "note"]:
-    return "fault" if rows > SHORT * len(values) else "note"
+def _kind(rows: int, values: Array) -> Literal["fault", "note"]:
+    return "fault" if rows > _SHORT * len(values) else "note"
 
 
 def _left_out(name: str, rows: NDArray[np.int64], why: str) -> Mend:

@@ -8,13 +8,13 @@ import numpy as np
 
 from tank2sim.records.audit.finding import Finding
 from tank2sim.records.audit.time_unit import MISCALIBRATED
-from tank2sim.records.audit.track import PAIRS, READINGS, Track, track_of
-from tank2sim.records.audit.weak import Complex, Fit, fit
+from tank2sim.records.audit.track import PAIRS, TRACK_READINGS, AuditedTrack, audited_track
+from tank2sim.records.audit.weak import Complex, WeakFit, fit
 from tank2sim.records.trials import Trial, with_signals
 from tank2sim.units import KNOT_MPS
 
 FOOT_M = 0.3048
-UNITS = {KNOT_MPS: "knots", 1 / 3.6: "km/h", FOOT_M: "ft/s"}
+_UNITS = {KNOT_MPS: "knots", 1 / 3.6: "km/h", FOOT_M: "ft/s"}
 """Factor between speed over ground and speed as given, to the unit of the velocities that it tells of."""
 LENGTHS = {1e-3: "kilometres", 1 / FOOT_M: "feet", 1 / 1852: "nautical miles"}
 """The same, to the unit of the positions."""
@@ -69,7 +69,7 @@ def speed_unit_findings(trial: Trial) -> list[Finding]:
 
 
 def _of(trial: Trial, names: tuple[str, ...]) -> Finding | None:
-    track = track_of(trial)
+    track = audited_track(trial)
     values = [track.signals[name] for name in names]
     given = np.asarray(values[0] + 1j * (values[1] if len(values) > 1 else 0.0), dtype=np.complex128)
     if np.count_nonzero(np.isfinite(track.windows.mean(given) + track.ground)) < 10:
@@ -83,7 +83,7 @@ def _of(trial: Trial, names: tuple[str, ...]) -> Finding | None:
     speeds = tuple(trial.heading(name) for name in names)
     places = tuple(trial.heading(name) for name in ("x_m", "y_m"))
     fault = Finding(trial.path, (*speeds, *places), what, "", "fault", evidence)
-    for unit, name in UNITS.items():
+    for unit, name in _UNITS.items():
         if scale.is_of(unit):
             wrong = names[:1] if len(names) > 1 and _sway_is_right(track, given, unit) else names
             return _in_unit(fault, wrong, unit, name, trial)
@@ -92,10 +92,10 @@ def _of(trial: Trial, names: tuple[str, ...]) -> Finding | None:
             return _in_lengths(fault, places, unit, name, trial)
     if not scale.known and scale.unexplained < MISCALIBRATED:  # a current may be as fast
         return None
-    nearest = min(UNITS, key=lambda unit: abs(np.log(factor / unit)))
+    nearest = min(_UNITS, key=lambda unit: abs(np.log(factor / unit)))
     truth = "the factor is that of no unit: velocities, positions or the clock are not what their names say"
     if abs(np.log(factor / nearest)) < np.log(1 + MISCALIBRATED):
-        truth += f" ({UNITS[nearest]} with an error of {100 * (nearest / factor - 1):+.2g} %, or another clock)"
+        truth += f" ({_UNITS[nearest]} with an error of {100 * (nearest / factor - 1):+.2g} %, or another clock)"
     return Finding(trial.path, fault.columns, what, truth, "fault", evidence)
 
 
@@ -123,7 +123,7 @@ def _in_lengths(fault: Finding, places: tuple[str, ...], unit: float, name: str,
     return Finding(trial.path, places, fault.what, truth, "fault", fault.evidence, in_metres, safe=True)
 
 
-def _scale(track: Track, given: Complex, names: tuple[str, ...]) -> _Scale | None:
+def _scale(track: AuditedTrack, given: Complex, names: tuple[str, ...]) -> _Scale | None:
     """By regression with a current left free, under the reading of the columns that leaves least; else by the speeds.
 
     Speeds alone, of a record that hardly turns, do not tell a scale from a current.
@@ -143,7 +143,7 @@ def _scale(track: Track, given: Complex, names: tuple[str, ...]) -> _Scale | Non
         found = fit((track.ground * along.conj()).real, [mean, along.real, along.imag])
         fits = [] if found is None else [(found.residual, float(found.values[0]), float(found.errors[0]))]
     else:
-        fits = [_fitted(track, reading.velocity(given, turn), reading.mirrored) for reading in READINGS]
+        fits = [_fitted(track, reading.velocity(given, turn), reading.mirrored) for reading in TRACK_READINGS]
     fits = [one for one in fits if one[1] > 0]
     if fits:
         left, factor, error = min(fits)
@@ -152,16 +152,16 @@ def _scale(track: Track, given: Complex, names: tuple[str, ...]) -> _Scale | Non
     return _Scale(ratio, np.inf)
 
 
-def _fitted(track: Track, velocity: Complex, mirrored: bool) -> tuple[float, float, float]:
+def _fitted(track: AuditedTrack, velocity: Complex, mirrored: bool) -> tuple[float, float, float]:
     ground = track.ground.conj() if mirrored else track.ground
     mean = track.windows.mean(velocity)
-    found: Fit | None = fit(ground, [mean, np.ones(len(mean))])
+    found: WeakFit | None = fit(ground, [mean, np.ones(len(mean))])
     if found is None:
         return np.inf, 0.0, np.inf
     return found.residual, float(np.hypot(*found.values[:2])), float(max(found.errors[:2]))
 
 
-def _sway_is_right(track: Track, given: Complex, factor: float) -> bool:
+def _sway_is_right(track: AuditedTrack, given: Complex, factor: float) -> bool:
     """Whether v alone is in m/s, by the velocity across the heading."""
     turn = track.windows.mean(np.exp(1j * track.signals["psi_rad"]))
     sway = track.windows.mean(given.imag)

@@ -18,7 +18,7 @@ UNEVEN = 0.1
 STRAY = 20.0
 """Times the duration of the middle half of a record from its middle, ten times the record: no row of one manoeuvre is
 as far away. Project choice; it also bounds the memory that later checks take."""
-FEW = 0.05
+_FEW = 0.05
 """Share of rows with stray times up to which they are left out. Project choice, as for the readings of a sensor."""
 
 
@@ -41,7 +41,7 @@ def _stray(trial: Trial) -> Finding | None:
     what = f"{rows.size} times are far from all others, first {trial.time_s[first]:.10g} in row {first + 1}"
     evidence = {"rows": float(rows.size), "first_row": float(first + 1)}
     found = Finding(trial.path, (trial.heading("t_s"),), what, "another clock or another recording", evidence=evidence)
-    if rows.size > max(1, FEW * len(far)) or np.count_nonzero(~far) < 2:
+    if rows.size > max(1, _FEW * len(far)) or np.count_nonzero(~far) < 2:
         return found
     truth = "a time of another clock or a slip in these rows: they are left out"
 

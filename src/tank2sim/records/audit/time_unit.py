@@ -8,11 +8,11 @@ from functools import partial
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
+from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding
-from tank2sim.records.csv_table import Vector
 from tank2sim.records.trials import Trial
 
-UNITS = {60.0: "minutes", 3600.0: "hours", 1e-3: "milliseconds"}
+_UNITS = {60.0: "minutes", 3600.0: "hours", 1e-3: "milliseconds"}
 """Seconds in a unit of time, to its name."""
 
 AGREEMENT = 0.03
@@ -23,7 +23,7 @@ MISCALIBRATED = 0.15
 choice: three times the 5 % that IMO A.526(13) allows a rate-of-turn indicator, far above the 2 % that MSC.96(72)
 allows a speed log."""
 
-POINTS = 50
+_POINTS = 50
 """The way is measured between this many points of a track, so that noise of the positions does not lengthen it."""
 
 
@@ -39,7 +39,7 @@ def time_unit_findings(trial: Trial) -> list[Finding]:
     what = f"heading and track change {abs(turned):.4g} and {gone:.4g} times as fast as r and the velocities say"
     evidence = {"factor_heading": abs(turned), "factor_track": gone}
     found = Finding(trial.path, (trial.heading("t_s"),), what, "", evidence=evidence)
-    for factor, name in UNITS.items():
+    for factor, name in _UNITS.items():
         if abs(gone / factor - 1) < AGREEMENT:
             mend = partial(_in_seconds, factor=factor, name=name)
             return [replace(found, likely_truth=f"time is in {name}", mend=mend, safe=True)]
@@ -61,7 +61,7 @@ def _turned(trial: Trial) -> float | None:
     integral = _integral(trial.time_s, trial.signals["r_radps"])
     heading = trial.signals["psi_rad"]
     known = np.isfinite(heading)
-    if integral is None or np.count_nonzero(known) < POINTS or np.std(integral) == 0:
+    if integral is None or np.count_nonzero(known) < _POINTS or np.std(integral) == 0:
         return None
     return float(np.polyfit(integral[known], heading[known], 1)[0])
 
@@ -75,18 +75,18 @@ def _gone(trial: Trial) -> float | None:
     if way is None:
         return None
     known = np.flatnonzero(np.isfinite(trial.signals["x_m"] + trial.signals["y_m"]))
-    if len(known) < POINTS:
+    if len(known) < _POINTS:
         return None
-    places = known[np.linspace(0, len(known) - 1, POINTS).astype(int)]
+    places = known[np.linspace(0, len(known) - 1, _POINTS).astype(int)]
     steps = np.hypot(np.diff(trial.signals["x_m"][places]), np.diff(trial.signals["y_m"][places]))
     through = float(way[places[-1]] - way[places[0]])
     return float(steps.sum()) / through if through > 0 and steps.sum() > 0 else None
 
 
-def _integral(time: Vector, values: Vector) -> Vector | None:
+def _integral(time: Array, values: Array) -> Array | None:
     """Integral of a signal (n,), taken as straight between its readings; None where it has fewer than two."""
     known = np.isfinite(values)
     if np.count_nonzero(known) < 2:
         return None
-    integral: Vector = cumulative_trapezoid(np.interp(time, time[known], values[known]), time, initial=0.0)
+    integral: Array = cumulative_trapezoid(np.interp(time, time[known], values[known]), time, initial=0.0)
     return integral

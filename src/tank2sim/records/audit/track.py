@@ -8,11 +8,11 @@ from typing import Literal
 
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding, Mend
-from tank2sim.records.audit.noise import estimated_noise
+from tank2sim.records.audit.noise import record_noise
 from tank2sim.records.audit.time_unit import MISCALIBRATED
-from tank2sim.records.audit.weak import Complex, Fit, Windows, fit, on_uniform_time, windows_of
-from tank2sim.records.csv_table import Vector
+from tank2sim.records.audit.weak import AuditWindows, Complex, WeakFit, fit, on_uniform_time, windows_of
 from tank2sim.records.trials import Trial, with_signals
 
 CLEARER = 1.5
@@ -29,7 +29,7 @@ PAIRS = (("u_mps", "v_mps"), ("u_ground_mps", "v_ground_mps"))
 
 
 @dataclass(frozen=True)
-class Reading:
+class TrackReading:
     """One way to read the columns.
 
     Velocity over ground follows from w = u + iv and e = exp(i psi), for x + iy is north + i east; ``mirrored`` if y is
@@ -46,17 +46,17 @@ class Reading:
     quarter_wrong: tuple[str, ...] = ()
 
 
-_AS_LABELLED = Reading("", (), lambda w, e: w * e)
+_AS_LABELLED = TrackReading("", (), lambda w, e: w * e)
 OTHERWISE = (
-    Reading(
+    TrackReading(
         "v is positive to port",
         ("v",),
         lambda w, e: w.conj() * e,
         quarter_truth="u and v are interchanged",
         quarter_wrong=("u", "v"),
     ),
-    Reading("they are earth-fixed velocities, along x and y", ("u", "v"), lambda w, e: w, earth=True),
-    Reading(
+    TrackReading("they are earth-fixed velocities, along x and y", ("u", "v"), lambda w, e: w, earth=True),
+    TrackReading(
         "they are earth-fixed velocities, along x and against y",
         ("u", "v"),
         lambda w, e: w.conj(),
@@ -64,7 +64,7 @@ OTHERWISE = (
         quarter_truth="they are earth-fixed velocities, along y and x",
         quarter_wrong=("u", "v"),
     ),
-    Reading(
+    TrackReading(
         "y is positive to west",
         ("x", "y"),
         lambda w, e: w * e,
@@ -72,7 +72,7 @@ OTHERWISE = (
         quarter_truth="x and y are interchanged: x is east and y north",
         quarter_wrong=("x", "y"),
     ),
-    Reading(
+    TrackReading(
         "psi is counted anticlockwise",
         ("psi", "r"),
         lambda w, e: w * e.conj(),
@@ -82,7 +82,7 @@ OTHERWISE = (
 )
 
 
-READINGS = (_AS_LABELLED, *OTHERWISE)
+TRACK_READINGS = (_AS_LABELLED, *OTHERWISE)
 
 _EARTH = {truth for reading in OTHERWISE if reading.earth for truth in (reading.truth, reading.quarter_truth)}
 
@@ -99,11 +99,11 @@ def track_findings(trial: Trial) -> list[Finding]:
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class AuditedTrack:
     """Signals on a uniform time base, and the velocity over ground in windows, (windows,) complex, north + i east."""
 
-    signals: dict[str, Vector]
-    windows: Windows
+    signals: dict[str, Array]
+    windows: AuditWindows
     ground: Complex
 
     @property
@@ -112,17 +112,17 @@ class Track:
         return float(np.sqrt(np.nanmean(np.abs(self.ground) ** 2)))
 
 
-def track_of(trial: Trial) -> Track:
+def audited_track(trial: Trial) -> AuditedTrack:
     """The track of a trial that has x_m and y_m."""
     step, signals = on_uniform_time(trial)
     place = signals["x_m"] + 1j * signals["y_m"]
-    noise = estimated_noise(trial)
+    noise = record_noise(trial)
     windows = windows_of(place, max(noise["x_m"], noise["y_m"]), step)
-    return Track(signals, windows, windows.rate(place))
+    return AuditedTrack(signals, windows, windows.rate(place))
 
 
 def _of_pair(trial: Trial, pair: tuple[str, str]) -> list[Finding]:
-    track = track_of(trial)
+    track = audited_track(trial)
     given = track.signals[pair[0]] + 1j * track.signals[pair[1]]
     if np.count_nonzero(np.isfinite(track.windows.mean(given) + track.ground)) < 10:
         return []
@@ -133,14 +133,14 @@ def _of_pair(trial: Trial, pair: tuple[str, str]) -> list[Finding]:
         findings.append(frame)
         assert frame.mend is not None
         trial = frame.mend(trial)
-        track = track_of(trial)
+        track = audited_track(trial)
         given = track.signals[pair[0]] + 1j * track.signals[pair[1]]
     lesser = _lesser(trial, track, pair, given)
     # velocities along the axes of the track have been turned with psi and back: they do not tell of it
     return findings + [one for one in lesser if not (earth and one.columns == (trial.heading("psi_rad"),))]
 
 
-def _frame(trial: Trial, track: Track, pair: tuple[str, str], given: Complex) -> Finding | None:
+def _frame(trial: Trial, track: AuditedTrack, pair: tuple[str, str], given: Complex) -> Finding | None:
     """Another reading than the labelled one, where it explains the track clearly better."""
     turn = np.exp(1j * track.signals["psi_rad"])
     labelled, _ = _misfit(track, _AS_LABELLED, given, turn)
@@ -168,7 +168,7 @@ def _frame(trial: Trial, track: Track, pair: tuple[str, str], given: Complex) ->
     return Finding(trial.path, columns, what, truth, "fault", evidence, mend, safe=explained)
 
 
-def _misfit(track: Track, reading: Reading, given: Complex, turn: Complex) -> tuple[float, float]:
+def _misfit(track: AuditedTrack, reading: TrackReading, given: Complex, turn: Complex) -> tuple[float, float]:
     """Root mean square misfit of a reading, m/s, with a constant current and a constant rotation left free; this."""
     ground = track.ground.conj() if reading.mirrored else track.ground
     velocity = track.windows.mean(reading.velocity(given, turn))
@@ -185,7 +185,7 @@ def _signal(pair: tuple[str, str], name: str) -> str:
     return {"u": pair[0], "v": pair[1], "x": "x_m", "y": "y_m", "psi": "psi_rad", "r": "r_radps"}[name]
 
 
-def _mend(reading: Reading, pair: tuple[str, str], notice: str, quarter: complex) -> Mend:
+def _mend(reading: TrackReading, pair: tuple[str, str], notice: str, quarter: complex) -> Mend:
     if reading.earth:
         notice += "; turned to body axes by psi (those through the water are the same if there is no current)"
 
@@ -195,7 +195,7 @@ def _mend(reading: Reading, pair: tuple[str, str], notice: str, quarter: complex
             place = np.conj(signals["x_m"] + 1j * signals["y_m"]) / quarter
             return with_signals(trial, {"x_m": place.real, "y_m": place.imag}, notice)
         if "psi" in reading.wrong:
-            turned: dict[str, Vector | None] = {"psi_rad": np.angle(quarter) - signals["psi_rad"]}
+            turned: dict[str, Array | None] = {"psi_rad": np.angle(quarter) - signals["psi_rad"]}
             if "r_radps" in signals:
                 turned["r_radps"] = 0.0 - signals["r_radps"]
             return with_signals(trial, turned, notice)
@@ -206,7 +206,7 @@ def _mend(reading: Reading, pair: tuple[str, str], notice: str, quarter: complex
     return read
 
 
-def _lesser(trial: Trial, track: Track, pair: tuple[str, str], given: Complex) -> list[Finding]:
+def _lesser(trial: Trial, track: AuditedTrack, pair: tuple[str, str], given: Complex) -> list[Finding]:
     """Current c, scale and turn a, antenna l or clock tau: d(x + iy)/dt = a w e + c + d(l e)/dt, or + tau d(w e)/dt."""
     turn = np.exp(1j * track.signals["psi_rad"])
     velocity = given * turn
@@ -250,7 +250,7 @@ def _lesser(trial: Trial, track: Track, pair: tuple[str, str], given: Complex) -
     return findings
 
 
-def _antenna(trial: Trial, lever: Fit, clock: Fit | None) -> Finding:
+def _antenna(trial: Trial, lever: WeakFit, clock: WeakFit | None) -> Finding:
     forward, starboard = (float(value) for value in lever.values[4:6])
     truth = f"the antenna is {forward:.3g} m before and {starboard:.3g} m to starboard of the origin"
     evidence = {
@@ -269,7 +269,7 @@ def _antenna(trial: Trial, lever: Fit, clock: Fit | None) -> Finding:
     return Finding(trial.path, columns, what, truth, "note", evidence)
 
 
-def _scale(trial: Trial, pair: tuple[str, str], found: Fit) -> Finding:
+def _scale(trial: Trial, pair: tuple[str, str], found: WeakFit) -> Finding:
     factor = float(found.values[0])
     evidence = {"factor": factor, "standard_error": float(found.errors[0])}
     truth = f"the log reads {100 * (1 / factor - 1):+.2g} %"
@@ -288,7 +288,7 @@ def _scale(trial: Trial, pair: tuple[str, str], found: Fit) -> Finding:
     return Finding(trial.path, columns, what, truth, "note", evidence, scaled)
 
 
-def _offset(trial: Trial, found: Fit) -> Finding:
+def _offset(trial: Trial, found: WeakFit) -> Finding:
     """The track is turned against heading and velocities: psi + offset is the heading in the axes of x and y."""
     offset = float(np.arctan2(found.values[1], found.values[0]))
     evidence = {"angle_deg": float(np.rad2deg(-offset)), "standard_error_deg": float(np.rad2deg(found.errors[1]))}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import oaconvolve
 from scipy.stats import t as student
 
-from tank2sim.records.csv_table import Vector
+from tank2sim.arrays import Array
 from tank2sim.records.trials import Trial, sampling_step
 
 Complex = NDArray[np.complex128]
@@ -22,16 +22,16 @@ FALSE_ALARM = 1e-5
 one false alarm in a hundred audits. A choice of ours."""
 SHARE = 0.01
 """The noise that a rate may keep, as a share of the motion: below most of the differences that matter."""
-FEWEST = 12
+FEWEST_WINDOWS = 12
 """Independent windows below which nothing is judged."""
-FINEST = 20
+_FINEST = 20
 """Steps of a uniform time base for one row: bounds what uneven times may take. Project choice."""
 ORDERS = ("delta_order_rad", "n_radps")
 """Signals that hold until the next reading."""
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
+class AuditWindows:
     """Windows of one width, half a width apart, over a uniform time base.
 
     For a smooth bump g that vanishes at both ends, the mean of dy/dt weighted with g is that of y weighted with the
@@ -89,7 +89,7 @@ class Windows:
         picked: NDArray[Number] = np.where(holes, np.nan, inside)[:: self.hop or (self.samples + 1) // 2]
         return picked
 
-    def _kernel(self, order: int) -> Vector:
+    def _kernel(self, order: int) -> Array:
         width = self.width_s
         phase = 2 * np.pi * np.arange(1, self.samples + 1) / (self.samples + 1)
         # (1 - cos p)^2 = 3/2 - 2 cos p + cos(2 p)/2, of mean 3/2; p = 2 pi t/width
@@ -99,11 +99,11 @@ class Windows:
             turn * (2 * np.sin(phase) - np.sin(2 * phase)),
             turn**2 * (2 * np.cos(phase) - 2 * np.cos(2 * phase)),
         )
-        kernel: Vector = shapes[order] / (1.5 * width) * self.step_s
+        kernel: Array = shapes[order] / (1.5 * width) * self.step_s
         return kernel
 
 
-def windows_for(noise: float, motion: float, step_s: float, count: int) -> Windows:
+def windows_for(noise: float, motion: float, step_s: float, count: int) -> AuditWindows:
     """Windows in which the rate of a signal with this noise is known to a hundredth of the rate of the motion.
 
     White noise s in the signal leaves s sqrt(10/9 (2 pi)^2 step/width^3) in its rate. At least eight samples wide,
@@ -123,12 +123,12 @@ def windows_for(noise: float, motion: float, step_s: float, count: int) -> Windo
         1 / 3
     ) / step_s
     samples = int(np.clip(wanted, 8, max(8, count / 20)))
-    return Windows(step_s, samples + 1 - samples % 2)
+    return AuditWindows(step_s, samples + 1 - samples % 2)
 
 
-def windows_of(values: NDArray[Number], noise: float, step_s: float) -> Windows:
+def windows_of(values: NDArray[Number], noise: float, step_s: float) -> AuditWindows:
     """Windows fit for the rate of a signal (n,) with this noise, by :func:`windows_for` and its own motion."""
-    windows = Windows(step_s, 9)
+    windows = AuditWindows(step_s, 9)
     for _ in range(2):  # narrow windows still hold noise, which the second pass does not
         rate = np.abs(windows.rate(values))
         rate = rate[np.isfinite(rate)]
@@ -138,11 +138,11 @@ def windows_of(values: NDArray[Number], noise: float, step_s: float) -> Windows:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class WeakFit:
     """Least-squares coefficients (k,), their standard errors (k,), and the root mean square of the residual."""
 
-    values: Vector
-    errors: Vector
+    values: Array
+    errors: Array
     residual: float
     freedom: float
 
@@ -152,7 +152,7 @@ class Fit:
         return bool(abs(self.values[place] - expected) > limit * self.errors[place])
 
 
-def fit(target: Vector | Complex, regressors: Sequence[Vector | Complex]) -> Fit | None:
+def fit(target: Array | Complex, regressors: Sequence[Array | Complex]) -> WeakFit | None:
     """Regression of a target (windows,) on regressors, real or complex.
 
     None if there are too few windows, or the regressors cannot be told apart.
@@ -165,7 +165,7 @@ def fit(target: Vector | Complex, regressors: Sequence[Vector | Complex]) -> Fit
 
     table = np.column_stack(regressors)
     whole = np.isfinite(target) & np.isfinite(table).all(axis=1)
-    if np.count_nonzero(whole) < 2 * FEWEST:
+    if np.count_nonzero(whole) < 2 * FEWEST_WINDOWS:
         return None
     table, wanted = table[whole], target[whole]
     if np.iscomplexobj(target) or np.iscomplexobj(table):
@@ -177,7 +177,7 @@ def fit(target: Vector | Complex, regressors: Sequence[Vector | Complex]) -> Fit
     independent = int(np.count_nonzero(whole)) / 2
     freedom = independent - design.shape[1]
     size = np.sqrt(np.mean(design**2, axis=0)) if len(design) else np.zeros(1)
-    if independent < FEWEST or freedom < FEWEST / 2 or not np.all(size > 0):
+    if independent < FEWEST_WINDOWS or freedom < FEWEST_WINDOWS / 2 or not np.all(size > 0):
         return None
     design = design / size
     if np.linalg.matrix_rank(design) < design.shape[1]:
@@ -187,17 +187,17 @@ def fit(target: Vector | Complex, regressors: Sequence[Vector | Complex]) -> Fit
     robust = result.get_robustcov_results(cov_type="HAC", maxlags=lags, use_correction=True)
     residual = float(np.sqrt(np.mean(np.asarray(result.resid) ** 2)))
     errors = np.maximum(np.asarray(result.bse), np.asarray(robust.bse))
-    return Fit(np.asarray(result.params) / size, errors / size, residual, freedom)
+    return WeakFit(np.asarray(result.params) / size, errors / size, residual, freedom)
 
 
-def on_uniform_time(trial: Trial) -> tuple[float, dict[str, Vector]]:
+def on_uniform_time(trial: Trial) -> tuple[float, dict[str, Array]]:
     """Step (s) and signals on a uniform time base: as they are if theirs is uniform, else interpolated linearly.
 
     A signal recorded less often than the rows, regularly, is taken as straight between its readings, orders as held.
     What lies in a longer gap of its signal or of the rows is nan. The time base has at most `FINEST` steps a row.
     """
     time = trial.time_s
-    step = max(sampling_step(trial), float(time[-1] - time[0]) / (FINEST * (len(time) - 1)))
+    step = max(sampling_step(trial), float(time[-1] - time[0]) / (_FINEST * (len(time) - 1)))
     even = time[0] + step * np.arange(len(time))
     uniform = bool(np.max(np.abs(time - even)) < 0.5 * step)
     grid = time if uniform else np.arange(time[0], time[-1] + step / 2, step)
@@ -207,7 +207,7 @@ def on_uniform_time(trial: Trial) -> tuple[float, dict[str, Vector]]:
     }
 
 
-def _on_grid(name: str, trial: Trial, grid: Vector, step: float) -> Vector:
+def _on_grid(name: str, trial: Trial, grid: Array, step: float) -> Array:
     known = np.isfinite(trial.signals[name])
     time, values = trial.time_s[known], trial.signals[name][known]
     if len(time) < 2:

@@ -7,23 +7,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import correlate, correlation_lags
 
+from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding, Mend
-from tank2sim.records.audit.noise import estimated_noise, rounding
+from tank2sim.records.audit.noise import record_noise, rounding
 from tank2sim.records.audit.rudder import rudder_response
 from tank2sim.records.audit.time_unit import MISCALIBRATED
-from tank2sim.records.audit.weak import Fit, Windows, fit, on_uniform_time, windows_of
-from tank2sim.records.csv_table import Vector
+from tank2sim.records.audit.weak import AuditWindows, WeakFit, fit, on_uniform_time, windows_of
 from tank2sim.records.trials import Trial, unwrapped, with_signals
 
-DEGREE = np.pi / 180
+_DEGREE = np.pi / 180
 UNIT_TOLERANCE = 0.023
 """How far a factor may be from that of a unit to be taken for it: half the way from 57.3 to the 60 of a time in minutes
 or of a rate per minute. Project choice."""
 COARSE = 0.3
 """The same for the course of a track over the heading, for the drift angle turns as well."""
-FACTOR = 0.02
+_FACTOR = 0.02
 """Scale error of a rate of turn worth a word: above what rate gyros are usually calibrated to. A choice of ours."""
-ROUNDED = 1.5
+_ROUNDED = 1.5
 """Times what rounding is expected to leave that is put down to it: errors of rounding are not quite so random (project
 choice)."""
 _ALIKE = 0.9  # correlation from which two signals are taken for the same motion
@@ -38,7 +38,7 @@ def heading_unit_findings(trial: Trial) -> list[Finding]:
         return []
     heading = trial.heading("psi_rad")
     degrees = "deg" in heading
-    factor = 1 / DEGREE if degrees else DEGREE
+    factor = 1 / _DEGREE if degrees else _DEGREE
     if abs(np.log(abs(slope) / factor)) > COARSE:
         return []
     truth = "psi is in radians" if degrees else "psi is in degrees"
@@ -65,7 +65,7 @@ def yaw_findings(trial: Trial) -> list[Finding]:
         return _judged(trial, found)
     step, signals = on_uniform_time(trial)
     rate, heading = signals["r_radps"], signals["psi_rad"]
-    noise = estimated_noise(trial)
+    noise = record_noise(trial)
     windows = windows_of(heading, noise["psi_rad"], step)
     found = _comparison(windows, rate, heading, step)
     if found is None:
@@ -86,7 +86,7 @@ def _alike(trial: Trial) -> _Comparison | None:
     if not {"psi_rad", "r_radps"} <= set(trial.signals):
         return None
     step, signals = on_uniform_time(trial)
-    rate, noise = signals["r_radps"], estimated_noise(trial)["psi_rad"]
+    rate, noise = signals["r_radps"], record_noise(trial)["psi_rad"]
     for candidate in _headings(trial, signals["psi_rad"]):
         windows = windows_of(candidate, noise, step)
         found = _comparison(windows, rate, candidate, step)
@@ -103,7 +103,7 @@ def _alike(trial: Trial) -> _Comparison | None:
 class _Comparison:
     """dpsi/dt = factor r(t + lag) + bias in windows, factor and lag by regression."""
 
-    fit: Fit
+    fit: WeakFit
     lag_s: float
     lag_error_s: float
     correlation: float
@@ -119,7 +119,7 @@ class _Comparison:
         return float(self.fit.values[0])
 
 
-def _hidden_by_rounding(trial: Trial, rate: Vector, heading: Vector, step: float) -> bool:
+def _hidden_by_rounding(trial: Trial, rate: Array, heading: Array, step: float) -> bool:
     """True if what r and dpsi/dt differ by in wide windows is no more than the rounding of the heading may leave.
 
     An error that is uniform within half a unit, and one value in each half of a window, leaves sqrt(2/12) unit times
@@ -131,13 +131,13 @@ def _hidden_by_rounding(trial: Trial, rate: Vector, heading: Vector, step: float
     windows = windows_of(heading, unit, step)
     found = _comparison(windows, rate, heading, step)
     return (
-        found is None or found.alike or found.fit.residual < ROUNDED * np.sqrt(2 / 12) * unit * 8 / 3 / windows.width_s
+        found is None or found.alike or found.fit.residual < _ROUNDED * np.sqrt(2 / 12) * unit * 8 / 3 / windows.width_s
     )
 
 
-def _headings(trial: Trial, heading: Vector) -> list[Vector]:
+def _headings(trial: Trial, heading: Array) -> list[Array]:
     """The heading, and as it is if it is in rad, wrapped at 2 pi, under the name of degrees."""
-    turn = 2 * np.pi * DEGREE
+    turn = 2 * np.pi * _DEGREE
     if (
         not np.isfinite(heading).any()
         or "deg" not in trial.heading("psi_rad")
@@ -150,7 +150,7 @@ def _headings(trial: Trial, heading: Vector) -> list[Vector]:
     return [again, heading]
 
 
-def _comparison(windows: Windows, rate: Vector, heading: Vector, step: float) -> _Comparison | None:
+def _comparison(windows: AuditWindows, rate: Array, heading: Array, step: float) -> _Comparison | None:
     """The comparison as they stand, or at the lag that makes them alike; None if there is too little to judge."""
     first = _at(windows, rate, heading, step, 0)
     if first is None:
@@ -166,7 +166,7 @@ def _comparison(windows: Windows, rate: Vector, heading: Vector, step: float) ->
     return found
 
 
-def _at(windows: Windows, rate: Vector, heading: Vector, step: float, shift: int) -> _Comparison | None:
+def _at(windows: AuditWindows, rate: Array, heading: Array, step: float, shift: int) -> _Comparison | None:
     """The comparison with r taken `shift` rows later, and the lag left over from regression on dr/dt."""
     moved = _shifted(rate, shift)
     r, target = windows.mean(moved), windows.rate(heading)
@@ -179,7 +179,7 @@ def _at(windows: Windows, rate: Vector, heading: Vector, step: float, shift: int
     return _Comparison(found, shift * step + lag, abs(error), correlation, step, shift)
 
 
-def _shifted(values: Vector, samples: int) -> Vector:
+def _shifted(values: Array, samples: int) -> Array:
     """Values as they are `samples` rows later; nan where there are none."""
     moved = np.full(len(values), np.nan)
     if samples >= 0:
@@ -189,7 +189,7 @@ def _shifted(values: Vector, samples: int) -> Vector:
     return moved
 
 
-def _coarse_lag(windows: Windows, rate: Vector, heading: Vector) -> int:
+def _coarse_lag(windows: AuditWindows, rate: Array, heading: Array) -> int:
     """Rows by which r is late, from the largest cross-correlation with dpsi/dt, within a tenth of the record."""
     every = replace(windows, hop=1)
     r, target = every.mean(rate), every.rate(heading)
@@ -205,7 +205,7 @@ def _judged(trial: Trial, found: _Comparison) -> list[Finding]:
     if found.factor < 0:
         findings.append(_sign(trial, found))
     factor = abs(found.factor)
-    if abs(factor - 1) > FACTOR and found.fit.differs(0, float(np.sign(found.factor))):
+    if abs(factor - 1) > _FACTOR and found.fit.differs(0, float(np.sign(found.factor))):
         findings.append(_factor(trial, found))
     if found.fit.differs(1):
         findings.append(_bias(trial, -float(found.fit.values[1]) / found.factor, float(found.fit.errors[1]) / factor))
@@ -221,7 +221,7 @@ def _note(trial: Trial, what: str, truth: str, evidence: dict[str, float]) -> Fi
     return Finding(trial.path, (trial.heading("r_radps"),), what, truth, "note", evidence)
 
 
-def _without_turn(trial: Trial, difference: Vector) -> list[Finding]:
+def _without_turn(trial: Trial, difference: Array) -> list[Finding]:
     """A bias, where noise hides the turn: dpsi/dt less r is constant."""
     found = fit(difference, [np.ones(len(difference))])
     if found is None or not found.differs(0):
@@ -230,8 +230,8 @@ def _without_turn(trial: Trial, difference: Vector) -> list[Finding]:
 
 
 def _bias(trial: Trial, bias: float, error: float) -> Finding:
-    in_degrees = {"bias_degps": bias / DEGREE, "standard_error_degps": error / DEGREE}
-    truth = f"the gyro reads {bias / DEGREE:+.3g} deg/s when the ship does not turn (bias)"
+    in_degrees = {"bias_degps": bias / _DEGREE, "standard_error_degps": error / _DEGREE}
+    truth = f"the gyro reads {bias / _DEGREE:+.3g} deg/s when the ship does not turn (bias)"
 
     def unbiased(other: Trial) -> Trial:
         return with_signals(other, {"r_radps": other.signals["r_radps"] - bias}, f"r: bias of {bias:.3g} rad/s removed")
@@ -258,14 +258,14 @@ def _factor(trial: Trial, found: _Comparison) -> Finding:
 def _unit(trial: Trial, found: _Comparison) -> Finding | None:
     """The unit that a factor between dpsi/dt and r tells of, and of which of them, if that can be told."""
     factor = abs(found.factor)
-    nearest = min((1.0, 1 / DEGREE, DEGREE, 1 / 60), key=lambda unit: abs(np.log(factor / unit)))
+    nearest = min((1.0, 1 / _DEGREE, _DEGREE, 1 / 60), key=lambda unit: abs(np.log(factor / unit)))
     # few or noisy windows tell a factor less well
     tolerance = max(UNIT_TOLERANCE, min(0.1, 4.5 * float(found.fit.errors[0]) / factor))
     if nearest == 1.0 or abs(np.log(factor / nearest)) > tolerance:
         return None
     r, psi = trial.heading("r_radps"), trial.heading("psi_rad")
     what = f"dpsi/dt is {factor:.4g} times r"
-    small, slope = nearest == 1 / DEGREE, _course_slope(trial)
+    small, slope = nearest == 1 / _DEGREE, _course_slope(trial)
     psi_right = slope is not None and abs(np.log(abs(slope))) < 1.0  # the course turns as it does
     readings = []
     if nearest == 1 / 60 and "deg" in r:
@@ -329,7 +329,7 @@ def _course_slope(trial: Trial) -> float | None:
     if not {"x_m", "y_m", "psi_rad"} <= set(trial.signals):
         return None
     step, signals = on_uniform_time(trial)
-    noise = estimated_noise(trial)
+    noise = record_noise(trial)
     place = signals["x_m"] + 1j * signals["y_m"]
     windows = windows_of(place, max(noise["x_m"], noise["y_m"]), step)
     velocity = windows.rate(place)
@@ -339,7 +339,7 @@ def _course_slope(trial: Trial) -> float | None:
     course = unwrapped(np.where(going, np.angle(velocity), np.nan))
     if np.isnan(course).all():
         return None
-    if not np.nanmax(course) - np.nanmin(course) > 10 * DEGREE:  # beyond any drift of a straight run
+    if not np.nanmax(course) - np.nanmin(course) > 10 * _DEGREE:  # beyond any drift of a straight run
         return None
     spread = float(np.nanstd(course))
     for candidate in _headings(trial, signals["psi_rad"]):

@@ -76,7 +76,7 @@ class TrialAnalysis:
 
 
 @dataclass(frozen=True)
-class Settings:
+class SignalSettings:
     """What a user chooses: the columns (none: all), the longest gap to bridge, the length of spectral segments."""
 
     columns: Sequence[str] = ()
@@ -84,7 +84,7 @@ class Settings:
     segment_s: float | None = None
 
 
-def analyse(trial: Trial, settings: Settings) -> TrialAnalysis:
+def analyse(trial: Trial, settings: SignalSettings) -> TrialAnalysis:
     """Analyse the signals of a trial.
 
     Raises

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from tank2sim.records.signals.analysis import ColumnAnalysis, Randomness, Steering, TrialAnalysis
-from tank2sim.records.signals.columns import DIRECTIONS, SignalName
-from tank2sim.records.signals.effect import Effect
+from tank2sim.records.signals.columns import DIRECTION_COLUMNS, SignalName
+from tank2sim.records.signals.effect import FilterEffect
 from tank2sim.records.signals.spectra import Averaging
 from tank2sim.records.signals.statistics import UnitRootTests
 
@@ -21,7 +21,7 @@ def analysis_as_json(analysis: TrialAnalysis) -> dict[str, Any]:
     }
 
 
-def effect_as_json(effect: Effect) -> dict[str, Any]:
+def effect_as_json(effect: FilterEffect) -> dict[str, Any]:
     """What a filter does."""
     return {
         "told": effect.sentence,
@@ -42,7 +42,7 @@ def _column(column: ColumnAnalysis) -> dict[str, Any]:
         "step_s": column.series.step_s,
         "mean": name.factor * column.mean,
         "standard_deviation": name.factor * column.standard_deviation,
-        "on_circle": column.series.name in DIRECTIONS,
+        "on_circle": column.series.name in DIRECTION_COLUMNS,
         "constant": column.randomness is None,
     }
     return told | (_random(column.randomness, name) if column.randomness else {})

@@ -8,10 +8,10 @@ from tank2sim.errors import InputError
 from tank2sim.records.trials import Trial
 from tank2sim.units import from_si, to_si
 
-HELD = frozenset({"delta_order_rad", "n_radps"})
+HELD_COLUMNS = frozenset({"delta_order_rad", "n_radps"})
 """Signals that hold until their next value: orders."""
 
-DIRECTIONS = frozenset({"psi_rad", "cog_rad", "wind_direction_rad", "wind_rel_direction_rad"})
+DIRECTION_COLUMNS = frozenset({"psi_rad", "cog_rad", "wind_direction_rad", "wind_rel_direction_rad"})
 """Signals that go round the compass: a step through north is no jump."""
 
 _WORDS = {

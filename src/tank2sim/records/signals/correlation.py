@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import signal
 
-from tank2sim.records.csv_table import Vector
+from tank2sim.arrays import Array
 from tank2sim.records.signals.sampling import Series, at_common_times
 
 _NORMAL = 1.959964
@@ -29,8 +29,8 @@ class Correlation:
         Bartlett's formula: 1.96 sqrt(sum over the lags of rho_1 rho_2 / n) (Box & Jenkins 1976, section 11.1.3).
     """
 
-    lag_s: Vector
-    coefficient: Vector
+    lag_s: Array
+    coefficient: Array
     bound: float
 
     @property
@@ -55,8 +55,8 @@ class Autocorrelation:
         1946); at most its number of samples.
     """
 
-    lag_s: Vector
-    coefficient: Vector
+    lag_s: Array
+    coefficient: Array
     correlation_time_s: float
     effective_count: float
 
@@ -85,8 +85,8 @@ def cross_correlation(first: Series, second: Series) -> Correlation:
     return Correlation(first.step_s * lags[kept], coefficient[kept], bound)
 
 
-def _coefficients(one: Vector, other: Vector) -> Vector:
+def _coefficients(one: Array, other: Array) -> Array:
     """At all lags from -(n - 1) to n - 1; divided by n and not by the number of pairs, whose scatter is greater."""
     one, other = one - one.mean(), other - other.mean()
-    product: Vector = signal.correlate(one, other, method="fft")
+    product: Array = signal.correlate(one, other, method="fft")
     return product / (len(one) * float(one.std()) * float(other.std()))

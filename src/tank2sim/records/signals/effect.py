@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tank2sim.records.csv_table import Vector
+from tank2sim.arrays import Array
 from tank2sim.records.signals.sampling import Series
 
 _FREQUENCIES = 400
 
 
 @dataclass(frozen=True, eq=False)
-class Effect:
+class FilterEffect:
     """Frequency response of a filter, and where its ends are not to be believed.
 
     Parameters
@@ -32,27 +32,27 @@ class Effect:
         All that in words.
     """
 
-    frequency_hz: Vector
+    frequency_hz: Array
     response: NDArray[np.complex128]
-    delay_s: Vector
+    delay_s: Array
     ends_s: tuple[float, float]
     sentence: str
 
     @property
-    def gain(self) -> Vector:
+    def gain(self) -> Array:
         """Amplitude of the output over that of the input."""
         return np.abs(self.response)
 
     @property
-    def phase_rad(self) -> Vector:
+    def phase_rad(self) -> Array:
         """Angle of the response, negative: later. Continuous, and within half a turn where the gain is largest.
 
         Without delay it is not made continuous: it is 0, or half a turn where waves come out upside down.
         """
-        angle: Vector = np.angle(self.response)
+        angle: Array = np.angle(self.response)
         if not self.delay_s.any():
             return np.where(angle < 1e-6 - math.pi, math.pi, angle)
-        phase: Vector = np.unwrap(angle)
+        phase: Array = np.unwrap(angle)
         turn = 2.0 * math.pi
         return phase - turn * round(float(phase[np.argmax(self.gain)]) / turn)
 
@@ -67,13 +67,13 @@ class Filtered:
     """A filtered signal and what the filter did to it."""
 
     series: Series
-    effect: Effect
+    effect: FilterEffect
 
 
-def frequencies(series: Series) -> Vector:
+def effect_frequencies(series: Series) -> Array:
     """Frequencies (Hz) at which an effect is told, evenly spread over their logarithm, (400,)."""
     # Not quite to Nyquist, where low-pass filters have a zero and no phase.
-    grid: Vector = np.geomspace(1.0 / series.duration_s, 0.499 * series.rate_hz, _FREQUENCIES)
+    grid: Array = np.geomspace(1.0 / series.duration_s, 0.499 * series.rate_hz, _FREQUENCIES)
     return grid
 
 

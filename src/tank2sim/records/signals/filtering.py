@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import interpolate, signal
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.csv_table import Vector
-from tank2sim.records.signals.effect import Effect, Filtered, decibel, frequencies
-from tank2sim.records.signals.sampling import FEWEST, Series
+from tank2sim.records.signals.effect import Filtered, FilterEffect, decibel, effect_frequencies
+from tank2sim.records.signals.sampling import FEWEST_SAMPLES, Series
 
-ORDER = 4
+_ORDER = 4
 """Order of a Butterworth filter if none is given: 24 dB an octave, and twice that forwards and backwards."""
 
 _SETTLED = 0.01
 """Part of the sum of a filter's impulse response that is still to come where its ends are called undistorted."""
 
 
-class Pass(StrEnum):
+class FilterType(StrEnum):
     """What a filter lets through."""
 
     LOW = "lowpass"
@@ -32,7 +32,7 @@ class Pass(StrEnum):
 
 
 def butterworth(
-    series: Series, kind: Pass, cutoff_hz: Sequence[float], *, order: int = ORDER, causal: bool = False
+    series: Series, kind: FilterType, cutoff_hz: Sequence[float], *, order: int = _ORDER, causal: bool = False
 ) -> Filtered:
     """Butterworth filter, forwards and backwards without shift of phase, or forwards alone as a measuring chain does.
 
@@ -55,12 +55,12 @@ def butterworth(
         A frequency is not between one period a record and the Nyquist frequency, or they do not rise.
     """
     edges = [_within(series, kind.value, edge) for edge in cutoff_hz]
-    if len(edges) != (2 if kind is Pass.BAND else 1) or sorted(set(edges)) != edges:
+    if len(edges) != (2 if kind is FilterType.BAND else 1) or sorted(set(edges)) != edges:
         raise InputError(
             kind.value, "", "takes one frequency, a band two that rise", "write lowpass:0.5, bandpass:0.1,1"
         )
     sections = signal.butter(
-        order, edges if kind is Pass.BAND else edges[0], kind.value, fs=series.rate_hz, output="sos"
+        order, edges if kind is FilterType.BAND else edges[0], kind.value, fs=series.rate_hz, output="sos"
     )
     settling = _settling(sections, series)
     if causal:
@@ -70,12 +70,12 @@ def butterworth(
         # Reflected as far as the filter remembers, the record's ends are least disturbed.
         reach = min(len(series.values) - 1, max(1, round(settling / series.step_s)))
         values = signal.sosfiltfilt(sections, series.values, padlen=reach)
-    grid = frequencies(series)
+    grid = effect_frequencies(series)
     response = _sections_response(sections, grid, series)
     if not causal:
         response = np.abs(response) ** 2 + 0j
     delay = _sections_delay(sections, grid, series) if causal else np.zeros(len(grid))
-    effect = Effect(grid, response, delay, (settling, 0.0 if causal else settling), "")
+    effect = FilterEffect(grid, response, delay, (settling, 0.0 if causal else settling), "")
     sentence = _causal_sentence(effect, kind, edges) if causal else _zero_phase_sentence(effect, edges)
     return Filtered(series.with_values(values), replace(effect, sentence=sentence))
 
@@ -104,14 +104,14 @@ def savitzky_golay(series: Series, samples: int, degree: int, *, derivative: int
         raise InputError("savgol", "", problem, "give an odd number of samples above the degree, such as savgol:11,3")
     values = signal.savgol_filter(series.values, samples, degree, deriv=derivative, delta=series.step_s)
     taps = signal.savgol_coeffs(samples, degree, deriv=derivative, delta=series.step_s)
-    grid = frequencies(series)
+    grid = effect_frequencies(series)
     response = _centred_response(taps, grid, series)
     half = samples // 2 * series.step_s
     found = _falls_to_half(grid, np.abs(response) / (2.0 * np.pi * grid) ** derivative)
     limit = f"{decibel(0.5)} at {found:.3g} Hz" if found else "more than half the amplitude at all frequencies"
     what = f"derivative of order {derivative} without delay" if derivative else "no phase shift"
     told = f"{what}, {limit}, side lobes above, some upside down; fit one-sided over {half:.3g} s at both ends"
-    return Filtered(series.with_values(values), Effect(grid, response, np.zeros(len(grid)), (half, half), told))
+    return Filtered(series.with_values(values), FilterEffect(grid, response, np.zeros(len(grid)), (half, half), told))
 
 
 def smoothing_spline(series: Series, cutoff_hz: float) -> Filtered:
@@ -134,11 +134,11 @@ def smoothing_spline(series: Series, cutoff_hz: float) -> Filtered:
     half = min(count, 10 + round(12 * math.sqrt(2.0) / (2.0 * math.pi * cutoff_hz * series.step_s)))
     places = np.arange(2.0 * half + 1)
     taps = interpolate.make_smoothing_spline(places, np.where(places == half, 1.0, 0.0), lam=weight)(places)
-    grid = frequencies(series)
+    grid = effect_frequencies(series)
     response = _centred_response(taps, grid, series)
     end = 1.0 / (2.0 * math.pi * cutoff_hz) * math.sqrt(2.0) * math.log(1.0 / _SETTLED)
     told = f"no phase shift, {decibel(0.5)} at {cutoff_hz:.3g} Hz, ends freer over {end:.3g} s"
-    return Filtered(series.with_values(values), Effect(grid, response, np.zeros(len(grid)), (end, end), told))
+    return Filtered(series.with_values(values), FilterEffect(grid, response, np.zeros(len(grid)), (end, end), told))
 
 
 def decimate(series: Series, factor: int) -> Filtered:
@@ -152,14 +152,14 @@ def decimate(series: Series, factor: int) -> Filtered:
     InputError
         The factor is below 2 or leaves fewer than 50 samples.
     """
-    if factor < 2 or len(series.values) // factor < FEWEST:
+    if factor < 2 or len(series.values) // factor < FEWEST_SAMPLES:
         problem = f"every {factor}th of {len(series.values)} samples"
-        raise InputError("decimate", "", problem, f"give a factor of 2 or more that leaves {FEWEST} samples")
+        raise InputError("decimate", "", problem, f"give a factor of 2 or more that leaves {FEWEST_SAMPLES} samples")
     edge = 0.8 / factor
     zeros, poles, gain = signal.cheby1(7, 0.05, edge, output="zpk")
     sections = signal.zpk2sos(zeros, poles, gain)
     values = signal.decimate(series.values, factor, ftype=signal.dlti(zeros, poles, gain), zero_phase=True)
-    grid = frequencies(series)
+    grid = effect_frequencies(series)
     response = np.abs(_sections_response(sections, grid, series)) ** 2 + 0j
     settling = _settling(sections, series)
     kept = edge * series.rate_hz / 2.0
@@ -169,7 +169,7 @@ def decimate(series: Series, factor: int) -> Filtered:
         f"ends distorted over {settling:.3g} s"
     )
     thinner = replace(series, step_s=factor * series.step_s, values=values)
-    return Filtered(thinner, Effect(grid, response, np.zeros(len(grid)), (settling, settling), told))
+    return Filtered(thinner, FilterEffect(grid, response, np.zeros(len(grid)), (settling, settling), told))
 
 
 def _within(series: Series, filter_name: str, frequency_hz: float) -> float:
@@ -180,25 +180,25 @@ def _within(series: Series, filter_name: str, frequency_hz: float) -> float:
     return float(frequency_hz)
 
 
-def _sections_response(sections: Vector, grid: Vector, series: Series) -> NDArray[np.complex128]:
+def _sections_response(sections: Array, grid: Array, series: Series) -> NDArray[np.complex128]:
     response: NDArray[np.complex128] = signal.sosfreqz(sections, worN=grid, fs=series.rate_hz)[1]
     return response
 
 
-def _sections_delay(sections: Vector, grid: Vector, series: Series) -> Vector:
+def _sections_delay(sections: Array, grid: Array, series: Series) -> Array:
     delays = [signal.group_delay((row[:3], row[3:]), w=grid, fs=series.rate_hz)[1] for row in sections]
-    total: Vector = series.step_s * np.sum(delays, axis=0)
+    total: Array = series.step_s * np.sum(delays, axis=0)
     return total
 
 
-def _centred_response(taps: Vector, grid: Vector, series: Series) -> NDArray[np.complex128]:
+def _centred_response(taps: Array, grid: Array, series: Series) -> NDArray[np.complex128]:
     """Response of an odd number of taps, the middle one at the present sample."""
     response: NDArray[np.complex128] = signal.freqz(taps, worN=grid, fs=series.rate_hz)[1]
     centred: NDArray[np.complex128] = response * np.exp(2j * np.pi * grid * series.step_s * (len(taps) // 2))
     return centred
 
 
-def _settling(sections: Vector, series: Series) -> float:
+def _settling(sections: Array, series: Series) -> float:
     """Time (s) after which 1 % of the impulse response, summed by size, is still to come; at most the record."""
     impulse = np.zeros(len(series.values))
     impulse[0] = 1.0
@@ -206,19 +206,23 @@ def _settling(sections: Vector, series: Series) -> float:
     return float(np.searchsorted(size, (1.0 - _SETTLED) * size[-1])) * series.step_s
 
 
-def _falls_to_half(grid: Vector, gain: Vector) -> float | None:
+def _falls_to_half(grid: Array, gain: Array) -> float | None:
     below = np.flatnonzero(gain < 0.5)
     return float(grid[below[0]]) if below.size else None
 
 
-def _zero_phase_sentence(effect: Effect, edges: Sequence[float]) -> str:
+def _zero_phase_sentence(effect: FilterEffect, edges: Sequence[float]) -> str:
     where = " and ".join(f"{edge:.3g}" for edge in edges)
     return f"no phase shift, {decibel(0.5)} at {where} Hz, ends distorted over {effect.ends_s[0]:.3g} s"
 
 
-def _causal_sentence(effect: Effect, kind: Pass, edges: Sequence[float]) -> str:
+def _causal_sentence(effect: FilterEffect, kind: FilterType, edges: Sequence[float]) -> str:
     # Told well inside of what is let through: an octave from the edge, or in the middle of the band.
-    frequency = {Pass.LOW: edges[0] / 2, Pass.HIGH: edges[0] * 2, Pass.BAND: math.sqrt(edges[0] * edges[-1])}[kind]
+    frequency = {
+        FilterType.LOW: edges[0] / 2,
+        FilterType.HIGH: edges[0] * 2,
+        FilterType.BAND: math.sqrt(edges[0] * edges[-1]),
+    }[kind]
     frequency = min(max(frequency, float(effect.frequency_hz[0])), float(effect.frequency_hz[-1]))
     place = int(np.argmin(np.abs(effect.frequency_hz - frequency)))
     phase = float(effect.phase_rad[place])

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from tank2sim.errors import InputError
 from tank2sim.records.signals.effect import Filtered
-from tank2sim.records.signals.filtering import Pass, butterworth, decimate, savitzky_golay, smoothing_spline
+from tank2sim.records.signals.filtering import FilterType, butterworth, decimate, savitzky_golay, smoothing_spline
 from tank2sim.records.signals.sampling import Series
 from tank2sim.records.signals.trends import detrend
 
-FORMS = (
+REQUEST_FORMS = (
     "lowpass:HZ, highpass:HZ, bandpass:HZ,HZ (each also with ,causal), savgol:SAMPLES,DEGREE, spline:HZ, "
     "detrend:DEGREE, decimate:FACTOR"
 )
@@ -47,7 +47,7 @@ def parse_filter(text: str) -> FilterRequest:
     """
     kind, _, rest = text.strip().partition(":")
     words = [word.strip() for word in rest.split(",") if word.strip()]
-    causal = bool(words) and words[-1] == "causal" and kind in set(Pass)
+    causal = bool(words) and words[-1] == "causal" and kind in set(FilterType)
     try:
         numbers = [float(word) for word in (words[:-1] if causal else words)]
         whole = [int(number) for number in numbers if number == int(number)]
@@ -55,7 +55,7 @@ def parse_filter(text: str) -> FilterRequest:
         raise _refusal(text) from None
     match kind, len(numbers), len(whole) == len(numbers):
         case ("lowpass" | "highpass", 1, _) | ("bandpass", 2, _):
-            return FilterRequest(text, lambda series: butterworth(series, Pass(kind), numbers, causal=causal))
+            return FilterRequest(text, lambda series: butterworth(series, FilterType(kind), numbers, causal=causal))
         case "savgol", 2, True:
             return FilterRequest(text, lambda series: savitzky_golay(series, whole[0], whole[1]))
         case "spline", 1, _:
@@ -68,4 +68,4 @@ def parse_filter(text: str) -> FilterRequest:
 
 
 def _refusal(text: str) -> InputError:
-    return InputError("--filter", "", f"{text!r} is no filter", f"write one of {FORMS}")
+    return InputError("--filter", "", f"{text!r} is no filter", f"write one of {REQUEST_FORMS}")

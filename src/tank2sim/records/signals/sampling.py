@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.csv_table import Vector
-from tank2sim.records.signals.columns import DIRECTIONS, HELD, SignalName
+from tank2sim.records.signals.columns import DIRECTION_COLUMNS, HELD_COLUMNS, SignalName
 from tank2sim.records.trials import Trial
 
-FEWEST = 50
+FEWEST_SAMPLES = 50
 """Samples below which nothing is analysed; a choice of ours: eight spectral segments of eleven samples."""
 
 GAP_STEPS = 5
@@ -46,11 +46,11 @@ class Series:
     name: str
     start_s: float
     step_s: float
-    values: Vector
+    values: Array
     notices: tuple[str, ...] = ()
 
     @property
-    def time_s(self) -> Vector:
+    def time_s(self) -> Array:
         """Times of the samples, (n,)."""
         return self.start_s + self.step_s * np.arange(len(self.values), dtype=np.float64)
 
@@ -69,7 +69,7 @@ class Series:
         """True if it does not vary by more than numbers are exact to."""
         return bool(np.ptp(self.values) <= 1e-9 * max(float(np.max(np.abs(self.values))), 1e-12))
 
-    def with_values(self, values: Vector) -> Series:
+    def with_values(self, values: Array) -> Series:
         """The same signal with other values at the same times."""
         return replace(self, values=values)
 
@@ -97,13 +97,13 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
     column = f"column {SignalName(name).file}"
     values = np.asarray(trial.signals[name], dtype=float)
     known = np.flatnonzero(np.isfinite(values))
-    if known.size < FEWEST:
-        problem = f"has {known.size} values, and at least {FEWEST} are needed"
+    if known.size < FEWEST_SAMPLES:
+        problem = f"has {known.size} values, and at least {FEWEST_SAMPLES} are needed"
         raise InputError(trial.path, column, problem, "give a longer record or leave the column out")
     time, values = trial.time_s[known], values[known]
     notices = _ends_cut(trial, known)
-    if name in DIRECTIONS:
-        continuous: Vector = np.unwrap(values)
+    if name in DIRECTION_COLUMNS:
+        continuous: Array = np.unwrap(values)
         if not np.array_equal(continuous, values):
             notices.append("was made continuous through north")
             values = continuous
@@ -117,14 +117,14 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
     step = float(time[-1] - time[0]) / (count - 1)
     grid = time[0] + step * np.arange(count, dtype=np.float64)
     if count != time.size or np.max(np.abs(time - grid)) > _JITTER * step:
-        values = _at(time, values, grid, held=name in HELD)
-        way = "held" if name in HELD else "interpolated by straight lines"
+        values = _at(time, values, grid, held=name in HELD_COLUMNS)
+        way = "held" if name in HELD_COLUMNS else "interpolated by straight lines"
         notices.append(f"is unevenly sampled or has gaps of up to {longest:.4g} s; it was {way} at {step:.4g} s")
     told = tuple(f"{column.removeprefix('column ')} {notice}" for notice in notices)
     return Series(trial.path, name, float(time[0]), step, values, told)
 
 
-def _usual_step(time: Vector) -> float:
+def _usual_step(time: Array) -> float:
     """The mean of the usual steps: their median is as coarse as the digits with which times are written."""
     steps = np.diff(time)
     usual = float(np.median(steps))
@@ -144,27 +144,27 @@ def at_common_times(first: Series, second: Series) -> tuple[Series, Series]:
     step = min(first.step_s, second.step_s)
     count = int(np.floor((end - start) / step + 1e-6)) + 1
     names = " and ".join(SignalName(one.name).file for one in (first, second))
-    if count < FEWEST:
-        problem = f"have {max(count, 0)} samples at the same times, and at least {FEWEST} are needed"
+    if count < FEWEST_SAMPLES:
+        problem = f"have {max(count, 0)} samples at the same times, and at least {FEWEST_SAMPLES} are needed"
         raise InputError(first.source, f"columns {names}", problem, "give a longer record")
     grid = start + step * np.arange(count, dtype=np.float64)
     return _moved(first, grid, step), _moved(second, grid, step)
 
 
-def _moved(series: Series, grid: Vector, step: float) -> Series:
+def _moved(series: Series, grid: Array, step: float) -> Series:
     own = series.time_s
     if len(own) == len(grid) and np.max(np.abs(own - grid)) <= _JITTER * step:
         return series
-    values = _at(own, series.values, grid, held=series.name in HELD)
+    values = _at(own, series.values, grid, held=series.name in HELD_COLUMNS)
     return replace(series, start_s=float(grid[0]), step_s=step, values=values)
 
 
-def _at(time: Vector, values: Vector, grid: Vector, *, held: bool) -> Vector:
+def _at(time: Array, values: Array, grid: Array, *, held: bool) -> Array:
     if held:
         places = np.searchsorted(time, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1
-        stands: Vector = values[np.clip(places, 0, None)]
+        stands: Array = values[np.clip(places, 0, None)]
         return stands
-    between: Vector = np.interp(grid, time, values)
+    between: Array = np.interp(grid, time, values)
     return between
 
 

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import signal, stats
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.csv_table import Vector
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.signals.correlation import autocorrelation
 from tank2sim.records.signals.sampling import Series, at_common_times
@@ -84,10 +84,10 @@ class Spectrum:
         None if the density only falls or only rises.
     """
 
-    frequency_hz: Vector
-    density: Vector
-    low: Vector
-    high: Vector
+    frequency_hz: Array
+    density: Array
+    low: Array
+    high: Array
     averaging: Averaging
     peak: Peak | None
 
@@ -127,26 +127,26 @@ class Transfer:
         What it rests on.
     """
 
-    frequency_hz: Vector
+    frequency_hz: Array
     response: NDArray[np.complex128]
-    coherence: Vector
-    error: Vector
+    coherence: Array
+    error: Array
     cross_density: NDArray[np.complex128]
     significant: float
     averaging: Averaging
 
     @property
-    def gain(self) -> Vector:
+    def gain(self) -> Array:
         """Size of the response, output unit over input unit."""
         return np.abs(self.response)
 
     @property
-    def phase_rad(self) -> Vector:
+    def phase_rad(self) -> Array:
         """Its angle, between -pi and pi: where there is no coherence nothing says how many turns it has made."""
         return np.angle(self.response)
 
     @property
-    def half_width(self) -> Vector:
+    def half_width(self) -> Array:
         """Half the 95 % interval of the gain's logarithm and of the phase (rad), by Student's t: the segments are few.
 
         It holds where the output mostly is the response: of low coherences those that are high by chance, with gains
@@ -158,7 +158,7 @@ class Transfer:
     @property
     def sure(self) -> NDArray[np.bool_]:
         """Where the coherence is above chance, its median over three neighbours: one alone is above now and then."""
-        median: Vector = signal.medfilt(self.coherence, 3)
+        median: Array = signal.medfilt(self.coherence, 3)
         return median > self.significant
 
 
@@ -257,7 +257,7 @@ def _inner(averaging: Averaging) -> slice:
     return slice(1, averaging.samples // 2 if averaging.samples % 2 == 0 else averaging.samples // 2 + 1)
 
 
-def _peak(frequency: Vector, density: Vector, freedom: float) -> Peak | None:
+def _peak(frequency: Array, density: Array, freedom: float) -> Peak | None:
     # With zero on both sides the ends can be peaks; the last frequency is none of interest.
     places = [place - 1 for place in signal.find_peaks(np.concatenate([[0.0], density]))[0]]
     if not places:

@@ -10,8 +10,8 @@ from enum import StrEnum
 import numpy as np
 from scipy import stats
 
-from tank2sim.records.csv_table import Vector
-from tank2sim.records.signals.columns import DIRECTIONS
+from tank2sim.arrays import Array
+from tank2sim.records.signals.columns import DIRECTION_COLUMNS
 from tank2sim.records.signals.correlation import Autocorrelation
 from tank2sim.records.signals.sampling import Series
 
@@ -133,18 +133,18 @@ class Density:
         In one over that unit.
     """
 
-    values: Vector
-    density: Vector
-    normal: Vector
+    values: Array
+    density: Array
+    normal: Array
 
 
-def mean_and_deviation(name: str, values: Vector) -> tuple[float, float]:
+def mean_and_deviation(name: str, values: Array) -> tuple[float, float]:
     """Mean and standard deviation of a signal (n,), SI; of a direction those on the circle.
 
     The mean of a direction is that of the sum of its unit vectors, 0 to 2 pi, and with R the length of their mean its
     deviation is sqrt(-2 ln R) (Mardia and Jupp 2000, Directional Statistics, 2.3): 350 and 10 deg have the mean 0.
     """
-    if name not in DIRECTIONS:
+    if name not in DIRECTION_COLUMNS:
         return float(np.mean(values)), float(np.std(values))
     mean = float(stats.circmean(values)) % (2.0 * np.pi)  # by rounding it may be 2 pi itself
     return mean, float(stats.circstd(values))
@@ -209,7 +209,7 @@ def probability_density(series: Series) -> Density:
     return Density(across, stats.gaussian_kde(values)(across), stats.norm.pdf(across, mean, spread))
 
 
-def _unit_root_tests(values: Vector, about: str) -> UnitRootTests:
+def _unit_root_tests(values: Array, about: str) -> UnitRootTests:
     # Loaded where it is used: it takes more than a second.
     from statsmodels.tsa.stattools import adfuller, kpss
 

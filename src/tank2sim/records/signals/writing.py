@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.csv_table import Vector
-from tank2sim.records.signals.columns import HELD, SignalName
+from tank2sim.records.signals.columns import HELD_COLUMNS, SignalName
 from tank2sim.records.signals.effect import Filtered
 from tank2sim.records.signals.sampling import Series, even_series
 from tank2sim.records.trials import Trial, with_signals
@@ -44,7 +44,7 @@ def thinned(trial: Trial, filtered: Sequence[Filtered], told: str) -> Trial:
         The signals do not have the same times.
     """
     time = filtered[0].series.time_s
-    signals: dict[str, Vector] = {}
+    signals: dict[str, Array] = {}
     for one in filtered:
         series = one.series
         if len(series.values) != len(time) or abs(series.start_s - time[0]) > series.step_s / 10:
@@ -53,7 +53,7 @@ def thinned(trial: Trial, filtered: Sequence[Filtered], told: str) -> Trial:
             raise InputError(trial.path, f"columns {names}", "are not known over the same times", remedy)
         signals[series.name] = _on_circle(series.name, series.values)
     for name in trial.signals:
-        if name in HELD:
+        if name in HELD_COLUMNS:
             signals[name] = _held(even_series(trial, name), time)
     return replace(trial, time_s=time, signals=signals, noise={}, notices=(*trial.notices, told))
 
@@ -76,10 +76,10 @@ def trial_text(trial: Trial, remarks: Sequence[str]) -> str:
     return text.getvalue()
 
 
-def _on_circle(name: str, values: Vector) -> Vector:
+def _on_circle(name: str, values: Array) -> Array:
     return np.mod(values, 2.0 * np.pi) if name in _CIRCLE else values
 
 
-def _held(order: Series, time: Vector) -> Vector:
+def _held(order: Series, time: Array) -> Array:
     places = np.searchsorted(order.time_s, time + 1e-6 * order.step_s, side="right") - 1
     return order.values[np.clip(places, 0, None)]

@@ -11,10 +11,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from tank2sim.analysis.practice.bridge import ORDERS_AHEAD, Bridge, Telegraph
-from tank2sim.analysis.practice.ship_track import ShipTrack, quarter
+from tank2sim.analysis.validation.bridge_data import ORDERS_AHEAD, Bridge, Telegraph
+from tank2sim.analysis.validation.ship_track import ShipTrack, quarter
 from tank2sim.report.bridge.drawings import clock, knots, metres
-from tank2sim.simulation.card_range import Reading
+from tank2sim.simulation.card_range import CardRangeReading
 from tank2sim.simulation.manoeuvres import FULL_ASTERN
 from tank2sim.units import KNOT_MPS
 
@@ -190,7 +190,7 @@ def turning(bridge: Bridge, circles: Sequence[ShipTrack]) -> Box:
     return Box("", tuple(rows), tuple(one.name for one in circles))
 
 
-def _told(one: Reading, name: str, words: Callable[[float], str]) -> Value:
+def _told(one: CardRangeReading, name: str, words: Callable[[float], str]) -> Value:
     """A figure in words, if the card holds for it."""
     if one.outside(name):
         return OUTSIDE

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tank2sim.analysis.practice.ship_track import Mark, ShipTrack
+from tank2sim.analysis.validation.ship_track import ShipTrack, TrackMark
 from tank2sim.records.thinning import thin_line
 from tank2sim.units import KNOT_MPS
 
@@ -185,7 +185,7 @@ def circles_drawing(
     return Drawing(width, height, tuple(lines), tuple(dots), tuple(words), f"Turning circles {sides}.")
 
 
-def _told(mark: Mark) -> list[str]:
+def _told(mark: TrackMark) -> list[str]:
     return [f"{round(mark.heading_change_deg)}°  {clock(mark.time_s)}", f"{knots(mark.speed_mps)} kn"]
 
 

@@ -9,12 +9,12 @@ import jinja2
 from markupsafe import Markup
 
 from tank2sim import __version__
-from tank2sim.analysis.practice.bridge import SHALLOW, Bridge
-from tank2sim.analysis.practice.ship_track import ShipTrack
+from tank2sim.analysis.validation.bridge_data import SHALLOW, Bridge
+from tank2sim.analysis.validation.ship_track import ShipTrack
 from tank2sim.report.bridge import boxes
 from tank2sim.report.bridge.boxes import Box, Row
 from tank2sim.report.bridge.drawings import Drawing, circles_drawing, stops_drawing
-from tank2sim.report.page import beside
+from tank2sim.report.kit.page import beside
 
 PANEL_MM = (88.0, 62.0)
 STOPS_MM = (113.0, 48.0)

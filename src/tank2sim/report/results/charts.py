@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import altair as alt
 import numpy as np
 
-from tank2sim.report.analysis_charts import (
+from tank2sim.report.kit.analysis_charts import (
     FrequencyResponse,
     OutputError,
     PolesZeros,
@@ -16,10 +16,20 @@ from tank2sim.report.analysis_charts import (
     error_chart,
     pole_zero_chart,
 )
-from tank2sim.report.chart_parts import LINE_SAMPLES, NUMBER, Record, axis_above, data, every, plain, stacked, with_unit
-from tank2sim.report.page import Illustration
-from tank2sim.report.results.values import Json, is_matrix, is_number, rises, words
-from tank2sim.report.switched_charts import misfit_maps
+from tank2sim.report.kit.before_after import misfit_maps
+from tank2sim.report.kit.chart_parts import (
+    LINE_SAMPLES,
+    NUMBER,
+    ChartRecord,
+    axis_above,
+    data,
+    every,
+    plain,
+    stacked,
+    with_unit,
+)
+from tank2sim.report.kit.json_values import Json, is_matrix, is_number_value, rises, words
+from tank2sim.report.kit.page import Illustration
 
 ACROSS = (
     "time_s",
@@ -49,7 +59,7 @@ def series_chart(heading: str, series: Mapping[str, Sequence[Json]]) -> Illustra
     A series of truth values divides the lines: dashed where it is false.
     """
     truths = {key: one for key, one in series.items() if all(isinstance(value, bool) for value in one)}
-    numbers = {key: one for key, one in series.items() if any(is_number(v) for v in one) and key not in truths}
+    numbers = {key: one for key, one in series.items() if any(is_number_value(v) for v in one) and key not in truths}
     across = next((key for key in ACROSS if key in numbers), next((k for k, v in numbers.items() if rises(v)), None))
     up = [key for key in numbers if key != across][:_MOST_PANELS]
     if across is None or not up:
@@ -71,11 +81,11 @@ def series_chart(heading: str, series: Mapping[str, Sequence[Json]]) -> Illustra
     return Illustration(chart=chart, caption=caption)
 
 
-def _parted(rows: list[Record], divided: bool) -> list[Record]:
+def _parted(rows: list[ChartRecord], divided: bool) -> list[ChartRecord]:
     # Each part shares its last row with the next, so that the line is whole.
     if not divided:
         return rows
-    parted: list[Record] = []
+    parted: list[ChartRecord] = []
     for row in rows:
         if parted and parted[-1]["truth"] != row["truth"]:
             parted.append({**row, "truth": parted[-1]["truth"], "part": parted[-1]["part"]})
@@ -86,7 +96,7 @@ def _parted(rows: list[Record], divided: bool) -> list[Record]:
 
 
 def _panel(
-    rows: list[Record], panel: int, key: str, across: tuple[str, bool, bool], truth: str | None
+    rows: list[ChartRecord], panel: int, key: str, across: tuple[str, bool, bool], truth: str | None
 ) -> alt.LayerChart:
     name, logarithmic, last = across
     scale = alt.Scale(type="log") if logarithmic else alt.Scale(zero=False, nice=False)
@@ -108,7 +118,7 @@ def heat_map(
     heading: str, names: Sequence[str], across: Sequence[str], matrix: Sequence[Sequence[Json]]
 ) -> Illustration:
     """A matrix as coloured cells, each with its number; colours diverge from 0 where there are both signs."""
-    rows: list[Record] = [
+    rows: list[ChartRecord] = [
         {"row": name, "column": title, "value": _plain(matrix[place][column])}
         for place, name in enumerate(names)
         for column, title in enumerate(across)
@@ -137,7 +147,7 @@ def heat_map(
     )
 
 
-def correlation(heading: str, value: Mapping[str, Json]) -> Illustration | None:
+def matrix_chart(heading: str, value: Mapping[str, Json]) -> Illustration | None:
     """The correlation of what is named beside it (``of`` or ``names``), where that is given."""
     names = value.get("of") or value.get("names")
     matrix: Json = value.get("matrix") or value.get("correlation")
@@ -154,7 +164,7 @@ def error_bars(heading: str, values: Mapping[str, Mapping[str, Json]]) -> Illust
     known = [
         {"name": name, "percent": _plain(100 * abs(one["standard_error"] / one["value"])), "value": one["value"]}
         for name, one in values.items()
-        if is_number(one.get("value")) and is_number(one.get("standard_error")) and one["value"] != 0
+        if is_number_value(one.get("value")) and is_number_value(one.get("standard_error")) and one["value"] != 0
     ]
     known = sorted((row for row in known if row["percent"]), key=lambda row: float(row["percent"]))[:_MOST_BARS]
     if len(known) < 2:
@@ -176,11 +186,11 @@ def error_bars(heading: str, values: Mapping[str, Mapping[str, Json]]) -> Illust
 
 def force_fit(heading: str, runs: Sequence[Mapping[str, Json]]) -> Illustration | None:
     """Measured against predicted, one point a run; a point off the diagonal is a run that the fit does not follow."""
-    rows: list[Record] = [
+    rows: list[ChartRecord] = [
         {"run": str(one.get("run", "")), "type": str(one.get("type", "")).replace("_", " ")}
         | {"measured": _plain(one["measured"]), "predicted": _plain(one["predicted"])}
         for one in runs
-        if is_number(one.get("measured")) and is_number(one.get("predicted"))
+        if is_number_value(one.get("measured")) and is_number_value(one.get("predicted"))
     ]
     if len(rows) < 3:
         return None
@@ -207,7 +217,7 @@ def misfits(heading: str, trials: Sequence[Mapping[str, Json]]) -> Illustration 
         for trial in trials
         for signal, models in (trial.get("signals") or {}).items()
         for model, value in models.items()
-        if is_number(value)
+        if is_number_value(value)
     ]
     models = list(dict.fromkeys(row["model"] for row in rows))
     if not models:
@@ -240,7 +250,7 @@ def errors(heading: str, found: Json, limits: Json) -> Illustration | None:
         OutputError(kind=kind, output=output, error=error, limit=limits[kind])
         for kind, outputs in found.items()
         for output, error in (outputs.items() if isinstance(outputs, Mapping) else ())
-        if is_number(error) and is_number(limits.get(kind))
+        if is_number_value(error) and is_number_value(limits.get(kind))
     ]
     return Illustration(chart=error_chart(all_of_them, title=heading)) if all_of_them else None
 
@@ -250,7 +260,7 @@ def influences(heading: str, found: Mapping[str, Mapping[str, Json]]) -> Illustr
 
     def size(of: Json) -> float | None:
         value = of.get("exact", of.get("difference")) if isinstance(of, Mapping) else of
-        return float(value) if is_number(value) else None
+        return float(value) if is_number_value(value) else None
 
     strongest: dict[str, float] = {}
     for values in found.values():
@@ -266,4 +276,4 @@ def influences(heading: str, found: Mapping[str, Mapping[str, Json]]) -> Illustr
 
 
 def _plain(value: Json) -> float | None:
-    return plain(float(value)) if is_number(value) else None
+    return plain(float(value)) if is_number_value(value) else None

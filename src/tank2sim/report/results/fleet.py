@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from tank2sim.gap.fleet.told import REPORT, FleetTold, ShipTold
-from tank2sim.report.fleet_page import fleet_page
-from tank2sim.report.page import Link, Page, Section, Table
-from tank2sim.report.results.values import Json
+from tank2sim.gap.fleet.summary import REPORT_FILE, FleetTold, ShipTold
+from tank2sim.report.gap.fleet_page import fleet_page
+from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.page import Link, Page, PageSection, PageTable
 
-_WHERE = f"Each ship has a page of her own, {REPORT}, in the folder of her name beside fleet.json."
+_WHERE = f"Each ship has a page of her own, {REPORT_FILE}, in the folder of her name beside fleet.json."
 
 
 def told_fleet_page(result: Json) -> Page:
@@ -28,13 +28,13 @@ def told_fleet_page(result: Json) -> Page:
     return replace(page, sections=[_without_links(one) for one in page.sections])
 
 
-def _without_links(section: Section) -> Section:
+def _without_links(section: PageSection) -> PageSection:
     tables = [_plain(table) for table in section.tables]
     linked = any(isinstance(cell, Link) for table in section.tables for row in table.rows for cell in row)
     text = f"{section.text} {_WHERE}".strip() if linked else section.text
     return replace(section, text=text, tables=tables)
 
 
-def _plain(table: Table) -> Table:
+def _plain(table: PageTable) -> PageTable:
     rows = [[cell.text if isinstance(cell, Link) else cell for cell in row] for row in table.rows]
     return replace(table, rows=rows)

@@ -9,23 +9,23 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tank2sim.records.thinning import Vector
-from tank2sim.report.motion_charts import (
+from tank2sim.arrays import Array
+from tank2sim.report.kit.json_values import Json, titled, words
+from tank2sim.report.kit.motion_charts import (
     History,
-    Mark,
     Signal,
-    Spiral,
-    Track,
+    SpiralData,
+    TimeMark,
+    TrackData,
     history_chart,
     spiral_chart,
     track_chart,
 )
-from tank2sim.report.page import Column, Illustration, Section, Table
-from tank2sim.report.results.values import Json, titled, words
+from tank2sim.report.kit.page import Column, Illustration, PageSection, PageTable
 from tank2sim.simulation.bands import small_edge_first
 from tank2sim.units import to_si
 
-Columns = Mapping[str, Sequence[float | None]]
+_Columns = Mapping[str, Sequence[float | None]]
 
 LOW, MIDDLE, HIGH = "5 %", "50 %", "95 %"
 """Labels of the quantiles of an ensemble."""
@@ -71,7 +71,7 @@ def is_columns(value: Json) -> bool:
 
 
 def motions(
-    title: str, runs: Mapping[str, Columns], measured: Sequence[str] = (), marks: Sequence[Mark] = ()
+    title: str, runs: Mapping[str, _Columns], measured: Sequence[str] = (), marks: Sequence[TimeMark] = ()
 ) -> list[Illustration]:
     """The tracks of some runs in one chart, where positions are known, and their time histories in another.
 
@@ -100,12 +100,12 @@ def motions(
     return drawn
 
 
-def simulated(result: Json) -> list[Section]:
+def simulated(result: Json) -> list[PageSection]:
     """Track and histories of a simulated manoeuvre, with the bands of an ensemble where there was one."""
-    runs: dict[str, Columns] = {"simulated": result["histories"]}
+    runs: dict[str, _Columns] = {"simulated": result["histories"]}
     runs |= _bands(result.get("ensemble") or {})
     text = "Nine of ten members of the ensemble lie between the 5 and the 95 % quantile." if len(runs) > 1 else ""
-    return [Section(heading="Motion", text=text, charts=[*_spiral(result), *motions(result["manoeuvre"], runs)])]
+    return [PageSection(heading="Motion", text=text, charts=[*_spiral(result), *motions(result["manoeuvre"], runs)])]
 
 
 def _spiral(result: Json) -> list[Illustration]:
@@ -113,11 +113,11 @@ def _spiral(result: Json) -> list[Illustration]:
     rudder, rate = (result["figures"].get(name) for name in ("rudder_deg", "rate_degps"))
     if not (isinstance(rudder, list) and isinstance(rate, list)):
         return []
-    spiral = Spiral(label=result["manoeuvre"], rudder_rad=np.radians(rudder), yaw_rate_radps=np.radians(rate))
+    spiral = SpiralData(label=result["manoeuvre"], rudder_rad=np.radians(rudder), yaw_rate_radps=np.radians(rate))
     return [Illustration(chart=spiral_chart([spiral], title=f"Steady yaw rate: {result['manoeuvre']}"))]
 
 
-def audited(result: Json) -> list[Section]:
+def audit_sections(result: Json) -> list[PageSection]:
     """What each trial measured, with the places of the findings, below what was found."""
     sections = []
     # Trials with findings come first: of many records the page has as many as it can hold.
@@ -132,19 +132,19 @@ def audited(result: Json) -> list[Section]:
         if marks:
             text = "Red in the histories: the places of findings about single values and rows."
         sections.append(
-            Section(heading=f"Record {name}", text=text, charts=charts, tables=[_findings(found)] if found else [])
+            PageSection(heading=f"Record {name}", text=text, charts=charts, tables=[_findings(found)] if found else [])
         )
     return sections
 
 
-def identified(result: Json) -> list[Section]:
+def identified(result: Json) -> list[PageSection]:
     """Each trial as measured beside the card that was given and the card found, those held out first."""
     charts: list[Illustration] = []
     for one in sorted(result["replays"], key=lambda one: not one["held_out"])[:_MOST_RECORDS]:
         runs = {"measured": one["measured"], "card given": one["before"], "card found": one["found"]}
         name = f"{one['trial']} ({'held out' if one['held_out'] else 'fitted'})"
         charts += motions(name, {label: run for label, run in runs.items() if is_columns(run)}, ["measured"])
-    return [Section(heading="Trials", text=_REPLAYED, charts=charts)] if charts else []
+    return [PageSection(heading="Trials", text=_REPLAYED, charts=charts)] if charts else []
 
 
 _REPLAYED = (
@@ -159,23 +159,23 @@ _WAYS = {
 }
 
 
-def from_the_bridge(result: Json) -> list[Section]:
+def from_the_bridge(result: Json) -> list[PageSection]:
     """Turning circles and stops of a poster or a pilot card: the way ahead is up, starboard is right."""
     charts = []
     for key, title in _WAYS.items():
-        tracks = [Track(label=one["name"], x_m=one["ahead_m"], y_m=one["starboard_m"]) for one in result[key]]
+        tracks = [TrackData(label=one["name"], x_m=one["ahead_m"], y_m=one["starboard_m"]) for one in result[key]]
         if tracks:
             charts.append(Illustration(chart=track_chart(tracks, title=title), caption="The ship heads up the page."))
-    return [Section(heading="Ways", charts=charts)] if charts else []
+    return [PageSection(heading="Ways", charts=charts)] if charts else []
 
 
-def _findings(found: Sequence[Mapping[str, Json]]) -> Table:
+def _findings(found: Sequence[Mapping[str, Json]]) -> PageTable:
     heads = {"kind": "", "column": "column", "what": "what", "likely_truth": "likely truth", "mended": "mended"}
     rows = [[one.get(key) for key in heads] for one in found]
-    return Table(caption="Findings", columns=[Column(title=head) for head in heads.values()], rows=rows)
+    return PageTable(caption="Findings", columns=[Column(title=head) for head in heads.values()], rows=rows)
 
 
-def _marks(found: Sequence[Mapping[str, Json]], trial: Mapping[str, Json]) -> list[Mark]:
+def _marks(found: Sequence[Mapping[str, Json]], trial: Mapping[str, Json]) -> list[TimeMark]:
     """A finding about a column in its panel, one about the time in all."""
     _, *columns = trial["histories"]
     stems = dict(zip(trial["columns"], map(_stem, columns), strict=False))  # by what the file calls them
@@ -183,16 +183,16 @@ def _marks(found: Sequence[Mapping[str, Json]], trial: Mapping[str, Json]) -> li
     for one in found:
         at = [stems[one["column"]]] if one["column"] in stems else list(stems.values())
         for begin, end in one.get("places_s") or ():
-            marks += [Mark(signal=name, begin_s=begin, end_s=end, text=str(one["what"])) for name in at]
+            marks += [TimeMark(signal=name, begin_s=begin, end_s=end, text=str(one["what"])) for name in at]
     return marks
 
 
-def _bands(ensemble: Mapping[str, Json]) -> dict[str, Columns]:
+def _bands(ensemble: Mapping[str, Json]) -> dict[str, _Columns]:
     """The quantiles of an ensemble as runs; its track is that of the median and of the band across its course."""
     if not (isinstance(ensemble.get("histories"), Mapping) and isinstance(ensemble.get("t_s"), list)):
         return {}
     track: Mapping[str, Json] = ensemble.get("track") or {}
-    runs: dict[str, Columns] = {}
+    runs: dict[str, _Columns] = {}
     lines = [np.array(track.get(side) or [], dtype=float).reshape(-1, 2) for side in ("low_m", "middle_m", "high_m")]
     small, large = small_edge_first(*lines)
     for label, key, points in ((LOW, "p5", small), (MIDDLE, "p50", lines[1]), (HIGH, "p95", large)):
@@ -203,7 +203,7 @@ def _bands(ensemble: Mapping[str, Json]) -> dict[str, Columns]:
     return runs
 
 
-def _in_si(columns: Columns) -> dict[str, Vector]:
+def _in_si(columns: _Columns) -> dict[str, Array]:
     found = {}
     for name, values in columns.items():
         numbers = np.array([np.nan if one is None else one for one in values], dtype=float)
@@ -216,11 +216,11 @@ def _stem(name: str) -> str:
     return name.rpartition("_")[0] or name
 
 
-def _by_stem(table: Mapping[str, Vector]) -> dict[str, Vector]:
+def _by_stem(table: Mapping[str, Array]) -> dict[str, Array]:
     return {_stem(name): values for name, values in table.items() if name != "t_s" and name not in _TRACK}
 
 
-def _signals(runs: Mapping[str, Columns]) -> list[Signal]:
+def _signals(runs: Mapping[str, _Columns]) -> list[Signal]:
     names = dict.fromkeys(name for columns in runs.values() for name in columns if name not in ("t_s", *_TRACK))
     found = []
     for name in names:
@@ -233,9 +233,9 @@ def _signals(runs: Mapping[str, Columns]) -> list[Signal]:
     return sorted(found, key=lambda one: order.index(one.name) if one.name in order else len(order))
 
 
-def _moves(table: Mapping[str, Vector]) -> bool:
+def _moves(table: Mapping[str, Array]) -> bool:
     return all(name in table and np.isfinite(table[name]).any() for name in _TRACK)
 
 
-def _track(label: str, table: Mapping[str, Vector], measured: bool) -> Track:
-    return Track(label=label, x_m=table["x_m"], y_m=table["y_m"], time_s=table["t_s"], measured=measured)
+def _track(label: str, table: Mapping[str, Array], measured: bool) -> TrackData:
+    return TrackData(label=label, x_m=table["x_m"], y_m=table["y_m"], time_s=table["t_s"], measured=measured)

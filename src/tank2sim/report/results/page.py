@@ -6,19 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tank2sim.report.page import Illustration, Page, Section, Table
-from tank2sim.report.results import charts
-from tank2sim.report.results.drawn import drawn, misshapen, whole_page
-from tank2sim.report.results.headlines import headlines
-from tank2sim.report.results.kinds import Kind, kind_of
-from tank2sim.report.results.motions import is_columns, motions
-from tank2sim.report.results.values import (
+from tank2sim.report.kit.json_values import (
     LONGEST_LIST,
     Json,
     alike,
     grouped,
     is_matrix,
-    is_number,
+    is_number_value,
     is_objects,
     is_scalar,
     is_series,
@@ -30,7 +24,13 @@ from tank2sim.report.results.values import (
     titled,
     words,
 )
-from tank2sim.report.results.watched import drawn_from, not_as_written
+from tank2sim.report.kit.page import Illustration, Page, PageSection, PageTable
+from tank2sim.report.results import charts
+from tank2sim.report.results.headlines import headlines
+from tank2sim.report.results.json_path import drawn_from, not_as_written
+from tank2sim.report.results.motions import is_columns, motions
+from tank2sim.report.results.renderers import misshapen, render_charts, whole_page
+from tank2sim.report.results.result_types import ResultType, kind_of
 
 _TOLD = ("notices", "warnings", "notes")
 _DEEPEST = 5
@@ -42,7 +42,7 @@ _BODE = {"omega_radps", "magnitude_dB", "phase_deg"}
 class _Parts:
     """What a section is filled with, in the order of the JSON."""
 
-    tables: list[Table] = field(default_factory=list)
+    tables: list[PageTable] = field(default_factory=list)
     charts: list[Illustration] = field(default_factory=list)
     left_out: int = 0
 
@@ -72,20 +72,20 @@ def result_page(result: Json, source: str) -> Page:
     return drawn_from(result, source, lambda watched: _page(watched, kind, source))
 
 
-def _page(result: Mapping[str, Json], kind: Kind, source: str) -> Page:
+def _page(result: Mapping[str, Json], kind: ResultType, source: str) -> Page:
     if whole := whole_page(kind.title, result):
         return whole
     told = [str(note) for key in _TOLD for note in result.get(key) or []]
     name = next((result[key] for key in ("ship", "campaign", "glider", "path") if isinstance(result.get(key), str)), "")
     checked = charts.errors("Errors of the outputs", result.get("errors"), result.get("limits"))
-    own, rest = drawn(kind.title, result)
+    own, rest = render_charts(kind.title, result)
     if checked:  # all but the largest errors, which the table of all of them has again
         rest = {key: value for key, value in rest.items() if key != "max_error"}
     sections = [_section(key, value) for key, value in rest.items() if key not in _TOLD and not is_scalar(value)]
     overview = {key: value for key, value in scalars(result).items() if key not in (*_TOLD, "kind")}
     table = [quantities("The result", overview)] if overview else []
     first = [
-        Section(heading="Overview", text=kind.beside, tables=table, charts=[checked] if checked else [], notes=told)
+        PageSection(heading="Overview", text=kind.beside, tables=table, charts=[checked] if checked else [], notes=told)
     ]
     return Page(
         title=f"{kind.title}: {Path(name).name}" if name else kind.title,
@@ -99,14 +99,14 @@ def _page(result: Mapping[str, Json], kind: Kind, source: str) -> Page:
     )
 
 
-def _section(key: str, value: Json) -> Section:
+def _section(key: str, value: Json) -> PageSection:
     parts = _Parts()
     title = words(key)[0]
     heading = "IMO criteria" if key == "imo" else title[:1].upper() + title[1:]
     _fill(parts, heading, key, value, 0)
     notes = [f"{parts.left_out} longer or deeper parts stand in the JSON alone."] if parts.left_out else []
     tables = [one for one in parts.tables if one.rows and [column.title for column in one.columns] != ["name"]]
-    return Section(heading=heading, tables=tables, charts=parts.charts, notes=notes)
+    return PageSection(heading=heading, tables=tables, charts=parts.charts, notes=notes)
 
 
 def _fill(parts: _Parts, caption: str, key: str, value: Json, depth: int) -> None:
@@ -131,7 +131,7 @@ def _fill(parts: _Parts, caption: str, key: str, value: Json, depth: int) -> Non
 
 
 def _fill_object(parts: _Parts, caption: str, key: str, value: Mapping[str, Json], depth: int) -> None:
-    if drawn := charts.correlation(caption, value):
+    if drawn := charts.matrix_chart(caption, value):
         parts.draw(drawn)
         return
     if is_columns(value):
@@ -194,7 +194,7 @@ def _fill_objects(parts: _Parts, caption: str, key: str, value: list[Mapping[str
     if all("predicted" in one for one in value):
         parts.draw(charts.force_fit(caption, value))
     elif len(value) > LONGEST_LIST:
-        keys = [name for name in value[0] if all(is_number(one.get(name)) for one in value)]
+        keys = [name for name in value[0] if all(is_number_value(one.get(name)) for one in value)]
         parts.draw(charts.series_chart(caption, {name: [one[name] for one in value] for name in keys}))
     if any(scalars(one) for one in value):
         parts.tables.append(rows_of(caption, [("", one) for one in value], ""))

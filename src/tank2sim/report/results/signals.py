@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import PurePath
 
-from tank2sim.report.page import Illustration, Section, Table
+from tank2sim.report.kit.json_values import Json, is_scalar, is_series, rows_of, titled, words
+from tank2sim.report.kit.page import Illustration, PageSection, PageTable
 from tank2sim.report.results import charts
-from tank2sim.report.results.values import Json, is_scalar, is_series, rows_of, titled, words
 
 _DRAWN = {
     "autocorrelation": "Autocorrelation",
@@ -19,12 +19,12 @@ _PEAK = {"frequency_hz": "peak_Hz", "density": "peak_density", "distinct": "peak
 _NOT_TOLD = ("constant", "on_circle")
 
 
-def signals_drawn(result: Json) -> list[Section]:
+def signals_drawn(result: Json) -> list[PageSection]:
     """Two sections a trial: its charts, then its tables."""
     return [section for one in result["trials"] for section in _trial(one)]
 
 
-def _trial(trial: Mapping[str, Json]) -> list[Section]:
+def _trial(trial: Mapping[str, Json]) -> list[PageSection]:
     columns: Mapping[str, Mapping[str, Json]] = trial["columns"]
     name = PurePath(str(trial["trial"])).name
     drawn = [
@@ -37,8 +37,8 @@ def _trial(trial: Mapping[str, Json]) -> list[Section]:
     notes = [str(one) for one in [*(trial.get("notices") or []), *(steering.get("notices") or [])]]
     tables = [table for table in tables if table.rows]
     return [
-        Section(heading=name, charts=[one for one in drawn if one], notes=notes),
-        Section(heading=f"Statistics of {name}", tables=tables),
+        PageSection(heading=name, charts=[one for one in drawn if one], notes=notes),
+        PageSection(heading=f"Statistics of {name}", tables=tables),
     ]
 
 
@@ -53,7 +53,7 @@ def _drawn(title: str, of: str, value: Mapping[str, Json]) -> Illustration | Non
     return charts.series_chart(f"{title}: {words(of)[0]}", together) if together else None
 
 
-def _table(caption: str, columns: Mapping[str, Mapping[str, Json]]) -> Table:
+def _table(caption: str, columns: Mapping[str, Mapping[str, Json]]) -> PageTable:
     """What stands in cells of each signal, with the peak of its spectrum."""
     rows = []
     for name, one in columns.items():
@@ -63,7 +63,7 @@ def _table(caption: str, columns: Mapping[str, Mapping[str, Json]]) -> Table:
     return rows_of(caption, rows, "signal")
 
 
-def _statistic(kind: str, columns: Mapping[str, Mapping[str, Json]]) -> Table:
+def _statistic(kind: str, columns: Mapping[str, Mapping[str, Json]]) -> PageTable:
     rows = [(words(name)[0], _flat(one[kind], "")) for name, one in columns.items() if one.get(kind)]
     return rows_of(titled(kind).capitalize(), rows, "signal")
 

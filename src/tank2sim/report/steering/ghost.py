@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tank2sim.dynamics.model import Model, Vector
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.records.trials import Trial
 from tank2sim.units import KNOT_MPS
@@ -29,12 +30,12 @@ class Ghost:
     """
 
     label: str
-    time_s: Vector
-    x_m: Vector
-    y_m: Vector
-    psi_rad: Vector
-    rudder_rad: Vector
-    rpm_radps: Vector
+    time_s: Array
+    x_m: Array
+    y_m: Array
+    psi_rad: Array
+    rudder_rad: Array
+    rpm_radps: Array
     by_angle: bool
     start: Mapping[str, float]
     held: Mapping[str, float]
@@ -82,7 +83,7 @@ def ghost_of(trial: Trial, model: Model) -> Ghost:
     )
 
 
-def _speed(signals: Mapping[str, Vector], way: float) -> tuple[float, list[str]]:
+def _speed(signals: Mapping[str, Array], way: float) -> tuple[float, list[str]]:
     """Speed ahead at the start, m/s, and what a user should be told of it."""
     if "u_mps" in signals:
         return _first(signals["u_mps"]), []
@@ -93,7 +94,7 @@ def _speed(signals: Mapping[str, Vector], way: float) -> tuple[float, list[str]]
     return way, [f"no speed: the ship starts at that of its first positions, {way / KNOT_MPS:.2f} knots"]
 
 
-def _wind(signals: Mapping[str, Vector], model: Model) -> tuple[dict[str, float], list[str]]:
+def _wind(signals: Mapping[str, Array], model: Model) -> tuple[dict[str, float], list[str]]:
     """The mean wind of a record, as a vector, as inputs of the model; and what a user should be told."""
     if not {"wind_speed_mps", "wind_direction_rad"} <= set(signals) or "wind.speed" not in model.input_names:
         return {}, []  # that a card without wind leaves it out is told where the trial is read
@@ -104,11 +105,11 @@ def _wind(signals: Mapping[str, Vector], model: Model) -> tuple[dict[str, float]
     return {"wind.speed": mean, "wind.direction": come_from}, [told]
 
 
-def _first(values: Vector) -> float:
+def _first(values: Array) -> float:
     return float(values[np.isfinite(values)][0])
 
 
-def _approach(time: Vector, x: Vector, y: Vector) -> tuple[float, float]:
+def _approach(time: Array, x: Array, y: Array) -> tuple[float, float]:
     """Course (rad) and speed (m/s) of the first part of a track."""
     known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
     if len(known) < 2:

@@ -14,17 +14,17 @@ from tank2sim import __version__
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
 from tank2sim.fmu.interface import interface
-from tank2sim.report.page import beside, json_in_html
+from tank2sim.report.kit.page import beside, json_in_html
 from tank2sim.report.steering.ghost import Ghost
-from tank2sim.report.steering.ship import NO_COMPILER, TOKEN, Control, controls, references, shown_in
+from tank2sim.report.steering.ship import NO_WASM_COMPILER, TOKEN, Control, controls, references, shown_in
 
 LONGEST_ZIGZAG = 150.0
 """A zigzag that has not ended after so many ship lengths is given up, as in the simulation."""
 
 HISTORY = 25.0
-"""Ship lengths that the chart over time shows at first, rounded to :data:`WINDOWS`. A choice of ours."""
+"""Ship lengths that the chart over time shows at first, rounded to :data:`_WINDOWS`. A choice of ours."""
 
-WINDOWS = (10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200)
+_WINDOWS = (10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200)
 """Stretches of time, s, that the chart over time may show: round ones, a choice of ours."""
 
 FASTEST_APPROACH = 2.0
@@ -54,7 +54,8 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
     Parameters
     ----------
     model : Model
-        A ship; for a ghost with a measured rudder angle that of :func:`tank2sim.report.steering.ship.following`.
+        A ship; for a ghost with a measured rudder angle that of
+        :func:`tank2sim.report.steering.ship.ship_following_angle`.
     library : str or None
         Of :func:`tank2sim.report.steering.ship.ship_in_page`; None where it cannot be compiled, which the page tells
         before anything else.
@@ -71,7 +72,7 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
     if "rudder.command" not in model.input_names:
         raise InputError(model.origin, "", "has no rudder", "only a ship (kind linear or abkowitz) can be steered")
     if library is None:
-        notices = [NO_COMPILER, *notices]
+        notices = [NO_WASM_COMPILER, *notices]
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("tank2sim", "report"), autoescape=True, undefined=jinja2.StrictUndefined
     )
@@ -93,7 +94,7 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
         windows=_windows(model),
         readouts=_readouts(model),
         fails="steering.failed" in model.input_names,
-        style=Markup(beside("page.css") + beside("steering/page.css")),
+        style=Markup(beside("kit/page.css") + beside("steering/page.css")),
         script=Markup("\n".join(beside(f"steering/{name}") for name in _SCRIPTS)),
         data=json_in_html(_data(model, library, ghost)),
     )
@@ -129,9 +130,9 @@ def _controls(model: Model, ghost: Ghost | None) -> list[Control]:
 def _windows(model: Model) -> tuple[list[tuple[int, str]], int]:
     """Stretches that the chart over time may show (s, in words), and the one at first, s."""
     wanted = HISTORY * _start(model, "ship.length") / _start(model, "ship.speed")
-    place = min(range(1, len(WINDOWS) - 2), key=lambda one: abs(math.log(WINDOWS[one] / wanted)))
-    shown = WINDOWS[place - 1 : place + 3]
-    return [(one, f"{one} s" if one < 120 else f"{one / 60:g} min") for one in shown], WINDOWS[place]
+    place = min(range(1, len(_WINDOWS) - 2), key=lambda one: abs(math.log(_WINDOWS[one] / wanted)))
+    shown = _WINDOWS[place - 1 : place + 3]
+    return [(one, f"{one} s" if one < 120 else f"{one / 60:g} min") for one in shown], _WINDOWS[place]
 
 
 def _series(ghost: Ghost) -> dict[str, list[float | None]]:

@@ -34,12 +34,12 @@ FUNCTIONS = (
 WEB = Target("wasm32-wasi", ".wasm", (*FUNCTIONS, "malloc"))
 """WebAssembly with the C library of WASI, of which nothing is left but mathematics and memory: it imports nothing."""
 
-NO_COMPILER = (
+NO_WASM_COMPILER = (
     "the ship is not in this page, which needs a compiler to WebAssembly: pip install tank2sim[platforms], and write "
     "the page again"
 )
 
-LARGEST_RUDDER = math.radians(35.0)
+_LARGEST_RUDDER = math.radians(35.0)
 """End of the rudder slider where a card states no largest angle: the hard-over of IMO MSC.137(76)."""
 
 FULL_AHEAD, FULL_ASTERN = 1.2, -1.0
@@ -47,7 +47,7 @@ FULL_AHEAD, FULL_ASTERN = 1.2, -1.0
 much astern as ahead."""
 
 GHOST_STEERS, GHOST_RATE = "ghost.steers", "ghost.rudder_rate"
-"""Inputs of a model that can follow a measured rudder (:func:`following`)."""
+"""Inputs of a model that can follow a measured rudder (:func:`ship_following_angle`)."""
 
 _SMALL = {"deg": 1.0, "knots": 0.1, "rpm": 1.0}
 """By what a control moves at a time, in the unit shown. A choice of ours."""
@@ -88,13 +88,13 @@ def ship_in_page(model: Model) -> str:
     return base64.b64encode(cross_compiled(sources, WEB)).decode("ascii")
 
 
-def following(model: Model) -> Model:
+def ship_following_angle(model: Model) -> Model:
     """The model of a page whose rudder can follow a measured angle, past the steering gear.
 
         d(delta)/dt = rate of the gear,  or ``ghost.rudder_rate`` (rad/s) while ``ghost.steers``
 
     Rates that are constant between readings bring the rudder to each of them exactly, so that the angle is straight
-    between them as in :func:`tank2sim.identification.trials.runs.prepare`.
+    between them as in :func:`tank2sim.identification.trials.problem.sampled_runs.prepare`.
     """
     steers = Input(name=GHOST_STEERS, unit="1", description="True: the rudder follows a measured angle", boolean=True)
     rate = Input(
@@ -127,7 +127,7 @@ def _control(model: Model, variable: Input) -> Control:
     low, high = _bounds(variable)
     if variable.name == "rudder.command":
         limits = [one.start for one in model.parameters if one.name == "steering.max_angle"]
-        high = limits[0] if limits else LARGEST_RUDDER
+        high = limits[0] if limits else _LARGEST_RUDDER
         low = -high
     if variable.name == "propeller.speed":
         low, high = FULL_ASTERN * variable.start, FULL_AHEAD * variable.start

@@ -1,0 +1,250 @@
+"""Influence coefficients of a ship's card: K % of every number on the card on any manoeuvring figure.
+
+By exact slopes, K = 10 c/F dF/dc, and by the 10 % difference of the paper
+(:mod:`tank2sim.analysis.influence.percent`), side by side; and what the standard errors of the card, and
+their covariance where one stands beside it, make of each figure.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tank2sim.analysis.influence.errors import JointErrors, joint_errors
+from tank2sim.analysis.influence.figures import InfluenceFigure
+from tank2sim.analysis.influence.parameters import CardParameter, agreed_by_name
+from tank2sim.analysis.influence.percent import STEP_PERCENT, change_percent, changed_together, combined_percent
+from tank2sim.analysis.influence.study import Study
+from tank2sim.arrays import Array
+from tank2sim.errors import InputError
+
+CURVED = 1.5
+"""A slope and a 10 % difference that differ by this factor are told: the figure bends or jumps there (ours)."""
+
+TOLD_FROM = 0.5
+"""... where either is at least so many per cent of the figure."""
+
+
+@dataclass(frozen=True)
+class Agreed:
+    """An agreed variation: Kc % by parameter, and for each figure what the sum of Kc K / 10 foretells, by exact slopes
+    and by 10 % differences, and what computing it directly gives; per cent of the figure."""
+
+    percent: Mapping[str, float]
+    foretold: tuple[float, ...]
+    foretold_by_difference: tuple[float, ...]
+    direct: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class CardInfluence:
+    """Influence coefficients of a card.
+
+    Parameters
+    ----------
+    ship : str
+    figures : tuple of Figure
+    values : array (nf,)
+        Of the figures.
+    errors : JointErrors
+        Of the k parameters.
+    slopes : array (nf, k)
+        Exact slopes dF/dc.
+    difference : array (nf, k)
+        K % by the 10 % difference; nan where the changed ship does not show the figure, or the parameter is zero.
+    agreed : Agreed or None
+    notices : tuple of str
+    """
+
+    ship: str
+    figures: tuple[InfluenceFigure, ...]
+    values: Array
+    errors: JointErrors
+    slopes: Array
+    difference: Array
+    agreed: Agreed | None = None
+    notices: tuple[str, ...] = field(default=())
+
+    @property
+    def parameters(self) -> tuple[CardParameter, ...]:
+        """The parameters (k)."""
+        return self.errors.parameters
+
+    @property
+    def exact(self) -> Array:
+        """K % (nf, k) by exact slopes, 10 c/F dF/dc; nan where a figure is zero."""
+        c = np.array([one.value for one in self.parameters])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = STEP_PERCENT * c * self.slopes / self.values[:, None]
+        return np.where(np.isfinite(found), found, np.nan)
+
+    @property
+    def standard_errors(self) -> Array:
+        """Standard error of each figure (nf,), by the delta method: the root of J C J^T."""
+        return np.sqrt(self._variances)
+
+    @property
+    def shares(self) -> Array:
+        """Share (nf, k) of the variance of each figure that would go if a parameter were known exactly; 0 where that is
+        zero.
+
+        (J C e_k)^2 / (C_kk J C J^T), the squared correlation of figure and parameter: the first-order index of Sobol
+        (1993) of normal errors. Of independent ones it is (J_k s_k)^2 over their sum, and all shares make one; of
+        those that go together each has what it shares with the others, too.
+        """
+        C = self.errors.covariance
+        size = self._variances[:, None] * np.diag(C)
+        return np.divide((self.slopes @ C) ** 2, size, out=np.zeros_like(size), where=size > 0)
+
+    @property
+    def of_errors(self) -> str:
+        """Which standard errors those of the figures are from."""
+        if not self.errors.together:
+            return "standard errors of figures are from those of the card's numbers, as if these were independent"
+        others = "" if len(self.errors.together) == len(self.parameters) else ", others as if independent"
+        count = len(self.errors.together)
+        return f"standard errors of figures are from the covariance beside the card ({count} numbers{others})"
+
+    @property
+    def _variances(self) -> Array:
+        found = np.einsum("ij,jk,ik->i", self.slopes, self.errors.covariance, self.slopes)
+        # Numbers that go together may leave less than rounding of what each would make of the figure alone.
+        return np.asarray(np.maximum(found, 0.0))
+
+    def as_json(self) -> dict[str, object]:
+        """``influence_percent``: {figure: {parameter: {exact, difference}}}; ``figures`` with standard errors.
+
+        Parameters have their dotted keys in the card's file, and their values as they stand there.
+        """
+        exact, errors, shares = self.exact, self.standard_errors, self.shares
+        names = [one.key for one in self.parameters]
+        rows = range(len(self.figures))
+        result: dict[str, object] = {
+            "ship": self.ship,
+            "standard_errors": self.of_errors,
+            "figures": {
+                self.figures[row].text: {
+                    "value": float(self.values[row]),
+                    "standard_error": float(errors[row]),
+                    "share_of_variance": dict(zip(names, shares[row].tolist(), strict=True)),
+                }
+                for row in rows
+            },
+            "parameters": {
+                one.key: {
+                    "value": one.value * one.factor,
+                    "standard_error": one.standard_error * abs(one.factor),
+                    "assumed": one.assumed,
+                    "name": one.short,
+                }
+                for one in self.parameters
+            },
+            "influence_percent": {
+                self.figures[row].text: {
+                    name: {"exact": float(exact[row, k]), "difference": float(self.difference[row, k])}
+                    for k, name in enumerate(names)
+                }
+                for row in rows
+            },
+        }
+        if self.agreed:
+            result["agreed"] = self._agreed_as_json(self.agreed)
+        return {**result, "notices": list(self.notices)}
+
+    def _agreed_as_json(self, agreed: Agreed) -> dict[str, object]:
+        columns = zip(self.figures, agreed.foretold, agreed.foretold_by_difference, agreed.direct, strict=True)
+        keys = {one.name: one.key for one in self.parameters}
+        return {
+            "percent": {keys[name]: percent for name, percent in agreed.percent.items()},
+            "figures": {
+                figure.text: {"foretold_exact": exact, "foretold_difference": difference, "direct": direct}
+                for figure, exact, difference, direct in columns
+            },
+        }
+
+
+def influence(study: Study, agreed: Mapping[str, float] | None = None) -> CardInfluence:
+    """Influence coefficients of every parameter of a card on the figures of a study.
+
+    Parameters
+    ----------
+    study : Study
+    agreed : mapping, optional
+        An agreed variation: Kc %, by names as a user writes them.
+
+    Raises
+    ------
+    InputError
+        `agreed` has a name that is none of the card's parameters.
+    """
+    values, slopes = study.slopes_at(study.values)
+    difference = _differences(study)
+    errors = joint_errors(study.card, study.parameters)
+    whole = CardInfluence(study.card.ship.name, study.figures, study.base, errors, slopes, difference)
+    together = None
+    if agreed:
+        together = _agreed(study, whole, agreed_by_name(agreed, study.parameters))
+    told = [*study.notices, *errors.in_words, *_not_smooth(whole), *_differing(study, values)]
+    return replace(whole, agreed=together, notices=tuple(told))
+
+
+def _differences(study: Study) -> Array:
+    found = np.full((len(study.figures), len(study.values)), np.nan)
+    for place, value in enumerate(study.values):
+        if value == 0:
+            continue
+        changed = study.values.copy()
+        changed[place] *= 1 + STEP_PERCENT / 100
+        found[:, place] = _change(study, changed)
+    return found
+
+
+def _change(study: Study, values: Array) -> list[float]:
+    """Change of each figure in per cent; nan where the changed ship does not show it."""
+    try:
+        figures = study.figures_at(values)
+    except InputError:  # the changed ship leaves all bounds
+        return [math.nan] * len(study.figures)
+    return [change_percent(float(new), float(old)) for new, old in zip(figures, study.base, strict=True)]
+
+
+def _agreed(study: Study, found: CardInfluence, percent: Mapping[str, float]) -> Agreed:
+    names = [one.name for one in study.parameters]
+    values = dict(zip(names, study.values.tolist(), strict=True))
+    changed = changed_together(values, percent)
+    direct = _change(study, np.array([changed[name] for name in names]))
+
+    def foretold(K: Array) -> tuple[float, ...]:
+        return tuple(combined_percent(dict(zip(names, row.tolist(), strict=True)), percent) for row in K)
+
+    return Agreed(percent, foretold(found.exact), foretold(found.difference), tuple(direct))
+
+
+def _differing(study: Study, sloped: Array) -> Iterable[str]:
+    """A word where the slopes are those of another value than the figure's: the event behind it is not the same."""
+    for figure, one, other in zip(study.figures, study.base, sloped, strict=True):
+        if not abs(one - other) <= 1e-4 * max(abs(one), 1e-3):
+            yield f"{figure.text}: its slopes are not to be trusted, the manoeuvre has no clean event there"
+
+
+def _not_smooth(found: CardInfluence) -> list[str]:
+    told = []
+    exact = found.exact
+    for row, figure in enumerate(found.figures):
+        gone, bent = [], []
+        for place, parameter in enumerate(found.parameters):
+            slope, step = exact[row, place], found.difference[row, place]
+            if parameter.value == 0 or max(abs(slope), abs(step) if math.isfinite(step) else math.inf) < TOLD_FROM:
+                continue
+            if not math.isfinite(step):
+                gone.append(parameter.short)
+            elif slope * step <= 0 or not 1 / CURVED < abs(step / slope) < CURVED:
+                bent.append(parameter.short)
+        if gone:
+            told.append(f"{figure.text}: 10 % more of {', '.join(gone)} and the ship does not show it any more")
+        if bent:
+            told.append(f"{figure.text} is not smooth or strongly curved in {', '.join(bent)}: slope and 10 % disagree")
+    return told

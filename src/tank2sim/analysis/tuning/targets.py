@@ -1,0 +1,69 @@
+"""What a ship shall do: figures with wanted values, as a user writes them."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from tank2sim.analysis.influence.figures import STRAIGHT, FigureKind, InfluenceFigure, parse_figure
+from tank2sim.errors import InputError
+
+TARGET_OPTION = "--tune"
+
+EQUAL, AT_MOST, AT_LEAST = "=", "<=", ">="
+
+_WISH = re.compile(r"(?P<name>[^@<>=]+)(?P<at>@[^<>=]+)?(?P<relation><=|>=|=)(?P<value>[^@<>=]+)(?P<behind>@[^<>=]+)?")
+
+
+@dataclass(frozen=True)
+class Wish:
+    """A figure and the value that it shall have, at most or at least; in the unit in the figure's name."""
+
+    figure: InfluenceFigure
+    relation: str
+    value: float
+
+    @property
+    def text(self) -> str:
+        """As the command takes it: ``steady_radius_m@20=424``."""
+        return f"{self.figure.text}{self.relation}{self.value:g}"
+
+
+def parse_wish(text: str) -> Wish:
+    """The wish that a command line means: ``steady_radius_m@20=424`` or ``steady_radius_m=424@20``, ``<=``, ``>=``.
+
+    Raises
+    ------
+    InputError
+        It is none, its figure does not exist, or its value is no finite number or one that no ship can have.
+    """
+    found = _WISH.fullmatch(text.strip())
+    if found is None or (found["at"] and found["behind"]):
+        remedy = "give FIGURE@ARGUMENT=VALUE, <= or >=, as steady_radius_m@20=424 or 'overshoot1_deg@20/20<=25'"
+        raise InputError(TARGET_OPTION, text, "is no wish", remedy)
+    try:
+        value = float(found["value"])
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InputError(
+            TARGET_OPTION, text, f"{found['value'].strip()} is no number", "give a value in the figure's unit"
+        )
+    figure = parse_figure(found["name"].strip() + (found["at"] or found["behind"] or "").strip(), TARGET_OPTION)
+    if not _possible(figure.kind, value):
+        problem = f"no ship has {figure.kind.description} of {value:g}"
+        raise InputError(TARGET_OPTION, text, problem, "give a value that a ship can have")
+    return Wish(figure, found["relation"], value)
+
+
+def _possible(kind: FigureKind, value: float) -> bool:
+    """Whether a ship can have a figure: sizes, times and rates of a manoeuvre are positive; a ship that loses all of
+    her speed turns no more."""
+    if kind.family == STRAIGHT or kind.name == "transfer_m":
+        return True
+    if kind.name == "steady_drift_deg":
+        return abs(value) < 90
+    if kind.name == "speed_loss_percent":
+        return 0 <= value < 100
+    return value >= 0 if kind.name.startswith("overshoot") else value > 0

@@ -1,0 +1,315 @@
+"""What a bridge wants to know of a ship (IMO A.601(15)): circles, stops, speeds by revolutions, zigzags, from her card.
+
+Only what the card tells is here; what it does not tell is None, and stays a blank on the pilot card and the poster. So
+does a figure whose manoeuvre had left what the card holds for: it is marked here, and no bridge document prints it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from tank2sim.analysis.linearisation import straight_course
+from tank2sim.analysis.stability.imo import TRIAL_RUDDER
+from tank2sim.analysis.validation.ship_track import ShipTrack, TrackMark, circle_track, stop_track
+from tank2sim.analysis.validation.standard_trials import TrialShip, ship_of
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.errors import InputError
+from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading
+from tank2sim.simulation.manoeuvres import COASTING_END, FULL_ASTERN, Stop, Turn, Zigzag
+from tank2sim.simulation.run import Run
+
+SHALLOW = 1.2
+"""Depth over draught in shallow water (A.601(15), appendix 2)."""
+
+DEEP = 20.0
+"""Depth over draught in deep water: a choice of ours, far beyond the 4 that MSC.137(76) asks for."""
+
+SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
+"""Revolutions over nominal ones at which speeds are told where no telegraph orders are given: a choice of ours."""
+
+ORDERS_AHEAD = ("Full sea speed", "Full ahead", "Half ahead", "Slow ahead", "Dead slow ahead")
+"""Orders ahead of the wheelhouse poster's form (A.601(15), appendix 2)."""
+
+_LARGEST_SHARE = 2.0
+"""Revolutions of an order over the nominal ones beyond which it is a slip: engines trip far below. A choice of ours."""
+
+LARGEST_RPM = 10_000.0
+"""The same where the card tells no nominal revolutions: propellers of the smallest models turn slower."""
+
+_RADIANS_PER_S = 2 * math.pi / 60
+
+
+@dataclass(frozen=True)
+class Telegraph:
+    """One order: its name (empty if it has none), revolutions, steady speed straight ahead (None if not known).
+
+    `within` is False where that speed is outside the card's range.
+    """
+
+    order: str
+    rpm: float
+    speed_mps: float | None
+    within: bool = True
+
+
+@dataclass(frozen=True)
+class StopFrom:
+    """Full astern from the speed of an order: track reach and time; None where the run did not show them.
+
+    `within` is False where the run left the card's range before the ship was at rest.
+    """
+
+    order: str
+    speed_mps: float
+    track_reach_m: float | None
+    time_s: float | None
+    within: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Bridge:
+    """One loading condition of a ship, as far as her card tells it.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    rudder_deg : float
+        Of the turning circles: the largest that the gear allows (A.601(15)), or 35 deg where the card tells no largest.
+    deep, shallow : tuple of ShipTrack
+        Circles to starboard and port; `shallow` at :data:`SHALLOW` times the draught, empty without the effect.
+    stops : tuple of ShipTrack
+        Full astern, and the engine stopped; empty without propulsion.
+    zigzags : mapping
+        Name to figures; what could not be run has none.
+    telegraph : tuple of Telegraph
+        Empty without propulsion, unless orders were given.
+    stops_from : tuple of StopFrom
+        Full astern from each speed of the telegraph.
+    hard_over_s : float or None
+        From hard over to hard over, by the gear's rate.
+    neutral_deg : float or None
+        Rudder that keeps a straight course, + to starboard; None where none does.
+    notices : tuple of str
+    """
+
+    card: ManoeuvringCard
+    rudder_deg: float
+    deep: tuple[ShipTrack, ...]
+    shallow: tuple[ShipTrack, ...]
+    stops: tuple[ShipTrack, ...]
+    zigzags: Mapping[str, CardRangeReading]
+    telegraph: tuple[Telegraph, ...]
+    stops_from: tuple[StopFrom, ...]
+    hard_over_s: float | None
+    neutral_deg: float | None
+    notices: tuple[str, ...] = ()
+
+    def as_json(self) -> dict[str, object]:
+        """All of it, tracks thinned to 200 points."""
+        return {
+            "ship": self.card.ship.name,
+            "source": self.card.ship.source,
+            "rudder_deg": self.rudder_deg,
+            "turning_circles_deep": [one.as_json() for one in self.deep],
+            "turning_circles_shallow": [one.as_json() for one in self.shallow],
+            "stops": [one.as_json() for one in self.stops],
+            "zigzags": {name: {"figures": one.figures, **one.as_json()} for name, one in self.zigzags.items()},
+            "telegraph": [vars(one) for one in self.telegraph],
+            "full_astern_from": [vars(one) for one in self.stops_from],
+            "hard_over_to_hard_over_s": self.hard_over_s,
+            "rudder_neutral_deg": self.neutral_deg,
+            "notices": list(self.notices),
+        }
+
+
+def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) -> Bridge:
+    """Run what a bridge wants to know.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    orders : mapping, optional
+        Order of the telegraph to its revolutions, rpm; by default some shares of the nominal ones, without names.
+
+    Raises
+    ------
+    InputError
+        The revolutions of an order are beyond :data:`_LARGEST_SHARE` of the nominal ones.
+    """
+    _check_orders(card, orders or {})
+    ship = ship_of(card)
+    depths = _depths(ship)
+    rudder = _rudder(card)
+    circles, told = _circles(ship, rudder, depths)
+    deep = depths["deep"]
+    stops, troubles = _stops(ship, deep)
+    telegraph = _telegraph(ship, orders)
+    gear = card.steering_gear
+    largest, rate = (gear.max_angle_rad, gear.max_rate_radps) if gear else (None, None)
+    return Bridge(
+        card=card,
+        rudder_deg=math.degrees(rudder),
+        deep=tuple(circles.get("deep", ())),
+        shallow=tuple(circles.get("shallow", ())),
+        stops=stops,
+        zigzags=_zigzags(ship, deep),
+        telegraph=telegraph,
+        stops_from=_stops_from(ship, telegraph, deep),
+        hard_over_s=2 * largest / rate if largest and rate else None,
+        neutral_deg=_neutral(ship),
+        notices=tuple(dict.fromkeys((*told, *troubles))),
+    )
+
+
+def _check_orders(card: ManoeuvringCard, orders: Mapping[str, float]) -> None:
+    engine = card.propulsion
+    largest = _LARGEST_SHARE * engine.nominal_radps / _RADIANS_PER_S if engine else LARGEST_RPM
+    for order, rpm in orders.items():
+        if rpm > largest:
+            nominal = f" (the card's nominal ones are {largest / _LARGEST_SHARE:.4g})" if engine else ""
+            problem = f"is beyond {largest:,.0f} revolutions a minute{nominal}"
+            raise InputError("--order", f"{order}={rpm:g}", problem, "give the propeller's revolutions, rpm")
+
+
+def _rudder(card: ManoeuvringCard) -> float:
+    """Rudder of the turning circles, rad."""
+    gear = card.steering_gear
+    return gear.max_angle_rad if gear and gear.max_angle_rad else TRIAL_RUDDER
+
+
+def steady_speed(ship: TrialShip, revolutions_radps: float) -> float | None:
+    """Speed (m/s) that the ship keeps straight ahead at these revolutions; None if there is none.
+
+    The highest at which the surge acceleration without drift, turn and rudder falls through zero. A ship that is
+    unstable on her course, or asymmetric, is held on it by a rudder whose drag is left out.
+    """
+    model = ship.model
+    p, x0 = model.parameter_values(), np.array(model.initial(model.parameter_values())).ravel()
+    inputs = {name: 0.0 for name in model.input_names if name in ("current.speed", "wind.speed", "rudder.command")}
+    u = model.input_values({**inputs, "propeller.speed": revolutions_radps})
+    place, out = model.state_names.index("motion.u"), model.outputs.index("motion.udot")
+
+    def pushed(speed: float) -> float:
+        x = x0.copy()
+        x[place] = speed
+        return float(np.array(model.output(x, u, p)).ravel()[out])
+
+    speeds = np.linspace(0.01, 1.5, 150) * ship.card.model.speed_mps
+    pushes = np.array([pushed(speed) for speed in speeds])
+    falls = np.flatnonzero((pushes[:-1] > 0) & (pushes[1:] <= 0))
+    if not len(falls):
+        return None
+    last = int(falls[-1])
+    return float(brentq(pushed, speeds[last], speeds[last + 1], xtol=1e-9))
+
+
+def _telegraph(ship: TrialShip, orders: Mapping[str, float] | None) -> tuple[Telegraph, ...]:
+    if ship.card.propulsion is None:
+        return tuple(Telegraph(order, rpm, None) for order, rpm in (orders or {}).items())
+    nominal = ship.card.propulsion.nominal_radps / _RADIANS_PER_S
+    asked = list(orders.items()) if orders else [("", share * nominal) for share in SHARES]
+    slowest, fastest = ship.card.model.speed_range_mps
+    rows = []
+    for order, rpm in asked:
+        speed = steady_speed(ship, rpm * _RADIANS_PER_S) if rpm > 0 else None
+        rows.append(Telegraph(order, rpm, speed, speed is None or slowest <= speed <= fastest))
+    return tuple(rows)
+
+
+def _depths(ship: TrialShip) -> dict[str, dict[str, float]]:
+    """Inputs in deep and in shallow water; shallow only where the card has the effect and a draught."""
+    draught = ship.card.ship.draught_m
+    if "water.depth" not in ship.model.input_names or draught is None:
+        return {"deep": {}}
+    return {"deep": {"water.depth": DEEP * draught}, "shallow": {"water.depth": SHALLOW * draught}}
+
+
+def _circles(
+    ship: TrialShip, rudder: float, depths: Mapping[str, Mapping[str, float]]
+) -> tuple[dict[str, list[ShipTrack]], list[str]]:
+    """Circles by depth, to starboard and port, and what is to be told of them."""
+    found: dict[str, list[ShipTrack]] = {}
+    told = []
+    if rudder > TRIAL_RUDDER * (1 + 1e-9):
+        shown = f"{math.degrees(rudder):.3g} deg, the largest of the gear"
+        told.append(f"turning circles with {shown}: the card does not say how far its rudder was tested")
+    for where, inputs in depths.items():
+        for side, sign in (("starboard", 1.0), ("port", -1.0)):
+            name = f"turn to {side}, {where} water"
+            run = ship.run(Turn(sign * rudder), inputs=inputs)
+            if isinstance(run, str):
+                told.append(f"{name}: {run}")
+                continue
+            track = circle_track(side, run)
+            found.setdefault(where, []).append(track)
+            told += _left(name, track.left)
+    return found, told
+
+
+def _left(name: str, left: TrackMark | None) -> list[str]:
+    """Where a run leaves the card's range, in words."""
+    if left is None:
+        return []
+    turned = f" and {left.heading_change_deg:.0f}° of heading" if abs(left.heading_change_deg) >= 1 else ""
+    place = f"after {left.time_s:.0f} s{turned}, at {left.speed_mps:.3g} m/s"
+    return [f"{name}: leaves the card's range {place}: what follows is not told"]
+
+
+def _stops(ship: TrialShip, inputs: Mapping[str, float]) -> tuple[tuple[ShipTrack, ...], list[str]]:
+    if not ship.has_engine:
+        return (), []
+    found, told = [], []
+    for name, manoeuvre in (
+        (f"full astern ({FULL_ASTERN:.0%} of nominal)", Stop()),
+        (f"engine stopped, to {COASTING_END:.0%} of speed", Stop(0.0)),
+    ):
+        run = ship.run(manoeuvre, inputs=inputs)
+        if isinstance(run, str):
+            told.append(f"{name}: {run}")
+            continue
+        told += [f"{name}: {one}" for one in run.notices if "not show" in one]
+        track = stop_track(name, run)
+        found.append(track)
+        told += _left(name, track.left)
+    return tuple(found), told
+
+
+def _stops_from(ship: TrialShip, telegraph: Sequence[Telegraph], inputs: Mapping[str, float]) -> tuple[StopFrom, ...]:
+    found = []
+    for one in telegraph:
+        if one.speed_mps is None or not one.within:
+            continue
+        run = ship.run(Stop(), {"initial.u": one.speed_mps}, inputs)
+        read = _read(run)
+        reach, time = (read.figures.get(name) for name in ("track_reach_m", "time_to_stop_s"))
+        order = one.order or f"{one.rpm:.4g} rpm"
+        found.append(StopFrom(order, one.speed_mps, reach, time, not read.outside("track_reach_m")))
+    return tuple(found)
+
+
+def _read(run: Run | str) -> CardRangeReading:
+    return NOTHING_READ if isinstance(run, str) else run.reading
+
+
+def _neutral(ship: TrialShip) -> float | None:
+    try:
+        course = straight_course(ship.model, ship.card.model.speed_mps)
+    except InputError:
+        return None
+    angle = math.degrees(course.x[ship.model.state_names.index("rudder.angle")])
+    # A card without any asymmetry does not say that the ship has none.
+    return angle if abs(angle) > 1e-6 else None
+
+
+def _zigzags(ship: TrialShip, inputs: Mapping[str, float]) -> dict[str, CardRangeReading]:
+    found = {}
+    for angle in (10.0, 20.0):
+        for name, sign in (("starboard", 1.0), ("port", -1.0)):
+            run = ship.run(Zigzag(sign * math.radians(angle), math.radians(angle)), inputs=inputs)
+            found[f"{angle:g}/{angle:g} first to {name}"] = _read(run)
+    return found

@@ -1,0 +1,317 @@
+"""Cards coefficient by coefficient: brought to one convention and one speed, and compared in standard errors.
+
+A polynomial in v', r', delta and Du' is another one when it is expanded about another speed, in primes by another
+speed, or with the inertial terms of (3.8) inside or outside. With V the speed of the scaling of the reference, in the
+units of the card's own u0 and of the length (k is the ratio of the Froude numbers),
+
+    V = k                            (nominal)
+    V = k/(sqrt(1 - v'^2) - Du')     (instantaneous, from V^2 = (k + Du' V)^2 + (v' V)^2)
+
+give u = k + Du' V, v = v' V, r = r' V, and so the card's forces. Their Taylor series about 0 in the reference's primes
+has the card's coefficients in the reference's convention, to the third order. They are linear in the card's own, and so
+the standard errors follow.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.analysis.influence.parameters import card_parameters
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.scaling import file_factor
+from tank2sim.cards.terms import Term, known_term
+from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS, polynomial
+from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.rigid_body import inertial_forces
+
+_SAME_SPEED = 1e-3
+"""Froude numbers that differ by less than this share are one."""
+
+BEYOND_STANDARD_ERRORS = 2.0
+"""Differences of more standard errors than this are told as such: 5 % of those by chance alone."""
+
+_ABSENT = 1e-12
+_RIGID_BODY = ("mass", "yaw_inertia", "x_G")
+
+
+@dataclass(frozen=True)
+class CardCoefficient:
+    """A coefficient of one card in the reference's convention, prime; in rows with the rudder's sign of the reference.
+
+    `value` is None where the card's model has no such term, `standard_error` where none is known; `stated` is False
+    where it rests on the default share of the value.
+    """
+
+    value: float | None
+    standard_error: float | None = None
+    stated: bool = False
+
+
+SAME = "the reference's own number"
+"""Why a number that is the reference's to the last digit has no difference: one of the cards took it over, or both from
+a third. Their errors are one and the same, and 0 standard errors would pass for the agreement of two."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A card less the reference: in standard errors, in per cent of the reference, or why there is none."""
+
+    standard_errors: float | None = None
+    percent: float | None = None
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class CoefficientRow:
+    """One coefficient of all cards, the reference first, and the others' differences from it."""
+
+    name: str
+    cards: tuple[CardCoefficient, ...]
+    differences: tuple[Difference, ...]
+
+    def as_json(self) -> dict[str, object]:
+        """As JSON has it."""
+        return {
+            "name": self.name,
+            "cards": [vars(one) for one in self.cards],
+            "differences": [vars(one) for one in self.differences],
+        }
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """A card's coefficients in the convention of another.
+
+    Parameters
+    ----------
+    coefficients : mapping
+        Name to coefficient; what the model has not is left out.
+    refused : mapping
+        Name to why it cannot be compared.
+    notes : tuple of str
+        What was converted.
+    """
+
+    coefficients: Mapping[str, CardCoefficient]
+    refused: Mapping[str, str]
+    notes: tuple[str, ...]
+
+
+def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[CoefficientRow, ...], tuple[str, ...]]:
+    """All coefficients of cards (the first is the reference) that any of them has, and notes on what was converted."""
+    reference = cards[0]
+    expansions = [expanded_as(card, reference) for card in cards]
+    rows = []
+    for name in (*_RIGID_BODY, *ALL_TERMS):
+        if not any(name in one.coefficients for one in expansions):
+            continue
+        found = tuple(_in_sign_of(reference, name, one.coefficients.get(name)) for one in expansions)
+        differences = tuple(
+            Difference(why=one.refused[name]) if name in one.refused else _difference(found[0], own)
+            for one, own in zip(expansions[1:], found[1:], strict=True)
+        )
+        rows.append(CoefficientRow(name, found, differences))
+    return tuple(rows), tuple(note for one in expansions[1:] for note in one.notes)
+
+
+def _in_sign_of(reference: ManoeuvringCard, name: str, found: CardCoefficient | None) -> CardCoefficient:
+    """A coefficient (rudder positive to starboard) with the rudder's sign of the reference's card."""
+    if found is None or found.value is None:
+        return CardCoefficient(None)
+    if name in _RIGID_BODY:
+        return found
+    factor = file_factor(known_term(name), None, rudder_to_port=reference.model.rudder_sign == "port")
+    return replace(found, value=factor * found.value)
+
+
+def _difference(first: CardCoefficient, other: CardCoefficient) -> Difference:
+    if first.value is None or other.value is None:
+        return Difference(why="not in the reference's model" if first.value is None else "not in this model")
+    apart = other.value - first.value
+    percent = 100 * apart / abs(first.value) if first.value else None
+    if first.standard_error and other.standard_error and _same(first.value, other.value):
+        return Difference(None, percent, SAME)
+    if first.standard_error is None or other.standard_error is None:
+        return Difference(None, percent, "" if apart == 0 else "no standard error")
+    both = math.hypot(first.standard_error, other.standard_error)
+    if both == 0:
+        return Difference(0.0 if apart == 0 else None, percent, "" if apart == 0 else "both are stated as certain")
+    return Difference(apart / both, percent)
+
+
+def compare_effects(cards: Sequence[ManoeuvringCard], models: Sequence[Model]) -> tuple[CoefficientRow, ...]:
+    """All parameters of effects that any card has, in SI, as their models have them; `models` are those of the cards.
+
+    What has a unit (a wind speed, a time) is compared between ships of one size alone.
+    """
+    found = [_of_effects(card, model) for card, model in zip(cards, models, strict=True)]
+    rows = []
+    for name in dict.fromkeys(name for own in found for name in own):
+        row = tuple(own.get(name, CardCoefficient(None)) for own in found)
+        differences = []
+        for card, model, one in zip(cards[1:], models[1:], row[1:], strict=True):
+            of_size = name in model and model[name].unit not in ("1", "rad")
+            other_size = not math.isclose(card.ship.length_m, cards[0].ship.length_m, rel_tol=1e-6)
+            refused = of_size and other_size
+            differences.append(Difference(why="of a ship of another size") if refused else _difference(row[0], one))
+        rows.append(CoefficientRow(name, row, tuple(differences)))
+    return tuple(rows)
+
+
+def _of_effects(card: ManoeuvringCard, model: Model) -> dict[str, CardCoefficient]:
+    return {
+        one.name: CardCoefficient(one.value, one.standard_error, not one.assumed)
+        for one in card_parameters(card, model)
+        if one.key.startswith("effects.")
+    }
+
+
+def _same(one: float, other: float) -> bool:
+    """One number but for rounding, as it is left by a change of convention."""
+    return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-15)
+
+
+def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
+    """The coefficients of a card in the speed, scaling and inertial convention of another."""
+    ratio = _froude(reference) / _froude(card)
+    linear = "linear" in (card.model.kind, reference.model.kind)
+    if abs(ratio - 1) < _SAME_SPEED or linear:
+        ratio = 1.0
+    names, matrix, constant = _conversion(card, reference, ratio)
+    sources = [name for name in card.derivatives if name in names]
+    columns = [names.index(name) for name in sources]
+    own = np.array([card.derivatives[name] for name in sources])
+    errors = np.array([card.standard_error(name) for name in sources])
+    stated = {name for name in sources if name in card.uncertainty}
+    found: dict[str, CardCoefficient] = {name: CardCoefficient(getattr(card.rigid_body, name)) for name in _RIGID_BODY}
+    refused = _refused(card, reference, ratio, linear)
+    outside = not _holds_at(card, ratio)
+    for row, name in enumerate(names):
+        weights = matrix[row, columns]
+        if linear and name not in _linear_names():
+            continue
+        if np.all(np.abs(weights) < _ABSENT) and abs(constant[row]) < _ABSENT:
+            continue
+        known = {source for source, weight in zip(sources, weights, strict=True) if abs(weight) > _ABSENT}
+        error = float(np.linalg.norm(weights * errors))
+        value = float(weights @ own + constant[row])
+        if outside and (known != {name} or abs(value - card.derivatives[name]) > _ABSENT):
+            refused.setdefault(name, "the reference's speed is outside the range in which this card holds")
+        found[name] = CardCoefficient(value, error if known else None, bool(known) and known <= stated)
+    for name in ACCELERATION_TERMS:
+        if name in card.derivatives:
+            stated_error = name in card.uncertainty
+            found[name] = CardCoefficient(card.derivatives[name], card.standard_error(name), stated_error)
+    return Expansion(found, refused, _notes(card, reference, ratio))
+
+
+def _holds_at(card: ManoeuvringCard, ratio: float) -> bool:
+    slowest, fastest = card.model.speed_range_mps
+    return slowest <= ratio * card.model.speed_mps <= fastest
+
+
+def _froude(card: ManoeuvringCard) -> float:
+    return card.model.speed_mps / math.sqrt(card.environment.gravity_mps2 * card.ship.length_m)
+
+
+def _linear_names() -> tuple[str, ...]:
+    return (*LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS)
+
+
+def _refused(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float, linear: bool) -> dict[str, str]:
+    found = {}
+    if linear:
+        found = {name: "not in the linear model" for name in ALL_TERMS if name not in _linear_names()}
+    if ratio != 1 and not (card.propulsion and reference.propulsion):
+        why = "another speed, and the revolutions are not known"
+        found |= {
+            name: why for name in ABKOWITZ_TERMS["X"] if not (known_term(name).v or known_term(name).r or _d(name))
+        }
+    return found
+
+
+def _d(name: str) -> int:
+    return known_term(name).d
+
+
+def _notes(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float) -> tuple[str, ...]:
+    told = []
+    if ratio != 1:
+        told.append(f"re-expanded about {ratio:.4g} times its own Froude number, to the third order")
+    own, other = card.model, reference.model
+    if own.speed_scale != other.speed_scale:
+        told.append(f"primes by the {own.speed_scale} speed converted to the {other.speed_scale} one")
+    if own.yaw_rate_terms != other.yaw_rate_terms:
+        told.append(f"yaw rate terms converted from {own.yaw_rate_terms} to {other.yaw_rate_terms}")
+    return tuple(f"{card.ship.name} ({card.source}): {one}" for one in told)
+
+
+def _conversion(
+    card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float
+) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """Names of the velocity and rudder terms, the matrix from the card's to the reference's, and what is added."""
+    names = [*ABKOWITZ_TERMS["X"], *ABKOWITZ_TERMS["Y"], *ABKOWITZ_TERMS["N"]]
+    own = ca.SX.sym("own", len(names))
+    at = ca.SX.sym("v"), ca.SX.sym("r"), ca.SX.sym("d"), ca.SX.sym("du")
+    forces = _forces_in_primes(card, reference, ratio, dict(zip(names, ca.vertsplit(own), strict=True)), at)
+    series = _taylor(forces, at, names)
+    both = ca.Function("conversion", [*at, own], [ca.jacobian(series, own), series])
+    matrix, constant = both(0, 0, 0, 0, np.zeros(len(names)))
+    return names, np.array(matrix), np.array(constant).ravel()
+
+
+def _forces_in_primes(
+    card: ManoeuvringCard,
+    reference: ManoeuvringCard,
+    ratio: float,
+    own: Mapping[str, ca.SX],
+    at: tuple[ca.SX, ca.SX, ca.SX, ca.SX],
+) -> ca.SX:
+    """X', Y', N' of the card's model in the reference's convention, at a motion in the reference's primes."""
+    v, r, d, du = at
+    nominal = _nominal(reference)
+    scale = ca.SX(ratio) if nominal else ratio / (ca.sqrt(1 - v**2) - du)
+    u, sway, yaw = ratio + du * scale, v * scale, r * scale
+    own_scale = ca.SX(1) if _nominal(card) else ca.sqrt(u**2 + sway**2)
+    primes = sway / own_scale, yaw / own_scale, d, (u - 1) / own_scale
+    X, Y, N = (own_scale**2 * polynomial(ABKOWITZ_TERMS[name], own, *primes) for name in "XYN")
+    # What each convention leaves to the equations: (3.8) with u, or nothing, for V stands in the coefficients already.
+    for one, sign in ((card, 1), (reference, -1)):
+        if one.model.yaw_rate_terms == "hydrodynamic":
+            inertia = inertial_forces(card.rigid_body.mass, card.rigid_body.x_G, u, sway, yaw)
+            X, Y, N = X + sign * inertia[0], Y + sign * inertia[1], N + sign * inertia[2]
+    if ratio != 1 and card.propulsion and reference.propulsion:
+        by_length = math.sqrt(reference.ship.length_m / card.ship.length_m)
+        revolutions = reference.propulsion.nominal_radps * by_length / card.propulsion.nominal_radps
+        X = X + card.propulsion.Xnn * (revolutions**2 - 1)
+    primes_of_forces: ca.SX = ca.vertcat(X, Y, N) / scale**2
+    return primes_of_forces
+
+
+def _nominal(card: ManoeuvringCard) -> bool:
+    return card.model.speed_scale == "nominal"
+
+
+def _taylor(forces: ca.SX, at: tuple[ca.SX, ...], names: Sequence[str]) -> ca.SX:
+    """Coefficients of the Taylor series, before 0 is put in: each derivative over its factorials."""
+    known: dict[tuple[int, ...], ca.SX] = {(0, 0, 0, 0): forces}
+
+    def derivative(powers: tuple[int, ...]) -> ca.SX:
+        if powers not in known:
+            place = next(number for number, power in enumerate(powers) if power)
+            lower = tuple(power - (number == place) for number, power in enumerate(powers))
+            known[powers] = ca.jacobian(derivative(lower), at[place])
+        return known[powers]
+
+    return ca.vertcat(*(_coefficient(known_term(name), derivative) for name in names))
+
+
+def _coefficient(term: Term, derivative: Callable[[tuple[int, ...]], ca.SX]) -> ca.SX:
+    powers = (term.v, term.r, term.d, term.u)
+    taylor: ca.SX = derivative(powers)["XYN".index(term.force)] / math.prod(math.factorial(power) for power in powers)
+    return taylor

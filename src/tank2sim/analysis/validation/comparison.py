@@ -1,0 +1,341 @@
+"""Cards of one ship compared: coefficient by coefficient, and by what they do in the standard trials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.analysis.validation.coefficients import (
+    BEYOND_STANDARD_ERRORS,
+    SAME,
+    CoefficientRow,
+    compare_coefficients,
+    compare_effects,
+)
+from tank2sim.analysis.validation.standard_trials import (
+    MEMBERS,
+    TrialShip,
+    figure_numbers,
+    member_spread,
+    members,
+    ship_of,
+    standard_trials,
+)
+from tank2sim.arrays import Array
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, ManoeuvringCard
+from tank2sim.errors import InputError
+from tank2sim.marks import ASSUMED, EXTRAPOLATED
+from tank2sim.simulation.card_range import Numbers
+from tank2sim.simulation.manoeuvres import Manoeuvre
+from tank2sim.simulation.trajectory import Trajectory
+
+SAME_SIZE = 0.03
+"""Lengths and breadths that differ by less than this share are those of one ship: not all count them alike. Ours."""
+
+
+@dataclass(frozen=True, eq=False)
+class CardTrack:
+    """The path of one card's ship in a trial, at the reference's size: s, m."""
+
+    label: str
+    time_s: Array
+    x_m: Array
+    y_m: Array
+
+
+@dataclass(frozen=True)
+class FigureRow:
+    """One figure by all cards at the reference's size.
+
+    Parameters
+    ----------
+    name : str
+        With its unit.
+    values, deviations : tuple of float or None
+        Of each card, the reference first; None where the run did not show it, or nothing is known of its error.
+    outside : tuple of bool
+        True where the run had left what the card was measured in before the figure was settled.
+    """
+
+    name: str
+    values: tuple[float | None, ...]
+    deviations: tuple[float | None, ...]
+    outside: tuple[bool, ...] = ()
+
+    def difference(self, place: int) -> float | None:
+        """A card's figure less the reference's."""
+        own, first = self.values[place], self.values[0]
+        return None if own is None or first is None else own - first
+
+    def in_errors(self, place: int) -> float | None:
+        """The difference over the root of both variances."""
+        apart, own, first = self.difference(place), self.deviations[place], self.deviations[0]
+        if apart is None or own is None or first is None or not math.hypot(own, first):
+            return None
+        return apart / math.hypot(own, first)
+
+
+@dataclass(frozen=True, eq=False)
+class TrialComparison:
+    """One standard trial by all cards: figures, tracks, and what went wrong."""
+
+    name: str
+    figures: tuple[FigureRow, ...]
+    tracks: tuple[CardTrack, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class CardComparison:
+    """Cards compared; the first is the reference.
+
+    Parameters
+    ----------
+    labels, ships, sources : tuple of str
+        What each card is called here, its ship, and where its numbers come from.
+    coefficients, effects : tuple of CoefficientRow
+        Coefficients in the reference's convention, and parameters of the effects, SI.
+    trials : tuple
+    members : int
+        Size of the ensembles behind the deviations of the figures.
+    notices : tuple of str
+    """
+
+    labels: tuple[str, ...]
+    ships: tuple[str, ...]
+    sources: tuple[str, ...]
+    coefficients: tuple[CoefficientRow, ...]
+    effects: tuple[CoefficientRow, ...]
+    trials: tuple[TrialComparison, ...]
+    members: int
+    notices: tuple[str, ...] = field(default=())
+
+    @property
+    def rows(self) -> tuple[CoefficientRow, ...]:
+        """Coefficients and parameters of effects."""
+        return (*self.coefficients, *self.effects)
+
+    def in_errors(self, place: int) -> tuple[float, ...]:
+        """All differences of a card (1 is the first after the reference) in standard errors, but for :data:`.SAME`."""
+        found = [row.differences[place - 1].standard_errors for row in self.rows]
+        return tuple(one for one in found if one is not None)
+
+    def same(self, place: int) -> int:
+        """How many numbers of a card are the reference's own."""
+        return sum(row.differences[place - 1].why == SAME for row in self.rows)
+
+    def beyond(self, place: int) -> int:
+        """How many coefficients differ by more than :data:`.BEYOND` standard errors."""
+        return sum(abs(one) > BEYOND_STANDARD_ERRORS for one in self.in_errors(place))
+
+    def rms(self, place: int) -> float | None:
+        """Root mean square of the differences in standard errors: 1 if they are by chance."""
+        found = self.in_errors(place)
+        return math.sqrt(sum(one**2 for one in found) / len(found)) if found else None
+
+    def as_json(self) -> dict[str, object]:
+        """All of it; tracks thinned to 200 points."""
+        others = range(1, len(self.labels))
+        return {
+            "kind": "compare",
+            "cards": [
+                {"label": label, "ship": ship, "source": source}
+                for label, ship, source in zip(self.labels, self.ships, self.sources, strict=True)
+            ],
+            "summary": [
+                {
+                    "card": self.labels[place],
+                    "compared": len(self.in_errors(place)),
+                    "same_number": self.same(place),
+                    "beyond_two_standard_errors": self.beyond(place),
+                    "rms_standard_errors": self.rms(place),
+                }
+                for place in others
+            ],
+            "coefficients": [row.as_json() for row in self.coefficients],
+            "effects": [row.as_json() for row in self.effects],
+            "trials": [self._trial_json(trial) for trial in self.trials],
+            "members": self.members,
+            "notices": list(self.notices),
+        }
+
+    def _trial_json(self, trial: TrialComparison) -> dict[str, object]:
+        others = range(1, len(self.labels))
+        return {
+            "name": trial.name,
+            "figures": {
+                row.name: {
+                    "values": list(row.values),
+                    "standard_deviations": list(row.deviations),
+                    "outside_card_range": list(row.outside),
+                    "differences": [row.difference(place) for place in others],
+                    "differences_standard_errors": [row.in_errors(place) for place in others],
+                }
+                for row in trial.figures
+            },
+            "tracks": [
+                {
+                    "card": track.label,
+                    **{
+                        name: values[:: max(1, len(values) // 200)]
+                        for name, values in (("t_s", track.time_s), ("x_m", track.x_m), ("y_m", track.y_m))
+                    },
+                }
+                for track in trial.tracks
+            ],
+        }
+
+
+def compare_cards(cards: Sequence[ManoeuvringCard], count: int = MEMBERS) -> CardComparison:
+    """Compare cards of one ship, or of ships and models of one form: the first is the reference, whose size is taken.
+
+    Parameters
+    ----------
+    cards : sequence of ManoeuvringCard
+        Two or more.
+    count : int
+        Members of the ensemble behind each figure's deviation; 0 for none.
+
+    Raises
+    ------
+    InputError
+        There is only one card.
+    """
+    if len(cards) < 2:
+        raise InputError("CARD", "", "is one alone", "give two cards or more; the first is the reference")
+    labels = labels_of(cards)
+    ships = [ship_of(card) for card in cards]
+    rows, notes = compare_coefficients(cards)
+    drawn = [members(ship.card, ship.model, count) for ship in ships]
+    told = [f"{label}: {one}" for label, (_, those) in zip(labels, drawn, strict=True) for one in those]
+    notices, trials = [*_notices(cards, labels), *told, *notes], []
+    for name, manoeuvre in standard_trials(ships).items():
+        trial, trouble = _trial(name, manoeuvre, ships, labels, [those for those, _ in drawn])
+        trials.append(trial)
+        notices += trouble
+    names = tuple(card.ship.name for card in cards)
+    sources = tuple(card.ship.source for card in cards)
+    unique = tuple(dict.fromkeys(notices))
+    effects = compare_effects(cards, [ship.model for ship in ships])
+    return CardComparison(labels, names, sources, rows, effects, tuple(trials), count, unique)
+
+
+def labels_of(cards: Sequence[ManoeuvringCard]) -> tuple[str, ...]:
+    """What each card is called: its file's stem, that of its folder for a bundled one, with a number where doubled."""
+    stems = []
+    for card in cards:
+        path = Path(card.source)
+        stems.append(path.resolve().parent.name or path.stem if path.name == "ship.toml" else path.stem)
+    doubled = {stem for stem in stems if stems.count(stem) > 1}
+    return tuple(f"{stem} ({place + 1})" if stem in doubled else stem for place, stem in enumerate(stems))
+
+
+def differences_of_size(one: ManoeuvringCard, other: ManoeuvringCard, scale: float = 1.0) -> list[str]:
+    """Length and breadth of two ships that differ by :data:`SAME_SIZE` or more, in words; `scale` is that of `one`."""
+    found = []
+    for what, own, others in (
+        ("length", one.ship.length_m, other.ship.length_m),
+        ("breadth", one.ship.beam_m, other.ship.beam_m),
+    ):
+        if own is not None and others is not None and not math.isclose(own * scale, others, rel_tol=SAME_SIZE):
+            found.append(f"{what} {others:.4g} m, and not {own * scale:.4g} m")
+    return found
+
+
+def scaled_number(name: str, value: float, length_ratio: float) -> float:
+    """A figure at another size by Froude's law: lengths by the ratio, times and speeds by its root, rates by 1/root."""
+    root = math.sqrt(length_ratio)
+    return value * {"m": length_ratio, "s": root, "mps": root, "degps": 1 / root}.get(name.rpartition("_")[2], 1.0)
+
+
+def _trial(
+    name: str,
+    manoeuvre: Manoeuvre,
+    ships: Sequence[TrialShip],
+    labels: Sequence[str],
+    drawn: Sequence[Sequence[Mapping[str, float]]],
+) -> tuple[TrialComparison, list[str]]:
+    reference = ships[0].card
+    found: list[Numbers] = []
+    deviations: list[Numbers] = []
+    outside: list[set[str]] = []
+    tracks, told = [], []
+    for ship, label, own in zip(ships, labels, drawn, strict=True):
+        ratio = reference.ship.length_m / ship.card.ship.length_m
+        start = {"initial.u": _approach(reference, ship.card)}
+        run = ship.run(manoeuvre, start)
+        if isinstance(run, str):
+            told.append(f"{label}: {name}: {run}")
+            found.append({})
+            deviations.append({})
+            outside.append(set())
+            continue
+        told += [f"{label}: {name}: {one}" for one in run.notices if EXTRAPOLATED in one or "not show" in one]
+        outside.append(set(run.reading.outside_names))
+        found.append(_scaled(figure_numbers(run.figures), ratio))
+        runs = [ship.run(manoeuvre, {**start, **member}) for member in own]
+        those = member_spread([{} if isinstance(one, str) else figure_numbers(one.figures) for one in runs])
+        deviations.append(_scaled(those, ratio))
+        tracks.append(_track(label, run.trajectory, ratio))
+    names = dict.fromkeys(one for figures in found for one in figures)
+    rows = tuple(
+        FigureRow(
+            name,
+            tuple(figures.get(name) for figures in found),
+            tuple(errors.get(name) for errors in deviations),
+            tuple(name in beyond for beyond in outside),
+        )
+        for name in names
+    )
+    return TrialComparison(name, rows, tuple(tracks)), told
+
+
+def _approach(reference: ManoeuvringCard, card: ManoeuvringCard) -> float:
+    """The reference's speed at the size of the card's ship, m/s; her own where the two are one but for rounding."""
+    speed = reference.model.speed_mps * math.sqrt(card.ship.length_m / reference.ship.length_m)
+    return card.model.speed_mps if math.isclose(speed, card.model.speed_mps, rel_tol=1e-6) else speed
+
+
+def _scaled(figures: Numbers, ratio: float) -> Numbers:
+    return {name: scaled_number(name, value, ratio) for name, value in figures.items()}
+
+
+def _track(label: str, run: Trajectory, ratio: float) -> CardTrack:
+    # To the same course: a card's ship may start at rest on another heading only by its file, never here.
+    x, y = run["motion.x"] - run["motion.x"][0], run["motion.y"] - run["motion.y"][0]
+    return CardTrack(label, np.sqrt(ratio) * run.t, ratio * x, ratio * y)
+
+
+def _notices(cards: Sequence[ManoeuvringCard], labels: Sequence[str]) -> list[str]:
+    told = []
+    reference = cards[0]
+    for card, label in zip(cards, labels, strict=True):
+        ratio = reference.ship.length_m / card.ship.length_m
+        if apart := differences_of_size(reference, card, 1 / ratio):
+            form = "; ".join(apart)
+            told.append(f"{label}: is of another form than {labels[0]} (at its size {form}): two ships are compared")
+        elif not math.isclose(ratio, 1.0, rel_tol=SAME_SIZE):
+            told.append(f"{label}: is of another size than {labels[0]}: ships or models of one form are compared")
+        present = [name for name, value in card.derivatives.items() if value]
+        if assumed := [name for name in present if name not in card.uncertainty]:
+            mark = f"{ASSUMED}, not measured ones: " if assumed == present else ""
+            share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of their value is taken"
+            told.append(f"{label}: {mark}{len(assumed)} derivatives state no standard error: {share}")
+        if not math.isclose(ratio, 1.0, rel_tol=1e-6):
+            told.append(f"{label}: figures and tracks scaled by Froude's law to a ship {ratio:.4g} times as long")
+        speed = _approach(reference, card)
+        if not math.isclose(speed, card.model.speed_mps, rel_tol=1e-3):
+            told.append(f"{label}: its trials begin at the reference's speed, {speed:.4g} m/s at its own size")
+        if _effects(card) != _effects(reference):
+            own, other = (", ".join(_effects(one)) or "none" for one in (card, reference))
+            told.append(f"{label}: its effects ({own}) are not the reference's ({other}); the trials have them")
+        if (card.propulsion is None) != (reference.propulsion is None):
+            told.append(f"{label}: only one of it and the reference has propulsion: no stop is compared")
+    return told
+
+
+def _effects(card: ManoeuvringCard) -> list[str]:
+    return sorted(one.name for one in card.effects)

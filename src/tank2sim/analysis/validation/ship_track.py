@@ -1,0 +1,124 @@
+"""Tracks of a ship from an order on, with marks, figures, and the place where the card's range ends."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.analysis.validation.standard_trials import figure_numbers
+from tank2sim.arrays import Array
+from tank2sim.simulation.card_range import CardRangeReading, Numbers, left_at
+from tank2sim.simulation.run import Run
+from tank2sim.simulation.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class TrackMark:
+    """A point of a track: time, change of heading (deg; of a turn to its side, else to starboard), place (m), speed."""
+
+    time_s: float
+    heading_change_deg: float
+    ahead_m: float
+    starboard_m: float
+    speed_mps: float
+
+
+@dataclass(frozen=True, eq=False)
+class ShipTrack:
+    """A track from the order on, in axes of the first course: ahead and to starboard, m.
+
+    Parameters
+    ----------
+    name : str
+    ahead_m, starboard_m : array (n,)
+    marks : tuple of Mark
+        At each quarter of a turn (turns), or at equal times (stops).
+    figures : mapping
+        Figures, also those that were settled outside what the card was measured in.
+    reading : Reading
+        Which those are.
+    inside : int
+        Points of the track until it leaves the card's range.
+    left : Mark, optional
+        Where it does; None if it does not.
+    """
+
+    name: str
+    ahead_m: Array
+    starboard_m: Array
+    marks: tuple[TrackMark, ...]
+    figures: Numbers
+    reading: CardRangeReading
+    inside: int
+    left: TrackMark | None = None
+
+    def outside(self, mark: TrackMark) -> bool:
+        """True if the run has left the card's range at a mark."""
+        return self.left is not None and mark.time_s >= self.left.time_s
+
+    def as_json(self) -> dict[str, object]:
+        """All of it, the track thinned to 200 points."""
+        every = max(1, len(self.ahead_m) // 200)
+        return {
+            "name": self.name,
+            "figures": self.figures,
+            **self.reading.as_json(),
+            "left_card_range_at": vars(self.left) if self.left else None,
+            "marks": [vars(one) for one in self.marks],
+            "ahead_m": self.ahead_m[::every],
+            "starboard_m": self.starboard_m[::every],
+        }
+
+
+def circle_track(side: str, run: Run) -> ShipTrack:
+    """A turning circle to its full turn; `side` is starboard or port."""
+    path = run.trajectory
+    sign = 1.0 if side == "starboard" else -1.0
+    change = sign * np.degrees(path["motion.psi"] - path["motion.psi"][0])
+    rows = [row for angle in (90.0, 180.0, 270.0, 360.0) if (row := _first_over(change, angle)) < len(change)]
+    return _track(side, run, change, rows, min(_first_over(change, 360.0) + 1, len(change)))
+
+
+def stop_track(name: str, run: Run) -> ShipTrack:
+    """A stopping track, marked at equal times."""
+    change = np.degrees(run.trajectory["motion.psi"] - run.trajectory["motion.psi"][0])
+    rows = np.unique(np.linspace(0, len(change) - 1, 7).astype(int))[1:]
+    return _track(name, run, change, rows.tolist(), len(change))
+
+
+def _track(name: str, run: Run, change: Array, rows: list[int], end: int) -> ShipTrack:
+    path = run.trajectory
+    ahead, starboard = _in_first_axes(path)
+    marks = tuple(_mark(path, change, row) for row in rows)
+    row, figures = left_at(path), figure_numbers(run.figures)
+    if row is None:
+        return ShipTrack(name, ahead[:end], starboard[:end], marks, figures, run.reading, end)
+    left = _mark(path, change, row)
+    return ShipTrack(
+        name, ahead[:end], starboard[:end], marks, figure_numbers(run.figures), run.reading, min(row + 1, end), left
+    )
+
+
+def quarter(path: ShipTrack, change_deg: float) -> TrackMark | None:
+    """The mark at a change of heading; None if the turn does not reach it."""
+    return next((one for one in path.marks if one.heading_change_deg >= change_deg), None)
+
+
+def _in_first_axes(run: Trajectory) -> tuple[Array, Array]:
+    north, east = run["motion.x"] - run["motion.x"][0], run["motion.y"] - run["motion.y"][0]
+    cos, sin = math.cos(run["motion.psi"][0]), math.sin(run["motion.psi"][0])
+    return north * cos + east * sin, east * cos - north * sin
+
+
+def _first_over(values: Array, level: float) -> int:
+    over = np.flatnonzero(values >= level)
+    return int(over[0]) if len(over) else len(values)
+
+
+def _mark(run: Trajectory, change: Array, row: int) -> TrackMark:
+    ahead, starboard = _in_first_axes(run)
+    return TrackMark(
+        float(run.t[row]), float(change[row]), float(ahead[row]), float(starboard[row]), float(run["motion.speed"][row])
+    )

@@ -1,0 +1,159 @@
+"""The standard trials of a ship in calm water, and what the errors of her card make of their figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.analysis.ensemble.draws import draws_with
+from tank2sim.analysis.influence.errors import joint_errors
+from tank2sim.analysis.influence.parameters import card_parameters, study_model
+from tank2sim.analysis.stability.imo import TRIAL_RUDDER
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics import build
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.simulation.card_range import Numbers, entry_name, single_figures
+from tank2sim.simulation.ensemble import Redrawn
+from tank2sim.simulation.figures import Figures
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
+from tank2sim.simulation.run import Run, simulate
+
+MEMBERS = 40
+"""Members of an ensemble: the deviation that they give is itself uncertain by 15 % or so. A choice of ours."""
+
+SEED = 601
+"""Where the members' random numbers start; any number does."""
+
+LEAST_SHARE = 0.9
+"""A figure that fewer of the members reach than this share has no spread: those that are left are a choice."""
+
+_OVERSHOOTS = 2
+"""Overshoots that are looked at: those of IMO MSC.137(76)."""
+
+_ONE_SIGMA = (0.158655, 0.841345)
+
+
+@dataclass(frozen=True)
+class TrialShip:
+    """A card ready to run.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    model : Model
+    integrator : Integrator
+    """
+
+    card: ManoeuvringCard
+    model: Model
+    integrator: Integrator
+
+    @property
+    def has_engine(self) -> bool:
+        """True if the card has propulsion."""
+        return "propeller.speed" in self.model.input_names
+
+    @property
+    def largest_rudder(self) -> float:
+        """Rudder of the turning circles, rad: 35 deg, or the largest that the gear allows."""
+        gear = self.card.steering_gear
+        return min(TRIAL_RUDDER, gear.max_angle_rad if gear and gear.max_angle_rad else TRIAL_RUDDER)
+
+    def run(
+        self,
+        manoeuvre: Manoeuvre,
+        parameters: Mapping[str, float] | None = None,
+        inputs: Mapping[str, float] | None = None,
+    ) -> Run | str:
+        """The trial in calm water, or why it cannot be run."""
+        calm = {name: 0.0 for name in self.model.input_names if name in ("current.speed", "wind.speed")}
+        try:
+            return simulate(
+                self.model,
+                manoeuvre,
+                inputs={**calm, **(inputs or {})},
+                parameters=parameters,
+                integrator=self.integrator,
+            )
+        except InputError as error:
+            return f"{error.place}: {error.problem}" if error.place else error.problem
+
+
+def ship_of(card: ManoeuvringCard) -> TrialShip:
+    """A card ready to run."""
+    model = build(card)
+    return TrialShip(card, model, Integrator(model))
+
+
+def standard_trials(ships: Sequence[TrialShip]) -> dict[str, Manoeuvre]:
+    """Name to trial: turns at the largest rudder, zigzags 10/10 and 20/20, and the stop where all have an engine."""
+    rudder = min(ship.largest_rudder for ship in ships)
+    shown = f"{math.degrees(rudder):.3g}"
+    ten, twenty = math.radians(10.0), math.radians(20.0)
+    trials: dict[str, Manoeuvre] = {
+        f"turn {shown} deg to starboard": Turn(rudder),
+        f"turn {shown} deg to port": Turn(-rudder),
+        "zigzag 10/10": Zigzag(ten, ten),
+        "zigzag 20/20": Zigzag(twenty, twenty),
+    }
+    if all(ship.has_engine for ship in ships):
+        trials["full astern stop"] = Stop()
+    return trials
+
+
+def figure_numbers(figures: Figures) -> Numbers:
+    """The figures of a run that are single numbers, with the first overshoots; what it did not show is left out."""
+    overshoots = {entry_name("overshoots_deg", place) for place in range(_OVERSHOOTS)}
+    left_out = {"stopped_at_mps", *(name for name in figures if name.endswith("_lengths"))}
+    single = single_figures(figures).items()
+    return {name: value for name, value in single if (name in figures or name in overshoots) and name not in left_out}
+
+
+def members(
+    card: ManoeuvringCard, model: Model, count: int, seed: int = SEED
+) -> tuple[tuple[dict[str, float], ...], tuple[str, ...]]:
+    """Parameters of `count` ships such as the card may mean, drawn within its errors; and what is to be told of them.
+
+    Errors of all numbers are normal, and go together as the covariance beside the card says; without one they are
+    independent. Each member has a random number generator of its own, so that it does not depend on how many there are.
+    What is no parameter of the `model` but an input (a current) is calm in the trials, and not drawn.
+
+    Raises
+    ------
+    InputError
+        The covariance to which the card refers is at fault.
+    """
+    if not count:
+        return (), ()
+    errors = joint_errors(card, card_parameters(card, study_model(card)))
+    draws, known = draws_with(errors, seed), set(model.parameter_names)
+    found = [draws.drawn(number) for number in range(count)]
+    told = Redrawn.of([one.beyond for one in found]).in_words(count)
+    drawn = tuple({name: value for name, value in one.values.items() if name in known} for one in found)
+    if errors.together:
+        return drawn, (errors.together_in_words, *told)
+    alone = (
+        "no covariance stands beside the card: errors are taken as independent, and deviations of figures may be too"
+    )
+    return drawn, (f"{alone} large where errors go together", *told)
+
+
+def member_spread(runs: Sequence[Mapping[str, float]]) -> Numbers:
+    """Standard deviation of each figure over the members' runs (empty where one could not be run).
+
+    Half the distance between the quantiles of 15.87 and 84.13 %, which is that of normal figures, and which a few
+    members that run away do not move. Figures that fewer than :data:`LEAST_SHARE` of them reach have none.
+    """
+    names = dict.fromkeys(name for run in runs for name in run)
+    found = {name: [run[name] for run in runs if name in run] for name in names}
+    enough = max(2.0, LEAST_SHARE * len(runs))
+    return {
+        name: float(np.diff(np.quantile(values, _ONE_SIGMA))[0] / 2)
+        for name, values in found.items()
+        if len(values) >= enough
+    }

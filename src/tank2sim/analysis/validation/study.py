@@ -1,0 +1,363 @@
+"""Validation of a manoeuvring simulation against trials, figure by figure, in the manner of ITTC and ASME.
+
+    E = S - D,   u_val^2 = u_num^2 + u_input^2 + u_D^2,   U_val = 2 u_val
+
+with the figure S of the simulation and D of the trial. If |E| <= U_val, the error of the model cannot be told from the
+uncertainties, and the figure is validated at the level U_val; if not, the model errs by about E. A large U_val is no
+merit, for what is not known well cannot be refuted: beyond a level that is required, U_reqd, the figure counts as too
+uncertain. ASME V&V 20-2009 (where E is S - D); ITTC 7.5-03-01-01 (E = D - S, and
+likewise U_V); Stern, Wilson, Coleman and Paterson (2001), J. Fluids Engineering 123. The factor of 2 is for 95 %.
+
+- u_num: the simulation is repeated with half the step. U_num = 3 |S(h) - S(h/2)|, the grid convergence index of two
+  grids with its factor of safety of 3 (Roache 1998), taken of the first order, which limits and switches of the rudder
+  leave of Runge-Kutta's fourth. u_num is half of it.
+- u_input: deviation of an ensemble with the errors of all numbers on the card, and their covariance if it has one.
+- u_D: the trial's figures are read off again with the noise of its signals added once more, and, where a manoeuvre was
+  run several times, the deviation between its runs; times are known to a sample (over sqrt 12). Weather, and what all
+  runs have in common, it does not know.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from tank2sim.analysis.influence.parameters import card_parameters, standard_errors_in_words, study_model
+from tank2sim.analysis.validation.standard_trials import (
+    MEMBERS,
+    SEED,
+    TrialShip,
+    figure_numbers,
+    member_spread,
+    members,
+    standard_trials,
+)
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics import build
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.marks import EXTRAPOLATED
+from tank2sim.records.audit.noise import record_noise
+from tank2sim.records.trials import Trial, sampling_step
+from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading, Numbers
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Turn
+from tank2sim.simulation.recorded import Recorded, recorded, repeat, steerable
+
+COVERAGE = 2.0
+"""Expanded over standard uncertainty: 95 %."""
+
+SAFETY = 3.0
+"""Factor of safety of a convergence index from two grids (Roache 1998)."""
+
+REQUIRED = 20.0
+"""U_reqd in per cent of the measured figure, where none is asked for: a choice of ours."""
+
+READINGS = 12
+"""Times that a trial's figures are read off with noise: enough to see whether that matters. A choice of ours."""
+
+TURN_FIGURES = ("advance_m", "transfer_m", "tactical_diameter_m", "time_90_s", "time_180_s")
+ZIGZAG_FIGURES = ("overshoot_1_deg", "overshoot_2_deg", "initial_turning_time_s", "reach_s")
+"""Figures of IMO MSC.137(76) and ITTC 7.5-04-02-01 that are compared; later ones repeat their errors."""
+
+_IDENTIFIED = r"identified by tank2sim \([^)]*\) from ([^;:]*)"
+"""What ``identify`` writes into the source of its card."""
+
+
+class ComparisonOutcome(StrEnum):
+    """What a comparison of a figure ends with."""
+
+    VALIDATED = "validated"
+    UNCERTAIN = "too uncertain"
+    FITTED = "only fitted"
+    REFUTED = "not validated"
+    OPEN = "open"
+
+
+@dataclass(frozen=True)
+class Validated:
+    """One figure of one trial.
+
+    Parameters
+    ----------
+    trial, manoeuvre, name : str
+        File, what it was, and the figure with its unit.
+    measured : float
+        D.
+    simulated : float or None
+        S; None where the simulation did not reach it.
+    numerical, data : float
+        u_num and u_D, standard.
+    inputs : float or None
+        u_input, standard; None where the ensemble does not tell it.
+    required_percent : float
+        U_reqd in per cent of D.
+    made_card : bool
+        True if the trial is one of those that the card was identified from.
+    """
+
+    trial: str
+    manoeuvre: str
+    name: str
+    measured: float
+    simulated: float | None
+    numerical: float = 0.0
+    inputs: float | None = 0.0
+    data: float = 0.0
+    required_percent: float = REQUIRED
+    made_card: bool = False
+
+    @property
+    def error(self) -> float | None:
+        """E = S - D."""
+        return None if self.simulated is None else self.simulated - self.measured
+
+    @property
+    def uncertainty(self) -> float | None:
+        """U_val, expanded; None where u_input is not known."""
+        if self.inputs is None:
+            return None
+        return COVERAGE * math.sqrt(self.numerical**2 + self.inputs**2 + self.data**2)
+
+    @property
+    def level_percent(self) -> float | None:
+        """U_val in per cent of the measured figure."""
+        if self.uncertainty is None or not self.measured:
+            return None
+        return 100 * self.uncertainty / abs(self.measured)
+
+    @property
+    def outcome(self) -> ComparisonOutcome:
+        """Open where U_val is not known; a figure that the simulation does not reach is not validated.
+
+        One of a trial that made the card cannot be validated by it: at best it is fitted.
+        """
+        if self.error is None:
+            return ComparisonOutcome.REFUTED
+        if self.uncertainty is None:
+            return ComparisonOutcome.OPEN
+        if abs(self.error) > self.uncertainty:
+            return ComparisonOutcome.REFUTED
+        if self.made_card:
+            return ComparisonOutcome.FITTED
+        loose = self.uncertainty > self.required_percent / 100 * abs(self.measured)
+        return ComparisonOutcome.UNCERTAIN if loose else ComparisonOutcome.VALIDATED
+
+    def as_json(self) -> dict[str, object]:
+        """With E, U_val and outcome."""
+        own = {"error": self.error, "uncertainty": self.uncertainty, "level_percent": self.level_percent}
+        return {**vars(self), **own, "outcome": str(self.outcome)}
+
+
+@dataclass(frozen=True)
+class Verified:
+    """One figure of a standard trial: its value, its change when the step is halved, its deviation by the inputs."""
+
+    trial: str
+    name: str
+    value: float
+    halving: float | None
+    deviation: float | None
+
+    @property
+    def numerical(self) -> float | None:
+        """U_num, expanded."""
+        return None if self.halving is None else SAFETY * abs(self.halving)
+
+
+@dataclass(frozen=True)
+class Validation:
+    """All figures of all trials, and what could not be compared."""
+
+    figures: tuple[Validated, ...]
+    members: int
+    notices: tuple[str, ...] = ()
+
+    def count(self, outcome: ComparisonOutcome) -> int:
+        """How many figures end so."""
+        return sum(one.outcome is outcome for one in self.figures)
+
+    @property
+    def verdict(self) -> str:
+        """In words."""
+        if not self.figures:
+            return "not validated: there is no trial to compare with"
+        told = [f"{self.count(one)} {one}" for one in ComparisonOutcome if self.count(one)]
+        return f"of {len(self.figures)} figures {', '.join(told)}"
+
+    def as_json(self) -> dict[str, object]:
+        """All of it."""
+        return {
+            "verdict": self.verdict,
+            "counts": {str(one): self.count(one) for one in ComparisonOutcome},
+            "figures": [one.as_json() for one in self.figures],
+            "members": self.members,
+        }
+
+
+def validate(
+    card: ManoeuvringCard, trials: Sequence[Trial], count: int = MEMBERS, required_percent: float = REQUIRED
+) -> Validation:
+    """Simulate the turns and zigzags among trials in closed loop from their measured starts, and compare figures.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        Of the ship.
+    trials : sequence of Trial
+        At the ship's size.
+    count : int
+        Members of the ensemble for u_input; 0 for none (u_input is then not known, and every figure is open).
+    required_percent : float
+        U_reqd in per cent of each measured figure.
+    """
+    model = build(steerable(card))
+    finer = replace(model, step_s=model.step_s / 2)
+    engines = Integrator(model), Integrator(finer)
+    drawn, of_errors = members(card, model, count)
+    known = [(trial, recorded(trial, model)) for trial in trials]
+    told = [
+        f"{trial.name}: neither a turning circle nor a zigzag with speed, yaw rate and track: only replayed"
+        for trial, what in known
+        if what is None
+    ]
+    told += [*standard_errors_in_words(card_parameters(card, study_model(card))), *of_errors]
+    whats = [what for _, what in known if what is not None]
+    between = _between_repeats(whats)
+    figures: list[Validated] = []
+    for what in whats:
+        found, trouble = _validated(what, engines, drawn, between)
+        own = made_card(card, what.trial.name)
+        figures += [replace(one, required_percent=required_percent, made_card=own) for one in found]
+        told += trouble
+        if own:
+            told.append(f"{what.trial.name}: the card was identified from this trial: its figures are only fitted")
+    if whats and not between:
+        told.append("no manoeuvre was run twice alike: u_D is of the noise of the signals alone, and so a lower bound")
+    if not count:
+        told.append("no ensemble was run: u_input and U_val are not known, and no figure can be judged")
+    return Validation(tuple(figures), count, tuple(told))
+
+
+def made_card(card: ManoeuvringCard, trial: str) -> bool:
+    """True if the source of a card tells that a trial, by the name of its file, was one of those that made it.
+
+    What ``identify`` writes is looked through for any name; the rest of the source for names with a digit or an
+    underscore, which are no words.
+    """
+    told = f"{card.ship.source}; {card.ship.notes or ''}"
+    looked = told if re.search(r"[\d_]", trial) else "; ".join(re.findall(_IDENTIFIED, told))
+    return re.search(rf"(?<![\w-]){re.escape(trial)}(?![\w-])", looked) is not None
+
+
+def verify(ship: TrialShip, count: int = MEMBERS) -> tuple[tuple[Verified, ...], tuple[str, ...]]:
+    """The standard trials with the model's step, with half of it, and by an ensemble; and what could not be run."""
+    model = replace(ship.model, step_s=ship.model.step_s / 2)
+    finer = TrialShip(ship.card, model, Integrator(model))
+    drawn, _ = members(ship.card, ship.model, count)
+    rows: list[Verified] = []
+    told: list[str] = []
+    for trial, manoeuvre in standard_trials([ship]).items():
+        run, fine = ship.run(manoeuvre), finer.run(manoeuvre)
+        if isinstance(run, str) or isinstance(fine, str):
+            told.append(f"{trial}: {run if isinstance(run, str) else fine}")
+            continue
+        told += [f"{trial}: {one}" for one in run.notices if EXTRAPOLATED in one or "not show" in one]
+        many = [ship.run(manoeuvre, member) for member in drawn]
+        deviation = member_spread([{} if isinstance(one, str) else figure_numbers(one.figures) for one in many])
+        halved = figure_numbers(fine.figures)
+        for name, value in figure_numbers(run.figures).items():
+            halving = halved[name] - value if name in halved else None
+            rows.append(Verified(trial, name, value, halving, deviation.get(name)))
+    return tuple(rows), tuple(told)
+
+
+def _validated(
+    what: Recorded,
+    engines: tuple[Integrator, Integrator],
+    drawn: Sequence[dict[str, float]],
+    between: Mapping[tuple[str, str], float],
+) -> tuple[list[Validated], list[str]]:
+    measured = compare_figures(what)
+    (coarse, read), (fine, _) = (_repeated(what, engine) for engine in engines)
+    ensemble = [_repeated(what, engines[0], member)[0] for member in drawn]
+    inputs, data = member_spread(ensemble), _read_again(what, engines[0].model)
+    told = [
+        f"{what.trial.name}: {name}: too few members of the ensemble reach it to tell u_input"
+        for name in measured
+        if drawn and name in coarse and name not in inputs
+    ]
+    if beyond := [name for name in measured if read.outside(name) and name in coarse]:
+        told.insert(0, f"{what.trial.name}: {', '.join(beyond)}: {read.message}")
+    rows = []
+    for name, value in measured.items():
+        simulated, finer = coarse.get(name), fine.get(name)
+        halving = 0.0 if simulated is None or finer is None else abs(simulated - finer)
+        sampled = sampling_step(what.trial) / math.sqrt(12) if name.endswith("_s") else 0.0
+        u_data = math.hypot(data.get(name, 0.0), between.get((kind(what), name), 0.0), sampled)
+        u_input = inputs.get(name)
+        u_num = SAFETY * halving / COVERAGE
+        rows.append(Validated(what.trial.name, what.words, name, value, simulated, u_num, u_input, u_data))
+    return rows, told
+
+
+def compare_figures(what: Recorded) -> Numbers:
+    """The figures of a recorded manoeuvre that are compared."""
+    names = TURN_FIGURES if isinstance(what.manoeuvre, Turn) else ZIGZAG_FIGURES
+    own = figure_numbers(what.figures)
+    return {name: own[name] for name in names if name in own}
+
+
+def kind(what: Recorded) -> str:
+    """What two repeats have in common: manoeuvre and side, to whole degrees, and approach speed to 5 %."""
+    speed = round(20 * math.log(max(what.start["initial.u"], 1e-9)))
+    angle = round(math.degrees(what.manoeuvre.rudder))
+    if isinstance(what.manoeuvre, Turn):
+        return f"turn {angle} {speed}"
+    return f"zigzag {angle}/{round(math.degrees(what.manoeuvre.heading))} {speed}"
+
+
+def _repeated(
+    what: Recorded, engine: Integrator, member: dict[str, float] | None = None
+) -> tuple[Numbers, CardRangeReading]:
+    """The figures of a recorded manoeuvre as simulated, and which of them are settled outside the card's range."""
+    try:
+        run = repeat(what, engine, member)
+    except InputError:  # the motion left all bounds: none of its figures is reached
+        return {}, NOTHING_READ
+    return figure_numbers(run.figures), run.reading
+
+
+def _between_repeats(whats: Sequence[Recorded]) -> dict[tuple[str, str], float]:
+    """Standard deviation of one run of a manoeuvre, by (kind, figure), where there are two or more."""
+    groups: dict[str, list[Numbers]] = {}
+    for what in whats:
+        groups.setdefault(kind(what), []).append(compare_figures(what))
+    found = {}
+    for name, runs in groups.items():
+        for figure in runs[0]:
+            values = [run[figure] for run in runs if figure in run]
+            if len(values) > 1:
+                found[name, figure] = float(np.std(values, ddof=1))
+    return found
+
+
+def _read_again(what: Recorded, model: Model) -> Numbers:
+    """Standard deviation of each figure when the noise of the trial's signals is added once more."""
+    noise = record_noise(what.trial)
+    readings = []
+    for number in range(READINGS):
+        generator = np.random.default_rng([SEED, number])
+        signals = {
+            name: values + noise.get(name, 0.0) * generator.standard_normal(len(values))
+            for name, values in what.trial.signals.items()
+        }
+        again = recorded(replace(what.trial, signals=signals), model)
+        if again is not None and type(again.manoeuvre) is type(what.manoeuvre):
+            readings.append(compare_figures(again))
+    return member_spread(readings)

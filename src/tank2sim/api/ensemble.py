@@ -1,0 +1,55 @@
+"""Ensembles: how many members, from which seed, computed where."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from tank2sim.errors import InputError
+from tank2sim.executors import PROCESSES, check_executor, executing
+
+FEW_BATCHES = 2
+"""Batches that are computed in this process: fewer are done before others have started. Project choice."""
+
+
+@dataclass(frozen=True)
+class EnsembleOptions:
+    """An ensemble drawn from the standard errors of a card.
+
+    Parameters
+    ----------
+    members : int
+        Ships drawn; 0 for no ensemble.
+    seed : int
+        The same seed gives the same members everywhere.
+    executor : str
+        ``processes`` or ``dask://host:port``.
+
+    Raises
+    ------
+    InputError
+        The executor cannot be used, there are fewer than 2 members, or an executor but no members.
+    """
+
+    members: int = 0
+    seed: int = 0
+    executor: str = PROCESSES
+
+    def __post_init__(self) -> None:
+        if check_executor(self.executor) != PROCESSES and not self.members:
+            raise InputError("--executor", "", "has nothing to do without --ensemble", "give --ensemble N, too")
+        if self.members and self.members < 2:
+            raise InputError("--ensemble", "", f"is {self.members}", "2 members or more, or 0 for no ensemble")
+
+    @contextmanager
+    def computing(self) -> Iterator[Executor | None]:
+        """The executor; None for a few members, which are computed here."""
+        from tank2sim.simulation.ensemble import BATCH
+
+        if self.executor == PROCESSES and self.members <= FEW_BATCHES * BATCH:
+            yield None
+            return
+        with executing(self.executor) as found:
+            yield found

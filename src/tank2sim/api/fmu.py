@@ -1,0 +1,184 @@
+"""FMUs of ships: written, and checked against their cards."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tank2sim.api.result import Result, ResultTable
+from tank2sim.cards import parse_card
+from tank2sim.dynamics import build
+from tank2sim.fmu.check import CheckReport
+from tank2sim.fmu.check import check_fmu as check_against_model
+from tank2sim.fmu.documents import documents_of
+from tank2sim.fmu.export import ExportedFmu, make_fmu
+from tank2sim.fmu.platforms import named_platforms
+from tank2sim.fmu.unpacking import embedded_card
+
+if TYPE_CHECKING:
+    from tank2sim.api.ship import Ship
+
+Files = Mapping[Path, str | bytes]
+
+
+class FmuFile(Result):
+    """An FMU that was made.
+
+    Parameters
+    ----------
+    ship : Ship
+    path : Path
+        Where it is written.
+    exported : ExportedFmu
+    ssp : Path or None
+        SSP package in which a heading autopilot steers the ship.
+    files : mapping
+        Paths and bytes of both.
+    """
+
+    command = "export"
+
+    def __init__(
+        self, ship: Ship, path: Path, exported: ExportedFmu, ssp: Path | None = None, files: Files | None = None
+    ) -> None:
+        self.ship, self.path, self.exported, self.ssp = ship, path, exported, ssp
+        self.files = files or {}
+        self.notices = tuple(ship.model.notices)
+
+    def content(self) -> Mapping[str, object]:
+        """As :meth:`.Result.content`."""
+        about = {"ship": self.ship.name, "fmu": self.path, "ssp": self.ssp}
+        return {**about, **self.exported.as_json(), "notices": self.notices}
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """File, version of FMI, platforms and size."""
+        return (
+            f"{self.path}: {self.ship.name}, FMI {self.exported.fmi}, Model Exchange and Co-Simulation, "
+            f"{', '.join(self.exported.platforms)}, {len(self.exported.content) / 1000:.0f} kB",
+        )
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """None."""
+        return ()
+
+
+class FmuCheck(Result):
+    """The check of an FMU against its card.
+
+    Parameters
+    ----------
+    report : CheckReport
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> _ = t2s.load("mariner").to_fmu("mariner.fmu")
+    >>> t2s.check_fmu("mariner.fmu").passed
+    True
+    """
+
+    command = "check"
+
+    def __init__(self, report: CheckReport) -> None:
+        self.report = report
+        self.notices = (
+            ()
+            if report.compared
+            else ("the FMU carries no card: only its description was validated; give --card to compare",)
+        )
+
+    @property
+    def passed(self) -> bool:
+        """True if the description is valid and no output differs from the model's by more than the limit."""
+        return self.report.passed
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What is wrong with the description or the outputs, one sentence each."""
+        return (*self.report.validation, *self.report.differences)
+
+    def content(self) -> Mapping[str, object]:
+        """As :meth:`.Result.content`."""
+        return self.report.as_json()
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Verdict, version of FMI and kinds; the error against the FMU's own reference result."""
+        report = self.report
+        verdict = ("passed" if report.compared else "valid") if report.passed else "FAILED"
+        lines = [f"{report.path}: FMI {report.fmi}, {', '.join(report.kinds)}: {verdict}"]
+        if report.reference_error is not None:
+            error = f"largest error {report.reference_error:.1e} of a range"
+            lines.append(f"{report.path}: repeats the reference result that it carries; {error}")
+        return tuple(lines)
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """Largest error of each output, relative to its range."""
+        report = self.report
+        if not report.errors:
+            return ()
+        rows: list[list[object]] = [
+            [name, *(errors.get(name) for errors in report.errors.values())] for name in report.max_error
+        ]
+        rows.append(["limit", *(report.limits[kind] for kind in report.errors)])
+        title = f"{report.path}: largest errors in {report.duration_s:g} s, relative to each output's range"
+        return (ResultTable(title, ("output", *report.errors), rows),)
+
+
+def make_fmu_file(
+    ship: Ship,
+    path: Path,
+    *,
+    fmi: int = 3,
+    platforms: str = "host",
+    ssp: Path | None = None,
+    report: Callable[[str], None] = lambda _: None,
+) -> FmuFile:
+    """Make the FMU of a ship, without writing it: its bytes are in ``files``. Raises as :meth:`.Ship.to_fmu`.
+
+    Parameters
+    ----------
+    ship : Ship
+    path : Path
+    fmi, platforms
+        As in :meth:`.Ship.to_fmu`.
+    ssp : Path, optional
+        Also an SSP package in which a heading autopilot steers the ship.
+    report : callable
+        Called with the stage that begins.
+    """
+    chosen = named_platforms(platforms)
+    made = make_fmu(ship.model, fmi=fmi, documents=documents_of(ship.card), platforms=chosen, told=report)
+    files: dict[Path, str | bytes] = {path: made.content}
+    if ssp:
+        from tank2sim.fmu.ssp import ship_with_autopilot
+
+        files[ssp] = ship_with_autopilot(ship.model, made, platforms=chosen, told=report)
+    return FmuFile(ship, path, made, ssp, files)
+
+
+def check_fmu(path: str | Path, card: Ship | None = None) -> FmuCheck:
+    """Validate an FMU and compare its outputs with the model of its card, in every kind of FMI it offers.
+
+    It runs the FMU's own code with your rights: check only files from sources that you trust.
+
+    Parameters
+    ----------
+    path : path
+        FMI 2.0 or 3.0, with a library for this machine.
+    card : Ship, optional
+        What the FMU should be; by default the card inside it.
+
+    Raises
+    ------
+    InputError
+        The file is missing, not an FMU, of another version of FMI, or has no library for this machine.
+    """
+    text = embedded_card(Path(path)) if card is None else None
+    inside = build(parse_card(text, f"{path}: resources/ship.toml")) if text is not None else None
+    model = inside if card is None else card.model
+    return FmuCheck(check_against_model(Path(path), model=model))

@@ -1,0 +1,152 @@
+"""A simulated manoeuvre: its figures, its motion as a data frame, and the bands of an ensemble."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tank2sim.api.ensemble import EnsembleOptions
+from tank2sim.api.result import Result, ResultTable
+from tank2sim.files import write_together
+from tank2sim.simulation.card_range import entry_name, single_figures
+from tank2sim.simulation.manoeuvres import Manoeuvre
+from tank2sim.simulation.run import Run, simulate
+from tank2sim.simulation.trial_file import histories, trial_columns, trial_csv
+from tank2sim.units import in_words
+
+if TYPE_CHECKING:
+    import altair as alt
+    import pandas as pd
+
+    from tank2sim.analysis.ensemble.results import ManoeuvreBands
+    from tank2sim.api.ship import Ship
+
+
+class ManoeuvreResult(Result):
+    """A simulated manoeuvre.
+
+    Parameters
+    ----------
+    ship : Ship
+    words : str
+        The manoeuvre (``zigzag:20/20``).
+    run : Run
+        Motion and figures, SI and radians.
+    bands : ManoeuvreBands, optional
+        Of an ensemble.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> run = t2s.load("mariner").zigzag(20, 20)
+    >>> round(run.figures["overshoot_1_deg"])
+    10
+    >>> list(run.df.columns)[:3]
+    ['t_s', 'delta_order_deg', 'delta_deg']
+    """
+
+    command = "simulate"
+
+    def __init__(self, ship: Ship, words: str, run: Run, bands: ManoeuvreBands | None = None) -> None:
+        self.ship, self.words, self.run, self.bands = ship, words, run, bands
+        self.notices = tuple(run.notices)
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """Manoeuvring figures (ITTC 7.5-04-02-01) by name with unit; entries of lists as ``overshoot_1_deg``."""
+        return single_figures(self.run.figures)
+
+    @cached_property
+    def df(self) -> pd.DataFrame:
+        """The motion, one row a step: ``t_s``, ``u_mps``, ``r_degps``, ``psi_deg``, ``x_m`` (north), ``y_m`` (east)."""
+        import pandas as pd
+
+        return pd.DataFrame(trial_columns(self.run.trajectory))
+
+    def to_csv(self, path: str | Path | None = None) -> str:
+        """The motion as text of a trial CSV, also written to `path`: readable wherever a measured trial is.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        text = trial_csv(self.run.trajectory, f"tank2sim simulation of {self.ship.name}: {self.words}")
+        if path is not None:
+            write_together({Path(path): text})
+        return text
+
+    def content(self) -> Mapping[str, object]:
+        """As :meth:`.Result.content`."""
+        return {
+            "ship": self.ship.name,
+            "manoeuvre": self.words,
+            "figures": self.run.figures,
+            **self.run.reading.as_json(),
+            "notices": self.run.notices,
+            "histories": histories(self.run.trajectory),
+            **({"ensemble": self.bands.as_json()} if self.bands else {}),
+        }
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """None: the table says it."""
+        return ()
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """The figures, marked where they were settled outside the card's range; bands of an ensemble."""
+        rows = [[*in_words(name), value, self._beyond(name, value)] for name, value in self.run.figures.items()]
+        columns: tuple[str, ...] = ("figure", "unit", "value", "card")
+        if not self.run.reading.message:
+            rows, columns = [row[:3] for row in rows], columns[:3]
+        figures = ResultTable(self._title, columns, rows)
+        if self.bands is None:
+            return (figures,)
+        from tank2sim.api.bands import band_table
+
+        return figures, band_table(self.bands.figures, self.bands.asked)
+
+    def charts(self) -> dict[str, alt.TopLevelMixin]:
+        """Track and time histories."""
+        from tank2sim.report.ensemble.sections import banded_chart
+        from tank2sim.report.kit.run_series import run_chart
+
+        title, run = self._title, self.run.trajectory
+        return {"motion": banded_chart(title, run, self.bands) if self.bands else run_chart(title, run)}
+
+    @property
+    def _title(self) -> str:
+        return f"{self.ship.name}, {self.words}"
+
+    def _beyond(self, name: str, value: object) -> str:
+        """Whether a figure was settled outside the card's range; of a list, from which entry on."""
+        reading = self.run.reading
+        if not isinstance(value, list):
+            return "beyond" if value is not None and reading.outside(name) else ""
+        outside = [place for place in range(len(value)) if reading.outside(entry_name(name, place))]
+        return "" if not outside else "beyond" if outside[0] == 0 else f"beyond from no. {outside[0] + 1}"
+
+
+def simulate_manoeuvre(
+    ship: Ship, manoeuvre: Manoeuvre, words: str, duration_s: float | None, ensemble: EnsembleOptions
+) -> ManoeuvreResult:
+    """Simulate a manoeuvre of a ship, with an ensemble if it has members.
+
+    Raises
+    ------
+    InputError
+        As :meth:`.Ship.simulate`.
+    """
+    run = simulate(ship.model, manoeuvre, duration_s=duration_s)
+    bands = None
+    if ensemble.members:
+        from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
+
+        length = duration_s, float(run.trajectory.t[-1])
+        request = EnsembleRequest(ensemble.members, ensemble.seed)
+        with ensemble.computing() as executor:
+            bands = manoeuvre_bands(ship.manoeuvring(), manoeuvre, length, request, executor)
+    return ManoeuvreResult(ship, words, run, bands)

@@ -1,0 +1,193 @@
+"""What every result of the API can do: print itself, draw itself, and write itself as JSON, picture and page."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+from tank2sim.files import plain_json, write_together
+from tank2sim.marks import marked
+
+if TYPE_CHECKING:
+    import altair as alt
+    import pandas as pd
+
+REPR_ROWS = 20
+"""Rows of a table in ``repr``: with its heading it fits a screen of 24 lines. Project choice."""
+
+
+@dataclass(frozen=True)
+class ResultTable:
+    """A table of a result.
+
+    Parameters
+    ----------
+    title : str
+    columns : tuple of str
+        Heads, units in brackets.
+    rows : list of list
+        Cells: numbers, text, truth values, lists of numbers, or None where there is no value.
+    notes : tuple of str
+        Sentences under the table.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: list[list[object]]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def df(self) -> pd.DataFrame:
+        """The table as a data frame."""
+        import pandas as pd
+
+        return pd.DataFrame(self.rows, columns=list(self.columns))
+
+    @property
+    def text(self) -> str:
+        """The table as text, at most :data:`REPR_ROWS` rows; numbers with five digits."""
+        import pandas as pd
+
+        cells = [[cell_text(cell) for cell in row] for row in self.rows[:REPR_ROWS]]
+        lines = [self.title, pd.DataFrame(cells, columns=list(self.columns)).to_string(index=False)]
+        left = len(self.rows) - REPR_ROWS
+        return "\n".join(lines + ([f"... {left} more rows in .tables"] if left > 0 else []))
+
+
+def cell_text(value: object) -> str:
+    """A value as tables show it: numbers with five digits, ``-`` for None."""
+    match value:
+        case None:
+            return "-"
+        case bool():
+            return "yes" if value else "no"
+        case float():
+            return f"{value:.5g}"
+        case list():
+            return ", ".join(cell_text(item) for item in value)
+        case _:
+            return str(value)
+
+
+class Result(ABC):
+    """What a call of the API returns; every command of the command line prints and writes one of these."""
+
+    command: ClassVar[str]
+    """Command that gives the same result on the command line; its name is in :attr:`schema`."""
+
+    notices: tuple[str, ...]
+    """What limits the result, one sentence each."""
+
+    @abstractmethod
+    def content(self) -> Mapping[str, object]:
+        """The content of the JSON, without its ``schema``; keys carry units (``advance_m``)."""
+
+    @property
+    @abstractmethod
+    def headline(self) -> tuple[str, ...]:
+        """One or a few sentences with the main findings."""
+
+    @property
+    @abstractmethod
+    def tables(self) -> tuple[ResultTable, ...]:
+        """Tables that the command line prints."""
+
+    @property
+    def schema(self) -> str:
+        """Name and version of the JSON's schema, for example ``tank2sim/simulate/1``."""
+        return f"tank2sim/{self.command}/1"
+
+    def to_dict(self) -> dict[str, object]:
+        """The result as JSON values: lists for arrays, None for what is not a finite number."""
+        plain: dict[str, object] = plain_json({"schema": self.schema, **self.content()})
+        return plain
+
+    def to_json(self, path: str | Path | None = None) -> str:
+        """The result as JSON text, also written to `path`.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        """
+        text = json.dumps(self.to_dict(), indent=1, ensure_ascii=False) + "\n"
+        if path is not None:
+            write_together({Path(path): text})
+        return text
+
+    def charts(self) -> dict[str, alt.TopLevelMixin]:
+        """Charts of the result by name, the main one first; empty where the command draws none."""
+        return {}
+
+    def plot(self, path: str | Path | None = None, name: str | None = None) -> alt.TopLevelMixin:
+        """One chart of the result (Altair), also written to `path` as PNG.
+
+        Parameters
+        ----------
+        path : path, optional
+        name : str, optional
+            One of :meth:`charts`; by default the main one.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written.
+        LookupError
+            There is no such chart.
+        """
+        charts = self.charts()
+        if not charts or (name is not None and name not in charts):
+            raise LookupError(
+                f"no chart {name or ''} of {type(self).__name__}; there are: {', '.join(charts) or 'none'}"
+            )
+        chart = charts[name] if name is not None else next(iter(charts.values()))
+        if path is not None:
+            write_together({Path(path): self.picture(name)})
+        return chart
+
+    def picture(self, name: str | None = None) -> bytes:
+        """One chart of the result as PNG."""
+        from tank2sim.report.kit.charts import chart_png
+
+        return chart_png(self.plot(name=name))
+
+    def page(self) -> str:
+        """The page of the result: self-contained HTML.
+
+        Raises
+        ------
+        InputError
+            The result cannot be drawn.
+        """
+        from tank2sim.report.kit.page import render_page
+        from tank2sim.report.results.page import result_page
+
+        return render_page(result_page(self.to_dict(), f"tank2sim {self.command}"))
+
+    def to_html(self, path: str | Path) -> None:
+        """Write :meth:`page` to a file."""
+        write_together({Path(path): self.page()})
+
+    @property
+    def marks(self) -> tuple[str, ...]:
+        """Notices that mark the result as one that its data do not carry."""
+        return tuple(marked(self.notices))
+
+    def __repr__(self) -> str:
+        return "\n".join([*self.marks, *self.headline, *(table.text for table in self.tables[:1])])
+
+    def _repr_html_(self) -> str:
+        parts = [f"<p>{html.escape(line)}</p>" for line in (*self.marks, *self.headline)]
+        if self.charts():
+            picture = base64.b64encode(self.picture()).decode("ascii")
+            parts.append(f'<img alt="{html.escape(" ".join(self.headline))}" src="data:image/png;base64,{picture}">')
+        parts += [
+            f"<p>{html.escape(table.title)}</p>{table.df.to_html(index=False, na_rep='')}" for table in self.tables
+        ]
+        return "\n".join(parts)

@@ -1,0 +1,193 @@
+"""Stability, steady turning and the IMO criteria of a ship as a result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tank2sim.analysis.ensemble.results import EnsembleRequest, StabilityBands, stability_bands
+from tank2sim.analysis.ensemble.steering import Grid
+from tank2sim.analysis.stability.imo import ImoCriterion
+from tank2sim.analysis.stability.study import StabilityStudy, stability_study
+from tank2sim.api.bands import band_table, criteria_table
+from tank2sim.api.ensemble import EnsembleOptions
+from tank2sim.api.result import Result, ResultTable
+from tank2sim.native.compiler import find_compiler
+from tank2sim.simulation.integrator import NO_COMPILER
+
+if TYPE_CHECKING:
+    import altair as alt
+    import pandas as pd
+
+    from tank2sim.api.ship import Ship
+
+STRONGEST = 5
+"""Coefficients whose influence on C' the table shows; JSON and page have all. Project choice."""
+
+
+class StabilityResult(Result):
+    """Stability, steady turning and IMO criteria of a ship.
+
+    Parameters
+    ----------
+    ship : Ship
+    study : StabilityStudy
+        SI and radians.
+    bands : StabilityBands, optional
+        Of an ensemble.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> found = t2s.load("mariner").stability(spirals=False)
+    >>> found.stable
+    True
+    """
+
+    command = "stability"
+
+    def __init__(self, ship: Ship, study: StabilityStudy, bands: StabilityBands | None = None) -> None:
+        self.ship, self.study, self.bands = ship, study, bands
+        compiler = [] if find_compiler() else [NO_COMPILER]
+        self.notices = (*ship.model.notices, *study.notices, *compiler)
+
+    @property
+    def stable(self) -> bool:
+        """True if the ship holds a straight course with the rudder fixed: no eigenvalue grows."""
+        return self.study.stability.stable
+
+    @property
+    def criterion(self) -> float:
+        """C' (prime): the ship is stable on a straight course if it is positive and no effect adds a growing mode."""
+        return self.study.stability.criterion
+
+    @property
+    def imo(self) -> pd.DataFrame:
+        """The IMO criteria (MSC.137(76)), worse side: found, allowed, unit, met, margin (%)."""
+        import pandas as pd
+
+        rows = [(one.name, one.found, one.allowed, one.unit, one.passed, one.margin_percent) for one in self.study.imo]
+        columns = ["criterion", "found", "allowed", "unit", "met", "margin_percent"]
+        return pd.DataFrame(rows, columns=columns).set_index("criterion")
+
+    def content(self) -> Mapping[str, object]:
+        """As :meth:`.Result.content`."""
+        ensemble = {"ensemble": self.bands.as_json()} if self.bands else {}
+        return {**self.study.as_json(), "notices": self.notices, **ensemble}
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Stability on a straight course, and the range of steady turns."""
+        found = self.study.stability
+        verdict = "stable" if found.stable else "unstable"
+        course = (
+            f"{found.name} at {found.speed_mps:.4g} m/s (drift {found.drift_deg:.3g} deg, rudder "
+            f"{found.rudder_deg:.3g} deg) is {verdict} on a straight course: {_margin_text(self.study)}"
+        )
+        chance = self.bands.stable if self.bands else None
+        return (
+            course,
+            *_turning_text(self.study),
+            *([] if chance is None else [f"Stable on a straight course with probability {chance:.3g}"]),
+        )
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """Eigenvalues, Nomoto's models, what moves C' most, IMO criteria; bands of an ensemble."""
+        found, margin = self.study.stability, self.study.margin
+        eigenvalues = ResultTable(
+            f"Eigenvalues of surge, sway and yaw{''.join(f', {name}' for name in found.effect_states)}",
+            ("real (1/s)", "imaginary (1/s)", "time constant (s)"),
+            _rounded([value.real, value.imag, -1 / value.real if value.real else None] for value in found.eigenvalues),
+        )
+        nomoto = ResultTable(
+            f"Nomoto{' (slow motions)' if found.effect_states else ''}",
+            ("", "K", "T", "T1", "T2", "T3"),
+            _rounded([["1/s and s", *vars(found.nomoto).values()], ["prime", *vars(found.nomoto_prime).values()]]),
+        )
+        influences = ResultTable(
+            "What moves C' most",
+            ("coefficient", "C' for 10 % more (%)", "change to neutral (%)"),
+            _rounded([one.short_name, one.percent, one.neutral_percent] for one in margin.influences[:STRONGEST]),
+        )
+        tables = (eigenvalues, nomoto, influences, _criteria(self.study.imo))
+        if self.bands is None:
+            return tables
+        return *tables, band_table(self.bands.figures, self.bands.asked), criteria_table(self.bands)
+
+    def charts(self) -> dict[str, alt.TopLevelMixin]:
+        """Charts of the page by their captions."""
+        from tank2sim.report.stability.page import stability_page
+
+        page = stability_page(self.study, list(self.notices))
+        return {chart.caption: chart.chart for section in page.sections for chart in section.charts}
+
+    def page(self) -> str:
+        """As :meth:`.Result.page`."""
+        from tank2sim.report.ensemble.sections import stability_section
+        from tank2sim.report.kit.page import render_page
+        from tank2sim.report.stability.page import stability_page
+
+        page = stability_page(self.study, list(self.notices))
+        return render_page(
+            replace(page, sections=[*page.sections, stability_section(self.bands)]) if self.bands else page
+        )
+
+
+def judge_stability(
+    ship: Ship, speed_mps: float | None, *, spirals: bool, ensemble: EnsembleOptions
+) -> StabilityResult:
+    """Stability of a ship, with an ensemble if it has members. Raises as :meth:`.Ship.stability`."""
+    study = stability_study(ship.model, speed_mps, spirals=spirals)
+    bands = None
+    if ensemble.members:
+        curves = (speed_mps, Grid.of(ship.model, study.responses[0])) if study.responses else None
+        request = EnsembleRequest(ensemble.members, ensemble.seed)
+        with ensemble.computing() as executor:
+            bands = stability_bands(ship.manoeuvring(), study.imo, request, executor, curves)
+    return StabilityResult(ship, study, bands)
+
+
+def _criteria(criteria: Sequence[ImoCriterion]) -> ResultTable:
+    remarks = list(dict.fromkeys(criterion.remark for criterion in criteria if criterion.remark))
+    rows: list[list[object]] = []
+    for criterion in criteria:
+        number = f" ({remarks.index(criterion.remark) + 1})" if criterion.remark else ""
+        # A verdict on a figure that the card does not hold for would be taken for one.
+        beyond = criterion.beyond_card and criterion.found is not None
+        met, margin = ("beyond card", None) if beyond else (criterion.passed, criterion.margin_percent)
+        rows.append([criterion.name + number, criterion.found, criterion.allowed, criterion.unit, met, margin])
+    columns = ("criterion", "found", "allowed", "unit", "met", "margin (%)")
+    notes = tuple(f"({number}) {text}" for number, text in enumerate(remarks, 1))
+    return ResultTable("IMO MSC.137(76), worse side", columns, _rounded(rows), notes)
+
+
+def _rounded(rows: Iterable[Sequence[object]]) -> list[list[object]]:
+    """Numbers of four digits, for which the tables have room on a screen of 80 columns."""
+    return [[float(f"{cell:.4g}") if isinstance(cell, float) else cell for cell in row] for row in rows]
+
+
+def _margin_text(study: StabilityStudy) -> str:
+    found, margin = study.stability, study.margin
+    if not found.criterion_decides:
+        return (
+            f"a mode grows at {found.growth_per_s:.3g} 1/s, which C' = {found.criterion:.4g} does not see, so there "
+            "is no margin"
+        )
+    return f"C' = {found.criterion:.4g}, margin {margin.percent:.3g} %, levers {margin.lever:.3g} L apart"
+
+
+def _turning_text(study: StabilityStudy) -> list[str]:
+    turning = study.turning
+    if turning is None:
+        return []
+    rudders = [f"{math.degrees(turning.rudder_rad[row]):.3g}" for row in (0, -1)]
+    rates = [f"{math.degrees(turning.yaw_rate_radps[row]):.3g}" for row in (0, -1)]
+    text = f"Steady turns: {rates[0]} to {rates[1]} deg/s at {rudders[0]} to {rudders[1]} deg of rudder"
+    if turning.loop is None:
+        return [f"{text}; no hysteresis loop"]
+    height = turning.loop.height_radps
+    high = "" if height is None else f", {math.degrees(height):.3g} deg/s high"
+    return [f"{text}; hysteresis loop {math.degrees(turning.loop.width_rad):.3g} deg of rudder wide{high}"]

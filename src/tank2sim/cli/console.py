@@ -1,0 +1,117 @@
+"""Output that all commands share: tables and notices on the screen, results as JSON, pages and pictures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from tank2sim.api.result import Result, cell_text
+from tank2sim.files import STANDARD_OUTPUT, plain_json, write_together
+from tank2sim.marks import marked
+
+screen = Console(highlight=False)
+"""Where summaries go."""
+
+
+def _standard_output(context: click.Context, parameter: click.Parameter, given: Path | None) -> Path | None:
+    if given != Path("-"):
+        screen.stderr = False
+        return given
+    screen.stderr = True  # the summary goes there, so that standard output is JSON and nothing else
+    return STANDARD_OUTPUT
+
+
+json_option = click.option(
+    "--json",
+    "json_file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    callback=_standard_output,
+    help="Write the full result as JSON; - is standard output, and the summary then goes to the error stream.",
+)
+"""``--json FILE``, the same on every command."""
+
+
+def show_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Print a table; numbers are rounded to five figures and stand right."""
+    table = Table(title=escape(title), title_justify="left", header_style="bold", pad_edge=False)
+    rows = [list(row) for row in rows]
+    for place, head in enumerate(heads):
+        numeric = all(isinstance(row[place], int | float) or row[place] is None for row in rows)
+        table.add_column(escape(head), justify="right" if numeric else "left", overflow="fold")
+    for row in rows:
+        table.add_row(*(escape(cell_text(value)) for value in row))
+    screen.print(table)
+
+
+def show_notices(notices: Iterable[str]) -> None:
+    """Print what the user should be told, a line each."""
+    for notice in notices:
+        screen.print(f"[yellow]note:[/yellow] {escape(notice)}", soft_wrap=True)
+
+
+def show_marked(notices: Iterable[str]) -> list[str]:
+    """Print the notices that mark the result as one that its data do not carry; return the others, for its end."""
+    notices = list(notices)
+    first = marked(notices)
+    for notice in first:
+        screen.print(f"[bold red]{escape(notice)}[/bold red]", soft_wrap=True)
+    return [notice for notice in notices if notice not in first]
+
+
+def json_text(result: Mapping[str, object]) -> str:
+    """The result as JSON; arrays become lists, and what is not a finite number becomes null."""
+    return json.dumps(plain_json(result), indent=1, ensure_ascii=False) + "\n"
+
+
+def show_result(result: Result) -> None:
+    """Print a result: its marks first, then the main findings, tables and notices."""
+    others = show_marked(result.notices)
+    for line in result.headline:
+        screen.print(escape(line), soft_wrap=True)
+    for table in result.tables:
+        show_table(table.title, table.columns, table.rows)
+        for note in table.notes:
+            screen.print(escape(note), soft_wrap=True)
+    show_notices(others)
+
+
+def write_result(
+    result: Result,
+    inputs: Iterable[str | Path],
+    *,
+    json_file: Path | None = None,
+    page: Path | None = None,
+    plot: Path | None = None,
+    files: Mapping[Path, str | bytes] | None = None,
+) -> None:
+    """Write what of a result was asked for, all files or none.
+
+    Parameters
+    ----------
+    result : Result
+    inputs : paths
+        Files that must not be overwritten.
+    json_file, page, plot : Path, optional
+        JSON, page (HTML) and main chart (PNG).
+    files : mapping, optional
+        Further files and their contents.
+
+    Raises
+    ------
+    InputError
+        A file cannot be written, is an input or is given twice.
+    """
+    contents = dict(files or {})
+    if json_file:
+        contents[json_file] = result.to_json()
+    if page:
+        contents[page] = result.page()
+    if plot:
+        contents[plot] = result.picture()
+    write_together(contents, inputs=[Path(path) for path in inputs], outputs=[*(files or {}), json_file, page, plot])

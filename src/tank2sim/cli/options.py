@@ -1,0 +1,67 @@
+"""Options that mean the same on every command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tank2sim.cli.overrides import parse_changes
+from tank2sim.executors import EXECUTOR_FORMS, PROCESSES
+
+Command = Callable[..., Any]
+
+
+def _parsed_changes(context: click.Context, parameter: click.Parameter, given: Sequence[str]) -> dict[str, object]:
+    return parse_changes(given)
+
+
+set_option = click.option(
+    "--set",
+    "values",
+    multiple=True,
+    metavar="KEY=VALUE",
+    callback=_parsed_changes,
+    help="A value in place of the card's, by dotted key: derivatives.Yv=-0.012.",
+)
+"""``--set KEY=VALUE``: values by dotted key."""
+
+plot_option = click.option(
+    "--plot", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.png", help="Draw the main chart."
+)
+"""``--plot FILE.png``."""
+
+executor_option = click.option(
+    "--executor",
+    default=PROCESSES,
+    show_default=True,
+    metavar="E",
+    help=f"Where independent work is computed: {EXECUTOR_FORMS}.",
+)
+"""``--executor``: processes of this machine, or a cluster."""
+
+
+def page_option(*names: str) -> Callable[[Command], Command]:
+    """``--page FILE.html``, and other names of it where the page is the main result."""
+    path = click.Path(path_type=Path, dir_okay=False)
+    return click.option(*names, "--page", "page", type=path, metavar="FILE.html", help="Write the page.")
+
+
+def ensemble_options(command: Command) -> Command:
+    """``--ensemble``, ``--seed`` and ``--executor``."""
+    options = (
+        click.option(
+            "--ensemble",
+            "members",
+            type=click.IntRange(2, 10_000_000),
+            metavar="N",
+            help="Also N ships drawn from the card's errors and their covariance: bands (5, 50, 95 %).",
+        ),
+        click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the ensemble."),
+        executor_option,
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command

@@ -1,0 +1,103 @@
+"""What an FMU is to be believed by: its reference result replayed in its own library, and its passport."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.fmu.documents import Documents
+from tank2sim.fmu.passport import PASSPORT_FILE, PASSPORT_PAGE, Replay, passport
+from tank2sim.fmu.platforms import host_platform
+from tank2sim.fmu.process import Drive, drive_apart
+from tank2sim.fmu.reference import reference_errors
+from tank2sim.fmu.reference_run import ReferenceRun, reference_run
+from tank2sim.fmu.templates import render
+from tank2sim.fmu.unpacking import unpack
+from tank2sim.simulation.run import Run
+from tank2sim.units import in_words
+
+_TITLES = {"zigzag_20_20": "Zigzag 20/20", "turn_35": "Turning circle, rudder 35 deg to starboard"}
+
+
+@dataclass(frozen=True)
+class AcceptanceResult:
+    """What the model itself answers to standard manoeuvres.
+
+    Parameters
+    ----------
+    reference : ReferenceRun, optional
+        None if the motion leaves all bounds.
+    manoeuvres : mapping
+        Standard manoeuvres of a ship, by name.
+    """
+
+    model: Model
+    reference: ReferenceRun | None
+    manoeuvres: Mapping[str, Run]
+
+    def reference_files(self) -> dict[str, str]:
+        """Name in the FMU to text of the reference result."""
+        return self.reference.files() if self.reference else {}
+
+    def passport_files(self, documents: Documents, fmu: bytes, fmi: int) -> dict[str, str]:
+        """Name in the FMU to text: the passport for machines and as a page, with what the FMU `fmu` itself answered."""
+        return passport_files(
+            self.model, documents, self.manoeuvres, replay_in_fmu(fmu, self.reference, self.model, fmi)
+        )
+
+
+def gather(model: Model) -> AcceptanceResult:
+    """Reference run and figures of a model."""
+    return AcceptanceResult(model, *reference_run(model))
+
+
+def replay_in_fmu(fmu: bytes, reference: ReferenceRun | None, model: Model, fmi: int) -> Replay:
+    """What the library of an FMU, if there is one for this machine, answers to its reference run."""
+    if reference is None:
+        return Replay(problem="there is none, because the motion leaves all bounds")
+    names: dict[str, tuple[str, ...]] = {"inputs": reference.input_names, "outputs": reference.output_names}
+    with tempfile.TemporaryDirectory(prefix="tank2sim-", ignore_cleanup_errors=True) as folder:
+        path = Path(folder, "ship.fmu")
+        path.write_bytes(fmu)
+        try:
+            platform = host_platform().folder(fmi)
+            unpacked = unpack(path, Path(folder, "unpacked"))
+        except InputError as error:
+            return Replay(run=reference.title, problem=f"on the machine that wrote the FMU it {error.problem}")
+        answer = drive_apart(unpacked, Drive(kind="CoSimulation", run=reference.run, parameters=(), **names))
+    if answer.outputs is None:  # `tank2sim check` fails, too
+        return Replay(run=reference.title, platform=platform, problem=answer.problem)
+    errors = reference_errors(model, reference.outputs, dict(zip(model.outputs, answer.outputs.T, strict=True)))
+    worst = max(errors, key=lambda name: errors[name])
+    return Replay(run=reference.title, platform=platform, max_error=errors[worst], output=worst)
+
+
+def passport_files(model: Model, documents: Documents, manoeuvres: Mapping[str, Run], replay: Replay) -> dict[str, str]:
+    """Name in the FMU to text: the passport for machines and as a page."""
+    made = passport(model, documents, manoeuvres, replay)
+    page = {
+        "passport": made,
+        "version": version("tank2sim"),
+        "file": PASSPORT_FILE,
+        "titles": _TITLES,
+        "words": in_words,
+        "shown": _shown,
+    }
+    return {PASSPORT_FILE: made.as_json(), PASSPORT_PAGE: render("passport.html", page)}
+
+
+def _shown(figure: object) -> str:
+    match figure:
+        case None:
+            return "not reached"
+        case float():
+            return f"{figure:.4g}"
+        case list() | tuple():
+            return ", ".join(_shown(one) for one in figure)
+        case _:
+            return str(figure)

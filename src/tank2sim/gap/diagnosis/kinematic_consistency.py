@@ -1,0 +1,83 @@
+"""Whether records of position, heading, velocity and yaw rate agree, whatever the hull does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from tank2sim.arrays import Array
+from tank2sim.gap.result import Passed
+
+ENDS = 20
+"""The motion at an end of a trial is read off a straight line through this many instants (half of L/u0)."""
+
+CONTRADICTED = 4.0
+"""Records that contradict themselves by more standard errors than this are at fault, not the hull (ours)."""
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """How far records contradict themselves, in standard errors: root mean square over trials, about 1 is none.
+
+    Parameters
+    ----------
+    turning : float
+        Integrated yaw rate against the change of heading.
+    track : float
+        Integrated velocities through the water against the change of position.
+    """
+
+    turning: float
+    track: float
+
+
+def kinematic_consistency(passed: Sequence[Passed]) -> Kinematics:
+    """Whether dpsi/dt is r, and whether positions follow from u, v and psi: nothing of the hull is asked.
+
+    Both sides are compared over the whole of each trial; the standard error is that of white noise of the sensors,
+    integrated.
+    """
+    turning, track = [], []
+    for one in passed:
+        seen = readable(one)
+        noise = {name.removeprefix("motion."): error for name, error in one.noise.items()}
+        if {"motion.psi", "motion.r"} <= seen.keys():
+            turning.append(_contradiction(one.time_s, seen["motion.psi"], noise["psi"], seen["motion.r"], noise["r"]))
+        if {f"motion.{name}" for name in ("psi", "u", "v", "x", "y")} <= seen.keys():
+            u, v, psi = (seen[f"motion.{name}"] for name in ("u", "v", "psi"))
+            over = math.hypot(noise["u"], noise["v"], float(np.max(np.hypot(u, v))) * noise["psi"])
+            for axis, rate in zip("xy", recorded_earth_velocity(u, v, psi), strict=True):
+                track.append(_contradiction(one.time_s, seen[f"motion.{axis}"], noise[axis], rate, over))
+    return Kinematics(*(float(np.sqrt(np.mean(np.square(z)))) if z else 0.0 for z in (turning, track)))
+
+
+def recorded_earth_velocity(u: Array, v: Array, psi: Array) -> tuple[Array, Array]:
+    """Velocity to north and east (n,) each, m/s."""
+    cos, sin = np.cos(psi), np.sin(psi)
+    return u * cos - v * sin, u * sin + v * cos
+
+
+def _contradiction(time: Array, signal: Array, noise: float, rate: Array, rate_noise: float) -> float:
+    """Change of a signal over a trial less the integral of its measured rate, in standard errors."""
+    ends = min(ENDS, len(time) // 2)
+    left = signal - np.concatenate([[0.0], cumulative_trapezoid(rate, time)])
+    change = float(left[-ends:].mean()) - float(left[:ends].mean())
+    step = float(np.median(np.diff(time)))
+    return change / math.hypot(noise * math.sqrt(2 / ends), rate_noise * step * math.sqrt(len(time)))
+
+
+def readable(one: Passed) -> dict[str, Array]:
+    """The signals of a trial of which there are readings, without gaps."""
+    return {name: filled(one.measured[name]) for name in one.noise if np.isfinite(one.measured[name]).any()}
+
+
+def filled(values: Array) -> Array:
+    """A signal (n,) with what was not measured put in between its neighbours, straight."""
+    known = np.isfinite(values)
+    places = np.arange(len(values), dtype=float)
+    whole: Array = np.interp(places, places[known], values[known])
+    return whole

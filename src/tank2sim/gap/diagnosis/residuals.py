@@ -1,0 +1,102 @@
+"""What a fitted explanation leaves and tells: the missing force, and what each trial says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.dynamics.effects.forces import with_forces
+from tank2sim.dynamics.model import Parameter
+from tank2sim.gap.diagnosis.misfit_location import missing_force_by_state
+from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.inference.hypothesis import Hypothesis
+from tank2sim.gap.inference.kalman_filter import FORCE_STATES
+from tank2sim.gap.inference.likelihood import Likelihood
+from tank2sim.gap.outcome.improve_card import Found
+from tank2sim.gap.result import MissingForce
+
+
+def force_lacking(likelihood: Likelihood, fit: ExplanationFit) -> MissingForce | None:
+    """The force that an explanation lacks, as the smoother needs it to follow the measurements."""
+    motion, explained = likelihood.motion, fit.explained
+    states, spread = likelihood.smoothed(fit)
+    inertia = _inertia(explained)
+    force = np.einsum("ij,rtj->rti", inertia, states[..., 6 : 6 + FORCE_STATES])
+    errors = np.sqrt(np.einsum("ij,rtjk,ik->rti", inertia, spread, inertia))
+    inside = motion.inside
+    inside[:, -1] = False  # inputs and states between the blocks
+    part = inside[:, :-1]
+    u, v, r, psi, _, _ = np.moveaxis(motion.block_states, -1, 0)
+    rudder = motion.block_inputs[..., explained.model.input_names.index("rudder.command")]
+    columns = {
+        "rudder": rudder,
+        "drift": -np.arcsin(np.clip(v / np.maximum(np.hypot(u, v), 1e-9), -1, 1)),
+        "yaw rate": r,
+        "speed": np.hypot(u, v),
+        "heading": psi,
+    }
+    names = np.repeat(np.array(motion.names)[:, None], part.shape[1], axis=1)[part]
+    return missing_force_by_state(
+        list(names),
+        motion.times[:, :-1][part],
+        force[:, :-1][part],
+        errors[:, :-1][part],
+        {name: values[part] for name, values in columns.items()},
+    )
+
+
+def _inertia(explained: Hypothesis) -> Array:
+    """Mass matrix (3, 3): forces X, Y (N) and N (N m) by accelerations of surge, sway and yaw at the design speed."""
+    pushes = [Parameter(name=f"push.{axis}", unit="1", description="A force", start=0.0) for axis in "XYN"]
+    X, Y, N = (one.symbol for one in pushes)
+    model = with_forces(explained.model.extend(*pushes), X=X, Y=Y, N=N)
+    places = [model.state_names.index(name) for name in ("motion.u", "motion.v", "motion.r")]
+    slope = ca.jacobian(model.rates[places], ca.vertcat(X, Y, N))
+    mobility = ca.Function("mobility", [model.x, model.u, model.p], [slope])
+    p = model.parameter_values()
+    return np.linalg.inv(np.array(mobility(np.array(model.initial(p)).ravel(), model.input_values(), p)))
+
+
+def each_trial(likelihood: Likelihood, fit: ExplanationFit) -> dict[str, dict[str, tuple[float, float]]]:
+    """What each trial alone would have each parameter of the effects: variable to {trial: (value, standard error)}.
+
+    The others of the same effect are as uncertain as all trials together leave them; the card's coefficients and the
+    forms of the effects as before.
+    """
+    whitened, _ = likelihood.whitened(fit)
+    k = len(fit.theta)
+    told: dict[str, dict[str, tuple[float, float]]] = {one.variable: {} for one in fit.explained.asked}
+    for run, name in enumerate(likelihood.motion.names):
+        flat = whitened[run].reshape(-1, whitened.shape[-1])
+        gram = flat.T @ flat
+        held = gram[1 + k :, 1 + k :] + np.eye(len(gram) - 1 - k)
+        mixed = gram[: 1 + k, 1 + k :]
+        own = gram[: 1 + k, : 1 + k] - mixed @ np.linalg.solve(held, mixed.T)
+        for place, one in enumerate(fit.explained.asked):
+            others = [other for other in range(k) if other != place]
+            prior = np.linalg.inv(fit.covariance[np.ix_(others, others)] + 1e-300 * np.eye(k - 1)) if others else None
+            information, pull = own[1 + place, 1 + place], -own[1 + place, 0]
+            if prior is not None:
+                rest = [1 + other for other in others]
+                solved = np.linalg.solve(own[np.ix_(rest, rest)] + prior, own[np.ix_(rest, [1 + place, 0])])
+                information -= own[1 + place, rest] @ solved[:, 0]
+                pull += own[1 + place, rest] @ solved[:, 1]
+            if information > 0:
+                value = float(fit.theta[place] + pull / information)
+                told[one.variable][name] = value, float(1 / np.sqrt(information))
+    return told
+
+
+def estimates(fit: ExplanationFit) -> list[Found]:
+    """Each effect of a fit with its parameters and their standard errors, SI, by the names of the parameters."""
+    errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    found: list[Found] = []
+    for effect in fit.explained.effects:
+        places = [place for place, one in enumerate(fit.explained.asked) if one.effect == effect]
+        names: Sequence[str] = [fit.explained.asked[place].parameter.name for place in places]
+        values = {name: float(fit.theta[place]) for name, place in zip(names, places, strict=True)}
+        found.append((effect, values, {name: float(errors[p]) for name, p in zip(names, places, strict=True)}))
+    return found

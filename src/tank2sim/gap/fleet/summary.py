@@ -1,0 +1,141 @@
+"""What was found of a fleet, ship by ship: read from the results of each, so that it does not matter which run they
+are of."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tank2sim.errors import InputError
+from tank2sim.gap.fleet.ships import GAP, IMPROVED
+
+REPORT_FILE = "report.html"
+"""Page of a ship, beside her ``gap.json``."""
+
+
+@dataclass(frozen=True)
+class ShipTold:
+    """One ship of a fleet.
+
+    Parameters
+    ----------
+    folder : str
+        Name of her folder, and of that of her results.
+    name : str
+        Of the ship, as her card has it.
+    verdict : str
+        One of :data:`.result.VERDICTS`.
+    effects : tuple of mappings
+        As in ``gap.json``: ``name``, ``parameters``, ``standard_errors``, ``confidence``; in the units of their names.
+    alternatives : tuple of str
+        What her trials cannot tell from them.
+    misfit : mapping
+        ``before`` and ``after`` to {``fit``, ``holdout``}: units of the noise, None without such trials or where a
+        simulation left all bounds.
+    trials : mapping
+        Numbers of trials, by ``fit`` and ``holdout``.
+    fault : str
+        Why she has no result, in one line; all but `folder` is then empty.
+    """
+
+    folder: str
+    name: str = ""
+    verdict: str = ""
+    effects: tuple[Mapping[str, Any], ...] = ()
+    alternatives: tuple[str, ...] = ()
+    misfit: Mapping[str, Mapping[str, float | None]] = field(default_factory=dict)
+    trials: Mapping[str, int] = field(default_factory=dict)
+    fault: str = ""
+
+    @property
+    def judged_by(self) -> str:
+        """``holdout``, or ``fit`` where no trial was held out."""
+        return "holdout" if self.trials.get("holdout") else "fit"
+
+    def misfits(self) -> tuple[float | None, float | None]:
+        """Misfit before and after of the trials by which she is judged."""
+        before, after = (self.misfit.get(which, {}).get(self.judged_by) for which in ("before", "after"))
+        return before, after
+
+    def as_json(self) -> dict[str, object]:
+        """In the form of ``fleet.json``."""
+        if self.fault:
+            return {"folder": self.folder, "fault": self.fault}
+        return {
+            "folder": self.folder,
+            "name": self.name,
+            "verdict": self.verdict,
+            "effects": list(self.effects),
+            "alternatives": list(self.alternatives),
+            "misfit": self.misfit,
+            "trials": self.trials,
+            "report": f"{self.folder}/{REPORT_FILE}",
+        }
+
+
+@dataclass(frozen=True)
+class FleetTold:
+    """All ships of a fleet.
+
+    Parameters
+    ----------
+    name : str
+        Of the folder.
+    ships : tuple of ShipTold
+        In the order of their folders' names, those with a fault among them.
+    notices : tuple of str
+    """
+
+    name: str
+    ships: tuple[ShipTold, ...]
+    notices: tuple[str, ...] = ()
+
+    @property
+    def verdicts(self) -> dict[str, int]:
+        """Verdict to the number of ships that have it."""
+        words = [one.verdict for one in self.ships if not one.fault]
+        return {word: words.count(word) for word in sorted(set(words))}
+
+    @property
+    def faults(self) -> tuple[ShipTold, ...]:
+        """The ships without a result."""
+        return tuple(one for one in self.ships if one.fault)
+
+    def as_json(self) -> dict[str, object]:
+        """In the form of ``fleet.json``."""
+        return {
+            "fleet": self.name,
+            "verdicts": self.verdicts,
+            "ships": [one.as_json() for one in self.ships],
+            "notices": list(self.notices),
+        }
+
+
+def ship_told(folder: Path) -> ShipTold:
+    """The ship whose results lie in a folder.
+
+    Raises
+    ------
+    InputError
+        They were changed or taken away while this run went on.
+    """
+    try:
+        told = json.loads((folder / GAP).read_text(encoding="utf-8"))
+        card = tomllib.loads((folder / IMPROVED).read_text(encoding="utf-8-sig"))
+        held = [bool(one["held_out"]) for one in told["trials"]]
+        return ShipTold(
+            folder=folder.name,
+            name=str(card["ship"]["name"]),
+            verdict=told["verdict"],
+            effects=tuple(told["effects"]),
+            alternatives=tuple(told["alternatives"]),
+            misfit={which: told["misfit"][which] for which in ("before", "after")},
+            trials={"fit": held.count(False), "holdout": held.count(True)},
+        )
+    except (OSError, ValueError, KeyError, TypeError):
+        remedy = "let one run at a time write there, and run it again"
+        raise InputError(folder, "", "the results of this ship were changed by another program", remedy) from None

@@ -1,0 +1,1 @@
+"""The likelihood of an explanation: a Kalman filter about the measured motion."""

@@ -1,0 +1,269 @@
+"""The measured motion of all trials side by side, about which every explanation of the gap is linearised.
+
+The motion that was measured, smoothed, is within the noise of the true one whatever effect is missing. About it the
+error of the motion is small, the filter of :mod:`.observer` is linear, and an effect enters as what it adds to the
+rates of the states along this motion. A simulated motion would drift away from the measured one, and need a new
+linearisation for each explanation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tank2sim.identification.trials.problem.measured_motion import MEASURED_STATES, measured_motion, sensor_noise
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun, prepare, seen_in
+from tank2sim.records.trials import Trial, sampling_step
+from tank2sim.simulation.recorded import SMOOTHING
+
+_Truths = NDArray[np.bool_]
+
+BLOCKS_PER_SHIP_TIME = 8
+"""Blocks in L/u0: two fifths of the fastest motion of a hull, whose yaw rate answers in about 0.3 L/u0 (ours)."""
+
+FINE_PER_SHIP_TIME = 200
+"""Fine steps in L/u0 at most, if the record has so many samples: a step of the rudder order must not be averaged with
+what was before, for a gear at its limit would then answer early."""
+
+_LEAST_NOISE = 1e-5
+"""Noise of a sample over the variable's nominal size, for records without any: no filter can take those as exact (ours,
+far below the noise of any sensor)."""
+
+
+GUESSED = (0.1, 0.1, 1e-3, 0.01, 1.0, 1.0)
+"""Error of the smoothed motion in u, v (m/s), r (rad/s), psi (rad), x and y (m) where they were derived (ours)."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredBatch:
+    """Trials side by side, padded to one length.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the R runs.
+    seen : tuple of str
+        The ny variables that are measured.
+    step_s : float
+        Fine step, s: over these the rates are integrated.
+    fine : int
+        Fine steps in a block, over which measurements are averaged; odd, so that an instant is the middle of a block.
+    begin_s : array (R,)
+        Time of the first fine instant in each trial's own time.
+    lengths : array (R,)
+        Number of blocks of each run.
+    states : array (R, n, 6)
+        Smoothed motion at the fine instants, in the order of KNOWN.
+    inputs : array (R, n - 1, nu)
+        Mean of each input from an instant to the next.
+    measured : array (R, T, ny)
+        Mean over each block, nan where nothing was measured.
+    noise : array (ny,)
+        Standard deviation of what is too fast for a ship in the mean over a block.
+    """
+
+    names: tuple[str, ...]
+    seen: tuple[str, ...]
+    step_s: float
+    fine: int
+    begin_s: Array
+    lengths: NDArray[np.int64]
+    states: Array
+    inputs: Array
+    measured: Array
+    noise: Array
+
+    @property
+    def block_s(self) -> float:
+        """Length of a block, s."""
+        return self.step_s * self.fine
+
+    @property
+    def blocks(self) -> int:
+        """Blocks of the longest run, T."""
+        return int(self.measured.shape[1])
+
+    @property
+    def inside(self) -> _Truths:
+        """Which blocks are of a run and not padding (R, T)."""
+        return np.arange(self.blocks) < self.lengths[:, None]
+
+    @property
+    def times(self) -> Array:
+        """Middle of each block in the trial's own time (R, T), s."""
+        middle = (np.arange(self.blocks) * self.fine + self.fine // 2) * self.step_s
+        times: Array = self.begin_s[:, None] + middle
+        return times
+
+    @property
+    def block_states(self) -> Array:
+        """Mean of the states from the middle of a block to that of the next (R, T - 1, 6)."""
+        middles = 0.5 * (self.states[:, 1:] + self.states[:, :-1])
+        return self.over_blocks(middles)
+
+    @property
+    def block_inputs(self) -> Array:
+        """Means of the inputs from the middle of a block to that of the next (R, T - 1, nu)."""
+        return self.over_blocks(self.inputs)
+
+    def over_blocks(self, values: Array) -> Array:
+        """Means of values of fine steps (R, n - 1, k) from the middle of a block to that of the next (R, T - 1, k)."""
+        inside = values[:, self.fine // 2 : self.fine // 2 + (self.blocks - 1) * self.fine]
+        means: Array = inside.reshape(len(values), self.blocks - 1, self.fine, -1).mean(axis=2)
+        return means
+
+    def in_blocks(self, values: Array) -> Array:
+        """Means over each block of values at the fine instants (R, n, k): (R, T, k)."""
+        means: Array = values.reshape(len(values), self.blocks, self.fine, -1).mean(axis=2)
+        return means
+
+    @property
+    def middles(self) -> Array:
+        """States in the middle of each block (R, T, 6)."""
+        return self.states[:, self.fine // 2 :: self.fine]
+
+    @property
+    def errors(self) -> Array:
+        """About how well each state is known (6,): as its sensor shows it; a guess where none does."""
+        noise = dict(zip(self.seen, self.noise, strict=True))
+        return np.array([noise.get(name, guess) for name, guess in zip(MEASURED_STATES, GUESSED, strict=True)])
+
+    def moved(self, away: Array, transition: Array, lack: Array, more: Array) -> MeasuredBatch:
+        """The same trials about a motion that is `away` from this one.
+
+        Parameters
+        ----------
+        away : array (R, T, 6)
+            In the middles of the blocks.
+        transition : array (R, T - 1, 6, 6)
+            exp(A h) from each middle to the next.
+        lack : array (R, n - 1, 6)
+            What the model's rates have beyond those of this motion, at each fine step.
+        more : array (R, T - 1, 6)
+            Rates that are added to those of the model, over each block.
+        """
+        # log(exp(A h))/h to second order is enough within a block: its end is known
+        small = transition - np.eye(6)
+        slope = (small - small @ small / 2) / self.block_s
+        begin, count, h = self.fine // 2, self.blocks - 1, self.step_s
+        inside = lack[:, begin : begin + count * self.fine].reshape(len(lack), count, self.fine, 6)
+        at = away[:, :-1].copy()
+        course = np.empty((len(lack), count, self.fine, 6))
+        for step in range(self.fine):
+            course[:, :, step] = at
+            rate = (slope @ at[..., None])[..., 0] + inside[:, :, step] + more
+            rate = rate + 0.5 * h * (slope @ rate[..., None])[..., 0]
+            at = at + h * rate
+        shares = np.arange(self.fine)[:, None] / self.fine
+        # Past a run's last middle nothing is known: there the model goes on.
+        known_end = np.where(self.inside[:, 1:, None], away[:, 1:] - at, 0.0)
+        course += shares * known_end[:, :, None]
+        states = self.states.copy()
+        states[:, begin : begin + count * self.fine] += course.reshape(len(lack), -1, 6)
+        states[:, :begin] += away[:, :1]
+        states[:, begin + count * self.fine :] += away[:, -1:]
+        return replace(self, states=states)
+
+
+def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> MeasuredBatch:
+    """The trials' measured motion.
+
+    Parameters
+    ----------
+    model : Model
+        Driven as the trials were.
+    trials : sequence of Trial
+        At the ship's size.
+    ship_time : float
+        L/u0, s.
+
+    Raises
+    ------
+    InputError
+        A trial is too short, or tells neither velocities nor positions.
+    """
+    seen = seen_in(model, trials)
+    step = max(ship_time / FINE_PER_SHIP_TIME, *(sampling_step(trial) for trial in trials))
+    runs = tuple(prepare(model, trial, seen, step_s=step * (1 + 1e-6)) for trial in trials)
+    step = max(run.step_s for run in runs)
+    runs = tuple(_at_step(run, step) for run in runs)
+    fine = 2 * round(ship_time / BLOCKS_PER_SHIP_TIME / step / 2 - 0.5) + 1
+    fine = max(fine, 1)
+    problem = Problem(model, (), np.zeros(0), np.zeros(0), runs)
+    lengths = np.array([len(run.measured) // fine for run in runs])
+    size = int(lengths.max()) * fine
+    states, inputs, measured, noise = [], [], [], []
+    for run in runs:
+        states.append(_padded(_smooth(measured_motion(problem, run).smooth, ship_time / step), size))
+        inputs.append(_padded(run.inputs, size)[:-1])
+        measured.append(_means(run, size, fine))
+        noise.append(sensor_noise(problem, run))
+    return MeasuredBatch(
+        names=tuple(run.name for run in runs),
+        seen=seen,
+        step_s=step,
+        fine=fine,
+        begin_s=np.array([run.begin_s for run in runs]),
+        lengths=lengths,
+        states=np.array(states),
+        inputs=np.array(inputs),
+        measured=np.array(measured),
+        noise=_typical(noise, np.array([_LEAST_NOISE * model[name].nominal for name in seen])) / np.sqrt(fine),
+    )
+
+
+def _at_step(run: SampledRun, step: float) -> SampledRun:
+    """A run at a step that may not be a whole number of its own samples: others may sample otherwise."""
+    if abs(run.step_s - step) < 1e-6 * step:
+        return run
+    count = len(run.measured)
+    own, places = run.step_s * np.arange(count), step * np.arange(int((count - 1) * run.step_s / step + 1e-6) + 1)
+    # The mean over a step is the difference of the integral; the last row repeats the one before, as in every run.
+    whole = np.cumsum(np.vstack([np.zeros(run.inputs.shape[1]), run.inputs[:-1]]), axis=0) * run.step_s
+    measured, at = (np.column_stack([np.interp(places, own, one) for one in rows.T]) for rows in (run.measured, whole))
+    inputs = np.diff(at, axis=0) / step
+    return replace(run, step_s=step, measured=measured, inputs=np.vstack([inputs, inputs[-1:]]))
+
+
+def _smooth(states: Array, ship_steps: float) -> Array:
+    """States (n, 6) with heading and position as smooth as velocities are: a block's rates are their differences."""
+    window = min(int(SMOOTHING * ship_steps), len(states) - 1) // 2 * 2 + 1
+    if window < 5:
+        return states
+    places: Array = savgol_filter(states[:, 3:], window, 3, axis=0)
+    return np.hstack([states[:, :3], places])
+
+
+def _typical(noise: Sequence[Array], least: Array) -> Array:
+    """Median over the runs of each signal's noise (ny,), where it was measured; `least` at least."""
+    known = np.array(noise)
+    medians = [np.median(one[one > 0]) if (one > 0).any() else 0.0 for one in known.T]
+    typical: Array = np.maximum(np.array(medians), least)
+    return typical
+
+
+def _padded(rows: Array, size: int) -> Array:
+    """Rows (n, k) cut or lengthened to `size` by repeating the last one."""
+    if len(rows) >= size:
+        return rows[:size]
+    return np.concatenate([rows, np.repeat(rows[-1:], size - len(rows), axis=0)])
+
+
+def _means(run: SampledRun, size: int, fine: int) -> Array:
+    count = len(run.measured) // fine
+    blocks = run.measured[: count * fine].reshape(count, fine, -1)
+    means = np.full((size // fine, blocks.shape[2]), np.nan)
+    known = ~np.isnan(blocks)
+    enough = known.all(axis=1)
+    means[:count][enough] = np.where(known, blocks, 0).mean(axis=1)[enough]
+    return means
+
+
+__all__ = ["MEASURED_STATES", "MeasuredBatch", "batch_trials"]

@@ -1,0 +1,124 @@
+"""What goes into a fit and what comes out: beliefs beforehand, columns of the least squares, and the fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.gap.inference.hypothesis import Hypothesis
+from tank2sim.gap.inference.kalman_filter import NoiseLevels
+
+
+@dataclass(frozen=True, eq=False)
+class NuisanceParameters:
+    """What may be a little wrong beside the effects: the card's coefficients, and the clock of the rudder's record.
+
+    Parameters
+    ----------
+    names : tuple of str
+        The n parameters of the model, and :data:`.explained.CLOCK`.
+    mixing : array (n, nc)
+        Change of each by one standard deviation of each of nc independent causes: its own error, and errors that it
+        shares with others.
+    """
+
+    names: tuple[str, ...]
+    mixing: Array
+
+    @property
+    def errors(self) -> Array:
+        """Standard error of each (n,)."""
+        errors: Array = np.sqrt(np.sum(self.mixing**2, axis=1))
+        return errors
+
+
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """What is believed beforehand of the noise, and of where a run begins.
+
+    Parameters
+    ----------
+    logs, spread : array
+        Mean and standard deviation of each logarithm (:attr:`.observer.Noise.logs`, and that of the width).
+    wide : array (6,), optional
+        Standard deviation of each state at the beginning of a run about the measured one: wide, for a sensor may be at
+        fault; by default :data:`.likelihood.WIDE` times its noise.
+    """
+
+    logs: Array
+    spread: Array
+    wide: Array | None = None
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Three standard deviations either way: what is further away is no noise of this kind."""
+        return self.logs - 3 * self.spread, self.logs + 3 * self.spread
+
+    def cost(self, logs: Array) -> tuple[float, Array]:
+        """Price of a noise and its slope."""
+        away = (logs - self.logs) / self.spread
+        return float(away @ away), 2 * away / self.spread
+
+
+@dataclass(frozen=True, eq=False)
+class FilterColumns:
+    """What goes through the filter: the residual, the effects' parameters, the coefficients (by unit standard error).
+
+    Parameters
+    ----------
+    driving : array (R, T - 1, 6, 1 + k + nc)
+    shown : array (R, T, ny, 1 + k + nc)
+    asked : int
+        k.
+    uncertain : int
+        nc, the coefficients'; what follows them is of the effects' form.
+    """
+
+    driving: Array
+    shown: Array
+    asked: int
+    uncertain: int
+
+    def scaled(self, width: float) -> FilterColumns:
+        """With the coefficients' standard errors times `width`."""
+        factors = np.ones(self.driving.shape[-1])
+        factors[1 + self.asked : 1 + self.asked + self.uncertain] = width
+        return replace(self, driving=self.driving * factors, shown=self.shown * factors)
+
+
+@dataclass(frozen=True, eq=False)
+class ExplanationFit:
+    """An explanation at its best.
+
+    Parameters
+    ----------
+    explained : Explained
+    theta : array (k,)
+        Its parameters.
+    covariance : array (k, k)
+    logs : array
+        Of the noise (:attr:`.observer.Noise.logs`), and of the width of the coefficients' prior as the last element.
+    score : float
+        T.
+    change : array (nc,)
+        Most probable change of the coefficients, in their standard errors beforehand.
+    """
+
+    explained: Hypothesis
+    theta: Array
+    covariance: Array
+    logs: Array
+    score: float
+    change: Array
+
+    @property
+    def noise(self) -> NoiseLevels:
+        """Levels and times of the noise."""
+        return NoiseLevels.of(self.logs[:-1])
+
+    @property
+    def width(self) -> float:
+        """Factor on the standard errors of the card's coefficients."""
+        return float(np.exp(self.logs[-1]))

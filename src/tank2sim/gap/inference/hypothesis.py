@@ -1,0 +1,396 @@
+"""A ship with some effects on top, asked what it would do along the measured motion.
+
+States that were not measured (the rudder behind its gear, heel, remembered flow) are integrated along the measured
+motion from the recorded inputs; the rates of the measured states, and what the sensors show, follow from both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects import EFFECTS, EffectParameter
+from tank2sim.dynamics.model import Model
+from tank2sim.gap.inference.batch import MEASURED_STATES, MeasuredBatch
+from tank2sim.identification.trials.problem.problem_from_card import driven_model
+from tank2sim.simulation.rows import Chain
+
+CLOCK = "rudder.clock"
+"""Among the parameters of which slopes are asked: how much later than the rudder's record the ship acts on it, s."""
+
+BEHIND_THE_GEAR = ("rudder.angle", "rudder_backlash.gear")
+"""States that nothing drives but the rudder order."""
+
+SENSED = (*MEASURED_STATES, "motion.u_ground", "motion.v_ground", "motion.sog")
+"""What sensors may show."""
+
+SMALL_SHARE = 0.01
+"""Change of a parameter for a difference quotient, as a share of it."""
+
+NEWTON_STEPS = 8
+"""To the steady value of a state that was not measured, at the beginning of a run."""
+
+STEPS_IN_A_TIME = 2.5
+"""Integration steps in a time constant or period that is estimated, at least. Classical Runge-Kutta is stable up to a
+step of 2.78 time constants (Hairer and Wanner 1996, IV.2), or 2.83/(2 pi) of a period."""
+
+
+@dataclass(frozen=True)
+class EstimatedParameter:
+    """A parameter that is estimated.
+
+    Parameters
+    ----------
+    effect : str
+        Name of its effect.
+    parameter : EffectParameter
+    variable : str
+        Of the model that holds it.
+    """
+
+    effect: str
+    parameter: EffectParameter
+    variable: str
+
+
+class Hypothesis:
+    """The model of a card with some effects more.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        The ship as it was known.
+    driven_by : str
+        ``angle`` or ``order``: what of the rudder was recorded.
+    effects : sequence of str
+        Names of effects that are added.
+    ship : Model, optional
+        The card's model as it is driven so, if it was built already.
+
+    Attributes
+    ----------
+    asked : tuple of Asked
+        The parameters that are estimated, in the order of every `theta`.
+    """
+
+    def __init__(self, card: ManoeuvringCard, driven_by: str, effects: Sequence[str] = (), ship: Model | None = None):
+        self.card, self.driven_by = card, driven_by
+        self.effects = tuple(effects)
+        model = driven_model(card, driven_by) if ship is None else ship
+        asked: list[EstimatedParameter] = []
+        for name in self.effects:
+            effect = EFFECTS[name]
+            start = {one.name: one.typical_values(card)[0] for one in effect.parameters if one.typical_values(card)}
+            model = effect.apply(model, start, card)
+            places = effect.model_names()
+            asked += [
+                EstimatedParameter(name, one, places[one.name])
+                for one in effect.parameters
+                if one.name in effect.free(card)
+            ]
+        self.model = model
+        self.asked = tuple(asked)
+        self.own = tuple(name for name in model.state_names if name not in MEASURED_STATES)
+        self._chains: dict[float, Chain] = {}
+
+    @property
+    def directed(self) -> bool:
+        """Whether one of the effects comes from a direction of the compass."""
+        return any(one.parameter.name == "direction_rad" for one in self.asked)
+
+    @cached_property
+    def touches(self) -> tuple[bool, bool, bool]:
+        """Whether what is asked for changes states that were not measured, rates of the measured ones, and readings.
+
+        What it does not change is what the card without the effects has.
+        """
+        chosen = ca.vcat([self.model.symbol(one.variable) for one in self.asked]) if self.asked else ca.SX(0, 1)
+        states = bool(self._delays(np.ones(len(self.asked)))) or ca.depends_on(self._of(self.own), chosen)
+        rates = states or ca.depends_on(self._known_rates, chosen)
+        return states, rates, states or ca.depends_on(self._shown(SENSED), chosen)
+
+    # -- parameters --------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest value of each parameter asked for (k,); times at least as long as can be integrated."""
+        low = np.array([one.parameter.minimum for one in self.asked])
+        times = np.array([one.parameter.name.endswith("_s") for one in self.asked], dtype=bool) & (low > 0)
+        low[times] = np.maximum(low[times], STEPS_IN_A_TIME * self.model.step_s)
+        return low, np.array([one.parameter.maximum for one in self.asked])
+
+    @cached_property
+    def prior(self) -> tuple[Array, Array]:
+        """What is known beforehand of each parameter asked for: mean and precision (k,), precision 0 for nothing."""
+        means, precisions = [], []
+        for one in self.asked:
+            spread = one.parameter.spread_value(self.card)
+            means.append(one.parameter.value({}, self.card) if spread else 0.0)
+            precisions.append(1 / spread**2 if spread else 0.0)
+        return np.array(means), np.array(precisions)
+
+    @property
+    def steps(self) -> Array:
+        """A small change of each parameter asked for (k,), for difference quotients."""
+        sizes: list[float] = []
+        for one in self.asked:
+            typical = one.parameter.typical_values(self.card) or (self.prior[0][len(sizes)],)
+            spread = one.parameter.spread_value(self.card)
+            sizes.append(0.01 * (max(map(abs, typical)) or spread or one.parameter.maximum))
+        return np.array(sizes)
+
+    def parameters(self, theta: Array) -> Array:
+        """The model's parameter vector with those asked for at `theta` (k,)."""
+        return self.model.parameter_values(self._chosen(theta, self.model.parameter_names))
+
+    def _chosen(self, theta: Array, names: Sequence[str]) -> dict[str, float]:
+        return {one.variable: float(v) for one, v in zip(self.asked, theta, strict=True) if one.variable in names}
+
+    def inputs(self, motion: MeasuredBatch, theta: Array) -> Array:
+        """Inputs of this model at every fine step (R, n - 1, nu)."""
+        known = motion.inputs
+        names = self.model.input_names
+        runs, steps, count = known.shape
+        inputs = np.empty((runs, steps, len(names)))
+        inputs[:, :, :count] = known  # effects append their inputs to those of the ship
+        inputs[:, :, count:] = self.model.input_values()[count:]
+        for name, value in self._chosen(theta, names).items():
+            inputs[:, :, names.index(name)] = value
+        for name, delay in self._delays(theta).items():
+            if not self._states_behind(name):
+                place = names.index(name)
+                inputs[:, :, place] = _late(inputs[:, :, place], delay / motion.step_s)
+        return inputs
+
+    def _delays(self, theta: Array) -> dict[str, float]:
+        """Name of each input whose record is not in time with the motion, to how much later the ship acts on it, s."""
+        values = {(one.effect, one.parameter.name): float(v) for one, v in zip(self.asked, theta, strict=True)}
+        return {
+            name: values[effect, parameter]
+            for effect in self.effects
+            for name, parameter in EFFECTS[effect].delays.items()
+        }
+
+    def _states_behind(self, name: str) -> tuple[int, ...]:
+        """Places of the states through which alone an input reaches the ship: what is late is these.
+
+        A gear at its largest rate answers to a step of the order at once or a whole sample later, and to nothing
+        between; its angle can be late by any time.
+        """
+        if name != "rudder.command" or "rudder.angle" not in self.own:
+            return ()
+        return tuple(place for place, one in enumerate(self.own) if one in BEHIND_THE_GEAR)
+
+    # -- what it would do --------------------------------------------------------------------------------------------
+
+    def own_states(self, motion: MeasuredBatch, theta: Array, p: Array | None = None) -> Array:
+        """States that were not measured, at the fine instants (R, n, no); `p` are other parameters of the model."""
+        if not self.own:
+            return np.zeros((*motion.states.shape[:2], 0))
+        inputs, p = self.inputs(motion, theta), self.parameters(theta) if p is None else p
+        x = motion.states
+        tracks = []
+        for run in range(len(x)):
+            start = self._settled(x[run, 0], inputs[run, 0], p)
+            tracks.append(self._chain(motion.step_s).run(start, x[run, :-1], x[run, 1:], inputs[run], p))
+        own = np.array(tracks)
+        for name, delay in self._delays(theta).items():
+            for place in self._states_behind(name):
+                own[:, :, place] = _late(own[:, :, place], delay / motion.step_s)
+        return own
+
+    def rates(self, motion: MeasuredBatch, theta: Array, own: Array | None = None) -> Array:
+        """Rates of the measured states, each from the middle of a block to that of the next (R, T - 1, 6).
+
+        `own` are the states that were not measured, if they are known already (:meth:`own_states`).
+        """
+        return _rowwise(self._rates, *self._along(motion, theta, own), self.parameters(theta))
+
+    def fine_rates(self, motion: MeasuredBatch, theta: Array) -> Array:
+        """The same, with the mean over the fine steps in place of the rate at the mean."""
+        return motion.over_blocks(self.rates_between(motion, theta))
+
+    def rates_between(self, motion: MeasuredBatch, theta: Array) -> Array:
+        """Rates of the measured states halfway between the fine instants (R, n - 1, 6)."""
+        own = self.own_states(motion, theta)
+        x = 0.5 * (motion.states[:, 1:] + motion.states[:, :-1])
+        xi = 0.5 * (own[:, 1:] + own[:, :-1])
+        return _rowwise(self._rates, x, xi, self.inputs(motion, theta), self.parameters(theta))
+
+    def readings(self, motion: MeasuredBatch, theta: Array, own: Array | None = None) -> Array:
+        """What the sensors would show in the middle of each block, but for their noise (R, T, ny)."""
+        return _rowwise(self._readings(motion.seen), *self._in_blocks(motion, theta, own), self.parameters(theta))
+
+    def slopes(self, motion: MeasuredBatch, theta: Array) -> tuple[Array, Array]:
+        """Rates by states (R, T - 1, 6, 6), and readings by states (R, T, ny, 6)."""
+        own = self.own_states(motion, theta)
+        p = self.parameters(theta)
+        by_state = _rowwise(self._state_slopes, *self._along(motion, theta, own), p)
+        seen = _rowwise(self._reading_slopes(motion.seen), *self._in_blocks(motion, theta, own), p)
+        shape = by_state.shape[:2]
+        ny = len(motion.seen)
+        return (
+            by_state.reshape(*shape, 6, 6).swapaxes(-1, -2),
+            seen.reshape(*seen.shape[:2], 6, ny).swapaxes(-1, -2),
+        )
+
+    def coefficient_slopes(self, motion: MeasuredBatch, theta: Array, names: Sequence[str]) -> Array:
+        """Rates by parameters of the ship (R, T - 1, 6, len(names)); 0 for what an effect has replaced."""
+        there = [name for name in names if name in self.model]
+        direct = [name for name in there if not name.startswith("steering.")]
+        along, p = self._along(motion, theta, None), self.parameters(theta)
+        columns = np.zeros((*along[0].shape, len(names)))
+        if direct:
+            slopes = _rowwise(self._coefficient_slopes(tuple(direct)), *along, p)
+            by_name = slopes.reshape(*slopes.shape[:2], len(direct), 6).swapaxes(-1, -2)
+            columns[..., [names.index(name) for name in direct]] = by_name
+        for name in there:
+            if name.startswith("steering."):  # through the rudder's own state
+                moved = p.copy()
+                place = self.model.parameter_names.index(name)
+                moved[place] *= 1 + SMALL_SHARE
+                own = self.own_states(motion, theta, moved)
+                rates = _rowwise(self._rates, *self._along(motion, theta, own), moved)
+                columns[..., names.index(name)] = (rates - _rowwise(self._rates, *along, p)) / (moved[place] - p[place])
+        if CLOCK in names:
+            late = self.own_states(motion, theta), self.inputs(motion, theta)
+            behind = self._states_behind("rudder.command")
+            for rows, places in zip(late, (behind, () if behind else (self._command,)), strict=True):
+                for place in places:
+                    rows[..., place] = _late(rows[..., place], 1.0)
+            middles = motion.over_blocks(0.5 * (late[0][:, 1:] + late[0][:, :-1]))
+            rates = _rowwise(self._rates, along[0], middles, motion.over_blocks(late[1]), p)
+            columns[..., names.index(CLOCK)] = (rates - _rowwise(self._rates, *along, p)) / motion.step_s
+        return columns
+
+    @property
+    def _command(self) -> int:
+        return self.model.input_names.index("rudder.command")
+
+    def _along(self, motion: MeasuredBatch, theta: Array, own: Array | None) -> tuple[Array, Array, Array]:
+        if own is None:
+            own = self.own_states(motion, theta)
+        xi = motion.over_blocks(0.5 * (own[:, 1:] + own[:, :-1]))
+        return motion.block_states, xi, motion.over_blocks(self.inputs(motion, theta))
+
+    def _in_blocks(self, motion: MeasuredBatch, theta: Array, own: Array | None) -> tuple[Array, Array, Array]:
+        if own is None:
+            own = self.own_states(motion, theta)
+        inputs = self.inputs(motion, theta)
+        every = np.concatenate([inputs, inputs[:, -1:]], axis=1)
+        x, xi, u = (motion.in_blocks(values) for values in (motion.states, own, every))
+        return x, xi, u
+
+    # -- CasADi functions --------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _symbols(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+        model = self.model
+        known = ca.vcat([model.symbol(name) for name in MEASURED_STATES])
+        own = ca.vcat([model.symbol(name) for name in self.own]) if self.own else ca.SX(0, 1)
+        return known, own, model.u, model.p
+
+    def _of(self, names: Sequence[str]) -> ca.SX:
+        return ca.vcat([self.model.rates[self.model.state_names.index(name)] for name in names])
+
+    @cached_property
+    def _known_rates(self) -> ca.SX:
+        return self._of(MEASURED_STATES)
+
+    @cached_property
+    def _rates(self) -> ca.Function:
+        return ca.Function("rates", [*self._symbols], [self._known_rates], {"cse": True})
+
+    @cached_property
+    def _state_slopes(self) -> ca.Function:
+        slopes = ca.jacobian(self._known_rates, self._symbols[0])
+        return ca.Function("state_slopes", [*self._symbols], [ca.densify(ca.vec(slopes))], {"cse": True})
+
+    def _coefficient_slopes(self, names: tuple[str, ...]) -> ca.Function:
+        chosen = ca.vcat([self.model.symbol(name) for name in names])
+        slopes = ca.jacobian(self._known_rates, chosen)
+        return ca.Function("coefficient_slopes", [*self._symbols], [ca.densify(ca.vec(slopes))], {"cse": True})
+
+    def _shown(self, seen: Sequence[str]) -> ca.SX:
+        names = [f"sensor.{name.partition('.')[2]}" for name in seen]
+        chosen = [there if there in self.model else name for there, name in zip(names, seen, strict=True)]
+        return self.model.expand(ca.vcat([self.model.symbol(name) for name in chosen]))
+
+    def _readings(self, seen: Sequence[str]) -> ca.Function:
+        return ca.Function("readings", [*self._symbols], [ca.densify(self._shown(seen))], {"cse": True})
+
+    def _reading_slopes(self, seen: Sequence[str]) -> ca.Function:
+        slopes = ca.jacobian(self._shown(seen), self._symbols[0])
+        return ca.Function("reading_slopes", [*self._symbols], [ca.densify(ca.vec(slopes))], {"cse": True})
+
+    @cached_property
+    def _own_rates(self) -> ca.Function:
+        known, own, u, p = self._symbols
+        return ca.Function("own_rates", [own, known, u, p], [self._of(self.own)], {"cse": True})
+
+    def _chain(self, step_s: float) -> Chain:
+        """Own states over one fine step, with the motion straight between its ends (classical Runge-Kutta)."""
+        if step_s not in self._chains:
+            known, own, u, p = self._symbols
+            end = ca.SX.sym("end", 6)
+            count = max(1, int(np.ceil(step_s / self.model.step_s - 1e-9)))
+            h, state = step_s / count, own
+            for part in range(count):
+                a, b, c = (known + (end - known) * (part + share) / count for share in (0.0, 0.5, 1.0))
+                k1 = self._own_rates(state, a, u, p)
+                k2 = self._own_rates(state + h / 2 * k1, b, u, p)
+                k3 = self._own_rates(state + h / 2 * k2, b, u, p)
+                k4 = self._own_rates(state + h * k3, c, u, p)
+                state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            step = ca.Function("own_step", [own, known, end, u, p], [ca.densify(state)], {"cse": True})
+            self._chains[step_s] = Chain(step)
+        return self._chains[step_s]
+
+    @cached_property
+    def _begin(self) -> ca.Function:
+        """Trims of the own states, or else their starts."""
+        known, own, u, p = self._symbols
+        trims = {
+            state.name: state.trim if state.trim is not None else ca.SX(state.start) for state in self.model.states
+        }
+        start = ca.densify(self.model.expand(ca.vcat([trims[name] for name in self.own])))
+        return ca.Function("begin", [own, known, u, p], [start])
+
+    @cached_property
+    def _newton(self) -> ca.Function:
+        """Rates of the own states, and their slopes by these."""
+        known, own, u, p = self._symbols
+        own_rates = self._of(self.own)
+        return ca.Function("newton", [own, known, u, p], [own_rates, ca.jacobian(own_rates, own)], {"cse": True})
+
+    def _settled(self, x: Array, u: Array, p: Array) -> Array:
+        """Own states at rest beside a motion that stands still: where trims are known they are taken."""
+        states = {state.name: state for state in self.model.states}
+        xi = np.array(self._begin(np.zeros(len(self.own)), x, u, p)).ravel()
+        moving = np.array([states[name].trim is None and states[name].steady for name in self.own])
+        for _ in range(NEWTON_STEPS if moving.any() else 0):
+            rate, slope_there = (np.array(value) for value in self._newton(xi, x, u, p))
+            part = np.ix_(moving, moving)
+            xi[moving] -= np.linalg.lstsq(slope_there[part], rate[moving, 0], rcond=None)[0]
+            xi = np.where(moving, xi, np.array(self._begin(xi, x, u, p)).ravel())
+        return xi
+
+
+def _rowwise(function: ca.Function, *arguments: Array) -> Array:
+    """A function over arrays (R, n, k), the last argument (k,) held: (R, n, results)."""
+    shape = arguments[0].shape[:2]
+    columns = [argument.reshape(shape[0] * shape[1], -1).T for argument in arguments[:-1]]
+    result = np.array(function(*columns, arguments[-1])).T
+    return result.reshape(*shape, -1)
+
+
+def _late(rows: Array, steps: float) -> Array:
+    """Values (R, n) as they would have been `steps` (a real number) later; the first one held before."""
+    places = np.arange(rows.shape[1])
+    return np.array([np.interp(places - steps, places, one) for one in rows])

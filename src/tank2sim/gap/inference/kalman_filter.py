@@ -1,0 +1,262 @@
+"""A Kalman filter about the measured motion: how likely the measurements are, whatever is missing.
+
+The error of the measured motion, the slow forces that nobody modelled (process noise) and the slow errors of the
+sensors are the states; the filter is linear, so that what an effect adds to the motion passes through it as a column of
+its own, and every explanation with the same noise is one small least-squares problem.
+
+    state      z = (dx of 6 states, 3 accelerations, ny sensor errors)
+    dx[k+1]    = Phi dx[k] + Gamma (g a[k] + w[k] + d[k]),   d = what the model's rates have beyond the measured change
+    a, e       first-order Gauss-Markov processes (white noise through a lag)
+    y - h(x)   = H dx + e + white noise
+
+Durbin and Koopman (2012), Time Series Analysis by State Space Methods, 2nd ed., chapters 4 and 7: likelihood by
+innovations, its slope in the noise's own parameters by the backward (disturbance) smoother.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.arrays import Array
+from tank2sim.gap.inference import kalman_kernels
+
+_Truths = NDArray[np.bool_]
+
+DOUBLINGS = 3
+"""Doublings of an eighth of a block, over which even a hull in very shallow water moves little."""
+
+FORCE_STATES = 3
+"""Accelerations of surge, sway and yaw."""
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseLevels:
+    """Levels and times of the noise.
+
+    Parameters
+    ----------
+    white, slow, slow_s : array (ny,)
+        Of each sensor: standard deviation of the white noise of a block's mean, of the slow error, its time constant.
+    force, force_s : array (3,)
+        Of the accelerations that nobody modelled: standard deviation (m/s2, m/s2, rad/s2) and time constant.
+    """
+
+    white: Array
+    slow: Array
+    slow_s: Array
+    force: Array
+    force_s: Array
+
+    @property
+    def logs(self) -> Array:
+        """Logarithms of all in one vector (3 ny + 6,)."""
+        logs: Array = np.log(np.concatenate([self.white, self.slow, self.slow_s, self.force, self.force_s]))
+        return logs
+
+    @staticmethod
+    def of(logs: Array) -> NoiseLevels:
+        """From :attr:`logs`."""
+        ny = (len(logs) - 2 * FORCE_STATES) // 3
+        values = np.exp(logs)
+        white, slow, slow_s = (values[part * ny : (part + 1) * ny] for part in range(3))
+        return NoiseLevels(white, slow, slow_s, values[3 * ny : 3 * ny + FORCE_STATES], values[3 * ny + FORCE_STATES :])
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """The motion about which the filter is linear.
+
+    Parameters
+    ----------
+    transition : array (R, T - 1, 6, 6)
+        From the middle of each block to that of the next.
+    spreading : array (R, T - 1, 6, 6)
+        What rates that are added during that time come to at its end, over what they would if nothing moved on.
+    reading : array (R, T, ny, 6)
+        Readings by states.
+    known : array (R, T, ny)
+        Where something was measured.
+    block_s : float
+    wide : array (6,)
+        Standard deviation of the error of the smoothed motion at the beginning: generous.
+    """
+
+    transition: Array
+    spreading: Array
+    reading: Array
+    known: _Truths
+    block_s: float
+    wide: Array
+
+
+def linear_filter(by_state: Array, reading: Array, known: _Truths, block_s: float, wide: Array) -> Linear:
+    """From the rates by states (R, T - 1, 6, 6): exp(A h), and its mean over the time to the end of the block.
+
+    By Taylor's series over h/8 and three doublings (scaling and squaring: Moler and Van Loan 2003, SIAM Review 45).
+    """
+    A = by_state * block_s / 2**DOUBLINGS
+    eye = np.eye(6)
+    square = A @ A
+    transition = eye + A + square / 2 + square @ A / 6
+    spreading = eye + A / 2 + square / 6
+    for _ in range(DOUBLINGS):
+        spreading = 0.5 * (spreading + transition @ spreading)
+        transition = transition @ transition
+    return Linear(transition, spreading, np.ascontiguousarray(reading), known, block_s, wide)
+
+
+@dataclass(frozen=True, eq=False)
+class Observer:
+    """The filter for one noise: gains, and what a backward pass needs.
+
+    Parameters
+    ----------
+    what : Linear
+    noise : Noise
+    push : array (R, T - 1, 6, 3)
+        Errors of the motion by the accelerations a block before.
+    fading : array (nz - 6,)
+        Share of each acceleration and sensor error that is left a block later.
+    gain : array (R, T, nz, ny)
+    white : array (R, T, ny, ny)
+        Inverse of the lower Cholesky factor of the innovations' covariance.
+    filtered : array (R, T, nz, nz)
+        Covariance after each measurement.
+    log_det : float
+        Sum of log det of the innovations' covariance, over what was measured.
+    """
+
+    what: Linear
+    noise: NoiseLevels
+    push: Array
+    fading: Array
+    gain: Array
+    white: Array
+    filtered: Array
+    log_det: float
+
+    def whitened(self, driving: Array, shown: Array) -> Array:
+        """Innovations in units of their standard deviation, of several columns at once.
+
+        Parameters
+        ----------
+        driving : array (R, T - 1, 6, C)
+            What the rates add to the states from block to block.
+        shown : array (R, T, ny, C)
+            What the sensors show; nan where nothing was measured.
+
+        Returns
+        -------
+        array (R, T, ny, C)
+            0 where nothing was measured.
+        """
+        return self.passed(driving, shown, keep=False)[0]
+
+    def passed(self, driving: Array, shown: Array, *, keep: bool = True) -> tuple[Array, Array]:
+        """Innovations in units of their standard deviation (R, T, ny, C), and states after each measurement
+        (R, T, nz, C) if they are to be kept; arguments as above."""
+        columns = np.ascontiguousarray(driving), np.ascontiguousarray(shown)
+        whitened, after = kalman_kernels.run_filter(self._seeing, self._moving, (self.gain, self.white), columns, keep)
+        return whitened, after
+
+    def smoothed(self, driving: Array, shown: Array) -> Array:
+        """States given all measurements (R, T, nz), of one column; arguments as in :meth:`whitened` without C."""
+        after = self.passed(driving[..., None], shown[..., None])
+        states: Array = kalman_kernels.smooth_backward(self._seeing, self._moving, self._filtering, *after)[..., 0]
+        return states
+
+    @property
+    def _seeing(self) -> tuple[Array, _Truths]:
+        return self.what.reading, self.what.known
+
+    @property
+    def _moving(self) -> tuple[Array, Array, Array, Array]:
+        return self.what.transition, self.what.spreading, self.push, self.fading
+
+    @property
+    def _filtering(self) -> tuple[Array, Array, Array]:
+        return self.gain, self.white, self.filtered
+
+
+@dataclass(frozen=True, eq=False)
+class _Pushed:
+    """An acceleration of first order over a block (3,): the change of speed that its value at the beginning makes
+    (`gain`), and the variances of what comes on top by chance: of that change, of it with the acceleration at the end
+    (`both`), and the slopes of all three in the logarithm of the time constant. Singer (1970), IEEE Trans. AES 6(4)."""
+
+    gain: Array
+    way: Array
+    both: Array
+    gain_slope: Array
+    way_slope: Array
+    both_slope: Array
+
+
+def _pushed(noise: NoiseLevels, block_s: float) -> _Pushed:
+    time, level = noise.force_s, noise.force
+    x = block_s / time
+    f = np.exp(-x)
+    gain = time * (1 - f)
+    way = (level * time) ** 2 * (2 * x - 3 + 4 * f - f**2)
+    both = level**2 * time * (1 - f) ** 2
+    return _Pushed(
+        gain,
+        way,
+        both,
+        gain - time * f * x,
+        2 * way + (level * time) ** 2 * (-2 * x + 4 * f * x - 2 * f**2 * x),
+        both - 2 * level**2 * time * (1 - f) * f * x,
+    )
+
+
+def observer(what: Linear, noise: NoiseLevels) -> Observer:
+    """The filter of a noise: the covariance recursion, once for all columns."""
+    runs, blocks, ny, _ = what.reading.shape
+    nz = 6 + FORCE_STATES + ny
+    fading = np.exp(-what.block_s / np.concatenate([noise.force_s, noise.slow_s]))
+    levels = np.concatenate([noise.force, noise.slow])
+    pushed = _pushed(noise, what.block_s)
+    B = what.spreading[..., :FORCE_STATES]
+    Q = np.zeros((runs, blocks - 1, nz, nz))
+    Q[..., range(6, nz), range(6, nz)] = levels**2 * (1 - fading**2)
+    Q[..., :6, :6] = (B * pushed.way) @ B.swapaxes(-1, -2)
+    Q[..., :6, 6:9] = B * pushed.both
+    Q[..., 6:9, :6] = Q[..., :6, 6:9].swapaxes(-1, -2)
+    push = B * pushed.gain
+    start = np.concatenate([what.wide**2, levels**2])
+    seeing = what.reading, what.known, noise.white**2
+    gain, white, filtered = kalman_kernels.covariances(start, what.transition, push, fading, Q, seeing)
+    # rows without a measurement have S = 1 on their diagonal and count nothing
+    log_det = float(-2 * np.sum(np.log(white[..., range(ny), range(ny)])))
+    return Observer(what, noise, push, fading, gain, white, filtered, log_det)
+
+
+def slopes(seen: Observer, driving: Array, shown: Array, whitened: Array) -> Array:
+    """Slope of ``sum(log det S) + |whitened|^2`` in the logarithms of the noise (:attr:`NoiseLevels.logs`).
+
+    `whitened` (R, T, ny, C) are the columns that count: the residual, and those of uncertain coefficients each times
+    the root of its covariance; `driving` and `shown` are what they were made of.
+
+    d(log det V + e'V^-1 e) = tr(V^-1 dV) - e'V^-1 dV V^-1 e, which the backward recursion gives for every noise at
+    once: r carries V^-1 e back to the states, N its covariance under the model (Durbin and Koopman, 7.3.3).
+    """
+    noise, block_s = seen.noise, seen.what.block_s
+    after = seen.passed(driving, shown)[1]
+    moved = seen._seeing, seen._moving, seen._filtering
+    variance, start, fading_slope, way, both, gain, white = kalman_kernels.backward(*moved, whitened, after)
+    levels = np.concatenate([noise.force, noise.slow])
+    times = np.concatenate([noise.force_s, noise.slow_s])
+    fading = seen.fading
+    by_level = 2 * levels**2 * ((1 - fading**2) * variance + start)
+    # d fading/d log time = fading h/time; the driving variance is level^2 (1 - fading^2)
+    by_time = (fading_slope - 2 * fading * levels**2 * variance) * fading * block_s / times
+    pushed = _pushed(noise, block_s)
+    by_level[:FORCE_STATES] += 2 * (way * pushed.way + both * pushed.both)
+    by_time[:FORCE_STATES] += way * pushed.way_slope + both * pushed.both_slope + gain * pushed.gain_slope
+    by_white = 2 * noise.white**2 * white
+    return np.concatenate(
+        [by_white, by_level[FORCE_STATES:], by_time[FORCE_STATES:], by_level[:FORCE_STATES], by_time[:FORCE_STATES]]
+    )

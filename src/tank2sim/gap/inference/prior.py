@@ -1,0 +1,135 @@
+"""From a card and trials to the likelihood that judges explanations: what of the card may be wrong, and which noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.terms import known_term
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.model import Model
+from tank2sim.gap.inference.batch import MeasuredBatch, batch_trials
+from tank2sim.gap.inference.fit import Belief, NuisanceParameters
+from tank2sim.gap.inference.hypothesis import CLOCK, Hypothesis
+from tank2sim.gap.inference.kalman_filter import FORCE_STATES, NoiseLevels
+from tank2sim.gap.inference.likelihood import WIDE_PRIOR, Likelihood
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.problem_from_card import free_parameters
+from tank2sim.records.trials import sampling_step
+
+SLOW_SHARE = 0.3
+"""Slow error of a sensor over its white noise at 10 samples in a block, before the trials tell (ours)."""
+
+SLOW_TIME = 3.0
+"""Time constant of a sensor's slow error before the trials tell, in L/u0 (ours): it outlasts a manoeuvre's phases."""
+
+FORCE_SHARE = 0.01
+"""Unexplained acceleration before the trials tell, as a share of what the ship's accelerations are (ours)."""
+
+FORCE_TIME = 0.5
+"""Time constant of the unexplained acceleration before the trials tell, in L/u0 (ours): that of gusts."""
+
+GEAR, ASSUMED_GEAR = 0.02, 0.5
+"""Standard error of what a card states of its steering gear, as that of a coefficient without one, and of the time
+constant that is assumed where it states none (ours)."""
+
+BEGINNING = 0.1
+"""Standard deviation of the first state about the measured one, in u0, u0/L, rad and 3 L (ours): more than a log, a
+gyro, a compass or the place of an antenna is wrong by."""
+
+CLOCK_SHARE = 0.5
+"""Standard error of the time of the rudder's record, in sampling steps (ours)."""
+
+LARGEST_SHARE = 0.1
+"""A group of coefficients is wrong together by no more than this share of their values (ours)."""
+
+BELIEVED = {"white": 0.5, "slow": 1.5, "slow_s": 0.7, "force": 2.5, "force_s": 0.7, "width": 0.7}
+"""Standard deviation of the logarithm of each, before the trials tell (ours): noise may be anything within reason."""
+
+
+def likelihood_from_card(card: ManoeuvringCard, measured: Measured) -> Likelihood:
+    """The likelihood of trials for a card.
+
+    Raises
+    ------
+    InputError
+        A trial is too short, or tells neither velocities nor positions.
+    """
+    none = Hypothesis(card, measured.driven_by)
+    ship_time = card.ship.length_m / card.model.speed_mps
+    motion = batch_trials(none.model, measured.trials, ship_time)
+    free = free_parameters(card, inertia=True)
+    known = {name: error for name, (_, error) in free.items() if name in none.model.parameter_names}
+    known |= _of_the_gear(card, none.model)
+    known[CLOCK] = CLOCK_SHARE * max(sampling_step(trial) for trial in measured.trials)
+    mixing = np.column_stack([np.diag(list(known.values())), *_shared(tuple(known), known, free)])
+    length, speed = card.ship.length_m, card.model.speed_mps
+    wide = BEGINNING * np.array([speed, speed, speed / length, 1.0, 3 * length, 3 * length])
+    known_before = replace(belief(motion, ship_time), wide=np.maximum(wide, WIDE_PRIOR * motion.errors))
+    return Likelihood(motion, none, NuisanceParameters(tuple(known), mixing), known_before)
+
+
+def _group(name: str) -> str:
+    """Which coefficients came from the same tests, and may be wrong together."""
+    term = known_term(name)
+    if term.acceleration:
+        return "accelerations"
+    if term.d:
+        return "rudder"
+    linear = term.v + term.r == 1 and not term.u
+    return f"{term.force}, linear" if linear else term.force
+
+
+def _shared(
+    names: tuple[str, ...], errors: Mapping[str, float], free: Mapping[str, tuple[float, float]]
+) -> list[NDArray[np.float64]]:
+    """Errors that coefficients share: a group all too large or too small, each by its own standard error."""
+    columns: dict[str, NDArray[np.float64]] = {}
+    for place, name in enumerate(names):
+        value = free.get(name, (0.0, 0.0))[0]
+        if name.startswith("derivatives.") and value:
+            column = columns.setdefault(_group(name.partition(".")[2]), np.zeros(len(names)))
+            column[place] = np.sign(value) * min(errors[name], LARGEST_SHARE * abs(value))
+    return list(columns.values())
+
+
+def _of_the_gear(card: ManoeuvringCard, model: Model) -> dict[str, float]:
+    """Rate and time constant of the steering gear, as uncertain as a coefficient; one that was assumed far more so."""
+    start = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+    stated = card.steering_gear is not None and card.steering_gear.time_constant_s is not None
+    shares = {"steering.max_rate": GEAR, "steering.time_constant": GEAR if stated else ASSUMED_GEAR}
+    return {name: share * float(start[name]) for name, share in shares.items() if start.get(name)}
+
+
+def belief(motion: MeasuredBatch, ship_time: float) -> Belief:
+    """What is believed of the noise before the trials tell."""
+    accelerations = np.diff(motion.states[..., :3], axis=1) / motion.step_s
+    size = np.sqrt(np.mean(accelerations**2, axis=(0, 1)))
+    ny = len(motion.seen)
+    noise = NoiseLevels(
+        white=motion.noise,
+        slow=SLOW_SHARE * motion.noise * np.sqrt(10.0),
+        slow_s=np.full(ny, SLOW_TIME * ship_time),
+        force=FORCE_SHARE * size,
+        force_s=np.full(FORCE_STATES, FORCE_TIME * ship_time),
+    )
+    spread = np.repeat(list(BELIEVED.values())[:-1], [ny, ny, ny, FORCE_STATES, FORCE_STATES])
+    return Belief(np.append(noise.logs, 0.0), np.append(spread, BELIEVED["width"]))
+
+
+def candidate_explanations(card: ManoeuvringCard, driven_by: str) -> tuple[str, ...]:
+    """Effects that can be asked for: those the card has not, with values to begin a search from.
+
+    Where the rudder's angle was measured, what the gear does is in the record, and nothing of it is asked for.
+    """
+    have = {entry.name for entry in card.effects}
+    chosen = []
+    for name, effect in EFFECTS.items():
+        inside_the_gear = effect.acts_on == "actuator" and name != "rudder_bias"
+        if effect.tried(card) and name not in have and not (driven_by == "angle" and inside_the_gear):
+            chosen.append(name)
+    return tuple(chosen)

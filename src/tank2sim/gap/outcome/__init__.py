@@ -1,0 +1,1 @@
+"""What follows from a gap: the improved card, corrected sensors, the next test."""

@@ -1,0 +1,300 @@
+"""A card with the effects that were found: keys where an effect changes what the card states, else ``[[effects]]``.
+
+A quantity is stated once. Both ways give the same model.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+
+import casadi as ca
+import numpy as np
+import tomlkit
+from numpy.typing import NDArray
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.reading import changed_text, parse_card
+from tank2sim.cards.scaling import file_factor
+from tank2sim.cards.terms import known_term
+from tank2sim.dynamics import build
+from tank2sim.dynamics.abkowitz import ALL_TERMS
+from tank2sim.dynamics.effects import EFFECTS, EffectParameter
+from tank2sim.dynamics.effects.particulars import model_particular
+from tank2sim.dynamics.model import Model, Quantity
+from tank2sim.files import BYTE_ORDER_MARK
+from tank2sim.gap.outcome.export import estimate_in_file, in_file_units
+from tank2sim.identification.trials.problem.problem_from_card import rounded
+from tank2sim.units import from_si, in_words, to_si
+
+Found = tuple[str, Mapping[str, float], Mapping[str, float]]
+"""Name of an effect, its parameters by name, and the standard errors of those that were estimated; SI."""
+
+STATED_BY_EFFECT = {"rudder_rate_limit": "steering_gear.max_rate_degps", "rudder_lag": "steering_gear.time_constant_s"}
+"""Effects of one parameter that stands in place of a key of the card, and that key as it is written anew."""
+
+_RUDDER = "rudder_effectiveness"
+
+CHANGING_DERIVATIVES = frozenset(
+    {
+        *("cubic_yaw_damping", "sway_yaw_coupling", "turning_drag", "linear_yaw_damping", "linear_sway_damping"),
+        *("added_yaw_inertia", "added_sway_mass", _RUDDER),
+    }
+)
+"""Effects that are nothing but other values of derivatives."""
+
+BUILT_ON_DERIVATIVES = frozenset({"flow_memory", "loaded_rudder", "shallow_water", "water_depth", "trim"})
+"""Effects whose forces hold derivatives. One that was fitted on top of a change of derivatives did not see that change
+(or magnified it alone), and would if it were written into the keys: then both stay ``[[effects]]``, in their order."""
+
+_DIGITS = 10
+"""Significant digits of numbers without a standard error: a particular that is estimated must give the force that was
+fitted."""
+
+
+def add_effects_to_card(card: ManoeuvringCard, found: Sequence[Found]) -> ManoeuvringCard:
+    """The card with effects on top; the given card where none of them is of the ship (faults of sensors).
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    found : sequence of Found
+        In the order in which their model was built. None of them may be among the card's own effects.
+
+    Notes
+    -----
+    Keys that change bear their old value as a comment, and derivatives a combined standard error: that of the card and
+    that of the effect, each by its slope, as if they were independent. Trials tell the sum of the two better than
+    either, so that this is too large rather than too small. Particulars that an effect took for want of stated ones
+    are written into ``[ship]`` as estimated.
+
+    Raises
+    ------
+    InputError
+        The card lacks something that an effect needs.
+    ValueError
+        The card has one of the effects already.
+    """
+    ship = [one for one in found if EFFECTS[one[0]].acts_on != "sensor"]
+    for name in {entry.name for entry in card.effects} & {name for name, *_ in ship}:
+        raise ValueError(f"the card has {name} already")
+    for place, (name, values, errors) in enumerate(ship):
+        behind = {other for other, *_ in ship[place + 1 :]}
+        if name in STATED_BY_EFFECT:
+            card = _changed(card, dict([_stated(card, name, values, errors)]))
+        elif name in CHANGING_DERIVATIVES and not behind & BUILT_ON_DERIVATIVES:
+            card = _changed(card, _derivatives(card, name, values, errors))
+        else:
+            card = _with_entry(_with_particulars(card, name, values), name, values, errors)
+    return card
+
+
+def card_with_effects_text(
+    card: ManoeuvringCard, found: Sequence[Found], trials: Sequence[str], rivals: Sequence[str] = ()
+) -> str:
+    """Text of a card with effects added by :func:`add_effects_to_card`, headed by their names and the trials used.
+
+    A card to which nothing was added is given as it stands. `rivals` are what these trials cannot tell from them.
+    """
+    names = [name for name, *_ in found if EFFECTS[name].acts_on != "sensor"]
+    if not names:
+        return card.text
+    how = f"{' and '.join(names)} added by tank2sim gap from {', '.join(trials)}"
+    text = changed_text(card.text, card.source, {"ship.source": f"{card.ship.source}; {how}"})
+    told = [f"{name}: {in_short(name, values, errors)}" for name, values, errors in found if name in names]
+    lines = [how, *told]
+    if any(name in STATED_BY_EFFECT or name in CHANGING_DERIVATIVES for name in names):
+        lines.append("Keys that were changed for this bear their old values in comments.")
+    if rivals:
+        lines.append(f"These trials cannot tell this from: {'; '.join(rivals)}.")
+    mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
+    return mark + "".join(f"# {_printable(line)}\n" for line in lines) + text.removeprefix(mark)
+
+
+def in_short(name: str, values: Mapping[str, float], errors: Mapping[str, float]) -> str:
+    """Parameters of an effect with their standard errors, in words: ``speed 0.45 m/s (standard error 0.02)``."""
+    told = []
+    for parameter in EFFECTS[name].parameters:
+        if parameter.name not in values:
+            continue
+        own, value, error = _written(parameter, values, errors)
+        words, unit = in_words(own)
+        spread = f" (standard error {error:.2g})" if error else ""
+        told.append(f"{words} {value:.6g}{f' {unit}' if unit else ''}{spread}")
+    return ", ".join(told)
+
+
+Change = tuple[object, str]
+"""New value of a key as the file has it, and the comment beside it."""
+
+
+def _changed(card: ManoeuvringCard, changes: Mapping[str, Change]) -> ManoeuvringCard:
+    text = card.text
+    for comment, those in groupby(sorted(changes.items(), key=_comment), key=_comment):
+        text = changed_text(text, card.source, {key: value for key, (value, _) in those}, comment=comment)
+    return _parsed(card, text)
+
+
+def _comment(change: tuple[str, Change]) -> str:
+    return change[1][1]
+
+
+def _parsed(card: ManoeuvringCard, text: str) -> ManoeuvringCard:
+    new = parse_card(text, card.source)
+    assert isinstance(new, ManoeuvringCard)
+    return new
+
+
+def _document(card: ManoeuvringCard) -> tomlkit.TOMLDocument:
+    return tomlkit.parse(card.text.removeprefix(BYTE_ORDER_MARK))
+
+
+def _was(document: tomlkit.TOMLDocument, key: str, name: str) -> str:
+    """Comment of a key that an effect changes: its old value as it stood in the file."""
+    section, _, own = key.partition(".")
+    content = document.get(section, {})
+    return f"was {content[own].as_string()} before {name}" if own in content else f"not stated before {name}"
+
+
+# -- what the card states of the steering gear ---------------------------------------------------------------------
+
+
+def _stated(
+    card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
+) -> tuple[str, Change]:
+    (parameter,) = EFFECTS[name].parameters
+    key = card.spelt.get(f"steering_gear.{parameter.name}", STATED_BY_EFFECT[name])
+    value, error = (from_si(key, each.get(parameter.name, 0.0)) for each in (values, errors))
+    spread = f"; standard error {error:.2g}" if error else ""
+    return key, (_rounded(value, error), f"{_was(_document(card), key, name)}{spread}")
+
+
+# -- derivatives ---------------------------------------------------------------------------------------------------
+
+
+def _derivatives(
+    card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
+) -> dict[str, Change]:
+    """Keys of ``[derivatives]`` and ``[uncertainty]`` that an effect changes."""
+    scales = card.scales if card.model.scaling == "dimensional" else None
+    document, changes = _document(card), dict[str, Change]()
+    spelt = {known_term(key).name: key for key in document.get("uncertainty", {})}  # it may be unlike [derivatives]
+    for derivative, value, own, total in changed_derivatives(card, name, values, errors):
+        factor = file_factor(known_term(derivative), scales, rudder_to_port=card.model.rudder_sign == "port")
+        stated = card.places.get(derivative, derivative)
+        key, error = f"derivatives.{stated}", f"uncertainty.{spelt.get(derivative, stated)}"
+        # To a thousandth of what the effect is known to; the card's own error would take away digits that it states.
+        changes[key] = _rounded(value * factor, own * abs(factor)), _was(document, key, name)
+        if total > 0:
+            changes[error] = float(f"{total * abs(factor):.3g}"), f"that of the card combined with that of {name}"
+    return changes
+
+
+def changed_derivatives(
+    card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
+) -> Iterator[tuple[str, float, float, float]]:
+    """Derivatives that one of :data:`CHANGING_DERIVATIVES` changes: name, value then (prime), standard error by the
+    effect alone, and altogether.
+
+    The effect itself is asked: it is applied to a model that has each derivative as a quantity.
+    """
+    model = build(card)
+    names = [one for one in ALL_TERMS if f"derivatives.{one}" in model]
+    asked = [
+        Quantity(name=f"changed.{one}", unit="1", description=one, value=model.symbol(f"derivatives.{one}"))
+        for one in names
+    ]
+    changed = EFFECTS[name].apply(model.extend(*asked), values, card)
+    found = {one: changed.symbol(f"changed.{one}") for one in names}
+    if name == _RUDDER:  # which magnifies forces; these are sums of terms, each in proportion to its derivative
+        more = 1 + changed.symbol(f"{_RUDDER}.factor")
+        found |= {one: more * found[one] for one in names if known_term(one).d}
+    after, slopes = _values_and_slopes(changed, ca.vcat(list(found.values())))
+    own = np.zeros(len(changed.parameters))
+    card_error = np.zeros(len(changed.parameters))
+    for parameter, place in EFFECTS[name].model_names().items():
+        own[changed.parameter_names.index(place)] = errors.get(parameter, 0.0)
+    for one in names:
+        card_error[changed.parameter_names.index(f"derivatives.{one}")] = card.standard_error(one)
+    by_effect, by_card = (np.sqrt(slopes**2 @ each**2) for each in (own, card_error))
+    for row, one in enumerate(names):
+        if after[row] != card.derivatives.get(one, 0.0) or by_effect[row] > 0:
+            yield one, float(after[row]), float(by_effect[row]), math.hypot(by_effect[row], by_card[row])
+
+
+def _values_and_slopes(model: Model, wanted: ca.SX) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values of expressions that hold parameters alone (n,), and their slopes by all parameters (n, np)."""
+    expression = model.expand(wanted)
+    evaluate = ca.Function("changed", [model.p], [expression, ca.densify(ca.jacobian(expression, model.p))])
+    values, slopes = evaluate(model.parameter_values())
+    return np.array(values).ravel(), np.array(slopes)
+
+
+# -- [[effects]] and [ship] ----------------------------------------------------------------------------------------
+
+
+def _with_entry(
+    card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
+) -> ManoeuvringCard:
+    """The card with one of ``[[effects]]`` more, behind those that it has."""
+    parameters, uncertainty = tomlkit.table(), tomlkit.table()
+    for parameter in EFFECTS[name].parameters:
+        if parameter.name not in values:
+            continue
+        own, value, error = _written(parameter, values, errors)
+        parameters[own] = value
+        if error:
+            uncertainty[own] = error
+    document = _document(card)
+    if "effects" not in document:
+        document["effects"] = tomlkit.aot()
+    entry = tomlkit.table()
+    entry["name"], entry["parameters"] = name, parameters
+    if uncertainty:
+        entry["uncertainty"] = uncertainty
+    if isinstance(document["effects"], tomlkit.items.AoT):
+        entry.trivia.indent = "\n"  # a line between this entry and what is before it
+        document["effects"].append(entry)
+    else:  # effects = [{...}]
+        document["effects"].append(entry.unwrap())
+    mark = BYTE_ORDER_MARK if card.text.startswith(BYTE_ORDER_MARK) else ""
+    return _parsed(card, mark + tomlkit.dumps(document))
+
+
+def _with_particulars(card: ManoeuvringCard, name: str, values: Mapping[str, float]) -> ManoeuvringCard:
+    """The card with the particulars that an effect took for want of stated ones."""
+    model = build(card)
+    notices = [one for one in EFFECTS[name].apply(model, values, card).notices if one not in model.notices]
+    changes: dict[str, Change] = {}
+    for key in type(card.ship).model_fields:
+        for notice in notices:
+            if notice.startswith(f"the card states no {key}: "):
+                value = float(f"{model_particular(card, key):.{_DIGITS}g}")
+                changes[f"ship.{key}"] = value, f"estimated for {name}: {notice.rpartition('(')[2].rstrip(')')}"
+    return _changed(card, changes) if changes else card
+
+
+# -- numbers -------------------------------------------------------------------------------------------------------
+
+
+def _written(
+    parameter: EffectParameter, values: Mapping[str, float], errors: Mapping[str, float]
+) -> tuple[str, float, float]:
+    """Name, value and standard error (0 if there is none) of a parameter as a card has them, rounded, within bounds."""
+    own, value = estimate_in_file(parameter.name, values[parameter.name])
+    error = in_file_units(parameter.name, errors.get(parameter.name, 0.0))[1]
+    error = float(f"{error:.3g}") if math.isfinite(error) else 0.0
+    # At a bound it may be rounded past it, in another unit even by the last bit of a float.
+    tried = (_rounded(value, error), value, value * (1 - 1e-12), value * (1 + 1e-12))
+    shown = next((one for one in tried if parameter.minimum <= to_si(own, one)[1] <= parameter.maximum), value)
+    return own, shown, error
+
+
+def _rounded(value: float, error: float) -> float:
+    return rounded(value, error) + 0.0 if error > 0 else float(f"{value:.{_DIGITS}g}") + 0.0
+
+
+def _printable(line: str) -> str:
+    """One line without what a comment must not hold: names of files may have anything."""
+    return "".join(letter if letter.isprintable() else " " for letter in line)

@@ -1,0 +1,380 @@
+"""The manoeuvre that would decide between explanations, by simulation of each and by what could still hide it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.effects.effect import MEASURED_BEFOREHAND
+from tank2sim.dynamics.model import Input, Parameter
+from tank2sim.gap.outcome.next_test_candidates import (
+    REVOLUTIONS,
+    RUDDER,
+    Candidate,
+    candidate_manoeuvres,
+    on_heading,
+    orders_csv,
+)
+from tank2sim.gap.proof.open_loop import INSTANTS, delayed, parts_of, shown_by
+from tank2sim.gap.result import NextTest
+from tank2sim.identification.trials.problem.problem_from_card import driven_model
+from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
+from tank2sim.simulation.rows import RowFunction
+from tank2sim.simulation.scheme import runge_kutta_step
+
+LENGTH = 24.0
+"""Length of a test, L/u0: a turn with 35 deg goes round once and a half, a zigzag reverses four times (ours)."""
+
+DECIDES = 10.0
+"""Gain of the score that decides: as for naming an effect."""
+
+AS_GOOD = 0.9
+"""Of manoeuvres with this share of the best score the first in the list is chosen: standard ones stand first (ours)."""
+
+READ_S = 1.0
+"""Readings are compared this far apart, s; nearer ones are taken to err together (ours)."""
+
+_WINDOW = 3.0
+"""Length of a window, L/u0 (ours): the slowest transients of a hull are in it, and a gust that lasts is as good as
+constant."""
+
+GUSTS = math.radians(0.25)
+"""Wind, waves and what else no model foresees are as strong as this much rudder (ours)."""
+
+FREE = 0.1
+"""The first motion of a window is known to this share of nominal values beforehand: as good as not at all (ours)."""
+
+TO_FEEL = 0.1
+"""Differences by a parameter are taken over this share of its standard deviation."""
+
+_ROUNDED = 1
+"""Decimals of an order in degrees: as fine as a helmsman can give it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """What could be the truth.
+
+    Parameters
+    ----------
+    name : str
+        For people: the effect, or ``none``.
+    card : ManoeuvringCard
+        With the effect at its most probable parameters; for ``none`` the card as it is.
+    free : tuple of str
+        k names of the model's parameters and inputs that are not known exactly: the effect's, and derivatives.
+    covariance : array (k, k)
+        Of these, SI (derivatives prime); may be singular.
+    """
+
+    name: str
+    card: ManoeuvringCard
+    free: tuple[str, ...]
+    covariance: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What one explanation foresees of c manoeuvres in w windows each, in noise units.
+
+    Parameters
+    ----------
+    readings : array (c, w, m)
+    slopes : array (c, w, m, k)
+        By what is unknown of the explanation, each column per standard deviation.
+    passing : array (c, w, m, j)
+        By what is unknown of the window: its first state, and disturbances.
+    """
+
+    readings: Array
+    slopes: Array
+    passing: Array
+
+
+def next_test(
+    explanations: Sequence[Explanation],
+    noise: Mapping[str, float],
+    duration_s: float | None = None,
+    correlation_s: float = 0.0,
+) -> NextTest | None:
+    """The manoeuvre by which the first explanation is told apart best from all the others.
+
+    A manoeuvre's score is the loss of the wrong explanation that is to be expected, the mean over which of the two is
+    true, against the rival that it tells apart worst: ``d' (I - J (J'J + P^-1)^-1 J') d``, d the difference of what
+    both foresee in noise units, J its derivatives by all that the wrong one could still be: its parameters and its
+    card's coefficients within their covariance P. Both foresee windows of :data:`_WINDOW` L/u0 from the motion of the
+    first explanation, each with a first state and constant disturbances of its own that absorb what they can: at sea,
+    too, a difference shows in what happens next and not in what has summed up.
+
+    Parameters
+    ----------
+    explanations : sequence of Explanation
+        Two or more; zigzags are steered with the first.
+    noise : mapping
+        Variable (``motion.*``) to the standard deviation of one reading, SI: what the sensors of the test will see.
+    duration_s : float, optional
+        Of the test; by default :data:`LENGTH` L/u0.
+    correlation_s : float
+        Time constant of the readings' errors: one independent reading every 2 of it (or :data:`READ_S`, if longer).
+
+    Returns
+    -------
+    NextTest, or None if there is only one explanation, or the ship leaves all bounds in every manoeuvre.
+    """
+    if len(explanations) < 2:
+        return None
+    ships = _ships(explanations, noise, correlation_s)
+    length = LENGTH if duration_s is None else duration_s / ships[0].ship_time
+    of = _with_headings(candidate_manoeuvres(explanations[0].card, length), explanations)
+    orders, motion = ships[0].sail(of, length)
+    first, *others = (ship.foreseen(of, orders, motion) for ship in ships)
+    each = np.stack([_lost(first, other) for other in others])
+    if not np.isfinite(scores := each.min(axis=0)).any():
+        return None
+    best, least = _best_and_least(scores)
+    why = _why(of[best], [one.name for one in explanations], each[:, best], (float(scores[least]), of[least]))
+    return NextTest(
+        manoeuvre=of[best].manoeuvre or "file:next_test.csv",
+        orders=orders_csv(ships[0].step_s, {name: values[best] for name, values in orders.items()}, why),
+        why=why,
+        expected={one.name: float(score) for one, score in zip(of, scores, strict=True) if np.isfinite(score)},
+        sizes=_sizes(explanations),
+    )
+
+
+def _ships(explanations: Sequence[Explanation], noise: Mapping[str, float], correlation_s: float) -> list[_Ship]:
+    """The ship of each explanation, with the sensors that there are and that all models know."""
+    models = [driven_model(one.card, "order") for one in explanations]
+    seen = {
+        name: noise[name]
+        for name in OBSERVED_SIGNALS.values()
+        if name in noise and all(name in model for model in models)
+    }
+    return [_Ship(one, seen, correlation_s) for one in explanations]
+
+
+def _best_and_least(scores: Array) -> tuple[int, int]:
+    """Places of the first manoeuvre that is as good as the best, and of the least telling."""
+    good = np.nan_to_num(scores) >= AS_GOOD * np.nanmax(scores)
+    return int(np.argmax(good)), int(np.nanargmin(scores))
+
+
+def _sizes(explanations: Sequence[Explanation]) -> dict[str, tuple[Mapping[str, float], Mapping[str, float]]]:
+    """Each effect to its parameters and standard errors; what all explanations have alike was on the card before."""
+    had = [entry for entry in explanations[0].card.effects if all(entry in one.card.effects for one in explanations)]
+    entries = [entry for one in explanations for entry in one.card.effects if entry not in had]
+    return {entry.name: (entry.parameters, entry.uncertainty) for entry in reversed(entries)}
+
+
+def _lost(one: _Seen, other: _Seen) -> Array:
+    """Expected loss of the wrong one of two explanations in each manoeuvre (c,); nan where a motion left all bounds."""
+    difference = one.readings - other.readings
+    return 0.5 * (_left(difference, other) + _left(difference, one))
+
+
+def _left(difference: Array, wrong: _Seen) -> Array:
+    """What the wrong explanation cannot absorb of a difference (c, w, m): its unknowns have unit prior variance."""
+    known = np.isfinite(difference).all(axis=(1, 2)) & np.isfinite(wrong.slopes).all(axis=(1, 2, 3))
+    losses = np.full(len(difference), np.nan)
+    S, A = wrong.passing[known], np.concatenate([wrong.slopes, difference[..., None]], axis=3)[known]
+    pull = S.swapaxes(2, 3) @ A
+    inner = S.swapaxes(2, 3) @ S + np.eye(S.shape[3])
+    # What is left of slopes and difference when each window has taken its part, summed over the windows.
+    G = (A.swapaxes(2, 3) @ A - pull.swapaxes(2, 3) @ np.linalg.solve(inner, pull)).sum(axis=1)
+    J, mixed = G[:, :-1, :-1] + np.eye(G.shape[1] - 1), G[:, :-1, -1:]
+    losses[known] = G[:, -1, -1] - (mixed.swapaxes(1, 2) @ np.linalg.solve(J, mixed))[:, 0, 0]
+    positive: Array = np.maximum(losses, 0.0)
+    return positive
+
+
+def _with_headings(of: Sequence[Candidate], explanations: Sequence[Explanation]) -> list[Candidate]:
+    """Those that keep to one heading on another one too, where an explanation has a direction of its own."""
+    directed = any(
+        key.startswith("direction") for one in explanations for e in one.card.effects for key in e.parameters
+    )
+    return [*of, *(on_heading(one, math.pi / 2) for one in of if one.on_course)] if directed else list(of)
+
+
+def _why(best: Candidate, names: Sequence[str], each: Array, least: tuple[float, Candidate]) -> str:
+    """What a manoeuvre would tell: the root of a score is a difference in standard deviations of the noise."""
+    first, *rivals = names
+    apart = " and ".join(f"{math.sqrt(score):.2g} from {name}" for score, name in zip(each, rivals, strict=True))
+    if min(each) < DECIDES:
+        told = f"No manoeuvre considered would tell {first} from {' and '.join(rivals)} for sure; nearest"
+    else:
+        told = f"The manoeuvre that would tell {first} from {' and '.join(rivals)} best"
+    told += (
+        f" is {best.name}: what {first} foresees differs there by {apart}, in standard deviations of the noise of all "
+        f"readings together and beyond what uncertain parameters can make up for; {math.sqrt(DECIDES):.2g} would "
+        f"decide. The least telling, {least[1].name}, would give {math.sqrt(max(least[0], 0.0)):.1g}."
+    )
+    if best.heading:
+        told += f" Begin on heading {math.degrees(best.heading):.0f} deg (initial.psi), which orders cannot say."
+    return told
+
+
+class _Ship:
+    """An explanation ready to be sailed, many motions side by side."""
+
+    def __init__(self, explanation: Explanation, seen: Mapping[str, float], correlation_s: float):
+        self.card, self.free = explanation.card, explanation.free
+        self.model = driven_model(explanation.card, "order")
+        self.names = self.model.parameter_names
+        self._step = RowFunction(runge_kutta_step(self.model))
+        self._shown = shown_by(self.model, tuple(seen))
+        self.p = self.model.parameter_values()
+        known = dict(zip(self.names, self.p, strict=True))
+        self.ship_time = known["ship.length"] / known["ship.speed"]
+        self.step_s = float(f"{self.ship_time / INSTANTS:.1g}")  # a round number of seconds in the file of orders
+        self.every = max(1, round(READ_S / self.step_s))
+        self.sigma = np.array(list(seen.values()))
+        self.sigma *= math.sqrt(max(1.0, 2 * correlation_s / (self.every * self.step_s)))
+        self._motion = [self.model.state_names.index(name) for name in MEASURED_BEFOREHAND]
+        self.axes = _independent(explanation.covariance) if self.free else np.zeros((0, 0))
+
+    def sail(self, of: Sequence[Candidate], length: float) -> tuple[dict[str, Array], Array]:
+        """The helmsmen's orders by input (c, n) each, and the motion (c, n, 6) that comes of them, as in MEASURED."""
+        window = round(_WINDOW * self.ship_time / self.step_s)
+        n = window * max(1, round(length / _WINDOW))
+        time = np.arange(n) * self.step_s / self.ship_time
+        inputs = np.tile(self.model.input_values(), (len(of), n, 1))
+        names, (psi, r) = self.model.input_names, (self.model.state_names.index(name) for name in _STEERED)
+        ordered = [RUDDER]
+        if self.card.propulsion is not None:
+            ordered.append(REVOLUTIONS)
+            shares = np.array([[one.revolutions(t) for t in time] for one in of])
+            inputs[:, :, names.index(REVOLUTIONS)] *= shares
+        headings, helmsmen = np.array([one.heading for one in of]), [one.helmsman() for one in of]
+        motion = np.empty((len(of), n, len(self._motion)))
+        x = self._starts(headings)
+        for row in range(n):
+            seen = zip(helmsmen, x[:, psi] - headings, x[:, r] * self.ship_time, strict=True)
+            orders = [steer(time[row], heading, rate) for steer, heading, rate in seen]
+            inputs[:, row, names.index(RUDDER)] = np.radians(np.round(np.degrees(orders), _ROUNDED))
+            motion[:, row] = x[:, self._motion]
+            x = self._after(x, inputs[:, row], self.p)
+        return {name: inputs[:, :, names.index(name)] for name in ordered}, motion
+
+    def foreseen(self, of: Sequence[Candidate], orders: Mapping[str, Array], motion: Array) -> _Seen:
+        """What the sensors would show in windows that begin with the motion (c, n, 6) of another, under her orders."""
+        c, n, _ = motion.shape
+        own = np.tile(self.model.input_values(), (c, n, 1))
+        for name, values in orders.items():
+            own[:, :, self.model.input_names.index(name)] = values
+        window = round(_WINDOW * self.ship_time / self.step_s)
+        begins = self._begins(of, own, motion)[:, ::window]
+        changes, shares, first = self._variations()
+        rows, w = len(changes), n // window
+        acting = np.stack([self._acting(own, change) for change in changes]).reshape(rows * c * w, window, -1)
+        p = np.repeat(self.p + np.stack([self._of_parameters(change) for change in changes]), c * w, axis=0)
+        x = (begins[None] + first[:, None, None]).reshape(rows * c * w, -1)
+        readings = []
+        for row in range(window):
+            if row % self.every == 0:
+                readings.append(self._shown(x, acting[:, row], p)[0] / self.sigma)
+            x = self._after(x, acting[:, row], p)
+        seen = np.stack(readings, axis=1).reshape(rows, c, w, -1)
+        slopes = np.moveaxis((seen[1:] - seen[0]) / shares[1:, None, None, None], 0, -1)
+        unknown = self.axes.shape[1]
+        return _Seen(seen[0], slopes[..., :unknown], slopes[..., unknown:])
+
+    def _after(self, x: Array, inputs: Array, p: Array) -> Array:
+        """States (rows, nx) a step later."""
+        parts = parts_of(self.model, self.step_s)
+        for _ in range(parts):
+            x = self._step(x, inputs, p, np.array([self.step_s / parts]))[0]
+        return x
+
+    def _starts(self, headings: Array) -> Array:
+        place = self.names.index("initial.psi")
+        p = np.tile(self.p, (len(headings), 1))
+        p[:, place] = headings
+        return np.stack([np.array(self.model.initial(one)).ravel() for one in p])
+
+    def _begins(self, of: Sequence[Candidate], inputs: Array, motion: Array) -> Array:
+        """States (c, n, nx): the motion, and this ship's own rudder, heel and whatever else she has."""
+        x = self._starts(np.array([one.heading for one in of]))
+        acting = self._acting(inputs, {})
+        states = np.empty((*motion.shape[:2], len(self.model.states)))
+        for row in range(motion.shape[1]):
+            x[:, self._motion] = motion[:, row]
+            states[:, row] = x
+            x = self._after(x, acting[:, row], self.p)
+        return states
+
+    def _variations(self) -> tuple[list[dict[str, float]], Array, Array]:
+        """Changes of variables by name, shares of a standard deviation, changes of the first state (rows, nx).
+
+        First none, then the explanation's unknowns, then the window's: its first motion and disturbances.
+        """
+        changes: list[dict[str, float]] = [{}]
+        shares, first = [1.0], [np.zeros(len(self.model.states))]
+        for axis in self.axes.T:
+            change = dict(zip(self.free, TO_FEEL * axis, strict=True))
+            side = 1.0 if self._inside(change, 1.0) or not self._inside(change, -1.0) else -1.0
+            changes.append({name: side * own for name, own in change.items()})
+            shares.append(side * TO_FEEL)
+            first.append(first[0])
+        for place in self._motion:
+            changes.append({})
+            shares.append(TO_FEEL)
+            first.append(np.zeros(len(self.model.states)))
+            first[-1][place] = TO_FEEL * FREE * self.model.states[place].nominal
+        for name, size in _disturbances(self.card).items():
+            if name in self.model:
+                changes.append({name: TO_FEEL * size})
+                shares.append(TO_FEEL)
+                first.append(first[0])
+        return changes, np.array(shares), np.stack(first)
+
+    def _acting(self, inputs: Array, change: Mapping[str, float]) -> Array:
+        """Inputs (c, n, nu) as the ship gets them: with what is changed of them, and late where an effect delays."""
+        acting = inputs.copy()
+        for name, own in change.items():
+            if name in self.model.input_names:
+                acting[:, :, self.model.input_names.index(name)] += own
+        p = self.p + self._of_parameters(change)
+        if not any(EFFECTS[entry.name].delays for entry in self.card.effects):
+            return acting
+        return np.stack([delayed(self.card, self.model, one, self.step_s, p) for one in acting])
+
+    def _of_parameters(self, change: Mapping[str, float]) -> Array:
+        return np.array([change.get(name, 0.0) for name in self.names])
+
+    def _inside(self, change: Mapping[str, float], side: float) -> bool:
+        """Whether all variables stay within their bounds."""
+        for name, own in change.items():
+            variable = self.model[name]
+            assert isinstance(variable, Parameter | Input)
+            value = variable.start + side * own
+            if (variable.minimum is not None and value < variable.minimum) or (
+                variable.maximum is not None and value > variable.maximum
+            ):
+                return False
+        return True
+
+
+_STEERED = ("motion.psi", "motion.r")
+
+
+def _disturbances(card: ManoeuvringCard) -> dict[str, float]:
+    """Standard deviations (prime) of constant forces in a window: what :data:`GUSTS` of rudder would do."""
+    sway, yaw = (GUSTS * abs(card.derivatives.get(name, 0.0)) for name in ("Yd", "Nd"))
+    sizes = {"derivatives.X0": sway, "derivatives.Y0": sway, "derivatives.N0": yaw}
+    return {name: size for name, size in sizes.items() if size > 0}
+
+
+def _independent(covariance: Array) -> Array:
+    """Columns (k, m) whose sum of squares is the covariance: its independent unknowns, without those of no spread."""
+    deviations = np.sqrt(np.diag(covariance))
+    scale = np.where(deviations > 0, deviations, 1.0)
+    spread, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
+    kept = spread > 1e-9
+    columns: Array = scale[:, None] * axes[:, kept] * np.sqrt(spread[kept])
+    return columns

@@ -1,0 +1,1 @@
+"""Whether a named effect holds on trials that it was not fitted to."""

@@ -1,0 +1,333 @@
+"""A card's model run freely under recorded inputs, from the initial state that suits the record best."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.model import Model
+from tank2sim.identification.trials.problem.problem_from_card import driven_model
+from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS, prepare
+from tank2sim.records.trials import Trial, sampling_step
+from tank2sim.simulation.rows import Chain, RowFunction
+from tank2sim.simulation.scheme import runge_kutta_step
+
+INSTANTS = 40
+"""Instants in L/u0 at which simulated and measured are compared (ours: the fastest motion lasts a tenth of L/u0)."""
+
+COARSEST = 2.5
+"""Integration steps of up to this many of the model's own: RK4 then errs by less than 1e-3 of a gear's motion in one
+step, (1/2)^5/120, far below any noise."""
+
+_FAR = 1e6
+"""A motion with a state beyond this many of its nominal sizes has left all bounds."""
+
+FIRST = 0.25
+"""The initial state is read off the first quarter of L/u0 (ours: nothing of a ship's motion changes much in it)."""
+
+TRUST = 2.0
+"""That reading is trusted to this many of its standard errors, as the motion is not quite straight (ours)."""
+
+ASTERN = 0.2
+"""Standard deviation of an initial speed that nothing tells of, as a share of the nominal one (ours)."""
+
+
+@dataclass(frozen=True, eq=False)
+class InputRecord:
+    """A trial as a replayer takes it.
+
+    Parameters
+    ----------
+    name : str
+        Of the trial.
+    begin_s, step_s : float
+        First instant in the trial's own time, and the step of the inputs, s.
+    inputs : array (n, nu)
+        Each row held for a step: as fine as the sampling, for the mean of two orders is an order that nobody gave, and
+        a gear with a largest rate makes something else of it.
+    every : int
+        Each so-manieth instant is compared.
+    readings : array (m, ny)
+        Single readings at those instants; nan where there is none.
+    """
+
+    name: str
+    begin_s: float
+    step_s: float
+    inputs: Array
+    every: int
+    readings: Array
+
+    @property
+    def times(self) -> Array:
+        """Compared instants (m,) in the trial's own time, s."""
+        times: Array = self.begin_s + self.every * self.step_s * np.arange(len(self.readings), dtype=float)
+        return times
+
+
+_LEAST_RUDDER = math.radians(1.0)
+"""A first order below this is no execute (ours)."""
+
+_ROUNDS = 5
+"""Gauss-Newton steps, and times that the weights of signals are found anew; both settle in two or three."""
+
+_SETTLED = 0.02
+"""A step below this share of the trust in the first reading ends the search."""
+
+_NEAR = 2.0
+"""A model that follows a record to within this many times the noise is taken as right when its initial state is sought
+(ours): what is left then is too small to bend it far."""
+
+
+class Replayer:
+    """A card's model ready to be run under recorded inputs, in machine code.
+
+    What is compared is what a sensor shows: ``sensor.psi`` where the model has it (a sensor at fault), else
+    ``motion.psi``, under the name ``motion.psi``.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        Its effects' inputs (a current's speed) keep what the card says unless the trial measured them.
+    driven_by : str
+        ``angle`` or ``order``.
+    seen : sequence of str
+        The ny variables to compare, ``motion.*``.
+    """
+
+    def __init__(self, card: ManoeuvringCard, driven_by: str, seen: Sequence[str]):
+        self.card, self.seen = card, tuple(seen)
+        self.model = driven_model(card, driven_by)
+        self._steps = Chain(runge_kutta_step(self.model))
+        self._shown = shown_by(self.model, seen)
+        self._nominal = np.array([state.nominal for state in self.model.states])
+
+    def states(self, start: Array, inputs: Array, step_s: float, p: Array) -> Array:
+        """States (n, nx) at the instants of `inputs` (n, nu), each row held for `step_s`; nan once out of bounds."""
+        parts = parts_of(self.model, step_s)
+        fine = np.repeat(inputs[:-1], parts, axis=0)
+        with np.errstate(all="ignore"):
+            states = self._steps.run(start, fine, p, np.array([step_s / parts]))[::parts]
+            lost = ~(np.abs(states) < _FAR * self._nominal).all(axis=1)
+        if lost.any():
+            states[int(np.argmax(lost)) :] = np.nan
+        return states
+
+    def seen_along(self, start: Array, inputs: Array, step_s: float, p: Array, every: int) -> Array:
+        """What the sensors show (m, ny) at every so-manieth of the instants of :meth:`states`."""
+        states = self.states(start, inputs, step_s, p)[::every]
+        return self._shown(states, inputs[::every], p)[0]
+
+    def motion(self, record: InputRecord, start: Array, p: Array) -> Array:
+        """What the sensors show (m, ny) at the instants of a record that are compared."""
+        return self.seen_along(start, record.inputs, record.step_s, p, record.every)
+
+    def settled(self, record: InputRecord, sigma: Array, p: Array) -> Array:
+        """Initial state (nx,) that suits a record best, kept near what its first seconds show.
+
+        `sigma` (ny,) is the noise of the signals. If with the least squares in noise units the model follows the record
+        to within :data:`_NEAR`, these have the word. Else the model is wrong, and would bend its heading and speed to
+        mend its track: then a signal weighs less by the size of its own residual beyond the noise (the likelihood of a
+        deviation that is not known), of which only one value in L/u0 counts as independent.
+        """
+        start, left = self._settled_from(record, sigma, p, wrong=False)
+        return start if left < _NEAR else self._settled_from(record, sigma, p, wrong=True)[0]
+
+    def first(self, record: InputRecord, sigma: Array, p: Array) -> Array:
+        """Initial state (nx,) as its first seconds show it, with the rudder that suits the record better."""
+        guess, _ = _first_state(self, record, sigma, p)
+        known = ~np.isnan(record.readings)
+
+        def size(start: Array) -> float:
+            return float(np.sum(((self.motion(record, start, p) - record.readings) / sigma)[known] ** 2))
+
+        return min(self._guesses(guess), key=size)
+
+    def _guesses(self, guess: Array) -> list[Array]:
+        """The first state, and with the rudder amidships: a record may begin at the execute."""
+        if "rudder.angle" not in self.model.state_names:
+            return [guess]
+        place = self.model.state_names.index("rudder.angle")
+        if abs(guess[place]) < _LEAST_RUDDER:
+            return [guess]
+        amidships = guess.copy()
+        amidships[place] = 0.0
+        return [guess, amidships]
+
+    def _settled_from(self, record: InputRecord, sigma: Array, p: Array, *, wrong: bool) -> tuple[Array, float]:
+        """Initial state by Gauss-Newton, and the misfit that it leaves: inf where the motion leaves all bounds.
+
+        Derivatives are differences: an effect need not be smooth.
+        """
+        guess, spread = self.first(record, sigma, p), _first_state(self, record, sigma, p)[1]
+        known = ~np.isnan(record.readings)
+        column = np.broadcast_to(np.arange(len(sigma)), known.shape)[known]
+        number = np.maximum(np.bincount(column, minlength=len(sigma)), 1)
+
+        def left(start: Array) -> Array:
+            return (self.motion(record, start, p) - record.readings)[known]
+
+        start, residual, before, slopes = guess, left(guess), np.zeros(0), np.zeros(0)
+        for turn in range(_ROUNDS):
+            size = np.sqrt(np.bincount(column, residual**2, len(sigma)) / number)
+            beyond = INSTANTS * np.maximum(size**2 - sigma**2, 0) if wrong else 0.0
+            weights = np.sqrt(sigma**2 + beyond)
+            if turn % 2 == 0:  # the motion is nearly linear in its initial state
+                slopes = difference_slopes(left, start, residual, 1e-4 * self._nominal)
+            if not (np.isfinite(weights).all() and np.isfinite(slopes).all()):
+                break
+            if wrong and turn and np.allclose(weights, before, rtol=0.02):
+                break
+            before, each = weights, weights[column]
+            J = np.concatenate([slopes / each[:, None], np.diag(1 / spread)])
+
+            def misfit(start: Array, each: Array = each) -> Array:
+                return np.append(left(start) / each, (start - guess) / spread)
+
+            then, all_left = downhill(misfit, start, np.append(residual / each, (start - guess) / spread), J)
+            near = float(np.max(np.abs(then - start) / spread)) < _SETTLED
+            start, residual = then, all_left[: len(column)] * each
+            if near:
+                break
+        whole = float(np.sqrt(np.mean((residual / sigma[column]) ** 2)))
+        return start, whole if np.isfinite(whole) else np.inf
+
+
+def shown_by(model: Model, seen: Sequence[str]) -> RowFunction:
+    """What sensors show of the variables `seen` (``sensor.psi`` where the model has it) as a function of x, u, p."""
+    names = [name.replace("motion.", "sensor.") for name in seen]
+    shown = ca.vcat([model.symbol(sensor if sensor in model else own) for sensor, own in zip(names, seen, strict=True)])
+    arguments = [model.x, model.u, model.p]
+    return RowFunction(ca.Function("shown", arguments, [ca.densify(model.expand(shown))], {"cse": True}))
+
+
+def parts_of(model: Model, step_s: float) -> int:
+    """Integration steps, none longer than :data:`COARSEST` of the model's own, in a step of the inputs."""
+    return max(1, math.ceil(step_s / (COARSEST * model.step_s) - 1e-9))
+
+
+def difference_slopes(function: Callable[[Array], Array], at: Array, there: Array, reach: Array) -> Array:
+    """Derivatives (n, k) of ``function(at) = there`` (n,) by forward differences of `reach` (k,)."""
+    columns = []
+    for place, step in enumerate(reach):
+        moved = at.copy()
+        moved[place] += step
+        columns.append((function(moved) - there) / step)
+    return np.stack(columns, axis=1)
+
+
+def downhill(misfit: Callable[[Array], Array], at: Array, there: Array, slopes: Array) -> tuple[Array, Array]:
+    """One Gauss-Newton step from ``misfit(at) = there``: the new point and its misfit.
+
+    A step that does not lower the sum of squares is halved; if none does, the old point is kept. `misfit` may answer
+    nan where a motion leaves all bounds: such points are never taken.
+    """
+    step, cost = np.linalg.lstsq(slopes, there, rcond=None)[0], float(there @ there)
+    for _ in range(8):
+        then = misfit(at - step)
+        if float(then @ then) < cost:
+            return at - step, then
+        step = step / 2
+    return at, there
+
+
+def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
+    """A trial on equal steps: of one sample, or of as many (an odd number) as a step of the model holds.
+
+    Raises
+    ------
+    InputError
+        The trial is too short, or has none of the signals that are seen.
+    """
+    model, sampling = replayer.model, sampling_step(trial)
+    stride = max(1, int(model.step_s / sampling + 1e-6))
+    stride -= 1 - stride % 2  # the middle of an odd number of samples is a sample
+    run = prepare(model, trial, replayer.seen, step_s=(stride + 1e-3) * sampling)
+    known = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+    every = max(1, round(known["ship.length"] / known["ship.speed"] / INSTANTS / run.step_s))
+    times = run.times[::every]
+    nearest = np.clip(np.searchsorted(trial.time_s, times - 0.5 * sampling), 0, len(trial.time_s) - 1)
+    off = np.abs(trial.time_s[nearest] - times) > 0.5 * sampling
+    variables = {variable: signal for signal, variable in OBSERVED_SIGNALS.items()}
+    readings = np.full((len(times), len(replayer.seen)), np.nan)
+    for place, name in enumerate(replayer.seen):
+        if (values := trial.signals.get(variables[name])) is not None:
+            readings[:, place] = np.where(off, np.nan, values[nearest])
+    return InputRecord(
+        run.name, run.begin_s, run.step_s, delayed(replayer.card, model, run.inputs, run.step_s), every, readings
+    )
+
+
+def delayed(card: ManoeuvringCard, model: Model, inputs: Array, step_s: float, p: Array | None = None) -> Array:
+    """Inputs (n, nu), each row held for `step_s`, with the delays of the card's effects at parameters `p`."""
+    known = dict(zip(model.parameter_names, model.parameter_values() if p is None else p, strict=True))
+    late = inputs.copy()
+    for entry in card.effects:
+        effect = EFFECTS[entry.name]
+        for name, key in effect.delays.items():
+            place = model.input_names.index(name)
+            late[:, place] = later(late[:, place], known[effect.model_names()[key]] / step_s)
+    return late
+
+
+def later(values: Array, steps: float) -> Array:
+    """Values (n,), each held for a step, as they come so many steps (any number) later; the first stands before it."""
+    n = len(values)
+    edges: Array = np.arange(-1, n + 2, dtype=float)
+    edges[0], edges[-1] = -n - abs(steps), n + 1 + abs(steps)
+    areas = np.concatenate([[values[0] * edges[0], 0.0], np.cumsum(values)])
+    areas = np.append(areas, areas[-1] + values[-1] * (edges[-1] - n))
+    at = np.interp(np.arange(n + 1) - steps, edges, areas)
+    means: Array = np.diff(at)
+    return means
+
+
+def _first_state(replayer: Replayer, record: InputRecord, sigma: Array, p: Array) -> tuple[Array, Array]:
+    """State read off the first seconds of a record, and how far to trust it (nx,) each.
+
+    A straight line through :data:`FIRST` L/u0 of each signal; a speed or heading that was not measured is that of the
+    track. What nothing tells of is the model's own start, within a nominal value.
+    """
+    model, step = replayer.model, record.every * record.step_s
+    n = max(3, round(FIRST * INSTANTS))
+    readings = zip(replayer.seen, record.readings[:n].T, sigma, strict=True)
+    values = {name: _straight(column, error) for name, column, error in readings}
+    read = {name: value[:2] for name, value in values.items() if value is not None}
+    track = [values.get(f"motion.{axis}") for axis in "xy"]
+    if track[0] is not None and track[1] is not None:
+        north, east = track[0][2] / step, track[1][2] / step
+        rate = sum(one[1] for one in track if one is not None) / (n * step)
+        way = float(np.hypot(north, east))
+        if way > rate:
+            read.setdefault("motion.u", (way, rate + ASTERN * way))
+            read.setdefault("motion.psi", (float(np.arctan2(east, north)), rate / way + 0.1))
+    for name in ("motion.u", "motion.v"):
+        if (over_ground := read.get(f"{name}_ground")) is not None:
+            read.setdefault(name, (over_ground[0], over_ground[1] + ASTERN * abs(over_ground[0])))
+    start = np.array(model.initial(p)).ravel()
+    spread = np.array([state.nominal for state in model.states])
+    for place, state in enumerate(model.states):
+        if state.name == "motion.u":
+            spread[place] *= ASTERN
+        if state.name == "rudder.angle":
+            start[place] = record.inputs[0, model.input_names.index("rudder.command")]
+        if state.name in read:
+            start[place], error = read[state.name]
+            spread[place] = TRUST * error
+    return start, spread
+
+
+def _straight(values: Array, sigma: float) -> tuple[float, float, float] | None:
+    """First value, its standard error and the change per step of a straight line; None for fewer than three values."""
+    places = np.flatnonzero(~np.isnan(values))
+    if len(places) < 3:
+        return None
+    slope, first = np.polyfit(places, values[places], 1)
+    return float(first), 2 * sigma / float(np.sqrt(len(places))), float(slope)  # 2: of the end of a line

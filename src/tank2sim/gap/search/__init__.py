@@ -1,0 +1,1 @@
+"""The search for explanations, and the choice between them."""

@@ -1,0 +1,123 @@
+"""What could hide in the trials: up to what size each effect would be there without showing.
+
+By the linear screen, at the noise of the best explanation and at others that would cost little: without the effect the
+noise is estimated as well, and may take an effect for a slow error of a sensor or a force that nobody modelled. An
+effect that is not linear in its size is asked again at the size that was found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import norm
+
+from tank2sim.arrays import Array
+from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.inference.kalman_filter import FORCE_STATES
+from tank2sim.gap.inference.likelihood import COUNTED, Likelihood
+from tank2sim.gap.search.explanations import Search
+from tank2sim.gap.search.screening import Screen, Variant, resized, variants_at
+
+_Sizes = dict[str, dict[str, float]]
+
+SIZES = (1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0)
+"""Shares of its typical value at which an effect without amplitude is asked whether it would show."""
+
+LOUDER = 3.0
+"""Factor on the level of one slow error or one force at a time, of the noises that may hide an effect (ours)."""
+
+SURE = float(norm.ppf(0.95))
+"""Standard deviations by which a size must be beyond what is enough, to show in 95 of 100 such sets of trials."""
+
+_ROUNDS = 2
+"""How often the size is sought at which an effect shows (ours): its force need not grow with it."""
+
+_NEAR = 1.2
+"""A size that the next round would change by less than this factor is found."""
+
+
+def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
+    """Effect to {parameter: size} below which the trials could not show it, beside what is explained already.
+
+    Parameters
+    ----------
+    search : Search
+    best : Fit
+        What is explained already.
+    enough : float
+        By how much the score must fall for an effect more, beyond its price.
+
+    Returns
+    -------
+    dict
+        Of several shapes the size at which the one that hides best does. For an effect without amplitude, the value
+        furthest from being visible at which it still is not.
+    """
+    likelihood = search.likelihood
+    sized = [one for one in search.variants if one.amplitudes and one.effect not in best.explained.effects]
+    for _ in range(_ROUNDS):
+        shares = _shares(likelihood, [best], sized, enough)
+        sized = [_at_its_size(likelihood, one, own) for one, own in zip(sized, shares, strict=True)]
+    shares = _shares(likelihood, [best, *_louder(likelihood, best)], sized, enough)
+    sizes: _Sizes = {}
+    for one, own in zip(sized, shares, strict=True):
+        for amplitude, share in zip(one.amplitudes, own, strict=True):
+            parameter = one.explained.asked[amplitude].parameter
+            size = min(float(abs(one.theta[amplitude]) * share), max(abs(parameter.minimum), abs(parameter.maximum)))
+            known = sizes.setdefault(one.effect, {})
+            known[parameter.name] = max(size, known.get(parameter.name, 0.0))
+    others = {one.effect: one for one in search.variants if not one.amplitudes}
+    for one in (other for name, other in others.items() if name not in best.explained.effects):
+        value = _hidden_value(likelihood, best, one, enough)
+        if value is not None:
+            sizes[one.effect] = {one.explained.asked[0].parameter.name: value}
+    return sizes
+
+
+def _at_its_size(likelihood: Likelihood, one: Variant, shares: Array) -> Variant:
+    """The variant at the size at which it shows, if that is another one."""
+    return resized(likelihood, one, shares) if np.any(np.abs(np.log(shares)) > np.log(_NEAR)) else one
+
+
+def _louder(likelihood: Likelihood, best: ExplanationFit) -> Iterator[ExplanationFit]:
+    """The same with one slow error of a sensor, or one force that nobody modelled, larger than it is."""
+    low, high = likelihood.belief.bounds
+    sensors = len(likelihood.motion.seen)
+    for place in (*range(sensors, 2 * sensors), *range(3 * sensors, 3 * sensors + FORCE_STATES)):
+        logs = best.logs.copy()
+        logs[place] += np.log(LOUDER)
+        yield replace(best, logs=np.clip(logs, low, high))
+
+
+def _shares(
+    likelihood: Likelihood, noises: Sequence[ExplanationFit], every: Sequence[Variant], enough: float
+) -> list[Array]:
+    """Shares of each variant's amplitudes, each alone, at which it would show even at the noise that hides it best."""
+    screens = [Screen(likelihood, one, every) for one in noises]
+    shares = []
+    for place, one in enumerate(every):
+        priced = int(np.count_nonzero(one.explained.prior[1] == 0))
+        least = enough + priced * np.log(likelihood.count / COUNTED)
+        columns = screens[0].places[place]
+        largest = np.zeros(len(columns))
+        for screen in screens:
+            left = least - (screen.cost - screens[0].cost)
+            if left > 0:
+                own = np.sqrt(np.maximum(np.diag(screen.gram)[columns], 1e-12))
+                largest = np.maximum(largest, (np.sqrt(left) + SURE) / own)
+        shares.append(largest)
+    return shares
+
+
+def _hidden_value(likelihood: Likelihood, best: ExplanationFit, one: Variant, enough: float) -> float | None:
+    """For an effect without amplitude: the tried value that comes nearest to being visible and is not."""
+    tried = variants_at(likelihood, one, SIZES)
+    if not tried:
+        return None
+    screen = Screen(likelihood, best, tried)
+    least = enough + len(one.theta) * np.log(likelihood.count / COUNTED)
+    seen = [screen.gram[places[0], places[0]] for places in screen.places]
+    hidden = [(size, float(v.theta[0])) for size, v in zip(seen, screen.every, strict=True) if size < least]
+    return max(hidden)[1] if hidden else None

@@ -1,0 +1,191 @@
+"""The search for the explanation: none, single effects, pairs; screened together, then each fitted by itself.
+
+The screen is linear and at one noise, the fit is not and estimates the noise anew; so the screen only proposes. It is
+asked at the noise of "none" (large, for it must cover what is missing), and again at that of the best explanation so
+far. Pairs are screened as pairs, for with two effects missing the best single one is often neither of them; and each
+half of the best pair is tried with all others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tank2sim.errors import InputError
+from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.inference.fit_all import Fitting, Known, Progress, Proposal, thetas_of
+from tank2sim.gap.inference.likelihood import Likelihood
+from tank2sim.gap.inference.prior import candidate_explanations
+from tank2sim.gap.search.screening import Screen, Screened, Variant, variants
+
+FIRST_SINGLES, FIRST_PAIRS = 4, 2
+SINGLES, PAIRS, WITH_THE_BEST, SWAPS = 4, 3, 3, 2
+"""How many proposals of each screen are fitted (ours)."""
+
+WORTH = 5.0
+"""Proposals whose gain in the screen is further below 0 are not fitted (ours)."""
+
+HOPELESS = 100.0
+"""Nor those whose gain, or whose score when fitted roughly, is so far behind the best of their kind (ours)."""
+
+_FAR = 300.0
+"""An explanation so far behind the best at the noise of the best has its own noise not sought, nor is it tried again
+(ours)."""
+
+ROUNDS_OF_NONE, ROUNDS, LAST_ROUNDS = (15,), (0, 10), (20,)
+"""Iterations on the noise after each solution for the parameters, see :meth:`.likelihood.Likelihood.at_best`. A score
+is known to some 100 after 6, to 20 after 15, to a few after 25."""
+
+SAME_NOISE = (0,)
+"""Rounds that only ask for the parameters, at the nearest of the noises given."""
+
+CLOSE = 30.0
+"""Explanations within this of the best are fitted once more at the end (ours)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What was tried.
+
+    Parameters
+    ----------
+    likelihood : Likelihood
+        Linear about the motion of the best explanation.
+    fits : tuple of Fit
+        Every explanation that was fitted, "none" among them, the best (lowest score) first.
+    variants : tuple of Variant
+        All effects at their typical sizes.
+    """
+
+    likelihood: Likelihood
+    fits: tuple[ExplanationFit, ...]
+    variants: tuple[Variant, ...]
+
+    @property
+    def none(self) -> ExplanationFit:
+        """The card as it is."""
+        return next(one for one in self.fits if not one.explained.effects)
+
+
+def search(
+    likelihood: Likelihood,
+    progress: Progress = lambda text: None,
+    executor: Executor | None = None,
+    names: Sequence[str] | None = None,
+    *,
+    most: int = 2,
+) -> Search:
+    """Find what explains the trials best.
+
+    Parameters
+    ----------
+    likelihood : Likelihood
+    progress : callable
+        Told what is being fitted.
+    executor : Executor, optional
+        Fits several explanations at once.
+    names : sequence of str, optional
+        Effects to ask for; by default all that can be.
+    most : int
+        Effects at a time, 1 or 2.
+    """
+    known, believed = Known(likelihood.none), likelihood.belief.logs
+    rough = Fitting(likelihood, known, progress, executor)
+    rough.fit([Proposal({}, [believed], ROUNDS_OF_NONE)])
+    chosen = candidate_explanations(likelihood.none.card, likelihood.none.driven_by) if names is None else names
+    every = tuple(one for name in chosen for one in _variants(likelihood, known, name))
+    none = rough.best()
+    first = Screen(likelihood, none, every)
+    proposed = [*first.singles()[:FIRST_SINGLES], *(first.pairs()[:FIRST_PAIRS] if most > 1 else ())]
+    rough.fit(_proposals(rough, proposed, [none.logs, believed], least=2))
+    best = rough.best()
+    # Once more about the motion of the best: what it leaves over is small, and none is judged by it as well.
+    fitting = Fitting(likelihood.about(best), known, progress, executor)
+    again = [one for one in rough.found.values() if one.score < best.score + HOPELESS and one.explained.effects]
+    fitting.fit(
+        [Proposal({}, [best.logs, none.logs, believed], ROUNDS_OF_NONE)]
+        + [Proposal(thetas_of(one), [best.logs, one.logs], ROUNDS) for one in again]
+    )
+    _explore(fitting, every, believed, most)
+    _polish(fitting)
+    fits = sorted(fitting.found.values(), key=lambda one: one.score)
+    return Search(fitting.likelihood, tuple(fits), every)
+
+
+def _variants(likelihood: Likelihood, known: Known, name: str) -> tuple[Variant, ...]:
+    """Variants of an effect; none if the card lacks what it needs (revolutions, for an effect of the propeller)."""
+    try:
+        return variants(likelihood, known(name))
+    except InputError:
+        return ()
+
+
+def _explore(fitting: Fitting, every: Sequence[Variant], believed: np.ndarray, most: int) -> None:
+    """Singles, pairs and swaps at the noise of the best so far."""
+    best = fitting.best()
+    starts = [best.logs, believed]
+    second = Screen(fitting.likelihood, replace(fitting.best(0), logs=best.logs), every)
+    singles, pairs = second.singles(), second.pairs() if most > 1 else ()
+    proposed = [one for one in singles[:SINGLES] if one.gain > singles[0].gain - HOPELESS]
+    proposed += [one for one in pairs[:PAIRS] if one.gain > singles[0].gain]
+    if len(best.explained.effects) == 1 and most > 1:
+        proposed += _on_top_of(fitting, best, every)[:WITH_THE_BEST]
+    fitting.fit(_proposals(fitting, proposed, starts, least=1, limit=best.score + _FAR))
+    if not fitting.has(2) or fitting.best(2).score > fitting.best(1).score - WORTH:
+        return
+    pair = fitting.best(2)
+    swapped: list[Screened] = []
+    for name, theta in thetas_of(pair).items():
+        alone = fitting.known(name)
+        base = ExplanationFit(alone, theta, np.zeros((len(theta), len(theta))), pair.logs, np.inf, pair.change)
+        swapped += [Screened({name: theta}, 0.0), *_on_top_of(fitting, base, every)[:SWAPS]]
+    fitting.fit(_proposals(fitting, swapped, [pair.logs], limit=pair.score + _FAR))
+
+
+def _polish(fitting: Fitting) -> None:
+    """The best with its noise well settled; the others at this noise as well; those that are then close once more.
+
+    Scores at noises that are not settled differ by more than explanations do. What shares an effect with the best is
+    tried from the best's parameters too: a search downhill may have stopped elsewhere.
+    """
+    fitting.fit([Proposal(thetas_of(fitting.best()), [fitting.best().logs], LAST_ROUNDS)])
+    best = fitting.best()
+    own = thetas_of(best)
+    begins = [{name: own[name]} for name in own if len(own) > 1]
+    for one in (one for one in fitting.found.values() if one.score < best.score + _FAR or not one.explained.effects):
+        theirs = thetas_of(one)
+        begins += [theirs] if one is not best else []
+        begins += [theirs | {name: own[name] for name in own if name in theirs}] if len(theirs) > 1 else []
+    fitting.fit([Proposal(thetas, [best.logs], SAME_NOISE) for thetas in begins])
+    best = fitting.best()
+    close = [
+        fit
+        for effects, fit in fitting.found.items()
+        if fit is not best and (fit.score < best.score + CLOSE or fit is fitting.best(len(effects)))
+    ]
+    fitting.fit([Proposal(thetas_of(one), [one.logs, best.logs], LAST_ROUNDS) for one in close])
+
+
+def _on_top_of(fitting: Fitting, base: ExplanationFit, every: Sequence[Variant]) -> list[Screened]:
+    """Each effect together with those of `base`."""
+    proposals = Screen(fitting.likelihood, base, every).singles()
+    return [Screened({**thetas_of(base), **one.thetas}, one.gain) for one in proposals]
+
+
+def _proposals(
+    fitting: Fitting,
+    screened: Sequence[Screened],
+    starts: Sequence[np.ndarray],
+    least: int = 0,
+    limit: float = np.inf,
+) -> list[Proposal]:
+    """Those that promise something and were not fitted yet; the first `least` of them in any case."""
+    proposals: dict[tuple[str, ...], Proposal] = {}
+    for place, one in enumerate(screened):
+        proposal = Proposal(one.thetas, starts, ROUNDS, limit)
+        if proposal.effects not in fitting.found and (one.gain > -WORTH or place < least):
+            proposals.setdefault(proposal.effects, proposal)
+    return list(proposals.values())

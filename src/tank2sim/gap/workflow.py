@@ -1,0 +1,295 @@
+"""The gap workflow: locate the gap, screen and fit what could be missing, decide, add it, and prove it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.form import EffectEntry
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.errors import InputError
+from tank2sim.executors import executing, processes_to_begin
+from tank2sim.gap.diagnosis.misfit_location import equation_of, figures, places
+from tank2sim.gap.diagnosis.residuals import each_trial, estimates, force_lacking
+from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.inference.fit_all import Progress
+from tank2sim.gap.inference.hypothesis import CLOCK
+from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
+from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
+from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
+from tank2sim.gap.outcome.next_test import Explanation, next_test
+from tank2sim.gap.proof.cross_check import MUCH, black_box, closes, trial_consistency, worse
+from tank2sim.gap.proof.replay import replay_trials, with_black_box
+from tank2sim.gap.result import (
+    AMBIGUOUS,
+    MISSING,
+    NO_EFFECT_MISSING,
+    OUTSIDE_LIBRARY,
+    Gap,
+    Named,
+    NextTest,
+    Passed,
+    Rival,
+)
+from tank2sim.gap.search.detection_limit import could_hide
+from tank2sim.gap.search.explanations import Search, search
+from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, Decision, Strange, decide
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
+from tank2sim.records.trials import Trial
+
+RIVALS = 12
+"""Explanations that are told of."""
+
+DOUBT = 1e-3
+"""Probability below which trials that disagree about a parameter are told of."""
+
+
+@dataclass(frozen=True)
+class GapOptions:
+    """How the missing effect is sought.
+
+    Parameters
+    ----------
+    effects : tuple of str, optional
+        Only these; by default the whole library.
+    without : tuple of str
+        Not these.
+    max_effects : int
+        1 or 2.
+    workers : int, optional
+        Processes; by default as many as there are processors.
+    """
+
+    effects: tuple[str, ...] | None = None
+    without: tuple[str, ...] = ()
+    max_effects: int = 2
+    workers: int | None = None
+
+
+def find_gap(
+    card: ManoeuvringCard,
+    fitted: Measured,
+    held: Measured,
+    options: GapOptions | None = None,
+    progress: Progress = lambda text: None,
+    executor: Executor | None = None,
+) -> Gap:
+    """Find where a card's model and trials differ, name what is missing, add it, and prove it.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        The ship as it is known.
+    fitted, held : Measured
+        Trials that name the effect, and trials that only prove it (may be none).
+    options : Options, optional
+    progress : callable
+        Told what is being done.
+    executor : Executor, optional
+        For fitting explanations; by default processes of this machine.
+
+    Raises
+    ------
+    InputError
+        A trial is too short or tells too little, or an effect that was asked for cannot be tried on this card.
+    """
+    options = options or GapOptions()
+    names = _names(card, fitted, options)
+    likelihood = likelihood_from_card(card, fitted)
+    with _processes(options, executor) as pool:
+        found = search(likelihood, progress, pool, names, most=options.max_effects)
+    decision = decide(found)
+    progress("proving")
+    return _told(card, (fitted, held), found, decision, progress)
+
+
+def _names(card: ManoeuvringCard, fitted: Measured, options: GapOptions) -> tuple[str, ...]:
+    possible = candidate_explanations(card, fitted.driven_by)
+    for name in options.effects or ():
+        if name not in possible:
+            have = any(entry.name == name for entry in card.effects)
+            why = "is on the card already" if have else "cannot be tried on this card and these trials"
+            raise InputError("--effects", "", f"{name} {why}", f"possible are: {', '.join(possible)}")
+    names = tuple(name for name in options.effects or possible if name not in options.without)
+    if not names:
+        raise InputError("--without", "", "leaves no effect to look for", f"possible are: {', '.join(possible)}")
+    return names
+
+
+@contextmanager
+def _processes(options: GapOptions, executor: Executor | None) -> Iterator[Executor | None]:
+    count = processes_to_begin(options.workers)
+    if executor is not None or count == 1:
+        yield executor
+        return
+    with executing(workers=count) as pool:
+        yield pool
+
+
+def _told(
+    card: ManoeuvringCard, trials: tuple[Measured, Measured], found: Search, decision: Decision, progress: Progress
+) -> Gap:
+    """Everything that follows from the decision."""
+    fitted, held = trials
+    estimated: list[Found] = []
+    if decision.verdict in (MISSING, AMBIGUOUS):
+        estimated = estimates(found.likelihood.by_formula(decision.best))
+    noise = _noise(found, decision.best, fitted)
+    sigmas = {name: sigma for name, (sigma, _) in noise.items()}
+    improved, results = _followed(card, trials, estimated, sigmas)
+    withheld = ""
+    if estimated and not closes(results):
+        withheld = " and ".join(name for name, *_ in estimated)
+        decision, estimated = replace(decision, verdict=OUTSIDE_LIBRARY), []
+        improved, results = _followed(card, trials, estimated, sigmas)
+    sensors = _of_sensors(estimated)
+    progress("where and how much")
+    force = force_lacking(found.likelihood, found.none)
+    every = (*fitted.trials, *held.trials)
+    told = each_trial(found.likelihood, decision.best) if estimated else {}
+    return Gap(
+        card=card,
+        improved=improved,
+        verdict=decision.verdict,
+        effects=tuple(Named(*one, decision.confidence(one[0])) for one in estimated),
+        alternatives=tuple(fit.explained.effects for fit in decision.alike) if estimated else (),
+        rivals=_rivals(found, decision),
+        where=places(results),
+        equation=equation_of([name for name, *_ in estimated], improved, force, results),
+        noise=noise,
+        passed=tuple(results),
+        figures_before=figures(card, every, results, "before"),
+        figures_after=figures(improved, _after(every, fitted, held, sensors), results, "after"),
+        missing_force=force,
+        could_hide=could_hide(found, decision.best, EVIDENCE_NEEDED),
+        agreement=told,
+        next_test=_next(card, found, decision, sigmas),
+        notices=_notices(card, decision, results, told, (fitted, held), withheld),
+    )
+
+
+def _followed(
+    card: ManoeuvringCard, trials: tuple[Measured, Measured], estimated: list[Found], sigmas: Mapping[str, float]
+) -> tuple[ManoeuvringCard, list[Passed]]:
+    """The card with what was estimated, and all trials as both cards and a black box follow them."""
+    improved = add_effects_to_card(card, estimated)
+    count = sum(len(errors) for *_, errors in estimated)
+    box = black_box(card, trials[0], sigmas, max(count, 1)) if estimated else None
+    results: list[Passed] = []
+    for group, held_out in zip(trials, (False, True), strict=True):
+        if group.trials:
+            some = replay_trials(card, improved, group, sigmas, held_out, _mended(group, _of_sensors(estimated)))
+            results += with_black_box(some, box.card, group, sigmas) if box else some
+    return improved, results
+
+
+def _of_sensors(estimated: Sequence[Found]) -> list[Found]:
+    return [one for one in estimated if EFFECTS[one[0]].acts_on == "sensor"]
+
+
+def _mended(group: Measured, sensors: Sequence[Found]) -> Measured | None:
+    if not sensors:
+        return None
+    return replace(group, trials=tuple(correct_sensor_faults(trial, sensors) for trial in group.trials))
+
+
+def _after(every: Sequence[Trial], fitted: Measured, held: Measured, sensors: Sequence[Found]) -> Sequence[Trial]:
+    groups = (_mended(group, sensors) or group for group in (fitted, held))
+    return [trial for group in groups for trial in group.trials] if sensors else every
+
+
+def _noise(found: Search, best: ExplanationFit, fitted: Measured) -> dict[str, tuple[float, str]]:
+    """Standard deviation of one reading of each variable: white and slow noise together, SI."""
+    motion, noise = found.likelihood.motion, best.noise
+    stated = {
+        OBSERVED_SIGNALS[name]: value
+        for trial in fitted.trials
+        for name, value in trial.noise.items()
+        if name in OBSERVED_SIGNALS
+    }
+    sizes = {}
+    for place, name in enumerate(motion.seen):
+        sigma = float(np.sqrt(noise.white[place] ** 2 * motion.fine + noise.slow[place] ** 2))
+        sizes[name] = (stated[name], "stated") if name in stated else (sigma, "estimated")
+    return sizes
+
+
+def _rivals(found: Search, decision: Decision) -> tuple[Rival, ...]:
+    least = found.fits[0].score
+    some = [*found.fits[:RIVALS]]
+    some += [found.none] if found.none not in some else []
+    return tuple(
+        Rival(fit.explained.effects, fit.score - least, decision.probabilities[fit.explained.effects]) for fit in some
+    )
+
+
+def _next(card: ManoeuvringCard, found: Search, decision: Decision, noise: Mapping[str, float]) -> NextTest | None:
+    """The manoeuvre that would tell apart what these trials could not."""
+    if decision.verdict != AMBIGUOUS:
+        return None
+    rivals = [_explanation(card, found, fit) for fit in (decision.best, *decision.alike)]
+    return next_test(rivals, noise)
+
+
+def _explanation(card: ManoeuvringCard, found: Search, fit: ExplanationFit) -> Explanation:
+    """A card with an explanation's effects, and what of it is not known exactly."""
+    entries = [
+        EffectEntry(name=name, parameters=dict(values), uncertainty=dict(errors))
+        for name, values, errors in estimates(fit)
+    ]
+    whole = replace(card, effects=(*card.effects, *entries))
+    coefficients = found.likelihood.coefficients
+    names = (*(one.variable for one in fit.explained.asked), *(one for one in coefficients.names if one != CLOCK))
+    kept = [place for place, one in enumerate(coefficients.names) if one != CLOCK]
+    shared = fit.width * coefficients.mixing[kept]
+    spread = np.zeros((len(names), len(names)))
+    spread[len(fit.theta) :, len(fit.theta) :] = shared @ shared.T
+    spread[: len(fit.theta), : len(fit.theta)] = fit.covariance
+    return Explanation(" and ".join(fit.explained.effects) or "none", whole, names, spread)
+
+
+def _notices(
+    card: ManoeuvringCard,
+    decision: Decision,
+    results: Sequence[Passed],
+    told: Mapping[str, Mapping[str, tuple[float, float]]],
+    trials: tuple[Measured, Measured],
+    withheld: str,
+) -> tuple[str, ...]:
+    notices = [*trials[0].notices, *trials[1].notices]
+    notices += [_in_words(one) for one in decision.strange]
+    if withheld:
+        notices.append(
+            f"{withheld}: fits best from instant to instant, but a simulation with it is no nearer: not named"
+        )
+    if card.effects:
+        have = ", ".join(entry.name for entry in card.effects)
+        notices.append(f"{have}: held as the card has it, and not sought")
+    left = float(np.sqrt(np.mean([one.misfit("after") ** 2 for one in results])))
+    if decision.verdict != OUTSIDE_LIBRARY and left > MUCH:
+        notices.append(
+            f"the trials are still missed by {left:.3g} times the noise: forces that vary by chance (gusts, waves), "
+            "coefficients that are off, or something more that is missing; the standard errors do not cover it"
+        )
+    if decision.verdict in (MISSING, AMBIGUOUS):
+        notices += [f"{name}: the improved card follows it worse than the given one" for name in worse(results)]
+    for variable, values in told.items():
+        if len(values) > 1 and (said := trial_consistency(values)).p < DOUBT:
+            notices.append(f"the trials do not agree about {variable} (Cochran Q {said.q:.3g}, p {said.p:.1g})")
+    return tuple(dict.fromkeys(notices))
+
+
+def _in_words(one: Strange) -> str:
+    when = f"from {one.begin_s:.0f} to {one.end_s:.0f} s"
+    if one.what == "period":
+        return f"all trials: an oscillation with a period of {one.begin_s:.3g} s that nothing in the library makes"
+    return f"{one.trial}: {when} the ship does what nothing in the library explains"
+
+
+__all__ = ["AMBIGUOUS", "MISSING", "NO_EFFECT_MISSING", "OUTSIDE_LIBRARY", "GapOptions", "find_gap"]

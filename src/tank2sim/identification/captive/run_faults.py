@@ -1,0 +1,256 @@
+"""Faults of single runs: records that cannot be what they are said to be.
+
+Every check is by run, names the run, and says what is wrong and what to do; a limit is generous, so that what it stops
+is a fault of the record and no unusual ship.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.cards.scaling import Scales
+from tank2sim.errors import InputError
+from tank2sim.identification.captive.harmonics import ReducedRun
+from tank2sim.identification.captive.motion import leading
+from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
+
+_OTHER_MOTION = 0.1
+"""Share that a motion foreign to the type of a run may have of its own motion."""
+_DRIFT_TOLERANCE_RAD = math.radians(1.0)
+_SAME_RATE = 0.1
+"""Relative difference by which v may differ from dy/dt, and r from dpsi/dt."""
+_STEP_RATIO, _STEP_BESIDE_DRIFT = 9.0, 5.5
+"""Standard errors that a step in the zero must reach, by itself and beside a linear drift of the zero; chance, which
+comes to 5 among the hundreds of records of a campaign, does not do both."""
+_LARGEST_PRIME = {"X": 0.5, "Y": 0.5, "N": 0.25}
+"""No hull's coefficients come near: a flat plate broadside has Y' of about T/L."""
+_GAP = 5.0
+_NO_SMALL_ANGLE = 0.05
+_FEWEST_LEVELS = 8
+_PLATEAU = 5.0
+"""Length of a saturated gauge's plateau, in those of its next level. A sinusoid read coarsely and without noise stays
+at its outermost level up to 1/(sqrt(2) - 1) = 2.4 times as long in all as at the next, and 4.8 times at a stretch."""
+
+
+def record_faults(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:
+    """What is wrong with a record, before anything is made of it: the first fault of each kind."""
+    if not run.is_average:
+        yield from _clock(run)
+    yield from _impossible_values(campaign, run)
+    if run.is_average:
+        return
+    yield from _other_motion(campaign, run)
+    for force in FORCE_COLUMNS:
+        yield from _dead(campaign, run, force)
+        yield from _clipped(run, force)
+
+
+def reduced_faults(run: ReducedRun) -> Iterator[InputError]:
+    """What shows in a reduced run alone: other angles, rates that do not belong to positions, a step in a zero."""
+    if run.run.is_average:
+        return
+    yield from _angles(run)
+    yield from _rates(run)
+    for force in FORCE_COLUMNS:
+        found = _step(run, force)
+        if found is not None:
+            when, size, ratio = found
+            unit = "N m" if force == "N" else "N"
+            problem = f"its zero steps by {size:.3g} {unit} at {when:.4g} s ({ratio:.1f} standard errors)"
+            yield InputError(run.run.name, f"gauge {force}", problem, "repeat the run, or cut the record there")
+
+
+def _clock(run: CaptiveRun) -> Iterator[InputError]:
+    steps = np.diff(run.time_s)
+    usual = float(np.median(steps))
+    longest = int(np.argmax(steps))
+    if steps[longest] > _GAP * usual:
+        problem = f"has a gap of {steps[longest]:.3g} s after {run.time_s[longest]:.4g} s"
+        yield InputError(
+            run.name, "column t_s", problem, f"readings come every {usual:.3g} s; fill it or cut the record"
+        )
+
+
+def _impossible_values(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:
+    speed = float(np.mean(run.speed_mps))
+    ratio = speed / campaign.test.speed_mps
+    if not 0.02 < ratio < 5.0:
+        problem = f"has a mean of {speed:.4g}, and the test speed is {campaign.test.speed_mps:.4g} m/s"
+        yield InputError(run.name, "column speed_mps", problem, "give it in m/s")
+        return
+    length = campaign.model.length_m
+    limits = (
+        ("v_mps", run.v_mps, 0.95 * speed, "m/s, below the speed of the model"),
+        ("r_radps", run.r_radps, 3.0 * speed / length, "rad/s (r_degps for degrees)"),
+        ("delta_rad", run.delta_rad, math.radians(80.0), "rad (delta_deg for degrees)"),
+        ("psi_rad", run.psi_rad, math.pi, "rad (psi_deg for degrees)"),
+    )
+    for column, values, limit, remedy in limits:
+        if values is not None and np.max(np.abs(values)) > limit:
+            problem = f"reaches {np.max(np.abs(values)):.4g}, which cannot be"
+            yield InputError(run.name, f"column {column}", problem, f"give it in {remedy}")
+    scales = Scales(campaign.test.water_density_kgpm3, length, speed)
+    for force in FORCE_COLUMNS:
+        unit = scales.force * (length if force == "N" else 1.0)
+        largest = float(np.max(np.abs(run.force(force)))) / unit
+        if largest > _LARGEST_PRIME[force]:
+            column = "N_Nm" if force == "N" else f"{force}_N"
+            problem = f"reaches {largest * unit:.4g}, {force}' = {largest:.3g}, which no hull has"
+            yield InputError(run.name, f"column {column}", problem, f"give it in {'N m' if force == 'N' else 'N'}")
+
+
+def _other_motion(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:
+    """A motion that is not what the type of the run says."""
+    speed, length = float(np.mean(run.speed_mps)), campaign.model.length_m
+    if speed <= 0:
+        return  # a fault of the speed, which is told by itself
+    sway, yaw = _swing(run.v_mps) / speed, _swing(run.r_radps) * length / speed
+    turning = abs(float(np.mean(run.r_radps))) * length / speed
+    remedy = "mend its type in the campaign, or the record"
+    own = {"pure_sway": sway, "pure_yaw": yaw, "yaw_with_drift": yaw}.get(run.type)
+    foreign = {"pure_sway": ("yaw rate", yaw), "pure_yaw": ("sway", sway), "yaw_with_drift": ("sway", sway)}
+    if own is not None:
+        name, other = foreign[run.type]
+        if other > _OTHER_MOTION * own or own == 0.0:
+            problem = f"is said to be {run.type}, and its {name} swings by {other:.3g} beside {own:.3g} (prime)"
+            yield InputError(run.name, "", problem, remedy)
+    elif max(sway, yaw) > 0.02 or turning > 0.02:
+        problem = (
+            f"is said to be {run.type}, and the model moves: v' by {sway:.3g}, r' by {yaw:.3g} about {turning:.3g}"
+        )
+        yield InputError(run.name, "", problem, remedy)
+
+
+def _angles(reduced: ReducedRun) -> Iterator[InputError]:
+    """Drift and rudder that are not those of the type or the sheet: means over whole periods."""
+    run, motion = reduced.run, reduced.motion
+    sine = -float(np.mean(motion.v_mps)) / motion.mean_speed_mps
+    drift = math.asin(float(np.clip(sine, -1.0, 1.0)))
+    remedy = "mend its type in the campaign, or the record"
+    expected = {"pure_sway": 0.0, "pure_yaw": 0.0, "static_rudder": 0.0}.get(run.type, run.sheet.drift_rad)
+    if expected is not None and abs(drift - expected) > _DRIFT_TOLERANCE_RAD:
+        problem = (
+            f"has a drift angle of {math.degrees(drift):.3g} deg by its v, and {math.degrees(expected):.3g} deg by "
+            "its type or sheet"
+        )
+        yield InputError(run.name, "column v_mps", problem, "drift is -asin(v/U); " + remedy)
+    rudder = float(np.mean(motion.delta_rad))
+    if run.sheet.rudder_rad is not None and abs(rudder - run.sheet.rudder_rad) > _DRIFT_TOLERANCE_RAD:
+        told = f"is {math.degrees(rudder):.3g} deg, and {math.degrees(run.sheet.rudder_rad):.3g} deg by the sheet"
+        yield InputError(run.name, "column delta_rad", told, "mend the sheet or the record")
+
+
+def _swing(values: Array) -> float:
+    """Amplitude of a signal, robust against noise of the sensor."""
+    return math.sqrt(2.0) * float(np.std(values))
+
+
+def _rates(reduced: ReducedRun) -> Iterator[InputError]:
+    """v against dy/dt in pure sway, and r against dpsi/dt."""
+    run, frequency = reduced.run, reduced.motion.frequency_radps
+    if not run.oscillates:
+        return
+    of, name, column = (run.y_m, "y_m", "v_mps") if run.type == "pure_sway" else (run.psi_rad, "psi_rad", "r_radps")
+    if of is None or np.ptp(of) == 0.0:
+        return
+    wave = np.exp(-1j * frequency * run.time_s) * np.hanning(len(run.time_s))
+    position, rate = np.sum(wave * (of - of.mean())), np.sum(wave * (leading(run) - leading(run).mean()))
+    factor = complex(rate / (1j * frequency * position))
+    if abs(factor - 1.0) <= _SAME_RATE:
+        return
+    what = "has the opposite sign of" if abs(factor + 1.0) <= _SAME_RATE else f"is {abs(factor):.3g} times"
+    if 0.9 < abs(factor) < 1.1 and abs(factor + 1.0) > _SAME_RATE:
+        what = f"is {math.degrees(np.angle(factor)):.3g} deg out of phase with"
+    problem = f"{what} the rate of change of {name}"
+    yield InputError(run.name, f"column {column}", problem, "one of them is in another unit, sign or clock")
+
+
+def _dead(campaign: Campaign, run: CaptiveRun, force: str) -> Iterator[InputError]:
+    """A gauge that shows one value from end to end, where the model's motion or the gauge's usual noise forbids it."""
+    values = run.force(force)
+    if np.ptp(values) > 0.0 or np.min(run.speed_mps) <= 0:
+        return  # without speed there is no drift angle; that fault is told by itself
+    angles = (float(np.mean(run.v_mps / run.speed_mps)), float(np.mean(run.delta_rad)))
+    # Drift and rudder together may cancel, and a coarse gauge reads nothing at a small angle.
+    nothing = float(values[0]) == 0.0 and max(map(abs, angles)) > _NO_SMALL_ANGLE and 0.0 in angles
+    if ((run.oscillates or nothing) and force != "X") or _usually_noisy(campaign, force):
+        when = "while the model oscillates" if run.oscillates else "from end to end"
+        problem = f"reads {values[0] + 0.0:.4g} {when} and never varies: the gauge is dead"
+        yield InputError(run.name, f"gauge {force}", problem, "repeat the run, or give it its readings")
+
+
+def _usually_noisy(campaign: Campaign, force: str) -> bool:
+    """Whether steady runs usually show many levels: no computed campaign, and no coarse gauge."""
+    records = [run for run in campaign.runs if not run.is_average]
+    steady = [run for run in records if not run.oscillates] or records
+    return float(np.median([len(np.unique(run.force(force))) for run in steady])) >= _FEWEST_LEVELS
+
+
+def _clipped(run: CaptiveRun, force: str) -> Iterator[InputError]:
+    """A plateau at the top or bottom of a record: many equal readings in a row, and nothing beyond.
+
+    A gauge that shows a few levels only is coarse beside what it measures, and its outermost may well be the usual one.
+    """
+    values = run.force(force)
+    stands, counts = np.unique(values, return_counts=True)
+    if len(stands) < _FEWEST_LEVELS:
+        return
+    inner = int(counts[1:-1].max())
+    equal = np.flatnonzero(np.diff(values) != 0.0)
+    lengths = np.diff(np.concatenate([[-1], equal, [len(values) - 1]]))
+    usual = float(np.median(lengths))
+    for extreme, end in ((float(values.max()), "top"), (float(values.min()), "bottom")):
+        levels = values[np.concatenate([equal, [len(values) - 1]])]
+        others = levels[levels != extreme]
+        next_level = others.max() if end == "top" else others.min()
+        # A coarse gauge stands still at every level, a saturated one at its last.
+        natural = max(usual, float(lengths[levels == next_level].max()))
+        longest, count = int(lengths[levels == extreme].max()), int(np.count_nonzero(values == extreme))
+        plateau = longest >= _PLATEAU * natural and count >= _PLATEAU * inner
+        if plateau and count >= max(6, 0.01 * len(values)):
+            problem = f"stands still at its {end}, {extreme:.4g}, for {longest} readings: the gauge is saturated"
+            yield InputError(run.name, f"gauge {force}", problem, "repeat the run with a larger range")
+            return
+
+
+def _step(run: ReducedRun, force: str) -> tuple[float, float, float] | None:
+    """Time, size and ratio to its standard error of a step in the mean of a residual; None if there is none.
+
+    A step must stand out whether or not a linear drift of the zero is fitted with it: slow noise seldom does both.
+    """
+    count = len(run.basis)
+    if count < 40:
+        return None
+    steady = [place for place, label in enumerate(run.labels) if label != "trend"]
+    record = run.run.force(force)[run.motion.kept]
+    place, size, ratio = _largest_step(record, run.basis)
+    if ratio < _STEP_BESIDE_DRIFT or _largest_step(record, run.basis[:, steady])[2] < _STEP_RATIO:
+        return None
+    return float(run.run.time_s[run.motion.kept][place]), size, ratio
+
+
+def _largest_step(record: Array, basis: Array) -> tuple[int, float, float]:
+    """Row, size and ratio of the step that is likeliest beside the columns of a basis.
+
+    It is fitted together with them, at the row where the sum of the residuals departs most.
+    """
+    count = len(record)
+    gram = basis.T @ basis
+    residual = record - basis @ np.linalg.solve(gram, basis.T @ record)
+    sums = np.abs(np.cumsum(residual))
+    edge = max(5, count // 20)
+    place = edge + int(np.argmax(sums[edge : count - edge]))
+    column = (np.arange(count) > place).astype(float)
+    column = column - basis @ np.linalg.solve(gram, basis.T @ column)
+    length = float(column @ column)
+    size = float(column @ residual) / length
+    # Density of what remains at low frequencies, where a step has its power: of a few lines for slow noise, of many
+    # for a steady estimate.
+    power = np.abs(np.fft.rfft(residual - size * column)) ** 2 / count
+    least = 1e-20 * float(np.max(record**2)) + 1e-300
+    density = max(*(float(np.mean(power[1:lines])) for lines in (3, 5, 13, 61)), least)
+    return place, size, abs(size) / math.sqrt(density / length)

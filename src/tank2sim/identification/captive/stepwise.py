@@ -1,0 +1,156 @@
+"""The paper's order: linear terms from the simplest tests, then held fixed while more complex tests give the rest.
+
+Paper 2, sections 4 and 5. What is held fixed is itself uncertain; its covariance goes on into what is found with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.cards.terms import parse_term
+from tank2sim.identification.captive.equations import SPEED_RANGE, CampaignEquations
+from tank2sim.identification.captive.regression import Solution, Spread, fitted_spread
+from tank2sim.identification.conditioning import COLLINEAR, column_norms, scaled_condition
+from tank2sim.records.campaign_form import RunType
+
+_STEPS: tuple[tuple[RunType, str], ...] = (
+    ("static_drift", "v"),
+    ("static_rudder", "d"),
+    ("pure_sway", "v"),
+    ("pure_yaw", "r"),
+    ("yaw_with_drift", "vr"),
+    ("drift_and_rudder", "vd"),
+)
+"""Type of run, and the motions whose terms it gives, in the order of the steps."""
+
+_LEAST_SPREAD = 0.5
+"""Least standard error of a difference, in those of the regression: less than that is no disagreement worth a word."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stepwise:
+    """What the paper's order gives of one force.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Terms found, in the order in which they were.
+    values, standard_errors : array, (terms,)
+        Prime.
+    found_in : tuple of str
+        Type of run that gave each.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    standard_errors: Array
+    found_in: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Disagreement:
+    """A term on which two ways differ: ``ratio`` is the difference over its standard error."""
+
+    name: str
+    stepwise: float
+    together: float
+    ratio: float
+
+
+def stepwise(equations: CampaignEquations, spread: Spread, test_speed_mps: float) -> Stepwise:
+    """The terms of a force in the paper's order, with the weights of the whole campaign.
+
+    The steps use the runs at the test speed; those at others give the terms in Du, last.
+    """
+    names: list[str] = []
+    found_in: list[str] = []
+    values, covariance = np.zeros(0), np.zeros((0, 0))
+    for kind, motions in (*_STEPS, ("", "vrdu")):
+        places = [
+            place
+            for place, run in enumerate(equations.runs)
+            if not kind or (run.run.type == kind and abs(run.motion.mean_speed_mps / test_speed_mps - 1) <= SPEED_RANGE)
+        ]
+        if not places:
+            continue
+        part = equations.of_runs(places)
+        new = _new_terms(part, spread, set(names), motions)
+        if not new:
+            continue
+        held = part.of_terms(names).design
+        own = part.of_terms(new)
+        weighted = spread.weighted(part, np.column_stack([own.design, held, part.values]))
+        prior = own.prior_rows
+        weighted = np.vstack([weighted, np.hstack([prior, np.zeros((len(prior), len(names) + 1))])])
+        design, fixed, target = weighted[:, : len(new)], weighted[:, len(new) : -1], weighted[:, -1]
+        norms = column_norms(design)
+        inverse = np.linalg.pinv(design / norms) / norms[:, None]
+        values = np.concatenate([values, inverse @ (target - fixed @ values)])
+        covariance = _joined(covariance, inverse, inverse @ fixed)
+        names += new
+        found_in += [kind or "all"] * len(new)
+    errors: Array = np.sqrt(np.diag(covariance))
+    return Stepwise(tuple(names), values, errors, tuple(found_in))
+
+
+def scatter_within_tests(equations: CampaignEquations) -> Spread:
+    """The spread of the runs when each type of test may have linear terms of its own.
+
+    Tests that contradict each other then do not pass for scatter, behind which the contradiction would hide.
+    """
+    columns, names = [equations.design], list(equations.names)
+    kinds = np.array([run.run.type for run in equations.runs])[equations.run_of_row]
+    for kind, letter in (("static_drift", "v"), ("static_rudder", "d"), ("pure_yaw", "r"), ("drift_and_rudder", "v")):
+        name = equations.force + letter
+        if name in equations.names and np.any(kinds == kind) and not np.all(kinds == kind):
+            columns.append(np.where(kinds == kind, equations.design[:, equations.names.index(name)], 0.0)[:, None])
+            names.append(f"{name} {kind}")
+    if len(names) > len(equations.values):
+        return fitted_spread(equations, by_type=False)
+    return fitted_spread(replace(equations, names=tuple(names), design=np.hstack(columns)), by_type=False)
+
+
+def _joined(held: Array, inverse: Array, leaning: Array) -> Array:
+    """Covariance of the terms held and of the new ones, which lean on them by -`leaning`."""
+    across = -held @ leaning.T
+    own = inverse @ inverse.T + leaning @ held @ leaning.T
+    joined: Array = np.block([[held, across], [across.T, own]])
+    return joined
+
+
+def _new_terms(part: CampaignEquations, spread: Spread, found: set[str], motions: str) -> list[str]:
+    """Terms not found yet that act in these runs, in the step's motions alone, and can be told apart there."""
+    reach = np.abs(spread.weighted(part, part.design)).max(axis=0)
+    new: list[str] = []
+    for name, reached in zip(part.names, reach, strict=True):
+        term = parse_term(name.partition(" ")[0])
+        assert term is not None
+        letters = {letter for letter in "vrdu" if getattr(term, letter)} | set(term.acceleration)
+        if name in found or reached < 1e-6 or not letters <= set(motions):
+            continue
+        trial = part.of_terms([*new, name])
+        if len(trial.values) > len(new) and scaled_condition(spread.weighted(trial, trial.design)) <= COLLINEAR:
+            new.append(name)
+    return new
+
+
+def disagreements(steps: Stepwise, together: Solution, names: Sequence[str], limit: float) -> tuple[Disagreement, ...]:
+    """Those of the named terms on which the paper's order and the regression differ by more than `limit` errors.
+
+    The regression is efficient, so that the variance of the difference is the difference of the variances (Hausman
+    1978).
+    """
+    found = []
+    for name, value, error in zip(steps.names, steps.values, steps.standard_errors, strict=True):
+        if name not in names:
+            continue
+        best = together.error(name) ** 2
+        spread = np.sqrt(max(error**2 - best, _LEAST_SPREAD**2 * best))
+        ratio = (value - together.value(name)) / spread
+        if abs(ratio) > limit:
+            found.append(Disagreement(name, float(value), together.value(name), float(ratio)))
+    return tuple(found)

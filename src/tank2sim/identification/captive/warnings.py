@@ -1,0 +1,117 @@
+"""All physics warnings on a captive campaign: on how it was tested, and on the derivatives it gave."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from tank2sim.cards import ManoeuvringCard
+from tank2sim.identification.captive.physics_warning import Caution
+from tank2sim.identification.captive.plausibility import (
+    ADDED_MASSES,
+    added_masses,
+    force_convention,
+    levers,
+    unusual_signs,
+    yaw_force,
+)
+from tank2sim.identification.captive.tank_conditions import (
+    LEAST_DEPTH_RATIO,
+    CarriedBody,
+    OscillationMotion,
+    Tank,
+    blockage,
+    carried_mass,
+    depth_froude,
+    flow_memory,
+    frequency_parameters,
+    model_length,
+    scale_effect,
+    similarity,
+    tank_resonance,
+    trim,
+)
+from tank2sim.records.campaigns import Campaign
+
+__all__ = ["Caution", "OscillationMotion", "body_of", "cautions_of_result", "cautions_of_test"]
+
+
+def cautions_of_test(
+    campaign: Campaign, runs: tuple[OscillationMotion, ...], ship: ManoeuvringCard | None = None
+) -> tuple[Caution, ...]:
+    """Everything to be said of a campaign before its forces are looked at.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        As read.
+    runs : tuple of Oscillation
+        Its oscillating runs, with frequencies as measured.
+    ship : ManoeuvringCard, optional
+        The ship that the model is to be similar to.
+    """
+    model, test = campaign.model, campaign.test
+    gravity, speed, length = test.gravity_mps2, test.speed_mps, model.length_m
+    tank = Tank(campaign.tank.breadth_m, campaign.tank.depth_m)
+    found = [
+        *model_length(length),
+        *frequency_parameters(runs, speed, gravity),
+        *flow_memory(runs, speed, length),
+        *trim(model.trim_m, length),
+        *tank_resonance(runs, tank, gravity),
+        *blockage(model.beam_m, model.draught_m, tank),
+        *depth_froude(speed, tank.depth_m, gravity),
+        scale_effect(model.scale, length, speed, test.kinematic_viscosity_m2ps),
+    ]
+    if ship is not None:
+        found += similarity(_numbers(campaign), _card_numbers(ship))
+    return tuple(found)
+
+
+def cautions_of_result(
+    derivatives: Mapping[str, float], standard_errors: Mapping[str, float], campaign: Campaign
+) -> tuple[Caution, ...]:
+    """Everything to be said of derivatives (prime, "hydrodynamic", starboard), standard errors by the same names."""
+    numbers = _numbers(campaign)
+    mass, inertia = numbers["m'"], numbers["J_z'"]
+    assert mass is not None
+    body = body_of(campaign)
+    deep = not (campaign.tank.depth_m and body.draught_m) or campaign.tank.depth_m >= LEAST_DEPTH_RATIO * body.draught_m
+    # A positive added mass is told once, with its likely cause.
+    others = {name: value for name, value in derivatives.items() if name not in ADDED_MASSES}
+    return (
+        *force_convention(derivatives, mass, inertia or 0.0, campaign.test.force_convention),
+        *carried_mass(body, campaign.model.block_coefficient),
+        *(added_masses(derivatives, standard_errors, mass, inertia) if deep else ()),
+        *unusual_signs(others, standard_errors),
+        *yaw_force(derivatives, mass),
+        *levers(derivatives, standard_errors),
+    )
+
+
+def body_of(campaign: Campaign) -> CarriedBody:
+    """The body that the gauges carry."""
+    model = campaign.model
+    return CarriedBody(
+        length_m=model.length_m,
+        mass_kg=model.mass_kg,
+        density_kgpm3=campaign.test.water_density_kgpm3,
+        yaw_inertia_kgm2=model.yaw_inertia_kgm2,
+        beam_m=model.beam_m,
+        draught_m=model.draught_m,
+        x_G_m=model.x_G_m,
+    )
+
+
+def _numbers(campaign: Campaign) -> dict[str, float | None]:
+    model, scales = campaign.model, campaign.scales
+    return {
+        "m'": model.mass_kg / float(scales.mass),
+        "J_z'": None if model.yaw_inertia_kgm2 is None else model.yaw_inertia_kgm2 / float(scales.inertia),
+        "x_G'": model.x_G_m / model.length_m,
+        "z_G'": None if model.z_G_m is None else model.z_G_m / model.length_m,
+    }
+
+
+def _card_numbers(ship: ManoeuvringCard) -> dict[str, float | None]:
+    body = ship.rigid_body
+    return {"m'": body.mass, "J_z'": body.yaw_inertia, "x_G'": body.x_G, "z_G'": None}

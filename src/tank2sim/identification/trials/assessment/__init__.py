@@ -1,0 +1,1 @@
+"""What an estimate is worth: identifiability, prediction intervals, held-out trials."""

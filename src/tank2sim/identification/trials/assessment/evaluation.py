@@ -1,0 +1,305 @@
+"""How well a model follows trials: over windows, over whole runs, and in the figures of the manoeuvres."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.arrays import Array
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics import build
+from tank2sim.errors import InputError
+from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, white
+from tank2sim.identification.trials.methods.shooting import Pieces, Shooting, cut
+from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.records.trials import Trial
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Turn
+from tank2sim.simulation.recorded import recorded, repeat, steerable
+from tank2sim.simulation.trajectory import Trajectory
+
+_WINDOW = 5.0
+"""Length of the windows of a free-running comparison, in L/u0 (30 s of a 7 m model at 1.18 m/s)."""
+
+TURN_FIGURE_NAMES = ("advance_m", "transfer_m", "tactical_diameter_m")
+_OVERSHOOTS = 2
+"""Overshoots that are compared: those of IMO MSC.137(76). Later ones repeat the errors of the first."""
+
+
+@dataclass(frozen=True)
+class Following:
+    """How a model follows one run.
+
+    Parameters
+    ----------
+    name : str
+    windows : mapping
+        Signal to (root mean square of error, of what was measured less its mean) over windows of :data:`_WINDOW`, each
+        from a state of its own; SI.
+    whole : mapping
+        Signal to root mean square error over the whole run from one initial state; inf where the motion ran away.
+    """
+
+    name: str
+    windows: Mapping[str, tuple[float, float]]
+    whole: Mapping[str, float]
+
+    def relative(self, signal: str) -> float:
+        """Error over windows as a share of the signal."""
+        error, size = self.windows[signal]
+        return error / size if size > 0 else np.inf
+
+
+def replay_error(problem: Problem, values: Array, noise: Mapping[str, float]) -> tuple[Following, ...]:
+    """How the model at `values` (k,) follows each run of a problem; `noise` weighs signals in the initial states."""
+    shooting = Shooting(problem)
+    own = [white(noise[name]) for name in problem.seen]
+    results = []
+    for run in problem.runs:
+        found = {}
+        for length in (_WINDOW * problem.ship_time, None):
+            pieces = cut(problem, run, length)
+            starts = _settled(shooting, pieces, values, own)
+            found[length] = shooting.residuals(pieces, starts, values)[0], pieces.measured
+        windows, whole = found.values()
+        results.append(
+            Following(
+                run.name,
+                {
+                    name: (_rms(windows[0][:, :, place]), _spread(name, windows[1][:, :, place]))
+                    for place, name in enumerate(problem.seen)
+                    if not np.isnan(windows[1][:, :, place]).all()
+                },
+                {
+                    name: _rms(whole[0][:, :, place])
+                    for place, name in enumerate(problem.seen)
+                    if not np.isnan(whole[1][:, :, place]).all()
+                },
+            )
+        )
+    return tuple(results)
+
+
+def pooled(results: Sequence[Following], signal: str) -> float:
+    """Error over windows of all runs together, as a share of the signal."""
+    pairs = np.array([result.windows[signal] for result in results if signal in result.windows])
+    if not len(pairs) or not pairs[:, 1].any():
+        return np.nan  # of a signal that is zero throughout there is no share
+    return float(np.sqrt(np.sum(pairs[:, 0] ** 2) / np.sum(pairs[:, 1] ** 2)))
+
+
+@dataclass(frozen=True)
+class FigureComparison:
+    """A figure of a manoeuvre.
+
+    Parameters
+    ----------
+    trial, name : str
+        Of which trial; its name with its unit.
+    measured : float
+    predicted : float or None
+        By the closed-loop simulation; None where that does not reach it.
+    interval : (float, float) or None
+        In which it is expected with 95 % probability; None where that was not computed.
+    """
+
+    trial: str
+    name: str
+    measured: float
+    predicted: float | None
+    interval: tuple[float, float] | None = None
+
+    @property
+    def error(self) -> float:
+        """Predicted less measured; for distances as a share of the measured one."""
+        if self.predicted is None:
+            return np.nan
+        difference = self.predicted - self.measured
+        return difference / self.measured if self.name.endswith("_m") else difference
+
+
+def predicted_figures(card: ManoeuvringCard, trials: Sequence[Trial]) -> tuple[FigureComparison, ...]:
+    """Figures of the turns and zigzags among trials, measured and simulated in closed loop from the measured start.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        Of the ship.
+    trials : sequence of Trial
+        At the ship's size; others than turns and zigzags are passed over.
+    """
+    model = build(steerable(card))
+    integrator = Integrator(model)
+    figures = []
+    for trial in trials:
+        what = recorded(trial, model)
+        if what is None:
+            continue
+        try:
+            simulated = repeat(what, integrator).figures
+        except InputError:  # the motion left all bounds: none of its figures is reached
+            simulated = {}
+        for name, value in select_figures(what.figures, turn=isinstance(what.manoeuvre, Turn)).items():
+            there = select_figures(simulated, turn=isinstance(what.manoeuvre, Turn)).get(name)
+            figures.append(FigureComparison(trial.name, name, value, there))
+    return tuple(figures)
+
+
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """One trial beside what a model makes of it.
+
+    Parameters
+    ----------
+    name : str
+        Of the trial.
+    closed_loop : bool
+        True for a turn or zigzag, in which the model was steered as the manoeuvre asks from the measured start; else
+        it was given the recorded rudder, from the initial state that suits the record best.
+    time_s : array (n,)
+        In the trial's own time.
+    measured : mapping
+        Some of :data:`_SHOWN` to what was measured (n,), nan where nothing was.
+    model_time_s : array (m,)
+        In the trial's own time; empty where the motion left all bounds.
+    simulated : mapping
+        Each of :data:`_SHOWN` (m,).
+    """
+
+    name: str
+    closed_loop: bool
+    time_s: Array
+    measured: Mapping[str, Array]
+    model_time_s: Array
+    simulated: Mapping[str, Array]
+
+
+_SHOWN = ("rudder", "motion.psi", "motion.r", "motion.speed", "motion.beta", "motion.x", "motion.y")
+"""Signals of a passage: rudder angle (its order where only that is known), heading, yaw rate, speed and drift angle
+(through the water, or over the ground where only that was measured), position; SI, rad."""
+
+
+def comparison_windows(
+    problem: Problem, card: ManoeuvringCard, trials: Sequence[Trial], noise: Mapping[str, float]
+) -> tuple[Passage, ...]:
+    """Trials beside their simulations by a card's model: turns and zigzags in closed loop, others replayed.
+
+    Parameters
+    ----------
+    problem : Problem
+        Posed with a card and these trials; its prior means are the card's values.
+    card : ManoeuvringCard
+        That card.
+    trials : sequence of Trial
+        One for each run of the problem.
+    noise : mapping
+        Standard deviation by variable: weighs signals in the initial state of a replayed trial.
+    """
+    model = build(steerable(card))
+    integrator, shooting = Integrator(model), None
+    found = []
+    for trial, run in zip(trials, problem.runs, strict=True):
+        what = recorded(trial, model)
+        ground = not {"motion.u", "motion.v"} <= set(_given(run))
+        simulated: Trajectory | None
+        if what is None:
+            shooting = shooting or Shooting(problem)
+            begin, replayed = run.begin_s, _replayed(shooting, run, noise)
+            simulated = replayed if replayed.is_finite() else None
+        else:
+            try:
+                begin, simulated = what.begin_s, repeat(what, integrator).trajectory
+            except InputError:  # the motion left all bounds
+                begin, simulated = what.begin_s, None
+        columns = {} if simulated is None else _shown_of(simulated, ground=ground)
+        times = np.zeros(0) if simulated is None else begin + simulated.t
+        found.append(Passage(run.name, what is not None, run.times, _measured_in(run, problem), times, columns))
+    return tuple(found)
+
+
+def _given(run: SampledRun) -> dict[str, Array]:
+    """What was measured in a run, by variable."""
+    return {name: run.column(name) for name in run.seen if not np.isnan(run.column(name)).all()}
+
+
+def _measured_in(run: SampledRun, problem: Problem) -> dict[str, Array]:
+    given = _given(run)
+    rudder = run.inputs[:, problem.model.input_names.index("rudder.command")]
+    columns = {"rudder": rudder, **{name: values for name, values in given.items() if name in _SHOWN}}
+    for ahead, side in (("motion.u_ground", "motion.v_ground"), ("motion.u", "motion.v")):
+        if ahead in given and side in given:
+            speed = np.hypot(given[ahead], given[side])
+            columns |= {"motion.speed": speed, "motion.beta": _drift(given[side], speed)}
+    if "motion.sog" in given:
+        columns.setdefault("motion.speed", given["motion.sog"])
+    return columns
+
+
+def _shown_of(simulated: Trajectory, *, ground: bool) -> dict[str, Array]:
+    names = simulated.model.outputs
+    rudder = simulated["rudder.angle" if "rudder.angle" in names else "rudder.command"]
+    columns = {"rudder": rudder, **{name: simulated[name] for name in _SHOWN[1:]}}
+    if ground:
+        over = simulated["motion.cog"] - simulated["motion.psi"]
+        columns |= {"motion.speed": simulated["motion.sog"], "motion.beta": _drift(np.sin(over), np.ones_like(over))}
+    return columns
+
+
+def _drift(side: Array, speed: Array) -> Array:
+    """-asin(v/U), rad; 0 at rest."""
+    share = np.divide(side, speed, out=np.zeros_like(speed), where=speed != 0)
+    angle: Array = -np.arcsin(np.clip(share, -1, 1))
+    return angle
+
+
+def _replayed(shooting: Shooting, run: SampledRun, noise: Mapping[str, float]) -> Trajectory:
+    """The whole run with its recorded inputs, from the initial state that suits the record best."""
+    problem = shooting.problem
+    model, values = problem.model, problem.prior_mean
+    pieces = cut(problem, run, None)
+    starts = _settled(shooting, pieces, values, [white(noise.get(name) or 1.0) for name in problem.seen])
+    x = shooting.residuals(pieces, starts, values)[1][0]
+    u, p = pieces.inputs[0], problem.parameters(values)
+    y = np.array(model.output(x.T, u.T, np.repeat(p[:, None], len(x), axis=1))).T
+    return Trajectory(model, run.step_s * np.arange(len(x), dtype=float), x, u, y)
+
+
+def _settled(shooting: Shooting, pieces: Pieces, values: Array, noise: Sequence[ColouredNoise]) -> NDArray[np.float64]:
+    """Initial states (pieces, nx) that suit the record best, at these parameters."""
+    starts = pieces.starts.copy()
+    for _ in range(3):  # the motion is nearly linear in its initial state: three steps are plenty
+        cost = shooting.cost(pieces, starts, values, noise)
+        if not np.isfinite(cost):
+            break
+        step = shooting.normal(pieces, starts, values, noise).step.reshape(starts.shape)
+        better = starts - step
+        if shooting.cost(pieces, better, values, noise) >= cost:
+            break
+        starts = better
+    return starts
+
+
+def select_figures(figures: Mapping[str, object], *, turn: bool) -> dict[str, float]:
+    """The figures that are compared, each a number."""
+    if turn:
+        return {name: float(value) for name in TURN_FIGURE_NAMES if isinstance(value := figures.get(name), float)}
+    overshoots = figures.get("overshoots_deg", [])
+    assert isinstance(overshoots, list)
+    return {f"overshoot_{place + 1}_deg": float(value) for place, value in enumerate(overshoots[:_OVERSHOOTS])}
+
+
+def _rms(values: Array) -> float:
+    if not np.isfinite(values[~np.isnan(values)]).all():
+        return np.inf
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(np.nanmean(values**2)))
+
+
+def _spread(name: str, values: Array) -> float:
+    """Size of a signal: of a rate or a sway velocity about zero, of the others about their mean."""
+    about = 0.0 if name in ("motion.r", "motion.v") else np.nanmean(values)
+    return float(np.sqrt(np.nanmean((values - about) ** 2)))

@@ -1,0 +1,257 @@
+"""What trials can tell of the free parameters, and what they cannot: before they are fitted, and after.
+
+The derivatives of an Abkowitz model drift: where sway and yaw are nearly proportional, as in every zigzag, only a
+combination of ``Nv`` and ``Nr`` is determined (Hwang 1980, J. Ship Research 26; Abkowitz 1980, Trans. SNAME 88).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import qr
+
+from tank2sim.arrays import Array
+from tank2sim.cards.terms import Term, parse_term
+from tank2sim.errors import InputError
+from tank2sim.identification.conditioning import correlation_matrix
+from tank2sim.identification.trials.methods.equation_error import EquationErrorSettings, equation_error, weights_of
+from tank2sim.identification.trials.methods.posterior import scaled_prior
+from tank2sim.identification.trials.methods.weak_form import WeakForm
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
+from tank2sim.identification.trials.problem.measured_motion import MEASURED_STATES
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+
+CLOSE_CORRELATION = 0.95
+"""Correlation from which two parameters are told as one: their difference has 39 times the variance of their sum."""
+
+WEAK = 0.1
+"""A direction in which the trials tell less than this share of what the prior tells counts as not seen (ours)."""
+
+PART = 0.3
+"""Least component of a direction for its parameter to be named (ours)."""
+
+_ALONE = 1e-6
+"""Information of the prior, of its own, that is left in what "the data alone" say: it keeps matrices regular."""
+
+LEAST_OF_LINEAR = 1e-3
+"""The same measure for linear terms, which no other term replaces: what is left out of a linear model swells the
+residuals, and a clear change of speed would not stand out against them (ours; a straight run shows 1e-24)."""
+
+STILL = {"motion.u": 0.002, "motion.v": 0.002, "motion.r": 0.002, "rudder": 0.002}
+"""Standard deviation below which a signal counts as constant: u, v over u0, r L/u0, rudder in rad (ours: 0.1 deg of
+drift or rudder, a tenth of what the smallest manoeuvre shows)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identifiability:
+    """How well trials determine k parameters; everything in units of the prior's standard errors (with its scale).
+
+    Parameters
+    ----------
+    free : tuple of str
+        Names of the parameters.
+    singular_values : array (k,)
+        Of the weighted sensitivities, falling; below 1 the prior tells more than the trials.
+    condition : float
+        Largest over smallest of them, inf where the smallest is zero.
+    correlation : array (k, k)
+        Of the estimates by the trials alone.
+    pairs : tuple of (str, str, float)
+        Parameters whose correlation exceeds :data:`CLOSE_CORRELATION` either way, the closest first.
+    unseen : tuple of tuple of str
+        Combinations of parameters that the trials do not see.
+    share : array (k,)
+        Share of each parameter's information that the trials give: 1 - (variance after / variance before).
+    notices : tuple of str
+        The same in words.
+    """
+
+    free: tuple[str, ...]
+    singular_values: Array
+    condition: float
+    correlation: Array
+    pairs: tuple[tuple[str, str, float], ...]
+    unseen: tuple[tuple[str, ...], ...]
+    share: Array
+    notices: tuple[str, ...]
+
+
+def identifiability(problem: Problem, estimate: Estimate) -> Identifiability:
+    """What the trials told an estimator of the parameters.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was asked: its prior.
+    estimate : Estimate
+        The answer: its information and the scale of the prior.
+    """
+    unit = scaled_prior(problem, estimate.prior_scale)
+    information = estimate.information * np.outer(unit, unit)
+    values, vectors = np.linalg.eigh(information)
+    singular = np.sqrt(np.maximum(values, 0.0))[::-1]
+    alone = correlation_matrix(np.asarray(np.linalg.inv(information + _ALONE * np.eye(len(unit))), dtype=np.float64))
+    names = tuple(_short(name) for name in estimate.free)
+    pairs = _pairs(names, alone)
+    unseen = _directions(names, vectors[:, values < WEAK])
+    return Identifiability(
+        free=estimate.free,
+        singular_values=singular,
+        condition=float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf,
+        correlation=alone,
+        pairs=pairs,
+        unseen=unseen,
+        share=1 - np.diag(np.linalg.inv(information + np.eye(len(unit)))),
+        notices=(*_told_pairs(pairs), *_told_directions(unseen)),
+    )
+
+
+def refuse_unseen(problem: Problem) -> tuple[str, ...]:
+    """Free parameters of which trials show nothing; trials without which nothing can be said are refused.
+
+    Sway, yaw and rudder must show in a manoeuvring trial: their linear derivatives are refused if they do not, and so
+    are acceleration derivatives, which are free only where they were asked for. The others are returned, to be held at
+    what was known of them before: a zigzag need not show what the speed does, least of all without a log.
+
+    A parameter is seen if a large change (:func:`_large`) would show in the weak form of the equations: move the mean
+    accelerations by one standard deviation of the residuals, all windows taken together. What moves no more than its
+    own noise counts as constant, and the constant part of a term that needs motion counts as nothing, for a constant
+    force does the same.
+
+    Raises
+    ------
+    InputError
+        Names the parameters that are refused, and what must move to show them.
+    """
+    estimate = equation_error(problem, settings=EquationErrorSettings(rounds=2))
+    form = WeakForm(problem)
+    inverse = weights_of(form, form.at(estimate.values)).inverse
+    quiet = WeakForm(problem.with_runs(tuple(_quietened(form, place) for place in range(len(problem.runs)))))
+    jacobian = np.concatenate([windows.jacobian for windows in quiet.at(estimate.values)])
+    size = _large(problem, estimate.values)
+    missing = []
+    for place, name in enumerate(problem.free):
+        column = jacobian[:, :, place]
+        term = parse_term(_short(name))
+        if term is not None and (term.v or term.r or term.d or term.u):
+            column = column - column.mean(axis=0)
+        shown = size[place] * inverse @ column.T
+        least = LEAST_OF_LINEAR if term is not None and _linear(term) else 1.0
+        if form.seen[place] and np.sum(shown**2) < least:
+            missing.append(name)
+    needed = [name for name in missing if _needed(parse_term(_short(name)))]
+    if needed:
+        runs = ", ".join(dict.fromkeys(run.origin for run in problem.runs))
+        told = ", ".join(_short(name) for name in needed)
+        raise InputError(runs, "", f"shows nothing of {told}", _remedy(needed))
+    return tuple(missing)
+
+
+def _needed(term: Term | None) -> bool:
+    """True for a derivative without which trials are of no manoeuvre, or that is free only because it was asked for."""
+    return term is not None and (bool(term.acceleration) or (_linear(term) and not term.u))
+
+
+def _large(problem: Problem, values: Array) -> Array:
+    """A large change of each free parameter (k,): its prior error, its value, or that of the largest linear derivative
+    of the same force, whichever is most. In the prime system terms of one force have coefficients of one size."""
+    size = np.maximum(problem.prior_error, np.abs(values))
+    model = dict(zip(problem.model.parameter_names, problem.parameters(values), strict=True))
+    terms = {name: term for name in model if (term := parse_term(_short(name))) is not None}
+    for place, name in enumerate(problem.free):
+        if name in terms and not terms[name].acceleration:
+            same = [model[other] for other, term in terms.items() if term.force == terms[name].force and _linear(term)]
+            size[place] = max(size[place], *np.abs(same), 0.0)
+    return size
+
+
+def _linear(term: Term) -> bool:
+    return not term.acceleration and term.v + term.r + term.d + term.u == 1
+
+
+def _quietened(form: WeakForm, place: int) -> SampledRun:
+    """A run in which every signal that moves no more than its noise is constant."""
+    run, motion = form.runs[place].run, form.runs[place].motion
+    model = form.problem.model
+    values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+    speed, length = float(values["ship.speed"]), float(values["ship.length"])
+    signals = motion.smooth.copy()
+    units = (speed, speed, speed / length)
+    for column, (name, unit, noise) in enumerate(zip(MEASURED_STATES, units, motion.left, strict=False)):
+        if signals[:, column].std() < max(3 * noise, STILL[name] * unit):
+            signals[:, column] = signals[:, column].mean()
+    signals[np.isnan(motion.velocities).any(axis=1), :3] = np.nan
+    inputs = run.inputs.copy()
+    if "rudder.command" in model.input_names:
+        rudder = inputs[:, model.input_names.index("rudder.command")]
+        if rudder.std() < STILL["rudder"]:
+            rudder[:] = rudder.mean()
+    return replace(run, inputs=inputs, measured=signals, seen=MEASURED_STATES)
+
+
+def _remedy(missing: list[str]) -> str:
+    terms = [term for name in missing if (term := parse_term(_short(name))) is not None]
+    motions = {"v": "sway", "r": "yaw", "d": "rudder", "u": "speed"}
+    needed = [word for letter, word in motions.items() if any(getattr(term, letter) for term in terms)]
+    verb = "changes" if len(needed) == 1 else "change"
+    moving = f"add a run in which {_listed(needed)} {verb}, or " if needed else ""
+    held = " ".join(f"--hold {_short(name)}" for name in missing)
+    return f"{moving}leave them as they are: {held}"
+
+
+def _pairs(names: tuple[str, ...], correlations: Array) -> tuple[tuple[str, str, float], ...]:
+    above = np.argwhere(np.triu(np.abs(correlations) > CLOSE_CORRELATION, 1))
+    found = [(names[a], names[b], float(correlations[a, b])) for a, b in above]
+    return tuple(sorted(found, key=lambda pair: -abs(pair[2])))
+
+
+def _directions(names: tuple[str, ...], vectors: Array) -> tuple[tuple[str, ...], ...]:
+    """Each of the unseen directions (k, m) by the parameters in it, with as few in each as possible.
+
+    Any mixture of unseen directions is one too: the mixture is taken in which each has a parameter of its own.
+    """
+    count = vectors.shape[1]
+    if not count:
+        return ()
+    pivots = qr(vectors.T, pivoting=True, mode="r")[1][:count]
+    plain = vectors @ np.linalg.inv(vectors[pivots])
+    plain = plain / np.abs(plain).max(axis=0)
+    return tuple(
+        tuple(names[place] for place in np.argsort(-np.abs(column), kind="stable") if abs(column[place]) > PART)
+        for column in plain.T
+    )
+
+
+def _told_pairs(pairs: tuple[tuple[str, str, float], ...]) -> list[str]:
+    told = []
+    for one, other, value in pairs:
+        a, b = parse_term(one), parse_term(other)
+        if a is not None and b is not None and _drift(a, b):
+            why = "they drift together: sway and yaw are nearly proportional in these trials"
+        else:
+            why = "the trials tell them apart hardly"
+        told.append(f"{one} and {other} have a correlation of {value:.3f}; {why}")
+    return told
+
+
+def _drift(one: Term, other: Term) -> bool:
+    """True if the terms differ by sway in place of yaw alone."""
+    same = one.force == other.force and (one.d, one.u) == (other.d, other.u) and one.name != other.name
+    return same and not (one.acceleration or other.acceleration) and one.v + one.r == other.v + other.r
+
+
+def _told_directions(unseen: tuple[tuple[str, ...], ...]) -> list[str]:
+    single = [direction[0] for direction in unseen if len(direction) == 1]
+    several = [direction for direction in unseen if len(direction) > 1]
+    told = [f"the trials tell next to nothing of {_listed(single)}: the prior stands"] if single else []
+    told += [f"the trials do not tell {_listed(list(direction))} apart: only together" for direction in several]
+    return told
+
+
+def _listed(words: list[str]) -> str:
+    return " and ".join(part for part in (", ".join(words[:-1]), words[-1] if words else "") if part)
+
+
+def _short(name: str) -> str:
+    return name.removeprefix("derivatives.")

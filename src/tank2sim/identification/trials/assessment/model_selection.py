@@ -1,0 +1,236 @@
+"""Which model to take: information criteria, and how well each predicts manoeuvres that it was not fitted to.
+
+Of models that predict alike the simpler one is taken: the rule of one standard error (Breiman et al. 1984,
+Classification and Regression Trees, 3.4.3; Hastie, Tibshirani and Friedman 2009, 7.10).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+from statsmodels.tsa.stattools import acovf
+
+from tank2sim.arrays import Array
+from tank2sim.errors import InputError
+from tank2sim.identification.trials.assessment.evaluation import pooled, replay_error
+from tank2sim.identification.trials.methods.posterior import scaled_prior
+from tank2sim.identification.trials.methods.weak_form import WeakForm
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
+from tank2sim.identification.trials.problem.picklable import Portable, map_tasks
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+
+FARTHEST = 4
+"""One in this many runs, those of largest amplitude, is left out to see how a model extrapolates (ours)."""
+
+TrialEstimator = Callable[[Problem], Estimate]
+Score = Callable[[Problem, Estimate], float]
+"""``score(problem with the runs left out, estimate) -> error``, the smaller the better."""
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """Information criteria, the smaller the better; to compare models of the same runs.
+
+    Parameters
+    ----------
+    aic, bic : float
+        Akaike (1974) and Schwarz (1978): -2 log likelihood + 2 k, + k log n.
+    samples : float
+        n, of independent residuals that tell as much as these coloured ones.
+    parameters : float
+        k, that the trials fix: a parameter that the prior holds counts for less than one.
+    """
+
+    aic: float
+    bic: float
+    samples: float
+    parameters: float
+
+
+def criteria(problem: Problem, estimate: Estimate, samples: float | None = None) -> Criteria:
+    """Information criteria from the weak form's residuals, which every model of the same runs has alike.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was asked.
+    estimate : Estimate
+        By any method.
+    samples : float, optional
+        n; give each rival that of the first (by default from this model's own residuals), or differences in n drown
+        those in fit.
+    """
+    form = WeakForm(problem)
+    windows = form.at(estimate.values)
+    series = [one.residuals[piece] for one, run in zip(windows, form.runs, strict=True) for piece in run.pieces]
+    prior = scaled_prior(problem, estimate.prior_scale)
+    inverse = np.linalg.inv(estimate.information * np.outer(prior, prior) + np.eye(len(prior)))
+    return criteria_of(series, float(len(prior) - np.trace(inverse)), samples)
+
+
+def criteria_of(series: Sequence[Array], parameters: float, samples: float | None = None) -> Criteria:
+    """Information criteria of Gaussian residuals: pieces (n, m) without gaps, covariance unknown.
+
+    -2 log likelihood is n log det of the residuals' covariance; n is :func:`effective_samples` unless given.
+    """
+    every = np.concatenate(series)
+    n = effective_samples(series) if samples is None else samples
+    deviance = n * float(np.linalg.slogdet(every.T @ every / len(every))[1])
+    return Criteria(deviance + 2 * parameters, deviance + parameters * math.log(n), n, parameters)
+
+
+def effective_samples(series: Sequence[Array]) -> float:
+    """Number of independent residuals that tell as much as these: N / (1 + 2 sum of autocorrelations).
+
+    The sum ends at the first that is not positive (Geyer 1992, Statistical Science 7). Pieces (n, m); the m components
+    are taken together, each in units of its own deviation.
+    """
+    every = np.concatenate(series)
+    size = np.sqrt(np.mean(every**2, axis=0))
+    longest = max(len(piece) for piece in series)
+    sums = np.zeros(longest)
+    for piece in series:
+        for column in (piece / np.where(size > 0, size, 1.0)).T:
+            sums[: len(piece)] += len(piece) * acovf(column, demean=False, fft=True)
+    correlations = sums[1:] / sums[0]
+    negative = np.flatnonzero(correlations <= 0)
+    positive = correlations[: negative[0]] if len(negative) else correlations
+    return float(max(1.0, len(every) / (1 + 2 * positive.sum())))
+
+
+@dataclass(frozen=True)
+class HeldOutFold:
+    """A fit without some of the runs, and its error on them.
+
+    Parameters
+    ----------
+    left_out : tuple of str
+        Names of the runs.
+    error : float
+        Of the score on them; inf where the fit or the prediction failed.
+    values : array (k,)
+        Estimates without them, empty where the fit failed.
+    """
+
+    left_out: tuple[str, ...]
+    error: float
+    values: Array
+
+
+@dataclass(frozen=True)
+class CrossValidation:
+    """How a model predicts manoeuvres that it was not fitted to.
+
+    Parameters
+    ----------
+    single : tuple of Fold
+        Each run left out once, in the order of the runs.
+    extrapolation : Fold
+        The runs of largest amplitude left out together.
+    """
+
+    single: tuple[HeldOutFold, ...]
+    extrapolation: HeldOutFold
+
+    @property
+    def errors(self) -> Array:
+        """Of all folds (runs + 1,), extrapolation last."""
+        return np.array([*(fold.error for fold in self.single), self.extrapolation.error])
+
+
+def cross_validate(
+    problem: Problem | Portable, estimator: TrialEstimator, score: Score, executor: Executor | None = None
+) -> CrossValidation:
+    """Leave out one run at a time, and then the runs of largest amplitude together.
+
+    Parameters
+    ----------
+    problem : Problem or Portable
+        Portable (:func:`tank2sim.identification.trials.problem.picklable.portable`) if the executor works in other
+        processes; `estimator` and `score` are then functions of a module, or partials of one.
+    estimator : callable
+        ``estimator(problem) -> Estimate``.
+    score : callable
+        ``score(problem, estimate) -> float``, told the runs left out.
+    executor : concurrent.futures.Executor, optional
+        By default one fold after the other, here.
+
+    Raises
+    ------
+    InputError
+        There are fewer than two runs.
+    """
+    runs = problem.runs
+    if len(runs) < 2:
+        raise InputError(runs[0].origin, "", "is the only run", "cross-validation needs two runs at least")
+    groups = [*((place,) for place in range(len(runs))), farthest(runs)]
+    tasks = [(problem, group, estimator, score) for group in groups]
+    *single, last = map_tasks(_fold, tasks, executor)
+    return CrossValidation(tuple(single), last)
+
+
+def farthest(runs: Sequence[SampledRun]) -> tuple[int, ...]:
+    """Places of the runs of largest amplitude, one in :data:`FARTHEST` and one at least.
+
+    Amplitude: the 95th percentile of the yaw rate either way, or of the heading's slope where none was measured.
+    """
+    amplitudes = []
+    for run in runs:
+        rate = run.column("motion.r")
+        if np.isnan(rate).all():
+            rate = np.gradient(run.column("motion.psi"), run.step_s)
+        amplitudes.append(0.0 if np.isnan(rate).all() else float(np.nanpercentile(np.abs(rate), 95)))
+    count = max(1, len(runs) // FARTHEST)
+    return tuple(sorted(np.argsort(amplitudes, kind="stable")[::-1][:count].tolist()))
+
+
+def simplest(candidates: Mapping[str, CrossValidation]) -> str:
+    """Name of the model to take: the simplest whose errors are not surely larger than the best one's.
+
+    Parameters
+    ----------
+    candidates : mapping
+        Name to cross-validation over the same runs, from the simplest model to the one with most parameters.
+
+    Notes
+    -----
+    Best is the least mean error over all folds. A simpler one is as good if the mean of its differences from the best,
+    fold by fold, is within one standard error of that mean: folds differ in difficulty, and the pairs take that out.
+    """
+    if not candidates:
+        raise ValueError("there is nothing to choose from")
+    errors = {name: one.errors for name, one in candidates.items()}
+    best = min(errors, key=lambda name: float(np.mean(errors[name])))
+
+    def as_good(name: str) -> bool:
+        difference = errors[name] - errors[best]
+        if name == best or not np.isfinite(difference).all():
+            return name == best
+        return bool(difference.mean() <= difference.std(ddof=1) / math.sqrt(len(difference)))
+
+    return next(name for name in errors if as_good(name))
+
+
+def yaw_rate_error(problem: Problem, estimate: Estimate) -> float:
+    """A score: error of the yaw rate over free-running windows, as a share of it (:mod:`.evaluation`)."""
+    spreads = np.nanstd(np.concatenate([run.measured for run in problem.runs]), axis=0)
+    weights = {name: float(one) or 1.0 for name, one in zip(problem.seen, spreads, strict=True)}
+    return pooled(replay_error(problem, estimate.values, weights), "motion.r")
+
+
+def _fold(task: tuple[Problem | Portable, tuple[int, ...], TrialEstimator, Score]) -> HeldOutFold:
+    asked, group, estimator, score = task
+    problem = asked.problem() if isinstance(asked, Portable) else asked
+    left = tuple(run for place, run in enumerate(problem.runs) if place in group)
+    kept = tuple(run for place, run in enumerate(problem.runs) if place not in group)
+    names = tuple(run.name for run in left)
+    try:
+        estimate = estimator(problem.with_runs(kept))
+        error = float(score(problem.with_runs(left), estimate))
+    except (InputError, np.linalg.LinAlgError):
+        return HeldOutFold(names, math.inf, np.empty(0))
+    return HeldOutFold(names, error if math.isfinite(error) else math.inf, estimate.values)

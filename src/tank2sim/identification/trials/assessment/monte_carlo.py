@@ -1,0 +1,245 @@
+"""Bands in which manoeuvring figures will lie, and the scatter of estimates, by simulation with random disturbances.
+
+Every member has a random generator of its own (numpy's SeedSequence, spawned): results hang on the seed alone, not on
+the executor nor on the order in which it works.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.identification.trials.assessment.residual_forces import (
+    Disturbances,
+    disturbed,
+    draw_disturbances,
+    fastest_rate,
+)
+from tank2sim.identification.trials.methods.shooting import cut
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
+from tank2sim.identification.trials.problem.measured_motion import sensor_noise
+from tank2sim.identification.trials.problem.picklable import PicklableShip, Portable, map_tasks
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.simulation.figures import Figures
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Manoeuvre
+from tank2sim.simulation.recorded import Recorded, repeat
+from tank2sim.simulation.rows import Chain, RowFunction
+from tank2sim.simulation.run import simulate
+from tank2sim.simulation.scheme import runge_kutta_step
+
+
+@dataclass(frozen=True)
+class PredictionSettings:
+    """How many members, and from which seed.
+
+    Parameters
+    ----------
+    members : int
+        Simulations; 200 give the ends of a 95 % band to about a tenth of its width (ours).
+    seed : int
+    levels : tuple of float
+        Quantiles to tell.
+    """
+
+    members: int = 200
+    seed: int = 0
+    levels: tuple[float, ...] = (0.025, 0.5, 0.975)
+
+
+@dataclass(frozen=True, eq=False)
+class Bands:
+    """Predicted distribution of the figures of a manoeuvre.
+
+    Parameters
+    ----------
+    levels : tuple of float
+    quantiles : mapping
+        Figure to its value at each level; those of a list are ``overshoots_deg.1`` and so on.
+    members : mapping
+        Figure to its value in each member (members,), nan where it was not reached.
+    failed : int
+        Members whose motion left all bounds.
+    """
+
+    levels: tuple[float, ...]
+    quantiles: Mapping[str, tuple[float, ...]]
+    members: Mapping[str, Array]
+    failed: int
+
+
+def bands(
+    ship: PicklableShip,
+    estimate: Estimate,
+    manoeuvre: Manoeuvre | Recorded,
+    disturbances: Disturbances | None = None,
+    settings: PredictionSettings | None = None,
+    executor: Executor | None = None,
+) -> Bands:
+    """Bands of a manoeuvre's figures: coefficients drawn from their covariance, random forces during the manoeuvre.
+
+    Parameters
+    ----------
+    ship : Ship
+        Its card is driven by the rudder's order here, whatever drove the trials.
+    estimate : Estimate
+        Values and covariance of parameters of the ship's model; drawn values stay within the model's bounds.
+    manoeuvre
+        One of :mod:`tank2sim.simulation.manoeuvres`, or a recorded one to be repeated from its start.
+    disturbances : Disturbances, optional
+        By default none: coefficients alone are uncertain.
+    settings : Settings, optional
+    executor : concurrent.futures.Executor, optional
+        By default one member after the other, here.
+
+    Raises
+    ------
+    InputError
+        The motion of every member leaves all bounds.
+    """
+    settings = settings or PredictionSettings()
+    ship = replace(ship, driven_by="order")
+    model = ship.model()
+    tasks = []
+    for rng in _generators(settings):
+        values = _within_bounds(model, estimate.free, rng.multivariate_normal(estimate.values, estimate.covariance))
+        if disturbances is not None:
+            values |= draw_disturbances(disturbances, fastest_rate(model), rng)
+        tasks.append((ship, manoeuvre, values))
+    found = list(map_tasks(_figures, tasks, executor))
+    reached = [one for one in found if one is not None]
+    if not reached:
+        raise InputError(model.origin, "", "the motion leaves all bounds in every member", "check the estimates")
+    names = list(dict.fromkeys(name for one in reached for name in one))
+    members = {name: np.array([np.nan if one is None else one.get(name, np.nan) for one in found]) for name in names}
+    members = {name: column for name, column in members.items() if not np.isnan(column).all()}
+    quantiles = {name: tuple(map(float, np.nanquantile(one, settings.levels))) for name, one in members.items()}
+    return Bands(settings.levels, quantiles, members, len(found) - len(reached))
+
+
+def bootstrap(
+    asked: Portable,
+    estimate: Estimate,
+    estimator: Callable[[Problem], Estimate],
+    disturbances: Disturbances,
+    settings: PredictionSettings | None = None,
+    executor: Executor | None = None,
+) -> Array:
+    """Parametric bootstrap: estimates (members, k) from runs that were simulated with the estimate (Efron 1979).
+
+    Each run is simulated anew under its own inputs, with random forces and white noise of the sensors' size; what was
+    known beforehand is drawn anew too, around the estimate. Members in which a run leaves all bounds are left out: on a
+    course-unstable ship over long runs there are some.
+
+    Parameters
+    ----------
+    asked : Portable
+        The problem that was estimated.
+    estimate : Estimate
+        The values that become the truth.
+    estimator : callable
+        ``estimator(problem) -> Estimate``; with an executor of processes a function of a module.
+    disturbances : Disturbances
+        Random forces on the simulated ship.
+    settings, executor
+        As for :func:`bands`.
+    """
+    tasks = [(asked, estimate, estimator, disturbances, rng) for rng in _generators(settings or PredictionSettings())]
+    found = [one for one in map_tasks(_again, tasks, executor) if one is not None]
+    return np.array(found).reshape(-1, len(estimate.free))
+
+
+def _generators(settings: PredictionSettings) -> list[np.random.Generator]:
+    return [np.random.default_rng(seed) for seed in np.random.SeedSequence(settings.seed).spawn(settings.members)]
+
+
+def _within_bounds(model: Model, names: tuple[str, ...], values: Array) -> dict[str, float]:
+    within = {}
+    for name, value in zip(names, values, strict=True):
+        lowest, highest = model[name].minimum, model[name].maximum
+        within[name] = float(np.clip(value, lowest, highest)) if (lowest, highest) != (None, None) else float(value)
+    return within
+
+
+@lru_cache(maxsize=8)
+def _integrator(ship: PicklableShip) -> Integrator:
+    return Integrator(disturbed(ship.model()))
+
+
+def _figures(task: tuple[PicklableShip, Manoeuvre | Recorded, dict[str, float]]) -> dict[str, float] | None:
+    """Figures of one member, None if its motion leaves all bounds."""
+    ship, manoeuvre, values = task
+    integrator = _integrator(ship)
+    try:
+        if isinstance(manoeuvre, Recorded):
+            return flat(repeat(manoeuvre, integrator, values).figures)
+        return flat(simulate(integrator.model, manoeuvre, parameters=values, integrator=integrator).figures)
+    except InputError:
+        return None
+
+
+def flat(figures: Figures) -> dict[str, float]:
+    """Figures one by one: those of a list by their number, None as nan."""
+    single: dict[str, float] = {}
+    for name, value in figures.items():
+        if isinstance(value, list | tuple):
+            single |= {f"{name}.{place}": float(one) for place, one in enumerate(value, start=1)}
+        else:
+            single[name] = float(value) if isinstance(value, int | float) else np.nan
+    return single
+
+
+@dataclass(frozen=True, eq=False)
+class _Simulator:
+    """Motion of a disturbed ship, and what is seen of it."""
+
+    model: Model
+    steps: Chain
+    shown: RowFunction
+
+
+@lru_cache(maxsize=8)
+def _simulator(ship: PicklableShip, seen: tuple[str, ...]) -> _Simulator:
+    model = disturbed(ship.model())
+    shown = ca.densify(model.expand(ca.vcat([model.symbol(name) for name in seen])))
+    function = ca.Function("shown", [model.x, model.u, model.p], [shown], {"cse": True})
+    return _Simulator(model, Chain(runge_kutta_step(model)), RowFunction(function))
+
+
+_Again = tuple[Portable, Estimate, Callable[[Problem], Estimate], Disturbances, np.random.Generator]
+
+
+def _again(task: _Again) -> Array | None:
+    """The estimate from one simulated set of runs, None if a run leaves all bounds."""
+    asked, estimate, estimator, disturbances, rng = task
+    problem = asked.problem()
+    simulator = _simulator(asked.ship, problem.seen)
+    runs = []
+    for run in problem.runs:
+        forces = draw_disturbances(disturbances, fastest_rate(simulator.model), rng)
+        values = dict(zip(estimate.free, map(float, estimate.values), strict=True))
+        p = simulator.model.parameter_values({**values, **forces})
+        measured = _simulated(problem, run, simulator, p)
+        if measured is None:
+            return None
+        noise = sensor_noise(problem, run) * rng.standard_normal(measured.shape)
+        runs.append(replace(run, measured=np.where(np.isnan(run.measured), np.nan, measured + noise)))
+    mean = estimate.values + problem.prior_error * rng.standard_normal(len(estimate.values))
+    return estimator(replace(problem, runs=tuple(runs), prior_mean=mean)).values
+
+
+def _simulated(problem: Problem, run: SampledRun, simulator: _Simulator, p: Array) -> Array | None:
+    """What is seen (n, ny) of a run under its own inputs; None if the motion leaves all bounds."""
+    start = np.append(cut(problem, run, None).starts[0], 0.0)  # the clock is the last state
+    states = simulator.steps.run(start, run.inputs[:-1], p, np.array([run.step_s]))
+    if not np.isfinite(states).all() or np.abs(states).max() > 1e9:
+        return None
+    return simulator.shown(states, run.inputs, p)[0]

@@ -1,0 +1,104 @@
+"""What a user should be told of an identification: where it is worse, what it rests on, where its card fails."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics import build
+from tank2sim.errors import InputError
+from tank2sim.identification.trials.assessment.evaluation import pooled
+from tank2sim.identification.trials.identify import Identification
+from tank2sim.simulation.manoeuvres import Turn
+from tank2sim.simulation.run import simulate
+
+HARD_TURN = math.radians(35.0)
+"""Rudder of the turn that a card is tried with (IMO MSC.137(76)), or the gear's largest angle if that is less."""
+
+STOPPED = 0.15
+"""A ship that keeps less than this share of her speed in a turn has stopped: full hulls keep a third (ours)."""
+
+WORSE = 1.05
+"""An error that grew by less than this factor is the same (ours)."""
+
+
+def remarks(result: Identification) -> tuple[str, ...]:
+    """All of them, as sentences."""
+    return (
+        *_recognised(result),
+        *_chosen(result),
+        *_widened(result.estimate.prior_scale),
+        *_worse(result),
+        *_outside(result),
+        *_stops(result.card),
+    )
+
+
+def _recognised(result: Identification) -> list[str]:
+    told = "; ".join(f"{name}: {words}" for name, words in result.manoeuvres.items())
+    return [f"recognised, to starboard positive: {told}"] if told else []
+
+
+def _chosen(result: Identification) -> list[str]:
+    if not result.structures and result.structure == "card":
+        return [
+            "other structures were not tried: --structure auto cross-validates them, cross_flow extrapolates to turns"
+        ]
+    if not result.structures:
+        return []
+    return [
+        f"cross-validation chose the structure {result.structure}: the simplest of those within one standard error "
+        "of the best"
+    ]
+
+
+def _widened(scale: Mapping[str, float]) -> list[str]:
+    wide = [f"{group} {factor:.3g} times" for group, factor in sorted(scale.items()) if factor > 1.05]
+    if not wide:
+        return []
+    return [f"the card's standard errors were widened as the trials demand: {', '.join(wide)}; --trust-card keeps them"]
+
+
+def _worse(result: Identification) -> list[str]:
+    told = []
+    pairs = [("the trials fitted", result.before, result.fit)]
+    if result.holdout and result.before_holdout:
+        pairs.append(("the trials held out", result.before_holdout, result.holdout))
+    for words, before, now in pairs:
+        old, new = pooled(before.following, "motion.r"), pooled(now.following, "motion.r")
+        if new > WORSE * old:
+            told.append(
+                f"WORSE than the card before on {words}: yaw-rate error {100 * old:.3g} % before, {100 * new:.3g} %"
+            )
+    return told
+
+
+def _outside(result: Identification) -> list[str]:
+    if result.holdout is None:
+        return []
+    missed = [
+        f"{one.trial} {one.name}"
+        for one in result.holdout.figures
+        if one.interval and not one.interval[0] <= one.measured <= one.interval[1]
+    ]
+    return [f"measured outside the 95 % interval: {', '.join(missed)}"] if missed else []
+
+
+def _stops(card: ManoeuvringCard) -> list[str]:
+    """Trials seldom hold a full turn: the card is tried in one, either way."""
+    gear = card.steering_gear
+    largest = HARD_TURN if gear is None or gear.max_angle_rad is None else min(HARD_TURN, gear.max_angle_rad)
+    told = []
+    for side, word in ((1, "starboard"), (-1, "port")):
+        words = f"in a {math.degrees(largest):.0f} deg turn to {word} the model found"
+        try:
+            speed = simulate(build(card), Turn(side * largest)).trajectory["motion.speed"]
+        except InputError:
+            told.append(f"{words} leaves all bounds: it holds only near the trials")
+            continue
+        if speed[-1] < STOPPED * speed[0]:
+            told.append(
+                f"{words} loses {100 * (1 - speed[-1] / speed[0]):.0f} % of its speed: it holds only near the trials"
+            )
+    return told

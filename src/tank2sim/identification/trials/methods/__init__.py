@@ -1,0 +1,1 @@
+"""Estimators of free-running trials."""

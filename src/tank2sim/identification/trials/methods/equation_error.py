@@ -1,0 +1,236 @@
+"""Equation error in its weak form: the model's accelerations are held against the measured changes of velocity.
+
+Generalised least squares: the covariance of the three equations and the colour of their residuals are estimated from
+them, the prior is a ridge. Linear in derivatives, so that one step solves for them; no start is too bad, and nothing is
+simulated but what no sensor saw. Noise in the regressors pulls the estimates towards zero: they are smoothed first, and
+the user is told how much is left. Gusts move the ship in step with themselves, which pulls the damping towards zero by
+the share of the motion that they cause (as in any regression on the motion itself): a start for output error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.errors import InputError
+from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, estimate_coloured_noise, white
+from tank2sim.identification.trials.methods.posterior import BLOCK, evidence_scale, sandwich, scaled_prior
+from tank2sim.identification.trials.methods.weak_form import WEAK_EQUATIONS, WIDTH, WeakForm, WeakWindows
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, Progress, silent
+
+TOLD_NOISE = 0.01
+"""Share of noise in a regressor's variance from which the user is told: so much too small its coefficients may be."""
+
+
+@dataclass(frozen=True)
+class EquationErrorSettings:
+    """How equation error is done.
+
+    Parameters
+    ----------
+    width : float
+        Of the test functions, in L/u0.
+    scale_prior : bool
+        The prior's standard errors are multiplied, by groups, by the factor of largest evidence, at least 1.
+    rounds : int
+        Times that noise (and prior) are estimated anew.
+    """
+
+    width: float = WIDTH
+    scale_prior: bool = True
+    rounds: int = 3
+
+
+@dataclass(frozen=True, eq=False)
+class WhiteningWeights:
+    """What makes residuals white: the root of the covariance of the three equations, and the colour of each.
+
+    Parameters
+    ----------
+    inverse : array (3, 3)
+        L^-1, with L L' the covariance of the residuals, L lower triangular.
+    colour : tuple of Noise
+        Of the three components of L^-1 e.
+    """
+
+    inverse: Array
+    colour: tuple[ColouredNoise, ...]
+
+    def whitened(self, values: Array, pieces: tuple[slice, ...]) -> Array:
+        """Residuals (windows, 3) or their derivatives (windows, 3, k), made white."""
+        flat = values.reshape(len(values), 3, -1)
+        alone = np.einsum("ij,wjk->iwk", self.inverse, flat)
+        whole = np.empty_like(alone)
+        for place, one in enumerate(self.colour):
+            for piece in pieces:
+                if not alone[place, piece].size:
+                    continue
+                whole[place, piece] = one.whitened(alone[place, piece][None])[0]
+        result: Array = whole.transpose(1, 0, 2).reshape(values.shape)
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Normal:
+    """Normal equations of all runs."""
+
+    cost: float
+    information: Array
+    gradient: Array
+    scores: list[Array]
+
+
+def equation_error(
+    problem: Problem,
+    start: Array | None = None,
+    settings: EquationErrorSettings | None = None,
+    progress: Progress = silent,
+) -> Estimate:
+    """Estimate the free parameters by equation error.
+
+    Parameters
+    ----------
+    problem : Problem
+        k free parameters.
+    start : array (k,), optional
+        Where the search begins; by default the prior's mean.
+    settings : Settings, optional
+    progress : callable
+        Told of each better estimate; what it raises passes through.
+
+    Raises
+    ------
+    InputError
+        A run lacks velocities, and they do not follow from what it has; or all runs are shorter than a window.
+    """
+    settings = settings or EquationErrorSettings()
+    form = WeakForm(problem, settings.width)
+    refuse_empty(form)
+    values = (problem.prior_mean if start is None else start).astype(float)
+    windows = form.at(values)
+    weights = first_weights(form)
+    scale: dict[str, float] = {}
+    costs = []
+    for number in range(settings.rounds):
+        prior = scaled_prior(problem, scale)
+        values, windows, normal = _minimise(form, values, windows, (weights, prior), progress)
+        costs.append(normal.cost)
+        if number < settings.rounds - 1:
+            weights = weights_of(form, windows)
+            if settings.scale_prior:
+                scale = evidence_scale(problem, normal.information, values, scale)
+    deviations = np.sqrt(np.mean(np.concatenate([one.residuals for one in windows]) ** 2, axis=0))
+    return Estimate(
+        method="equation_error",
+        free=problem.free,
+        values=values,
+        covariance=sandwich(normal.information, prior, normal.scores),
+        information=normal.information,
+        noise=dict(zip(WEAK_EQUATIONS, map(float, deviations), strict=True)),
+        cost=tuple(costs),
+        prior_scale=scale,
+        notices=(*form.notices, *_told(form)),
+    )
+
+
+def refuse_empty(form: WeakForm) -> None:
+    """Raise InputError if no run has a window."""
+    if all(run.averaging.shape[0] == 0 for run in form.runs):
+        names = ", ".join(run.run.name for run in form.runs)
+        remedy = f"velocities without gaps over {2 * form.half:.3g} s at least are needed"
+        raise InputError(names, "", "has no stretch long enough", remedy)
+
+
+def first_weights(form: WeakForm) -> WhiteningWeights:
+    """A tenth of the spread of each acceleration: nothing is known of the residuals yet."""
+    every = np.concatenate([run.change for run in form.runs])
+    spread = 0.1 * np.sqrt(np.mean(every**2, axis=0))
+    return WhiteningWeights(np.diag(1 / np.where(spread > 0, spread, 1.0)), (white(1.0),) * 3)
+
+
+def weights_of(form: WeakForm, windows: list[WeakWindows]) -> WhiteningWeights:
+    """Covariance and colour of the residuals as they are."""
+    every = np.concatenate([one.residuals for one in windows])
+    covariance = every.T @ every / len(every)
+    smallest = 1e-12 * np.mean(np.concatenate([run.change for run in form.runs]) ** 2, axis=0)
+    covariance += np.diag(np.where(smallest > 0, smallest, 1.0))  # an equation without residual would be singular
+    inverse = np.linalg.inv(np.linalg.cholesky(covariance))
+    pieces = [
+        inverse @ one.residuals[piece].T for one, run in zip(windows, form.runs, strict=True) for piece in run.pieces
+    ]
+    return WhiteningWeights(
+        inverse, tuple(estimate_coloured_noise([piece[place] for piece in pieces], 1e-6) for place in range(3))
+    )
+
+
+def normal_equations(form: WeakForm, windows: list[WeakWindows], weights: WhiteningWeights) -> _Normal:
+    """Cost, information, gradient and its shares by blocks of time, of all runs without the prior."""
+    k = len(form.problem.free)
+    information, gradient, cost, scores = np.zeros((k, k)), np.zeros(k), 0.0, []
+    per_block = max(1, round(BLOCK * form.problem.ship_time / form.half))
+    for one, run in zip(windows, form.runs, strict=True):
+        if not len(one.residuals):
+            continue
+        r = weights.whitened(one.residuals, run.pieces)
+        J = -weights.whitened(one.jacobian, run.pieces)
+        cost += float(np.sum(r**2))
+        information += np.einsum("wik,wil->kl", J, J, optimize=True)
+        pull = np.einsum("wik,wi->wk", J, r)
+        gradient += pull.sum(axis=0)
+        scores.append(np.add.reduceat(pull, np.arange(0, len(pull), per_block), axis=0))
+    return _Normal(cost, information, gradient, scores)
+
+
+def _minimise(
+    form: WeakForm, values: Array, windows: list[WeakWindows], known: tuple[WhiteningWeights, Array], progress: Progress
+) -> tuple[Array, list[WeakWindows], _Normal]:
+    """Damped Gauss-Newton steps; values, windows and normal equations at the best point."""
+    weights, errors = known
+    problem = form.problem
+    prior = 1 / errors**2
+
+    def cost_at(at: Array, there: list[WeakWindows]) -> float:
+        own = float(np.sum(prior * (at - problem.prior_mean) ** 2))
+        runs = zip(there, form.runs, strict=True)
+        return own + sum(float(np.sum(weights.whitened(one.residuals, run.pieces) ** 2)) for one, run in runs)
+
+    best, damping = cost_at(values, windows), 0.0
+    for _ in range(20):
+        normal = normal_equations(form, windows, weights)
+        H = normal.information + np.diag(prior)
+        g = normal.gradient + prior * (values - problem.prior_mean)
+        for _ in range(10):
+            # In units of the prior's errors the matrix is well scaled.
+            scaled = H * np.outer(errors, errors)
+            step = -errors * np.linalg.solve(scaled + damping * np.diag(np.diag(scaled)), g * errors)
+            step = np.clip(values + step, *problem.bounds) - values
+            there = form.at(values + step)
+            cost = cost_at(values + step, there)
+            if cost < best:
+                break
+            damping = max(10 * damping, 1e-3)
+        else:
+            return values, windows, normal
+        gain, best, values, windows = best - cost, cost, values + step, there
+        damping = damping / 10 if damping > 1e-6 else 0.0
+        progress("equation error", values, cost)
+        if gain < 1e-6 * max(1.0, best):
+            break
+    return values, windows, normal_equations(form, windows, weights)
+
+
+def _told(form: WeakForm) -> list[str]:
+    """Regressors in which noise is left, and parameters that no acceleration depends on."""
+    told = []
+    spread = np.concatenate([run.motion.smooth[:, :3] for run in form.runs]).std(axis=0)
+    left = np.sqrt(np.mean([run.motion.left**2 for run in form.runs], axis=0))
+    for name, own, noise in zip("uvr", spread, left, strict=True):
+        share = (noise / own) ** 2 if own > 0 else 0.0
+        if share > TOLD_NOISE:
+            told.append(f"{100 * share:.0f} % of the variance of {name} is noise: its coefficients come out too small")
+    blind = [name for name, seen in zip(form.problem.free, form.seen, strict=True) if not seen]
+    if blind:
+        told.append(f"equation error does not see {', '.join(blind)}: no acceleration depends on them")
+    return told

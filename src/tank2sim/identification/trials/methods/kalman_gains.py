@@ -1,0 +1,180 @@
+"""The Kalman filter's gains along a trajectory that is linearised already, its innovations, and the smoother.
+
+Runs of one batch are padded to one length; an instant without a measurement has a row of zeros in C, a residual of 0
+and a variance of 1, and so adds nothing to the likelihood. Everything works on stacks of small matrices with any
+leading axes, of which the last is the run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.identification.trials.methods.process_noise import Tangents
+
+
+@dataclass(frozen=True, eq=False)
+class Variances:
+    """Of the process and of the measurements.
+
+    Parameters
+    ----------
+    process : array (..., runs, nz)
+        Of what is added to the state in a step (diagonal).
+    measurement : array (..., runs, n, ny)
+        1 where nothing was measured.
+    start : array (..., runs, nz, nz)
+        Covariance of the first state.
+    """
+
+    process: Array
+    measurement: Array
+    start: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Gains:
+    """What a pass of the filter leaves.
+
+    Parameters
+    ----------
+    K : array (runs, n, nz, ny)
+        Gains.
+    whitener : array (runs, n, ny, ny)
+        W, the inverse of the Cholesky factor of the innovation's covariance S: ``W S W' = 1``.
+    P : array (runs, n, nz, nz)
+        Covariance of the state before each measurement.
+    """
+
+    K: Array
+    whitener: Array
+    P: Array
+
+    @property
+    def log_determinant(self) -> float:
+        """Sum of log det S."""
+        return float(-2 * np.log(np.diagonal(self.whitener, axis1=-2, axis2=-1)).sum())
+
+
+def gains(A: Array, C: Array, variances: Variances) -> Gains:
+    """Filter gains of A (runs, n, nz, nz) and C (runs, n, ny, nz)."""
+    runs, n, ny, nz = C.shape
+    result = Gains(np.empty((runs, n, nz, ny)), np.empty((runs, n, ny, ny)), np.empty((runs, n, nz, nz)))
+    P = variances.start
+    for k in range(n):
+        result.P[:, k] = P
+        _, W, M = _update(P, C[:, k], variances.measurement[:, k])
+        result.whitener[:, k] = W
+        result.K[:, k] = np.swapaxes(M, -1, -2) @ W
+        P = _following(P, M, A[:, k], variances.process)
+    return result
+
+
+def varied(
+    tangents: Tangents, variances: Variances, innovations: Array, after: Array, factors: Array
+) -> tuple[Array, Array]:
+    """Likelihood of filters with other noise levels, along the same linearised trajectory.
+
+    Parameters
+    ----------
+    tangents : Tangents
+        Stacked (runs, n, ...).
+    variances : Variances
+        With a leading axis of variants; the first variant is the filter of the trajectory itself.
+    innovations, after : arrays (runs, n, ny), (runs, n, nz)
+        Of the first variant: innovations, and states after each measurement.
+    factors : array (variants, runs, g)
+        What is left of each of the last g states after a step.
+
+    Returns
+    -------
+    cost : array (variants,)
+        -2 log likelihood: sum of log det S and of squared whitened innovations.
+    information : array (variants, variants)
+        Sum of ``d d' + t t' / 2``, with d and t the changes against the first variant of each innovation over its
+        standard deviation and of the logarithm of its variance: Fisher's information for small changes if the signals
+        of an instant were independent. (The true one was tried: where the model is far off, its steps are too short.)
+    """
+    count, runs, g = factors.shape
+    n, _, nz = tangents.C.shape[1:]
+    cost, information = np.zeros(count), np.zeros((count, count))
+    P, before = variances.start, np.zeros((count, runs, nz, 1))
+    A, places = np.empty((count, runs, nz, nz)), np.arange(nz - g, nz)
+    for k in range(n):
+        C = tangents.C[:, k]
+        A[:] = tangents.A[:, k]
+        A[..., places, places] = factors
+        S, W, M = _update(P, C, variances.measurement[:, :, k])
+        e = innovations[:, k, :, None] - C @ before
+        white = W @ e
+        cost += (white[..., 0] ** 2 - 2 * np.log(np.diagonal(W, axis1=-2, axis2=-1))).sum(axis=(1, 2))
+        own = np.diagonal(S, axis1=-2, axis2=-1)
+        d = ((e - e[:1])[..., 0] / np.sqrt(own[:1])).reshape(count, -1)
+        t = ((own - own[:1]) / own[:1]).reshape(count, -1)
+        information += d @ d.T + 0.5 * t @ t.T
+        gained = np.swapaxes(M, -1, -2) @ white
+        before = A @ (before + gained - gained[:1])  # away from the state of the first variant
+        before[..., nz - g :, 0] += (factors - factors[:1]) * after[:, k, nz - g :]
+        P = _following(P, M, A, variances.process)
+    return cost, information
+
+
+def _update(P: Array, C: Array, measurement: Array) -> tuple[Array, Array, Array]:
+    """S, W and ``M = W C P``: the gain is ``M' W``, and a measurement takes ``M' M`` from P."""
+    CP = C @ P
+    S = CP @ np.swapaxes(C, -1, -2)
+    places = np.arange(S.shape[-1])
+    S[..., places, places] += measurement
+    W = np.linalg.inv(np.linalg.cholesky(S))
+    return S, W, W @ CP
+
+
+def _following(P: Array, M: Array, A: Array, process: Array) -> Array:
+    after = P - np.swapaxes(M, -1, -2) @ M
+    following: Array = A @ after @ np.swapaxes(A, -1, -2)
+    following = 0.5 * (following + np.swapaxes(following, -1, -2))
+    places = np.arange(P.shape[-1])
+    following[..., places, places] += process
+    return following
+
+
+def smooth_states(A: Array, C: Array, found: Gains, before: Array, innovations: Array) -> tuple[Array, Array]:
+    """States (runs, n, nz) from all measurements, before and after each instant, and their standard errors.
+
+    The smoother of Rauch, Tung and Striebel (1965, AIAA J. 3) in the form of Bierman (1973, Automatica 9), which needs
+    no inverse of the state's covariance: that is nearly singular where process noise is small.
+    """
+    runs, n, nz = before.shape
+    states, errors = np.empty_like(before), np.empty_like(before)
+    adjoint, spread = np.zeros((runs, nz, 1)), np.zeros((runs, nz, nz))
+    for k in range(n - 1, -1, -1):
+        WC = found.whitener[:, k] @ C[:, k]
+        white = found.whitener[:, k] @ innovations[:, k, :, None]
+        kept = np.eye(nz) - found.K[:, k] @ C[:, k]
+        back = np.swapaxes(A[:, k] @ kept, -1, -2)
+        turned = np.swapaxes(WC, -1, -2)
+        adjoint = turned @ white + back @ adjoint
+        spread = turned @ WC + back @ spread @ np.swapaxes(back, -1, -2)
+        P = found.P[:, k]
+        states[:, k] = before[:, k] + (P @ adjoint)[..., 0]
+        variance = np.diagonal(P, axis1=-2, axis2=-1) - np.diagonal(P @ spread @ P, axis1=-2, axis2=-1)
+        errors[:, k] = np.sqrt(np.maximum(variance, 0.0))
+    return states, errors
+
+
+def innovation_tangents(tangents: Tangents, found: Gains, start: Array | None = None) -> tuple[Array, Array]:
+    """Derivatives of the whitened innovations by the parameters (runs, n, ny, k), gains held.
+
+    Also those of the state before the last measurement (runs, nz, k); `start` are those before the first, by default 0.
+    """
+    A, B, C, D = tangents.A, tangents.B, tangents.C, tangents.D
+    runs, n, _, k = D.shape
+    result = np.empty(D.shape)
+    S = last = np.zeros((runs, A.shape[-1], k)) if start is None else start
+    for row in range(n):
+        e = -(C[:, row] @ S + D[:, row])
+        result[:, row] = found.whitener[:, row] @ e
+        last, S = S, A[:, row] @ (S + found.K[:, row] @ e) + B[:, row]
+    return result, last

@@ -1,0 +1,194 @@
+"""Passes of a Kalman filter over all runs at once: noise levels, linearisation, innovations and their likelihood."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.arrays import Array
+from tank2sim.identification.trials.methods.kalman_gains import Gains, Variances, gains
+from tank2sim.identification.trials.methods.process_noise import Disturbed, Tangents
+from tank2sim.identification.trials.methods.shooting import cut
+from tank2sim.identification.trials.problem.estimation_problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Runs padded to one length.
+
+    Parameters
+    ----------
+    inputs : array (runs, n, nu)
+    measured : array (runs, n, ny)
+        0 where nothing was measured.
+    known : array of bool (runs, n, ny)
+        Where something was measured; False in the padding.
+    lengths : tuple of int
+        Instants of each run.
+    steps : array (runs,)
+        s.
+    starts : array (runs, nz)
+        First guess of the first states, from the measurements near them; no random acceleration or drift.
+    spread : array (runs, nz, nz), optional
+        Covariance of the first states; by default wide.
+    """
+
+    inputs: Array
+    measured: Array
+    known: NDArray[np.bool_]
+    lengths: tuple[int, ...]
+    steps: Array
+    starts: Array
+    spread: Array | None = None
+
+    def part(self, run: int, begin: int, end: int, start: Array, spread: Array | None) -> Batch:
+        """Instants of a run from `begin` to `end`, the last only predicted, from a state (nz,) and its covariance."""
+        where = slice(run, run + 1), slice(begin, end + 1)
+        known = self.known[where].copy()
+        if end < self.lengths[run]:
+            known[:, -1] = False
+        measured = np.where(known, self.measured[where], 0.0)
+        steps, covariance = self.steps[run : run + 1], None if spread is None else spread[None]
+        return Batch(self.inputs[where], measured, known, (known.shape[1],), steps, start[None], covariance)
+
+
+def batch_of(problem: Problem, lasting: int) -> Batch:
+    """The runs of a problem, for a filter with that many random accelerations and drifts."""
+    pieces = [cut(problem, run, None) for run in problem.runs]
+    lengths = tuple(len(run.measured) for run in problem.runs)
+    n = max(lengths)
+    inputs = np.stack([np.pad(run.inputs, ((0, n - len(run.inputs)), (0, 0)), mode="edge") for run in problem.runs])
+    rows = [(0, n - length) for length in lengths]
+    measured = np.stack(
+        [
+            np.pad(run.measured, (row, (0, 0)), constant_values=np.nan)
+            for run, row in zip(problem.runs, rows, strict=True)
+        ]
+    )
+    known = ~np.isnan(measured)
+    starts = np.stack([np.append(piece.starts[0], np.zeros(lasting)) for piece in pieces])
+    steps = np.array([run.step_s for run in problem.runs])
+    return Batch(inputs, np.where(known, measured, 0.0), known, lengths, steps, starts)
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """Noise levels as natural logarithms.
+
+    Parameters
+    ----------
+    process : array (g,)
+        Of the standard deviation of each random acceleration, m/s2 or rad/s2, and then of each sensor's drift.
+    time : array (g,)
+        Of their time constants, s; -inf for white.
+    measurement : array (ny,)
+        Of the standard deviation of each measured signal's noise, in the signal's unit.
+    """
+
+    process: Array
+    time: Array
+    measurement: Array
+
+    @property
+    def vector(self) -> Array:
+        """All that can vary."""
+        times = self.time[np.isfinite(self.time)]
+        whole: Array = np.concatenate([self.process, times, self.measurement])
+        return whole
+
+    def at(self, vector: Array) -> Levels:
+        """Levels with those values in place of their own."""
+        g, ny = len(self.process), len(self.measurement)
+        time = self.time.copy()
+        time[np.isfinite(time)] = vector[g : len(vector) - ny]
+        return Levels(vector[:g], time, vector[len(vector) - ny :])
+
+    def factors(self, steps: Array) -> Array:
+        """phi (runs, g): what is left of an acceleration or a drift after a step of each run."""
+        with np.errstate(divide="ignore"):
+            left: Array = np.exp(-steps[:, None] / np.exp(self.time))
+        return left
+
+    def variances(self, batch: Batch, nominal: Array) -> Variances:
+        """Variances for the filter; the first states are known to within a nominal value."""
+        runs, nx = len(batch.steps), len(nominal)
+        power = np.exp(2 * self.process)
+        process = np.concatenate([np.zeros((runs, nx)), power * (1 - self.factors(batch.steps) ** 2)], axis=1)
+        start = np.broadcast_to(np.diag(np.concatenate([nominal**2, power])), (runs, nx + len(power), nx + len(power)))
+        measurement = np.where(batch.known, np.exp(2 * self.measurement), 1.0)
+        return Variances(process, measurement, start if batch.spread is None else batch.spread)
+
+
+@dataclass(frozen=True, eq=False)
+class FilterPass:
+    """What a filter with given parameters and levels made of the runs.
+
+    Parameters
+    ----------
+    before, after : arrays (runs, n, nz)
+        States before and after each measurement.
+    innovations : array (runs, n, ny)
+        Measured less predicted; 0 where nothing was measured.
+    tangents : Tangents
+        Stacked (runs, n, ...), along the trajectory at which the gains were taken.
+    gains : Gains
+    cost : float
+        -2 log likelihood but for a constant; inf where the motion leaves all bounds.
+    """
+
+    before: Array
+    after: Array
+    innovations: Array
+    tangents: Tangents
+    gains: Gains
+    cost: float
+
+    @property
+    def white(self) -> Array:
+        """Whitened innovations (runs, n, ny)."""
+        white: Array = (self.gains.whitener @ self.innovations[..., None])[..., 0]
+        return white
+
+
+def filter_pass(disturbed: Disturbed, batch: Batch, p: Array, levels: Levels, along: tuple[Array, Array]) -> FilterPass:
+    """Gains along a trajectory (before, after), and the observer with these gains on its own trajectory."""
+    factors = levels.factors(batch.steps)
+    cases = [(p, phi, np.array([h])) for phi, h in zip(factors, batch.steps, strict=True)]
+    every = [
+        disturbed.tangents(before, after, inputs, case)
+        for before, after, inputs, case in zip(*along, batch.inputs, cases, strict=True)
+    ]
+    mask = batch.known[..., None]
+    tangents = Tangents(
+        A=np.stack([one.A for one in every]),
+        B=np.stack([one.B for one in every]),
+        C=np.where(mask, np.stack([one.C for one in every]), 0.0),
+        D=np.where(mask, np.stack([one.D for one in every]), 0.0),
+    )
+    found = gains(tangents.A, tangents.C, levels.variances(batch, disturbed.nominal))
+    runs = zip(batch.starts, batch.inputs, batch.measured, found.K, cases, strict=True)
+    before = np.stack([disturbed.predicted(*one) for one in runs])
+    if not np.isfinite(before).all() or np.abs(before).max() > 1e9:
+        return FilterPass(before, before, np.zeros_like(batch.measured), tangents, found, np.inf)
+    seen = np.stack([disturbed.seen(states, inputs, p) for states, inputs in zip(before, batch.inputs, strict=True)])
+    innovations = np.where(batch.known, batch.measured - seen, 0.0)
+    after = before + (found.K @ innovations[..., None])[..., 0]
+    white = found.whitener @ innovations[..., None]
+    return FilterPass(before, after, innovations, tangents, found, float(np.sum(white**2)) + found.log_determinant)
+
+
+def measured_trajectory(problem: Problem, batch: Batch) -> tuple[Array, Array]:
+    """A first trajectory: the measured states where there are any, else those of the beginning."""
+    n = batch.measured.shape[1]
+    states = np.repeat(batch.starts[:, None], n, axis=1)
+    for place, name in enumerate(problem.model.state_names):
+        if name not in problem.seen:
+            continue
+        column = problem.seen.index(name)
+        for number in range(len(states)):
+            known = np.flatnonzero(batch.known[number, :, column])
+            if len(known):
+                states[number, :, place] = np.interp(np.arange(n), known, batch.measured[number, known, column])
+    return states, states

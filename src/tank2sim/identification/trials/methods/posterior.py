@@ -1,0 +1,93 @@
+"""What estimators of trials share: standard errors for residuals that hang together, and the width of the prior."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.linalg import eigh
+
+from tank2sim.arrays import Array
+from tank2sim.identification.trials.problem.estimation_problem import Problem
+
+BLOCK = 5.0
+"""Residuals farther apart than this many ship lengths count as independent in standard errors (ours: the memory of the
+flow and of a slow model error are of that order)."""
+
+MOST_FITTED = 2 / 3
+"""Share of the residuals' variance that parameters are believed to have fitted away at most: beyond it there are hardly
+more blocks than parameters, and the correction of their scatter would itself be scatter (ours)."""
+
+
+def scaled_prior(problem: Problem, scale: Mapping[str, float]) -> Array:
+    """Standard errors before the trials (k,), those of :attr:`Problem.groups` times the scale of their group."""
+    errors: Array = np.array([scale.get(group, 1.0) for group in problem.groups]) * problem.prior_error
+    return errors
+
+
+def evidence_scale(problem: Problem, information: Array, values: Array, scale: Mapping[str, float]) -> dict[str, float]:
+    """Factor on the prior's errors of each group that has the largest evidence, at least 1 (MacKay 1992, Neural
+    Computation 4): distance from the prior's mean over how many parameters the trials fix.
+
+    Parameters
+    ----------
+    problem : Problem
+        k free parameters.
+    information : array (k, k)
+        Of the trials alone.
+    values : array (k,)
+        Estimates.
+    scale : mapping
+        The factors with which they were found.
+    """
+    prior = scaled_prior(problem, scale)
+    own = information * np.outer(prior, prior)
+    fixed = 1 - np.diag(np.linalg.inv(own + np.eye(len(prior))))
+    away = ((values - problem.prior_mean) / problem.prior_error) ** 2
+    groups = np.array(problem.groups)
+    return {
+        group: max(1.0, float(np.sqrt(away[groups == group].sum() / max(fixed[groups == group].sum(), 1.0))))
+        for group in sorted(set(problem.groups) - {""})
+    }
+
+
+def sandwich(information: Array, prior_error: Array, scores: Sequence[Array]) -> Array:
+    """Covariance (k, k) of estimates, for residuals as they are (Huber 1967; Newey and West 1987).
+
+    Parameters
+    ----------
+    information : array (k, k)
+        Of the trials alone, as if the noise model were true.
+    prior_error : array (k,)
+        With its scale.
+    scores : sequence of arrays (blocks, k)
+        Gradient of each run by blocks of :data:`BLOCK` ship lengths, in the order of time.
+    """
+    # Everything in units of the prior's errors: well scaled, and what no trial sees has information 0 against 1.
+    own = information * np.outer(prior_error, prior_error)
+    identity = np.eye(len(prior_error))
+    bread = np.linalg.inv(own + identity)
+    determined = len(prior_error) - float(np.trace(bread))
+    spread = bread @ (_meat(own, [score * prior_error for score in scores], determined) + identity) @ bread
+    covariance: Array = spread * np.outer(prior_error, prior_error)
+    return covariance
+
+
+def _meat(information: Array, scores: Sequence[Array], determined: float) -> Array:
+    """Covariance of the gradient (k, k) from blocks of time and their neighbours (Newey and West 1987, one lag).
+
+    Model error makes residuals hang together far longer than the noise model says; white-noise theory would make the
+    intervals several times too narrow. In no direction is it less than that theory's `information`. The `determined`
+    parameters have fitted some of the residuals away: with B blocks of equal weight a share determined/B of them (Bell
+    and McCaffrey 2002, Survey Methodology 28).
+    """
+    total = np.zeros_like(information)
+    for score in scores:
+        lagged = score[1:].T @ score[:-1]
+        total += score.T @ score + 0.5 * (lagged + lagged.T)
+    count = sum(len(score) for score in scores)
+    total *= 1 / (1 - min(determined / max(count, 1), MOST_FITTED))
+    values, vectors = eigh(total, information + 1e-9 * np.eye(len(total)))  # 1e-9 of what the prior knows: nothing
+    root = information @ vectors
+    meat: Array = (root * np.maximum(values, 1.0)) @ root.T
+    return meat

@@ -1,0 +1,126 @@
+"""A model on which random accelerations act, and what a filter needs of it: steps, tangents, what is seen.
+
+The accelerations are held over a step and decay from step to step: ``a[k+1] = phi a[k] + w[k]``, a first-order
+Gauss-Markov process (white for phi = 0). So may the sensors drift, each by a b that is added to what is seen. The
+filter's state is z = (x, a, b).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Input, Model
+from tank2sim.simulation.rows import Chain, RowFunction
+from tank2sim.simulation.scheme import runge_kutta_step
+
+PUSHED = ("motion.u", "motion.v", "motion.r")
+"""States on whose rates random accelerations act, as far as the model has them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tangents:
+    """Derivatives along a run of n instants.
+
+    Parameters
+    ----------
+    A, B : arrays (n, nz, nz), (n, nz, k)
+        Of the next state by the state (after the measurement) and by the free parameters.
+    C, D : arrays (n, ny, nz), (n, ny, k)
+        Of what is seen by the state (before the measurement) and by the free parameters.
+    """
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+
+
+class Disturbed:
+    """Filter steps of a model with random accelerations.
+
+    Parameters
+    ----------
+    model : Model
+        nx states; m of :data:`PUSHED` are among them.
+    free : sequence of str
+        Names of the k parameters by which to derive.
+    seen : sequence of str
+        Names of the ny states and quantities that are measured.
+    drifting : bool
+        Every sensor drifts: nz = nx + m + ny, else nz = nx + m.
+    """
+
+    def __init__(self, model: Model, free: Sequence[str], seen: Sequence[str], *, drifting: bool = False):
+        pushed = [state for state in model.states if state.name in PUSHED]
+        self.pushed = tuple(state.name for state in pushed)
+        self.nominal = np.array([state.nominal for state in model.states])
+        whole, pushes = _pushed(model, [state.derivative for state in pushed])
+        drifts = ca.SX.sym("drift", len(seen) if drifting else 0)
+        lasting = ca.vertcat(pushes, drifts)
+        self.lasting = int(lasting.numel())
+        z, phi, h = ca.vertcat(model.x, lasting), ca.SX.sym("phi", self.lasting), ca.SX.sym("h")
+        theta = ca.vcat([model.symbol(name) for name in free])
+        moved = runge_kutta_step(whole)(model.x, ca.vertcat(model.u, pushes), model.p, h)
+        following = ca.vertcat(moved, phi * lasting)
+        shown = whole.expand(ca.vcat([model.symbol(name) for name in seen]))
+        shown = shown + drifts if drifting else shown
+        y, K = ca.SX.sym("y", len(seen)), ca.SX.sym("K", z.numel(), len(seen))
+        corrected = ca.substitute(following, z, z + K @ (y - shown))
+        where, cse = [z, model.u, model.p], {"cse": True}
+        by = [ca.densify(ca.jacobian(following, one)) for one in (z, theta)]
+        shown_by = [ca.densify(one) for one in (shown, ca.jacobian(shown, z), ca.jacobian(shown, theta))]
+        self._observer = Chain(ca.Function("observer", [*where, y, ca.vec(K), phi, h], [corrected], cse))
+        self._tangents = RowFunction(ca.Function("pushed_tangents", [*where, phi, h], by, cse))
+        self._shown = RowFunction(ca.Function("pushed_shown", where, shown_by, cse))
+
+    def predicted(self, start: Array, inputs: Array, measured: Array, gains: Array, case: tuple[Array, ...]) -> Array:
+        """States (n, nz) before each measurement, of the observer with given gains.
+
+        Parameters
+        ----------
+        start : array (nz,)
+        inputs : array (n, nu)
+        measured : array (n, ny)
+            Without nan: where nothing was measured any value, with a column of zeros in the gain.
+        gains : array (n, nz, ny)
+        case : tuple
+            Parameters p, factors phi (nz - nx,), step h (1,).
+        """
+        p, phi, h = case
+        columns = gains[:-1].transpose(0, 2, 1).reshape(len(gains) - 1, -1)
+        return self._observer.run(start, inputs[:-1], p, measured[:-1], columns, phi, h)
+
+    def seen(self, states: Array, inputs: Array, p: Array) -> Array:
+        """What is seen (n, ny) at states z (n, nz)."""
+        return self._shown(states, inputs, p)[0]
+
+    def tangents(self, before: Array, after: Array, inputs: Array, case: tuple[Array, ...]) -> Tangents:
+        """Derivatives at the states before and after each measurement (n, nz)."""
+        p, phi, h = case
+        n, nz = before.shape
+        by_state, by_theta = self._tangents(after, inputs, p, phi, h)
+        seen, C, D = self._shown(before, inputs, p)
+        ny = seen.shape[1]
+        return Tangents(
+            A=by_state.reshape(n, nz, nz).transpose(0, 2, 1),
+            B=by_theta.reshape(n, -1, nz).transpose(0, 2, 1),
+            C=C.reshape(n, nz, ny).transpose(0, 2, 1),
+            D=D.reshape(n, -1, ny).transpose(0, 2, 1),
+        )
+
+
+def _pushed(model: Model, rates: Sequence[str]) -> tuple[Model, ca.SX]:
+    """The model with an input added to each of the quantities `rates`, and the symbols of these inputs."""
+    inputs = tuple(
+        Input(name=f"process.{rate}", unit=model[rate].unit, description=f"Random acceleration in {rate}")
+        for rate in rates
+    )
+    whole = model.extend(*inputs)
+    for rate, push in zip(rates, inputs, strict=True):
+        whole = whole.redefine(rate, lambda old, push=push: old + push.symbol)  # type: ignore[misc]
+    return whole, ca.vcat([push.symbol for push in inputs])

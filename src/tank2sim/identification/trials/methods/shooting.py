@@ -1,0 +1,206 @@
+"""Multiple shooting: runs cut into pieces, each with an initial state of its own that is estimated with the parameters.
+
+What a piece shows is compared with what was measured; its end is not tied to the beginning of the next. The initial
+states are eliminated from the normal equations (a Schur complement), so that what remains has the size of the
+parameters. The `noise` of the methods is that of each seen variable (ny).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise
+from tank2sim.identification.trials.methods.posterior import BLOCK
+from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.simulation.sensitivity import Sensitivity
+
+START_WINDOW = 5
+"""First guess of an initial state: a straight line through this many instants on either side (ours)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """A run cut into pieces of equal length that share their ends.
+
+    Parameters
+    ----------
+    run : Run
+        Where they come from.
+    inputs : array (pieces, n + 1, nu)
+    measured : array (pieces, n + 1, ny)
+        The last row is nan but in the last piece: it is the first of the next piece.
+    starts : array (pieces, nx)
+        First guess of the initial states.
+    """
+
+    run: SampledRun
+    inputs: Array
+    measured: Array
+    starts: Array
+
+
+def cut(problem: Problem, run: SampledRun, length_s: float | None) -> Pieces:
+    """Pieces of about `length_s` s; the whole run for None. Up to one step a piece at the end is left over."""
+    steps = len(run.measured) - 1
+    count = 1 if length_s is None else max(1, round(steps * run.step_s / length_s))
+    n = steps // count
+    rows = np.arange(count)[:, None] * n + np.arange(n + 1)
+    measured = run.measured[rows].copy()
+    measured[:-1, -1] = np.nan
+    starts = np.stack([_start(problem, run, first) for first in rows[:, 0]])
+    return Pieces(run, run.inputs[rows], measured, starts)
+
+
+def _start(problem: Problem, run: SampledRun, first: int) -> Array:
+    """State of the model at an instant, from what was measured near it; else its start value."""
+    model = problem.model
+    values = {name: _local(run.column(name), first) for name in run.seen}
+    p = model.parameter_values()
+    default = np.array(model.initial(p)).ravel()
+    state = []
+    for place, variable in enumerate(model.states):
+        value = values.get(variable.name)
+        if value is None and variable.name == "motion.u":
+            value = values.get("motion.u_ground", values.get("motion.sog"))
+        if value is None and variable.name == "motion.v":
+            value = values.get("motion.v_ground")
+        if variable.name == "rudder.angle":
+            value = float(run.inputs[max(first - 1, 0), model.input_names.index("rudder.command")])
+        state.append(default[place] if value is None else value)
+    return np.array(state)
+
+
+def _local(column: Array, first: int) -> float | None:
+    low, high = max(0, first - START_WINDOW), min(len(column), first + START_WINDOW + 1)
+    places = np.arange(low, high) - first
+    near = column[low:high]
+    known = ~np.isnan(near)
+    if np.count_nonzero(known) < 2:
+        return None
+    return float(np.polyfit(places[known], near[known], 1)[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Normal:
+    """Normal equations of one run with the initial states eliminated, at given parameters and initial states.
+
+    Parameters
+    ----------
+    cost : float
+        Sum of squares.
+    matrix : array (k, k)
+    vector : array (k,)
+        ``matrix @ step = -vector`` for the parameters alone.
+    states : array (unknown, k), and step (unknown,)
+        Change of the initial states: ``-(step + states @ parameter step)``.
+    scores : array (blocks, k)
+        Shares of `vector` in the order of time, each of :data:`BLOCK` lengths or less: for standard errors.
+    residuals : array (pieces, n + 1, ny)
+        Simulated less measured.
+    """
+
+    cost: float
+    matrix: Array
+    vector: Array
+    states: Array
+    step: Array
+    scores: Array
+    residuals: Array
+
+
+class Shooting:
+    """Residuals of pieces and their normal equations, for the parameters `free` of a problem."""
+
+    def __init__(self, problem: Problem):
+        self.problem = problem
+        self.sensitivity = Sensitivity(problem.model, problem.free, problem.seen)
+        nominal = [state.nominal for state in problem.model.states]
+        self._wide = np.array(nominal)  # weak knowledge of initial states: within a nominal value of the guess
+
+    def residuals(self, pieces: Pieces, starts: Array, values: Array) -> tuple[Array, Array]:
+        """Simulated less measured (pieces, n + 1, ny), and the states (pieces, n + 1, nx)."""
+        p, h = self.problem.parameters(values), pieces.run.step_s
+        pairs = zip(starts, pieces.inputs, strict=True)
+        states = np.stack([self.sensitivity.motion(start, inputs[:-1], p, h) for start, inputs in pairs])
+        flat = states.reshape(-1, states.shape[2]), pieces.inputs.reshape(-1, pieces.inputs.shape[2])
+        seen = self.sensitivity.shown(*flat, p).reshape(pieces.measured.shape)
+        return seen - pieces.measured, states
+
+    def cost(self, pieces: Pieces, starts: Array, values: Array, noise: Sequence[ColouredNoise]) -> float:
+        """Sum of squares of a run, inf where the motion leaves all bounds."""
+        residuals, states = self.residuals(pieces, starts, values)
+        if not np.isfinite(states).all() or np.abs(states).max() > 1e9:
+            return np.inf
+        total = float(np.sum(_whitened(residuals, residuals, noise) ** 2))
+        total += float(np.sum(((starts - pieces.starts) / self._wide) ** 2))
+        return total
+
+    def normal(self, pieces: Pieces, starts: Array, values: Array, noise: Sequence[ColouredNoise]) -> Normal:
+        """Normal equations of one run."""
+        p, h = self.problem.parameters(values), pieces.run.step_s
+        residuals, states = self.residuals(pieces, starts, values)
+        _, by, _ = self.sensitivity.derivatives(states, pieces.inputs, p, h)
+        count, nx = starts.shape
+        white = _whitened(residuals, residuals, noise)
+        white_by = _whitened(residuals, by.reshape(*by.shape[:2], -1), noise, by.shape[3])
+        r = white.reshape(count, -1)
+        J = white_by.reshape(count, -1, by.shape[3])
+        own = J.transpose(0, 2, 1) @ J
+        pull = (J.transpose(0, 2, 1) @ r[:, :, None])[:, :, 0]
+        # Unknowns: initial states of all pieces, then parameters.
+        k = own.shape[1] - nx
+        size = count * nx
+        H = np.zeros((size + k, size + k))
+        shares = np.zeros((count, size + k))
+        spread = np.tile(self._wide, count)
+        H[np.arange(size), np.arange(size)] = 1 / spread**2
+        for piece in range(count):
+            at = np.r_[piece * nx : (piece + 1) * nx, size : size + k]
+            H[np.ix_(at, at)] += own[piece]
+            shares[piece, at] += pull[piece]
+        g = shares.sum(axis=0)
+        g[:size] += ((starts - pieces.starts) / self._wide**2).ravel()
+        inner = np.linalg.inv(H[:size, :size])
+        mixed = inner @ H[:size, size:]
+        return Normal(
+            cost=self.cost(pieces, starts, values, noise),
+            matrix=H[size:, size:] - H[size:, :size] @ mixed,
+            vector=g[size:] - mixed.T @ g[:size],
+            states=mixed,
+            step=inner @ g[:size],
+            scores=self._scores(pieces, r, J, mixed),
+            residuals=residuals,
+        )
+
+    def _scores(self, pieces: Pieces, r: Array, J: Array, mixed: Array) -> Array:
+        """Share of each block of time in the gradient by the parameters, (blocks, k)."""
+        count, nx = pieces.starts.shape
+        rows, ny = pieces.measured.shape[1:]
+        ship_time = self.problem.ship_time
+        blocks = max(1, round(rows * pieces.run.step_s / (BLOCK * ship_time)))
+        edges = np.linspace(0, rows, blocks + 1).astype(int)[:-1] * ny
+        pull = np.add.reduceat(J * r[:, :, None], edges, axis=1)  # (pieces, blocks, nx + k)
+        own = mixed.reshape(count, nx, -1)
+        scores: Array = pull[:, :, nx:] - np.einsum("pbx,pxk->pbk", pull[:, :, :nx], own)
+        return scores.reshape(count * blocks, -1)
+
+
+def _whitened(residuals: Array, values: Array, noise: Sequence[ColouredNoise], columns: int = 1) -> Array:
+    """Values (pieces, n, ny * columns) made white as the residuals are; 0 where nothing was measured."""
+    shape = (*residuals.shape[:2], residuals.shape[2], columns)
+    values = values.reshape(shape)
+    result = np.zeros(shape)
+    for place, one in enumerate(noise):
+        known = ~np.isnan(residuals[:, :, place])
+        filled = np.where(known[:, :, None], values[:, :, place, :], 0.0)
+        whole = one.whitened(filled)
+        if one.phi:  # what follows a gap would be compared with the filled-in zero
+            after = known[:, :-1]
+            known = known & np.concatenate([np.ones_like(after[:, :1]), after], axis=1)
+        result[:, :, place, :] = np.where(known[:, :, None], whole, 0.0)
+    return result.reshape(*residuals.shape[:2], -1)

@@ -1,0 +1,176 @@
+"""Equations of motion multiplied by test functions and integrated: no acceleration is ever formed.
+
+For window w and equation i, with bump functions phi_w = (1 - s^2)^2 that half overlap,
+
+    e_wi = -integral(phi_w' q_i) dt - integral(phi_w a_i(q, inputs; theta)) dt,  q = (u, v, r), a = dq/dt of the model,
+
+over integral(phi_w) dt: a mean acceleration. Summation by parts makes the first term a sum of phi_w times the
+differences of q (Messenger and Bortz 2021, Multiscale Model. Simul. 19; the modulating functions of Shinbrot 1957).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Input, Model
+from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tank2sim.identification.trials.problem.measured_motion import MEASURED_STATES, MeasuredMotion, measured_motion
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.simulation.rows import RowFunction
+from tank2sim.simulation.sensitivity import Sensitivity
+
+WIDTH = 0.7
+"""Width of a window in L/u0 (ours): short against a manoeuvre, long against noise and the smoothing of regressors."""
+
+WEAK_EQUATIONS = ("motion.udot", "motion.vdot", "motion.rdot")
+
+
+@dataclass(frozen=True, eq=False)
+class WeakWindows:
+    """The weak form of one run at given parameters.
+
+    Parameters
+    ----------
+    residuals : array (windows, 3)
+        Measured less modelled mean acceleration, m/s2, m/s2, rad/s2.
+    jacobian : array (windows, 3, k)
+        Derivative of the *modelled* acceleration by the free parameters.
+    """
+
+    residuals: Array
+    jacobian: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """What of a run does not depend on the parameters."""
+
+    run: SampledRun
+    motion: MeasuredMotion
+    middle: Array  # KNOWN in the middle of each step
+    averaging: sparse.csr_matrix  # (windows, steps)
+    change: Array  # mean measured acceleration of each window
+    pieces: tuple[slice, ...]  # windows that follow each other without a gap
+
+
+class WeakForm:
+    """Weak-form residuals of a problem's runs.
+
+    Parameters
+    ----------
+    problem : Problem
+        k free parameters.
+    width : float
+        Of a window, in L/u0.
+
+    Raises
+    ------
+    InputError
+        A run lacks velocities, and they do not follow from what it has.
+    """
+
+    def __init__(self, problem: Problem, width: float = WIDTH):
+        self.problem = problem
+        self._hidden = _hidden_model(problem.model)
+        theta = ca.vcat([problem.model.symbol(name) for name in problem.free])
+        accelerations = problem.model.expand(ca.vcat([problem.model.symbol(name) for name in WEAK_EQUATIONS]))
+        derivatives = [ca.jacobian(accelerations, theta), ca.jacobian(accelerations, self._hidden.x)]
+        self.seen = tuple(not derivatives[0][:, place].is_zero() for place in range(len(problem.free)))
+        rates = self._hidden.rates
+        self._moves_hidden = bool(len(self._hidden.states)) and bool(ca.depends_on(rates, theta))
+        if self._moves_hidden:
+            self.seen = tuple(True for _ in problem.free)
+        values = [ca.densify(value) for value in (accelerations, *derivatives)]
+        arguments = [self._hidden.x, self._hidden.u, self._hidden.p]
+        self._accelerations = RowFunction(ca.Function("accelerations", arguments, values, {"cse": True}))
+        states = self._hidden.state_names
+        self._sensitivity = Sensitivity(self._hidden, problem.free, states) if states else None
+        self.half = width * problem.ship_time / 2
+        self.runs = tuple(self._prepared(run) for run in problem.runs)
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What was derived."""
+        return tuple(notice for run in self.runs for notice in run.motion.notices)
+
+    def at(self, values: Array) -> list[WeakWindows]:
+        """The windows of each run at the free parameters `values` (k,)."""
+        p = self.problem.parameters(values)
+        return [self._windows(run, p) for run in self.runs]
+
+    def _windows(self, run: _Prepared, p: Array) -> WeakWindows:
+        k = len(self.problem.free)
+        inputs = np.hstack([run.run.inputs[:-1], run.middle])
+        hidden, by_theta = self._hidden_states(run, inputs, p)
+        values, own, by_hidden = self._accelerations(hidden, inputs, p)
+        jacobian = own.reshape(-1, k, 3)
+        if by_theta is not None:
+            jacobian = jacobian + by_theta.transpose(0, 2, 1) @ by_hidden.reshape(len(own), -1, 3)
+        mean = run.averaging @ jacobian.reshape(len(jacobian), -1)
+        return WeakWindows(
+            residuals=run.change - run.averaging @ values,
+            jacobian=mean.reshape(-1, k, 3).transpose(0, 2, 1),
+        )
+
+    def _hidden_states(self, run: _Prepared, inputs: Array, p: Array) -> tuple[Array, Array | None]:
+        """States that were not measured, simulated beside the measured ones: in the middle of steps (n, nz), and by
+        the free parameters (n, nz, k)."""
+        if self._sensitivity is None:
+            return np.zeros((len(inputs), 0)), None
+        start = np.array(self.problem.model.initial(p)).ravel()
+        names = self.problem.model.state_names
+        first = start[[names.index(name) for name in self._hidden.state_names]]
+        if "rudder.angle" in self._hidden.state_names:
+            order = run.run.inputs[0, self.problem.model.input_names.index("rudder.command")]
+            first[self._hidden.state_names.index("rudder.angle")] = order
+        states = self._sensitivity.motion(first, inputs, p, run.run.step_s)
+        middle = 0.5 * (states[:-1] + states[1:])
+        if not self._moves_hidden:
+            return middle, None
+        full = np.vstack([inputs, inputs[-1:]])
+        _, by, _ = self._sensitivity.derivatives(states[None], full[None], p, run.run.step_s)
+        by_theta = by[0, :, :, states.shape[1] :]
+        return middle, 0.5 * (by_theta[:-1] + by_theta[1:])
+
+    def _prepared(self, run: SampledRun) -> _Prepared:
+        motion = measured_motion(self.problem, run)
+        steps = np.diff(motion.velocities, axis=0)
+        half = max(2, round(self.half / run.step_s))
+        starts = np.arange(0, max(len(steps) - 2 * half + 1, 0), half)
+        bump = (1 - ((np.arange(2 * half) + 0.5) / half - 1) ** 2) ** 2
+        bump /= bump.sum()
+        bad = np.concatenate([[0], np.cumsum(np.isnan(steps).any(axis=1))])
+        starts = starts[bad[starts + 2 * half] == bad[starts]]
+        rows = np.repeat(np.arange(len(starts)), 2 * half)
+        columns = (starts[:, None] + np.arange(2 * half)).ravel()
+        averaging = sparse.csr_matrix((np.tile(bump, len(starts)), (rows, columns)), (len(starts), len(steps)))
+        breaks = np.flatnonzero(np.diff(starts) > half) + 1
+        edges = [0, *breaks.tolist(), len(starts)]
+        return _Prepared(
+            run=run,
+            motion=motion,
+            middle=0.5 * (motion.smooth[:-1] + motion.smooth[1:]),
+            averaging=averaging,
+            change=averaging @ np.nan_to_num(steps) / run.step_s,
+            pieces=tuple(slice(a, b) for a, b in pairwise(edges) if b > a),
+        )
+
+
+def _hidden_model(model: Model) -> Model:
+    """The model of the states that no record holds, with the recorded ones among its inputs."""
+    known = []
+    for state in (model[name] for name in MEASURED_STATES):
+        copy = Input(name=state.name, unit=state.unit, description=state.description, display_unit=state.display_unit)
+        copy.__dict__["symbol"] = state.symbol  # what the quantities already refer to
+        known.append(copy)
+    others = tuple(state for state in model.states if state.name not in MEASURED_STATES)
+    return replace(model, states=others, inputs=(*model.inputs, *known), outputs=())
+
+
+__all__ = ["WEAK_EQUATIONS", "WIDTH", "WeakForm", "WeakWindows"]

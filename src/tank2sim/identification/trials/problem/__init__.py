@@ -1,0 +1,1 @@
+"""The estimation problem: card, trials, free parameters and their prior."""

@@ -1,0 +1,134 @@
+"""What is asked of an estimator of free-running trials, and what it answers: the same for every method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+
+LITTLE_KNOWN = 0.25
+"""A standard error of this share of the value or more is taken as it is (ours)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Free parameters of a model, what is known of them beforehand, and the runs that tell more.
+
+    Parameters
+    ----------
+    model : Model
+        Driven as the runs were (:mod:`.driving`).
+    free : tuple of str
+        Names of the k parameters to estimate.
+    prior_mean, prior_error : array (k,)
+        Value and standard error before the trials, in the parameter's own unit; the error is positive.
+    runs : tuple of Run
+        Each with the same `seen`.
+    """
+
+    model: Model
+    free: tuple[str, ...]
+    prior_mean: Array
+    prior_error: Array
+    runs: tuple[SampledRun, ...]
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Group of each parameter whose error may be too small (k,): its equation, X, Y or N; "" for all others.
+
+        A card's standard errors are of the tests that gave it; another basin, Reynolds number or ship differs by more.
+        An error of the size of the value itself says already that little is known.
+        """
+        return tuple(
+            name.partition(".")[2][0] if name.startswith("derivatives.") and error < LITTLE_KNOWN * abs(mean) else ""
+            for name, mean, error in zip(self.free, self.prior_mean, self.prior_error, strict=True)
+        )
+
+    @property
+    def seen(self) -> tuple[str, ...]:
+        """Variables that are compared with measurements, in the order of the columns of each run."""
+        return self.runs[0].seen
+
+    @property
+    def ship_time(self) -> float:
+        """L/u0, s."""
+        p = self.model.parameter_values()
+        names = self.model.parameter_names
+        return float(p[names.index("ship.length")] / p[names.index("ship.speed")])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest value of each free parameter (k,), infinite where the model states none."""
+        chosen = [self.model[name] for name in self.free]
+        lowest = np.array([-np.inf if one.minimum is None else one.minimum for one in chosen])
+        return lowest, np.array([np.inf if one.maximum is None else one.maximum for one in chosen])
+
+    def parameters(self, values: Array) -> Array:
+        """The model's parameter vector with the free ones at `values` (k,)."""
+        return self.model.parameter_values(dict(zip(self.free, map(float, values), strict=True)))
+
+    def without(self, names: Collection[str]) -> Problem:
+        """The same question with some of the free parameters held at what was known of them before."""
+        kept = [place for place, name in enumerate(self.free) if name not in names]
+        free = tuple(self.free[place] for place in kept)
+        return replace(self, free=free, prior_mean=self.prior_mean[kept], prior_error=self.prior_error[kept])
+
+    def with_runs(self, runs: tuple[SampledRun, ...]) -> Problem:
+        """The same question, asked of other runs."""
+        return replace(self, runs=runs)
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """What a method found.
+
+    Parameters
+    ----------
+    method : str
+        Its name.
+    free : tuple of str
+        The k parameters.
+    values : array (k,)
+        Estimates.
+    covariance : array (k, k)
+        Of the estimates, for the residuals as they are (coloured, with model error), not as white noise.
+    information : array (k, k)
+        What the trials alone tell: the inverse covariance without the prior.
+    noise : mapping
+        Standard deviation of the residual by variable.
+    cost : tuple of float
+        What was minimised, after each iteration.
+    prior_scale : mapping
+        Factor on the prior's standard errors by group (:attr:`Problem.groups`) that was chosen.
+    notices : tuple of str
+        What a user should be told.
+    """
+
+    method: str
+    free: tuple[str, ...]
+    values: Array
+    covariance: Array
+    information: Array
+    noise: Mapping[str, float] = field(default_factory=dict)
+    cost: tuple[float, ...] = ()
+    prior_scale: Mapping[str, float] = field(default_factory=dict)
+    notices: tuple[str, ...] = ()
+
+    @property
+    def standard_errors(self) -> Array:
+        """Of the estimates (k,)."""
+        errors: Array = np.sqrt(np.diag(self.covariance))
+        return errors
+
+
+Progress = Callable[[str, Array, float], None]
+"""Called as ``progress(stage, values, cost)`` whenever a better estimate is found; it may raise to stop."""
+
+
+def silent(stage: str, values: Array, cost: float) -> None:
+    """Progress that nobody watches."""

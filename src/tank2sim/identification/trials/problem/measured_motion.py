@@ -1,0 +1,158 @@
+"""The measured motion of a run as equation error takes it: velocities as measured, and states smoothed as regressors.
+
+What was not measured is derived where it follows from the rest: yaw rate from heading, velocities through the water
+from positions or from velocities over the ground.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+from scipy.signal import savgol_coeffs, savgol_filter
+
+from tank2sim.arrays import Array
+from tank2sim.dynamics.kinematics import earth_velocity
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.simulation.recorded import SMOOTHING, drift_over_ground
+
+VELOCITIES = ("motion.u", "motion.v", "motion.r")
+POSITION = ("motion.psi", "motion.x", "motion.y")
+MEASURED_STATES = (*VELOCITIES, *POSITION)
+"""States that equation error takes from the record."""
+
+SMALL_NOISE = 1e-4
+"""A signal whose noise has less than this share of its variance is not smoothed: it pulls coefficients towards zero by
+that share (Fuller 1987, Measurement Error Models), and smoothing might do more harm."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredMotion:
+    """What was measured of a run.
+
+    Parameters
+    ----------
+    velocities : array (n, 3)
+        u, v (m/s), r (rad/s) as measured or derived, nan where they are unknown.
+    smooth : array (n, 6)
+        :data:`MEASURED_STATES`, smoothed against noise in the regressors, without gaps.
+    noise : array (3,)
+        Standard deviation of the measurement of u, v, r.
+    left : array (3,)
+        Of the same after smoothing.
+    notices : tuple of str
+        What was derived.
+    """
+
+    velocities: Array
+    smooth: Array
+    noise: Array
+    left: Array
+    notices: tuple[str, ...]
+
+
+def measured_motion(problem: Problem, run: SampledRun) -> MeasuredMotion:
+    """Velocities and position of a run.
+
+    Raises
+    ------
+    InputError
+        Velocities are neither measured nor do they follow from heading and positions.
+    """
+    columns = {name: run.column(name) for name in MEASURED_STATES}
+    missing = {name for name, column in columns.items() if np.isnan(column).all()}
+    window = _window(problem, run)
+    if len(run.measured) <= window:
+        raise InputError(run.origin, "", f"has only {len(run.measured)} steps", f"at least {window + 1} are needed")
+    notices = []
+    if "motion.r" in missing:
+        if "motion.psi" in missing:
+            raise InputError(run.origin, "header", "has neither yaw rate nor heading", "give r_degps or psi_deg")
+        columns["motion.r"] = _slope(columns["motion.psi"], window, run.step_s)
+        notices.append(f"{run.name}: the yaw rate is the slope of the smoothed heading")
+    if "motion.psi" in missing:
+        columns["motion.psi"] = cumulative_trapezoid(_filled(columns["motion.r"]), dx=run.step_s, initial=0.0)
+    derived = missing & {"motion.u", "motion.v"}
+    if derived:
+        own, how = _velocities(problem.model, run, columns, window)
+        columns |= {name: own[name] for name in derived}
+        notices.append(f"{run.name}: {' and '.join(name[7:] for name in sorted(derived))} {how}")
+    _complete_positions(columns, missing, run.step_s)
+    velocities = np.column_stack([columns[name] for name in VELOCITIES])
+    smooth, noise, left = zip(*(_smoothed(columns[name], window) for name in VELOCITIES), strict=True)
+    position = [_filled(columns[name]) for name in POSITION]
+    every = np.column_stack([*smooth, *position])
+    return MeasuredMotion(velocities, every, np.array(noise), np.array(left), tuple(notices))
+
+
+def sensor_noise(problem: Problem, run: SampledRun) -> Array:
+    """Standard deviation of what is too fast for a ship in each signal of a run (ny,), 0 where nothing was measured."""
+    window = _window(problem, run)
+    columns = [run.column(name) for name in run.seen]
+    return np.array([0.0 if np.isnan(column).all() else _smoothed(column, window)[1] for column in columns])
+
+
+def _window(problem: Problem, run: SampledRun) -> int:
+    return max(5, int(SMOOTHING * problem.ship_time / run.step_s) // 2 * 2 + 1)
+
+
+def _velocities(model: Model, run: SampledRun, columns: dict[str, Array], window: int) -> tuple[dict[str, Array], str]:
+    """u and v through the water from the motion over the ground, less the current of the model."""
+    psi = columns["motion.psi"]
+    ground = run.column("motion.u_ground"), run.column("motion.v_ground")
+    if np.isnan(ground[0]).all() or np.isnan(ground[1]).all():
+        if any(np.isnan(columns[name]).all() for name in ("motion.x", "motion.y")):
+            remedy = "give u_mps and v_mps, or x_m, y_m and psi_deg"
+            raise InputError(run.origin, "header", "has neither velocities nor positions", remedy)
+        north, east = (_slope(columns[name], window, run.step_s) for name in ("motion.x", "motion.y"))
+        how = "from the slope of the smoothed positions"
+    else:
+        north, east = _turned(*ground, psi)
+        how = "from the velocities over the ground"
+    drift = drift_over_ground(model, run.inputs, _filled(psi))
+    u, v = _turned(north - drift[:, 0], east - drift[:, 1], -psi)
+    return {"motion.u": u, "motion.v": v}, how
+
+
+def _complete_positions(columns: dict[str, Array], missing: set[str], step: float) -> None:
+    """Positions that were not measured, from the velocities: wind and banks need no more than their rough course."""
+    if not missing & {"motion.x", "motion.y"}:
+        return
+    u, v, psi = (_filled(columns[name]) for name in ("motion.u", "motion.v", "motion.psi"))
+    for name, rate in zip(("motion.x", "motion.y"), _turned(u, v, psi), strict=True):
+        if name in missing:
+            columns[name] = cumulative_trapezoid(rate, dx=step, initial=0.0)
+
+
+def _turned(forward: Array, starboard: Array, angle: Array) -> tuple[Array, Array]:
+    """Components (n,) each after turning the axes back by `angle` (n,): those of the earth from those of the body."""
+    north, east = earth_velocity(*(ca.DM(values) for values in (forward, starboard, angle)))  # type: ignore[arg-type]
+    return np.array(north).ravel(), np.array(east).ravel()
+
+
+def _slope(column: Array, window: int, step: float) -> Array:
+    """Time derivative of a smoothed signal (Savitzky and Golay 1964), nan near gaps."""
+    slope: Array = savgol_filter(_filled(column), window, 3, deriv=1, delta=step)
+    slope[np.isnan(column)] = np.nan
+    return slope
+
+
+def _smoothed(column: Array, window: int) -> tuple[Array, float, float]:
+    """A signal without gaps and noise; standard deviation of its noise before and after."""
+    whole = _filled(column)
+    smooth: Array = savgol_filter(whole, window, 3)
+    gain = float(savgol_coeffs(window, 3)[window // 2])  # its own sample's weight: var(raw - smooth) = (1 - gain) var
+    noise = float(np.std(whole - smooth)) / np.sqrt(1 - gain)
+    if noise**2 < SMALL_NOISE * float(np.var(whole)):
+        return whole, noise, noise
+    return smooth, noise, noise * float(np.sqrt(gain))  # sum of squared weights = gain, for a projection
+
+
+def _filled(column: Array) -> Array:
+    known = np.flatnonzero(~np.isnan(column))
+    return np.interp(np.arange(len(column)), known, column[known])

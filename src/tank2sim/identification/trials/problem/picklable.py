@@ -1,0 +1,96 @@
+"""Problems that can be sent to another process: a model holds symbols that cannot, and is built anew from its card."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TypeVar
+
+from tank2sim.arrays import Array
+from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.dynamics.model import Model
+from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tank2sim.identification.trials.problem.problem_from_card import driven_model
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+
+Task = TypeVar("Task")
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True)
+class PicklableShip:
+    """A model in two words: the text of its card, and by what trials drive it.
+
+    Parameters
+    ----------
+    card : str
+        TOML.
+    driven_by : str
+        ``angle`` or ``order`` (:func:`tank2sim.identification.trials.problem.problem_from_card.driven_model`).
+    """
+
+    card: str
+    driven_by: str
+
+    def model(self) -> Model:
+        """The model; built once in each process."""
+        return _model(self)
+
+    def manoeuvring_card(self) -> ManoeuvringCard:
+        """The card."""
+        card = parse_card(self.card, "card")
+        assert isinstance(card, ManoeuvringCard)
+        return card
+
+
+@lru_cache(maxsize=8)
+def _model(ship: PicklableShip) -> Model:
+    return driven_model(ship.manoeuvring_card(), ship.driven_by)
+
+
+@dataclass(frozen=True, eq=False)
+class Portable:
+    """A :class:`Problem` with its ship in place of its model."""
+
+    ship: PicklableShip
+    free: tuple[str, ...]
+    prior_mean: Array
+    prior_error: Array
+    runs: tuple[SampledRun, ...]
+
+    def problem(self) -> Problem:
+        """The problem itself."""
+        return Problem(self.ship.model(), self.free, self.prior_mean, self.prior_error, self.runs)
+
+    def with_runs(self, runs: tuple[SampledRun, ...]) -> Portable:
+        """The same question, asked of other runs."""
+        return replace(self, runs=runs)
+
+
+def portable(problem: Problem, card: ManoeuvringCard, driven_by: str) -> Portable:
+    """A problem made portable.
+
+    Parameters
+    ----------
+    problem : Problem
+        Posed by :func:`tank2sim.identification.trials.problem.problem_from_card.problem_from_card`.
+    card : ManoeuvringCard
+    driven_by : str
+        The card and the driving with which it was posed.
+
+    Raises
+    ------
+    ValueError
+        The problem's model is not the one that these give.
+    """
+    ship = PicklableShip(card.text, driven_by)
+    if ship.model().parameter_names != problem.model.parameter_names:
+        raise ValueError("the problem was posed for another card")
+    return Portable(ship, problem.free, problem.prior_mean, problem.prior_error, problem.runs)
+
+
+def map_tasks(work: Callable[[Task], _Result], tasks: Iterable[Task], executor: Executor | None) -> Iterator[_Result]:
+    """Results in the order of the tasks: one after the other here, or by any executor."""
+    return map(work, tasks) if executor is None else executor.map(work, tasks)

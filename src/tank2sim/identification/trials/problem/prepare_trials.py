@@ -1,0 +1,158 @@
+"""Trials as they are taken for identification: audited, mended, and brought to the size of the card's ship."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.errors import InputError
+from tank2sim.records.audit import Finding, audit_and_repair
+from tank2sim.records.reading import read_trial
+from tank2sim.records.same_record import refuse_copies
+from tank2sim.records.trials import RUDDERS, Trial, froude_scaled
+
+TYPICAL_SPEED = 95
+"""Percentile of the speed that stands for a trial's approach: some begin at rest, and all are slower afterwards."""
+
+SAME_LENGTH = 0.03
+"""Lengths that differ by less than this share are those of one ship: not all count them alike."""
+
+FARTHEST_FROUDE = 2.5
+"""A trial whose approach speed differs from the card's speed by more than this factor is at another scale."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Trials at the size of the ship.
+
+    Parameters
+    ----------
+    trials : tuple of Trial
+    driven_by : str
+        ``angle`` if the rudder's angle was measured in all of them, ``order`` if only its order is known.
+    notices : tuple of str
+        What was mended and scaled.
+    """
+
+    trials: tuple[Trial, ...]
+    driven_by: str
+    notices: tuple[str, ...]
+
+
+def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
+    """Read trials, mend what the audit is sure of, and scale them to the card's ship.
+
+    Raises
+    ------
+    InputError
+        A file is at fault, the audit finds a fault that it cannot repair, two trials have one name or are one record, a
+        trial is of another size and does not tell its scale, or the rudder's angle is known in some trials and only its
+        order in others.
+    """
+    trials, notices = [], []
+    for path in paths:
+        trial, findings = audit_and_repair(read_trial(path))
+        for one in findings:
+            _refuse_open(one)
+            done = "taken so" if one.safe and one.mend is not None else "left as it is"
+            notices.append(f"{path.name}: {one.column}: {one.what}; {done}: {one.likely_truth}")
+        if not set(RUDDERS) & set(trial.signals):
+            raise InputError(path, "column of the rudder", "has no usable reading", "give the rudder in more rows")
+        notices += _unused(trial, card)
+        scaled, factor = at_size_of(trial, card)
+        if factor != 1:
+            notices.append(f"{path.name}: scaled by Froude's law to a ship {factor:.4g} times as long")
+        trials.append(scaled)
+    names = [trial.name for trial in trials]
+    for trial in trials:
+        if names.count(trial.name) > 1:
+            raise InputError(trial.path, "", "has the name of another trial", "give each file once, under its own name")
+    refuse_copies(trials)
+    by_angle = ["delta_rad" in trial.signals for trial in trials]
+    if any(by_angle) and not all(by_angle):
+        odd = trials[by_angle.index(False)]
+        remedy = "give trials that all have delta_deg, or all only delta_order_deg"
+        raise InputError(odd.path, "header", "has no delta_deg, as others have", remedy)
+    return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(dict.fromkeys(notices)))
+
+
+def _refuse_open(finding: Finding) -> None:
+    """Refuse a trial of which a column is not what its name says, and nobody knows what it is instead."""
+    if finding.open:
+        place = f"column{'s' * (len(finding.columns) > 1)} {finding.column}"
+        remedy = f"probably {finding.likely_truth}: correct the file, or leave the column out"
+        raise InputError(finding.source, place, finding.what, remedy)
+
+
+def _unused(trial: Trial, card: ManoeuvringCard) -> list[str]:
+    """What of a trial does not enter, in words."""
+    told = []
+    if {"wind_speed_mps", "wind_direction_rad"} <= set(trial.signals) and all(
+        one.name != "wind" for one in card.effects
+    ):
+        told.append(f"{trial.path.name}: wind was measured, and the card has no effect 'wind': it is not used")
+    rudder = trial.signals.get("delta_rad", trial.signals.get("delta_order_rad"))
+    empty = 0 if rudder is None else int(np.isnan(rudder).sum())
+    if empty:
+        told.append(f"{trial.path.name}: the rudder is empty in {empty} rows: taken as straight between its readings")
+    return told
+
+
+def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
+    """The trial at the size of the card's ship, and the factor on its lengths.
+
+    A trial that tells its scale may hold numbers of the model or of the ship, and the card may be of either: the factor
+    is the scale, one over it, or 1, whichever brings the approach speed nearest to the card's.
+
+    Raises
+    ------
+    InputError
+        None of them brings it near.
+    """
+    if trial.length_m is not None:
+        return _at_length(trial, card)
+    speed = approach_speed(trial)
+    candidates = [1.0] if trial.scale is None else [1.0, trial.scale, 1 / trial.scale]
+    if speed is None:
+        return trial, 1.0
+    if speed == 0:
+        raise InputError(trial.path, "", "the ship lies still in it", "leave it out: nothing of a motion is in it")
+    away = [abs(math.log(speed * math.sqrt(factor) / card.model.speed_mps)) for factor in candidates]
+    factor = candidates[int(np.argmin(away))]
+    if min(away) > math.log(FARTHEST_FROUDE) and trial.scale is None:
+        problem = f"reaches {speed:.3g} m/s, and the card is of {card.model.speed_mps:.3g} m/s"
+        remedy = "if one of the two is a model, add the comment '# scale: LAMBDA' (ship length over model length)"
+        raise InputError(trial.path, "", problem, remedy)
+    return (trial if factor == 1 else froude_scaled(trial, factor)), factor
+
+
+def _at_length(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
+    """The same for a trial whose format tells the length of the ship or model: it must be the card's, or its model."""
+    assert trial.length_m is not None
+    own, scale = card.ship.length_m / trial.length_m, trial.scale or 1.0
+    factor = min((1.0, scale, 1 / scale), key=lambda one: abs(math.log(own / one)))
+    if abs(math.log(own / factor)) > SAME_LENGTH:
+        problem = f"is of a ship or model of {trial.length_m:g} m, and the card of one of {card.ship.length_m:g} m"
+        raise InputError(trial.path, "", problem, f"neither is the other at 1:{scale:g}; give the card of that ship")
+    return (trial if factor == 1 else froude_scaled(trial, factor)), factor
+
+
+def approach_speed(trial: Trial) -> float | None:
+    """Speed at which a trial was approached, m/s; None if neither speed nor position was measured."""
+    signals = trial.signals
+    for name in ("u_mps", "u_ground_mps", "sog_mps"):
+        if name in signals and not np.isnan(signals[name]).all():
+            return float(np.nanpercentile(np.abs(signals[name]), TYPICAL_SPEED))
+    if "x_m" in signals and "y_m" in signals:
+        known = ~np.isnan(signals["x_m"] + signals["y_m"])
+        t, x, y = (values[known] for values in (trial.time_s, signals["x_m"], signals["y_m"]))
+        if len(t) > 1:
+            stride = max(1, len(t) // 100)  # over a hundredth of the trial, so that noise of positions does not count
+            way = np.hypot(np.diff(x[::stride]), np.diff(y[::stride])) / np.diff(t[::stride])
+            return float(np.percentile(way, TYPICAL_SPEED))
+    return None

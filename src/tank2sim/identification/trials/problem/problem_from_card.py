@@ -1,0 +1,196 @@
+"""The problem that a card and trials pose: what is free, and what was known of it before."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.form import Propulsion
+from tank2sim.cards.reading import revised
+from tank2sim.dynamics import build
+from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
+from tank2sim.identification.trials.problem.rudder_input import driven_by_angle, with_ground_velocities
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun, in_range, prepare, seen_in
+from tank2sim.records.trials import Trial
+from tank2sim.units import from_si
+
+LEAST_PART = 2.0
+"""Parts of a run inside the card's range of speeds are used if they last this many L/u0 (ours)."""
+
+REVOLUTIONS = "propulsion.Xnn"
+REVOLUTIONS_ERROR = 0.2
+"""Standard error before the trials of the effect of revolutions, as a share of it: a card states none (ours)."""
+
+REVOLUTIONS_VARY = 0.01
+"""Revolutions that vary by less than this share of their nominal number tell nothing of their effect."""
+
+ASSUMED_EFFECT_ERROR = 0.25
+"""Standard error of an effect's parameter without one, as a share of its bounds' distance (ours)."""
+
+
+def driven_model(card: ManoeuvringCard, driven_by: str) -> Model:
+    """The card's model, driven by the measured angle of the rudder or by its order."""
+    model = with_ground_velocities(build(card))
+    return driven_by_angle(model) if driven_by == "angle" else model
+
+
+def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str, tuple[float, float]]:
+    """Name in the model of each free parameter, to its value and standard error before the trials.
+
+    Every derivative that the card has (with a value or an uncertainty) but for accelerations, unless `inertia` asks for
+    them: motion alone cannot tell a mass from a force. Every parameter of the card's effects that is no input.
+    """
+    free = {}
+    for name in {**card.derivatives, **card.uncertainty}:
+        if name in ACCELERATION_TERMS and not inertia:
+            continue
+        error = card.standard_error(name)
+        if error > 0 and name in _used(card):
+            free[f"derivatives.{name}"] = card.derivatives.get(name, 0.0), error
+    for entry in card.effects:
+        effect = EFFECTS[entry.name]
+        for one in effect.parameters:
+            unsaid = one.default is not None and one.absent is not None and one.name not in entry.parameters
+            if one.input_name or unsaid:  # an input, or a part of the effect that the card does not say to be there
+                continue
+            error = entry.uncertainty.get(one.name, ASSUMED_EFFECT_ERROR * (one.maximum - one.minimum))
+            if error <= 0:  # stated as certain
+                continue
+            free[f"{effect.name}.{one.stem}"] = one.value(entry.parameters, card), error
+    return free
+
+
+def problem_from_card(
+    card: ManoeuvringCard,
+    trials: Sequence[Trial],
+    driven_by: str,
+    *,
+    inertia: bool = False,
+    hold: Sequence[str] = (),
+    whole: bool = False,
+) -> Problem:
+    """The problem of fitting a card's free parameters to trials, but for those in `hold`.
+
+    Parts of runs at speeds outside the range that the card states are left out, unless runs are to stay `whole`.
+
+    Raises
+    ------
+    InputError
+        A trial is too short or has nothing to compare, or the card leaves nothing free.
+    """
+    model = driven_model(card, driven_by)
+    free = free_parameters(card, inertia=inertia)
+    if card.propulsion is not None and card.propulsion.Xnn and _revolutions_vary(card.propulsion, trials):
+        free[REVOLUTIONS] = card.propulsion.Xnn, REVOLUTIONS_ERROR * abs(card.propulsion.Xnn)
+    for name in hold:
+        known = name if name in free else f"derivatives.{name}"
+        if known not in free:
+            told = " ".join(one.removeprefix("derivatives.") for one in free)
+            raise InputError("--hold", "", f"{name} is not estimated anyway", f"estimated are {told}")
+        del free[known]
+    if not free:
+        raise InputError(card.source, "derivatives", "there is nothing to estimate", "give derivatives with a value")
+    seen = seen_in(model, trials)
+    if not seen:
+        raise InputError(trials[0].path, "header", "none of its signals can be compared", "give u_mps, r_degps, ...")
+    prepared = [prepare(model, trial, seen) for trial in trials]
+    runs = tuple(prepared) if whole else tuple(part for run in prepared for part in _parts(card, model, run))
+    if not runs:
+        low, high = card.model.speed_range_mps
+        problem = f"never goes for long at {low:g} to {high:g} m/s, where the card holds"
+        raise InputError(trials[0].path, "", problem, "change model.valid_speed_mps of the card, or leave it out")
+    values = np.array(list(free.values()))
+    return Problem(model, tuple(free), values[:, 0], values[:, 1], runs)
+
+
+def _revolutions_vary(propulsion: Propulsion, trials: Sequence[Trial]) -> bool:
+    known = [trial.signals["n_radps"] for trial in trials if "n_radps" in trial.signals]
+    return bool(known) and float(np.nanstd(np.concatenate(known))) > REVOLUTIONS_VARY * propulsion.nominal_radps
+
+
+def _parts(card: ManoeuvringCard, model: Model, run: SampledRun) -> tuple[SampledRun, ...]:
+    """The parts of a run at speeds at which the card says that it holds; the whole run if it does not say."""
+    if card.model.valid_speed_mps is None:
+        return (run,)
+    return in_range(run, model, card.model.valid_speed_mps, LEAST_PART * card.ship.length_m / card.model.speed_mps)
+
+
+def answered(card: ManoeuvringCard, estimate: Estimate) -> ManoeuvringCard:
+    """The card with the estimates in place of its values, and their standard errors."""
+    found = dict(zip(estimate.free, zip(estimate.values, estimate.standard_errors, strict=True), strict=True))
+    derivatives = {
+        name.partition(".")[2]: (rounded(value, error), float(f"{error:.3g}"))
+        for name, (value, error) in found.items()
+        if name.startswith("derivatives.")
+    }
+    changes: dict[str, object] = {}
+    for number, entry in enumerate(card.effects):
+        effect = EFFECTS[entry.name]
+        for one in effect.parameters:
+            if (name := f"{effect.name}.{one.stem}") in found:
+                value, error = found[name]
+                for section, figure in (("parameters", rounded(value, error)), ("uncertainty", float(f"{error:.3g}"))):
+                    key, shown = card.in_file(f"effects.{number}.{section}.{one.name}", figure)
+                    changes[key] = shown
+    if REVOLUTIONS in found:
+        scale = float(card.scales.force) if card.model.scaling == "dimensional" else 1.0
+        changes[REVOLUTIONS] = rounded(*found[REVOLUTIONS]) * scale
+    return revised(card, derivatives, changes, comment="identified from trials")
+
+
+def with_range(card: ManoeuvringCard, problem: Problem) -> ManoeuvringCard:
+    """The card with the range that it holds in after the fit.
+
+    The speeds of the runs, if it states none and they are known; its largest drift, yaw rate and rudder angle where the
+    runs went further than it states.
+    """
+    changes: dict[str, object] = {}
+    columns = {name: np.concatenate([run.column(f"motion.{name}") for run in problem.runs]) for name in "uvr"}
+    speeds = columns["u"][~np.isnan(columns["u"])]
+    if card.model.valid_speed_mps is None and len(speeds) and speeds.min() > 0:
+        changes["model.valid_speed_mps"] = [float(f"{speed:.3g}") for speed in (speeds.min(), speeds.max())]
+    reached = _reached(card, problem, columns)
+    stated = {
+        "valid_drift_rad": card.model.valid_drift_rad,
+        "valid_yaw_rate_prime": card.model.valid_yaw_rate_prime,
+        "valid_rudder_rad": np.inf if card.model.valid_rudder_rad is None else card.model.valid_rudder_rad,
+    }
+    for name, largest in reached.items():
+        if largest > stated[name]:
+            key = name if name in card.text else name.replace("_rad", "_deg")
+            changes[f"model.{key}"] = float(f"{from_si(key, largest):.3g}")
+    return revised(card, {}, changes, comment="range of the trials") if changes else card
+
+
+def _reached(card: ManoeuvringCard, problem: Problem, columns: Mapping[str, Array]) -> dict[str, float]:
+    """Largest drift angle (rad), r L/U and rudder angle (rad) of the runs: of 99 in 100 instants, for noise."""
+    known = columns["u"] > 0
+    found = {
+        "valid_drift_rad": np.arctan2(np.abs(columns["v"][known]), columns["u"][known]),
+        "valid_yaw_rate_prime": np.abs(columns["r"][known]) * card.ship.length_m / columns["u"][known],
+    }
+    rudder = next(place for place, name in enumerate(problem.model.input_names) if name.startswith("rudder."))
+    found["valid_rudder_rad"] = np.abs(np.concatenate([run.inputs[:, rudder] for run in problem.runs]))
+    finite = {name: values[np.isfinite(values)] for name, values in found.items()}
+    return {name: float(np.quantile(values, 0.99)) for name, values in finite.items() if len(values)}
+
+
+def rounded(value: float, error: float) -> float:
+    """A value to a thousandth of its standard error: no figure is lost that means anything."""
+    if not 0 < error < np.inf:
+        return float(f"{value:.10g}")
+    places = int(np.ceil(3 - np.log10(error)))
+    return float(round(value, places))
+
+
+def _used(card: ManoeuvringCard) -> set[str]:
+    if card.model.kind == "abkowitz":
+        return set(ALL_TERMS)
+    return {*LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS}

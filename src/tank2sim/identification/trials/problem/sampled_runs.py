@@ -1,0 +1,208 @@
+"""Trials as an estimator takes them: equal steps, inputs held over each, and what was measured at each instant."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.records.trials import Trial
+from tank2sim.simulation.recorded import FED, STATES
+
+OBSERVED_SIGNALS = {
+    **STATES,
+    "u_ground_mps": "motion.u_ground",
+    "v_ground_mps": "motion.v_ground",
+    "sog_mps": "motion.sog",
+    "phi_rad": "motion.phi",
+}
+"""Signal of a trial to the variable of a model that it measures."""
+
+MOST_INSTANTS_A_ROW = 100
+"""Instants of an even time a row of the file: beyond, 99 % of the record is missing, and one bad time (an epoch among
+seconds) would ask for gigabytes. Project choice: records of what a ship does have gaps of a few per cent."""
+LONGEST_GAP = 3
+"""Gaps of up to this many samples are bridged; in longer ones nothing counts as measured (a choice of ours)."""
+
+
+@dataclass(frozen=True, eq=False)
+class SampledRun:
+    """One trial on equal steps.
+
+    Parameters
+    ----------
+    name : str
+        Of the trial.
+    begin_s, step_s : float
+        Time of the first instant in the trial's own time, and the step, s.
+    inputs : array (n, nu)
+        Mean of each of the model's inputs from an instant to the next; the last row repeats the one before.
+    measured : array (n, ny)
+        In the order of `seen`; nan where nothing was measured.
+    seen : tuple of str
+        Names of the model's variables that are measured.
+    file : str
+        The trial's file, for messages; empty if it has none.
+    """
+
+    name: str
+    begin_s: float
+    step_s: float
+    inputs: Array
+    measured: Array
+    seen: tuple[str, ...]
+    file: str = ""
+
+    @property
+    def origin(self) -> str:
+        """The file, as messages begin; the name if there is none."""
+        return self.file or self.name
+
+    @property
+    def times(self) -> Array:
+        """Instants in the trial's own time (n,), s."""
+        times: Array = self.begin_s + self.step_s * np.arange(len(self.measured), dtype=float)
+        return times
+
+    def column(self, name: str) -> Array:
+        """What was measured of a variable (n,), nan where nothing was."""
+        if name not in self.seen:
+            return np.full(len(self.measured), np.nan)
+        column: Array = self.measured[:, self.seen.index(name)]
+        return column
+
+    def part(self, begin: int, end: int) -> SampledRun:
+        """The instants `begin` to `end` - 1."""
+        where = slice(begin, end)
+        begin_s = self.begin_s + begin * self.step_s
+        return SampledRun(
+            self.name, begin_s, self.step_s, self.inputs[where], self.measured[where], self.seen, self.file
+        )
+
+
+def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | None = None) -> SampledRun:
+    """A trial on equal steps, for a model that is driven as the trial was (:mod:`.driving`).
+
+    The step is a whole number of sampling steps near `step_s` (by default 1.5 times the model's own). Signals are
+    averaged over a step, so that no measurement is thrown away. A rudder order holds until the next and enters with its
+    mean over the step; a measured angle is taken as straight between samples.
+
+    Raises
+    ------
+    InputError
+        The trial has fewer than ten steps, or none of the signals in `seen`.
+    """
+    sampling = float(np.median(np.diff(trial.time_s)))
+    stride = max(1, int((step_s or 1.5 * model.step_s) / sampling))
+    step = stride * sampling
+    count = int((trial.time_s[-1] - trial.time_s[0]) / step + 1e-6)
+    begin = float(trial.time_s[0]) + 0.5 * (stride - 1) * sampling
+    grid: Array = begin + step * np.arange(count, dtype=float)
+    if count < 10:
+        raise InputError(trial.path, "", f"is only {trial.time_s[-1] - trial.time_s[0]:g} s long", "leave it out")
+    if count * stride > MOST_INSTANTS_A_ROW * len(trial.time_s):
+        lasts = trial.time_s[-1] - trial.time_s[0]
+        problem = f"lasts {lasts:g} s, and has {len(trial.time_s)} rows, most of them {sampling:g} s apart"
+        raise InputError(trial.path, f"column {trial.heading('t_s')}", problem, "correct the time, or cut the record")
+    inputs = np.tile(model.input_values(), (count, 1))
+    for name, values in _input_signals(model, trial).items():
+        held = name == "rudder.command" and "delta_rad" not in trial.signals
+        inputs[:, model.input_names.index(name)] = _means(trial.time_s, values, grid, step, held=held)
+    signals = {variable: signal for signal, variable in OBSERVED_SIGNALS.items()}
+    measured = np.full((count, len(seen)), np.nan)
+    for place, name in enumerate(seen):
+        if (values_there := trial.signals.get(signals[name])) is not None:
+            measured[:, place] = _averaged(trial.time_s, values_there, grid, stride)
+    if np.isnan(measured).all():
+        raise InputError(
+            trial.path, "header", "none of the signals to be compared is there", "give u_mps, r_degps, ..."
+        )
+    return SampledRun(trial.name, begin, step, inputs, measured, tuple(seen), str(trial.path))
+
+
+def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s: float) -> tuple[SampledRun, ...]:
+    """The parts of a run in which the ship goes at speeds (m/s) at which the model holds, each of `least_s` s or more.
+
+    Speed is judged by its mean over half of L/u0, for single readings jump. Without a measured speed the run is kept.
+    """
+    speed = _speed(run)
+    if speed is None:
+        return (run,)
+    p = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+    width = max(1, round(0.5 * p["ship.length"] / p["ship.speed"] / run.step_s))
+    smooth = uniform_filter1d(speed, width)
+    inside = (smooth >= speeds[0]) & (smooth <= speeds[1])
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
+    pairs = [(begin, end) for begin, end in zip(edges[::2], edges[1::2], strict=True) if end - begin > 1]
+    parts = [run.part(int(begin), int(end)) for begin, end in pairs if (end - begin - 1) * run.step_s >= least_s]
+    if len(parts) == 1 and len(parts[0].measured) == len(run.measured):
+        return (run,)
+    return tuple(replace(part, name=f"{run.name} at {part.begin_s:.0f} s") for part in parts)
+
+
+def _speed(run: SampledRun) -> Array | None:
+    for name in ("motion.u", "motion.u_ground", "motion.sog"):
+        speed = run.column(name)
+        known = ~np.isnan(speed)
+        if np.count_nonzero(known) > 1:
+            return np.interp(run.times, run.times[known], speed[known])
+    return None
+
+
+def seen_in(model: Model, trials: Sequence[Trial]) -> tuple[str, ...]:
+    """Variables of the model that at least one of the trials measured."""
+    there = {signal for trial in trials for signal in trial.signals}
+    return tuple(variable for signal, variable in OBSERVED_SIGNALS.items() if signal in there and variable in model)
+
+
+def _input_signals(model: Model, trial: Trial) -> dict[str, Array]:
+    given = {variable: trial.signals[name] for name, variable in FED.items() if name in trial.signals}
+    angle = trial.signals.get("delta_rad")
+    given["rudder.command"] = trial.signals["delta_order_rad"] if angle is None else angle
+    return {
+        name: _continuous(values) if name.endswith("direction") else values
+        for name, values in given.items()
+        if name in model.input_names
+    }
+
+
+def _continuous(direction: Array) -> Array:
+    """A direction without jumps of a full turn, so that it can be averaged."""
+    known = ~np.isnan(direction)
+    whole = direction.copy()
+    whole[known] = np.unwrap(direction[known])
+    return whole
+
+
+def _means(time: Array, values: Array, grid: Array, step: float, *, held: bool) -> Array:
+    """Mean of a signal from each instant of the grid to the next, (n,)."""
+    known = ~np.isnan(values)
+    time, values = time[known], values[known]
+    lengths = np.diff(time)
+    areas = lengths * (values[:-1] if held else 0.5 * (values[:-1] + values[1:]))
+    whole = np.concatenate([[0.0], np.cumsum(areas)])
+    at = np.interp(np.append(grid, grid[-1] + step), time, whole)
+    means: Array = np.diff(at) / step
+    means[-1] = means[-2]
+    return means
+
+
+def _averaged(time: Array, values: Array, grid: Array, stride: int) -> Array:
+    """Signal at the instants of the grid: mean of the `stride` samples around each, nan in long gaps."""
+    known = np.flatnonzero(~np.isnan(values))
+    if len(known) < 2:
+        return np.full(len(grid), np.nan)
+    sampling = float(np.median(np.diff(time)))
+    places = (np.arange(stride) - 0.5 * (stride - 1)) * sampling
+    fine = (grid[:, None] + places).ravel()
+    there = np.interp(fine, time[known], values[known], left=np.nan, right=np.nan)
+    after = np.clip(np.searchsorted(time[known], fine), 1, len(known) - 1)
+    gap = time[known[after]] - time[known[after - 1]]
+    there[gap > (LONGEST_GAP + 1.5) * sampling] = np.nan  # three missing: four steps from known to known
+    mean: Array = there.reshape(len(grid), stride).mean(axis=1)
+    return mean

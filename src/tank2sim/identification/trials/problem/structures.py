@@ -1,0 +1,177 @@
+"""Structures of the model that trials can be fitted with: each turns a card into the card to start from.
+
+A structure says which terms and effects the model has, with a value and a standard error before the trials for each.
+Because it is a card, everything downstream (simulation, linearisation, FMU) takes it as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import tomlkit
+
+from tank2sim.cards import parse_card
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.reading import linear_card, revised
+from tank2sim.cards.terms import known_term
+from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, LINEAR_TERMS
+from tank2sim.files import BYTE_ORDER_MARK
+
+TYPICAL = {"v": 0.3, "r": 0.7, "d": 0.6, "u": 0.4}
+"""Primes of a hard turn (v', r', rudder in rad, Du'): sizes at which terms are compared (KVLCC2, 35 deg turn)."""
+
+SHARE_OF_LINEAR = 0.3
+"""Standard error before the trials of a term that a card has not: this share of the linear force in a hard turn."""
+
+SHARE_BESIDE_DRAG = 0.1
+"""The same for cubic terms of the yaw moment beside cross-flow drag, which takes one coefficient for bow and stern. A
+tenth is ours; of 0, 0.1 and 0.3 it was the one that followed KVLCC2's 35 deg turn at MARIN (tactical diameter -12, -3
+and +8 %) after fits of HSVA's zigzags, which themselves cannot tell the three apart."""
+
+SHARE_OF_ASYMMETRY = 0.02
+"""The same for terms of asymmetry (Y0, N0, Y0u, N0u): the lateral force of a single screw is a few percent (ours)."""
+
+CUBIC_HULL = {force: tuple(f"{force}{powers}" for powers in ("vvv", "vvr", "vrr", "rrr")) for force in "YN"}
+ASYMMETRY = ("Y0", "N0", "Y0u", "N0u")
+TURNING = ("Xvv", "Xvr", "Xrr", "Xdd")
+
+_LOADED_RUDDER = {"loading": (0.6, 0.15), "straightening": (0.55, 0.2), "lever": (-0.71, 0.3)}
+"""Value and standard error before the trials. Values: the KVLCC2 of Yasukawa and Yoshimura (2015): its rudder's inflow
+speed rises by 0.62 to 0.65 of the loading, whose straightening is 0.395 to port and 0.640 to starboard over a rudder
+inflow of 0.92 U, and whose lever is -0.710; standard errors ours, wide enough for another single-screw ship."""
+
+CROSS_FLOW = (0.6, 0.3)
+"""Cross-flow drag coefficient before the trials: 0.4 to 0.9 for full hulls (Faltinsen 1990, Sea Loads, 6.4)."""
+
+Terms = Mapping[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class ModelStructure:
+    """A structure of the model.
+
+    Parameters
+    ----------
+    name : str
+        As the command line has it.
+    description : str
+        A sentence for people.
+    start : callable
+        ``start(card) -> card``: with value and standard error of all that is to be estimated.
+    """
+
+    name: str
+    description: str
+    start: Callable[[ManoeuvringCard], ManoeuvringCard]
+
+
+def _as_it_is(card: ManoeuvringCard) -> ManoeuvringCard:
+    return card
+
+
+def _linear(card: ManoeuvringCard) -> ManoeuvringCard:
+    wanted = [name for force in "XYN" for name in LINEAR_TERMS[force]]
+    return linear_card(_with_terms(card, wanted))
+
+
+def _third_order(card: ManoeuvringCard) -> ManoeuvringCard:
+    return _with_terms(card, [*CUBIC_HULL["Y"], *CUBIC_HULL["N"], *ASYMMETRY, *TURNING])
+
+
+def _cross_flow(card: ManoeuvringCard) -> ManoeuvringCard:
+    """Linear hull with cross-flow drag in place of its cubic terms, and the rudder in the slipstream."""
+    replaced = {
+        name
+        for force in "YN"
+        for name in ABKOWITZ_TERMS[force]
+        if (term := known_term(name)).d + term.v + term.r > 1 or (term.d and term.u)
+    }
+    replaced |= {name for name in ABKOWITZ_TERMS["X"] if known_term(name).d and name != "Xdd"}
+    bare = _without(card, replaced)
+    bare = _with_terms(bare, [*ASYMMETRY, *TURNING, "Yd", "Nd"])
+    bare = _with_terms(bare, ["Nvvr", "Nvrr", "Nrrr"], SHARE_BESIDE_DRAG)
+    bare = _with_effect(bare, "cross_flow_drag", {"drag_coefficient": CROSS_FLOW})
+    return _with_effect(bare, "loaded_rudder", _LOADED_RUDDER)
+
+
+STRUCTURES: dict[str, ModelStructure] = {
+    one.name: one
+    for one in (
+        ModelStructure("linear", "linear derivatives alone (3.5)", _linear),
+        ModelStructure("card", "the terms and effects that the card has", _as_it_is),
+        ModelStructure("cross_flow", "linear hull, cross-flow drag, rudder in the propeller's slipstream", _cross_flow),
+        ModelStructure("third_order", "the card's terms and all third-order terms in v and r", _third_order),
+    )
+}
+"""From the simplest to the one with most parameters: of two that predict alike the earlier is taken."""
+
+
+def prior_of_absent(card: ManoeuvringCard, name: str, share: float = SHARE_OF_LINEAR) -> tuple[float, float]:
+    """Value and standard error (prime) before the trials of a term that the card has not.
+
+    X_vr is -Yvdot: in ideal fluid the force of the added mass in sway, m_y v r (the MMG model's (m + m_y) v r); where
+    the card's terms in r are "total", it holds m v r as well. All others are 0 within `share` of the linear force of a
+    hard turn, asymmetry within :data:`SHARE_OF_ASYMMETRY` of it.
+    """
+    known = card.derivatives
+    term = known_term(name)
+    if name == "Xvr":
+        value = -known.get("Yvdot", 0.0)
+        if card.model.yaw_rate_terms == "total":
+            value += card.rigid_body.mass
+        return value, max(0.3 * abs(value), 1e-4)
+    sizes = {
+        "X": max(abs(known.get("Xu", 0.0)) * TYPICAL["u"], 5e-4),
+        "Y": max(abs(known.get("Yv", 0.0)) * TYPICAL["v"], 1e-3),
+        "N": max(abs(known.get("Nr", 0.0)) * TYPICAL["r"], 3e-4),
+    }
+    size = 1.0
+    for letter, power in (("v", term.v), ("r", term.r), ("d", term.d), ("u", term.u)):
+        size *= TYPICAL[letter] ** power
+    return 0.0, (SHARE_OF_ASYMMETRY if name in ASYMMETRY else share) * sizes[term.force] / size
+
+
+def _with_terms(card: ManoeuvringCard, names: list[str], share: float = SHARE_OF_LINEAR) -> ManoeuvringCard:
+    """The card with these terms: those that it has not, or has with no uncertainty, with their value before trials."""
+    new: dict[str, tuple[float, float]] = {}
+    for name in names:
+        value, error = prior_of_absent(card, name, share)
+        if name in ASYMMETRY:
+            new[name] = card.derivatives.get(name, 0.0), max(card.standard_error(name), error)
+        elif not card.derivatives.get(name):
+            new[name] = value, error
+    return revised(card, new) if new else card
+
+
+def _without(card: ManoeuvringCard, names: set[str]) -> ManoeuvringCard:
+    document = tomlkit.parse(card.text.removeprefix(BYTE_ORDER_MARK))
+    for name in names & set(card.derivatives):
+        key = card.places.get(name, name)
+        for section in ("derivatives", "uncertainty"):
+            if section in document and key in document[section]:
+                del document[section][key]
+    return _parsed(card, document)
+
+
+def _with_effect(card: ManoeuvringCard, name: str, parameters: Terms) -> ManoeuvringCard:
+    """The card with an effect; one that it has already stays as it is."""
+    if any(entry.name == name for entry in card.effects):
+        return card
+    document = tomlkit.parse(card.text.removeprefix(BYTE_ORDER_MARK))
+    effect = tomlkit.table()
+    effect["name"] = name
+    values, errors = tomlkit.table(), tomlkit.table()
+    for key, (value, error) in parameters.items():
+        values[key], errors[key] = value, error
+    effect["parameters"], effect["uncertainty"] = values, errors
+    if "effects" not in document:
+        document["effects"] = tomlkit.aot()
+    document["effects"].append(effect)
+    return _parsed(card, document)
+
+
+def _parsed(card: ManoeuvringCard, document: tomlkit.TOMLDocument) -> ManoeuvringCard:
+    new = parse_card(tomlkit.dumps(document), card.source)
+    assert isinstance(new, ManoeuvringCard)
+    return new

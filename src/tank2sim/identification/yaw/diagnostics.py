@@ -1,0 +1,174 @@
+"""What is looked at before and after an estimate from records of the yaw rig, and what the user is told."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tank2sim.errors import InputError
+from tank2sim.identification.yaw.energy import EnergyFit
+from tank2sim.identification.yaw.estimate import YawEstimate
+from tank2sim.identification.yaw.intervals import ENERGY_TERMS
+from tank2sim.records.yaw import YawRecord
+
+_NOT_QUITE_MIRRORED = 0.03
+_FULL = 0.995
+"""Share of the largest current from which the motor is taken for saturated."""
+_ANOTHER_UNIT = 20.0
+_STRONG_A = 20.0
+"""More than a motor of such a rig takes; the paper's has 1 A."""
+_NOT_THE_PROGRAMME = 1.5
+"""A turn that is so many times more or less than programmed is a mistake of units, not of tracking."""
+_PULSE_RAD = 2 * math.pi / 3000
+"""Of the paper's encoder; where (3) holds, about a quarter of it is left."""
+_APART = 3.0
+_SHARPER = 3.0
+
+
+def check_current(records: tuple[YawRecord, ...]) -> list[str]:
+    """What to say of the files and their currents; InputError where the motor is saturated in an interval."""
+    notes = []
+    for record in records:
+        notes += [f"{record.path.name}: {told}" for told in record.notes]
+        largest = float(np.abs(record.current_A).max())
+        if largest > _STRONG_A:
+            notes.append(
+                f"{record.path.name}: the current reaches {largest:.3g} A; if the column is in mA, divide it by 1000."
+            )
+        limit = record.constants.get("max_current_A")
+        if limit is None:
+            continue
+        full = np.abs(record.current_A) >= _FULL * limit
+        for pair in record.programme.pairs():
+            for begin, end in pair:
+                bad = full & (record.time_s >= begin) & (record.time_s <= end)
+                if bad.any():
+                    row = int(np.flatnonzero(bad)[0])
+                    problem = f"reaches the motor's {limit:g} A at {record.time_s[row]:.3f} s, where it is evaluated"
+                    remedy = "run a slower programme, or lower gains"
+                    if largest > _ANOTHER_UNIT * limit:
+                        remedy = f"its largest is {largest:.3g} A: if the column is in mA, divide it by 1000"
+                    raise InputError(record.path, "column current_A", problem, remedy)
+        if full.any():
+            first = record.time_s[int(np.flatnonzero(full)[0])]
+            notes.append(
+                f"{record.path.name}: the motor is saturated at {first:.3f} s, outside the intervals that are "
+                "evaluated."
+            )
+    return notes
+
+
+def check_turn(record: YawRecord) -> None:
+    """Raise InputError if the body does not turn about as far as the programme: the units are then not what they say.
+
+    Looked at while the rate is held, where a wrong start_s does little.
+    """
+    own = record.programme
+    for number in range(own.humps):
+        ends = own.start_s + number * own.period_s + own.rise_s * np.array([1.0, 2.0])
+        programmed = float(abs(np.diff(own.at(ends).angle_rad)[0]))
+        measured = float(abs(np.diff(np.interp(ends, record.time_s, record.angle_rad))[0]))
+        if not programmed / _NOT_THE_PROGRAMME < measured < programmed * _NOT_THE_PROGRAMME:
+            problem = (
+                f"turns by {measured:.3g} rad from {ends[0]:.2f} to {ends[1]:.2f} s (hump {number + 1}), where the "
+                f"programme turns by {programmed:.3g} rad"
+            )
+            remedy = "check the unit of the angle (phi_rad or phi_deg), max_rate_degps, rise_s and start_s"
+            raise InputError(record.path, "column phi_rad", problem, remedy)
+
+
+def check_sign(record: YawRecord, fit: EnergyFit) -> None:
+    """Raise InputError if the motor works against the motion throughout: angle and current have opposite signs."""
+    if fit.coefficients[0] < 0 and float(fit.balance.work_J.sum()) < 0:
+        problem = "drives the body against its motion throughout, which makes inertia and friction negative"
+        raise InputError(record.path, "column current_A", problem, "give current and angle the same positive sense")
+
+
+def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limit: float) -> list[str]:
+    """What to say of intervals that are not quite mirror images; InputError beyond the limit."""
+    place = 0
+    for record in records:
+        for number in range(record.programme.humps):
+            if mirror[place] > limit:
+                pair = record.programme.pairs()[number]
+                problem = (
+                    f"the intervals {_span(pair.accelerating_s)} and {_span(pair.braking_s)} are no mirror images: "
+                    f"their rates differ by up to {100 * mirror[place]:.1f} % of the largest, and {100 * limit:g} % is "
+                    "allowed"
+                )
+                remedy = "check start_s and rise_s, tune the controller, leave the hump out, or raise --mirror-percent"
+                raise InputError(record.path, "", problem, remedy)
+            place += 1
+    worst = max(mirror)
+    if worst > _NOT_QUITE_MIRRORED:
+        return [
+            f"The accelerating and braking intervals are mirror images to {100 * worst:.1f} % of the largest rate: the "
+            "two-interval formulas are biased by what that does to the dissipation."
+        ]
+    return []
+
+
+def _span(ends: tuple[float, float]) -> str:
+    return f"{ends[0]:.2f}-{ends[1]:.2f} s"
+
+
+def check_explained(records: tuple[YawRecord, ...], misfit_rad: float | None) -> list[str]:
+    """What to say where (3) does not give the record's motion, or a single hump cannot show that it does not."""
+    notes = []
+    if misfit_rad is not None and misfit_rad > _PULSE_RAD:
+        notes.append(
+            f"(3) leaves {misfit_rad:.2g} rad of the angle (rms), more than an encoder's pulse: gravity, walls or "
+            "something else acts that is not among the terms, and no standard error contains what they do."
+        )
+    (first, *others) = records
+    if not others and first.programme.humps == 1 and first.programme.turn_per_interval_rad < 2 * math.pi:
+        notes.append(
+            "One hump of part of a turn does not tell a moment of gravity from inertia: give two humps or more, which "
+            "begin at other angles."
+        )
+    return notes
+
+
+def judged(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[str]:
+    """What to say of the estimates."""
+    best, two = estimates["energy_least_squares"], estimates["two_intervals"]
+    notes = []
+    if two.bias_kgm2 is not None:
+        share = 100 * two.bias_kgm2 / best.total_inertia_kgm2
+        parts = two.bias_from
+        notes.append(
+            f"The two-interval formula (1) lies {1e4 * two.bias_kgm2:+.3g}e-4 kg m2 ({share:+.2g} % of the total) from "
+            f"the least squares: {1e4 * parts['dissipation']:+.3g}e-4 because the intervals do not dissipate alike, "
+            f"{1e4 * parts['speeds']:+.3g}e-4 because their end speeds differ. Its standard error does not "
+            "contain that."
+        )
+    if len(two.by_hump_kgm2) > 1:
+        humps = ", ".join(f"{1e4 * value:.4g}" for value in two.by_hump_kgm2)
+        notes.append(
+            f"It is the mean of {humps} e-4 kg m2 (total), hump by hump; while the controller's gains are still being "
+            "tuned, a hump differs."
+        )
+    for term, (value, error) in best.friction.items():
+        if error is not None and abs(value) < 2 * error:
+            notes.append(f"{term} does not differ from zero: {value:.3g} ± {error:.2g} {ENERGY_TERMS[term][1]}.")
+    return [*notes, *_compared(best, estimates.get("output_error"))]
+
+
+def _compared(best: YawEstimate, other: YawEstimate | None) -> list[str]:
+    """The energy least squares beside the nonlinear ones, where these say more, or something else."""
+    if other is None or not best.inertia_error_kgm2 or not other.inertia_error_kgm2:
+        return []
+    apart = abs(best.total_inertia_kgm2 - other.total_inertia_kgm2)
+    error = math.hypot(best.inertia_error_kgm2, other.inertia_error_kgm2)
+    if apart > _APART * error:
+        return [
+            f"energy_least_squares and output_error differ by {1e4 * apart:.3g}e-4 kg m2, {apart / error:.2g} times "
+            "their errors: something in the record is in neither's equations, and neither error contains it."
+        ]
+    if other.inertia_error_kgm2 < best.inertia_error_kgm2 / _SHARPER:
+        return [
+            f"output_error is sharper here, ± {1e4 * other.inertia_error_kgm2:.2g}e-4 against "
+            f"± {1e4 * best.inertia_error_kgm2:.2g}e-4 kg m2; --method output_error puts it into a card."
+        ]
+    return []

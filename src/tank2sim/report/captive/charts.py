@@ -1,0 +1,343 @@
+"""Charts of captive tests: force against angle or amplitude, loops over the motion, harmonics and residuals by run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import altair as alt
+import numpy as np
+from numpy.typing import ArrayLike
+
+from tank2sim.records.thinning import thin_line, thin_points
+from tank2sim.report.kit.chart_parts import (
+    LINE_SAMPLES,
+    NUMBER,
+    POINT_SAMPLES,
+    ChartRecord,
+    Position,
+    SeriesLook,
+    axis_above,
+    data,
+    extent,
+    pan_zoom,
+    plain,
+    records,
+    series_look,
+    shown_unit,
+    stacked,
+    vector,
+    with_unit,
+)
+
+BAND_OPACITY = 0.16
+_CROWDED = 40
+_USUAL_LIMIT = 2.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Across:
+    """What lies across: its words and its unit, a key of :data:`tank2sim.units.UNITS`; angles are shown in degrees."""
+
+    title: str
+    unit: str = "1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceSeries:
+    """One force against an angle or an amplitude.
+
+    Parameters
+    ----------
+    label : str
+        Of the series, such as ``pure sway, 0.45 rad/s``.
+    x, value : array, (n,)
+        Measured points.
+    half_width : array, (n,), optional
+        Half the 95 % interval of each point, in its unit.
+    fit_x, fit_value, fit_half_width : array, (m,), optional
+        The fit and half its 95 % band; a fit without half widths has no band.
+    """
+
+    label: str
+    x: ArrayLike
+    value: ArrayLike
+    half_width: ArrayLike | None = None
+    fit_x: ArrayLike = ()
+    fit_value: ArrayLike = ()
+    fit_half_width: ArrayLike | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ForceLoop:
+    """Forces over the motion in one run, in the order of time.
+
+    Parameters
+    ----------
+    label : str
+        Of the run.
+    motion : array, (n,)
+        Sway velocity or yaw rate.
+    forces : mapping
+        Name of a force to its values, (n,).
+    fitted : mapping
+        The same of the fit, over `fitted_motion` (m,).
+    """
+
+    label: str
+    motion: ArrayLike
+    forces: Mapping[str, ArrayLike]
+    fitted_motion: ArrayLike = ()
+    fitted: Mapping[str, ArrayLike] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Harmonics:
+    """Amplitudes of the harmonics (1, 2, 3, ... in this order) of a force in one run, and those of the fit if given."""
+
+    run: str
+    amplitude: ArrayLike
+    fitted: ArrayLike | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Residual:
+    """What a fit leaves of one force in one run, over its standard error; `kind` is the type of run."""
+
+    run: str
+    kind: str
+    force: str
+    value: float
+
+
+def force_chart(
+    series: Sequence[ForceSeries], across: Across, up: str, *, title: str = "", size_px: tuple[int, int] = (620, 380)
+) -> alt.LayerChart:
+    """A force against angle or amplitude: measured points with their intervals, the fits as lines in their bands.
+
+    Parameters
+    ----------
+    series : sequence of ForceSeries
+        In one colour each.
+    across : Across
+        What `x` is.
+    up : str
+        Title of the force with its unit, such as ``Y (N)``.
+    title : str
+        Of the chart.
+    size_px : (int, int)
+        Width and height.
+    """
+    unit, factor = shown_unit(across.unit)
+    name = with_unit(across.title, unit)
+    look = series_look([one.label for one in series], as_points=[one.label for one in series])
+    x = alt.X("x:Q", title=name, scale=alt.Scale(zero=False, padding=10))
+    y = alt.Y("v:Q", title=up, scale=alt.Scale(zero=False))
+    points = _rows(series, factor, fit=False)
+    lines = _rows(series, factor, fit=True)
+    low, high = extent(np.array([row["v"] for row in (*points, *lines)], dtype=float))
+    # A line at zero far from the values would squeeze them into an edge of the chart.
+    zero = [{"v": 0.0}] if low <= 0 <= high else []
+    layers = [alt.Chart(data(zero)).mark_rule(style="reference", clip=True).encode(y="v:Q")] if zero else []
+    layers += _bands(lines, x, look)
+    if lines:
+        line = alt.Chart(data(lines)).mark_line(clip=True)
+        layers.append(line.encode(x=x, y=y, color=look.colour, order="i:Q"))
+    layers += _intervals(points, x, look)
+    tooltip = [
+        alt.Tooltip("run:N", title="series"),
+        alt.Tooltip("x:Q", title=name, format=NUMBER),
+        alt.Tooltip("v:Q", title=up, format=NUMBER),
+    ]
+    mark = alt.Chart(data(points), name="plot").mark_point(clip=True)
+    layers.append(mark.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip))
+    labels = ", ".join(one.label for one in series)
+    return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(
+        title=title,
+        width=size_px[0],
+        height=size_px[1],
+        description=f"{up} against {across.title} of {labels}; points were measured, lines are the fit with its band.",
+    )
+
+
+def loop_chart(
+    loops: Sequence[ForceLoop], across: Across, forces: Mapping[str, str], *, title: str = "", height_px: int = 260
+) -> alt.VConcatChart:
+    """Hysteresis loops: forces over the motion, one panel a force; measured as points, the fit as a line.
+
+    Parameters
+    ----------
+    loops : sequence of Loop
+        In one colour each.
+    across : Across
+        What `motion` is.
+    forces : mapping
+        Name of a force in the loops to its title with unit; the panels from top to bottom.
+    title : str
+        Of the chart.
+    height_px : int
+        Height of one panel.
+    """
+    unit, factor = shown_unit(across.unit)
+    name = with_unit(across.title, unit)
+    look = series_look([loop.label for loop in loops], as_points=[loop.label for loop in loops])
+    panels = []
+    for place, (force, up) in enumerate(forces.items()):
+        last = place == len(forces) - 1
+        axis = alt.Axis(title=name) if last else alt.Axis(title=None, labels=False, ticks=False)
+        position: Position = {
+            "x": alt.X("x:Q", scale=alt.Scale(zero=False), axis=axis),
+            "y": alt.Y("v:Q", scale=alt.Scale(zero=False), axis=axis_above(up)),
+        }
+        panels.append(
+            alt.layer(*_loop_layers(loops, force, factor, position, look)).properties(width=560, height=height_px)
+        )
+    labels = ", ".join(loop.label for loop in loops)
+    return stacked(panels, title=title, description=f"Forces over {across.title} of {labels}.")
+
+
+def harmonic_chart(
+    runs: Sequence[Harmonics], up: str, *, title: str = "", width_px: int = 720, height_px: int = 110
+) -> alt.VConcatChart:
+    """Amplitudes of a force's harmonics as bars, one panel a harmonic, the runs side by side; strokes are the fit.
+
+    Parameters
+    ----------
+    runs : sequence of Harmonics
+        In the order in which they stand.
+    up : str
+        Title of the force with its unit.
+    title : str
+        Of the chart.
+    width_px, height_px : int
+        Size of one panel.
+    """
+    count = max(len(vector(run.amplitude)) for run in runs)
+    panels = []
+    for order in range(1, count + 1):
+        x = _runs_axis("run:N", [run.run for run in runs], named=order == count)
+        rows = [{"run": run.run, "v": _at(run.amplitude, order)} for run in runs]
+        fits = [{"run": run.run, "v": _at(run.fitted, order)} for run in runs if run.fitted is not None]
+        y = alt.Y("v:Q", axis=axis_above(f"harmonic {order} of {up}", tickCount=4), scale=alt.Scale(zero=True))
+        tooltip = [alt.Tooltip("run:N", title="run"), alt.Tooltip("v:Q", title=up, format=NUMBER)]
+        bars = alt.Chart(data(rows)).mark_bar(opacity=0.7).encode(x=x, y=y, tooltip=tooltip)
+        layers = [bars]
+        if fits:
+            layers.append(alt.Chart(data(fits)).mark_tick(style="limit", thickness=2).encode(x=x, y=y))
+        panels.append(alt.layer(*layers).properties(width=width_px, height=height_px))
+    subtitle = "Bars: measured. Red strokes: fit." if any(run.fitted is not None for run in runs) else ""
+    return alt.vconcat(*panels, spacing=14).properties(
+        title=alt.Title(title, subtitle=subtitle) if title and subtitle else title,
+        description=f"Amplitudes of the harmonics of {up} in {len(runs)} runs.",
+    )
+
+
+def residual_chart(
+    residuals: Sequence[Residual], *, title: str = "", width_px: int = 720, height_px: int = 140
+) -> alt.VConcatChart:
+    """What the fit leaves, over its standard error, by run: one panel a force, a colour a type of run.
+
+    Dotted lines mark two standard errors, within which nineteen of twenty should lie.
+
+    Parameters
+    ----------
+    residuals : sequence of Residual
+        Runs stand in the order of their first appearance.
+    title : str
+        Of the chart.
+    width_px, height_px : int
+        Size of one panel.
+    """
+    runs = list(dict.fromkeys(one.run for one in residuals))
+    kinds = list(dict.fromkeys(one.kind for one in residuals))
+    forces = list(dict.fromkeys(one.force for one in residuals))
+    look = series_look(kinds, as_points=kinds)
+    low, high = extent(vector([one.value for one in residuals]))
+    reach = 1.1 * max(_USUAL_LIMIT, -low, high)
+    panels = []
+    for force in forces:
+        x = _runs_axis("name:N", runs, named=force == forces[-1])
+        scale = alt.Scale(domain=[-reach, reach], nice=False)
+        y = alt.Y("v:Q", axis=axis_above(f"{force}: residual / standard error", tickCount=5), scale=scale)
+        rows = [{"run": one.kind, "name": one.run, "v": plain(one.value)} for one in residuals if one.force == force]
+        tooltip = [alt.Tooltip("name:N", title="run"), alt.Tooltip("v:Q", title="residual", format=NUMBER)]
+        limits = [{"v": -_USUAL_LIMIT}, {"v": 0.0}, {"v": _USUAL_LIMIT}]
+        rules = alt.Chart(data(limits)).mark_rule(style="reference", strokeDash=[2, 3]).encode(y="v:Q")
+        points = alt.Chart(data(rows)).mark_point()
+        marks = points.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
+        panels.append(alt.layer(rules, marks).properties(width=width_px, height=height_px))
+    chart = alt.vconcat(*panels, spacing=14).resolve_scale(color="shared", shape="shared")
+    return chart.properties(title=title, description=f"Residuals of {', '.join(forces)} in {len(runs)} runs.")
+
+
+def _rows(series: Sequence[ForceSeries], factor: float, *, fit: bool) -> list[ChartRecord]:
+    rows: list[ChartRecord] = []
+    for one in series:
+        x, value, half = (one.fit_x, one.fit_value, one.fit_half_width) if fit else (one.x, one.value, one.half_width)
+        columns = {"x": factor * vector(x), "v": vector(value)}
+        if half is not None:
+            columns |= {"low": columns["v"] - vector(half), "high": columns["v"] + vector(half)}
+        order = np.argsort(columns["x"], kind="stable") if fit else np.arange(len(columns["x"]))
+        kept = order[thin_line([columns["v"][order]], LINE_SAMPLES)] if fit else order
+        rows += records(one.label, {name: column[kept] for name, column in columns.items()})
+    return rows
+
+
+def _bands(lines: Sequence[ChartRecord], x: alt.X, look: SeriesLook) -> list[alt.Chart]:
+    rows = [row for row in lines if "low" in row]
+    if not rows:
+        return []
+    colour = look.colour.copy()
+    if colour.legend is not None:
+        # The legend is shared with the points, and would be as faint as the band.
+        colour.legend = alt.Legend(title=None, symbolOpacity=1)
+    area = alt.Chart(data(rows)).mark_area(opacity=BAND_OPACITY, clip=True)
+    return [area.encode(x=x, y=alt.Y("low:Q"), y2="high:Q", color=colour)]
+
+
+def _intervals(points: Sequence[ChartRecord], x: alt.X, look: SeriesLook) -> list[alt.Chart]:
+    rows = [row for row in points if "low" in row]
+    if not rows:
+        return []
+    rule = alt.Chart(data(rows)).mark_rule(style="stem", clip=True)
+    return [rule.encode(x=x, y=alt.Y("low:Q"), y2="high:Q", color=look.colour)]
+
+
+def _loop_layers(
+    loops: Sequence[ForceLoop], force: str, factor: float, position: Position, look: SeriesLook
+) -> list[alt.Chart]:
+    points: list[ChartRecord] = []
+    lines: list[ChartRecord] = []
+    for loop in loops:
+        if force in loop.forces:
+            x, value = factor * vector(loop.motion), vector(loop.forces[force])
+            kept = thin_points([value], POINT_SAMPLES)
+            points += records(loop.label, {"x": x[kept], "v": value[kept]})
+        if force in loop.fitted:
+            x, value = factor * vector(loop.fitted_motion), vector(loop.fitted[force])
+            kept = thin_line([x, value], LINE_SAMPLES)
+            lines += records(loop.label, {"x": x[kept], "v": value[kept]})
+    if not points and not lines:
+        raise ValueError(f"no loop has the force {force}")
+    layers = []
+    if points:
+        mark = alt.Chart(data(points)).mark_point(clip=True, size=14)
+        layers.append(mark.encode(**position, color=look.colour, shape=look.shape))
+    if lines:
+        mark = alt.Chart(data(lines)).mark_line(clip=True)
+        layers.append(mark.encode(**position, color=look.colour, order="i:Q"))
+    return layers
+
+
+def _runs_axis(place: str, runs: Sequence[str], *, named: bool) -> alt.X:
+    size = 8 if len(runs) > _CROWDED else 11
+    axis = alt.Axis(
+        title=None, labels=named, ticks=named, grid=False,
+        labelAngle=-90, labelFontSize=size, labelLimit=140, labelOverlap=False,
+    )  # fmt: skip
+    return alt.X(place, scale=alt.Scale(domain=list(runs), paddingInner=0.25), axis=axis)
+
+
+def _at(amplitudes: ArrayLike | None, order: int) -> float | None:
+    values = vector(() if amplitudes is None else amplitudes)
+    return plain(abs(float(values[order - 1]))) if order <= len(values) else None

@@ -1,0 +1,178 @@
+"""The page of cards compared: coefficients in standard errors, figures side by side, tracks on one chart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import altair as alt
+
+from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS
+from tank2sim.analysis.validation.comparison import CardComparison
+from tank2sim.files import plain_json
+from tank2sim.report.kit.chart_parts import NUMBER, data, series_look
+from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.motion_charts import TrackData, track_chart
+from tank2sim.report.kit.numbers import format_number
+from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.units import in_words
+
+_COEFFICIENTS = (
+    "Prime system, in the convention of the first card, the sign of its rudder included. A coefficient belongs to the "
+    "speed about which forces are expanded, to the speed that makes them non-dimensional and to what of the inertia is "
+    "in it; where cards differ in these, the forces are expanded anew to the third order, and the standard errors go "
+    "with them. A difference is divided by the root of both variances: beyond 2 it is unlikely to be chance. A number "
+    "that is the reference's own to the last digit was taken over, and is not compared."
+)
+_ASSUMED = "An asterisk marks a standard error that the card does not state: 2 % of the value."
+_TRIALS = (
+    "Simulated in calm water from the same approach speed, at the size of the first card's ship. In brackets the "
+    "standard deviation of each figure when the card's coefficients are drawn within their errors; z is the "
+    "difference over the root of both variances."
+)
+
+
+def compare_page(found: CardComparison) -> Page:
+    """The page."""
+    return compared_page(plain_json(found.as_json()))
+
+
+def compared_page(found: Json) -> Page:
+    """The page, from what JSON has of a :class:`CardComparison`."""
+    labels = [one["label"] for one in found["cards"]]
+    sections = [_cards(found["cards"]), _coefficients(found["coefficients"], found.get("effects", []), labels)]
+    sections += [_trial(trial, labels, first=place == 0) for place, trial in enumerate(found["trials"])]
+    if found["notices"]:
+        rows: list[list[Cell]] = [[one] for one in found["notices"]]
+        table = PageTable(caption="What the reader should know.", columns=[Column(title="")], rows=rows)
+        sections.append(PageSection(heading="Notices", tables=[table]))
+    return Page(
+        title=found["cards"][0]["ship"],
+        subtitle=f"Comparison of cards: {', '.join(labels)}",
+        figures=[_figure(one) for one in found["summary"]],
+        sections=sections,
+    )
+
+
+def _figure(one: Mapping[str, Json]) -> KeyFigure:
+    compared, beyond, rms = one["compared"], one["beyond_two_standard_errors"], one["rms_standard_errors"]
+    # One in twenty differs by more by chance alone.
+    verdict = Verdict.PASSED if beyond <= 0.05 * compared + 1 else Verdict.CAUTION
+    note = "no standard errors" if rms is None else f"rms {rms:.3g} standard errors"
+    note += f"; {same} more taken over" if (same := one.get("same_number")) else ""
+    label = f"{one['card']}: coefficients beyond {BEYOND_STANDARD_ERRORS:g}"
+    return KeyFigure(label=label, value=f"{beyond} of {compared}", verdict=verdict, note=note)
+
+
+def _cards(cards: Sequence[Mapping[str, Json]]) -> PageSection:
+    rows: list[list[Cell]] = [
+        [one["label"] + (" (reference)" if place == 0 else ""), one["ship"], one["source"]]
+        for place, one in enumerate(cards)
+    ]
+    columns = [Column(title="card"), Column(title="ship"), Column(title="source")]
+    return PageSection(heading="Cards", tables=[PageTable(caption="What is compared.", columns=columns, rows=rows)])
+
+
+def _coefficients(
+    coefficients: Sequence[Mapping[str, Json]], effects: Sequence[Mapping[str, Json]], labels: Sequence[str]
+) -> PageSection:
+    caption = "Coefficient by coefficient (values and errors times 1000)."
+    tables = [_coefficient_table(caption, coefficients, labels, 1000.0)]
+    if effects:
+        tables.append(_coefficient_table("Parameters of effects, SI.", effects, labels, 1.0))
+    charts, both = [], [*coefficients, *effects]
+    if any(one["standard_errors"] is not None for row in both for one in row["differences"]):
+        caption = f"Lines at {BEYOND_STANDARD_ERRORS:g} standard errors."
+        charts.append(Illustration(chart=_errors_chart(both, labels), caption=caption))
+    return PageSection(heading="Coefficients", text=f"{_COEFFICIENTS}\n\n{_ASSUMED}", tables=tables, charts=charts)
+
+
+def _coefficient_table(
+    caption: str, rows: Sequence[Mapping[str, Json]], labels: Sequence[str], factor: float
+) -> PageTable:
+    columns = [Column(title="coefficient")]
+    for label in labels:
+        columns += [Column(title=label, digits=6), Column(title="s.e.", digits=3)]
+    for label in labels[1:]:
+        columns += [Column(title=f"{label}: difference", unit="%", digits=3), Column(title="z", digits=3)]
+    columns.append(Column(title="remark"))
+    return PageTable(caption=caption, columns=columns, rows=[_coefficient_row(row, factor) for row in rows])
+
+
+def _coefficient_row(row: Mapping[str, Json], factor: float) -> list[Cell]:
+    cells: list[Cell] = [row["name"]]
+    for one in row["cards"]:
+        error = None if one["standard_error"] is None else factor * one["standard_error"]
+        shown: Cell = error if one["stated"] or error is None else f"{error:.3g}*"
+        cells += [None if one["value"] is None else factor * one["value"], shown]
+    for difference in row["differences"]:
+        cells += [difference["percent"], difference["standard_errors"]]
+    return [*cells, "; ".join(dict.fromkeys(one["why"] for one in row["differences"] if one["why"]))]
+
+
+def _errors_chart(coefficients: Sequence[Mapping[str, Json]], labels: Sequence[str]) -> alt.LayerChart:
+    """Differences of all coefficients in standard errors, a row each, a shape and colour for each card."""
+    rows = [
+        {"name": row["name"], "z": difference["standard_errors"], "run": label}
+        for row in coefficients
+        for label, difference in zip(labels[1:], row["differences"], strict=True)
+        if difference["standard_errors"] is not None
+    ]
+    names = list(dict.fromkeys(str(row["name"]) for row in rows))
+    look = series_look(labels[1:], as_points=labels[1:])
+    y = alt.Y("name:N", sort=names, title=None)
+    points = (
+        alt.Chart(data(rows))
+        .mark_point(filled=True, size=60)
+        .encode(
+            x=alt.X("z:Q", title="difference (standard errors)"),
+            y=y,
+            color=look.colour,
+            shape=look.shape,
+            tooltip=[
+                alt.Tooltip("run:N", title="card"),
+                alt.Tooltip("name:N", title="coefficient"),
+                alt.Tooltip("z:Q", title="standard errors", format=NUMBER),
+            ],
+        )
+    )
+    limits = (
+        alt.Chart(data([{"z": -BEYOND_STANDARD_ERRORS}, {"z": BEYOND_STANDARD_ERRORS}]))
+        .mark_rule(style="limit")
+        .encode(x="z:Q")
+    )
+    described = f"Differences of {len(names)} coefficients from {labels[0]} in standard errors."
+    chart: alt.LayerChart = alt.layer(limits, points).properties(
+        title="Differences in standard errors", width=620, height=alt.Step(15), description=described
+    )
+    return chart
+
+
+def _trial(trial: Mapping[str, Json], labels: Sequence[str], *, first: bool) -> PageSection:
+    columns = [Column(title="figure"), Column(title="unit")]
+    columns += [Column(title=label) for label in labels]
+    for label in labels[1:]:
+        columns += [Column(title=f"{label}: difference", digits=3), Column(title="z", digits=3)]
+    rows: list[list[Cell]] = []
+    for name, row in trial["figures"].items():
+        cells: list[Cell] = [*in_words(name)]
+        cells += [_with_error(*pair) for pair in zip(row["values"], row["standard_deviations"], strict=True)]
+        for apart, z in zip(row["differences"], row["differences_standard_errors"], strict=True):
+            cells += [None if apart is None else format_number(apart, 3), z]
+        rows.append(cells)
+    charts: Sequence[Illustration] = ()
+    name = trial["name"]
+    if trial["tracks"]:
+        tracks = [
+            TrackData(label=one["card"], x_m=one["x_m"], y_m=one["y_m"], time_s=one["t_s"]) for one in trial["tracks"]
+        ]
+        charts = [Illustration(chart=track_chart(tracks, title=f"Tracks: {name}"))]
+    table = PageTable(caption=f"Figures of the {name}.", columns=columns, rows=rows)
+    return PageSection(
+        heading=name[:1].upper() + name[1:], text=_TRIALS if first else "", tables=[table], charts=charts
+    )
+
+
+def _with_error(value: float | None, error: float | None) -> str | None:
+    if value is None:
+        return None
+    return format_number(value) if error is None else f"{format_number(value)} ({format_number(error, 2)})"

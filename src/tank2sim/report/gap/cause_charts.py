@@ -1,0 +1,310 @@
+"""Charts of what could explain a gap: the missing force over states, the rivals, what each trial alone would have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import altair as alt
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.gap.outcome.export import estimate_in_file, in_file_units, joined, meant
+from tank2sim.gap.result import Gap, MissingForce, MissingSignal, NextTest
+from tank2sim.records.thinning import thin_points
+from tank2sim.report.gap.charts import SETS, small
+from tank2sim.report.gap.text import as_percent
+from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, extent, plain, series_look, shown_unit, with_unit
+from tank2sim.report.kit.numbers import format_number
+from tank2sim.units import in_words
+
+BINS = 12
+"""Bins over the state that explains the missing force (ours): a rudder's range in steps of about 6 deg."""
+
+FORCE_POINTS = 500
+"""Rows of the missing force that are drawn, of all trials together; all of them make the means."""
+
+MOST_RIVALS = 12
+"""Explanations, and manoeuvres for the next test, that are shown: the best (ours)."""
+
+NORMAL = 1.959964
+"""Half a 95 % interval in standard errors."""
+
+TELLS_LITTLE = 10.0
+"""A trial whose standard error is this many times the smallest tells so little that its bar may leave the picture."""
+
+STATE_UNITS = {"rudder": "rad", "drift": "rad", "yaw rate": "rad/s", "speed": "m/s", "heading": "rad"}
+_STATE_WORDS = {"rudder": "rudder angle", "drift": "drift angle"}
+_FORCES = {"X": ("surge force", "N"), "Y": ("sway force", "N"), "N": ("yaw moment", "N m")}
+_SIGNALS = {
+    "north": ("velocity to north", "m/s"),
+    "east": ("velocity to east", "m/s"),
+    "ahead": ("velocity ahead", "m/s"),
+    "starboard": ("velocity to starboard", "m/s"),
+    "turning": ("turning (rate of heading less yaw rate)", "rad/s"),
+}
+
+Lacking = MissingForce | MissingSignal
+"""What the model lacks, instant by instant."""
+
+_STRIPS = 90
+"""Instants of a trial that are drawn beside each other, each the mean of what it covers."""
+_TURN = 2 * math.pi
+
+
+def _values(lacking: Lacking) -> tuple[Array, str, str]:
+    """What is missing in a reader's unit (n,), its words, and the unit."""
+    if isinstance(lacking, MissingForce):
+        what, unit = _FORCES[lacking.equation]
+        prefix, scale = _prefix(lacking.force)
+        return lacking.force / scale, what, prefix + unit
+    what, own = _SIGNALS[lacking.quantity]
+    if own != "rad/s":
+        return lacking.values, what, own
+    unit, factor = shown_unit(own)
+    return factor * lacking.values, what, unit
+
+
+def lacking_chart(lacking: Lacking, *, title: str = "") -> alt.HConcatChart:
+    """The missing force or signal over the state that explains most of it, and how much of it each state explains.
+
+    Points are single instants of all trials, thinned. Squares are means of bins; their bars are 95 % by the spread
+    between the trials in the bin, for instants of one trial do not err independently.
+    """
+    unit, factor = shown_unit(STATE_UNITS.get(lacking.explaining, "1"))
+    words = _STATE_WORDS.get(lacking.explaining, lacking.explaining)
+    values = lacking.states[lacking.explaining]
+    state = factor * (np.mod(values, _TURN) if lacking.explaining == "heading" else values)
+    every, what, own_unit = _values(lacking)
+    finite = np.flatnonzero(np.isfinite(state) & np.isfinite(every))
+    trials = np.array(lacking.trials)[finite]
+    state, needed = state[finite], every[finite]
+    kept = thin_points([state, needed], FORCE_POINTS)
+    points = [
+        {"s": plain(float(state[row])), "f": plain(float(needed[row])), "trial": str(trials[row])}
+        for row in kept.tolist()
+    ]
+    across, up = with_unit(words, unit), with_unit(f"missing {what}", own_unit)
+    x = alt.X("s:Q", title=across, scale=alt.Scale(zero=False, nice=False, padding=8), axis=alt.Axis(tickCount=6))
+    y = alt.Y("f:Q", title=up, axis=alt.Axis(tickCount=6))
+    tooltip = [
+        alt.Tooltip("trial:N"),
+        alt.Tooltip("s:Q", title=across, format=NUMBER),
+        alt.Tooltip("f:Q", title=up, format=NUMBER),
+    ]
+    cloud = alt.Chart(data(points)).mark_point(style="reference", size=12, opacity=0.45, clip=True)
+    zero = alt.Chart(data([{"f": 0.0}])).mark_rule(style="reference", strokeDash=[4, 3]).encode(y="f:Q")
+    layers = [zero, cloud.encode(x=x, y=y, tooltip=tooltip), *_means(binned(state, needed, trials), across, up)]
+    main = alt.layer(*layers).properties(width=400, height=280)
+    shares = alt.hconcat(main, _explained(lacking), spacing=24)
+    return shares.properties(title=title, description=f"Missing {what} over {words}, and what each state explains.")
+
+
+def when_chart(lacking: Lacking, *, title: str = "") -> alt.LayerChart:
+    """What is missing over time, a strip a trial: the colour is its size to either side."""
+    values, what, unit = _values(lacking)
+    trials = np.array(lacking.trials)
+    rows: list[ChartRecord] = []
+    for trial in dict.fromkeys(lacking.trials):
+        there = np.flatnonzero((trials == trial) & np.isfinite(values))
+        for part in np.array_split(there, min(_STRIPS, len(there))):
+            begin, end = lacking.time_s[part[0]], lacking.time_s[min(part[-1] + 1, there[-1])]
+            rows.append(
+                {"trial": trial, "f": plain(float(values[part].mean()))} | {"t": plain(begin), "to": plain(end)}
+            )
+    largest = float(np.quantile(np.abs([row["f"] or 0.0 for row in rows]), 0.98)) or 1.0 if rows else 1.0
+    up = with_unit(f"missing {what}", unit)
+    scale = alt.Scale(domain=[-largest, 0, largest], range=list(DIVERGING), type="linear", clamp=True)
+    base = alt.Chart(data(rows)).encode(
+        x=alt.X("t:Q", title="time (s)", scale=alt.Scale(nice=False)),
+        x2="to:Q",
+        y=alt.Y("trial:N", sort=list(dict.fromkeys(lacking.trials)), axis=alt.Axis(title=None, labelLimit=220)),
+        color=alt.Color("f:Q", scale=scale, legend=alt.Legend(title=up, gradientLength=180, titleLimit=420)),
+        tooltip=[
+            alt.Tooltip("trial:N"),
+            alt.Tooltip("t:Q", title="from (s)", format=NUMBER),
+            alt.Tooltip("to:Q", title="to (s)", format=NUMBER),
+            alt.Tooltip("f:Q", title=up, format=NUMBER),
+        ],
+    )
+    chart = alt.layer(base.mark_rect()).properties(width=520, height=20 * max(1, len(set(lacking.trials))))
+    return chart.properties(title=title, description=f"Missing {what} over time, by trial.")
+
+
+DIVERGING = ("#D55E00", "#f7f7f7", "#0072B2")
+"""Colours of a size to either side: two of the palette that any eye tells apart."""
+
+
+def binned(state: Array, force: Array, trials: np.ndarray) -> list[ChartRecord]:
+    """Mean of the force (n,) in each of :data:`BINS` equal bins of the state (n,), with its 95 % interval.
+
+    The interval is that of the means of the trials in the bin; None where there is one trial alone.
+    """
+    edges = np.linspace(*extent(state), BINS + 1)
+    place = np.clip(np.digitize(state, edges) - 1, 0, BINS - 1)
+    rows: list[ChartRecord] = []
+    for one in np.unique(place).tolist():
+        inside = place == one
+        own = np.array([force[inside & (trials == trial)].mean() for trial in np.unique(trials[inside])])
+        mean = float(force[inside].mean())
+        half = NORMAL * float(own.std(ddof=1)) / math.sqrt(len(own)) if len(own) > 1 else math.nan
+        rows.append(
+            {"s": plain(float(state[inside].mean())), "f": plain(mean), "trials": len(own)}
+            | {"low": plain(mean - half), "high": plain(mean + half)}
+        )
+    return rows
+
+
+def _means(rows: Sequence[ChartRecord], across: str, up: str) -> list[alt.Chart]:
+    tooltip = [
+        alt.Tooltip("s:Q", title=across, format=NUMBER),
+        alt.Tooltip("f:Q", title=f"mean {up}", format=NUMBER),
+        alt.Tooltip("trials:Q", title="trials in the bin"),
+    ]
+    drawn = [row | {"run": "mean of a bin"} for row in rows]
+    colour = alt.Color("run:N", legend=None)
+    bars = alt.Chart(data([row for row in drawn if row["low"] is not None])).mark_rule(strokeWidth=1.6, clip=True)
+    marks = alt.Chart(data(drawn))
+    return [
+        marks.mark_line(strokeWidth=1.4, clip=True).encode(x="s:Q", y="f:Q", color=colour),
+        bars.encode(x="s:Q", y="low:Q", y2="high:Q", color=colour),
+        marks.mark_point(shape="square", filled=True, size=44).encode(x="s:Q", y="f:Q", color=colour, tooltip=tooltip),
+    ]
+
+
+def _explained(lacking: Lacking) -> alt.LayerChart:
+    rows: list[ChartRecord] = [
+        {"name": _STATE_WORDS.get(name, name), "v": plain(100 * share), "text": f"{100 * share:.0f} %"}
+        for name, share in sorted(lacking.explained.items(), key=lambda item: -item[1])
+    ]
+    return _bars(rows, "share of it that each state explains (%)", width=150, domain=[0, 100])
+
+
+def _bars(
+    rows: Sequence[ChartRecord], across: str, *, width: int, kind: str = "linear", domain: Sequence[float] | None = None
+) -> alt.LayerChart:
+    names = [row["name"] for row in rows]
+    farthest = max((row["v"] for row in rows if row["v"] is not None), default=0.0) or 1.0
+    # Room on the right for the number at the end of the longest bar.
+    ends = list(domain) if domain else [0, farthest * (12 if kind == "symlog" else 1.25)]
+    more = {"constant": 10} if kind == "symlog" else {}
+    x = alt.X("v:Q", title=across, scale=alt.Scale(type=kind, domain=ends, nice=False, **more))
+    ticks = [step for step in (0, 10, 100, 1e3, 1e4, 1e5, 1e6) if step <= ends[1]]
+    x = x.axis(**({"values": ticks} if kind == "symlog" else {"tickCount": 4}))
+    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, labelLimit=260, ticks=False))
+    base = alt.Chart(data(rows)).encode(x=x, y=y)
+    bars = base.mark_bar(height=11, opacity=0.75, clip=True)
+    texts = base.mark_text(align="left", dx=5, fontSize=10.5, style="reference").encode(text="text:N")
+    return alt.layer(bars, texts).properties(width=width, height=22 * max(1, len(rows)))
+
+
+def rival_chart(gap: Gap, *, title: str = "") -> alt.LayerChart | None:
+    """Explanations that were compared, with their loss of score to the best; None without any."""
+    ranked = sorted(gap.rivals, key=lambda one: one.loss)
+    shown, none = ranked[:MOST_RIVALS], [one for one in ranked[MOST_RIVALS:] if not one.effects]
+    if not shown:
+        return None
+    rows: list[ChartRecord] = [
+        {
+            "name": joined(one.effects).replace("_", " ") if one.effects else "none (the card as it is)",
+            "v": plain(one.loss),
+            "text": f"{format_number(one.loss, 3)}  ({as_percent(one.probability)})",
+        }
+        for one in (*shown, *none)
+    ]
+    across = "how much worse than the best explanation (-2 log likelihood, penalised)"
+    kind = "symlog" if max(row["v"] or 0.0 for row in rows) > 100 else "linear"
+    return _bars(rows, across, width=430, kind=kind).properties(
+        title=alt.Title(title, subtitle=_COMPARED),
+        description="Explanations by their loss of score.",
+    )
+
+
+_COMPARED = (
+    "A longer bar explains the data less well; the best has 0. In brackets: probability that the explanation is right "
+    "as a whole, no more and no less being missing. An effect's own probability is the sum over all that contain it."
+)
+
+
+def expected_chart(test: NextTest, *, title: str = "") -> alt.LayerChart | None:
+    """How far apart the explanations would be in each manoeuvre that was considered; None without any."""
+    best = sorted(test.expected.items(), key=lambda item: -item[1])[:MOST_RIVALS]
+    sizes = [(name, math.sqrt(max(score, 0.0))) for name, score in best]  # of a score: a difference in noise units
+    rows: list[ChartRecord] = [{"name": name, "v": plain(size), "text": format_number(size, 2)} for name, size in sizes]
+    if not rows:
+        return None
+    chart = _bars(rows, "expected difference between the explanations (noise units, all readings together)", width=430)
+    return chart.properties(title=title, description="Expected difference in each manoeuvre.")
+
+
+def agreement_chart(gap: Gap, *, title: str = "") -> alt.HConcatChart | None:
+    """What each trial alone would have each parameter of the effect, with 95 % intervals; None without any.
+
+    The grey band is the 95 % interval of all fitting trials together.
+    """
+    panels = [
+        _agreement_panel(gap, variable, trials, named=not place)
+        for place, (variable, trials) in enumerate(one for one in gap.agreement.items() if one[1])
+    ]
+    if not panels:
+        return None
+    chart = alt.hconcat(*panels, spacing=20).resolve_scale(color="shared", shape="shared")
+    return chart.properties(
+        title=title, description="Each trial's own estimate of the parameters, with 95 % intervals."
+    )
+
+
+def _agreement_panel(
+    gap: Gap, variable: str, trials: Mapping[str, tuple[float, float]], *, named: bool
+) -> alt.LayerChart:
+    effect, parameter = meant(variable)
+    words, unit = in_words(in_file_units(parameter, 0.0)[0])
+    whole = next((one for one in gap.effects if one.name == effect and parameter in one.parameters), None)
+    middle = estimate_in_file(parameter, whole.parameters[parameter])[1] if whole else None
+    held = {one.name: one.held_out for one in gap.passed}
+    rows: list[ChartRecord] = []
+    for trial, (value, error) in trials.items():
+        own, half = estimate_in_file(parameter, value)[1], NORMAL * in_file_units(parameter, error)[1]
+        if parameter == "direction_rad" and middle is not None:
+            own += 360.0 * round((middle - own) / 360.0)
+        rows.append(
+            {"name": trial, "run": next(word for word, value in SETS.items() if value == held.get(trial, False))}
+            | {"v": plain(own), "low": plain(own - half), "high": plain(own + half)}
+        )
+    band = NORMAL * in_file_units(parameter, whole.standard_errors.get(parameter, 0.0))[1] if whole else 0.0
+    told = [row for row in rows if row["low"] is not None and row["high"] is not None]
+    least = min((row["high"] - row["low"] for row in told), default=0.0)
+    telling = [row for row in told if row["high"] - row["low"] <= TELLS_LITTLE * least] or told
+    ends = [row[key] for row in telling for key in ("low", "high")]
+    ends += [] if middle is None else [middle - band, middle + band]
+    low, high = extent(np.array(ends, dtype=float))
+    margin = 0.05 * (high - low) or 1.0
+    scale = alt.Scale(domain=[low - margin, high + margin], nice=False, zero=False)
+    x = alt.X("v:Q", title=with_unit(words, unit), scale=scale, axis=alt.Axis(tickCount=5))
+    side = {} if named else {"labels": False, "ticks": False}
+    names = [one.name for one in gap.passed if one.name in trials]
+    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, grid=True, labelLimit=220, **side))
+    look = series_look(list(SETS), as_points=list(SETS))
+    tooltip = [
+        alt.Tooltip("name:N", title="trial"),
+        *(alt.Tooltip(f"{key}:Q", format=NUMBER) for key in ("v", "low", "high")),
+    ]
+    base = alt.Chart(data(rows)).encode(y=y, color=look.colour, tooltip=tooltip)
+    layers = [
+        base.mark_rule(strokeWidth=1.6, clip=True).encode(x=alt.X("low:Q", scale=scale), x2="high:Q"),
+        base.mark_point(size=36, clip=True).encode(x=x, shape=look.shape),
+    ]
+    if middle is not None:
+        span = {"low": plain(middle - band), "high": plain(middle + band), "v": plain(middle)}
+        one = alt.Chart(data([span]))
+        shade = one.mark_rect(style="reference", opacity=0.25).encode(x=alt.X("low:Q", scale=scale), x2="high:Q")
+        layers = [shade, one.mark_rule(style="reference").encode(x=alt.X("v:Q", scale=scale)), *layers]
+    title = small(f"{effect.replace('_', ' ')}: {words}")
+    return alt.layer(*layers).properties(title=title, width=230, height=22 * len(names))
+
+
+def _prefix(values: Array) -> tuple[str, float]:
+    """Prefix of a force's unit, and what a force in N is divided by."""
+    low, high = extent(values)
+    largest = max(abs(low), abs(high))
+    return next(((word, size) for word, size in (("G", 1e9), ("M", 1e6), ("k", 1e3)) if largest >= size), ("", 1.0))

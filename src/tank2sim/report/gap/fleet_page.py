@@ -1,0 +1,139 @@
+"""The page of a fleet: all ships in one table, each with the way to her own page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import altair as alt
+
+from tank2sim.gap.fleet.summary import REPORT_FILE, FleetTold, ShipTold
+from tank2sim.gap.result import AMBIGUOUS, GAP_VERDICTS, MISSING
+from tank2sim.report.gap.text import effect_in_words, parameter_in_words, with_error
+from tank2sim.report.kit.chart_parts import NUMBER, data, series_look
+from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Link, Page, PageSection, PageTable, Verdict
+
+_SHIPS = (
+    "Misfit is the root mean square of simulated less measured, in standard deviations of the measurement noise: 1 is "
+    "the noise floor. It is that of the trials held out, which took no part in naming the effect, or of the fitted "
+    "ones where none was held out. Before is the card as given, after the one with what was found."
+)
+_CHART = "The line is the noise; the scale is logarithmic. Where nothing was added, one point lies upon the other."
+_BEFORE, _AFTER = "card as given", "card found"
+
+
+def fleet_page(told: FleetTold) -> Page:
+    """The page; it stands in the folder in which each ship has one of her own."""
+    found = [one for one in told.ships if not one.fault]
+    sections = []
+    if found:
+        chart = _misfit_chart(found)
+        charts = [Illustration(chart=chart, caption=_CHART)]
+        sections.append(
+            PageSection(
+                heading="Ships", text=_SHIPS, tables=[_ships(found)], charts=charts if chart is not None else []
+            )
+        )
+    if told.faults:
+        rows: list[list[Cell]] = [[one.folder, one.fault] for one in told.faults]
+        columns = [Column(title="ship"), Column(title="why")]
+        table = PageTable(caption="Ships that could not be judged", columns=columns, rows=rows)
+        sections.append(PageSection(heading="Without a result", tables=[table]))
+    if told.notices:
+        sections.append(PageSection(heading="Notices", notes=told.notices))
+    return Page(
+        title=f"Fleet: {told.name}",
+        subtitle=f"What the models of {len(told.ships)} ships lack",
+        figures=_figures(told),
+        sections=sections,
+    )
+
+
+def _figures(told: FleetTold) -> list[KeyFigure]:
+    counts = told.verdicts
+    figures = [KeyFigure(label="Ships", value=str(len(told.ships)))]
+    figures += [
+        KeyFigure(label=f"{word[0].upper()}{word[1:]}", value=str(counts[word]))
+        for word in GAP_VERDICTS
+        if word in counts
+    ]
+    if told.faults:
+        figures.append(KeyFigure(label="Without a result", value=str(len(told.faults)), verdict=Verdict.FAILED))
+    return figures
+
+
+def _ships(found: list[ShipTold]) -> PageTable:
+    rows: list[list[Cell]] = [
+        [
+            Link(text=one.folder, path=f"{one.folder}/{REPORT_FILE}"),
+            one.name,
+            one.verdict,
+            _effects(one),
+            *map(_hundredths, one.misfits()),
+            "held out" if one.judged_by == "holdout" else "fitted",
+        ]
+        for one in found
+    ]
+    heads = ("ship", "name", "verdict", "what is missing", "misfit before", "misfit after", "of trials")
+    # Misfits are rounded to hundredths: nothing more is cut off.
+    return PageTable(caption="What was found", columns=[Column(title=head, digits=7) for head in heads], rows=rows)
+
+
+def _effects(ship: ShipTold) -> str:
+    """Effects with their parameters, ± one standard error; or all that it may be."""
+    named = "; ".join(_effect(one) for one in ship.effects)
+    if ship.verdict == AMBIGUOUS:
+        return " or ".join([named, *(effect_in_words(one) for one in ship.alternatives)])
+    return named if ship.verdict == MISSING else ""
+
+
+def _effect(one: Mapping[str, Any]) -> str:
+    values = []
+    for own, value in one["parameters"].items():
+        words, unit = parameter_in_words(one["name"], own)
+        error = one["standard_errors"].get(own)
+        shown = "?" if value is None else with_error(value, math.nan if error is None else error)
+        values.append(f"{words} {shown}{f' {unit}' if unit else ''}")
+    return f"{effect_in_words(one['name'])} ({', '.join(values)})" if values else effect_in_words(one["name"])
+
+
+def _hundredths(misfit: float | None) -> float | None:
+    return None if misfit is None else round(misfit, 2)
+
+
+def _misfit_chart(found: list[ShipTold]) -> alt.LayerChart | None:
+    """Misfit of each ship before and after, a row each; None where no simulation came to its end."""
+    rows = [
+        {"ship": one.folder, "run": label, "misfit": _hundredths(misfit)}
+        for one in found
+        for label, misfit in zip((_BEFORE, _AFTER), one.misfits(), strict=True)
+        if misfit
+    ]
+    if not rows:
+        return None
+    look = series_look([_BEFORE, _AFTER], as_points=[_BEFORE, _AFTER])
+    y = alt.Y("ship:N", sort=[one.folder for one in found], title=None)
+    points = (
+        alt.Chart(data(rows))
+        .mark_point(filled=True, size=70)
+        .encode(
+            x=alt.X("misfit:Q", title="misfit (standard deviations of the noise)", scale=alt.Scale(type="log")),
+            y=y,
+            color=look.colour,
+            shape=look.shape,
+            tooltip=[
+                alt.Tooltip("ship:N", title="ship"),
+                alt.Tooltip("run:N", title="model"),
+                alt.Tooltip("misfit:Q", title="misfit", format=NUMBER),
+            ],
+        )
+    )
+    noise = alt.Chart(data([{"misfit": 1.0}])).mark_rule(style="limit").encode(x="misfit:Q")
+    chart: alt.LayerChart = alt.layer(noise, points).properties(
+        title="Misfit before and after",
+        width=620,
+        height=alt.Step(22),
+        description=f"Misfit of {len(found)} ships by the cards as given and by those found.",
+    )
+    return chart

@@ -1,0 +1,397 @@
+"""Charts of an identification from trials: tracks and histories beside simulations, errors, parameters, figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import altair as alt
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.identification.trials.assessment.evaluation import FigureComparison, Following, Passage
+from tank2sim.records.thinning import Indices, thin_points
+from tank2sim.report.kit.before_after import before_after_switch, switch
+from tank2sim.report.kit.chart_parts import (
+    NUMBER,
+    ChartRecord,
+    Position,
+    axis_above,
+    data,
+    equal_frame,
+    extent,
+    plain,
+    records,
+    series_look,
+    shown_unit,
+    with_unit,
+)
+
+MEASURED, BEFORE, AFTER = "measured", "card before", "card found"
+
+MODEL_SERIES = {"before": BEFORE, "after": AFTER}
+"""Word of the switch to the series that it shows."""
+
+PANELS_PER_ROW = 3
+"""Trials beside each other in a picture."""
+
+MODEL_SAMPLES, MEASURED_SAMPLES = 140, 40
+"""Samples of a line, and points of a series, in a small panel (about 200 px wide)."""
+
+_SIGNALS = {
+    "rudder": ("rudder", "rad"),
+    "motion.psi": ("heading", "rad"),
+    "motion.r": ("yaw rate", "rad/s"),
+    "motion.speed": ("speed", "m/s"),
+    "motion.beta": ("drift angle", "rad"),
+}
+"""Signal of a passage that is shown over time, to its words and unit."""
+
+SYMBOLS = {
+    "motion.u": ("u", "m/s"),
+    "motion.v": ("v", "m/s"),
+    "motion.u_ground": ("u ground", "m/s"),
+    "motion.v_ground": ("v ground", "m/s"),
+    "motion.sog": ("speed", "m/s"),
+    "motion.r": ("r", "rad/s"),
+    "motion.psi": ("ψ", "rad"),
+    "motion.phi": ("φ", "rad"),
+    "motion.x": ("x", "m"),
+    "motion.y": ("y", "m"),
+}
+
+_LOOK = series_look([AFTER, BEFORE, MEASURED], as_points=[MEASURED])
+_POINT_LOOK = {"color": _LOOK.colour.to_dict(), "shape": _LOOK.shape.to_dict()}
+_LINE_LOOK = {"color": _LOOK.colour.to_dict(), "strokeDash": _LOOK.dash.to_dict()}
+_SHARED = {"color": "shared", "strokeDash": "shared", "shape": "shared"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class BeforeAfter:
+    """One trial beside the card before, and beside the card found."""
+
+    before: Passage
+    after: Passage
+
+    @property
+    def name(self) -> str:
+        """Of the trial."""
+        return self.after.name
+
+
+def track_grid(pairs: Sequence[BeforeAfter], *, title: str = "") -> alt.ConcatChart | None:
+    """Tracks, a panel a trial, x north up and y east to the right in one scale; measured as points, models as lines.
+
+    The scale is that of what was measured and of the card found: the card before may leave the panel. None where no
+    trial has a track.
+    """
+    panels, rows_of = [], {}
+    for pair in pairs:
+        series = {
+            label: columns
+            for label, columns in _series(pair, ("motion.x", "motion.y")).items()
+            if {"motion.x", "motion.y"} <= set(columns)
+        }
+        if not series:
+            continue
+        shown = [columns for label, columns in series.items() if label != BEFORE] or list(series.values())
+        north, east = (np.concatenate([columns[name] for columns in shown]) for name in ("motion.x", "motion.y"))
+        frame = equal_frame(east, north, width_px=205, height_px=260)
+        position = frame.axes(across=("y:Q", "east y (m)"), up=("x:Q", "north x (m)"))
+        narrow = alt.Axis(tickCount=max(2, frame.width_px // 70), labelOverlap="greedy", labelSeparation=6)
+        position["x"] = position["x"].axis(narrow)
+        rows: list[ChartRecord] = []
+        for label, columns in series.items():
+            kept = _thinned(label, [columns["motion.x"], columns["motion.y"]])
+            rows += records(label, {"x": columns["motion.x"][kept], "y": columns["motion.y"][kept]})
+        tooltip = [
+            alt.Tooltip("x:Q", title="north (m)", format=NUMBER),
+            alt.Tooltip("y:Q", title="east (m)", format=NUMBER),
+        ]
+        rows_of[pair.name] = rows
+        layers = alt.layer(*_marks(position, tooltip), data=alt.NamedData(pair.name))
+        panels.append(layers.properties(title=_small(pair.name), width=frame.width_px, height=frame.height_px))
+    if not panels:
+        return None
+    told = f"Tracks of {', '.join(rows_of)}, measured and simulated; north is up."
+    slender = all(panel.width <= 110 for panel in panels)
+    chart = _grid(panels, title, told, columns=PANELS_PER_ROW + slender).properties(usermeta={"equal_scales": True})
+    return _with_rows(chart, rows_of)
+
+
+def history_grid(
+    pairs: Sequence[BeforeAfter], *, signals: Mapping[str, tuple[str, str]] = _SIGNALS, title: str = ""
+) -> alt.ConcatChart:
+    """Signals over time, a column of panels a trial; `signals` as :data:`_SIGNALS` has them, angles in degrees."""
+    made = {pair.name: _histories(pair, signals) for pair in pairs}
+    told = f"Time histories of {', '.join(made)}, measured and simulated."
+    chart = _grid([panels for panels, _ in made.values()], title, told)
+    return _with_rows(chart, {name: rows for name, (_, rows) in made.items()})
+
+
+def _histories(pair: BeforeAfter, signals: Mapping[str, tuple[str, str]]) -> tuple[alt.VConcatChart, list[ChartRecord]]:
+    series = _series(pair, tuple(signals))
+    names = [name for name in signals if any(name in columns for columns in series.values())]
+    fields = {name: f"s{place}" for place, name in enumerate(signals)}
+    rows: list[ChartRecord] = []
+    for label, columns in series.items():
+        factors = {name: shown_unit(signals[name][1])[1] for name in names if name in columns}
+        kept = _thinned(label, [columns[name] for name in factors])
+        values = {fields[name]: factor * columns[name][kept] for name, factor in factors.items()}
+        rows += records(label, {"t": columns["time"][kept], **values})
+    times = extent(np.concatenate([columns["time"] for columns in series.values()]))
+    scale = alt.Scale(domain=list(times), nice=False, zero=False)
+    panels = []
+    for name in names:
+        words, unit = signals[name]
+        up, last = with_unit(words, shown_unit(unit)[0]), name == names[-1]
+        axis = alt.Axis(title="time (s)", tickCount=4) if last else alt.Axis(title=None, labels=False, ticks=False)
+        position: Position = {
+            "x": alt.X("t:Q", scale=scale, axis=axis),
+            "y": alt.Y(f"{fields[name]}:Q", scale=_whole(rows, fields[name]), axis=axis_above(up, tickCount=3)),
+        }
+        tooltip = [
+            alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
+            alt.Tooltip(f"{fields[name]}:Q", title=up, format=NUMBER),
+        ]
+        panels.append(alt.layer(*_marks(position, tooltip)).properties(width=200, height=66))
+    chart = alt.vconcat(*panels, data=alt.NamedData(pair.name), spacing=12).resolve_scale(x="shared", **_SHARED)
+    return chart.properties(title=_small(pair.name)), rows
+
+
+def _whole(rows: Sequence[ChartRecord], field: str) -> alt.Scale:
+    # Told, that it stays when the switch takes a line away.
+    values = np.array([row[field] for row in rows if row.get(field) is not None], dtype=float)
+    return alt.Scale(domain=list(extent(values)), nice=True, zero=False)
+
+
+def window_chart(
+    sets: Mapping[str, tuple[Sequence[Following], Sequence[Following]]], *, title: str = ""
+) -> alt.VConcatChart:
+    """Error over windows of each signal in each trial, as a share of the signal, as a heat map.
+
+    Parameters
+    ----------
+    sets : mapping
+        ``fitted`` and ``held out`` to how the card before and the card found follow their trials.
+    title : str
+        Of the chart.
+    """
+    every = [one for pair in sets.values() for results in pair for one in results]
+    signals = [SYMBOLS[name][0] for name in SYMBOLS if any(name in one.windows for one in every)]
+    rows = []
+    for word, pair in sets.items():
+        maps = [
+            _window_map(results, signals, f"{words} · {word}", named=words == BEFORE)
+            for words, results in zip((BEFORE, AFTER), pair, strict=True)
+        ]
+        rows.append(alt.hconcat(*maps, spacing=16))
+    return alt.vconcat(*rows, spacing=18).properties(
+        title=alt.Title(title, subtitle="Number and colour: root mean square error as a share of the signal, %."),
+        description="Errors over windows by trial and signal, of the card before and the card found.",
+    )
+
+
+def _window_map(results: Sequence[Following], signals: Sequence[str], title: str, *, named: bool) -> alt.LayerChart:
+    rows = []
+    for one in results:
+        for name, (error, _) in one.windows.items():
+            symbol, unit = SYMBOLS.get(name, (name, "1"))
+            shown, factor = shown_unit(unit)
+            share = 100 * one.relative(name)
+            rows.append(
+                {"trial": one.name, "signal": symbol, "share": plain(share), "text": _in_three(share)}
+                | {"error": f"{factor * error:.3g} {shown}".strip()}
+            )
+    side = alt.Axis(title=None, labelLimit=230) if named else alt.Axis(title=None, labels=False, ticks=False)
+    y = alt.Y("trial:N", sort=[one.name for one in results], axis=side)
+    x = alt.X("signal:N", sort=list(signals), scale=alt.Scale(domain=list(signals)))
+    x = x.axis(title="signal", orient="bottom", labelAngle=0)
+    colours = alt.Scale(type="log", domain=[1, 100], scheme="blues", clamp=True)
+    legend = alt.Legend(gradientLength=180)  # of all maps alike, which makes it one
+    tooltip = [
+        alt.Tooltip("trial:N"),
+        alt.Tooltip("signal:N"),
+        alt.Tooltip("text:N", title="share (%)"),
+        alt.Tooltip("error:N", title="rms error"),
+    ]
+    base = alt.Chart(data(rows)).encode(x=x, y=y, tooltip=tooltip)
+    cells = base.mark_rect().encode(color=alt.Color("share:Q", scale=colours, legend=legend))
+    ink = alt.condition("datum.share > 18", alt.value("white"), alt.value("black"))  # on the cell, whatever the page
+    numbers = base.mark_text(fontSize=10.5).encode(text="text:N", color=ink)
+    size = {"width": 38 * len(signals), "height": 21 * len(results)}
+    return alt.layer(cells, numbers).properties(title=_small(title), **size)
+
+
+def figure_chart(
+    sets: Mapping[str, tuple[Sequence[FigureComparison], Sequence[FigureComparison]]], *, title: str = ""
+) -> alt.VConcatChart | None:
+    """Figures of turns and zigzags, predicted against measured, and their errors; None if there is no figure.
+
+    Parameters
+    ----------
+    sets : mapping
+        ``fitted`` and ``held out`` to the figures by the card before, and by the card found.
+    title : str
+        Of the chart.
+    """
+    panels = []
+    for ending, words, unit, error_unit in (("_deg", "overshoot", "deg", "deg"), ("_m", "distance", "m", "%")):
+        rows = list(_figure_rows(sets, ending))
+        if rows:
+            panels.append(_figure_panels(rows, words, unit, error_unit))
+    if not panels:
+        return None
+    return alt.vconcat(*panels, spacing=26).properties(
+        title=title, description="Figures of turns and zigzags predicted against measured, and their errors."
+    )
+
+
+def _figure_rows(
+    sets: Mapping[str, tuple[Sequence[FigureComparison], Sequence[FigureComparison]]], ending: str
+) -> Iterable[ChartRecord]:
+    for word, pair in sets.items():
+        for label, figures in zip((BEFORE, AFTER), pair, strict=True):
+            for one in figures:
+                if one.name.endswith(ending):
+                    yield {"run": label, "set": word} | _figure_row(one, ending)
+
+
+def _figure_row(one: FigureComparison, ending: str) -> ChartRecord:
+    predicted = math.nan if one.predicted is None else one.predicted
+    low, high = one.interval or (predicted, predicted)
+
+    def error(value: float) -> float | None:
+        difference = value - one.measured
+        return plain(100 * difference / one.measured if ending == "_m" else difference)
+
+    return {
+        "name": f"{one.trial} · {one.name.removesuffix(ending).replace('_', ' ')}",
+        "measured": plain(one.measured),
+        "predicted": plain(predicted),
+        "low": plain(low),
+        "high": plain(high),
+        "error": error(predicted),
+        "least": error(low),
+        "most": error(high),
+    }
+
+
+def _figure_panels(rows: list[ChartRecord], words: str, unit: str, error_unit: str) -> alt.HConcatChart:
+    look = series_look([AFTER, BEFORE], as_points=[AFTER, BEFORE])
+    reached = [row for row in rows if row["predicted"] is not None]
+    ends = extent(np.array([row[key] for row in reached or rows for key in ("measured", "low", "high")], dtype=float))
+    scale = alt.Scale(domain=[min(0.0, ends[0]), 1.05 * ends[1]], nice=False)
+    tooltip = [
+        alt.Tooltip("name:N", title="figure"),
+        alt.Tooltip("set:N", title="trial is"),
+        alt.Tooltip("run:N", title="by"),
+        alt.Tooltip("measured:Q", title=f"measured ({unit})", format=NUMBER),
+        alt.Tooltip("predicted:Q", title=f"predicted ({unit})", format=NUMBER),
+        alt.Tooltip("error:Q", title=f"error ({error_unit})", format=NUMBER),
+    ]
+    line = alt.Chart(data([{"a": value, "b": value} for value in scale.domain]))
+    equal = line.mark_line(style="reference", strokeWidth=1).encode(
+        x=alt.X("a:Q", scale=scale, title=f"measured {words} ({unit})", axis=alt.Axis(tickCount=5)),
+        y=alt.Y("b:Q", scale=scale, title=f"predicted {words} ({unit})", axis=alt.Axis(tickCount=5)),
+    )
+    base = alt.Chart(data(reached)).encode(color=look.colour, shape=look.shape, tooltip=tooltip)
+    bars = alt.Chart(data(reached)).mark_rule(strokeWidth=1.2, clip=True).encode(color=look.colour)
+    points = base.mark_point(filled=False, size=46).encode(
+        x=alt.X("measured:Q", scale=scale), y=alt.Y("predicted:Q", scale=scale)
+    )
+    names = list(dict.fromkeys(row["name"] for row in rows))
+    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, grid=True, labelLimit=300))
+    errors = base.mark_point(filled=False, size=46).encode(
+        x=alt.X(
+            "error:Q",
+            title=f"predicted less measured ({error_unit})",
+            scale=alt.Scale(padding=10),
+            axis=alt.Axis(tickCount=6),
+        ),
+        y=y,
+    )
+    zero = alt.Chart(data([{"error": 0.0}])).mark_rule(style="reference").encode(x="error:Q")
+    return alt.hconcat(
+        alt.layer(equal, bars.encode(x="measured:Q", y="low:Q", y2="high:Q"), points).properties(width=210, height=210),
+        alt.layer(zero, bars.encode(x="least:Q", x2="most:Q", y=y), errors).properties(
+            width=220, height=max(210, 19 * len(names))
+        ),
+        spacing=18,
+    ).resolve_scale(**_SHARED)
+
+
+def _series(pair: BeforeAfter, names: Sequence[str]) -> dict[str, dict[str, Array]]:
+    """Label to time and those of the signals that it has; what ran away is left out.
+
+    Of what was measured the part that was simulated: after a turn, a model or ship may have sailed on for long.
+    """
+    sources = {
+        MEASURED: (pair.after.time_s, pair.after.measured),
+        BEFORE: (pair.before.model_time_s, pair.before.simulated),
+        AFTER: (pair.after.model_time_s, pair.after.simulated),
+    }
+    series = {}
+    for label, (time, columns) in sources.items():
+        there = {name: columns[name] for name in names if name in columns}
+        if label == MEASURED and there:
+            inside = _simulated_part(pair, time)
+            series[label] = {name: values[inside] for name, values in {"time": time, **there}.items()}
+        elif there:
+            series[label] = {"time": time, **there}
+    return series
+
+
+def _simulated_part(pair: BeforeAfter, time: Array) -> slice:
+    ends = [one.model_time_s[[0, -1]] for one in (pair.after, pair.before) if len(one.model_time_s)]
+    if not ends:
+        return slice(None)
+    first, last = np.searchsorted(time, [min(end[0] for end in ends), max(end[1] for end in ends)])
+    return slice(max(int(first) - 1, 0), int(last) + 1)
+
+
+def _thinned(label: str, columns: Sequence[Array]) -> Indices:
+    # Several signals stand on one set of samples: evenly spread ones, and the extremes of each.
+    return thin_points(columns, MEASURED_SAMPLES if label == MEASURED else MODEL_SAMPLES)
+
+
+def _marks(position: Position, tooltip: Sequence[alt.Tooltip]) -> list[alt.Chart]:
+    # The data stand once for all panels of a trial: what is a line and what a point is told by the series. Encodings
+    # are handed over as dictionaries: Altair copies its own objects, with all they leave open, at every level.
+    place = {name: channel.to_dict() for name, channel in position.items()}
+    told = [one.to_dict() for one in tooltip]
+    points = place | _POINT_LOOK | {"tooltip": told}
+    lines = place | _LINE_LOOK | {"order": {"field": "i", "type": "quantitative"}}
+    return [_drawn("point", "==", points, size=14, strokeWidth=1), _drawn("line", "!=", lines, strokeWidth=1.5)]
+
+
+def _drawn(kind: str, sign: str, encoding: ChartRecord, **mark: float) -> alt.Chart:
+    return alt.Chart(
+        mark={"type": kind, "clip": True, **mark},
+        encoding=alt.FacetedEncoding(**encoding),
+        transform=[{"filter": f"datum.run {sign} '{MEASURED}'"}, {"filter": before_after_switch(MODEL_SERIES)}],
+    )
+
+
+def _grid(
+    panels: Sequence[alt.LayerChart | alt.VConcatChart], title: str, told: str, columns: int = PANELS_PER_ROW
+) -> alt.ConcatChart:
+    chart = alt.concat(*panels, columns=columns, spacing=26, params=switch(list(MODEL_SERIES))).resolve_scale(**_SHARED)
+    return chart.properties(title=title, description=told)
+
+
+def _with_rows(chart: alt.ConcatChart, rows: Mapping[str, list[ChartRecord]]) -> alt.ConcatChart:
+    # Data by name, put in at last: Altair copies those that stand in a panel whenever the panel is put into another.
+    chart["datasets"] = dict(rows)
+    return chart
+
+
+def _small(text: str) -> alt.Title:
+    return alt.Title(text, fontSize=11, offset=22, limit=240)
+
+
+def _in_three(percent: float) -> str:
+    if not math.isfinite(percent):
+        return "∞"
+    return f"{percent:.0f}" if percent >= 10 else f"{percent:.1f}"

@@ -1,0 +1,186 @@
+"""Charts of influence coefficients: K % by exact slopes beside the 10 % difference, variances, and tuning."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import altair as alt
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, plain, series_look
+from tank2sim.report.kit.json_values import Json
+
+EXACT, DIFFERENCE = "exact slope", "10 % difference"
+
+_MOST_ROWS = 24
+"""Parameters in a chart: those that move some figure most. The table has all."""
+
+PANELS = 4
+"""Figures side by side in one chart: as many as leave their bars readable on a sheet of paper."""
+
+_WIDTH = 600
+
+
+@dataclass(frozen=True, eq=False)
+class InfluenceData:
+    """What is drawn of a result: names of the figures (nf,) and of the parameters (k,), and K % by exact slopes and by
+    the 10 % difference and shares of the variance, (nf, k); nan where there is none."""
+
+    figures: tuple[str, ...]
+    names: tuple[str, ...]
+    exact: Array
+    difference: Array
+    shares: Array
+
+    @staticmethod
+    def of(found: Json) -> InfluenceData:
+        """From what JSON has of a :class:`tank2sim.analysis.influence.card_influence.CardInfluence`."""
+        figures, parameters = found["influence_percent"], found["parameters"]
+
+        def table(values: Mapping[str, Mapping[str, Json]]) -> Array:
+            return np.array([[row.get(key) for key in parameters] for row in values.values()], dtype=float)
+
+        def part(name: str) -> Array:
+            return table({text: {key: one[name] for key, one in row.items()} for text, row in figures.items()})
+
+        shares = table({text: found["figures"][text]["share_of_variance"] for text in figures})
+        names = tuple(short_name(key, one) for key, one in parameters.items())
+        return InfluenceData(tuple(figures), names, part("exact"), part("difference"), shares)
+
+
+def short_name(key: str, parameter: Mapping[str, Json]) -> str:
+    """Name of a parameter as a chart has it."""
+    return str(parameter.get("name") or key.removeprefix("derivatives."))
+
+
+def most_influential(result: InfluenceData, limit: int = _MOST_ROWS) -> list[int]:
+    """Places of the parameters with the largest K % on any figure, each figure measured by its own largest."""
+    sizes = np.nan_to_num(np.abs(result.exact))
+    largest = sizes.max(axis=1, keepdims=True)
+    relative = np.divide(sizes, largest, out=np.zeros_like(sizes), where=largest > 0).max(axis=0)
+    order = [int(place) for place in np.argsort(-relative, kind="stable") if relative[place] > 1e-6]
+    return order[:limit]
+
+
+def influence_charts(result: InfluenceData) -> list[alt.HConcatChart]:
+    """K % of the most influential parameters: bars by exact slopes, points by the 10 % difference; figures beside
+    each other, :data:`PANELS` to a chart."""
+    order = most_influential(result)
+    return [_bars(result, order, rows) for rows in figure_groups(len(result.figures), PANELS)]
+
+
+def figure_groups(count: int, most: int) -> list[range]:
+    """Places of `count` figures in groups of `most` at most, as even as it goes."""
+    each = -(-count // -(-count // most))
+    return [range(first, min(first + each, count)) for first in range(0, count, each)]
+
+
+def _bars(result: InfluenceData, order: Sequence[int], rows: Sequence[int]) -> alt.HConcatChart:
+    names = [result.names[place] for place in order]
+    panels = [_panel(result, order, names, row, first=row == rows[0], width=_WIDTH // len(rows)) for row in rows]
+    shown = ", ".join(result.figures[row] for row in rows)
+    return alt.hconcat(*panels, spacing=12).properties(
+        title=f"Influence on {shown}",
+        description=f"K per cent of {len(names)} parameters on {shown}, by exact slopes and by a 10 % difference.",
+    )
+
+
+def _panel(
+    result: InfluenceData, order: Sequence[int], names: list[str], row: int, *, first: bool, width: int
+) -> alt.LayerChart:
+    exact, difference = result.exact[row], result.difference[row]
+    bars = [_record(result, place, EXACT, exact[place], difference[place]) for place in order]
+    points = [record | {"run": DIFFERENCE, "k": record["step"]} for record in bars if record["step"] is not None]
+    look = series_look([EXACT, DIFFERENCE], as_points=[EXACT, DIFFERENCE])
+    axis = alt.Axis(title=None, grid=True, labelLimit=170) if first else alt.Axis(title=None, labels=False, ticks=False)
+    y = alt.Y("name:N", sort=names, scale=alt.Scale(domain=names), axis=axis)
+    x = alt.X("k:Q", title="K (%)", axis=alt.Axis(tickCount=4))
+    tooltip = [
+        alt.Tooltip("name:N", title="parameter"),
+        alt.Tooltip("exact:Q", title=f"K, {EXACT} (%)", format=NUMBER),
+        alt.Tooltip("step:Q", title=f"K, {DIFFERENCE} (%)", format=NUMBER),
+    ]
+    zero = alt.Chart(data([{"k": 0.0}])).mark_rule(style="reference").encode(x=x)
+    drawn = alt.Chart(data(bars)).mark_bar(height=9, opacity=0.65).encode(x=x, y=y, color=look.colour, tooltip=tooltip)
+    marks = alt.Chart(data(points)).mark_point(size=34, strokeWidth=1.6)
+    marked = marks.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
+    return alt.layer(drawn, zero, marked).properties(
+        width=width, height=19 * len(names), title=alt.Title(result.figures[row], fontSize=12, anchor="middle")
+    )
+
+
+def _record(result: InfluenceData, place: int, run: str, exact: float, difference: float) -> ChartRecord:
+    return {
+        "run": run,
+        "name": result.names[place],
+        "k": plain(exact) if math.isfinite(exact) else None,
+        "exact": plain(exact),
+        "step": plain(difference),
+    }
+
+
+def variance_chart(result: InfluenceData) -> alt.Chart:
+    """Share of each parameter in the variance of each figure, as a heat map of those with 1 % of any."""
+    shares = 100 * result.shares
+    order = [int(k) for k in np.argsort(-shares.max(axis=0), kind="stable") if shares[:, k].max() >= 1][:_MOST_ROWS]
+    names = [result.names[place] for place in order]
+    figures = list(result.figures)
+    rows: list[ChartRecord] = [
+        {"figure": figures[row], "name": result.names[place], "share": plain(float(shares[row, place]))}
+        for row in range(len(figures))
+        for place in order
+    ]
+    tooltip = [
+        alt.Tooltip("figure:N"),
+        alt.Tooltip("name:N", title="parameter"),
+        alt.Tooltip("share:Q", title="share (%)", format=".1f"),
+    ]
+    axis = alt.Axis(title=None, labelLimit=200, ticks=False)
+    scale = alt.Scale(domain=[0, max(10.0, float(shares.max(initial=0.0)))], scheme="blues")
+    return (
+        alt.Chart(data(rows))
+        .mark_rect()
+        .encode(
+            x=alt.X("name:N", sort=names, axis=alt.Axis(title=None, labelAngle=-60, ticks=False)),
+            y=alt.Y("figure:N", sort=figures, axis=axis),
+            color=alt.Color("share:Q", scale=scale, legend=alt.Legend(title="share of the variance (%)")),
+            tooltip=tooltip,
+        )
+        .properties(
+            width=_WIDTH,
+            height=28 * len(figures),
+            title="Which standard errors make those of the figures",
+            description=f"Shares of {len(names)} parameters in the variances of {len(figures)} figures.",
+        )
+    )
+
+
+def moves_chart(tuned: Json, names: Mapping[str, str]) -> alt.LayerChart:
+    """What tuning changed, in standard errors of the card, with the bounds; `names` are those of the keys."""
+    moves = {key: one for key, one in tuned["parameters"].items() if one["standard_errors"] is not None}
+    rows: list[ChartRecord] = [
+        {"name": names.get(key, key), "z": plain(one["standard_errors"])}
+        | {"before": plain(one["before"]), "after": plain(one["after"])}
+        for key, one in list(moves.items())[:_MOST_ROWS]
+    ]
+    shown = [row["name"] for row in rows]
+    x = alt.X("z:Q", title="move (standard errors of the card)")
+    y = alt.Y("name:N", sort=shown, axis=alt.Axis(title=None, grid=True, labelLimit=170))
+    tooltip = [
+        alt.Tooltip("name:N", title="parameter"),
+        *(alt.Tooltip(f"{key}:Q", title=key, format=".6~g") for key in ("before", "after")),
+        alt.Tooltip("z:Q", title="standard errors", format=".3f"),
+    ]
+    within = tuned["within_standard_errors"]
+    bounds = alt.Chart(data([{"z": -within}, {"z": within}])).mark_rule(style="limit", strokeDash=[5, 3]).encode(x=x)
+    zero = alt.Chart(data([{"z": 0.0}])).mark_rule(style="reference").encode(x=x)
+    bars = alt.Chart(data(rows)).mark_bar(height=10, opacity=0.75).encode(x=x, y=y, tooltip=tooltip)
+    return alt.layer(bars, zero, bounds).properties(
+        width=_WIDTH,
+        height=max(60, 20 * len(shown)),
+        title="What tuning changed",
+        description=f"Moves of {len(shown)} parameters in standard errors; the bounds are at {within:g}.",
+    )

@@ -1,0 +1,213 @@
+"""The page of influence coefficients: what each number on a card does to the ship's figures, and what tuning did."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from tank2sim.analysis.influence.card_influence import CardInfluence
+from tank2sim.analysis.tuning.result import Tuned
+from tank2sim.arrays import Array
+from tank2sim.files import plain_json
+from tank2sim.report.ensemble.sections import figures_section
+from tank2sim.report.influence.charts import (
+    PANELS,
+    InfluenceData,
+    figure_groups,
+    influence_charts,
+    moves_chart,
+    short_name,
+    variance_chart,
+)
+from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.units import in_words
+
+_COEFFICIENTS = (
+    "K is the change of a figure in per cent when one number on the card grows by 10 %. Bars are by exact slopes "
+    "(10 c/F dF/dc), points by computing the ship anew with 10 % more; where they differ, the figure is curved.\n\n"
+    "Slopes of steady turns and straight courses are by the implicit function theorem, those of manoeuvres by forward "
+    "sensitivities through the events, whose times move, too."
+)
+
+_ERRORS = (
+    "By the delta method, {}. The share of a number is the part of the variance that would go if it were known "
+    "exactly; of numbers whose errors go together each has what it shares with the others, too."
+)
+
+
+def influence_page(result: CardInfluence, tuned: Tuned | None = None, after: Array | None = None) -> Page:
+    """The page of a result; with the tuning if there was one, and all figures `after` it."""
+    told = result.as_json()
+    if tuned is not None:
+        values = [] if after is None else after.tolist()
+        told["tuned"] = tuned.as_json(dict(zip((one.text for one in result.figures), values, strict=False)))
+    return influenced_page(plain_json(told))
+
+
+def influenced_page(found: Json) -> Page:
+    """The page, from what JSON has of a result: that of :class:`CardInfluence`, ``tuned`` and ``ensemble``."""
+    coefficients = InfluenceData.of(found)
+    sections = []
+    tuned = found.get("tuned")
+    if tuned:
+        sections.append(_tuning(found, tuned))
+    charts = [Illustration(chart=chart) for chart in influence_charts(coefficients)]
+    heading = "Influence coefficients"
+    sections.append(PageSection(heading=heading, text=_COEFFICIENTS, charts=charts, notes=found["notices"]))
+    sections.append(_uncertainty(found, coefficients))
+    if "agreed" in found:
+        sections.append(_together(found["agreed"]))
+    sections.append(_all_coefficients(coefficients))
+    if tuned:
+        sections.append(_moves(tuned["parameters"]))
+    if "ensemble" in found:
+        sections.append(figures_section(found["ensemble"]))
+    return Page(
+        title=f"{found['ship']}: influence coefficients",
+        subtitle=f"{len(coefficients.names)} parameters on {len(coefficients.figures)} figures",
+        figures=[_key_figure(text, one, tuned or {}) for text, one in found["figures"].items()],
+        sections=sections,
+    )
+
+
+def _wished(tuned: Mapping[str, Json]) -> dict[str, tuple[Mapping[str, Json], Verdict]]:
+    """Figure to its wish, and whether that is met."""
+    return {
+        wish["figure"]: (wish, Verdict.FAILED if text in tuned["contradiction"] else Verdict.PASSED)
+        for text, wish in tuned.get("wishes", {}).items()
+    }
+
+
+def _key_figure(text: str, one: Mapping[str, Json], tuned: Mapping[str, Json]) -> KeyFigure:
+    kind, _, argument = text.partition("@")
+    words, unit = in_words(kind)
+    label = f"{words}, {argument} deg" if argument else words
+    after, (wish, verdict) = tuned.get("figures", {}).get(text), _wished(tuned).get(text, ({}, Verdict.NONE))
+    if after is None:
+        note = f"standard error {one['standard_error']:.2g}"
+        return KeyFigure(label=label, value=one["value"], unit=unit, note=note)
+    note = f"was {one['value']:.5g} before tuning"
+    if wish:
+        note = f"was {one['value']:.5g}, wished {wish['relation']} {wish['wanted']:g}"
+    return KeyFigure(label=label, value=after, unit=unit, verdict=verdict, note=note)
+
+
+def _all_coefficients(result: InfluenceData) -> PageSection:
+    tables = [
+        _table(caption, result, K, rows)
+        for caption, K in (("K by exact slopes", result.exact), ("K by the 10 % difference", result.difference))
+        for rows in figure_groups(len(result.figures), PANELS)
+    ]
+    return PageSection(heading="Coefficients of all parameters", tables=tables)
+
+
+def _table(caption: str, result: InfluenceData, K: Array, rows: Sequence[int]) -> PageTable:
+    """K of some figures, as many as are as wide as the page at most."""
+    return PageTable(
+        caption=caption,
+        columns=[Column(title="parameter"), *(Column(title=result.figures[n], unit="%", digits=3) for n in rows)],
+        rows=[[name, *(_cell(K[n, place]) for n in rows)] for place, name in enumerate(result.names)],
+    )
+
+
+def _cell(value: float | None) -> float | None:
+    return None if value is None or not np.isfinite(value) else float(np.round(value, 3)) + 0.0
+
+
+def _uncertainty(found: Json, coefficients: InfluenceData) -> PageSection:
+    figures: Mapping[str, Mapping[str, Json]] = found["figures"]
+    text = _ERRORS.format(found.get("standard_errors", "from the card's standard errors"))
+    rows: list[Sequence[Cell]] = []
+    for name, one in figures.items():
+        relative = 100 * abs(one["standard_error"] / one["value"]) if one["value"] else None
+        rows.append([name, one["value"], one["standard_error"], _cell(relative)])
+    columns = [
+        Column(title="figure"),
+        Column(title="value"),
+        Column(title="standard error", digits=3),
+        Column(title="relative", unit="%", digits=3),
+    ]
+    known = any(one["standard_error"] > 0 for one in figures.values())
+    charts = [Illustration(chart=variance_chart(coefficients))] if known else []
+    table = PageTable(caption="Figures and their standard errors", columns=columns, rows=rows)
+    return PageSection(heading="What is known of the figures", text=text, charts=charts, tables=[table])
+
+
+def _together(agreed: Mapping[str, Json]) -> PageSection:
+    changes: list[Sequence[Cell]] = [
+        [key.removeprefix("derivatives."), value] for key, value in agreed["percent"].items()
+    ]
+    ways = {
+        "foretold_exact": "by exact slopes",
+        "foretold_difference": "by 10 % differences",
+        "direct": "direct",
+    }
+    figures: list[Sequence[Cell]] = [
+        [text, *(_cell(one[way]) for way in ways)] for text, one in agreed["figures"].items()
+    ]
+    percent = [Column(title=title, unit="%") for title in ways.values()]
+    return PageSection(
+        heading="Agreed variation",
+        text="All these change together. To first order a figure changes by the sum of Kc K / 10; beside it, what "
+        "computing the changed ship gives.",
+        tables=[
+            PageTable(
+                caption="Agreed changes",
+                columns=[Column(title="parameter"), Column(title="Kc", unit="%")],
+                rows=changes,
+            ),
+            PageTable(caption="Change of the figures", columns=[Column(title="figure"), *percent], rows=figures),
+        ],
+    )
+
+
+def _tuning(found: Json, tuned: Mapping[str, Json]) -> PageSection:
+    wished = _wished(tuned)
+    figures: list[Sequence[Cell]] = []
+    for text, one in found["figures"].items():
+        wish, verdict = wished.get(text, ({}, None))
+        wanted = f"{wish['relation']} {wish['wanted']:g}" if wish else ""
+        figures.append([text, wanted, one["value"], tuned["figures"].get(text), verdict])
+    heads = ("figure", "wished", "before", "after", "")
+    notes = []
+    if contradiction := tuned["contradiction"]:
+        several = len(contradiction) > 1
+        what = (
+            f"{' and '.join(contradiction)} contradict each other"
+            if several
+            else f"{contradiction[0]} cannot be reached"
+        )
+        notes.append(f"{what} within the bounds. What is shown is the nearest, in least squares of relative misses.")
+    if tuned["agreed_times"] is not None:
+        notes.append(f"The agreed variation was taken {tuned['agreed_times']:+.3g} times.")
+    names = {key: short_name(key, one) for key, one in found["parameters"].items()}
+    return PageSection(
+        heading="Tuning",
+        text=f"By the {'fewest' if tuned['by'] == 'fewest' else 'most uncertain'} parameters, each within "
+        f"{tuned['within_standard_errors']:g} standard errors of the card.",
+        charts=[Illustration(chart=moves_chart(tuned, names))] if tuned["parameters"] else [],
+        tables=[
+            PageTable(
+                caption="Figures before and after",
+                columns=[Column(title=head, digits=5) for head in heads],
+                rows=figures,
+            )
+        ],
+        notes=notes,
+    )
+
+
+def _moves(parameters: Mapping[str, Mapping[str, Json]]) -> PageSection:
+    rows: list[Sequence[Cell]] = [
+        [key, one["before"], one["after"], one["standard_errors"]] for key, one in parameters.items()
+    ]
+    columns = [
+        Column(title="key"),
+        Column(title="before", digits=6),
+        Column(title="after", digits=6),
+        Column(title="move", unit="standard errors", digits=3),
+    ]
+    table = PageTable(caption="Parameters that changed, as the card's file has them", columns=columns, rows=rows)
+    return PageSection(heading="What tuning changed", tables=[table])

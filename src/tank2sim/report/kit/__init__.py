@@ -1,0 +1,1 @@
+"""What every page is made of: the page, its theme, charts, numbers and values from JSON."""

@@ -1,0 +1,107 @@
+"""A switch between before and after in a chart, by mouse or keyboard, and the map of misfits that has it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+
+import altair as alt
+
+from tank2sim.report.kit.chart_parts import ChartRecord, data
+
+BOTH, ALL = "both", "all"
+"""What a switch stands at first, and on paper: two series together, or more of them."""
+
+MISFIT_SHOWN = 100.0
+"""Misfit in noise units at which the darkest colour begins (ours): far from any doubt."""
+
+_NAME = "shown"
+
+
+def switch(words: Sequence[str]) -> list[alt.VariableParameter]:
+    """The parameter of a chart by which its reader takes one of `words`, or them together; none for less than two."""
+    if len(words) < 2:
+        return []
+    together = BOTH if len(words) == 2 else ALL
+    choice = alt.BindRadioSelect(input="radio", options=[*words, together], name="Show: ")
+    return [alt.VariableParameter(name=_NAME, bind=choice, value=together)]
+
+
+def before_after_switch(series: Mapping[str, str], field: str = "run") -> str:
+    """The filter of a chart with a :func:`switch`: rows whose `field` is the series chosen, or no series of it.
+
+    Parameters
+    ----------
+    series : mapping
+        Word of the switch to the name of the series in the rows.
+    field : str
+        Field of the rows that names the series.
+    """
+    if len(series) < 2:
+        return "true"
+    names, of = json.dumps(list(series.values())), json.dumps(dict(series))
+    return f"!{of}[{_NAME}] || datum.{field} === {of}[{_NAME}] || indexof({names}, datum.{field}) < 0"
+
+
+def misfit_maps(rows: Sequence[ChartRecord], models: Sequence[str], *, title: str = "") -> alt.VConcatChart:
+    """Misfit of each signal in each trial in noise units, in one scale of colours, to switch between models.
+
+    Parameters
+    ----------
+    rows : sequence of record
+        ``group`` (words for a kind of trials, or nothing), ``trial``, ``signal``, ``model`` and ``misfit`` (-) each.
+    models : sequence of str
+        What is to be switched between, in the order in which they stand beside each other.
+    title : str
+        Of the chart.
+    """
+    groups = list(dict.fromkeys(row["group"] for row in rows))
+    signals = list(dict.fromkeys(row["signal"] for row in rows))
+    maps = [_maps([row for row in rows if row["group"] == group], signals, models) for group in groups]
+    subtitle = "Number and colour: root mean square of simulated less measured, in standard deviations of the noise."
+    return alt.vconcat(*maps, spacing=18, params=switch(models)).properties(
+        title=alt.Title(title, subtitle=subtitle),
+        description=f"Misfit by trial and signal in noise units, {' and '.join(models)}.",
+    )
+
+
+def _maps(rows: Sequence[ChartRecord], signals: Sequence[str], models: Sequence[str]) -> alt.FacetChart:
+    heads = {model: f"{rows[0]['group']}, {model}".removeprefix(", ") for model in models}
+    cells = [
+        {"trial": row["trial"], "signal": row["signal"], "model": row["model"], "head": heads[row["model"]]}
+        | {"misfit": min(row["misfit"], MISFIT_SHOWN), "text": in_noise(row["misfit"])}
+        for row in rows
+    ]
+    trials = list(dict.fromkeys(row["trial"] for row in rows))
+    y = alt.Y("trial:N", sort=trials, axis=alt.Axis(title=None, labelLimit=230))
+    x = alt.X("signal:N", sort=list(signals), scale=alt.Scale(domain=list(signals)))
+    x = x.axis(title="signal", orient="bottom", labelAngle=0)
+    colours = alt.Scale(type="log", domain=[1, MISFIT_SHOWN], scheme="blues", clamp=True)
+    bar = alt.Legend(title="misfit (noise units)", gradientLength=180)  # of all maps alike, which makes it one
+    tooltip = [alt.Tooltip("trial:N"), alt.Tooltip("signal:N"), alt.Tooltip("text:N", title="misfit (noise units)")]
+    base = alt.Chart().encode(x=x, y=y, tooltip=tooltip)
+    ink = alt.condition("datum.misfit > 18", alt.value("white"), alt.value("black"))  # on the cell, whatever the page
+    both = alt.layer(
+        base.mark_rect().encode(color=alt.Color("misfit:Q", scale=colours, legend=bar)),
+        base.mark_text(fontSize=10.5).encode(text="text:N", color=ink),
+        data=data(cells),
+    ).properties(width=_cell_width(signals) * len(signals), height=21 * len(trials))
+    head = alt.Header(title=None, labelFontSize=11, labelAnchor="start", labelLimit=260)
+    columns = alt.Column("head:N", sort=list(heads.values()), header=head)
+    return both.transform_filter(before_after_switch({model: model for model in models}, "model")).facet(
+        column=columns, spacing=16
+    )
+
+
+def _cell_width(signals: Sequence[str]) -> int:
+    return max(40, 6 * max((len(name) for name in signals), default=0) + 8)
+
+
+def in_noise(misfit: float) -> str:
+    """A misfit as a cell shows it: two figures, or more where it has them before the point."""
+    if not math.isfinite(misfit):
+        return "∞"
+    if misfit >= 1e4:
+        return f"{misfit:.0e}".replace("e+0", "e").replace("e+", "e")
+    return f"{misfit:.0f}" if misfit >= 9.95 else f"{misfit:.1f}"

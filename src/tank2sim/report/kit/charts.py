@@ -1,0 +1,79 @@
+"""One plot function for each kind of thing, and the chart as a picture.
+
+A chart is defined once, in Altair, and is drawn the same in a picture (:func:`chart_png`) and in a page
+(:mod:`tank2sim.report.kit.page`). It says what is drawn; how it looks stands in :mod:`tank2sim.report.kit.theme`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import altair as alt
+import vl_convert
+
+from tank2sim.report.kit.analysis_charts import (
+    FrequencyResponse,
+    OutputError,
+    PolesZeros,
+    bode_chart,
+    error_chart,
+    pole_zero_chart,
+)
+from tank2sim.report.kit.motion_charts import (
+    History,
+    Signal,
+    SpiralData,
+    TimeMark,
+    Tow,
+    TrackData,
+    history_chart,
+    spiral_chart,
+    tow_chart,
+    track_chart,
+)
+from tank2sim.report.kit.theme import LIGHT, LOCALE
+
+__all__ = [
+    "VEGALITE_VERSION",
+    "FrequencyResponse",
+    "History",
+    "OutputError",
+    "PolesZeros",
+    "Signal",
+    "SpiralData",
+    "TimeMark",
+    "Tow",
+    "TrackData",
+    "bode_chart",
+    "chart_png",
+    "chart_specification",
+    "error_chart",
+    "history_chart",
+    "pole_zero_chart",
+    "spiral_chart",
+    "tow_chart",
+    "track_chart",
+]
+
+VEGALITE_VERSION = ".".join(alt.SCHEMA_VERSION.lstrip("v").split(".")[:2])
+"""Version of Vega-Lite that Altair writes, and in which its charts are drawn: ``6.1``."""
+
+
+def chart_specification(chart: alt.TopLevelMixin) -> dict[str, Any]:
+    """The Vega-Lite specification of a chart, without its looks; the same chart gives the same specification."""
+    specification: dict[str, Any] = chart.to_dict()
+    specification.pop("config", None)
+    return specification
+
+
+def chart_png(chart: alt.TopLevelMixin, *, scale: float = 2.0) -> bytes:
+    """The chart as a PNG picture on white, `scale` pixels to each px of its size. Needs no network and no browser."""
+    picture: bytes = vl_convert.vegalite_to_png(
+        chart_specification(chart),
+        vl_version=VEGALITE_VERSION,
+        scale=scale,
+        config=LIGHT,
+        format_locale=LOCALE,
+        allowed_base_urls=[],
+    )
+    return picture

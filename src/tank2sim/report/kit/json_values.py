@@ -1,0 +1,262 @@
+"""What stands in the JSON of any result: words and units of its keys; tables, series and matrices in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any, TypeGuard
+
+from tank2sim.report.kit.numbers import format_number
+from tank2sim.report.kit.page import Cell, Column, PageTable, Verdict
+
+Json = Any
+"""What JSON holds: numbers, text, truth values, None, lists and objects of these."""
+
+LONGEST_LIST = 12
+"""Numbers of a list that stand in one cell; longer ones are series. A choice of ours."""
+
+_MOST_ROWS = 400
+"""Rows of a table; what is beyond is left to the JSON. A choice of ours."""
+
+MOST_COLUMNS, FEW_ROWS = 8, 4
+"""More columns than fit on a sheet in the type of the text, and so few rows that the table is turned. Ours."""
+
+_WIDE = 300.0
+"""Largest over smallest number of a column that still have their digits in common. A choice of ours."""
+
+VERDICT_TEXTS = ("passed", "met", "within", "stable", "finished", "course_stable_before", "course_stable_after")
+"""Keys whose truth is good."""
+
+# The unit at the end of a key, longest first, as a reader writes it.
+_UNITS = {
+    "s2_per_rad2": "s²/rad²",
+    "s3_per_rad2": "s³/rad²",
+    "s2_per_rad": "s²/rad",
+    "s_per_m": "s/m",
+    "per_s": "1/s",
+    "degpmin": "deg/min",
+    "kgs2pm3": "kg s²/m³",
+    "kgspm2": "kg s/m²",
+    "kgpm3": "kg/m³",
+    "radps": "rad/s",
+    "degps": "deg/s",
+    "m2ps": "m²/s",
+    "kgm2": "kg m²",
+    "deg2s": "deg² s",
+    "NmpA": "N m/A",
+    "kgpm": "kg/m",
+    "kgps": "kg/s",
+    "mps2": "m/s²",
+    "mps": "m/s",
+    "Nms": "N m s",
+    "rpm": "rpm",
+    "rps": "1/s",
+    "deg": "deg",
+    "rad": "rad",
+    "percent": "%",
+    "lengths": "L",
+    "bytes": "B",
+    "dB": "dB",
+    "Nm": "N m",
+    "Hz": "Hz",
+    "kg": "kg",
+    "m2": "m²",
+    "N": "N",
+    "A": "A",
+    "J": "J",
+    "m": "m",
+    "s": "s",
+}
+
+
+_NAMES = {
+    "speed_polynomial": ("speed polynomial, constant first", "m/s, by powers of t/s"),
+    "force_polynomial": ("force polynomial, constant first", "N, by powers of t/s"),
+    "could_hide": ("sizes that would not show", ""),
+    "could_hide_in_words": ("sizes that would not show, in words", ""),
+    "left_card_range_s": ("left the range of the card after", "s"),
+    "left_card_range_at": ("where it left the range of the card", ""),
+    "outside_card_range": ("outside the range of the card", ""),
+    "p_values": ("p", ""),
+    "members": ("members of the ensemble", ""),
+}
+"""Keys that are no words for a reader."""
+
+
+def words(key: str) -> tuple[str, str]:
+    """A key as a reader sees it, and its unit: ``("advance", "m")``; names of files and parameters stay as they are."""
+    if key in _NAMES:
+        return _NAMES[key]
+    stem, _, condition = key.partition("@")
+    if stem.endswith("_prime"):
+        return f"{stem.removesuffix('_prime')}′", ""
+    for suffix, unit in _UNITS.items():
+        if stem.endswith(f"_{suffix}"):
+            name = words(stem.removesuffix(f"_{suffix}"))[0]
+            return (f"{name} at {condition} deg" if condition else name), unit
+    named = "." in key or "/" in key or key[1:2] == "_"  # a file, a parameter, x_G
+    return (key if named else key.replace("_", " ")), ""
+
+
+def titled(key: str) -> str:
+    """A key as a reader sees it, with its unit in brackets."""
+    name, unit = words(key)
+    return f"{name} ({unit})" if unit else name
+
+
+def is_number_value(value: Json) -> TypeGuard[float]:
+    """Whether this is a number, and not a truth value."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def is_scalar(value: Json) -> bool:
+    """Whether this stands in one cell: a scalar, or a short list of them."""
+    if isinstance(value, list):
+        return len(value) <= LONGEST_LIST and not any(isinstance(one, list | Mapping) for one in value)
+    return not isinstance(value, Mapping)
+
+
+def is_series(value: Json) -> bool:
+    """Whether this is a long list of scalars."""
+    return isinstance(value, list) and len(value) > LONGEST_LIST and not any(isinstance(v, list | dict) for v in value)
+
+
+def is_matrix(value: Json) -> bool:
+    """Whether this is a list of lists of numbers, all of one length."""
+    if not (isinstance(value, list) and value and all(isinstance(row, list) and row for row in value)):
+        return False
+    return all(len(row) == len(value[0]) and all(is_number_value(one) or one is None for one in row) for row in value)
+
+
+def is_objects(value: Json) -> bool:
+    """Whether this is a list of objects."""
+    return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) for one in value)
+
+
+def scalars(value: Mapping[str, Json]) -> dict[str, Json]:
+    """What of an object stands in cells."""
+    return {key: one for key, one in value.items() if is_scalar(one)}
+
+
+def cell(key: str, value: Json) -> Cell:
+    """A value in a table."""
+    if isinstance(value, bool) and key in VERDICT_TEXTS:
+        return Verdict.PASSED if value else Verdict.FAILED
+    if isinstance(value, list):
+        return ", ".join(f"{one:.4g}" if is_number_value(one) else str(one) for one in value) or None
+    if value is None or isinstance(value, int | float | bool):
+        return value
+    return str(value)
+
+
+def quantities(caption: str, values: Mapping[str, Json], unit: str = "") -> PageTable:
+    """One row a value: its name, the value, its unit, which is `unit` where its key has none."""
+    return _listed(caption, ["quantity"], [(words(key)[0], key, value) for key, value in values.items()], unit)
+
+
+def grouped(caption: str, groups: Mapping[str, Mapping[str, Json]]) -> PageTable:
+    """One row a value, under the name of its object: for small objects that have little in common."""
+    rows = [
+        (titled(group) if place == 0 else "", words(key)[0], key, value)
+        for group, values in groups.items()
+        for place, (key, value) in enumerate(values.items())
+    ]
+    return _listed(caption, ["of", "quantity"], rows)
+
+
+def _listed(caption: str, heads: Sequence[str], rows: Sequence[tuple[Json, ...]], unit: str = "") -> PageTable:
+    """Rows that end with a key and its value: each value has its own digits, for the column has no one unit. What is
+    not known has no row."""
+    rows = [row for row in rows if cell(row[-2], row[-1]) is not None]
+    units = [words(key)[1] or (unit if is_number_value(value) else "") for *_, key, value in rows]
+    heads = [*heads, "value", *(["unit"] if any(units) else [])]
+    cells = [
+        [*names, _digits(cell(key, value)), *([own] if any(units) else [])]
+        for (*names, key, value), own in zip(rows, units, strict=True)
+    ]
+    return PageTable(caption=caption, columns=[Column(title=head) for head in heads], rows=cells)
+
+
+def _digits(value: Cell) -> Cell:
+    return format_number(value) if is_number_value(value) else value
+
+
+def rows_of(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], first: str) -> PageTable:
+    """One row an object, one column a key that any of them has; `first` heads the names, empty where there are none."""
+    keys = [key for key in dict.fromkeys(key for _, one in named for key in scalars(one)) if _is_known(key, named)]
+    if len(keys) > MOST_COLUMNS and len(named) <= FEW_ROWS:
+        return _turned(caption, named, keys)
+    columns = [Column(title=words(key)[0], unit=words(key)[1]) for key in keys]
+    wide = _wide(named, keys)
+    cells = [[_shown(key, one.get(key), key in wide) for key in keys] for _, one in named[:_MOST_ROWS]]
+    if first:
+        columns.insert(0, Column(title=first))
+        cells = [[name, *row] for (name, _), row in zip(named, cells, strict=False)]
+    more = f" The first {_MOST_ROWS} of {len(named)} rows." if len(named) > _MOST_ROWS else ""
+    return PageTable(caption=f"{caption}.{more}" if more else caption, columns=columns, rows=cells)
+
+
+def _is_known(key: str, named: Sequence[tuple[str, Mapping[str, Json]]]) -> bool:
+    return any(is_scalar(one.get(key)) and cell(key, one.get(key)) is not None for _, one in named)
+
+
+def _turned(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], keys: Sequence[str]) -> PageTable:
+    """A row a key and a column an object, for few objects with many keys: on paper a wide table is cut off."""
+    units = [words(key)[1] for key in keys]
+    heads = [name or f"no. {place}" if len(named) > 1 else name or "value" for place, (name, _) in enumerate(named, 1)]
+    told = [Column(title=head) for head in ("quantity", *heads, *(["unit"] if any(units) else []))]
+    rows = [
+        [words(key)[0], *(_shown(key, one.get(key), True) for _, one in named), *([unit] if any(units) else [])]
+        for key, unit in zip(keys, units, strict=True)
+    ]
+    return PageTable(caption=caption, columns=told, rows=rows)
+
+
+def _wide(named: Sequence[tuple[str, Mapping[str, Json]]], keys: Sequence[str]) -> set[str]:
+    """Columns of numbers so far apart that each needs its own digits."""
+    found = set()
+    for key in keys:
+        sizes = [abs(one[key]) for _, one in named if is_number_value(one.get(key)) and one[key] != 0]
+        if sizes and max(sizes) > _WIDE * min(sizes):
+            found.add(key)
+    return found
+
+
+def _shown(key: str, value: Json, wide: bool) -> Cell:
+    shown = cell(key, value) if is_scalar(value) else None
+    return _digits(shown) if wide else shown
+
+
+def alike(values: Mapping[str, Json]) -> bool:
+    """Whether these are objects of one kind: two or more that share at least half of what they have in cells."""
+    if len(values) < 2 or not all(isinstance(one, Mapping) for one in values.values()):
+        return False
+    keys = [set(scalars(one)) or set(one) for one in values.values()]
+    return 2 * len(set.intersection(*keys)) >= len(set.union(*keys))
+
+
+def short_columns(values: Mapping[str, Json]) -> list[str]:
+    """Keys of short lists of numbers that belong together: two or more of one length, above one."""
+    lists = {
+        k: v for k, v in values.items() if isinstance(v, list) and v and all(map(is_number_value, v)) and is_scalar(v)
+    }
+    return [key for key, one in lists.items() if len(one) > 1 and _as_long(one, lists.values())]
+
+
+def _as_long(one: list[Json], all_of_them: Any) -> bool:
+    return sum(len(other) == len(one) for other in all_of_them) > 1
+
+
+def numbered(caption: str, values: Mapping[str, list[Json]]) -> PageTable:
+    """Short lists beside each other, one row a place, counted from 1."""
+    longest = max(len(one) for one in values.values())
+    columns = [Column(title="no."), *(Column(title=words(key)[0], unit=words(key)[1]) for key in values)]
+    rows = [
+        [place + 1, *(one[place] if place < len(one) else None for one in values.values())] for place in range(longest)
+    ]
+    return PageTable(caption=caption, columns=columns, rows=rows)
+
+
+def rises(values: Sequence[Json]) -> bool:
+    """Whether numbers rise all the way."""
+    return all(is_number_value(one) for one in values) and all(low < high for low, high in pairwise(values))

@@ -1,0 +1,263 @@
+"""One self-contained HTML page of a result: key figures, tables and charts, for the screen and for paper.
+
+The page fetches nothing: style, script and data stand in it, and its content security policy forbids the rest. The
+same content gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.resources
+import json
+import urllib.parse
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import altair as alt
+import jinja2
+import vl_convert
+from markupsafe import Markup
+
+from tank2sim import __version__
+from tank2sim.marks import marked
+from tank2sim.report.kit.charts import VEGALITE_VERSION, chart_specification
+from tank2sim.report.kit.numbers import NO_VALUE, format_column, format_number, is_number_text
+from tank2sim.report.kit.theme import DARK, LIGHT, LOCALE
+
+
+class Verdict(StrEnum):
+    """What a figure means, in words; sign and colour only go with them."""
+
+    NONE = ""
+    PASSED = "passed"
+    CAUTION = "caution"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeyFigure:
+    """A key figure, shown on a card at the top: `value` in `unit`; `note` is a few words under it."""
+
+    label: str
+    value: float | str
+    unit: str = ""
+    verdict: Verdict = Verdict.NONE
+    note: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """Head of a column: its title, the unit of its numbers, and their significant digits."""
+
+    title: str
+    unit: str = ""
+    digits: int = 4
+
+
+_SHORT = 24
+"""Characters of text in a table that are not broken into lines."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """A cell that leads elsewhere: `path` is that of a file relative to the page, with slashes."""
+
+    text: str
+    path: str
+
+    @property
+    def address(self) -> str:
+        """The path as a page has it: no character of a name means anything but itself."""
+        return urllib.parse.quote(self.path)
+
+
+Cell = float | int | bool | str | Verdict | Link | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PageTable:
+    """A table. Cells are numbers in the unit of their column, text, verdicts, truth values or None (nothing known).
+
+    Raises
+    ------
+    ValueError
+        A row has not as many cells as there are columns.
+    """
+
+    caption: str
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[Cell]]
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise ValueError(f"table {self.caption!r}: {len(row)} cells in a row of {len(self.columns)} columns")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Illustration:
+    """A chart and what the reader should see in it; the chart's own title becomes the heading of its caption."""
+
+    chart: alt.TopLevelMixin
+    caption: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PageSection:
+    """A part of the page. An empty line in `text` starts a paragraph; `notes` are what the reader must not miss."""
+
+    heading: str
+    text: str = ""
+    tables: Sequence[PageTable] = ()
+    charts: Sequence[Illustration] = ()
+    notes: Sequence[str] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Page:
+    """All of a page, from top to bottom; everything is plain text, never HTML."""
+
+    title: str
+    subtitle: str = ""
+    figures: Sequence[KeyFigure] = ()
+    sections: Sequence[PageSection] = ()
+
+
+def render_page(page: Page) -> str:
+    """The page as one HTML file, about 1 MB and its data. It opens without a network and can be printed."""
+    counter = _Counter()
+    sections = [_section(section, counter) for section in page.sections]
+    specifications = [chart["specification"] for section in sections for chart in section["charts"]]
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("tank2sim", "report"), autoescape=True, undefined=jinja2.StrictUndefined
+    )
+    environment.trim_blocks = environment.lstrip_blocks = True
+    environment.filters["paragraphs"] = _paragraphs
+    return environment.get_template("kit/page.html.j2").render(
+        page=page,
+        marks=marked(_messages(page)),
+        cards_across=_cards_across(len(page.figures)),
+        figures=[(figure, _shown(figure.value)) for figure in page.figures],
+        sections=sections,
+        version=__version__,
+        style=Markup(beside("kit/page.css")),
+        script=Markup(beside("kit/page.js")),
+        library=Markup(_vega()) if specifications else None,
+        drawings=json_in_html({"light": LIGHT, "dark": DARK, "locale": LOCALE, "charts": specifications}),
+    )
+
+
+def _messages(page: Page) -> Iterable[str]:
+    """The notes of all sections, and the cells of their tables that are text."""
+    for section in page.sections:
+        yield from section.notes
+        for table in section.tables:
+            yield from (cell for row in table.rows for cell in row if isinstance(cell, str))
+
+
+def _cards_across(count: int) -> int:
+    # As many as leave the fewest gaps in the last row.
+    return max(3, count) if count <= 5 else min((4, 5, 3), key=lambda across: -count % across)
+
+
+class _Counter:
+    """Numbers of figures and tables, from 1 through the whole page."""
+
+    def __init__(self) -> None:
+        self.charts = self.tables = 0
+
+    def next_chart(self) -> int:
+        self.charts += 1
+        return self.charts
+
+    def next_table(self) -> int:
+        self.tables += 1
+        return self.tables
+
+
+def _section(section: PageSection, counter: _Counter) -> dict[str, Any]:
+    return {
+        "content": section,
+        "tables": [_table(table, counter.next_table()) for table in section.tables],
+        "charts": [_chart(illustration, counter.next_chart()) for illustration in section.charts],
+    }
+
+
+def _table(table: PageTable, number: int) -> dict[str, Any]:
+    columns = [_column(column, [row[place] for row in table.rows]) for place, column in enumerate(table.columns)]
+    return {
+        "number": number,
+        "caption": table.caption,
+        "columns": columns,
+        "rows": [[column["cells"][place] for column in columns] for place in range(len(table.rows))],
+    }
+
+
+def _column(column: Column, cells: Sequence[Cell]) -> dict[str, Any]:
+    numbers: list[Any] = [cell for cell in cells if is_number_text(cell)]
+    texts = iter(format_column(numbers, column.digits))
+    shown = [
+        {
+            "text": next(texts) if is_number_text(cell) else _shown(cell),
+            "verdict": cell if isinstance(cell, Verdict) else "",
+            "address": cell.address if isinstance(cell, Link) else "",
+        }
+        for cell in cells
+    ]
+    longest = max((len(cell["text"]) for cell in shown), default=0)
+    kind = "number" if numbers else "short" if longest <= _SHORT else ""
+    return {"head": column, "kind": kind, "cells": shown}
+
+
+def _shown(cell: Cell) -> str:
+    if cell is None:
+        return NO_VALUE
+    if isinstance(cell, str):
+        return str(cell)
+    if isinstance(cell, Link):
+        return cell.text
+    if is_number_text(cell):
+        return format_number(cell)
+    return "yes" if cell else "no"
+
+
+def _chart(illustration: Illustration, number: int) -> dict[str, Any]:
+    specification = chart_specification(illustration.chart)
+    title = specification.pop("title", "")
+    heading, subtitle = (title.get("text", ""), title.get("subtitle", "")) if isinstance(title, dict) else (title, "")
+    return {
+        "number": number,
+        "heading": heading,
+        "caption": " ".join(text for text in (subtitle, illustration.caption) if text),
+        "description": specification.get("description", heading),
+        "switch": any(
+            "bind" in parameter for parameter in specification.get("params", ()) if "select" not in parameter
+        ),
+        "moves": any("select" in parameter for parameter in specification.get("params", ())),
+        "specification": specification,
+    }
+
+
+def _paragraphs(text: str) -> Iterable[str]:
+    return [part.strip() for part in text.split("\n\n") if part.strip()]
+
+
+def json_in_html(value: object) -> Markup:
+    """JSON of a value, to stand in a script element of a page."""
+    # Inside <script> the reader of HTML looks for "</script" and "<!--" even within strings of JSON.
+    text = json.dumps(value, allow_nan=False, sort_keys=True, separators=(",", ":"))
+    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
+
+
+def beside(name: str) -> str:
+    """Text of a file that lies beside this one."""
+    return importlib.resources.files("tank2sim.report").joinpath(name).read_text(encoding="utf-8")
+
+
+@functools.cache
+def _vega() -> str:
+    bundle: str = vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;", vl_version=VEGALITE_VERSION)
+    bundle = f"(() => {{{bundle}}})();"  # its hundreds of short names stay its own
+    return bundle.replace("</script", "<\\/script").replace("<!--", "<\\!--")

@@ -1,0 +1,44 @@
+"""From a simulated trajectory to what the charts of tracks and time histories take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import altair as alt
+
+from tank2sim.dynamics.model import Model
+from tank2sim.report.kit.charts import History, Signal, TrackData, history_chart, track_chart
+from tank2sim.simulation.trajectory import Trajectory
+
+SHIP_SIGNALS = {
+    "rudder.angle": "rudder, + to starboard",
+    "motion.psi": "heading",
+    "motion.r": "yaw rate",
+    "motion.u": "surge velocity",
+    "motion.v": "sway velocity, + to starboard",
+}
+"""What the time histories of a ship show, from top to bottom, and the words on each axis."""
+
+
+def track_data(label: str, run: Trajectory) -> TrackData:
+    """The track of a run."""
+    return TrackData(label=label, x_m=run["motion.x"], y_m=run["motion.y"], time_s=run.t)
+
+
+def history_of(label: str, run: Trajectory, names: Iterable[str]) -> History:
+    """Named signals of a run over time."""
+    return History(label=label, time_s=run.t, values={name: run[name] for name in names})
+
+
+def run_chart(label: str, run: Trajectory) -> alt.VConcatChart:
+    """Track and time histories of one run, one under the other."""
+    track = track_chart([track_data(label, run)], title=label)
+    track.usermeta = alt.Undefined  # only a chart by itself may carry it
+    return alt.vconcat(
+        track, history_chart([history_of(label, run, SHIP_SIGNALS)], signals_of(run.model, SHIP_SIGNALS))
+    )
+
+
+def signals_of(model: Model, titles: Mapping[str, str]) -> list[Signal]:
+    """Panels for named variables of a model, with their titles and the units that it declares."""
+    return [Signal(name=name, title=title, unit=model[name].unit) for name, title in titles.items()]

@@ -1,0 +1,172 @@
+"""What is drawn of the results of each command beside their tables, by the functions of the command's own page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from tank2sim.report.autopilot.page import piloted_page
+from tank2sim.report.comparison.page import compared_page
+from tank2sim.report.glide.page import glides_drawn
+from tank2sim.report.influence.page import influenced_page
+from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.page import Page, PageSection
+from tank2sim.report.results.fleet import told_fleet_page
+from tank2sim.report.results.motions import audit_sections, from_the_bridge, identified, simulated
+from tank2sim.report.results.signals import signals_drawn
+from tank2sim.report.stability.page import stability_drawn
+from tank2sim.report.steering_card.page import catalogue_drawn
+from tank2sim.report.tow.page import tows_drawn
+from tank2sim.report.validation.charts import validated
+from tank2sim.report.yaw.page import yaw_drawn
+
+
+@dataclass(frozen=True)
+class _Drawer:
+    """The sections of a result; the keys that it `needs`, each with what stands under it (older versions wrote none of
+    them); and the paths of what is drawn (with dots between keys; * is any), which is then not told again in tables."""
+
+    sections: Callable[[Json], list[PageSection]]
+    needs: Mapping[str, type]
+    taken: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Page:
+    """A whole page, and the keys that it `needs`, each with what stands under it."""
+
+    make: Callable[[Json], Page]
+    needs: Mapping[str, type]
+
+
+_WAY = ("ahead_m", "starboard_m")
+
+_DRAWERS: Mapping[str, _Drawer] = {
+    "Simulated manoeuvre": _Drawer(
+        simulated,
+        {"histories": dict, "figures": dict, "manoeuvre": str},
+        (
+            "histories",
+            "figures.rate_degps",
+            "figures.rudder_deg",
+            "ensemble.t_s",
+            "ensemble.histories",
+            "ensemble.track",
+        ),
+    ),
+    "Signals": _Drawer(
+        signals_drawn,
+        {"trials": list},
+        tuple(f"trials.*.{one}" for one in ("columns", "rudder_to_yaw_rate", "notices", "trial")),
+    ),
+    "Audit of trials": _Drawer(audit_sections, {"findings": list, "trials": list}, ("trials.*.histories", "findings")),
+    "Coefficients from trials": _Drawer(identified, {"replays": list}, ("replays",)),
+    "Bridge": _Drawer(
+        from_the_bridge,
+        {"turning_circles_deep": list, "turning_circles_shallow": list, "stops": list},
+        tuple(f"{one}.*.{way}" for one in ("turning_circles_deep", "turning_circles_shallow", "stops") for way in _WAY),
+    ),
+    "Validation": _Drawer(validated, {"figures": list}, ("replays",)),
+    "Stability": _Drawer(
+        stability_drawn,
+        {
+            "margins": dict,
+            "trim": dict,
+            "responses": list,
+            "steady_turning": dict,
+            "characteristic": dict,
+            "spirals": dict,
+        },
+        (
+            "responses",
+            "characteristic.curve",
+            "spirals",
+            "margins.speed",
+            "steady_turning.points",
+            "trim.inoue_1981.C_prime",
+            "trim.inoue_1981.trim_by_stern_over_length",
+            "ensemble.curves",
+        ),
+    ),
+    "Towed vehicle": _Drawer(tows_drawn, {"speeds": dict, "models": list}, ("speeds", "confidence_ellipses")),
+    "Yaw rig": _Drawer(
+        yaw_drawn,
+        {"histories": dict, "energy_balance": dict, "methods": dict, "energy_residuals": list},
+        ("histories", "energy_balance", "energy_residuals", "angle_residual"),
+    ),
+    "Underwater glider": _Drawer(
+        glides_drawn,
+        {"polar": dict},
+        (
+            "polar",
+            "path_histories",
+            "path_as_printed_histories",
+            "quasi_steady_error",
+            "transient.histories",
+            "transient.orders",
+        ),
+    ),
+    "Steering catalogue": _Drawer(catalogue_drawn, {"diagrams": object}, ("diagrams", "histories", "titles")),
+}
+
+_PAGES: Mapping[str, _Page] = {
+    "Cards compared": _Page(
+        compared_page, {"summary": list, "cards": list, "coefficients": list, "trials": list, "notices": list}
+    ),
+    "Heading control": _Page(piloted_page, {"ship_alone": dict, "responses": list, "histories": dict, "notices": list}),
+    "Fleet": _Page(told_fleet_page, {"fleet": str, "ships": list}),
+    "Influence coefficients": _Page(
+        influenced_page, {"figures": dict, "parameters": dict, "influence_percent": dict, "notices": list}
+    ),
+}
+"""Commands whose own page is made of their JSON."""
+
+
+_LISTS = {"notices": list, "warnings": list, "notes": list}
+
+
+def needs_of(kind: str) -> Mapping[str, type]:
+    """Keys that the charts of a kind need, each with what stands under it."""
+    own = _DRAWERS.get(kind) or _PAGES.get(kind)
+    return own.needs if own else {}
+
+
+def misshapen(kind: str, result: Mapping[str, Json]) -> str:
+    """The first key under which there is something else than the command writes; empty where there is none."""
+    forms = _LISTS | dict(needs_of(kind))
+    notices = result.get("notices")
+    if isinstance(notices, list) and not all(isinstance(text, str) for text in notices):
+        return "notices"
+    return next((key for key, form in forms.items() if not isinstance(result.get(key, None), form | None)), "")
+
+
+def whole_page(kind: str, result: Json) -> Page | None:
+    """The command's own page of a result, where it is made of the JSON alone."""
+    page = _PAGES.get(kind)
+    return page.make(result) if page and all(key in result for key in page.needs) else None
+
+
+def render_charts(kind: str, result: Mapping[str, Json]) -> tuple[list[PageSection], Json]:
+    """Sections with the charts of a result, and what is left of it for tables.
+
+    `kind` is one of :data:`tank2sim.report.results.result_types.RESULT_TYPES`.
+    """
+    drawer = _DRAWERS.get(kind)
+    if drawer is None or not all(key in result for key in drawer.needs):
+        return [], result
+    rest: Json = result
+    for path in drawer.taken:
+        rest = _without(rest, path.split("."))
+    return drawer.sections(result), rest
+
+
+def _without(value: Json, path: list[str]) -> Json:
+    key, *deeper = path
+    if isinstance(value, list):
+        return [_without(one, deeper) for one in value] if key == "*" and deeper else value
+    if not isinstance(value, Mapping):
+        return value
+    keys = [name for name in value if key in (name, "*")]
+    if not deeper:
+        return {name: one for name, one in value.items() if name not in keys}
+    return {name: _without(one, deeper) if name in keys else one for name, one in value.items()}

@@ -1,0 +1,245 @@
+"""Charts of a ship's stability and turning: the steering diagram with its spirals, what moves C', the step response."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+
+import altair as alt
+import numpy as np
+
+from tank2sim.analysis.stability.response import FIRST_ORDER
+from tank2sim.arrays import Array
+from tank2sim.report.kit.analysis_charts import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
+from tank2sim.report.kit.chart_parts import (
+    NUMBER,
+    ChartRecord,
+    SeriesLook,
+    axis_above,
+    data,
+    pan_zoom,
+    records,
+    series_look,
+    vector,
+)
+from tank2sim.report.kit.chart_parts import stacked as stacked_panels
+from tank2sim.report.kit.json_values import Json
+
+STABLE, UNSTABLE, DIRECT, REVERSE = "stable turns", "unstable turns", "spiral", "reverse spiral"
+_FEW = 14
+"""Coefficients in the chart of influences; the table has all."""
+
+_WIDTH = 680
+_RUDDER = "rudder angle, starboard positive (deg)"
+
+
+def steering_diagram(turning: Json, spirals: Json, *, title: str = "") -> alt.VConcatChart:
+    """Yaw rate, speed, drift and heel of steady turns against the rudder; unstable turns dashed, spirals as points;
+    from ``steady_turning`` and ``spirals`` of the JSON."""
+    points = turning["points"]
+    run = {name: spirals[key] for name, key in ((DIRECT, "direct"), (REVERSE, "reverse")) if spirals.get(key)}
+    lines = [STABLE, *([UNSTABLE] if not all(points["stable"]) else [])]
+    look = series_look([*lines, *run], as_points=list(run))
+    shown = {
+        "yaw rate (deg/s)": ("yaw_rate_degps", 300),
+        "speed (m/s)": ("speed_mps", 110),
+        "drift angle (deg)": ("drift_deg", 110),
+        "heel (deg)": ("heel_deg", 110),
+    }
+    shown = {name: one for name, one in shown.items() if one[0] in points}
+    panels = []
+    for name, (key, height) in shown.items():
+        last = name == list(shown)[-1]
+        own = run if name.startswith("yaw") else {}
+        panel = _turning_panel(_branches(turning, points[key]), own, look, (name, _RUDDER if last else None))
+        panels.append(panel.properties(width=_WIDTH, height=height))
+    return stacked_panels(panels, title=title, description="Steady yaw rate, speed and drift against the rudder angle.")
+
+
+def _branches(turning: Json, values: Sequence[float]) -> list[ChartRecord]:
+    """Rows of the branches: between two folds (or changes of stability) one line."""
+    points = turning["points"]
+    rudder, rate, column = (vector(one) for one in (points["rudder_deg"], points["yaw_rate_degps"], values))
+    stable = points["stable"]
+    # A fold is one of the turns.
+    folds = {
+        int(np.argmin(np.abs(rudder - one["rudder_deg"]) + np.abs(rate - one["yaw_rate_degps"])))
+        for one in turning["folds"]
+    }
+    ends, rows = [0], []
+    for place in range(1, len(rudder) - 1):
+        changes = stable[place] != stable[place + 1] and place + 1 not in folds and place not in folds
+        if place in folds or changes:
+            ends.append(place)
+    ends.append(len(rudder) - 1)
+    for part, (first, last) in enumerate(itertools.pairwise(ends)):
+        kept = slice(first, last + 1)
+        label = STABLE if stable[(first + last + 1) // 2] else UNSTABLE
+        found = records(label, {"d": rudder[kept], "v": column[kept]})
+        rows += [{**row, "part": part} for row in found]
+    return rows
+
+
+def _turning_panel(
+    rows: list[ChartRecord], spirals: Mapping[str, Json], look: SeriesLook, titles: tuple[str, str | None]
+) -> alt.LayerChart:
+    name, across = titles
+    labelled = across is not None
+    x = alt.X(
+        "d:Q", scale=alt.Scale(nice=False, padding=8), axis=alt.Axis(title=across, labels=labelled, ticks=labelled)
+    )
+    y = alt.Y("v:Q", axis=axis_above(name), scale=alt.Scale(zero=False))
+    tooltip = [
+        alt.Tooltip("run:N", title="branch"),
+        alt.Tooltip("d:Q", title="rudder (deg)", format=NUMBER),
+        alt.Tooltip("v:Q", title=name, format=NUMBER),
+    ]
+    line = alt.Chart(data(rows)).mark_line(clip=True)
+    unseen = alt.Chart(data(rows)).mark_point(opacity=0, filled=True, size=90, clip=True)
+    layers = [
+        line.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, detail="part:N", order="i:Q"),
+        unseen.encode(x=x, y=y, tooltip=tooltip),
+        alt.Chart(data([{"d": 0.0}])).mark_rule(style="reference", clip=True).encode(x=x),
+    ]
+    points = [
+        row
+        for label, one in spirals.items()
+        for row in records(label, {"d": vector(one["rudder_deg"]), "v": vector(one["yaw_rate_degps"])})
+    ]
+    if points:
+        layers.append(
+            alt.Chart(data(points))
+            .mark_point(clip=True)
+            .encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
+        )
+    return alt.layer(*layers)
+
+
+def _curves(
+    rows: list[ChartRecord],
+    look: SeriesLook,
+    *,
+    across: str,
+    up: str,
+    marks: Sequence[alt.Chart] = (),
+    height: int = 260,
+) -> alt.LayerChart:
+    """Lines of `x` and `y` with what they are, and reference marks under them."""
+    x = alt.X("x:Q", title=across, scale=alt.Scale(zero=False, nice=False))
+    y = alt.Y("y:Q", title=up, scale=alt.Scale(zero=False))
+    tooltip = [
+        alt.Tooltip("run:N", title="series"),
+        alt.Tooltip("x:Q", title=across, format=NUMBER),
+        alt.Tooltip("y:Q", title=up, format=NUMBER),
+    ]
+    line = alt.Chart(data(rows)).mark_line(clip=True)
+    unseen = alt.Chart(data(rows)).mark_point(opacity=0, filled=True, size=90, clip=True)
+    lines = line.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, order="i:Q").properties(name="plot")
+    chart = alt.layer(*marks, lines, unseen.encode(x=x, y=y, tooltip=tooltip), params=[pan_zoom("x", views=["plot"])])
+    return chart.properties(width=_WIDTH, height=height)
+
+
+def _level(value: float) -> alt.Chart:
+    return alt.Chart(data([{"y": value}])).mark_rule(style="reference", clip=True).encode(y="y:Q")
+
+
+def step_chart(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
+    """Yaw rate after a step of one degree of rudder (or of its order), deg/s; from ``responses`` of the JSON."""
+    rows = [
+        row
+        for one in responses
+        for row in records(
+            one["system"],
+            {"x": vector(one["step"]["time_s"]), "y": vector(one["step"]["yaw_rate_per_rudder_per_s"])},
+        )
+    ]
+    look = series_look([one["system"] for one in responses])
+    chart = _curves(rows, look, across="time after the step (s)", up="yaw rate per degree of rudder (deg/s)")
+    return chart.properties(title=title, description="Yaw rate over time after a step of the rudder.")
+
+
+def steering_bode(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.VConcatChart:
+    """Bode diagram of the yaw rate by the rudder."""
+    drawn = []
+    for one in responses:
+        gain = 10 ** (vector(one["bode"]["magnitude_dB"]) / 20)
+        response = gain * np.exp(1j * np.radians(vector(one["bode"]["phase_deg"])))
+        drawn.append(FrequencyResponse(label=one["system"], omega_radps=one["bode"]["omega_radps"], response=response))
+    return bode_chart(drawn, title=title)
+
+
+def steering_poles(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
+    """Poles and zeros of the hull, and of Nomoto's first order; those of the gear lie far out and are left out."""
+    shown = [one for one in responses if one["system"] in (responses[0]["system"], FIRST_ORDER)]
+    systems = [
+        PolesZeros(
+            label=one["system"],
+            poles=[complex(*pole) for pole in one["poles"]],
+            zeros=[complex(*zero) for zero in one["zeros"]],
+        )
+        for one in shown
+    ]
+    return pole_zero_chart(systems, title=title)
+
+
+def influence_chart(margins: Json, *, title: str = "") -> alt.LayerChart:
+    """Change of C' by ten per cent more of each coefficient, as bars, the strongest at the top; from ``margins``."""
+    strongest = margins["derivatives"][:_FEW]
+    names = [one["name"].rpartition(".")[2] for one in strongest]
+    rows = [{"name": name, "y": float(f"{one['percent']:.6g}")} for name, one in zip(names, strongest, strict=True)]
+    y = alt.Y("name:N", title=None, sort=names)
+    x = alt.X("y:Q", title="change of C′ when the coefficient grows by 10 % (% of |C′|)")
+    tooltip = [alt.Tooltip("name:N", title="coefficient"), alt.Tooltip("y:Q", title="change of C′ (%)", format=NUMBER)]
+    bars = alt.Chart(data(rows)).mark_bar(opacity=0.8).encode(x=x, y=y, tooltip=tooltip)
+    zero = alt.Chart(data([{"y": 0.0}])).mark_rule(style="reference").encode(x="y:Q")
+    return alt.layer(bars, zero).properties(
+        title=title,
+        width=_WIDTH - 60,
+        height=alt.Step(22),
+        description=f"Change of the stability criterion by {', '.join(names)}.",
+    )
+
+
+def criterion_by_speed_chart(speed: Json, *, title: str = "") -> alt.LayerChart:
+    """C' over speed, from ``margins.speed`` of the JSON."""
+    rows = records("C′", {"x": vector(speed["speed_mps"]), "y": 1e5 * vector(speed["C_prime"])})
+    look = series_look(["C′"])
+    chart = _curves(rows, look, across="speed (m/s)", up="C′ · 10⁵", marks=[_level(0.0)], height=200)
+    return chart.properties(title=title, description="Stability criterion over speed.")
+
+
+def trim_chart(trim: Json, *, title: str = "") -> alt.LayerChart:
+    """C' over trim after Inoue et al., and the two readings of paper 2 as levels around it; from ``trim``."""
+    inoue = trim["inoue_1981"]
+    per_cent, criteria = 100 * vector(inoue["trim_by_stern_over_length"]), vector(inoue["C_prime"])
+    base = float(criteria[len(criteria) // 2])
+    series = {"Inoue et al. 1981": criteria}
+    for name, one in trim["paper_7_5_percent"].items():
+        series[f"paper 2, read as {name}: ±7.5 % for 1 %"] = base + per_cent * (one["more"] - one["less"]) / 2
+    rows = [row for label, values in series.items() for row in records(label, {"x": per_cent, "y": 1e5 * values})]
+    across = "trim by the stern (% of length)"
+    chart = _curves(rows, series_look(list(series)), across=across, up="C′ · 10⁵", marks=[_level(0.0)], height=220)
+    return chart.properties(title=title, description="Stability criterion over trim, estimated.")
+
+
+def characteristic_chart(found: Json, *, title: str = "") -> alt.LayerChart:
+    """Rudder angle against steady yaw rate: the diagram, Bech's cubic and Norrbin's, where they were fitted; from
+    ``characteristic`` of the JSON."""
+    rate = vector(found["curve"]["yaw_rate_degps"])
+    kept = np.abs(rate) <= found["fitted_up_to_degps"] * (1 + 1e-9)
+    rate, rudder = rate[kept], vector(found["curve"]["rudder_deg"])[kept]
+    bech = [found["bech"][name] for name in ("b0_rad", "b1_s", "b2_s2_per_rad", "b3_s3_per_rad2")]
+    norrbin = [found["norrbin"][name] for name in ("n0_radps", "n1", "n2_s_per_rad", "n3_s2_per_rad2")]
+
+    def cubic(coefficients: Sequence[float]) -> Array:
+        return np.asarray(np.degrees(np.polynomial.polynomial.polyval(np.radians(rate), coefficients)))
+
+    series = {
+        "steady turns": rudder,
+        "Bech, nearest cubic": cubic(bech),
+        "Norrbin, slope kept": cubic(norrbin) / found["norrbin"]["K_per_s"],
+    }
+    rows = [row for label, values in series.items() for row in records(label, {"x": rate, "y": values})]
+    across = "yaw rate, starboard positive (deg/s)"
+    chart = _curves(rows, series_look(list(series)), across=across, up="rudder angle (deg)", marks=[_level(0.0)])
+    return chart.properties(title=title, description="Rudder angle against steady yaw rate.")

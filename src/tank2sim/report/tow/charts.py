@@ -1,0 +1,178 @@
+"""Charts of tows: speeds with fits and residuals, drag coefficients, joint regions of M and B3, models by AIC."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import altair as alt
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.dynamics.surge_theory import DragPolynomial, TowedBody
+from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, pan_zoom, plain, records, series_look, vector
+from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.motion_charts import History, Signal, history_chart
+
+_SPEEDS = (
+    Signal(name="speed", title="speed", unit="m/s"),
+    Signal(name="left", title="less the model", unit="m/s"),
+)
+
+
+def tow_speed_chart(speeds: Json, *, title: str = "") -> alt.VConcatChart:
+    """Readings as points and simulated speeds as lines; below, all of them less the first simulation.
+
+    Parameters
+    ----------
+    speeds : mapping
+        As ``speeds`` of the JSON has them: ``t_s`` and ``measured_mps`` by tow, ``simulated_t_s`` and
+        ``simulated_mps`` by name, not empty; null where nothing was read.
+    """
+    time, model_time = (vector(speeds[name]) for name in ("t_s", "simulated_t_s"))
+    simulated = {name: vector(values) for name, values in speeds["simulated_mps"].items()}
+    reference = next(iter(simulated.values()))
+    at_readings = np.interp(time, model_time, reference)
+    runs = []
+    for label, values in speeds["measured_mps"].items():
+        speed = vector(values)
+        own = {"speed": speed, "left": speed - at_readings}
+        runs.append(History(label=label, time_s=time, values=own, measured=True))
+    for name, speed in simulated.items():
+        runs.append(History(label=name, time_s=model_time, values={"speed": speed, "left": speed - reference}))
+    return history_chart(runs, _SPEEDS, title=title, height_px=230)
+
+
+def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_mps: float) -> alt.HConcatChart:
+    """Fig. 2 of paper 1: C referred to L^2 against speed, and C referred to V^(2/3) against Reynolds number."""
+    speeds = np.linspace(0.0, top_speed_mps, 121)
+    look = series_look(list(drags))
+    rows = [
+        row
+        for name, own in drags.items()
+        for row in records(
+            name,
+            {
+                "v": speeds,
+                "re": body.reynolds(speeds),
+                "c": own.at(speeds),
+                "cv": own.times(body.area_ratio).at(speeds),
+            },
+        )
+    ]
+    tooltip = [
+        alt.Tooltip("run:N", title="by"),
+        alt.Tooltip("v:Q", title="v (m/s)", format=NUMBER),
+        alt.Tooltip("re:Q", title="Re", format=",.3~s"),
+        alt.Tooltip("c:Q", title="C by L²", format=NUMBER),
+        alt.Tooltip("cv:Q", title="C by V^(2/3)", format=NUMBER),
+    ]
+    panels = []
+    factors = {"c:Q": 1.0, "cv:Q": body.area_ratio}
+    for across, words, up, name in (
+        ("v:Q", "speed (m/s)", "c:Q", "C referred to L²"),
+        ("re:Q", "Reynolds number v L / ν", "cv:Q", "C referred to V^(2/3)"),
+    ):
+        axis = alt.Axis(format="~s") if across == "re:Q" else alt.Axis()
+        x = alt.X(across, title=words, axis=axis, scale=alt.Scale(nice=False))
+        y = alt.Y(up, title=name, scale=alt.Scale(domain=_frame(drags, speeds, factors[up]), nice=True))
+        zero = alt.Chart(data([{"zero": 0.0}])).mark_rule(style="reference").encode(y="zero:Q")
+        base = alt.Chart(data(rows)).encode(x=x, y=y, color=look.colour, order="i:Q")
+        line = base.mark_line(clip=True).encode(strokeDash=look.dash)
+        hover = base.mark_point(opacity=0, filled=True, size=110, clip=True).encode(tooltip=tooltip)
+        panels.append(alt.layer(zero, line, hover).properties(width=330, height=300))
+    return alt.hconcat(*panels, spacing=28).properties(
+        title="Drag coefficient (Fig. 2)",
+        description="Drag coefficient referred to length squared over speed, and to volume over Reynolds number.",
+    )
+
+
+def _frame(drags: Mapping[str, DragPolynomial], speeds: Array, factor: float) -> list[float]:
+    """From a little below 0 to above the highest C of the curves that stay above zero; of all, if none does."""
+    curves = [own.times(factor).at(speeds) for own in drags.values()]
+    kept = [curve for curve in curves if curve.min() >= 0] or curves
+    low, high = min(0.0, *(float(curve.min()) for curve in kept)), max(float(curve.max()) for curve in kept)
+    margin = 0.08 * (high - low)
+    return [low - margin, high + margin]
+
+
+def ellipse_chart(
+    ellipses: Sequence[Mapping[str, Json]], by_tow: Mapping[str, Mapping[str, Json]], *, width_px: int = 620
+) -> alt.LayerChart:
+    """Joint 95 % regions of M and B3 from all tows, and each tow by itself as a point; both as the JSON has them."""
+    lines: list[ChartRecord] = []
+    points: list[ChartRecord] = []
+    for own in ellipses:
+        lines += records(f"95 %: {own['label']}", {"m": vector(own["mass_kg"]), "b": vector(own["B3_kgpm"])})
+    for name, way in by_tow.items():
+        if way["unknowns"][:2] == ["M", "B3"] and name.startswith("output error"):
+            for number, row in enumerate(way["alone"], start=1):
+                if None not in row[:2]:
+                    label = f"each tow: {', '.join(way['unknowns'])}"
+                    points.append({"run": label, "m": plain(row[0]), "b": plain(row[1]), "tow": number})
+    labels = [f"95 %: {own['label']}" for own in ellipses]
+    dots = list(dict.fromkeys(str(row["run"]) for row in points))
+    look = series_look([*labels, *dots], as_points=dots)
+    x = alt.X("m:Q", title="M (kg)", scale=alt.Scale(zero=False))
+    y = alt.Y("b:Q", title="B3 (kg/m)", scale=alt.Scale(zero=False))
+    outline = alt.Chart(data(lines)).mark_line(clip=True)
+    layers = [outline.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, order="i:Q").properties(name="plot")]
+    tooltip = [
+        alt.Tooltip("run:N", title="of"),
+        alt.Tooltip("tow:O", title="tow"),
+        alt.Tooltip("m:Q", title="M (kg)", format=NUMBER),
+        alt.Tooltip("b:Q", title="B3 (kg/m)", format=NUMBER),
+    ]
+    if points:
+        shown = alt.Chart(data(points)).mark_point(size=70, strokeWidth=1.8, clip=True)
+        layers.append(shown.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip))
+    return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(
+        title="M and B3 together",
+        width=width_px,
+        height=360,
+        description="Joint 95 % regions of M and B3 with and without a start delay, and the estimates of each tow.",
+    )
+
+
+_VERDICTS = ("usable", "not determined", "drag negative somewhere")
+
+
+def model_chart(models: Sequence[Mapping[str, Json]], *, width_px: int = 340) -> alt.HConcatChart:
+    """M with its 95 % interval, and AIC above the lowest, of each of the ``models`` of the JSON."""
+    lowest = min(one["aic"] for one in models)
+    names = [", ".join(one["unknowns"]) for one in models]
+    rows: list[ChartRecord] = []
+    for name, one in zip(names, models, strict=True):
+        mass, half = one["estimates"]["M"], one["half_widths_95"]["M"]
+        ends = (None, None) if half is None else (plain(mass - half), plain(mass + half))
+        rows.append(
+            {"name": name, "run": _verdict(one), "m": plain(mass)}
+            | {"low": ends[0], "high": ends[1], "aic": plain(one["aic"] - lowest)}
+        )
+    shown = [verdict for verdict in _VERDICTS if any(row["run"] == verdict for row in rows)]
+    look = series_look(shown, as_points=shown)
+    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, grid=True, labelLimit=200))
+    tooltip = [
+        alt.Tooltip("name:N", title="model"),
+        alt.Tooltip("run:N", title="it is"),
+        alt.Tooltip("m:Q", title="M (kg)", format=NUMBER),
+        alt.Tooltip("low:Q", title="from", format=NUMBER),
+        alt.Tooltip("high:Q", title="to", format=NUMBER),
+        alt.Tooltip("aic:Q", title="AIC above the lowest", format=NUMBER),
+    ]
+    base = alt.Chart(data(rows)).encode(y=y, tooltip=tooltip)
+    scale = alt.Scale(zero=False)
+    bars = base.mark_rule(strokeWidth=2).encode(x=alt.X("low:Q", scale=scale), x2="high:Q", color=look.colour)
+    marks = base.mark_point(size=70, strokeWidth=2).encode(color=look.colour, shape=look.shape)
+    masses = alt.layer(bars, marks.encode(x=alt.X("m:Q", scale=scale, title="M with its 95 % interval (kg)")))
+    ranks = marks.encode(
+        x=alt.X("aic:Q", title="AIC above the lowest"),
+        y=alt.Y("name:N", sort=names, axis=alt.Axis(labels=False, title=None, grid=True)),
+    )
+    height = 30 * len(models)
+    return alt.hconcat(
+        masses.properties(width=width_px, height=height), ranks.properties(width=width_px - 60, height=height)
+    ).properties(title="Models of different size", description="Mass and AIC of each model fitted by output error.")
+
+
+def _verdict(one: Mapping[str, Json]) -> str:
+    return _VERDICTS[2] if not one["drag_nowhere_negative"] else _VERDICTS[0] if one["determined"] else _VERDICTS[1]

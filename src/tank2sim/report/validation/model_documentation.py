@@ -1,0 +1,82 @@
+"""What ITTC 7.5-02-06-03 wants documented of a simulation model, as far as its card tells."""
+
+from __future__ import annotations
+
+import math
+
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.model import Model
+from tank2sim.report.kit.page import Cell, Column, PageSection, PageTable
+
+
+def documentation(card: ManoeuvringCard, system: Model) -> PageSection:
+    """What a card and its model say to each item."""
+    ship, model, environment, gear = card.ship, card.model, card.environment, card.steering_gear
+    kind = {"abkowitz": "third-order polynomial (Abkowitz), whole ship", "linear": "linear"}[model.kind]
+    froude = model.speed_mps / math.sqrt(environment.gravity_mps2 * ship.length_m)
+    reynolds = model.speed_mps * ship.length_m / environment.kinematic_viscosity_m2ps
+    slowest, fastest = model.speed_range_mps
+    stated = "" if model.valid_speed_mps else " (not stated: half to 1.2 times the speed of expansion)"
+    steering = "not stated: a short lag is taken, without limits"
+    if gear:
+        lag = "lag not stated" if gear.time_constant_s is None else f"lag {gear.time_constant_s:.3g} s"
+        limits = [
+            f"{name} {math.degrees(value):.3g} {unit}"
+            for name, value, unit in (("rate", gear.max_rate_radps, "deg/s"), ("angle", gear.max_angle_rad, "deg"))
+            if value is not None
+        ]
+        steering = ", ".join([lag, *limits])
+    rows: list[list[Cell]] = [
+        ["Ship", _particulars(card)],
+        ["Mathematical model", f"{kind}; surge, sway and yaw, {len(system.states)} states"],
+        ["Source of the coefficients", ship.source],
+        ["Notes of the card", ship.notes or "none"],
+        ["Speed of expansion", f"{model.speed_mps:.4g} m/s, Froude number {froude:.3g}"],
+        ["Range of speeds", f"{slowest:.4g} to {fastest:.4g} m/s{stated}"],
+        ["Scaling and signs", _conventions(card)],
+        ["Scale effects", f"Reynolds number {reynolds:.3g}; no correction between model and ship is made"],
+        ["Steering gear", steering],
+        ["Autopilot", "none: rudder by the manoeuvre (zigzag reversed at its heading) or by the record"],
+        ["Propulsion", _propulsion(card)],
+        ["Effects", "; ".join(one.name for one in card.effects) or "none"],
+        ["Environment", _environment(card)],
+        ["Integration", f"classical Runge-Kutta, fourth order, step {system.step_s:.3g} s"],
+        ["Low speed", "below the range: cross-flow drag and linear damping without division by speed"],
+    ]
+    columns = [Column(title="item"), Column(title="here")]
+    table = PageTable(caption="Documentation asked for by ITTC 7.5-02-06-03.", columns=columns, rows=rows)
+    return PageSection(heading="The simulation model", tables=[table])
+
+
+def _particulars(card: ManoeuvringCard) -> str:
+    ship = card.ship
+    parts = [f"length {ship.length_m:.5g} m"]
+    for name, value, unit in (
+        ("breadth", ship.beam_m, "m"),
+        ("draught", ship.draught_m, "m"),
+        ("displacement", ship.displacement_kg, "kg"),
+        ("block coefficient", ship.block_coefficient, ""),
+    ):
+        parts.append(f"{name} {'not stated' if value is None else f'{value:.5g} {unit}'.strip()}")
+    return ", ".join(parts)
+
+
+def _conventions(card: ManoeuvringCard) -> str:
+    model = card.model
+    return (
+        f"{model.scaling}, by the {model.speed_scale} speed; yaw rate terms {model.yaw_rate_terms}; rudder positive to "
+        f"{model.rudder_sign} in the file"
+    )
+
+
+def _propulsion(card: ManoeuvringCard) -> str:
+    if card.propulsion is None:
+        return "none: revolutions constant, no stopping"
+    rpm = card.propulsion.nominal_radps * 30 / math.pi
+    return f"surge force with n|n| about {rpm:.4g} rpm, reached at once unless an effect delays them"
+
+
+def _environment(card: ManoeuvringCard) -> str:
+    depth = card.ship.water_depth_m
+    water = "depth not stated" if depth is None else f"depth {depth:.4g} m"
+    return f"water {card.environment.water_density_kgpm3:.5g} kg/m3, {water}; calm unless effects say otherwise"

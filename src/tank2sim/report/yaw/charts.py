@@ -1,0 +1,141 @@
+"""Charts of the yaw rig: the record beside its programme, the energy balance, estimates by method, residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import altair as alt
+
+from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, plain, series_look, vector
+from tank2sim.report.kit.json_values import Json
+from tank2sim.report.kit.motion_charts import History, Signal, history_chart
+
+_NORMAL = 1.959964
+_SIGNALS = (
+    Signal(name="rate", title="yaw rate", unit="rad/s"),
+    Signal(name="error", title="tracking error", unit="rad"),
+    Signal(name="current", title="motor current", unit="A"),
+)
+
+
+def record_chart(name: str, columns: Mapping[str, Json]) -> alt.VConcatChart:
+    """Rate where it is evaluated beside the programme's, tracking error, and current, over the whole record; from
+    ``histories`` of the JSON."""
+    time = columns["t_s"]
+    own = {"rate": "rate_radps", "error": "tracking_error_rad", "current": "current_A"}
+    values = {key: vector(columns[column]) for key, column in own.items()}
+    programme = {"rate": vector(columns["programme_rate_radps"])}
+    histories = [
+        History(label=name, time_s=time, values=values),
+        History(label="programme", time_s=time, values=programme),
+    ]
+    return history_chart(histories, _SIGNALS, title=f"{name}: programme and record")
+
+
+def balance_chart(balance: Json, *, width_px: int = 340) -> alt.HConcatChart:
+    """Work of the motor in each subinterval (points) and what it is spent on (bars), the mean over all pairs; from
+    ``energy_balance`` of the JSON."""
+    terms = {term.replace("_", " "): parts for term, parts in balance["spent_J"].items()}
+    look = series_look([*terms, "motor"], as_points=["motor"])
+    panels = []
+    for name in ("accelerating", "braking"):
+        bars = [
+            {"part": place, "run": term, "v": plain(1e3 * value)}
+            for term, parts in terms.items()
+            for place, value in enumerate(parts[name], start=1)
+        ]
+        motor = enumerate(balance["motor_J"][name], start=1)
+        points = [{"part": place, "run": "motor", "v": plain(1e3 * value)} for place, value in motor]
+        x = alt.X("part:O", title=f"{name}: part of the interval", axis=alt.Axis(labelAngle=0))
+        y = alt.Y("v:Q", title="work (mJ)")
+        tooltip = [
+            alt.Tooltip("run:N", title="spent on"),
+            alt.Tooltip("part:O", title="part"),
+            alt.Tooltip("v:Q", title="work (mJ)", format=NUMBER),
+        ]
+        stacked = alt.Chart(data(bars)).mark_bar(opacity=0.75).encode(x=x, y=y, color=look.colour, tooltip=tooltip)
+        motors = alt.Chart(data(points)).mark_point(size=60, strokeWidth=2)
+        motors = motors.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
+        panels.append(alt.layer(stacked, motors).properties(width=width_px, height=260))
+    title = "Work of the motor, and what it goes into"
+    description = (
+        "Energy balance of each subinterval: kinetic energy and each term of friction against the motor's work."
+    )
+    return alt.hconcat(*panels, spacing=24).resolve_scale(y="shared").properties(title=title, description=description)
+
+
+def estimates_chart(methods: Mapping[str, Mapping[str, Json]], *, width_px: int = 560) -> alt.LayerChart:
+    """Inertia by each method with its 95 % interval: the added one, or the total where J_zz is not known; from
+    ``methods`` of the JSON."""
+    rows: list[ChartRecord] = []
+    names = []
+    kind = "total" if any(one["added_inertia_kgm2"] is None for one in methods.values()) else "added"
+    for method, estimate in methods.items():
+        value, error = estimate[f"{kind}_inertia_kgm2"], estimate[f"{kind}_inertia_standard_error_kgm2"]
+        spread = _NORMAL * (error or 0.0)
+        names.append(method.replace("_", " "))
+        rows.append(
+            {"name": names[-1], "v": plain(1e4 * value)}
+            | {"low": plain(1e4 * (value - spread)), "high": plain(1e4 * (value + spread))}
+        )
+    words = f"{kind} inertia"
+    scale = alt.Scale(zero=False, nice=True)
+    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, grid=True, labelLimit=260))
+    tooltip = [
+        alt.Tooltip("name:N", title="method"),
+        alt.Tooltip("v:Q", title="10⁻⁴ kg m²", format=NUMBER),
+        alt.Tooltip("low:Q", title="from", format=NUMBER),
+        alt.Tooltip("high:Q", title="to", format=NUMBER),
+    ]
+    x = alt.X("v:Q", scale=scale, title=f"{words} (10⁻⁴ kg m²)")
+    best = alt.Chart(data([{"v": rows[0]["v"]}])).mark_rule(style="reference", strokeDash=[4, 3]).encode(x=x)
+    base = alt.Chart(data(rows)).encode(y=y, tooltip=tooltip)
+    bars = base.mark_rule(strokeWidth=2).encode(x=alt.X("low:Q", scale=scale), x2="high:Q")
+    points = base.mark_point(size=70, filled=True).encode(x=x)
+    return alt.layer(best, bars, points).properties(
+        title=f"{words.capitalize()} by method",
+        width=width_px,
+        height=34 * len(rows),
+        description=f"{words.capitalize()} by each method with its 95 % interval.",
+    )
+
+
+def energy_residual_chart(residuals: Sequence[Mapping[str, Json]], *, width_px: int = 720) -> alt.LayerChart:
+    """What the least squares leave of each subinterval's work, against the rate in its middle; from
+    ``energy_residuals`` of the JSON."""
+    rows: list[ChartRecord] = [
+        {"run": one["stage"], "hump": one["hump"], "w": plain(one["rate_degps"]), "v": plain(1e6 * one["left_J"])}
+        for one in residuals
+    ]
+    look = series_look(["accelerating", "braking"], as_points=["accelerating", "braking"])
+    tooltip = [
+        alt.Tooltip("run:N", title="interval"),
+        alt.Tooltip("hump:O", title="hump"),
+        alt.Tooltip("v:Q", title="left over (µJ)", format=NUMBER),
+    ]
+    zero = alt.Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(y="v:Q")
+    points = (
+        alt.Chart(data(rows))
+        .mark_point()
+        .encode(
+            x=alt.X("w:Q", title="mean rate of the subinterval (deg/s)", scale=alt.Scale(zero=False)),
+            y=alt.Y("v:Q", title="work left over (µJ)"),
+            color=look.colour,
+            shape=look.shape,
+            tooltip=tooltip,
+        )
+    )
+    return alt.layer(zero, points).properties(
+        title="Residuals of the energy balance",
+        width=width_px,
+        height=220,
+        description="Work that the energy least squares do not explain, by subinterval.",
+    )
+
+
+def angle_residual_chart(residual: Mapping[str, Json]) -> alt.VConcatChart:
+    """What the integrated equation leaves of the angle, over time; from ``angle_residual`` of the JSON."""
+    left = vector(residual["residual_rad"])
+    history = History(label="integrated less measured", time_s=residual["t_s"], values={"left": left})
+    signal = Signal(name="left", title="angle, integrated less measured", unit="rad")
+    return history_chart([history], [signal], title="Residuals of the nonlinear least squares")

@@ -1,0 +1,119 @@
+"""What a bridge is told: circles, stops and speeds that agree with the simulation, and nothing that is guessed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tank2sim.analysis.validation.bridge_data import SHALLOW, bridge_of, steady_speed
+from tank2sim.analysis.validation.ship_track import quarter
+from tank2sim.analysis.validation.standard_trials import ship_of
+from tank2sim.cards import ManoeuvringCard, parse_card, read_card, revised
+from tank2sim.errors import InputError
+from tank2sim.simulation.manoeuvres import Orders, Turn
+from tank2sim.simulation.run import simulate
+
+RPM = 2 * math.pi / 60
+DEPTH = '\n[[effects]]\nname = "water_depth"\n[effects.parameters]\ndepth_m = 150.0\n'
+
+
+@pytest.fixture(scope="module")
+def card(mariner_card) -> ManoeuvringCard:
+    """The Mariner with an engine and an effect of water depth."""
+    engine = {"propulsion.nominal_rpm": 84.0, "propulsion.Xnn": 77e-5, "ship.block_coefficient": 0.6}
+    found = parse_card(revised(mariner_card, {}, engine).text + DEPTH, "mariner_at_sea.toml")
+    assert isinstance(found, ManoeuvringCard)
+    return found
+
+
+@pytest.fixture(scope="module")
+def bridge(card):
+    return bridge_of(card, {"Full sea speed": 84.0, "Half ahead": 75.0})
+
+
+def test_circles_lie_on_their_sides_and_show_the_figures(bridge) -> None:
+    starboard, port = bridge.deep
+    assert starboard.starboard_m.max() > 900 and port.starboard_m.min() < -900
+    mark = quarter(starboard, 90)
+    assert mark.ahead_m == pytest.approx(starboard.figures["advance_m"], abs=1.0)
+    assert mark.starboard_m == pytest.approx(starboard.figures["transfer_m"], abs=1.0)
+    half = quarter(port, 180)
+    assert half.starboard_m == pytest.approx(-port.figures["tactical_diameter_m"], abs=1.0)
+    assert 180 <= port.as_json()["marks"][1]["heading_change_deg"] < 181  # to her side: it is no heading
+    assert half.time_s == pytest.approx(port.figures["time_180_s"], abs=0.2)
+    assert quarter(starboard, 360).speed_mps == pytest.approx(starboard.figures["steady_speed_mps"], rel=1e-3)
+
+
+def test_shallow_water_widens_the_circles(bridge, mariner_card) -> None:
+    deep, shallow = bridge.deep[0].figures, bridge.shallow[0].figures
+    assert shallow["tactical_diameter_m"] > 1.5 * deep["tactical_diameter_m"]
+    assert SHALLOW == 1.2
+    assert bridge_of(mariner_card).shallow == ()
+
+
+def test_steady_speeds_are_those_that_the_ship_settles_at(card) -> None:
+    ship = ship_of(read_card("esso-osaka"))
+    speed = steady_speed(ship, 480 * RPM)
+    orders = Orders(
+        np.array([0.0, 1500.0]),
+        {k: np.full(2, v) for k, v in (("rudder.command", 0.0), ("propeller.speed", 480 * RPM), ("wind.speed", 0.0))},
+        "test",
+    )
+    run = simulate(ship.model, orders, integrator=ship.integrator).trajectory
+    assert speed == pytest.approx(run["motion.u"][-1], rel=1e-4)
+    assert steady_speed(ship_of(card), 84 * RPM) == pytest.approx(7.7175, rel=1e-6)
+
+
+def test_stops_begin_at_the_speed_of_their_order(bridge, card) -> None:
+    full, half = bridge.telegraph
+    assert full.order == "Full sea speed" and half.speed_mps < full.speed_mps
+    assert bridge.stops_from[0].track_reach_m == pytest.approx(bridge.stops[0].figures["track_reach_m"], rel=1e-6)
+    assert bridge.stops_from[1].track_reach_m < bridge.stops_from[0].track_reach_m
+    assert bridge.stops[0].marks[-1].time_s == pytest.approx(bridge.stops[0].figures["time_to_stop_s"])
+
+
+def test_the_gear_tells_hard_over_to_hard_over_and_asymmetry_the_neutral_rudder(bridge) -> None:
+    assert bridge.hard_over_s == pytest.approx(2 * 40 / 5)
+    assert bridge.neutral_deg == pytest.approx(-1.1, abs=0.1)  # to port
+
+
+def test_what_a_card_does_not_tell_is_none(mariner_card) -> None:
+    bare = bridge_of(mariner_card)
+    assert bare.telegraph == () and bare.stops == () and bare.stops_from == ()
+    tanker = bridge_of(read_card("esso-osaka"))
+    assert tanker.hard_over_s is None and tanker.neutral_deg is None
+    assert [one.order for one in tanker.telegraph] == [""] * 5
+    assert [one.within for one in tanker.telegraph] == [True, True, True, False, False]
+
+
+def test_what_is_read_off_before_the_range_ends_is_kept() -> None:
+    changed = {"model.valid_speed_mps": [5.8, 9.5], "model.valid_yaw_rate_prime": 1.0}
+    ship = ship_of(read_card("kvlcc2", changed))
+    run = ship.run(Turn(math.radians(10)))
+    read, path = run.reading, run.trajectory
+    row = int(np.argmax(path["motion.speed"] < 5.8))
+    assert read.left_s == pytest.approx(path.t[row], abs=1.0)
+    assert read.figures["time_90_s"] < read.left_s
+    assert not read.outside("advance_m") and not read.outside("time_90_s")
+    assert read.outside("steady_diameter_m")
+    assert read.outside("tactical_diameter_m") == (read.figures["time_180_s"] >= read.left_s)
+
+
+def test_a_card_that_holds_throughout_has_all_its_figures(mariner_card) -> None:
+    found = bridge_of(mariner_card)
+    assert all(one.left is None and one.inside == len(one.ahead_m) for one in found.deep)
+    assert found.as_json()["turning_circles_deep"][0]["outside_card_range"] == []
+    tanker = bridge_of(read_card("kvlcc2", {"model.valid_yaw_rate_prime": 1.0, "model.valid_rudder_deg": 40.0}))
+    assert tanker.as_json()["turning_circles_deep"][0]["left_card_range_s"] == pytest.approx(91.6, abs=1)
+    assert any("60° of heading" in one for one in tanker.notices)
+
+
+def test_absurd_revolutions_are_refused() -> None:
+    with pytest.raises(InputError, match="beyond 1,200 revolutions"):
+        bridge_of(read_card("esso-osaka"), {"Full": 7e6})
+    with pytest.raises(InputError, match="beyond 10,000 revolutions"):
+        bridge_of(read_card("mariner"), {"Full": 7e6})
+    given = bridge_of(read_card("mariner"), {"Full ahead": 84.0}).telegraph
+    assert [(one.order, one.rpm, one.speed_mps) for one in given] == [("Full ahead", 84.0, None)]

@@ -1,0 +1,161 @@
+"""``gap.json`` holds what was found in the units and names of the files, and is valid JSON whatever was found."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.gap.outcome.export import estimate_in_file, gap_as_json, in_file_units, meant, signal_display_name
+from tank2sim.units import to_si
+from tests.gap import made_up
+
+
+def written(gap, **more):
+    return json.loads(json.dumps(gap_as_json(gap, **more), allow_nan=False))
+
+
+@pytest.mark.parametrize("verdict", made_up.EVERY)
+def test_every_verdict_is_valid_json_with_the_keys_of_the_format(verdict) -> None:
+    told = written(made_up.EVERY[verdict]())
+    assert told["verdict"] == verdict
+    assert {"effects", "alternatives", "where", "misfit", "could_hide", "next_test"} <= set(told)
+    assert {"noise", "noise_floor", "before", "after"} <= set(told["misfit"])
+
+
+def test_an_effect_is_in_the_units_of_a_card() -> None:
+    (effect,) = written(made_up.missing())["effects"]
+    assert effect["name"] == "current" and effect["confidence"] == 0.97
+    assert effect["parameters"] == pytest.approx({"speed_mps": 0.45, "direction_deg": 270.0})
+    assert effect["standard_errors"] == pytest.approx({"speed_mps": 0.02, "direction_deg": 1.5})
+
+
+def test_places_bear_names_of_files_and_columns() -> None:
+    first, second = written(made_up.missing(), files={"zigzag": "zigzag.dat"})["where"]
+    assert first == {"trial": "turn35.csv", "signal": "x_m", "t_start_s": 20, "t_end_s": 80, "share_of_misfit": 0.6}
+    assert (second["trial"], second["signal"]) == ("zigzag.dat", "psi_deg")
+
+
+@pytest.mark.parametrize(
+    ("variable", "column"),
+    [("motion.x", "x_m"), ("motion.u", "u_mps"), ("motion.r", "r_degps"), ("motion.u_ground", "u_ground_mps")],
+)
+def test_a_variable_is_told_by_the_column_that_measures_it(variable, column) -> None:
+    assert signal_display_name(variable).file == column
+
+
+def test_misfit_is_in_noise_units_and_noise_in_the_units_of_its_column() -> None:
+    misfit = written(made_up.missing())["misfit"]
+    assert misfit["noise_floor"] == 1
+    assert misfit["before"] == pytest.approx({"fit": np.sqrt((64 + 36) / 2), "holdout": 9.0})
+    assert misfit["after"] == pytest.approx({"fit": 1.0, "holdout": 1.5})
+    assert misfit["black_box"] == pytest.approx({"fit": 3.0, "holdout": 3.0})
+    assert misfit["noise"]["psi_deg"] == {"sigma": pytest.approx(0.2), "from": "estimated"}
+    assert misfit["noise"]["r_degps"]["sigma"] == pytest.approx(0.05)
+    assert misfit["noise"]["y_m"] == {"sigma": 0.5, "from": "stated"}
+
+
+def test_what_could_hide_is_in_the_units_of_a_card() -> None:
+    hidden = written(made_up.missing())["could_hide"]
+    assert hidden == {
+        "rudder_bias": {"angle_deg": pytest.approx(0.25)},
+        "linear_yaw_damping": {"factor": pytest.approx(0.05)},
+    }
+
+
+def test_explanations_are_joined_and_the_next_test_names_its_file() -> None:
+    told = written(made_up.ambiguous())
+    assert told["alternatives"] == ["current", "wind + rudder_bias"]
+    assert told["next_test"]["orders"] == "next_test.csv" and told["next_test"]["manoeuvre"] == "turn:35"
+    assert [one["effects"] for one in told["rivals"]] == [["current"], ["heading_offset"], []]
+
+
+def test_a_simulation_that_left_all_bounds_has_no_misfit() -> None:
+    told = written(made_up.outside())
+    assert told["misfit"]["before"] == {"fit": None, "holdout": None}
+    lost, other = told["trials"]
+    assert lost["misfit"]["before"] is None and other["misfit"]["before"] == pytest.approx(6.0)
+    assert told["effects"] == [] and told["next_test"] is None
+
+
+def test_a_signal_that_a_trial_lacks_is_left_out_of_its_misfits() -> None:
+    found = made_up.missing()
+    turn, *others = found.passed
+    blind = replace(turn, measured={**turn.measured, "motion.x": np.full(len(turn.time_s), np.nan)})
+    first, second, _ = written(replace(found, passed=(blind, *others)))["trials"]
+    assert "x_m" not in first["signals"] and "x_m" in second["signals"]
+    assert first["signals"]["y_m"]["before"] == pytest.approx(8.0)
+
+
+def test_each_trial_says_what_it_alone_would_have() -> None:
+    agreement = written(made_up.missing())["agreement"]
+    assert agreement["current.speed_mps"]["turn35.csv"] == {"value": 0.44, "standard_error": 0.03}
+    directions = agreement["current.direction_deg"]
+    assert directions["turn35.csv"]["value"] == pytest.approx(268)
+    assert directions["zigzag.csv"]["value"] == pytest.approx(271)
+    assert directions["zigzag.csv"]["standard_error"] == pytest.approx(np.rad2deg(0.03))
+
+
+def test_figures_stand_before_and_after() -> None:
+    advance, _, lost = written(made_up.missing())["figures"]
+    assert advance["before"] == pytest.approx(550) and advance["after"] == pytest.approx(505)
+    assert lost["after"] is None
+    same = written(made_up.nothing())["figures"]
+    assert [one["before"] == one["after"] for one in same] == [True] * 3
+
+
+def test_every_parameter_of_the_library_is_read_back_as_it_was() -> None:
+    for effect in EFFECTS.values():
+        for parameter, variable in effect.model_names().items():
+            own, value = in_file_units(parameter, 0.3)
+            assert "rad" not in own.rpartition("_")[2]
+            assert to_si(own, value) == (parameter, pytest.approx(0.3))
+            assert meant(variable) == (effect.name, parameter)
+
+
+def test_directions_alone_go_round_once() -> None:
+    assert estimate_in_file("direction_rad", -0.1)[1] == pytest.approx(360 - np.rad2deg(0.1))
+    assert estimate_in_file("angle_rad", -0.1)[1] == pytest.approx(-np.rad2deg(0.1))
+
+
+def test_times_are_those_of_the_samples() -> None:
+    """Adding up steps of half a second, or taking them off a later start, leaves the last digits wrong."""
+    gap = made_up.missing()
+    where = (replace(gap.where[0], t_start_s=11.499999999999755, t_end_s=539.4999999999981),)
+    (place,) = written(replace(gap, where=where))["where"]
+    assert (place["t_start_s"], place["t_end_s"]) == (11.5, 539.5)
+
+
+def test_candidates_do_not_hide_and_tell_their_sizes() -> None:
+    gap = made_up.ambiguous()
+    assert gap.next_test is not None
+    sizes = {"wind": ({"direction_rad": -np.pi / 2}, {"direction_rad": 0.1})}
+    told = written(replace(gap, next_test=replace(gap.next_test, sizes=sizes)))
+    assert set(told["could_hide"]) == {"linear_yaw_damping"} == set(told["could_hide_in_words"])
+    (wind,) = told["next_test"]["candidates"].values()
+    assert wind["parameters"] == {"direction_deg": pytest.approx(270.0)}
+
+
+def test_what_could_hide_is_worded_by_what_a_size_means() -> None:
+    sizes = {"rudder_bias": {"angle_rad": np.deg2rad(0.25)}, "rudder_rate_limit": {"max_rate_radps": np.deg2rad(4)}}
+    words = written(replace(made_up.missing(), could_hide=sizes))["could_hide_in_words"]
+    assert words["rudder_bias"] == "angle up to 0.25 deg would not show"
+    assert words["rudder_rate_limit"] == "max rate of 4 deg/s in place of the card's would not show"
+
+
+def test_no_force_is_told_of_where_none_is_missing() -> None:
+    gap = made_up.missing()
+    assert written(gap)["missing_force"] is None
+    assert written(replace(gap, effects=(), equation="sway"))["missing_force"]["equation"] == "Y"
+
+
+def test_cautions_are_among_the_notices() -> None:
+    gap = made_up.missing()
+    poor = replace(gap, passed=(made_up.passed("turn35", 9.0, 5.0),))
+    first, second, *_ = written(poor)["notices"]
+    assert "55 % of the gap of the fitting trials remains" in first and "black box" in second
+    unsure = replace(gap, effects=(replace(gap.effects[0], confidence=0.11),))
+    assert "those without it are likelier together: its probability is 0.11" in written(unsure)["notices"][0]

@@ -1,0 +1,336 @@
+"""What is said of scores and of innovations, on explanations and innovations that are made up."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.inference.hypothesis import Hypothesis
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY
+from tank2sim.gap.search.explanations import Search
+from tank2sim.gap.search.explanations import model_choice as module
+from tank2sim.gap.search.model_choice import (
+    ALIKE,
+    EVIDENCE_NEEDED,
+    OF_ONE_KIND,
+    STANDARD_ERRORS,
+    SUREST,
+    TEMPER,
+    Strange,
+    decide,
+    stands_out,
+    strangeness,
+)
+from tests.gap.test_likelihood import LOGS, judge
+from tests.gap.toy import NAMES, Toy, toy_motion
+from tests.identification.trials import made_up_ship
+
+YAW, SURGE, SWAY, *_ = NAMES
+SETS = ((), (0,), (1,), (2,), (0, 1), (0, 2), (1, 2))
+
+
+def said(theta) -> module.Decision:
+    """Of the toy with some forces hidden, all single ones and pairs fitted."""
+    of = judge(toy_motion(theta), spread=1.0)
+    fits = [
+        of.at_best(Toy((None,) * len(which), which=which), np.full(len(which), 0.1), [LOGS], [0, 8]) for which in SETS
+    ]
+    return decide(Search(of, tuple(sorted(fits, key=lambda fit: fit.score)), ()))
+
+
+@pytest.mark.parametrize(
+    ("theta", "verdict", "effects"),
+    [
+        pytest.param((), NO_EFFECT_MISSING, (), marks=pytest.mark.slow),
+        ((0.8,), MISSING, (YAW,)),
+        ((0.0, -0.8), MISSING, (SURGE,)),
+        ((0.9, 0.8), MISSING, NAMES[:2]),
+    ],
+)
+def test_what_is_hidden_in_the_toy_is_said(theta, verdict, effects) -> None:
+    found = said(theta)
+    assert (found.verdict, found.best.explained.effects) == (verdict, effects)
+    assert found.strange == () and found.alike == ()
+    assert sum(found.probabilities.values()) == pytest.approx(1.0)
+    for name, size in zip(NAMES, theta, strict=False):
+        assert found.confidence(name) > 0.9 or size == 0
+    for value, one in zip(found.best.theta, found.best.explained.asked, strict=True):
+        assert value == pytest.approx(theta[NAMES.index(one.effect)], abs=0.3)
+
+
+# -- scores typed by hand --------------------------------------------------------------------------------------------
+
+
+def fit(score: float, *which: int, sure: float = 10.0) -> ExplanationFit:
+    """An explanation whose sizes are 1 and so many standard errors."""
+    count = len(which)
+    return ExplanationFit(
+        Toy((None,) * count, which=which), np.ones(count), np.eye(count) / sure**2, LOGS, score, np.zeros(2)
+    )
+
+
+@pytest.fixture
+def calm(monkeypatch) -> None:
+    monkeypatch.setattr(module, "strangeness", lambda likelihood, fit: ())
+
+
+def of_scores(*fits: ExplanationFit) -> module.Decision:
+    return decide(Search(SimpleNamespace(), tuple(sorted(fits, key=lambda one: one.score)), ()))
+
+
+@pytest.mark.usefixtures("calm")
+@pytest.mark.parametrize(
+    ("fits", "verdict", "effects", "alike"),
+    [
+        # not enough, enough, and a size that is not told from nothing
+        ([fit(0), fit(-EVIDENCE_NEEDED + 0.1, 0)], NO_EFFECT_MISSING, (), []),
+        ([fit(0), fit(-EVIDENCE_NEEDED - 0.1, 0)], MISSING, (YAW,), []),
+        ([fit(0), fit(-50, 0, sure=STANDARD_ERRORS - 0.1)], NO_EFFECT_MISSING, (), []),
+        ([fit(0), fit(-50, 0, sure=STANDARD_ERRORS + 0.1)], MISSING, (YAW,), []),
+        # another as good, and one that is not
+        ([fit(0), fit(-50, 0), fit(-50 + ALIKE - 0.1, 1)], AMBIGUOUS, (YAW,), [(SURGE,)]),
+        ([fit(0), fit(-50, 0), fit(-50 + ALIKE + 0.1, 1)], MISSING, (YAW,), []),
+        ([fit(0), fit(-50, 0), fit(-49, 1, sure=1.0)], MISSING, (YAW,), []),
+        ([fit(0), fit(-11, 0), fit(-7, 1)], AMBIGUOUS, (YAW,), [(SURGE,)]),
+        # a second effect must pay for itself
+        ([fit(0), fit(-50, 0), fit(-50 - EVIDENCE_NEEDED + 0.1, 0, 1)], MISSING, (YAW,), []),
+        ([fit(0), fit(-50, 0), fit(-50 - EVIDENCE_NEEDED - 0.1, 0, 1)], MISSING, (YAW, SURGE), []),
+        ([fit(0), fit(-50, 0), fit(-90, 0, 1, sure=2.0)], MISSING, (YAW,), []),
+        ([fit(0), fit(-50, 0), fit(-90, 1, 2), fit(-88, 0, 1)], AMBIGUOUS, (SURGE, SWAY), [(YAW, SURGE)]),
+        # a pair with one of another single effect is no rival of a single one
+        ([fit(0), fit(-50, 0), fit(-54, 0, 1), fit(-52, 1, 2)], MISSING, (YAW,), []),
+        # many that are a little less good are together more probable than the best
+        (
+            [fit(0), fit(-50, 0), *(fit(-50 + ALIKE + 0.5, one) for one in range(1, 7))],
+            AMBIGUOUS,
+            (YAW,),
+            [(name,) for name in NAMES[1:]],
+        ),
+        # a pair alone: no single effect stands out, or none is enough
+        ([fit(0), fit(-5, 0, sure=1.0), fit(-40, 0, 1)], MISSING, (YAW, SURGE), []),
+        ([fit(0), fit(-5, 0), fit(-40, 0, 1)], MISSING, (YAW, SURGE), []),
+        ([fit(0), fit(-8, 0), fit(-12, 0, 1)], NO_EFFECT_MISSING, (), []),
+    ],
+)
+def test_verdicts_follow_the_scores(fits, verdict, effects, alike) -> None:
+    found = of_scores(*fits)
+    assert (found.verdict, found.best.explained.effects) == (verdict, effects)
+    assert [one.explained.effects for one in found.alike] == alike
+
+
+FORCE, DRAG, BIAS, LAG, LATE = range(2, 7)
+
+
+@pytest.mark.usefixtures("calm")
+@pytest.mark.parametrize(
+    ("pair", "share"),
+    [
+        ((FORCE, DRAG), OF_ONE_KIND["force"]),
+        ((DRAG, BIAS), OF_ONE_KIND["force"]),
+        ((LAG, LATE), OF_ONE_KIND["actuator"]),
+        ((FORCE, LAG), 0.0),
+        ((0, 1), 0.0),
+    ],
+)
+def test_a_second_effect_of_the_same_kind_must_have_a_share_of_the_gain(pair, share: float) -> None:
+    """Of a gain of 2000 in all: a little less than the share, a little more, and what is enough otherwise."""
+    names = tuple(NAMES[place] for place in pair)
+    for part in (share * 2000 - 1, share * 2000 + 1, EVIDENCE_NEEDED + 1):
+        found = of_scores(fit(0), fit(-2000 + part, pair[0]), fit(-2000, *pair))
+        assert found.best.explained.effects == (names if part > max(share * 2000, EVIDENCE_NEEDED) else names[:1]), part
+
+
+@pytest.mark.usefixtures("calm")
+def test_probabilities_are_those_of_the_scores() -> None:
+    found = of_scores(fit(0), fit(-30, 0), fit(-24, 1), fit(-36, 0, 1))
+    weights = np.exp([0, 15 / TEMPER, 12 / TEMPER, 18 / TEMPER])
+    expected = dict(zip([(), (YAW,), (SURGE,), (YAW, SURGE)], weights / weights.sum(), strict=True))
+    assert found.probabilities == pytest.approx(expected)
+    assert found.confidence(YAW) == pytest.approx(expected[YAW,] + expected[YAW, SURGE])
+    assert found.confidence(SWAY) == 0
+    huge = of_scores(fit(-1e5), fit(-1e5 - 3e4, 0))
+    assert huge.probabilities[YAW,] == pytest.approx(1.0) and huge.confidence(YAW) == SUREST < 1
+
+
+@pytest.mark.parametrize("fits", [[fit(0)], [fit(0), fit(-50, 0)], [fit(0), fit(-50, 0), fit(-49, 1)]])
+def test_no_name_is_said_where_the_innovations_are_strange(monkeypatch, fits) -> None:
+    odd = (Strange("period", "", 20.0, 20.0, 99.0),)
+    asked = []
+    monkeypatch.setattr(module, "strangeness", lambda likelihood, fit: asked.append(fit) or odd)
+    found = of_scores(*fits)
+    assert found.verdict == OUTSIDE_LIBRARY and found.strange == odd
+    assert asked == [found.best] and found.best.score == min(one.score for one in fits)
+
+
+@pytest.mark.parametrize("effect", ["linear_yaw_damping", "added_sway_mass", "rudder_effectiveness"])
+def test_what_the_card_may_be_wrong_by_is_not_named(effect: str) -> None:
+    """A card's derivative is known to 2 %: a rescaling below 6 % is no effect, however surely it was measured."""
+    card = parse_card(made_up_ship.CARD, "made_up.toml")
+    assert isinstance(card, ManoeuvringCard)
+    assert card.standard_error("Nr") == pytest.approx(0.02 * abs(card.derivatives["Nr"]))
+    explained = Hypothesis(card, "angle", [effect])
+    for factor, named in ((0.05, False), (-0.05, False), (0.07, True), (-0.07, True)):
+        found = ExplanationFit(explained, np.array([factor]), np.array([[1e-8]]), LOGS, 0.0, np.zeros(0))
+        assert stands_out(found) == named, factor
+        unsure = replace(found, covariance=np.array([[(abs(factor) / 2.9) ** 2]]))
+        assert not stands_out(unsure)
+
+
+def test_a_rate_of_the_gear_that_the_card_may_be_wrong_by_is_not_named() -> None:
+    """5 deg/s are stated, and known to 2 %: 4.8 deg/s are no slower gear, 4.6 deg/s are."""
+    stated = made_up_ship.CARD.replace("[steering_gear]", "[steering_gear]\nmax_rate_degps = 5.0")
+    for text, rate, named in ((stated, 4.8, False), (stated, 4.6, True), (made_up_ship.CARD, 4.8, True)):
+        explained = Hypothesis(parse_card(text, "made_up.toml"), "order", ["rudder_rate_limit"])
+        found = ExplanationFit(explained, np.array([np.radians(rate)]), np.array([[1e-12]]), LOGS, 0.0, np.zeros(0))
+        assert stands_out(found) == named, rate
+
+
+def test_an_effect_without_amplitude_stands_out_by_its_score_alone() -> None:
+    card = parse_card(made_up_ship.CARD, "made_up.toml")
+    explained = Hypothesis(card, "order", ["rudder_lag"])
+    assert stands_out(ExplanationFit(explained, np.array([3.0]), np.array([[100.0]]), LOGS, 0.0, np.zeros(0)))
+
+
+# -- innovations that are made up ------------------------------------------------------------------------------------
+
+RUNS, BLOCKS, NY, BLOCK_S = 4, 200, 6, 2.5
+LENGTHS = np.array([200, 200, 150, 90])
+
+
+def made_up(seed: int, *, added=0.0, theta=None, gaps: float = 0.05, pushed=0.0):
+    """A likelihood and a fit of two parameters by least squares, to white noise; `theta` (R, 2) are each trial's own
+    values of them, less those of the fit. The force that is left over is of first order by scipy's filter, four times
+    as large as the smoother may be wrong by, and `pushed` (R, BLOCKS, 3) more."""
+    rng = np.random.default_rng(seed)
+    inside = np.arange(BLOCKS) < LENGTHS[:, None]
+    known = inside[..., None] & (rng.random((RUNS, BLOCKS, NY)) > gaps)
+    X = np.where(known[..., None], rng.standard_normal((RUNS, BLOCKS, NY, 2)), 0.0)
+    e = rng.standard_normal((RUNS, BLOCKS, NY)) + added
+    if theta is not None:
+        e = e + np.einsum("rtyk,rk->rty", X, theta)
+    e = np.where(known, e, 0.0)
+    flat = X.reshape(-1, 2)
+    best = np.linalg.lstsq(flat, e.ravel(), rcond=None)[0]
+    e = e - X @ best
+    motion = SimpleNamespace(
+        names=tuple("abcd"),
+        blocks=BLOCKS,
+        block_s=BLOCK_S,
+        lengths=LENGTHS,
+        times=100.0 * np.arange(RUNS)[:, None] + BLOCK_S * (np.arange(BLOCKS) + 0.5),
+    )
+    fades = np.exp(-BLOCK_S / np.exp(LOGS[-4:-1]))
+    shocks = rng.standard_normal((RUNS, 2 * BLOCKS, 3))
+    forces = np.stack([lfilter([np.sqrt(1 - f**2)], [1, -f], shocks[..., i], axis=1) for i, f in enumerate(fades)], -1)
+    states = np.zeros((RUNS, BLOCKS, 9 + NY))
+    states[..., 6:9] = 4 * forces[:, BLOCKS:] + pushed
+    spread = np.broadcast_to(np.eye(3), (RUNS, BLOCKS, 3, 3))
+    motion.inside = inside
+    # what is left over falls as a parameter grows
+    whitened = np.concatenate([e[..., None], -X], axis=-1)
+    likelihood = SimpleNamespace(
+        motion=motion,
+        known=known,
+        innovations=lambda fit: e,
+        whitened=lambda fit: (whitened, e),
+        smoothed=lambda fit: (states, spread),
+    )
+    return likelihood, ExplanationFit(Toy((None, None)), best, np.linalg.inv(flat.T @ flat), LOGS, 0.0, np.zeros(0))
+
+
+def test_white_noise_is_not_strange() -> None:
+    strange = {seed: found for seed in range(200) if (found := strangeness(*made_up(seed, gaps=0.05 * (seed % 3))))}
+    assert strange == {}
+
+
+@pytest.mark.parametrize("run", [0, 3])
+def test_a_burst_is_a_passage_of_its_trial(run: int) -> None:
+    added = np.zeros((RUNS, BLOCKS, NY))
+    added[run, 60:75, 1:3] = 3.0
+    first, *_ = strangeness(*made_up(1, added=added))
+    assert (first.what, first.trial) == ("passage", "abcd"[run])
+    begin, end = 100.0 * run + BLOCK_S * np.array([60.5, 74.5])
+    assert first.begin_s == pytest.approx(begin, abs=12 * BLOCK_S)
+    assert first.end_s == pytest.approx(end, abs=12 * BLOCK_S)
+
+
+def test_a_burst_at_the_end_of_a_short_run_ends_with_it() -> None:
+    added = np.zeros((RUNS, BLOCKS, NY))
+    added[3, 80:90] = 3.0
+    found = [one for one in strangeness(*made_up(2, added=added)) if one.what == "passage"]
+    assert [one.trial for one in found] == ["d"]
+    assert 300.0 + BLOCK_S * 65.5 < found[0].begin_s < found[0].end_s <= 300.0 + BLOCK_S * 89.5 + 1e-9
+
+
+@pytest.mark.parametrize("period", [8.3, 21.0, 60.0])
+def test_a_line_in_all_trials_is_a_period(period: float) -> None:
+    """Of a phase of its own in each, in one of six signals and as large as its noise: no passage stands out."""
+    t = BLOCK_S * np.arange(BLOCKS)
+    added = np.zeros((RUNS, BLOCKS, NY))
+    added[..., 4] = np.sin(2 * np.pi * t / period + np.arange(RUNS)[:, None])
+    found = strangeness(*made_up(3, added=added, gaps=0.0))
+    assert [one.what for one in found] == ["period"]
+    assert found[0].begin_s == found[0].end_s == pytest.approx(period, rel=0.05)
+
+
+@pytest.mark.parametrize(("run", "axis"), [(1, 1), (2, 2)])
+def test_a_force_that_pushes_once_is_strange_and_one_that_pushes_always_is_not(run: int, axis: int) -> None:
+    pushed = np.zeros((RUNS, BLOCKS, 3))
+    pushed[run, 70:95, axis] = 40.0
+    (first,) = strangeness(*made_up(6, pushed=pushed))
+    assert (first.what, first.trial) == ("push", "abcd"[run])
+    begin, end = 100.0 * run + BLOCK_S * np.array([70.5, 94.5])
+    assert first.begin_s == pytest.approx(begin, abs=25 * BLOCK_S) and first.end_s == pytest.approx(
+        end, abs=25 * BLOCK_S
+    )
+    pushed[...] = 40.0 * np.sin(np.arange(BLOCKS))[:, None]
+    assert strangeness(*made_up(6, pushed=pushed)) == ()
+
+
+def test_a_trial_that_has_another_value_disagrees() -> None:
+    theta = np.zeros((RUNS, 2))
+    theta[2, 1] = 0.35  # some ten of its standard errors; in a trial's passages it drowns
+    found = strangeness(*made_up(4, theta=theta))
+    assert [(one.what, one.trial) for one in found] == [("trial", "c")]
+    assert (found[0].begin_s, found[0].end_s) == pytest.approx((200.0 + 0.5 * BLOCK_S, 200.0 + 149.5 * BLOCK_S))
+
+
+def test_the_strangest_is_told_first() -> None:
+    added, theta = np.zeros((RUNS, BLOCKS, NY)), np.zeros((RUNS, 2))
+    added[0, 20:60] = 4.0
+    theta[2, 1] = 0.35
+    found = strangeness(*made_up(5, added=added, theta=theta))
+    assert found[0].what == "passage" and {one.what for one in found} >= {"passage", "trial"}
+    assert [one.excess for one in found] == sorted((one.excess for one in found), reverse=True)
+    assert all(np.isfinite(one.excess) for one in found)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.9])
+def test_noise_of_another_colour_has_no_strange_passage(memory: float) -> None:
+    """Sums of squares of coloured noise vary more: chance still makes one in twenty as strange as once in twenty."""
+    blocks, rng, excess = 400, np.random.default_rng(4), []
+    for _ in range(60):
+        white = rng.standard_normal((blocks + 100, 3))
+        noise = lfilter([math.sqrt(1 - memory**2)], [1.0, -memory], white, axis=0)[100:]
+        motion = SimpleNamespace(names=("a",), blocks=blocks, lengths=[blocks], times=np.arange(blocks)[None, :])
+        likelihood = SimpleNamespace(motion=motion, known=np.ones((1, blocks, 3), dtype=bool))
+        (found,) = module._passages(likelihood, noise[None])
+        excess.append(found.excess)
+    assert np.mean(np.array(excess) > -2 * math.log(0.05)) < 0.25
+    assert np.mean(np.array(excess) > -2 * math.log(3e-3)) < 0.1
+
+
+def test_a_burst_in_white_noise_is_the_strangest_passage() -> None:
+    noise = np.random.default_rng(4).standard_normal((1, 400, 3))
+    noise[0, 200:212] *= 3
+    motion = SimpleNamespace(names=("a",), blocks=400, lengths=[400], times=10.0 * np.arange(400)[None, :])
+    (found,) = module._passages(SimpleNamespace(motion=motion, known=np.ones((1, 400, 3), dtype=bool)), noise)
+    assert found.excess > -2 * math.log(1e-6)
+    assert (found.begin_s, found.end_s) == pytest.approx((2000, 2110), abs=30)

@@ -1,0 +1,123 @@
+"""What of a card may be wrong, by itself and together with others, and what is believed of the noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.gap.inference.hypothesis import CLOCK
+from tank2sim.gap.inference.likelihood import Likelihood
+from tank2sim.gap.inference.prior import LARGEST_SHARE, likelihood_from_card
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tests.identification.trials import made_up_ship
+from tests.identification.trials.made_up_ship import ESTIMATED, TRUTH
+
+STEP = 0.5
+GEAR = "\nmax_rate_degps = 3.0"
+STATED = {"Nr": 0.1, "Yd": 0.5}
+"""Shares of their values by which a card says that two of its derivatives may be wrong."""
+
+
+def posed(*, by_angle: bool = True, gear: str = "time_constant_s = 0.5" + GEAR, stated: bool = False) -> Likelihood:
+    text = made_up_ship.CARD.replace("time_constant_s = 0.5", gear)
+    if stated:
+        text += "\n[uncertainty]\n" + "\n".join(f"{name} = {abs(TRUTH[name]) * s}" for name, s in STATED.items())
+    card = parse_card(text, "made_up.toml")
+    assert isinstance(card, ManoeuvringCard)
+    one = made_up_ship.trial(made_up_ship.zigzag(20), duration=60, step=STEP)
+    if not by_angle:
+        one.signals["delta_order_rad"] = one.signals.pop("delta_rad")
+    return likelihood_from_card(card, Measured((one,), "angle" if by_angle else "order", ()))
+
+
+def row(likelihood: Likelihood, name: str) -> np.ndarray:
+    """What a coefficient is wrong by together with others, in its own standard error."""
+    place = likelihood.coefficients.names.index(name)
+    mixing = likelihood.coefficients.mixing
+    own = mixing[place, place]
+    shared: np.ndarray = mixing[place, len(mixing) :] / own
+    return shared
+
+
+def test_each_coefficient_is_wrong_by_its_own_standard_error() -> None:
+    coefficients = posed(stated=True).coefficients
+    count = len(coefficients.names)
+    own = dict(zip(coefficients.names, np.diag(coefficients.mixing), strict=True))
+    np.testing.assert_array_equal(coefficients.mixing[:, :count], np.diag(np.diag(coefficients.mixing)))
+    for name in ESTIMATED:
+        assert own[f"derivatives.{name}"] == pytest.approx(STATED.get(name, 0.02) * abs(TRUTH[name])), name
+    assert own["derivatives.Nrdot"] == pytest.approx(0.02 * abs(TRUTH["Nrdot"]))
+
+
+GROUPS = (
+    ("Yv", "Yr"),
+    ("Nv", "Nr"),
+    ("Yvvv",),
+    ("Nvvr",),
+    ("Xu", "Xvv", "Xvr"),
+    ("Xdd", "Yd", "Nd"),
+    ("Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot"),
+)
+"""Terms that come from the same tests: oblique towing and rotating arm, speed, rudder, and pure motions."""
+
+
+def test_terms_of_the_same_tests_are_all_too_large_or_all_too_small() -> None:
+    likelihood = posed()
+    rows = {name: row(likelihood, f"derivatives.{name}") for group in GROUPS for name in group}
+    assert likelihood.coefficients.mixing.shape[1] - len(likelihood.coefficients.names) == len(GROUPS)
+    seen = []
+    for group in GROUPS:
+        (cause,) = {int(np.flatnonzero(rows[name])[0]) for name in group}
+        seen.append(cause)
+        for name in group:
+            assert np.count_nonzero(rows[name]) == 1
+            # too large all of them, whatever their signs
+            assert rows[name][cause] == pytest.approx(np.sign(TRUTH[name])), name
+    assert len(set(seen)) == len(GROUPS)
+    errors = dict(zip(likelihood.coefficients.names, likelihood.coefficients.errors, strict=True))
+    assert errors["derivatives.Nr"] == pytest.approx(np.sqrt(2) * 0.02 * abs(TRUTH["Nr"]))
+
+
+def test_a_group_is_not_wrong_by_more_than_a_tenth() -> None:
+    likelihood = posed(stated=True)
+    assert np.abs(row(likelihood, "derivatives.Nr")).max() == pytest.approx(1.0)
+    assert np.abs(row(likelihood, "derivatives.Yd")).max() == pytest.approx(LARGEST_SHARE / STATED["Yd"])
+
+
+@pytest.mark.parametrize(("gear", "share"), [("time_constant_s = 0.5" + GEAR, 0.02), (GEAR, 0.5)])
+def test_the_gear_is_as_uncertain_as_a_coefficient_unless_it_was_assumed(gear: str, share: float) -> None:
+    likelihood = posed(by_angle=False, gear=gear)
+    errors = dict(zip(likelihood.coefficients.names, likelihood.coefficients.errors, strict=True))
+    model = likelihood.none.model
+    assumed = dict(zip(model.parameter_names, model.parameter_values(), strict=True))["steering.time_constant"]
+    assert errors["steering.max_rate"] == pytest.approx(0.02 * np.deg2rad(3.0))
+    assert errors["steering.time_constant"] == pytest.approx(share * assumed)
+    assert np.all(row(likelihood, "steering.max_rate") == 0)
+
+
+def test_of_a_measured_angle_what_the_gear_is_wrong_by_does_not_show() -> None:
+    for by_angle in (True, False):
+        likelihood = posed(by_angle=by_angle)
+        places = [place for place, one in enumerate(likelihood.coefficients.names) if one.startswith("steering.")]
+        assert bool(np.any(likelihood.coefficient_columns[..., places])) != by_angle
+
+
+@pytest.mark.parametrize("by_angle", [True, False])
+def test_the_rudder_s_clock_is_known_to_half_a_sample(by_angle: bool) -> None:
+    likelihood = posed(by_angle=by_angle)
+    errors = dict(zip(likelihood.coefficients.names, likelihood.coefficients.errors, strict=True))
+    assert errors[CLOCK] == pytest.approx(0.5 * STEP)
+    # and its column is one of those that are integrated out
+    place = likelihood.coefficients.names.index(CLOCK)
+    assert np.abs(likelihood.coefficient_columns[..., place]).max() > 0
+
+
+def test_noise_is_believed_to_be_that_of_the_trials() -> None:
+    likelihood = posed()
+    motion, believed = likelihood.motion, likelihood.belief
+    from_logs = np.exp(believed.logs)
+    ny = len(motion.seen)
+    assert from_logs[:ny] == pytest.approx(motion.noise)
+    assert from_logs[2 * ny : 3 * ny] == pytest.approx(np.full(ny, 3 * made_up_ship.LENGTH / made_up_ship.SPEED))
+    assert from_logs[-1] == 1.0 and len(believed.logs) == len(believed.spread) == 3 * ny + 7

@@ -1,0 +1,194 @@
+"""The screen against least squares written out, and against effects hidden in trials of a ship typed by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.inference.hypothesis import Hypothesis
+from tank2sim.gap.inference.kalman_filter import observer
+from tank2sim.gap.inference.likelihood import COUNTED, Likelihood
+from tank2sim.gap.inference.prior import likelihood_from_card
+from tank2sim.gap.search.screening import LEAST_AMPLITUDE, Screen, Variant, variants
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tests.identification.trials import made_up_ship
+from tests.identification.trials.made_up_ship import TRUTH
+
+EFFECTS = ("linear_yaw_damping", "current", "gyro_bias", "cubic_yaw_damping", "hull_fouling", "rudder_time_offset")
+MORE = 0.25
+"""By which the hidden ship's damping in yaw exceeds that of the card."""
+
+
+@pytest.fixture(scope="module")
+def card() -> ManoeuvringCard:
+    read = parse_card(made_up_ship.CARD, "made_up.toml")
+    assert isinstance(read, ManoeuvringCard)
+    return read
+
+
+def judged(card: ManoeuvringCard, truth=None, *, bias: float = 0.0, flow=(0.0, 0.0)) -> Likelihood:
+    trials = [
+        made_up_ship.trial(made_up_ship.zigzag(20), name="zigzag", duration=200, step=0.5, truth=truth),
+        made_up_ship.trial(made_up_ship.turn(30), name="turn", duration=150, step=0.5, truth=truth, seed=2),
+    ]
+    for one in trials:
+        one.signals["r_radps"][:] += bias
+        for name, speed in zip(("x_m", "y_m"), flow, strict=True):  # velocities are through the water
+            one.signals[name][:] += speed * one.time_s
+    return likelihood_from_card(card, Measured(tuple(trials), "angle", ()))
+
+
+@pytest.fixture(scope="module")
+def damped(card) -> Likelihood:
+    return judged(card, {**TRUTH, "Yr": (1 + MORE) * TRUTH["Yr"], "Nr": (1 + MORE) * TRUTH["Nr"]}, bias=0.001)
+
+
+def none_of(likelihood: Likelihood) -> ExplanationFit:
+    return likelihood.at_best(likelihood.none, np.zeros(0), [likelihood.belief.logs], [15])
+
+
+def every(likelihood: Likelihood, names=EFFECTS) -> list[Variant]:
+    card = likelihood.none.card
+    return [one for name in names for one in variants(likelihood, Hypothesis(card, "angle", [name]))]
+
+
+@pytest.fixture(scope="module")
+def screened(damped) -> Screen:
+    return Screen(damped, none_of(damped), every(damped))
+
+
+def least_squares(likelihood: Likelihood, base: ExplanationFit, chosen: list[Variant]) -> tuple[float, np.ndarray]:
+    """Least cost over what is there, the coefficients and the amplitudes of `chosen`; and these."""
+    seen = observer(
+        likelihood.linear(base.explained, base.theta) if base.explained.effects else likelihood.base, base.noise
+    )
+    own = likelihood.columns(base.explained, base.theta, likelihood.coefficient_columns).scaled(base.width)
+
+    def rows(driving, shown):
+        white = seen.whitened(driving, shown)
+        return white.reshape(-1, white.shape[-1])
+
+    columns = [rows(own.driving, own.shown)]
+    # what the sensors show is left over by the effect: the residual has the opposite sign
+    columns += [rows(one.driving, -one.shown) for one in chosen]
+    residual, held = columns[0][:, :1], columns[0][:, 1:]
+    design = np.hstack([held, *columns[1:]])
+    mean, precision = base.explained.prior
+    deviations = np.concatenate([np.sqrt(precision), np.ones(held.shape[1] - own.asked)])
+    known = np.hstack([np.diag(deviations), np.zeros((held.shape[1], design.shape[1] - held.shape[1]))])
+    away = np.concatenate([np.sqrt(precision) * (base.theta - mean), np.zeros(held.shape[1] - own.asked)])
+    whole, target = np.vstack([design, known]), -np.concatenate([residual[:, 0], away])
+    scale = np.linalg.norm(whole, axis=0)
+    scale[scale == 0] = 1.0
+    found = np.linalg.lstsq(whole / scale, target, rcond=1e-14)[0] / scale
+    return float(np.sum((whole @ found - target) ** 2)), found[held.shape[1] :]
+
+
+def check(screen: Screen, base: ExplanationFit, places: list[int]) -> None:
+    likelihood, chosen = screen.likelihood, [screen.every[place] for place in places]
+    before, _ = least_squares(likelihood, base, [])
+    after, shares = least_squares(likelihood, base, chosen)
+    asked = sum(len(one.theta) for one in chosen)
+    gain, found = screen.of(places)
+    ends = np.cumsum([one.driving.shape[-1] for one in chosen])[:-1]
+    if all(one.allowed(part) for one, part in zip(chosen, np.split(shares, ends), strict=True)):
+        assert found == pytest.approx(shares, rel=1e-4, abs=1e-6)
+        assert gain == pytest.approx(before - after - asked * np.log(likelihood.count / COUNTED), rel=1e-6, abs=1e-4)
+    else:
+        assert gain < 0 and np.all(found == 0)
+
+
+def test_gains_are_those_of_least_squares(screened) -> None:
+    for place in range(len(screened.every)):
+        check(screened, screened.base, [place])
+    for a, b in ((0, 2), (0, 9), (10, 11), (4, 0)):
+        check(screened, screened.base, [a, b])
+
+
+def test_gains_beside_an_effect_that_is_there_are_those_of_least_squares(card, damped) -> None:
+    """Also where something is known of its parameters, and away from the best ones."""
+    there = Hypothesis(card, "angle", ["wave_drift"])
+    logs = none_of(damped).logs
+    theta = np.where(there.prior[1] > 0, there.prior[0] + 0.2, 1.0)
+    base = ExplanationFit(there, theta, np.eye(len(theta)), logs, 0.0, np.zeros(0))
+    screen = Screen(damped, base, every(damped, ("linear_yaw_damping", "gyro_bias", "wave_drift")))
+    assert {one.effect for one in screen.every} == {"linear_yaw_damping", "gyro_bias"}
+    check(screen, base, [0])
+    check(screen, base, [0, 1])
+
+
+def test_two_hidden_effects_are_the_first_pair_at_the_right_sizes(screened) -> None:
+    best, second, *_ = screened.pairs()
+    assert set(best.effects) == {"linear_yaw_damping", "gyro_bias"} and best.gain > second.gain
+    assert best.thetas["linear_yaw_damping"] == pytest.approx([MORE], rel=0.3)
+    assert best.thetas["gyro_bias"] == pytest.approx([0.001], rel=0.15)
+    gains = [one.gain for one in screened.pairs()]
+    assert gains == sorted(gains, reverse=True) and len(gains) == len(EFFECTS) * (len(EFFECTS) - 1) // 2
+
+
+def test_a_small_hidden_amplitude_is_found_alone_at_its_size(card) -> None:
+    likelihood = judged(card, bias=4e-4)
+    screen = Screen(likelihood, none_of(likelihood), every(likelihood))
+    best, second, *_ = screen.singles()
+    assert best.effects == ("gyro_bias",) and best.gain > second.gain + 5
+    assert best.thetas["gyro_bias"] == pytest.approx([4e-4], rel=0.15)
+
+
+def test_singles_are_the_best_variant_of_each_effect(screened) -> None:
+    singles = screened.singles()
+    assert sorted(one.effects[0] for one in singles) == sorted(EFFECTS)
+    for one in singles:
+        gains = [
+            screened.of([place])[0] for place, other in enumerate(screened.every) if other.effect == one.effects[0]
+        ]
+        assert one.gain == max(gains)
+    assert [one.gain for one in singles] == sorted((one.gain for one in singles), reverse=True)
+
+
+def test_a_search_begins_at_something_and_within_the_bounds(screened) -> None:
+    card = screened.likelihood.none.card
+    asked = {name: Hypothesis(card, "angle", [name]).asked for name in EFFECTS}
+    for one in (*screened.singles(), *screened.pairs()):
+        for name, theta in one.thetas.items():
+            for value, parameter in zip(theta, (each.parameter for each in asked[name]), strict=True):
+                assert parameter.minimum <= value <= parameter.maximum
+                if parameter.absent is not None:
+                    least = LEAST_AMPLITUDE * abs(parameter.typical_values(card)[0])
+                    assert abs(value - parameter.absent) > 0.99 * least, one.effects
+
+
+def test_a_current_is_never_begun_with_backwards(card) -> None:
+    """A negative share of a speed is another direction's; in its bounds it would be no current at all."""
+    likelihood = judged(card, flow=(0.3 * np.cos(0.8), 0.3 * np.sin(0.8)))
+    screen = Screen(likelihood, none_of(likelihood), every(likelihood, ("current", "gyro_bias")))
+    best, _ = screen.singles()
+    assert best.thetas["current"] == pytest.approx([0.3, np.pi / 4], rel=0.1)
+    flows = [place for place, one in enumerate(screen.every) if one.effect == "current"]
+    backwards = [place for place in flows if np.cos(screen.every[place].theta[1] - 0.8) < -0.5]
+    assert backwards and all(screen.of([place])[0] < 0 for place in backwards)
+    (pair,) = screen.pairs()
+    assert pair.gain == max(screen.of([place, len(screen.every) - 1])[0] for place in flows)
+
+
+def test_variants_are_all_typical_shapes_at_the_typical_size(card, damped) -> None:
+    current = variants(damped, Hypothesis(card, "angle", ["current"]))
+    assert len(current) == 8 and {one.amplitudes for one in current} == {(0,)}
+    assert current[0].driving.shape == (*damped.motion.block_states.shape[:2], 6, 1)
+    (cubic,) = variants(damped, Hypothesis(card, "angle", ["cubic_yaw_damping"]))
+    assert cubic.amplitudes == (0, 1) and cubic.driving.shape[-1] == 2
+    # each amplitude alone; together they add, for both are linear
+    whole, _ = damped.added(cubic.explained, cubic.theta)
+    assert cubic.driving.sum(axis=-1) == pytest.approx(whole)
+    assert cubic.start(np.array([2.0, -0.5])) == pytest.approx(cubic.theta * [2.0, -0.5])
+    assert cubic.start(np.array([0.0, -0.001])) == pytest.approx(cubic.theta * [LEAST_AMPLITUDE, -LEAST_AMPLITUDE])
+
+
+def test_a_faulty_sensor_adds_to_what_is_shown_alone(card, damped) -> None:
+    (gyro,) = variants(damped, Hypothesis(card, "angle", ["gyro_bias"]))
+    place = damped.motion.seen.index("motion.r")
+    assert np.all(gyro.driving == 0)
+    inside = damped.motion.inside
+    assert gyro.shown[inside][:, place, 0] == pytest.approx(np.full(inside.sum(), gyro.theta[0]))
+    assert np.all(np.delete(gyro.shown[inside], place, axis=1) == 0)

@@ -1,0 +1,109 @@
+"""Trials are brought to the size of the card's ship, whichever of the two is the model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tank2sim.cards import ManoeuvringCard, parse_card, read_card
+from tank2sim.errors import InputError
+from tank2sim.identification.trials.problem.prepare_trials import at_size_of, measured
+from tank2sim.records.trials import Trial, froude_scaled
+
+
+@pytest.fixture(scope="module")
+def card() -> ManoeuvringCard:
+    known = read_card("mariner")
+    assert isinstance(known, ManoeuvringCard)
+    return known
+
+
+def straight(speed: float, scale: float | None = None) -> Trial:
+    time = np.arange(0.0, 100.0, 0.5)
+    signals = {"delta_rad": 0.1 * np.sin(time / 20), "u_mps": np.full(200, speed), "r_radps": 0.01 * np.sin(time / 20)}
+    return Trial(Path("made.csv"), time, signals, scale=scale)
+
+
+@pytest.mark.parametrize(("is_model", "factor"), [(True, 40.0), (False, 1.0)])
+def test_a_trial_that_tells_its_scale_comes_to_the_ships_size(
+    is_model: bool, factor: float, card: ManoeuvringCard
+) -> None:
+    full = straight(card.model.speed_mps, scale=40.0)
+    given = froude_scaled(full, 1 / 40.0) if is_model else full
+    found, by = at_size_of(given, card)
+    assert by == factor
+    np.testing.assert_allclose(found.time_s, full.time_s)
+    for name, values in full.signals.items():
+        np.testing.assert_allclose(found.signals[name], values, rtol=1e-12, err_msg=name)
+
+
+def test_a_full_scale_trial_comes_to_the_size_of_a_model_card(card: ManoeuvringCard) -> None:
+    small = replace(card, model=card.model.model_copy(update={"speed_mps": card.model.speed_mps / 40**0.5}))
+    found, by = at_size_of(straight(card.model.speed_mps, scale=40.0), small)
+    assert by == pytest.approx(1 / 40)
+    assert found.signals["u_mps"][0] == pytest.approx(small.model.speed_mps)
+
+
+def test_a_model_trial_without_a_scale_is_refused_with_what_to_do(card: ManoeuvringCard) -> None:
+    with pytest.raises(InputError, match="# scale"):
+        at_size_of(straight(card.model.speed_mps / 7), card)
+
+
+def write(path: Path, columns: str, rows: str) -> Path:
+    path.write_text(f"{columns}\n{rows}", encoding="utf-8")
+    return path
+
+
+def test_orders_and_angles_do_not_mix(tmp_path: Path, card: ManoeuvringCard) -> None:
+    rows = "".join(f"{t},{np.sin(t / 9):.3f},7.7\n" for t in range(60))
+    one = write(tmp_path / "a.csv", "t_s,delta_deg,u_mps", rows)
+    two = write(tmp_path / "b.csv", "t_s,delta_order_deg,u_mps", rows)
+    assert measured([one], card).driven_by == "angle"
+    assert measured([two], card).driven_by == "order"
+    with pytest.raises(InputError, match=r"b\.csv.*delta_deg"):
+        measured([one, two], card)
+
+
+def test_a_trial_given_twice_is_refused(tmp_path: Path, card: ManoeuvringCard) -> None:
+    rows = "".join(f"{t},{np.sin(t / 9):.3f},7.7\n" for t in range(60))
+    one = write(tmp_path / "a.csv", "t_s,delta_deg,u_mps", rows)
+    with pytest.raises(InputError, match="once"):
+        measured([one, one], card)
+
+
+def test_hsva_and_marin_come_to_the_same_ship(data: Path) -> None:
+    card = read_card("kvlcc2")
+    assert isinstance(card, ManoeuvringCard)
+    hsva = measured([data / "data/kvlcc2_hsva/HSVA_CPMC_KVLCC2_Z_10_10_P.dat"], card).trials[0]
+    marin = measured([data / "data/kvlcc2_marin/MARIN_FREE_KVLCC2_zz_10_m.dat"], card).trials[0]
+    for trial in (hsva, marin):
+        assert trial.signals["u_mps"][:50].mean() == pytest.approx(card.model.speed_mps, rel=0.02)
+        assert np.abs(trial.signals["v_mps"]).max() < 2.0, "body velocities after the audit"
+    assert hsva.signals["r_radps"].max() == pytest.approx(marin.signals["r_radps"].max(), rel=0.1)
+
+
+def test_a_tanker_is_no_mariner(data: Path, card: ManoeuvringCard) -> None:
+    with pytest.raises(InputError, match=r"7 m.*160\.93 m"):
+        measured([data / "data/kvlcc2_hsva/HSVA_CPMC_KVLCC2_Z_10_10_P.dat"], card)
+
+
+def test_wind_that_the_card_cannot_take_is_told(tmp_path: Path, card: ManoeuvringCard) -> None:
+    rows = "".join(f"{t},{np.sin(t / 9):.3f},7.7,5,200\n" for t in range(60))
+    one = write(tmp_path / "a.csv", "t_s,delta_deg,u_mps,wind_speed_mps,wind_direction_deg", rows)
+    assert any("wind was measured" in notice for notice in measured([one], card).notices)
+
+
+def test_wind_is_told_to_be_unused_by_the_effects_that_a_card_has_and_not_by_how_many(
+    tmp_path: Path, card: ManoeuvringCard
+) -> None:
+    rows = "".join(f"{t},{np.sin(t / 9):.3f},7.7,5,200\n" for t in range(60))
+    one = write(tmp_path / "a.csv", "t_s,delta_deg,u_mps,wind_speed_mps,wind_direction_deg", rows)
+    wind = '\n[[effects]]\nname = "wind"\nparameters = {speed_mps = 5.0, direction_deg = 200.0}\n'
+    current = '\n[[effects]]\nname = "current"\nparameters = {speed_mps = 0.5, direction_deg = 120.0}\n'
+    for effects, unused in ((wind, False), (current, True), (wind + current, False)):
+        own = parse_card(card.text + effects, "ship.toml")
+        assert isinstance(own, ManoeuvringCard)
+        assert any("wind was measured" in notice for notice in measured([one], own).notices) == unused, effects

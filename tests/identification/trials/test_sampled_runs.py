@@ -1,0 +1,110 @@
+"""Trials on equal steps: means of inputs, averages of signals, orders held, gaps."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tank2sim.errors import InputError
+from tank2sim.identification.trials.problem.sampled_runs import prepare, seen_in
+from tank2sim.records.trials import Trial
+from tests.identification.trials.made_up_ship import model, problem, trial, turn, zigzag
+
+
+@pytest.fixture(scope="module")
+def by_angle():
+    return model()
+
+
+@pytest.fixture(scope="module")
+def by_order():
+    return model(by_angle=False)
+
+
+def record(t, **signals):
+    return Trial(Path("made_up.csv"), t, signals)
+
+
+def command(ship, run):
+    return run.inputs[:, ship.input_names.index("rudder.command")]
+
+
+def test_steps_are_whole_numbers_of_samples(by_angle):
+    t = np.arange(0, 30, 0.05)
+    run = prepare(by_angle, record(t, delta_rad=np.zeros_like(t), r_radps=np.sin(t)), ("motion.r",), step_s=0.22)
+    assert run.step_s == pytest.approx(0.2)
+    assert run.begin_s == pytest.approx(0.075)  # the middle of the first four samples
+    np.testing.assert_allclose(np.diff(run.times), 0.2)
+
+
+def test_signals_are_averaged_around_their_instant(by_angle):
+    t = np.arange(0, 30, 0.05)
+    run = prepare(by_angle, record(t, delta_rad=np.zeros_like(t), r_radps=2 + 3 * t), ("motion.r",), step_s=0.2)
+    np.testing.assert_allclose(run.column("motion.r"), 2 + 3 * run.times)
+    noise = np.random.default_rng(1).standard_normal(len(t))
+    run = prepare(by_angle, record(t, delta_rad=np.zeros_like(t), r_radps=noise), ("motion.r",), step_s=0.2)
+    assert run.column("motion.r").std() == pytest.approx(0.5, rel=0.2)
+
+
+def test_a_measured_angle_is_straight_between_samples(by_angle):
+    t = np.arange(0, 20, 0.1)
+    run = prepare(by_angle, record(t, delta_rad=0.1 * t, r_radps=t), ("motion.r",), step_s=0.2)
+    np.testing.assert_allclose(command(by_angle, run)[:-1], 0.1 * (run.times[:-1] + 0.1))
+
+
+def test_an_order_holds_until_the_next(by_order):
+    t = np.arange(0, 20, 0.5)
+    order = np.where(t >= 10, 0.3, 0.0)
+    run = prepare(by_order, record(t, delta_order_rad=order, r_radps=t), ("motion.r",), step_s=0.5)
+    expected = np.where(run.times >= 10 - 1e-9, 0.3, 0.0)
+    np.testing.assert_allclose(command(by_order, run)[:-1], expected[:-1], atol=1e-12)
+    assert command(by_order, run)[-1] == command(by_order, run)[-2]
+
+
+def test_the_measured_angle_goes_before_the_order(by_angle):
+    t = np.arange(0, 20, 0.1)
+    both = record(t, delta_rad=np.full_like(t, 0.2), delta_order_rad=np.full_like(t, 0.3), r_radps=t)
+    np.testing.assert_allclose(command(by_angle, prepare(by_angle, both, ("motion.r",))), 0.2)
+
+
+def test_short_gaps_are_bridged_and_long_ones_are_not(by_angle):
+    t = np.arange(0, 20, 0.1)
+    holed = 2.0 * t
+    holed[50:53] = np.nan
+    holed[100:104] = np.nan
+    run = prepare(by_angle, record(t, delta_rad=np.zeros_like(t), r_radps=holed), ("motion.r",), step_s=0.1)
+    column = run.column("motion.r")
+    assert np.isfinite(column[50:53]).all()
+    assert np.isnan(column[101:103]).all()
+    known = np.isfinite(column)
+    np.testing.assert_allclose(column[known], 2 * run.times[known])
+
+
+def test_what_was_not_measured_is_nan(by_angle):
+    run = prepare(by_angle, trial(zigzag(10), duration=20.0), ("motion.r", "motion.u_ground"))
+    assert np.isnan(run.column("motion.u_ground")).all()
+    assert np.isnan(run.column("motion.phi")).all()
+    assert np.isfinite(run.column("motion.r")).all()
+
+
+def test_what_is_seen_is_what_model_and_trials_share(by_angle):
+    t = np.arange(0, 20, 0.1)
+    there = [record(t, delta_rad=t, r_radps=t, phi_rad=t), record(t, delta_rad=t, psi_rad=t)]
+    assert seen_in(by_angle, there) == ("motion.r", "motion.psi")
+
+
+def test_too_short_or_empty_trials_are_refused(by_angle):
+    t = np.arange(0, 0.5, 0.1)
+    with pytest.raises(InputError, match=r"only 0\.4 s long; leave it out"):
+        prepare(by_angle, record(t, delta_rad=t, r_radps=t), ("motion.r",))
+    t = np.arange(0, 20, 0.1)
+    with pytest.raises(InputError, match="none of the signals to be compared"):
+        prepare(by_angle, record(t, delta_rad=t), ("motion.r",))
+
+
+def test_a_part_begins_at_its_own_time():
+    run = problem([trial(turn(20), duration=40.0)]).runs[0]
+    part = run.part(10, 60)
+    np.testing.assert_allclose(part.times, run.times[10:60])
+    np.testing.assert_array_equal(part.measured, run.measured[10:60])
+    np.testing.assert_array_equal(part.inputs, run.inputs[10:60])

@@ -1,0 +1,349 @@
+"""What is drawn of the JSON of each command: the data in the charts are those of the JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tank2sim.analysis.glide.study import GlideQuestion
+from tank2sim.analysis.glide.study import study as glide_study
+from tank2sim.bundled import bundled
+from tank2sim.cards import read_card
+from tank2sim.cli.console import json_text
+from tank2sim.identification.tow.identify import identify_tow
+from tank2sim.identification.tow.study import study_tows, towed_body
+from tank2sim.identification.yaw.identify import YawOptions, identify_yaw
+from tank2sim.records.tows import read_tows
+from tank2sim.records.yaw import read_yaw_record
+from tank2sim.report.kit.charts import chart_specification
+from tank2sim.report.kit.page import Illustration, Page, PageSection, render_page
+from tank2sim.report.results.page import result_page
+from tests.cli.command_line import tank2sim
+from tests.report.test_page_in_browser import CHROMIUM, opened
+from tests.yaw_truth import Truth, record, written
+
+TIMES = [0.0, 1.0, 2.0, 3.0]
+HISTORIES = {
+    "t_s": TIMES,
+    "delta_deg": [0.0, 10.0, 10.0, 10.0],
+    "n_rpm": [60.0] * 4,
+    "u_mps": [7.0, 6.9, None, 6.7],
+    "r_degps": [0.0, 0.1, 0.2, 0.3],
+    "psi_deg": [0.0, 0.05, 0.2, 0.45],
+    "x_m": [0.0, 7.0, 14.0, 21.0],
+    "y_m": [0.0, 0.1, 0.3, 0.6],
+}
+BAND = {"p5": [6.9, 6.8, 6.7, 6.6], "p50": [7.0, 6.9, 6.8, 6.7], "p95": [7.1, 7.0, 6.9, 6.8]}
+SIDES = {
+    f"{side}_m": [[x, y + aside] for x, y in zip(HISTORIES["x_m"], HISTORIES["y_m"], strict=True)]
+    for side, aside in (("low", -0.1), ("middle", 0.0), ("high", 0.1))
+}
+SIMULATED = {"ship": "A ship", "manoeuvre": "turn:10", "figures": {"advance_m": 570.0}, "notices": []}
+SIMULATED |= {"histories": HISTORIES}
+ENSEMBLE = {"members": 5, "t_s": TIMES, "histories": {"u_mps": BAND, "x_m": BAND, "y_m": BAND}, "track": SIDES}
+AUDITED = {
+    "findings": [
+        {"file": "a/turn.csv", "column": "psi [deg]", "what": "2 spikes", "likely_truth": "disturbed readings"}
+        | {"kind": "note", "mended": True, "evidence": {}, "places_s": [[1.0, 1.0]]},
+        {"file": "a/turn.csv", "column": "t_s", "what": "1 gaps", "likely_truth": "rows were not recorded"}
+        | {"kind": "note", "mended": False, "evidence": {}, "places_s": [[2.0, 3.0]]},
+    ],
+    "trials": [
+        {"file": "a/turn.csv", "columns": ["psi [deg]", "u_mps"], "notices": []}
+        | {"histories": {key: HISTORIES[key] for key in ("t_s", "psi_deg", "u_mps")}}
+    ],
+}
+VALIDATED = {
+    "kind": "validate",
+    "verdict": "of 1 figures 1 validated",
+    "counts": {"validated": 1},
+    "figures": [
+        {"trial": "zigzag", "name": "overshoot_1_deg", "measured": 10.0, "simulated": 11.0, "error": 1.0}
+        | {"level_percent": 15.0, "outcome": "validated"}
+    ],
+    "verification": [],
+    "replays": [
+        {"trial": "zigzag", "measured": HISTORIES, "simulated": {**HISTORIES, "u_mps": [7.0, 6.95, 6.9, 6.85]}}
+    ],
+}
+
+
+IDENTIFIED = {"method": "output_error", "derivatives": {}, "misfit": {}}
+IDENTIFIED |= {
+    "replays": [
+        {"trial": name, "held_out": held_out, "closed_loop": True, "measured": HISTORIES, "before": {}}
+        | {"found": {**HISTORIES, "u_mps": [7.0, 6.95, 6.9, 6.85]}}
+        for name, held_out in (("zigzag", False), ("turn", True))
+    ]
+}
+WAY = {"name": "starboard", "figures": {}, "ahead_m": [0.0, 500.0, 600.0], "starboard_m": [0.0, 50.0, 400.0]}
+POSTER = {"ship": "A ship", "turning_circles_deep": [WAY], "turning_circles_shallow": [], "stops": [], "telegraph": []}
+
+
+def rows_of(chart: Any) -> list[dict[str, Any]]:
+    return [row for rows in chart_specification(chart)["datasets"].values() for row in rows]
+
+
+def charts_of(page: Page) -> dict[str, Illustration]:
+    found = {}
+    for section in page.sections:
+        for one in section.charts:
+            title = chart_specification(one.chart).get("title", "")
+            found[title["text"] if isinstance(title, dict) else title] = one
+    return found
+
+
+def drawn(result: Any) -> dict[str, Illustration]:
+    """The charts of the page of a result, after its way through a file."""
+    return charts_of(result_page(json.loads(json_text(result)), "r.json"))
+
+
+def line(chart: Illustration, up: str, run: str | None = None) -> list[float]:
+    rows = {
+        row["i"]: row[up] for row in rows_of(chart.chart) if {up, "i"} <= set(row) and run in (None, row.get("run"))
+    }
+    return [rows[place] for place in sorted(rows)]
+
+
+def panels(chart: Illustration) -> dict[str, list[dict[str, Any]]]:
+    """Title of each panel to the rows of its first layer."""
+    specification = chart_specification(chart.chart)
+    found = {}
+    for panel in specification["vconcat"]:
+        title = panel["layer"][0]["encoding"]["y"]["axis"]["title"]
+        found[title] = specification["datasets"][panel["layer"][0]["data"]["name"]]
+    return found
+
+
+def test_a_simulated_manoeuvre_has_its_track_and_its_histories_in_their_units() -> None:
+    charts = drawn(SIMULATED)
+    assert list(charts) == ["Track: turn:10", "Histories: turn:10"]
+    track = [(row["x"], row["y"]) for row in rows_of(charts["Track: turn:10"].chart) if row["run"] == "simulated"]
+    assert track[:4] == list(zip(HISTORIES["x_m"], HISTORIES["y_m"], strict=True))
+    shown = panels(charts["Histories: turn:10"])
+    assert list(shown) == [
+        "rudder, + to starboard (deg)",
+        "revolutions (rpm)",
+        "heading (deg)",
+        "yaw rate (deg/s)",
+        "surge velocity (m/s)",
+    ]
+    for title, name in (("heading (deg)", "psi_deg"), ("revolutions (rpm)", "n_rpm"), ("yaw rate (deg/s)", "r_degps")):
+        assert [row["v"] for row in shown[title]] == pytest.approx(HISTORIES[name])
+    assert [row["v"] for row in shown["surge velocity (m/s)"]] == HISTORIES["u_mps"]
+
+
+def test_an_ensemble_is_drawn_as_bands_beside_the_run() -> None:
+    charts = drawn({**SIMULATED, "ensemble": ENSEMBLE})
+    speeds = panels(charts["Histories: turn:10"])["surge velocity (m/s)"]
+    for label, quantile in (("5 %", "p5"), ("50 %", "p50"), ("95 %", "p95")):
+        assert [row["v"] for row in speeds if row["run"] == label] == BAND[quantile]
+    low = [row["y"] for row in rows_of(charts["Track: turn:10"].chart) if row["run"] == "5 %"][:4]
+    assert low == pytest.approx([y - 0.1 for y in HISTORIES["y_m"]])
+
+
+def test_a_spiral_is_drawn_against_its_rudder() -> None:
+    figures = {"rudder_deg": [10.0, 0.0, -10.0], "rate_degps": [0.5, 0.1, -0.4]}
+    chart = drawn({**SIMULATED, "manoeuvre": "spiral", "figures": figures})["Steady yaw rate: spiral"]
+    rows = [(row["d"], row["r"]) for row in rows_of(chart.chart) if "i" in row]
+    assert [value for row in rows for value in row] == pytest.approx([10.0, 0.5, 0.0, 0.1, -10.0, -0.4])
+
+
+def test_an_older_result_without_histories_still_has_its_page() -> None:
+    assert drawn({key: value for key, value in SIMULATED.items() if key != "histories"}) == {}
+
+
+def test_places_of_findings_are_marked_in_the_panel_of_their_column_and_those_of_the_time_in_all() -> None:
+    page = result_page(AUDITED, "audit.json")
+    (chart,) = page.sections[0].charts
+    specification = chart_specification(chart.chart)
+    marked = []
+    for panel in specification["vconcat"]:
+        layers = [layer for layer in panel["layer"] if layer["mark"].get("style") == "region"]
+        rows = [specification["datasets"][layer["data"]["name"]] for layer in layers]
+        marked.append([(row["t"], row["end"], row["text"]) for one in rows for row in one])
+    assert marked == [[(1.0, 1.0, "2 spikes"), (2.0, 3.0, "1 gaps")], [(2.0, 3.0, "1 gaps")]]
+    assert [row[1] for row in page.sections[0].tables[0].rows] == ["psi [deg]", "t_s"]
+
+
+def test_a_validation_shows_errors_beside_their_uncertainty_and_the_replays() -> None:
+    charts = drawn(VALIDATED)
+    (row,) = (row for row in rows_of(charts["Comparison error and validation uncertainty"].chart) if "e" in row)
+    assert (row["e"], row["low"], row["high"]) == (10.0, -15.0, 15.0)
+    speeds = panels(charts["Histories: zigzag"])["surge velocity (m/s)"]
+    assert [row["v"] for row in speeds if row["run"] == "simulated"] == [7.0, 6.95, 6.9, 6.85]
+
+
+def test_an_identification_shows_each_trial_beside_both_cards_those_held_out_first() -> None:
+    charts = drawn(IDENTIFIED)
+    assert list(charts)[::2] == ["Track: turn (held out)", "Track: zigzag (fitted)"]
+    speeds = panels(charts["Histories: turn (held out)"])["surge velocity (m/s)"]
+    assert [row["v"] for row in speeds if row["run"] == "card found"] == [7.0, 6.95, 6.9, 6.85]
+
+
+def test_the_turning_circle_of_a_poster_is_drawn_with_the_way_ahead_up() -> None:
+    track = [row for row in rows_of(drawn(POSTER)["Turning circles in deep water"].chart) if row.get("i") is not None]
+    assert [(row["x"], row["y"]) for row in track[:3]] == list(zip(WAY["ahead_m"], WAY["starboard_m"], strict=True))
+
+
+@pytest.fixture(scope="module")
+def tow() -> dict[str, Any]:
+    tows = read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
+    result = identify_tow(tows, terms=("B3",))
+    return study_tows(result, towed_body(tows, result.mass_kg, {})).as_json()
+
+
+def test_tows_have_their_readings_their_fits_and_what_is_between_them(tow: dict[str, Any]) -> None:
+    charts = drawn(tow)
+    titles = ["Speeds of the tows and of the models", "Models of different size", "M and B3 together"]
+    assert list(charts)[:4] == [*titles, "Drag coefficient (Fig. 2)"]
+    speed, left = panels(charts[titles[0]]).values()
+    first, *_ = tow["speeds"]["simulated_mps"]
+    assert [row["v"] for row in speed if row["run"] == first] == pytest.approx(
+        tow["speeds"]["simulated_mps"][first], 1e-5
+    )
+    assert {row["v"] for row in left if row["run"] == first} == {0.0}
+    models = {row["name"]: row["m"] for row in rows_of(charts[titles[1]].chart)}
+    assert models == {
+        ", ".join(one["unknowns"]): pytest.approx(one["estimates"]["M"], rel=1e-5) for one in tow["models"]
+    }
+
+
+@pytest.fixture(scope="module")
+def yaw(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    truth = Truth(humps=1)
+    path = written(tmp_path_factory.mktemp("yaw") / "water.csv", truth, record(truth))
+    return identify_yaw([read_yaw_record(path)], YawOptions(inertia_kgm2=0.0204)).as_json()
+
+
+def test_the_yaw_rig_has_estimates_balance_residuals_and_records(yaw: dict[str, Any]) -> None:
+    charts = drawn(yaw)
+    assert list(charts)[:4] == [
+        "Added inertia by method",
+        "Work of the motor, and what it goes into",
+        "Residuals of the energy balance",
+        "water.csv: programme and record",
+    ]
+    rows = [row for row in rows_of(charts["Residuals of the energy balance"].chart) if "hump" in row]
+    assert [row["v"] for row in rows] == pytest.approx(
+        [1e6 * one["left_J"] for one in yaw["energy_residuals"]], rel=1e-5
+    )
+    estimates = {row["name"]: row["v"] for row in rows_of(charts["Added inertia by method"].chart) if "name" in row}
+    for method, value in yaw["added_inertia_kgm2"].items():
+        assert estimates[method.replace("_", " ")] == pytest.approx(1e4 * value, rel=1e-5)
+
+
+@pytest.fixture(scope="module")
+def glide() -> dict[str, Any]:
+    asked = GlideQuestion(angles_rad=(math.radians(-30),))
+    return glide_study(read_card("kulikovsky-velikanov"), asked).as_json()
+
+
+def test_a_glider_has_its_polar(glide: dict[str, Any]) -> None:
+    speeds = line(drawn(glide)["Glide polar"], "y")
+    assert speeds == pytest.approx([-climb for climb in glide["polar"]["climb_mps"]], rel=1e-5)
+
+
+RESPONSE = {"omega_radps": list(np.logspace(-3, 1, 60))}
+LOOP = 0.1 / (1j * np.array(RESPONSE["omega_radps"]) * (1 + 10j * np.array(RESPONSE["omega_radps"])))
+MARGINS = {
+    "speed_mps": 7.7,
+    "gain_margin_up": None,
+    "gain_margin_down": 0.0,
+    "phase_margin_deg": 60.0,
+    "delay_margin_s": 10.0,
+    "sensitivity_peak": float(1 / np.abs(1 + LOOP).min()),
+    "crossover_radps": 0.1,
+    "bandwidth_radps": 0.1,
+    "stable": True,
+    "poles": [[-0.05, 0.08], [-0.05, -0.08]],
+}
+CHANGE = {"ordered_deg": 20.0, "rise_time_s": 60.0, "overshoot_deg": 1.0, "settling_time_s": 200.0}
+CHANGE |= {"largest_rudder_deg": 15.0, "rate_limited_s": 3.0}
+KEEPING = ("duration_s", "heading_error_deg2s", "rudder_deg2s", "heading_error_rms_deg", "heading_error_mean_deg")
+KEEPING += ("rudder_rms_deg", "rudder_travel_degps", "rate_limited_percent")
+STEERED = {name: HISTORIES[name] for name in ("t_s", "delta_deg", "r_degps", "psi_deg")}
+PILOTED = {
+    "ship": "A ship",
+    "design": "pid",
+    "source": "poles placed",
+    "gains": {"Kp": 1.2},
+    "limits": {"largest_rudder_deg": 35.0},
+    "margins": {"at_design": MARGINS, "at_speeds": [MARGINS]},
+    "closed_loop": {
+        "course_changes": {"change": CHANGE, "large": CHANGE},
+        "course_keeping": dict.fromkeys(KEEPING, 1.0),
+        "largest_step_within_rate_limit_deg": 4.0,
+        "largest_step_within_angle_limit_deg": None,
+    },
+    "weather": {"current_mps": 0.5, "current_towards_deg": 90.0, "wind_mps": 10.0, "wind_from_deg": 45.0}
+    | {"wave_yaw_deg": 0.2, "wave_radps": 0.6, "seed": 1},
+    "track": {},
+    "ship_alone": {"speed_mps": 7.7, "stable": True, "rudder_deg": -1.0, "K_per_s": 0.2, "T_s": 100.0},
+    "responses": [
+        {"speed_mps": 7.7, **RESPONSE, "loop_real": list(LOOP.real), "loop_imaginary": list(LOOP.imag)}
+        | {"heading_real": list((LOOP / (1 + LOOP)).real), "heading_imaginary": list((LOOP / (1 + LOOP)).imag)}
+    ],
+    "histories": dict.fromkeys(("change", "large", "keeping"), STEERED),
+    "notices": [],
+}
+
+
+def test_an_autopilot_has_its_loop_and_its_steps() -> None:
+    charts = drawn(PILOTED)
+    assert list(charts) == [
+        "Loop transfer",
+        "Nyquist curve",
+        "Sensitivity and closed loop",
+        "Poles of the closed loop",
+        "Course change by 20 deg",
+        "A change that takes the rudder to its limit",
+        "Course keeping, the last waves",
+    ]
+    magnitude, phase = panels(charts["Loop transfer"]).values()
+    assert [row["v"] for row in magnitude] == pytest.approx(20 * np.log10(np.abs(LOOP)), rel=1e-4)
+    assert [row["v"] for row in phase] == pytest.approx(np.degrees(np.angle(LOOP)), rel=1e-4)
+    sensitivity = line(charts["Sensitivity and closed loop"], "v", "S, 7.7 m/s")
+    wanted = -20 * np.log10(np.abs(1 + LOOP))
+    assert sensitivity == pytest.approx(wanted[wanted > -60], rel=1e-4)
+    assert [row["v"] for row in panels(charts["Course change by 20 deg"])["heading (deg)"]] == HISTORIES["psi_deg"]
+
+
+def test_an_older_autopilot_without_responses_has_tables_in_their_place() -> None:
+    older = {key: value for key, value in PILOTED.items() if key not in ("responses", "histories", "ship_alone")}
+    assert [section.heading for section in result_page(older, "a.json").sections][:2] == ["Overview", "Gains"]
+
+
+def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
+    command = "influence mariner --figure criterion_C K_per_s --json i.json --page i.html".split()
+    assert tank2sim(*command, cwd=tmp_path).returncode == 0
+    assert tank2sim("report", "i.json", "-o", "r.html", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "i.html").read_bytes() == (tmp_path / "r.html").read_bytes()
+    told = json.loads((tmp_path / "i.json").read_text())
+    chart = charts_of(result_page(told, "i.json"))["Influence on criterion_C, K_per_s"]
+    bars = {(row["name"], row["exact"]) for row in rows_of(chart.chart) if row.get("run") == "exact slope"}
+    exact = told["influence_percent"]["criterion_C"]["derivatives.Nr"]["exact"]
+    assert any(name == "Nr" and value == pytest.approx(exact, rel=1e-5) for name, value in bars)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in")
+def test_the_charts_of_every_kind_open_without_a_word_in_the_console(
+    tow: dict[str, Any], yaw: dict[str, Any], glide: dict[str, Any], tmp_path: Any
+) -> None:
+    results = [{**SIMULATED, "ensemble": ENSEMBLE}, AUDITED, VALIDATED, IDENTIFIED, POSTER, tow, yaw, glide, PILOTED]
+    pages = [result_page(json.loads(json_text(one)), "r.json") for one in results]
+    sections = [
+        PageSection(heading=page.title, charts=[chart for section in page.sections for chart in section.charts])
+        for page in pages
+    ]
+    html = render_page(Page(title="All", sections=sections))
+    assert len(html.encode()) < 6e6
+    seen, console = opened(html, tmp_path)
+    assert console == []
+    assert 'data-charts="drawn"' in seen
+    assert seen.count("<svg") >= sum(len(section.charts) for section in sections)

@@ -1,0 +1,46 @@
+"""The page of cards compared: what it says and draws."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from tank2sim.analysis.validation.comparison import compare_cards
+from tank2sim.cli.console import json_text
+from tank2sim.report.comparison.page import compare_page
+from tank2sim.report.kit.charts import chart_specification
+from tank2sim.report.kit.page import render_page
+from tank2sim.report.results.page import result_page
+
+
+@pytest.fixture(scope="module")
+def found(mariner_card):
+    changed = {**mariner_card.derivatives, "Nd": 1.2 * mariner_card.derivatives["Nd"]}
+    certain = dict.fromkeys(mariner_card.derivatives, 1e-4)
+    other = replace(mariner_card, derivatives=changed, uncertainty=certain, source="trial.toml")
+    return compare_cards([mariner_card, other], 0)
+
+
+def test_the_page_tells_what_differs_and_draws_both_tracks(found) -> None:
+    page = compare_page(found)
+    assert [section.heading for section in page.sections][:3] == ["Cards", "Coefficients", "Turn 35 deg to starboard"]
+    rows = {row[0]: row for row in page.sections[1].tables[0].rows}
+    assert rows["Nd"][5] == pytest.approx(-20.0)  # the file counts its rudder to port: Nd is negative there
+    assert rows["Nd"][2].endswith("*") and rows["Nd"][4] == pytest.approx(0.1)
+    tracks = chart_specification(page.sections[2].charts[0].chart)
+    runs = {row["run"] for data in tracks["datasets"].values() for row in data if "run" in row}
+    assert runs == {"mariner", "trial"}
+    assert "Mariner class" in render_page(page)
+
+
+def test_the_chart_of_errors_has_a_point_for_each_difference(found) -> None:
+    specification = chart_specification(compare_page(found).sections[1].charts[0].chart)
+    points = [row for data in specification["datasets"].values() for row in data if "name" in row]
+    assert len(points) == len(found.in_errors(1))
+
+
+def test_the_report_of_the_json_is_this_page(found) -> None:
+    told = json.loads(json_text(found.as_json()))
+    assert render_page(result_page(told, "c.json")) == render_page(compare_page(found))
