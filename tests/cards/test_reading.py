@@ -81,7 +81,7 @@ def test_degrees_and_radians_are_one() -> None:
 
 def test_a_card_is_written_back_without_loss(tmp_path: Path) -> None:
     for path in bundled_cards().values():
-        read_card(path).write(tmp_path / "copy.toml")
+        read_card(path).save(tmp_path / "copy.toml")
         assert (tmp_path / "copy.toml").read_text(encoding="utf-8") == path.read_text(encoding="utf-8")
 
 
@@ -239,7 +239,7 @@ def test_line_ends_and_byte_order_mark_are_written_back(tmp_path: Path) -> None:
     data = b"\xef\xbb\xbf" + SI_CARD.encode().replace(b"\n", b"\r\n")
     (tmp_path / "ship.toml").write_bytes(data)
     card = read_card(tmp_path / "ship.toml")
-    card.write(tmp_path / "copy.toml")
+    card.save(tmp_path / "copy.toml")
     assert (tmp_path / "copy.toml").read_bytes() == data
     new = revised(card, {"Yv": (card.derivatives["Yv"], 0.0)}).text
     assert new.startswith("\ufeff\r\nformat") and "# kg\r\n" in new

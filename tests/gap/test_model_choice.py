@@ -14,8 +14,8 @@ from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY
+from tank2sim.gap.search import model_choice as module
 from tank2sim.gap.search.explanations import Search
-from tank2sim.gap.search.explanations import model_choice as module
 from tank2sim.gap.search.model_choice import (
     ALIKE,
     EVIDENCE_NEEDED,

@@ -51,7 +51,7 @@ class ManoeuvreResult(Result):
 
     def __init__(self, ship: Ship, words: str, run: Run, bands: ManoeuvreBands | None = None) -> None:
         self.ship, self.words, self.run, self.bands = ship, words, run, bands
-        self.notices = tuple(run.notices)
+        self.notices = tuple(dict.fromkeys([*run.notices, *(bands.asked.notices if bands else ())]))
 
     @property
     def figures(self) -> dict[str, float]:

@@ -6,7 +6,7 @@ import base64
 import html
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -31,7 +31,7 @@ class ResultTable:
     title : str
     columns : tuple of str
         Heads, units in brackets.
-    rows : list of list
+    rows : sequence of sequences
         Cells: numbers, text, truth values, lists of numbers, or None where there is no value.
     notes : tuple of str
         Sentences under the table.
@@ -39,7 +39,7 @@ class ResultTable:
 
     title: str
     columns: tuple[str, ...]
-    rows: list[list[object]]
+    rows: Sequence[Sequence[object]]
     notes: tuple[str, ...] = ()
 
     @property

@@ -344,6 +344,13 @@ def load(card: str | Path, values: Mapping[str, object] | None = None) -> Ship:
     return Ship(read_card(card, dict(values or {})))
 
 
+def as_ship(card: Ship | Card | str | Path) -> Ship:
+    """A ship, whatever names it: a ship itself, its card, a bundled ship's name or a file. Raises as :func:`load`."""
+    if isinstance(card, Ship):
+        return card
+    return Ship(card) if isinstance(card, Card) else load(card)
+
+
 def ships() -> pd.DataFrame:
     """The bundled ships: name (index) as :func:`load` takes it, title, kind of model, length (m) and source.
 

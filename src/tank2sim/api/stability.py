@@ -51,7 +51,8 @@ class StabilityResult(Result):
     def __init__(self, ship: Ship, study: StabilityStudy, bands: StabilityBands | None = None) -> None:
         self.ship, self.study, self.bands = ship, study, bands
         compiler = [] if find_compiler() else [NO_COMPILER]
-        self.notices = (*ship.model.notices, *study.notices, *compiler)
+        members = bands.asked.notices if bands else ()
+        self.notices = tuple(dict.fromkeys([*ship.model.notices, *study.notices, *compiler, *members]))
 
     @property
     def stable(self) -> bool:
@@ -75,7 +76,9 @@ class StabilityResult(Result):
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""
         ensemble = {"ensemble": self.bands.as_json()} if self.bands else {}
-        return {**self.study.as_json(), "notices": self.notices, **ensemble}
+        members = self.bands.asked.notices if self.bands else ()
+        notices = [notice for notice in self.notices if notice not in members or notice in self.study.notices]
+        return {**self.study.as_json(), "notices": notices, **ensemble}
 
     @property
     def headline(self) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tank2sim.cards.form import (
     BodySection,
@@ -25,8 +26,11 @@ from tank2sim.cards.form import (
 )
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
-from tank2sim.files import write_whole
+from tank2sim.files import write_together
 from tank2sim.units import from_si
+
+if TYPE_CHECKING:
+    from tank2sim.cards.covariance import Covariance
 
 DEFAULT_RELATIVE_ERROR = 0.02
 """Standard error of a derivative without ``[uncertainty]``, relative to its value (card format)."""
@@ -49,6 +53,9 @@ class Card:
         Particulars and surroundings, SI.
     model
         Kind of equations.
+    covariance : Covariance, optional
+        Of the card's numbers, where they were estimated here; a card that was read refers to a file of it
+        (:func:`tank2sim.cards.covariance.read_covariance`).
     """
 
     source: str
@@ -56,10 +63,30 @@ class Card:
     ship: BodySection
     environment: Environment
     model: ShipModel | SurgeModel | GliderModel | YawRigModel
+    covariance: Covariance | None = field(default=None, kw_only=True, compare=False, repr=False)
 
-    def write(self, path: Path) -> None:
-        """Write the card's text to a file, whole or not at all."""
-        write_whole(path, self.text)
+    def files(self, path: Path) -> dict[Path, str | bytes]:
+        """The files of the card at `path`: its text, and the covariance next to it if it was estimated here.
+
+        What is not a regular file (a pipe) takes the card alone.
+        """
+        from tank2sim.cards.covariance import covariance_file, not_referring, referring
+
+        if self.covariance is None:
+            return {path: self.text}
+        if path.exists() and not path.is_file():
+            return {path: not_referring(self.text)}
+        return {path: referring(self.text, path), covariance_file(path): self.covariance.as_text()}
+
+    def save(self, path: str | Path) -> None:
+        """Write the card to a file, with its covariance next to it; all or nothing.
+
+        Raises
+        ------
+        InputError
+            A file cannot be written.
+        """
+        write_together(self.files(Path(path)))
 
     def fault(self, place: str, problem: str, remedy: str) -> InputError:
         """An error about this card, to be raised."""

@@ -125,6 +125,8 @@ def read_covariance(card: Card) -> Covariance | None:
         The file is missing or no covariance (shape, names of the card, symmetric, positive semidefinite up to
         rounding), or its standard errors are not those of the card.
     """
+    if card.covariance is not None:
+        return card.covariance
     found = _LINE.search(card.text)
     if found is None:
         return None

@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from tank2sim.api.result import Result, cell_text
-from tank2sim.files import STANDARD_OUTPUT, plain_json, write_together
+from tank2sim.files import STANDARD_OUTPUT, plain_json, writable_folder, write_together
 from tank2sim.marks import marked
 
 screen = Console(highlight=False)
@@ -88,6 +88,7 @@ def write_result(
     json_file: Path | None = None,
     page: Path | None = None,
     plot: Path | None = None,
+    plots: Path | None = None,
     files: Mapping[Path, str | bytes] | None = None,
 ) -> None:
     """Write what of a result was asked for, all files or none.
@@ -99,6 +100,8 @@ def write_result(
         Files that must not be overwritten.
     json_file, page, plot : Path, optional
         JSON, page (HTML) and main chart (PNG).
+    plots : Path, optional
+        Folder for a picture of each chart, and the page as ``report.html``.
     files : mapping, optional
         Further files and their contents.
 
@@ -114,4 +117,8 @@ def write_result(
         contents[page] = result.page()
     if plot:
         contents[plot] = result.picture()
+    if plots:
+        writable_folder(plots)
+        contents |= {plots / f"{name}.png": result.picture(name) for name in result.charts()}
+        contents[plots / "report.html"] = result.page()
     write_together(contents, inputs=[Path(path) for path in inputs], outputs=[*(files or {}), json_file, page, plot])

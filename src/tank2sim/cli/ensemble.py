@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,9 @@ from tank2sim.analysis.ensemble.results import EnsembleRequest, Members, Stabili
 from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.cards.covariance import (
     HOLDS,
-    Covariance,
     carried,
-    covariance_file,
     not_referring,
     read_covariance,
-    referring,
 )
 from tank2sim.cli.console import screen, show_marked, show_notices, show_table
 from tank2sim.errors import InputError
@@ -73,13 +71,6 @@ def asked_of(given: Mapping[str, object]) -> EnsembleRequest | None:
     return EnsembleRequest(int(str(given["ensemble"])), int(str(given["seed"])))
 
 
-def with_covariance(text: str, output: Path, covariance: Covariance) -> dict[Path, str | bytes]:
-    """A card's file and its covariance beside it; the card alone where it goes to no file (a pipe)."""
-    if output.exists() and not output.is_file():
-        return {output: not_referring(text)}
-    return {output: referring(text, output), covariance_file(output): covariance.as_text()}
-
-
 def with_carried_covariance(card: Card, text: str, output: Path) -> tuple[dict[Path, str | bytes], list[str]]:
     """Files of a card made of `card`, with what of the covariance of that still holds; and what is to be told of it.
 
@@ -96,7 +87,7 @@ def with_carried_covariance(card: Card, text: str, output: Path) -> tuple[dict[P
         return {output: not_referring(text)}, [
             f"{output.name} has no covariance: all numbers of {card.source}'s changed"
         ]
-    files = with_covariance(text, output, kept)
+    files = replace(card, text=text, covariance=kept).files(output)
     if len(files) == 1 or len(kept.names) == len(known.names):
         return files, []
     changed = ", ".join(name.removeprefix("derivatives.") for name in known.names if name not in kept.names)

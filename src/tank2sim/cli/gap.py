@@ -10,6 +10,7 @@ from pathlib import Path
 
 import click
 
+from tank2sim.api.trials import fitted_and_held, trial_files
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import read_card
 from tank2sim.cli.console import json_option, screen, show_notices
@@ -17,7 +18,7 @@ from tank2sim.cli.ensemble import executor_option
 from tank2sim.cli.gap_files import GapFiles, folder_made, gap_file_contents, put, refuse_early
 from tank2sim.cli.gap_screen import show_gap
 from tank2sim.cli.progress import showing_stages
-from tank2sim.cli.trials import TakesSeveral, fitted_and_held, trial_files
+from tank2sim.cli.trials import TakesSeveral
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing

@@ -10,12 +10,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tank2sim.api.trials import fitted_and_held
 from tank2sim.cards import read_card
 from tank2sim.cli.console import json_text, show_notices
 from tank2sim.cli.gap_files import folder_made, gap_file_contents, put, refuse_early
 from tank2sim.cli.gap_screen import hundredths, line, wide_table
 from tank2sim.cli.progress import showing_stages
-from tank2sim.cli.trials import fitted_and_held
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
 from tank2sim.files import writable_folder, write_together

@@ -33,6 +33,15 @@ plot_option = click.option(
 )
 """``--plot FILE.png``."""
 
+plot_folder_option = click.option(
+    "--plot",
+    "plots",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Write a picture of each chart, and the page (report.html), into a folder.",
+)
+"""``--plot DIR``, where there are many charts."""
+
 executor_option = click.option(
     "--executor",
     default=PROCESSES,

@@ -12,12 +12,12 @@ from rich.markup import escape
 from tank2sim.analysis.stability.imo import imo_criteria
 from tank2sim.analysis.validation.standard_trials import MEMBERS, ship_of
 from tank2sim.analysis.validation.study import REQUIRED, Validation, Verified, validate, verify
+from tank2sim.api.trials import trial_files
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.cli.bridge import manoeuvring
 from tank2sim.cli.console import json_option, json_text, screen, show_marked, show_notices, show_table
 from tank2sim.cli.overrides import parse_changes
-from tank2sim.cli.trials import trial_files
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.gap.outcome.export import signal_display_name

@@ -10,7 +10,6 @@ import pytest
 from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
 from tank2sim.cards import parse_card, read_card
 from tank2sim.cards.covariance import Covariance
-from tank2sim.cli.ensemble import with_covariance
 from tank2sim.dynamics import build
 from tank2sim.identification.captive.covariance import reduction_covariance
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
@@ -104,8 +103,7 @@ def turn_inside_its_band(folder, seed):
     text = reduced_card_text(reduction, card, 50.0)
     for estimated in card.estimated:  # of what was not measured both ships have the same, without any doubt
         text = re.sub(rf"(\[uncertainty\].*?^{estimated} = )\S+", r"\g<1>1e-15", text, flags=re.DOTALL | re.MULTILINE)
-    for file, content in with_covariance(text, path, covariance).items():
-        file.write_text(content) if isinstance(content, str) else file.write_bytes(content)
+    replace(parse_card(text, str(path)), covariance=covariance).save(path)
     found = read_card(str(path))
     known = {name: value for name, value in written.derivatives.items() if value and name not in {"X0", "Xudot"}}
     true = {name: value for name, value in found.derivatives.items() if name in card.estimated} | known

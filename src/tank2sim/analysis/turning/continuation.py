@@ -58,6 +58,12 @@ def corrector_step(equations: ContinuationEquations, guess: Array, row: Array) -
     """The solution near `guess` in the plane through it whose normal is `row` (n + 1,): point, Jacobian, iterations.
 
     None if Newton's method does not come to one.
+
+    Parameters
+    ----------
+    equations : callable
+        Residual (n,) and Jacobian (n, n + 1) at a point (n + 1,).
+    guess, row : array (n + 1,)
     """
     point = guess.copy()
     for iteration in range(_ITERATIONS):
@@ -86,7 +92,15 @@ def tangent(jacobian: Array, along: Array) -> Array | None:
 
 
 def follow_branch(equations: ContinuationEquations, start: Array, direction: Array, bounds: Bounds) -> Curve:
-    """The curve from a point on it (n + 1,), to the side of `direction` (n + 1,)."""
+    """The curve from a point on it, to the side of a direction.
+
+    Parameters
+    ----------
+    equations : callable
+        Residual (n,) and Jacobian (n, n + 1) at a point (n + 1,).
+    start, direction : array (n + 1,)
+    bounds : Bounds
+    """
     found = tangent(equations(start)[1], direction)
     if found is None:
         return Curve(start[None, :], direction[None, :] / np.linalg.norm(direction), STALLED)

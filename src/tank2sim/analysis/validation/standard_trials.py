@@ -70,7 +70,15 @@ class TrialShip:
         parameters: Mapping[str, float] | None = None,
         inputs: Mapping[str, float] | None = None,
     ) -> Run | str:
-        """The trial in calm water, or why it cannot be run."""
+        """The trial in calm water, or why it cannot be run.
+
+        Parameters
+        ----------
+        manoeuvre : Manoeuvre
+            Of :mod:`tank2sim.simulation.manoeuvres`.
+        parameters, inputs : mapping, optional
+            Values in place of the model's, by name, SI.
+        """
         calm = {name: 0.0 for name in self.model.input_names if name in ("current.speed", "wind.speed")}
         try:
             return simulate(

@@ -1,0 +1,262 @@
+"""Coefficients identified from free-running trials, as a result with its card."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tank2sim.analysis.ensemble.draws import by_file_name
+from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.ship import Ship, as_ship
+from tank2sim.api.trials import TrialPaths, fitted_and_held
+from tank2sim.cards import Card, ManoeuvringCard, parse_card
+from tank2sim.errors import InputError
+from tank2sim.executors import PROCESSES, check_executor, executing
+from tank2sim.identification.trials.as_json import (
+    estimate_rows,
+    figure_rows,
+    following_rows,
+    identification_as_json,
+    identified_card_text,
+    structure_rows,
+)
+from tank2sim.identification.trials.assessment.notices import remarks
+from tank2sim.identification.trials.assessment.replays import replays, replays_as_json
+from tank2sim.identification.trials.identify import AUTO, TRIAL_METHODS, Identification, IdentificationOptions
+from tank2sim.identification.trials.identify import identify as identify_trials
+from tank2sim.identification.trials.problem.estimation_problem import Progress, silent
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.structures import STRUCTURES
+from tank2sim.marks import FORCED
+from tank2sim.units import in_words
+
+if TYPE_CHECKING:
+    import altair as alt
+    import pandas as pd
+
+
+class IdentificationResult(Result):
+    """Coefficients identified from trials, and how well the new card follows trials.
+
+    Parameters
+    ----------
+    before : ManoeuvringCard
+        The card that was given.
+    identification : Identification
+        SI and radians.
+    fitted, held : Measured
+        Trials that were fitted, and trials that were only compared with.
+    """
+
+    command = "identify"
+
+    def __init__(
+        self, before: ManoeuvringCard, identification: Identification, fitted: Measured, held: Measured
+    ) -> None:
+        self.before, self.identification, self.fitted, self.held = before, identification, fitted, held
+        self.remarks = tuple(remarks(identification))
+        forced = (f"{FORCED}: {'; '.join(identification.forced)}",) if identification.forced else ()
+        self.notices = (*forced, *identification.notices, *identification.identifiability.notices, *self.remarks)
+
+    @cached_property
+    def card(self) -> Card:
+        """The card found, with the covariance of its estimates; ``card.save("better.toml")`` writes it."""
+        found = self.identification
+        text = identified_card_text(found, [trial.name for trial in self.fitted.trials])
+        covariance = by_file_name(found.card, found.estimate.free, found.estimate.covariance)
+        return replace(parse_card(text, "the card found"), covariance=covariance)
+
+    @property
+    def ship(self) -> Ship:
+        """The ship of the card found."""
+        return Ship(self.card)
+
+    @property
+    def estimates(self) -> pd.DataFrame:
+        """What was estimated, by name: value and standard error, prime or SI, rudder positive to starboard."""
+        import pandas as pd
+
+        estimate = self.identification.estimate
+        columns = {"value": estimate.values, "standard_error": estimate.standard_errors}
+        return pd.DataFrame(columns, index=pd.Index(estimate.free, name="name"))
+
+    @property
+    def figures(self) -> pd.DataFrame:
+        """Figures of each trial: measured, by the card before and now, error, and its 95 % interval if held out."""
+        import pandas as pd
+
+        columns = ["trial", "set", "figure", "measured", "before", "now", "error", "interval_95"]
+        return pd.DataFrame(figure_rows(self.identification), columns=columns)
+
+    def content(self) -> Mapping[str, object]:
+        """As :meth:`.Result.content`."""
+        return {**identification_as_json(self.identification, self.remarks), "replays": self._replays()}
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """None: the first table says it."""
+        return ()
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """Estimates, errors of the yaw rate, figures; bootstrap and cross-validation where asked for."""
+        found = self.identification
+        estimate = found.estimate
+        title = f"{found.card.ship.name}: {len(estimate.free)} coefficients from {len(found.problem.runs)} trials"
+        tables = [ResultTable(title, ("", "found", "before", "from trials"), estimate_rows(found))]
+        if found.bootstrap is not None:
+            scatter = found.bootstrap.std(axis=0, ddof=1)
+            triples = zip(estimate.free, estimate.standard_errors, scatter, strict=True)
+            tables.append(
+                ResultTable(
+                    f"Standard errors, and scatter over {len(found.bootstrap)} sets of trials simulated again",
+                    ("", "standard error", "bootstrap"),
+                    [[name, float(error), float(deviation)] for name, error, deviation in triples],
+                )
+            )
+        tables.append(
+            ResultTable(
+                "Yaw rate: error over windows of 5 ship lengths, of its root mean square",
+                ("trial", "", "before", "now"),
+                following_rows(found),
+            )
+        )
+        if rows := structure_rows(found):
+            columns = ("structure", "one at a time, mean", "those of largest amplitude")
+            tables.append(ResultTable("Yaw-rate error of trials left out of the fit, %", columns, rows))
+        if rows := figure_rows(found):
+            tables.append(
+                ResultTable(
+                    "Figures, simulated in closed loop from the measured start, with the rudder rate and lag of each "
+                    "trial",
+                    ("trial", "", "figure", "measured", "before", "now", "error", "95 %"),
+                    [[trial, word, ", ".join(in_words(str(name))), *rest] for trial, word, name, *rest in rows],
+                )
+            )
+        return tuple(tables)
+
+    def charts(self) -> dict[str, alt.TopLevelMixin]:
+        """Tracks, histories, errors and parameters, by file stem."""
+        from tank2sim.report.identification.page import identification_charts, pairs_of
+
+        fitted, held = (
+            pairs_of(self.before, self.identification, group) if group.trials else ()
+            for group in (self.fitted, self.held)
+        )
+        return dict(identification_charts(self.identification, fitted, held))
+
+    def page(self) -> str:
+        """As :meth:`.Result.page`."""
+        from tank2sim.report.identification.page import identification_page
+        from tank2sim.report.kit.page import render_page
+
+        return render_page(identification_page(self.identification, self.charts()))
+
+    def _replays(self) -> list[dict[str, object]]:
+        """Every trial, fitted or held out, next to both cards."""
+        return [
+            entry
+            for held_out, group in ((False, self.fitted), (True, self.held))
+            if group.trials
+            for entry in replays_as_json(replays(self.before, self.identification, group), held_out=held_out)
+        ]
+
+
+def identify(
+    card: Ship | Card | str | Path,
+    trials: TrialPaths,
+    *,
+    holdout: TrialPaths = (),
+    method: str = "output_error",
+    structure: str = "card",
+    inertia: bool = False,
+    piece_s: float | None = None,
+    trust_card: bool = False,
+    hold: Sequence[str] = (),
+    force: bool = False,
+    members: int = 100,
+    bootstrap: int = 0,
+    executor: str = PROCESSES,
+    workers: int | None = None,
+    progress: Progress = silent,
+) -> IdentificationResult:
+    """Identify the coefficients of a ship from free-running trials.
+
+    Parameters
+    ----------
+    card : Ship, Card, str or path
+        What is known of the ship beforehand; its standard errors say how well.
+    trials, holdout : path or sequence of paths
+        Trials to fit, and trials only to compare with; a folder stands for the trials in it.
+    method : str
+        ``output_error``, ``equation_error``, ``kalman`` or ``recursive``.
+    structure : str
+        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, or ``auto``: by cross-validation.
+    inertia : bool
+        Estimate acceleration derivatives, too.
+    piece_s : float, optional
+        Length of the pieces of output error, s; by default 5 L/u0.
+    trust_card : bool
+        Take the card's standard errors as they are.
+    hold : sequence of str
+        Derivatives or parameters of effects that stay as the card has them.
+    force : bool
+        Fit trials also where they look like another ship's; the result is marked.
+    members : int
+        Simulations behind the intervals of the figures of held-out trials.
+    bootstrap : int
+        Sets of trials simulated again with the estimate and fitted, for its scatter.
+    executor : str
+        ``processes`` or ``dask://host:port``.
+    workers : int, optional
+        Processes for cross-validation and bootstrap.
+    progress : callable
+        Called with stage, values and cost of each better estimate.
+
+    Raises
+    ------
+    InputError
+        A file is at fault, the trials are not of the card's ship, or they do not determine the coefficients.
+    """
+    for name, value, known in (("method", method, TRIAL_METHODS), ("structure", structure, (*STRUCTURES, AUTO))):
+        if value not in known:
+            raise InputError(name, "", f"{value!r} is not known", f"there are: {', '.join(known)}")
+    if piece_s is not None and not 0 < piece_s < float("inf"):
+        raise InputError("--piece", "", f"is {piece_s:g} s", "a positive number of seconds was expected")
+    ship = as_ship(card).manoeuvring()
+    options = IdentificationOptions(
+        method=method,
+        structure=structure,
+        inertia=inertia,
+        piece_s=piece_s,
+        scale_prior=not trust_card,
+        members=members,
+        bootstrap=bootstrap,
+        hold=tuple(hold),
+        force=force,
+    )
+    fitted, held = fitted_and_held(trials, holdout, ship)
+    with _computing(options, executor, workers, held=bool(held.trials)) as pool:
+        found = identify_trials(ship, fitted, held, options, progress, pool)
+    return IdentificationResult(ship, found, fitted, held)
+
+
+@contextmanager
+def _computing(
+    options: IdentificationOptions, executor: str, workers: int | None, *, held: bool
+) -> Iterator[Executor | None]:
+    """For cross-validation and bootstrap; a cluster for the intervals of what is held out, too."""
+    here = check_executor(executor) == PROCESSES
+    if not here and not (options.structure == AUTO or options.bootstrap or (held and options.members)):
+        remedy = f"give --structure {AUTO}, --bootstrap N or --holdout TRIAL, too"
+        raise InputError("--executor", "", "has nothing to do", remedy)
+    if here and options.structure != AUTO and not options.bootstrap:
+        yield None
+        return
+    with executing(executor, workers) as pool:
+        yield pool
