@@ -82,7 +82,8 @@ def _parameter(one: EffectParameter) -> str:
     if suffix in _SUFFIXES:
         suffix, factor = _SUFFIXES[suffix]
     name = f"{stem}_{suffix}" if suffix else stem
-    bounds = f"{one.minimum * factor:.4g} to {one.maximum * factor:.4g}"
+    lowest = "by the card" if callable(one.minimum) else f"{one.minimum * factor:.4g}"
+    bounds = f"{lowest} to {one.maximum * factor:.4g}"
     default = "required" if one.default is None else "by the card" if callable(one.default) else _number(one, factor)
     held = f" (input `{one.input_name}`)" if one.input_name else ""
     return f"| `{name}` | {_UNITS.get(suffix, '1')} | {bounds} | {default} | {_text(one.description)}{held} |"

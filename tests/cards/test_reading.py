@@ -221,6 +221,19 @@ def test_the_propeller_term_of_a_dimensional_card_is_a_force() -> None:
         ("[rigid_body]", "valid_speed_mps = [9.0, 3.0]\n[rigid_body]", "model.valid_speed_mps", "the lower first"),
         ("[rigid_body]", f"valid_speed_mps = [1, {'9' * 400}]\n[rigid_body]", "model.valid_speed_mps", "100 m/s"),
         ("Yv = -6e5", f"Yv = {'9' * 400}", "derivatives.Yv", "number"),
+        ("[rigid_body]", "low_speed_below_mps = -1\n[rigid_body]", "model.low_speed_below_mps", "at least 0 "),
+        (
+            "[derivatives]",
+            '[[fitted_trials]]\nname = "z"\nt_s = [0.0, 0.0]\n[derivatives]',
+            "fitted_trials.0",
+            "times t_s that rise",
+        ),
+        (
+            "[derivatives]",
+            '[[fitted_trials]]\nname = "z"\nt_s = [0.0, 1.0]\nsignals = {psi_rad = [1.0]}\n[derivatives]',
+            "fitted_trials.0",
+            "psi_rad has 1 value",
+        ),
     ],
 )
 def test_what_no_ship_can_have_is_refused_in_one_short_line(old: str, new: str, place: str, expected: str) -> None:

@@ -16,6 +16,7 @@ from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.gap.outcome.improve_card import add_effects_to_card, card_with_effects_text
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, Gap, Named
+from tank2sim.identification.trials.problem.signatures import fitted_as
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.trial_file import trial_csv
@@ -108,6 +109,7 @@ def test_a_current_is_written_into_a_card_a_page_and_json(folder: Path, tmp_path
     improved = read_card(out / "improved.toml")
     assert isinstance(improved, ManoeuvringCard)
     assert [one.name for one in improved.effects] == ["current"]
+    assert [fitted_as(improved, one) for one in (*fitted.trials, *held.trials)] == ["turn20", "zigzag", None]
     assert improved.text.startswith("# current added by tank2sim gap from turn20, zigzag\n")
     assert (out / "next_test.csv").read_text().startswith("t_s,delta_order_deg")
     assert "</html>" in (out / "report.html").read_text(encoding="utf-8")

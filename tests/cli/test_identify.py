@@ -15,7 +15,7 @@ from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance import read_covariance
 from tank2sim.identification.trials.assessment.evaluation import predicted_figures
 from tank2sim.identification.trials.problem.prepare_trials import measured
-from tests.identification.trials.made_up_ship import CARD, LENGTH, SPEED, TRUTH, trial, turn, zigzag
+from tests.identification.trials.made_up_ship import CARD, LENGTH, TRUTH, trial, turn, zigzag
 
 from .command_line import refused, tank2sim
 
@@ -54,9 +54,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name, value in TRUTH.items():
         text += f"{name} = {value if name.endswith('dot') else value * (1 + 0.2 * rng.choice([-1, 1]))}\n"
     (folder / "off.toml").write_text(text, encoding="utf-8")
-    # The made-up ship's polynomial is her truth at all speeds; a card identified from trials would state theirs.
-    every = text.replace(f"speed_mps = {SPEED}", f"speed_mps = {SPEED}\nvalid_speed_mps = [1.0, 6.0]")
-    (folder / "off_at_all_speeds.toml").write_text(every, encoding="utf-8")
     return folder
 
 
@@ -65,7 +62,7 @@ FITTED = ("zigzag20.csv", "zigzag10.csv", "turn25.csv")
 
 def test_a_card_that_is_off_comes_back_to_the_truth(folder: Path) -> None:
     result = tank2sim(
-        *("identify", "off_at_all_speeds.toml", *FITTED, "--holdout", "turn-35.csv"),
+        *("identify", "off.toml", *FITTED, "--holdout", "turn-35.csv"),
         *("-o", "found.toml", "--json", "found.json"),
         cwd=folder,
     )
@@ -283,6 +280,33 @@ def test_a_copy_of_a_trial_that_is_fitted_cannot_be_held_out(folder: Path) -> No
     for command in ("identify", "validate"):
         result = tank2sim(command, "off.toml", "zigzag20.csv", "another_run.csv", cwd=folder)
         refused(result, "another_run.csv", "zigzag20.csv again")
+
+
+def test_a_renamed_copy_of_a_trial_that_made_the_card_is_never_held_out(folder: Path) -> None:
+    """Its columns in another order, with fewer digits, every second row, and its first rows cut."""
+    made = ("identify", "off.toml", "zigzag10.csv", "turn25.csv", "--method", "equation_error", "-o", "signed.toml")
+    assert tank2sim(*made, cwd=folder).returncode == 0
+    heads, *rows = ((folder / "turn25.csv").read_text()).splitlines()
+    cells = [[f"{float(cell):.5g}" for cell in reversed(line.split(","))] for line in rows[4::2]]
+    lines = [",".join(reversed(heads.split(","))), *(",".join(row) for row in cells)]
+    (folder / "unheard.csv").write_text("\n".join(lines) + "\n")
+    result = tank2sim("validate", "signed.toml", "unheard.csv", "turn-35.csv", "--json", "signed.json", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    assert "unheard: the card was identified from this trial (as turn25)" in " ".join(result.stdout.split())
+    figures = json.loads((folder / "signed.json").read_text())["figures"]
+    own, other = ([one for one in figures if one["trial"] == trial] for trial in ("unheard", "turn-35"))
+    assert own and all(one["made_card"] and one["outcome"] in ("only fitted", "not validated") for one in own)
+    assert any(one["outcome"] == "only fitted" for one in own)
+    assert other and not any(one["made_card"] for one in other)
+    for command in ("identify", "gap"):
+        asked = (command, "signed.toml", "zigzag20.csv", "--holdout", "unheard.csv", "-o", "held_out")
+        refused(tank2sim(*asked, cwd=folder), "unheard.csv", "is held out", "signed.toml was fitted to it", "turn25")
+        assert not (folder / "held_out").exists()
+    again = ("identify", "signed.toml", "zigzag10.csv", "zigzag20.csv", "--method", "equation_error", "-o", "more.toml")
+    assert tank2sim(*again, cwd=folder).returncode == 0
+    card = read_card(str(folder / "more.toml"))
+    assert isinstance(card, ManoeuvringCard)
+    assert [one.name for one in card.fitted_trials] == ["zigzag10", "turn25", "zigzag20"]
 
 
 def test_a_card_of_another_ship_is_refused_unless_forced(folder: Path) -> None:

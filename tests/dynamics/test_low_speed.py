@@ -139,6 +139,22 @@ def test_validity_is_one_in_the_range_and_nothing_well_outside_it_or_astern() ->
     assert all(b >= a for a, b in itertools.pairwise(along))
 
 
+def test_the_polynomial_reaches_as_far_down_as_the_card_says_and_validity_ends_where_it_was_measured() -> None:
+    whole = build(driven(valid_speed_mps="valid_speed_mps = [3.0, 9.3]"))
+    narrow = build(driven(valid_speed_mps="valid_speed_mps = [6.0, 9.3]\nlow_speed_below_mps = 3.0"))
+    place = narrow.outputs.index("validity")
+    for u in (1.0, 2.5, 2.9, 3.5, 5.0, 7.0):
+        x = state(whole, u, -0.1 * u, 0.002, 0.1)
+        for axis in "XYN":
+            name = f"force.{axis}"
+            assert force(narrow, name, x) == force(whole, name, x), (u, name)
+    validity = {
+        u: float(narrow.output(state(narrow, u), narrow.input_values(), narrow.parameter_values())[place])
+        for u in (6.0, 5.0, 4.0, 3.1)
+    }
+    assert validity[6.0] == 1.0 and 0 < validity[5.0] < 1 and validity[4.0] == validity[3.1] == 0.0
+
+
 # -- regular everywhere ----------------------------------------------------------------------------------------------
 
 

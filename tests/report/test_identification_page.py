@@ -32,10 +32,8 @@ COLUMNS = {"delta_deg": "delta_rad", "u_mps": "u_mps", "v_mps": "v_mps", "r_degp
 def text_of(factors):
     """The made-up ship's card in which these derivatives are off, little known, and the only ones to estimate."""
     lines, errors = [], ["[uncertainty]"]
-    # Without a stated range the card found would state the speeds of its trials, and take the form at low speed below.
-    range_of_speeds = "[model]\nvalid_speed_mps = [1.0, 6.0]"
     gear = "[steering_gear]\nmax_rate_degps = 20.0\nmax_angle_deg = 40.0"
-    for line in made_up_ship.CARD.replace("[steering_gear]", gear).replace("[model]", range_of_speeds).splitlines():
+    for line in made_up_ship.CARD.replace("[steering_gear]", gear).splitlines():
         name, _, value = line.partition(" = ")
         factor = factors.get(name) if name in made_up_ship.TRUTH else None
         lines.append(f"{name} = {float(value) * factor}" if factor else line)

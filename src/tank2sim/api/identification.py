@@ -31,6 +31,7 @@ from tank2sim.identification.trials.identify import AUTO, TRIAL_METHODS, Identif
 from tank2sim.identification.trials.identify import identify as identify_trials
 from tank2sim.identification.trials.problem.estimation_problem import Progress, silent
 from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.signatures import with_fitted_trials
 from tank2sim.identification.trials.problem.structures import STRUCTURES
 from tank2sim.marks import FORCED
 from tank2sim.units import in_words
@@ -68,6 +69,7 @@ class IdentificationResult(Result):
         """The card found, with the covariance of its estimates; ``card.save("better.toml")`` writes it."""
         found = self.identification
         text = identified_card_text(found, [trial.name for trial in self.fitted.trials])
+        text = with_fitted_trials(text, "the card found", self.fitted.trials)
         covariance = by_file_name(found.card, found.estimate.free, found.estimate.covariance)
         return replace(parse_card(text, "the card found"), covariance=covariance)
 

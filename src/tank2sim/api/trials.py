@@ -8,6 +8,7 @@ from pathlib import Path
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
+from tank2sim.identification.trials.problem.signatures import fitted_as
 from tank2sim.records.reading import looks_like_a_trial
 from tank2sim.records.same_record import refuse_copies
 
@@ -38,11 +39,15 @@ def fitted_and_held(trials: TrialPaths, holdout: TrialPaths, card: ManoeuvringCa
     ------
     InputError
         A file is at fault (:func:`tank2sim.identification.trials.problem.prepare_trials.measured`), or two have one
-        name or are one record, also where one of them is held out.
+        name or are one record, also where one of them is held out; or the card was fitted to one that is held out.
     """
     fitted, held = measured(trial_files(trials), card), measured(trial_files(holdout), card)
     for trial in held.trials:
         if trial.name in {other.name for other in fitted.trials}:
             raise InputError(trial.path, "", "is both fitted and held out", "hold out what is not fitted")
     refuse_copies(fitted.trials, held.trials)
+    for trial in held.trials:
+        if (name := fitted_as(card, trial)) is not None:
+            problem = f"is held out, and {card.source} was fitted to it: it is the record of {name}"
+            raise InputError(trial.path, "", problem, "hold out what the card was not fitted to")
     return fitted, held

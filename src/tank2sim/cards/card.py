@@ -11,6 +11,7 @@ from tank2sim.cards.form import (
     BodySection,
     EffectEntry,
     Environment,
+    FittedTrial,
     Glider,
     GliderModel,
     ProgrammeSection,
@@ -115,6 +116,8 @@ class ManoeuvringCard(Card):
         (``effects.0.parameters.direction_deg``).
     effects : tuple
         Effects on top of the polynomial, in the order of the file.
+    fitted_trials : tuple
+        Trials that the card was fitted to.
     """
 
     ship: ShipSection
@@ -127,6 +130,7 @@ class ManoeuvringCard(Card):
     steering_gear: SteeringGear | None = None
     propulsion: Propulsion | None = None
     effects: tuple[EffectEntry, ...] = ()
+    fitted_trials: tuple[FittedTrial, ...] = ()
 
     @property
     def scales(self) -> Scales:

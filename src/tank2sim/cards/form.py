@@ -5,6 +5,7 @@ Values here are in SI and radians (a file may give angles in degrees), but still
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
@@ -102,11 +103,17 @@ class ShipModel(CardSection):
     valid_drift_rad: Annotated[float, Field(ge=0, le=1.5707963267948966)] = DRIFT_OF_CAPTIVE_TESTS
     valid_rudder_rad: Annotated[float, Field(ge=0, le=1.5707963267948966)] | None = None
     valid_yaw_rate_prime: Annotated[float, Field(ge=0, le=10)] = YAW_RATE_OF_CAPTIVE_TESTS
+    low_speed_below_mps: Annotated[float, Field(ge=0, le=100)] | None = None
 
     @property
     def speed_range_mps(self) -> tuple[float, float]:
         """Speeds (m/s) in which the card holds; by default half to 1.2 times the speed of expansion."""
         return self.valid_speed_mps or (0.5 * self.speed_mps, 1.2 * self.speed_mps)
+
+    @property
+    def low_speed_bound_mps(self) -> float:
+        """Speed (m/s) below which the forces at low speed replace the polynomial; by default the lowest of the card."""
+        return self.speed_range_mps[0] if self.low_speed_below_mps is None else self.low_speed_below_mps
 
 
 class SurgeModel(CardSection):
@@ -295,6 +302,38 @@ class EffectEntry(CardSection):
     uncertainty: dict[str, Annotated[float, Field(ge=0)]] = {}
 
 
+class FittedTrial(CardSection):
+    """One of ``[[fitted_trials]]``: a trial that the card was fitted to, and some of its rows to know it by.
+
+    Parameters
+    ----------
+    name : str
+        Of its file, without ending.
+    t_s : list of float
+        Times of these rows, rising.
+    signals : mapping
+        Name of the trial format in SI (``psi_rad``) to values at these times, at the size of the card's ship.
+
+    Raises
+    ------
+    ValueError
+        Times do not rise, or a signal has not as many values as there are times.
+    """
+
+    name: Text
+    t_s: Annotated[list[float], Field(max_length=1000)] = []
+    signals: dict[str, Annotated[list[float], Field(max_length=1000)]] = {}
+
+    @model_validator(mode="after")
+    def _is_a_table(self) -> Self:
+        if any(later <= earlier for earlier, later in pairwise(self.t_s)):
+            raise ValueError("times t_s that rise were expected")
+        for name, values in self.signals.items():
+            if len(values) != len(self.t_s):
+                raise ValueError(f"{name} has {len(values)} values and t_s {len(self.t_s)}: as many were expected")
+        return self
+
+
 class ShipCard(CardSection):
     """A manoeuvring ship's card, as in its file."""
 
@@ -308,6 +347,7 @@ class ShipCard(CardSection):
     steering_gear: SteeringGear | None = None
     propulsion: Propulsion | None = None
     effects: list[EffectEntry] = []
+    fitted_trials: list[FittedTrial] = []
 
 
 class SurgeCard(CardSection):

@@ -260,6 +260,7 @@ def _manoeuvring_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard
         steering_gear=form.steering_gear,
         propulsion=_prime_propulsion(form.propulsion, scales),
         effects=tuple(form.effects),
+        fitted_trials=tuple(form.fitted_trials),
     )
 
 

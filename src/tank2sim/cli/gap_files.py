@@ -21,6 +21,7 @@ from tank2sim.gap.outcome.export import NEXT_TEST_FILE, gap_as_json, joined
 from tank2sim.gap.outcome.improve_card import Found, card_with_effects_text
 from tank2sim.gap.result import MISSING, Gap
 from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.signatures import with_fitted_trials
 
 REPORT = "report.html"
 
@@ -67,8 +68,13 @@ def gap_file_contents(gap: Gap, fitted: Measured, held: Measured, folder: Path) 
     rivals = [joined(one) for one in gap.alternatives]
     names_fitted = [one.name for one in fitted.trials]
     unchanged = gap.improved.text == gap.card.text
-    text = gap.card.text if unchanged else card_with_effects_text(gap.improved, found, names_fitted, rivals)
-    parse_card(text, str(folder / IMPROVED))
+    name = str(folder / IMPROVED)
+    text = gap.card.text
+    if not unchanged:
+        text = with_fitted_trials(
+            card_with_effects_text(gap.improved, found, names_fitted, rivals), name, fitted.trials
+        )
+    parse_card(text, name)
     trials = (*fitted.trials, *held.trials)
     improved, notices = _with_covariance(gap.card, text, folder / IMPROVED)
     files: GapFiles = {**improved, folder / REPORT: _page(gap)}

@@ -60,7 +60,7 @@ _REPLAY_SAMPLES = 240
 def command(card: str, trials: tuple[Path, ...], **options: Any) -> None:
     """Validate CARD in the manner of ITTC 7.5-02-06-03: by TRIALs that did not make it, figure by figure.
 
-    A TRIAL that the source of CARD names among those it was identified from is told, and can only refute it.
+    A TRIAL that CARD was identified from, by its content or by the names in its source, can only refute it.
     """
     ship = manoeuvring(read_card(card, parse_changes(options["settings"])), "manoeuvres")
     files = trial_files(trials)

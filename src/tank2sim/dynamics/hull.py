@@ -20,6 +20,7 @@ from tank2sim.dynamics.low_speed import (
     regular_speed,
     rudder_factors,
     share_of_low_speed,
+    share_out_of_range,
 )
 from tank2sim.dynamics.model import Quantity
 from tank2sim.dynamics.propulsion import propeller_force
@@ -75,7 +76,7 @@ class Hull:
 
     @cached_property
     def X_bound(self) -> ca.SX:
-        """The card's X straight ahead at the lowest speed at which it holds, N."""
+        """The card's X straight ahead at the lowest speed of the polynomial, N."""
         return _ahead(self, "X", lowest_speed(self.symbols))
 
     def scales(self, speed: ca.SX) -> Scales:
@@ -108,7 +109,7 @@ def _terms(hull: Hull, force: str, with_rudder: bool) -> list[str]:
 def _polynomials(hull: Hull, with_rudder: bool) -> Forces:
     """X, Y, N of the terms of (3.5) or (3.8) that hold the rudder's angle, or of those that do not; N, N and N m.
 
-    They fade out below the lowest speed of the card.
+    They fade out below the lowest speed of the polynomial.
     """
     speed, scales = _scales_of_forces(hull)
     u, v, r = hull["motion.u"], hull["motion.v"], hull["motion.r"]
@@ -312,7 +313,7 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
     low = Quantity(
         name="low_speed.share",
         unit="1",
-        description="Share of the forces at low speed: 0 in the card's range of speeds, 1 at rest and astern",
+        description="Share of the forces at low speed: 0 from low_speed.bound upwards, 1 at rest and astern",
         minimum=0.0,
         maximum=1.0,
         value=hull.low_share,
@@ -322,11 +323,11 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
         unit="1",
         description=(
             "1 in the range of speed, drift angle, yaw rate and rudder angle in which the card holds; below that "
-            "speed the share of the card's polynomial in the forces, 0 at low speed and astern; falling to 0 beyond "
-            "the others"
+            "speed falling to 0 at low speed and astern, and never above the share of the card's polynomial in the "
+            "forces; falling to 0 beyond the others"
         ),
         minimum=0.0,
         maximum=1.0,
-        value=(1 - low.symbol) * inside,
+        value=(1 - share_out_of_range(hull.symbols)) * inside,
     )
     return speed, drift, low, validity

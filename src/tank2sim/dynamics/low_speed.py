@@ -1,7 +1,8 @@
 """The ship at low speed and astern, where the polynomial of (3.5), (3.8) does not hold.
 
-Its prime system divides by U, and its powers of Du' = (u - u0)/U grow without bound as the ship stops. So below the
-lowest speed u_b of the card the forces pass into those of this module, which are regular everywhere, at rest too:
+Its prime system divides by U, and its powers of Du' = (u - u0)/U grow without bound as the ship stops. So below a speed
+u_b (the card's ``low_speed_below_mps``, by default the lowest speed at which it holds) the forces pass into those of
+this module, which are regular everywhere, at rest too:
 
     X = F_p - R_b u (V + e)/(u_b (u_b + e))
     Y = 1/2 rho L^2 (Y_v (V + e) v + L Y_r u r) - 1/2 rho T C_D integral of (v + x r) abs(v + x r) dx
@@ -113,6 +114,7 @@ the moment errs by 1 % and the force by 3 % at most of the largest that the end 
 
 def low_speed_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
     """Parameters of the forces at low speed: ``ship.draught``, ``ship.propeller_diameter`` and ``low_speed.*``."""
+    bound = card.model.low_speed_bound_mps
 
     def length(key: str, name: str, description: str) -> Parameter:
         estimated = "" if getattr(card.ship, key) else " (estimated: the card states none)"
@@ -133,6 +135,16 @@ def low_speed_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
     return (
         length("draught_m", "ship.draught", "Draught"),
         length("propeller_diameter_m", "ship.propeller_diameter", "Diameter of the propeller"),
+        Parameter(
+            name="low_speed.bound",
+            unit="m/s",
+            description="Speed below which the forces at low speed replace the polynomial, within 0.05 and 0.9 u0",
+            display_unit="knots",
+            nominal=bound or 1.0,
+            minimum=0.0,
+            start=bound,
+            tunable=False,
+        ),
         number("low_speed.drag_coefficient", "Cross-flow drag coefficient of the hull at low speed", DRAG_COEFFICIENT),
         number("low_speed.rudder_astern", "Rudder force going astern over that ahead at one speed", RUDDER_ASTERN),
         number(
@@ -152,18 +164,29 @@ def low_speed_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
 
 
 def lowest_speed(s: Symbols) -> ca.SX:
-    """u_b, m/s: the lowest speed of the card, within its bounds over u0."""
+    """u_b, m/s: the lowest speed of the polynomial, within its bounds over u0."""
+    return _bounded(s, s["low_speed.bound"])
+
+
+def _bounded(s: Symbols, speed: ca.SX) -> ca.SX:
     u0 = s["ship.speed"]
-    return ca.fmax(LEAST_BOUND * u0, ca.fmin(s["ship.slowest"], LARGEST_BOUND * u0))
+    return ca.fmax(LEAST_BOUND * u0, ca.fmin(speed, LARGEST_BOUND * u0))
 
 
 def share_of_low_speed(s: Symbols) -> ca.SX:
-    """Share of the forces at low speed: 0 from u_b upwards, to the last digit, 1 at rest and astern.
+    """Share of the forces at low speed: 0 from u_b upwards, to the last digit, 1 at rest and astern."""
+    return _share_below(s, lowest_speed(s))
 
-    3 y^2 - 2 y^3, y from 0 to 1 between 1 and :data:`BLEND` of (u|u| + v^2)/u_b^2, which is U^2/u_b^2 ahead.
-    """
+
+def share_out_of_range(s: Symbols) -> ca.SX:
+    """How far the speed is below both u_b and the lowest speed at which the card holds: 0 to 1, as the share is."""
+    return _share_below(s, _bounded(s, ca.fmax(s["low_speed.bound"], s["ship.slowest"])))
+
+
+def _share_below(s: Symbols, bound: ca.SX) -> ca.SX:
+    """3 y^2 - 2 y^3, y from 0 to 1 between 1 and :data:`BLEND` of (u|u| + v^2)/bound^2, which is U^2/bound^2 ahead."""
     u, v = s["motion.u"], s["motion.v"]
-    square = lowest_speed(s) ** 2
+    square = bound**2
     short = square - (u * ca.fabs(u) + v * v)
     # The greater of `short` and 0, the lesser of that and 1: with |a|, to which a solver need not step up as to a kink.
     below = (short + ca.fabs(short)) * (0.5 / ((1 - BLEND) * square))

@@ -53,6 +53,7 @@ _PLACES = {
     "ship.water_density": ("environment", "water_density_kgpm3"),
     "ship.slowest": ("model", "valid_speed_mps"),
     "ship.fastest": ("model", "valid_speed_mps"),
+    "low_speed.bound": ("model", "low_speed_below_mps"),
     "ship.largest_drift": ("model", "valid_drift_rad"),
     "ship.largest_yaw_rate": ("model", "valid_yaw_rate_prime"),
     "ship.largest_rudder": ("model", "valid_rudder_rad"),

@@ -29,6 +29,20 @@ _FAR = 0.3
 COMMON = 0.5
 """Share of the shorter record that must lie at the same times to be compared (project choice)."""
 
+LEAST_ROWS = 4
+"""Rows at the same times below which records are not compared. Project choice: three numbers may agree by chance."""
+
+SIGNED = ("psi_rad", "x_m", "r_radps", "y_m", "u_mps", "sog_mps", "v_mps", "u_ground_mps", "v_ground_mps", "phi_rad")
+"""Signals of a signature, the first of them first. Project choice: heading and position are in most copies."""
+
+MOST_SIGNED, LEAST_SIGNED_ROWS = 3, 16
+"""Signals of a signature, and rows; below twice as many. Project choice: a few lines on a card, and half of the rows
+are still enough to compare."""
+
+STRIDES = (60, 12, 1)
+"""The rows of a signature are a multiple of one of these apart, where the record is long enough. Project choice: a copy
+with every second, third, ... row still has them all."""
+
 
 def refuse_copies(trials: Sequence[Trial], others: Sequence[Trial] | None = None) -> None:
     """Refuse trials that are one record: among themselves, or fitted and held out if others are given.
@@ -65,16 +79,48 @@ def same_record(one: Trial, other: Trial) -> bool:
     return bool(names) and any(_same_at(one, other, names, shift) for shift in shifts)
 
 
+def signature(trial: Trial) -> tuple[list[float], dict[str, list[float]]]:
+    """Some rows of a trial by which :func:`same_record` knows it: times (s), and up to three signals, SI.
+
+    Of the rows in which all of these are known, evenly spread; times to a thousandth of the step between rows, values
+    to 1e-5 of their range. Empty if no signal moves.
+    """
+    known = {
+        name: np.isfinite(values)
+        for name in SIGNED
+        if (values := trial.signals.get(name)) is not None and np.nanmax(values) > np.nanmin(values)
+    }
+    names = list(known)[:MOST_SIGNED]
+    rows = np.flatnonzero(np.all([known[name] for name in names], axis=0)) if names else np.array([], dtype=int)
+    if names and len(rows) < LEAST_SIGNED_ROWS:  # signals that are never known at once
+        names = names[:1]
+        rows = np.flatnonzero(known[names[0]])
+    unit = next((unit for unit in STRIDES if len(rows) >= unit * LEAST_SIGNED_ROWS), 1)
+    rows = rows[:: unit * max(1, len(rows) // (unit * LEAST_SIGNED_ROWS))]
+    time = _rounded(trial.time_s[rows], 1e-3 * sampling_step(trial))
+    signals = {name: trial.signals[name] for name in names}
+    return time, {
+        name: _rounded(one[rows], 1e-5 * float(np.nanmax(one) - np.nanmin(one))) for name, one in signals.items()
+    }
+
+
+def _rounded(values: Array, unit: float) -> list[float]:
+    places = math.ceil(-math.log10(unit))
+    return [round(float(value), places) for value in values]
+
+
 def _same_at(one: Trial, other: Trial, names: Sequence[str], shift: float) -> bool:
     time = other.time_s + shift
     inside = (one.time_s >= time[0]) & (one.time_s <= time[-1])
     spans = [float(times[-1] - times[0]) for times in (one.time_s, time)]
     common = one.time_s[inside]
-    if len(common) < 2 or common[-1] - common[0] < COMMON * min(spans):
+    if len(common) < LEAST_ROWS or common[-1] - common[0] < COMMON * min(spans):
         return False
     alike = False
     for name in names:
-        verdict = _alike(one.signals[name][inside], _at(common, time, other.signals[name]))
+        signals = one.signals[name], other.signals[name]
+        noise = min(white_noise(values) for values in signals), max(rounding(values) for values in signals)
+        verdict = _alike(signals[0][inside], _at(common, time, signals[1]), *noise)
         if verdict is False:
             return False
         alike = alike or verdict is True
@@ -88,8 +134,8 @@ def _at(common: Array, time: Array, values: Array) -> Array:
     return np.interp(common, time[known], values[known])
 
 
-def _alike(one: Array, other: Array) -> bool | None:
-    """None where neither moves."""
+def _alike(one: Array, other: Array, noise: float, unit: float) -> bool | None:
+    """None where neither moves; `noise` is the smaller one of the two, `unit` the coarser one of their digits."""
     known = ~np.isnan(one + other)
     if np.count_nonzero(known) < 2:
         return None
@@ -100,5 +146,4 @@ def _alike(one: Array, other: Array) -> bool | None:
     apart = float(np.sqrt(np.mean((one - other) ** 2)))
     if apart > _FAR * spread:
         return False
-    noise, unit = min(white_noise(one), white_noise(other)), max(rounding(one), rounding(other))
     return apart <= max(PRINTED * spread, NOISE * noise, _ROUNDED * unit / math.sqrt(12))

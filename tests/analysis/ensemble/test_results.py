@@ -11,7 +11,7 @@ import pytest
 
 from tank2sim.analysis.ensemble import results
 from tank2sim.analysis.ensemble.draws import by_file_name, draws_of
-from tank2sim.analysis.ensemble.questions import ENSEMBLE_SIGNALS, OfCriteria, OfManoeuvre, ShipText, by_number
+from tank2sim.analysis.ensemble.questions import ENSEMBLE_SIGNALS, OfCriteria, OfManoeuvre, ShipText
 from tank2sim.analysis.ensemble.results import (
     EnsembleRequest,
     bands_without_poles,
@@ -24,6 +24,7 @@ from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cards.covariance import Covariance, covariance_file, referring
 from tank2sim.dynamics import build
+from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.ensemble import Ensemble, ensemble
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
@@ -47,7 +48,7 @@ def test_members_are_the_ship_with_other_numbers_simulated_one_by_one(mariner_ca
     model = build(mariner_card)
     for member in range(4):
         run = simulate(model, manoeuvre, parameters=draws.member(member))
-        for name, value in by_number(run.figures).items():
+        for name, value in single_figures(run.figures).items():
             # The ensemble keeps one step of ten.
             assert found.figures[name][member] == pytest.approx(value, rel=2e-4, nan_ok=True), name
         assert found.histories is not None

@@ -31,7 +31,7 @@ def test_every_effect_of_the_library_is_tried_here() -> None:
 def test_an_effect_says_what_it_is_and_where_it_comes_from(name: str) -> None:
     effect = EFFECTS[name]
     assert effect.name == name and effect.description.endswith(".") and effect.source
-    assert all(one.minimum < one.maximum for one in effect.parameters)
+    assert all(one.lowest(card_with()) < one.maximum for one in effect.parameters)
 
 
 @pytest.mark.parametrize("name", TYPICAL)
@@ -93,7 +93,7 @@ def test_values_out_of_bounds_are_refused_with_their_key(name: str) -> None:
     for key in TYPICAL[name]:
         si, _ = to_si(key, 1.0)
         bounds = {one.name: one for one in EFFECTS[name].parameters}[si]
-        for wrong in (bounds.minimum - 0.1, bounds.maximum + 0.1):
+        for wrong in (bounds.lowest(card_with()) - 0.1, bounds.maximum + 0.1):
             with pytest.raises(InputError, match=rf"effects\.0\.parameters\.{key}.* was expected"):
                 ship({name: {**TYPICAL[name], key: from_si(key, wrong)}})
 

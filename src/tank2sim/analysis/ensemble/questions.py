@@ -18,6 +18,7 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import mass_fault
 from tank2sim.errors import InputError
+from tank2sim.simulation.card_range import Numbers, single_figures
 from tank2sim.simulation.ensemble import Ask, MemberResult
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import Integrator
@@ -104,7 +105,7 @@ class OfManoeuvre:
                 run = simulate(model, self.manoeuvre, duration_s=duration, parameters=values, integrator=integrator)
             except InputError as error:
                 return MemberResult({}, trouble=error.problem)
-            return MemberResult(by_number(run.figures), _sampled(run.trajectory, self.times))
+            return MemberResult(_numbers(run.figures), _sampled(run.trajectory, self.times))
 
         return ask
 
@@ -127,7 +128,7 @@ class OfManoeuvre:
                     found.append(MemberResult({}, trouble=fault))
                     continue
                 figures = figures_of(turn, run, own["ship.length"])
-                found.append(MemberResult(by_number(figures), _sampled(run, self.times)))
+                found.append(MemberResult(_numbers(figures), _sampled(run, self.times)))
             return found
 
         return ask
@@ -188,16 +189,9 @@ def _each(ask: AskOne) -> Ask:
     return lambda members: [ask(values) for values in members]
 
 
-def by_number(figures: Figures) -> dict[str, float]:
-    """Figures that are numbers; those of a list by their place in it, ``overshoots_1_deg`` the first."""
-    found: dict[str, float] = {}
-    for name, value in figures.items():
-        if isinstance(value, list):
-            stem, _, unit = name.rpartition("_")
-            found |= {f"{stem}_{place}_{unit}": float(one) for place, one in enumerate(value, start=1)}
-        else:
-            found[name] = float(value) if isinstance(value, int | float) else math.nan
-    return found
+def _numbers(figures: Figures) -> Numbers:
+    """Figures as single numbers, nan for those that the run does not show."""
+    return {name: math.nan for name, value in figures.items() if value is None} | single_figures(figures)
 
 
 def _parameters(model: Model) -> dict[str, float]:

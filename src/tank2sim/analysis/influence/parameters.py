@@ -162,7 +162,7 @@ def _effects(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
             key = key or f"effects.{number}.parameters.{parameter.name}"
             stated = parameter.name in entry.uncertainty
             error = entry.uncertainty.get(parameter.name, DEFAULT_RELATIVE_ERROR * abs(values[name]))
-            bounds = (parameter.minimum, parameter.maximum)
+            bounds = (parameter.lowest(card), parameter.maximum)
             found.append(CardParameter(name, values[name], error, not stated, key, from_si(key, 1.0), bounds))
     return found
 

@@ -41,6 +41,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.identification.trials.problem.signatures import fitted_as
 from tank2sim.marks import EXTRAPOLATED
 from tank2sim.records.audit.noise import record_noise
 from tank2sim.records.trials import Trial, sampling_step
@@ -230,13 +231,17 @@ def validate(
     whats = [what for _, what in known if what is not None]
     between = _between_repeats(whats)
     figures: list[Validated] = []
-    for what in whats:
+    for trial, what in known:
+        if what is None:
+            continue
         found, trouble = _validated(what, engines, drawn, between)
-        own = made_card(card, what.trial.name)
+        copied = fitted_as(card, trial)
+        own = copied is not None or made_card(card, trial.name)
         figures += [replace(one, required_percent=required_percent, made_card=own) for one in found]
         told += trouble
         if own:
-            told.append(f"{what.trial.name}: the card was identified from this trial: its figures are only fitted")
+            named = f" (as {copied})" if copied not in (None, trial.name) else ""
+            told.append(f"{trial.name}: the card was identified from this trial{named}: its figures are only fitted")
     if whats and not between:
         told.append("no manoeuvre was run twice alike: u_D is of the noise of the signals alone, and so a lower bound")
     if not count:

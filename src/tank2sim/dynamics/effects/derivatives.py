@@ -223,7 +223,7 @@ WATER_DEPTH = Effect(
     source="Kijima, Katsuno, Nakiri and Furukawa (1990), J. Soc. Naval Architects of Japan 168",
     parameters=(
         # Not sought in trials: what they show of shallow water is one factor, that of SHALLOW_WATER.
-        EffectParameter("depth_m", "depth of the water", 0.01, 1e4, input_name="water.depth", least=_least_depth),
+        EffectParameter("depth_m", "depth of the water", _least_depth, 1e4, input_name="water.depth"),
     ),
     equations=_at_depth,
 )

@@ -33,8 +33,10 @@ class EffectParameter:
         Name with its unit in SI (``direction_rad``; a card may give ``direction_deg``).
     description : str
         What it is, with its sign; small first letter.
-    minimum, maximum : float
-        Physical bounds, SI.
+    minimum : float or callable
+        Physical lower bound, SI, or what determines it from the card (:meth:`lowest`).
+    maximum : float
+        Physical upper bound, SI.
     default : float or callable, optional
         Value where a card gives none, or what tells it from the card; without one the parameter is required.
     input_name : str, optional
@@ -51,20 +53,17 @@ class EffectParameter:
     spread : float or callable, optional
         Standard deviation, SI, of what is known beforehand of a parameter with a default, if a search shall estimate
         it with the others; None: it stays at its default.
-    least : callable, optional
-        A lower bound, SI, that depends on the ship, where that is above `minimum`.
     """
 
     name: str
     description: str
-    minimum: float
+    minimum: float | Callable[[ManoeuvringCard], float]
     maximum: float
     default: float | Callable[[ManoeuvringCard], float] | None = None
     input_name: str | None = None
     absent: float | None = field(default=None, kw_only=True)
     typical: Values | Callable[[ManoeuvringCard], Values] = field(default=(), kw_only=True)
     spread: float | Callable[[ManoeuvringCard], float] | None = field(default=None, kw_only=True)
-    least: Callable[[ManoeuvringCard], float] | None = field(default=None, kw_only=True)
 
     @property
     def stem(self) -> str:
@@ -80,7 +79,7 @@ class EffectParameter:
 
     def lowest(self, card: ManoeuvringCard) -> float:
         """The lower bound on this ship, SI."""
-        return max(self.minimum, self.least(card)) if self.least else self.minimum
+        return self.minimum(card) if callable(self.minimum) else self.minimum
 
     def typical_values(self, card: ManoeuvringCard) -> Values:
         """Values from which a search begins on this ship, SI; none if it is not to be tried."""
@@ -109,8 +108,8 @@ class EffectParameter:
             unit=unit,
             description=description,
             display_unit=_SHOWN.get(suffix),
-            nominal=0.1 * (self.maximum - self.minimum),
-            minimum=self.minimum,
+            nominal=0.1 * (self.maximum - self.lowest(card)),
+            minimum=self.lowest(card),
             maximum=self.maximum,
             start=value,
         )

@@ -120,7 +120,7 @@ class Hypothesis:
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest value of each parameter asked for (k,); times at least as long as can be integrated."""
-        low = np.array([one.parameter.minimum for one in self.asked])
+        low = np.array([one.parameter.lowest(self.card) for one in self.asked])
         times = np.array([one.parameter.name.endswith("_s") for one in self.asked], dtype=bool) & (low > 0)
         low[times] = np.maximum(low[times], STEPS_IN_A_TIME * self.model.step_s)
         return low, np.array([one.parameter.maximum for one in self.asked])

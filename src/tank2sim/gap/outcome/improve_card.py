@@ -287,7 +287,8 @@ def _written(
     error = float(f"{error:.3g}") if math.isfinite(error) else 0.0
     # At a bound it may be rounded past it, in another unit even by the last bit of a float.
     tried = (_rounded(value, error), value, value * (1 - 1e-12), value * (1 + 1e-12))
-    shown = next((one for one in tried if parameter.minimum <= to_si(own, one)[1] <= parameter.maximum), value)
+    lowest = -math.inf if callable(parameter.minimum) else parameter.minimum
+    shown = next((one for one in tried if lowest <= to_si(own, one)[1] <= parameter.maximum), value)
     return own, shown, error
 
 

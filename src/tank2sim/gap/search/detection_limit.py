@@ -65,7 +65,8 @@ def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
     for one, own in zip(sized, shares, strict=True):
         for amplitude, share in zip(one.amplitudes, own, strict=True):
             parameter = one.explained.asked[amplitude].parameter
-            size = min(float(abs(one.theta[amplitude]) * share), max(abs(parameter.minimum), abs(parameter.maximum)))
+            largest = max(abs(parameter.lowest(one.explained.card)), abs(parameter.maximum))
+            size = min(float(abs(one.theta[amplitude]) * share), largest)
             known = sizes.setdefault(one.effect, {})
             known[parameter.name] = max(size, known.get(parameter.name, 0.0))
     others = {one.effect: one for one in search.variants if not one.amplitudes}

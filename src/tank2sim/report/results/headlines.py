@@ -12,6 +12,7 @@ from tank2sim.report.kit.json_values import VERDICT_TEXTS, Json, cell, is_number
 from tank2sim.report.kit.numbers import format_number
 from tank2sim.report.kit.page import KeyFigure, Verdict
 from tank2sim.report.results.result_types import ResultType
+from tank2sim.simulation.card_range import entry_name
 
 _MOST_FIGURES = 8
 _NOISE = "times the noise, before → after"
@@ -28,7 +29,8 @@ def _plain(result: Mapping[str, Json], paths: Sequence[str]) -> list[KeyFigure]:
     figures = result.get("figures")
     if isinstance(figures, Mapping):
         values |= {
-            f"overshoot_{place}_deg": value for place, value in enumerate(figures.get("overshoots_deg") or [], start=1)
+            entry_name("overshoots_deg", place): value
+            for place, value in enumerate(figures.get("overshoots_deg") or [])
         }
         values |= {key: value for key, value in figures.items() if is_number_value(value)}
     return [_figure(path, value) for path, value in values.items() if value is not None and is_scalar(value)]

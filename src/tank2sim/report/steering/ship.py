@@ -146,7 +146,10 @@ def _control(model: Model, variable: Input) -> Control:
 def _bounds(variable: Input) -> tuple[float | None, float | None]:
     """Bounds of an input, SI: for what an effect takes from its surroundings those of a card, which the model lacks."""
     known = [one for effect in EFFECTS.values() for one in effect.parameters if one.input_name == variable.name]
-    return (known[0].minimum, known[0].maximum) if known else (variable.minimum, variable.maximum)
+    if not known:
+        return variable.minimum, variable.maximum
+    lowest = known[0].minimum
+    return variable.minimum if callable(lowest) else lowest, known[0].maximum
 
 
 def _label(name: str) -> str:

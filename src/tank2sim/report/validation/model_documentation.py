@@ -41,7 +41,10 @@ def documentation(card: ManoeuvringCard, system: Model) -> PageSection:
         ["Effects", "; ".join(one.name for one in card.effects) or "none"],
         ["Environment", _environment(card)],
         ["Integration", f"classical Runge-Kutta, fourth order, step {system.step_s:.3g} s"],
-        ["Low speed", "below the range: cross-flow drag and linear damping without division by speed"],
+        [
+            "Low speed",
+            f"below {model.low_speed_bound_mps:.4g} m/s: cross-flow drag and linear damping without division by speed",
+        ],
     ]
     columns = [Column(title="item"), Column(title="here")]
     table = PageTable(caption="Documentation asked for by ITTC 7.5-02-06-03.", columns=columns, rows=rows)

@@ -60,7 +60,7 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
             unsaid = one.default is not None and one.absent is not None and one.name not in entry.parameters
             if one.input_name or unsaid:  # an input, or a part of the effect that the card does not say to be there
                 continue
-            error = entry.uncertainty.get(one.name, ASSUMED_EFFECT_ERROR * (one.maximum - one.minimum))
+            error = entry.uncertainty.get(one.name, ASSUMED_EFFECT_ERROR * (one.maximum - one.lowest(card)))
             if error <= 0:  # stated as certain
                 continue
             free[f"{effect.name}.{one.stem}"] = one.value(entry.parameters, card), error
@@ -149,13 +149,16 @@ def with_range(card: ManoeuvringCard, problem: Problem) -> ManoeuvringCard:
     """The card with the range that it holds in after the fit.
 
     The speeds of the runs, if it states none and they are known; its largest drift, yaw rate and rudder angle where the
-    runs went further than it states.
+    runs went further than it states. The polynomial itself is used down to the speed at which it ended before: no trial
+    says anything about where it breaks down.
     """
     changes: dict[str, object] = {}
     columns = {name: np.concatenate([run.column(f"motion.{name}") for run in problem.runs]) for name in "uvr"}
     speeds = columns["u"][~np.isnan(columns["u"])]
     if card.model.valid_speed_mps is None and len(speeds) and speeds.min() > 0:
         changes["model.valid_speed_mps"] = [float(f"{speed:.3g}") for speed in (speeds.min(), speeds.max())]
+        if card.model.low_speed_below_mps is None:
+            changes["model.low_speed_below_mps"] = card.model.low_speed_bound_mps
     reached = _reached(card, problem, columns)
     stated = {
         "valid_drift_rad": card.model.valid_drift_rad,
@@ -164,8 +167,8 @@ def with_range(card: ManoeuvringCard, problem: Problem) -> ManoeuvringCard:
     }
     for name, largest in reached.items():
         if largest > stated[name]:
-            key = name if name in card.text else name.replace("_rad", "_deg")
-            changes[f"model.{key}"] = float(f"{from_si(key, largest):.3g}")
+            key = card.spelt.get(f"model.{name}", f"model.{name.replace('_rad', '_deg')}")
+            changes[key] = float(f"{from_si(key, largest):.3g}")
     return revised(card, {}, changes, comment="range of the trials") if changes else card
 
 
