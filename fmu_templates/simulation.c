@@ -19,9 +19,6 @@ enum { STEPS_BETWEEN_CHECKS = 256 };
 
 static const size_t STATE_BYTES = (STATES_END - STATES_BEGIN) * sizeof(double);
 
-/* A state this many times beyond its bounds has left all that the equations can mean: a choice of ours. */
-static const double TIMES_BEYOND = 10;
-
 /* The states are all numbers that a ship can have, or the place of the first that is not. */
 static bool plausible_states(const double states[], size_t *place) {
     for (size_t i = STATES_BEGIN; i < STATES_END; ++i) {

@@ -52,11 +52,13 @@ def test_the_fmu_is_valid_and_the_page_has_its_charts(result: Path) -> None:
 
 def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(tmp_path: Path) -> None:
     (tmp_path / "track.csv").write_text("x_m,y_m\n0,0\n0,0\n")
+    (tmp_path / "short.csv").write_text("x_m,y_m\n0,0\n2,0\n0,9000\n")
     wrong = {
         ("wilinski-zellman",): "has no rudder",
         ("mariner", "--speed", "30"): "outside the range",
         ("mariner", "--track", "track.csv"): "same place",
         ("mariner", "--track", "none.csv"): "no such file",
+        ("mariner", "--track", "short.csv"): "short.csv: leg 1: is 2 m",
         ("mariner", "--course-change", "0"): "is 0",
         ("mariner", "--verify"): "needs an FMU",
         ("mariner", "--design", "fuzzy"): "fuzzy",
@@ -65,7 +67,7 @@ def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(tmp_path: Path
     }
     for arguments, words in wrong.items():
         refused(tank2sim("autopilot", *arguments, "--json", "x.json", cwd=tmp_path), words)
-    assert [path.name for path in tmp_path.iterdir()] == ["track.csv"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["short.csv", "track.csv"]
 
 
 @pytest.mark.skipif(importlib.util.find_spec("slycot") is not None, reason="slycot is installed")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import re
 
 import pytest
 
+from tank2sim.bundled import bundled
 from tank2sim.cards import ManoeuvringCard, YawRigCard, read_card
 from tank2sim.records.yaw import read_yaw_record
 from tests.cli.command_line import refused, tank2sim
@@ -88,6 +90,13 @@ def test_a_record_can_be_simulated_from_a_card_and_gives_its_inertia(folder):
     refused(tank2sim("yaw", "rig.csv", "--simulate", "alyshev", cwd=folder), "rig.csv", "already")
     refused(tank2sim("yaw", "a.csv", "b.csv", "--simulate", "alyshev", cwd=folder), "--simulate", "2 records")
     refused(tank2sim("yaw", "a.csv", "--simulate", "mariner", cwd=folder), "model.kind", "yaw rig")
+
+
+def test_a_simulated_record_that_gives_no_result_is_not_left_behind_and_its_card_is_named(folder):
+    text = bundled("models", "alyshev", "ship.toml").read_text()
+    (folder / "rig.toml").write_text(re.sub(r"(?m)^settle_s *=.*$", "settle_s = 0.0", text))
+    refused(tank2sim("yaw", "made.csv", "--simulate", "rig.toml", cwd=folder), "rig.toml", "no mirror images")
+    assert not (folder / "made.csv").exists()
 
 
 def test_a_run_in_air_can_be_simulated_and_gives_j(folder):

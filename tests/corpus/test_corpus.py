@@ -6,6 +6,7 @@ failure tells the command and the number, and ``python -m tests.corpus COMMAND N
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -17,6 +18,10 @@ import pytest
 from tests.corpus.inputs import RESULTS, plain, shortened, thinned
 from tests.corpus.jobs import SHARES, job
 from tests.corpus.worker import MEMORY, Job, Outcome, Worker
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux", reason="memory is limited and measured by RLIMIT_DATA and /proc, as Linux has them"
+)
 
 WORKERS = 2
 

@@ -6,7 +6,6 @@ import contextlib
 import io
 import multiprocessing
 import os
-import resource
 import shutil
 import signal
 import sys
@@ -77,6 +76,8 @@ class Worker:
             self.close()
             return Outcome(None, error=f"the process died ({died})")
         self._warm = True
+        if outcome.peak > MEMORY:  # what a process once took it may keep, and the next job would be blamed for it
+            self.close()
         return outcome
 
     _warm = False
@@ -105,6 +106,7 @@ def _serve(pipe: Connection) -> None:
 
 
 def _run(job: Job) -> Outcome:
+    import resource  # which other systems than Linux lack, or count otherwise
     import time
 
     from tank2sim.cli import main

@@ -21,8 +21,10 @@ from lxml import etree
 from tank2sim.bundled import bundled
 from tank2sim.dynamics.model import Model, Parameter
 from tank2sim.errors import InputError
+from tank2sim.fmu import sources
 from tank2sim.fmu.check import check_fmu
 from tank2sim.fmu.export import Documents, write_fmu
+from tank2sim.fmu.interface import interface
 from tank2sim.fmu.templates import c_identifier
 from tank2sim.fmu.unpacking import UnpackedFmu, embedded_card
 from tank2sim.native.compiler import require_compiler
@@ -246,3 +248,11 @@ def test_what_was_written_is_plain_data(hull: Model, tmp_path: Path) -> None:
     exported = write_fmu(hull, tmp_path / "x.fmu", fmi=3).as_json()
     assert json.loads(json.dumps(exported))["model_identifier"] == "Test_hull"
     assert len(exported["platforms"]) == 1
+
+
+def test_an_fmu_bounds_its_states_by_the_number_of_the_simulation(hull: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sources, "TIMES_BEYOND", 7.5)
+    texts = sources.c_sources(hull, interface(hull), 3, "{token}")
+    found = [(name, line) for name, text in texts.items() for line in text.splitlines() if "TIMES_BEYOND " in line]
+    assert sorted(name for name, _ in found) == ["model.h", "simulation.c"]  # defined once, used once
+    assert ("model.h", "#define TIMES_BEYOND 7.5") in found

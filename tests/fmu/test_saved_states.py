@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import struct
+import sys
+
 import pytest
 
 from tank2sim.fmu.running import RunningFmu
@@ -95,6 +99,51 @@ def test_a_single_bit_that_is_wrong_is_found(fmi: int, instantiate: Instantiate,
     assert len(fmu.log) == len(range(0, len(data), 7))
     assert sum("checksum" in line for line in fmu.log) > len(data) // 14
     assert fmu.read(STATES) == before
+
+
+def sealed(data: bytes) -> bytes:
+    """A state with the checksum of its bytes: FNV-1a with 64 bits of what follows the checksum (RFC 9923)."""
+    total = 14695981039346656037
+    for byte in data[24:]:
+        total = (total ^ byte) * 1099511628211 % 2**64
+    return data[:16] + total.to_bytes(8, sys.byteorder) + data[24:]
+
+
+def value_count(fmu: RunningFmu) -> int:
+    """Values of a state: time, states, inputs, parameters and largest step, which come before the rates."""
+    variables = fmu.unpacked.description.modelVariables
+    return min(int(variable.valueReference) for variable in variables if variable.derivative is not None)
+
+
+@FMI
+def test_every_value_of_a_state_comes_back(fmi: int, instantiate: Instantiate) -> None:
+    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.3)
+    steps(fmu, 5)
+    before, count = saved(fmu), value_count(fmu)
+    assert sealed(before) == before
+    assert struct.unpack_from("=d", before, len(before) - 8 * count)[0] == pytest.approx(0.5)  # the first is the time
+    changed = sealed(before[: -8 * count] + struct.pack(f"={count}d", *(0.25 + 0.5 * k for k in range(count))))
+    restore(fmu, changed)
+    assert saved(fmu) == changed
+    assert fmu.read(STATES) == [0.75 + 0.5 * k for k in range(len(STATES))]  # they follow the time
+    restore(fmu, before)
+    assert saved(fmu) == before
+
+
+@FMI
+def test_a_state_with_one_value_that_is_no_number_is_refused_whichever_it_is(
+    fmi: int, instantiate: Instantiate, status: Status
+) -> None:
+    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.3)
+    steps(fmu, 5)
+    data, count = saved(fmu), value_count(fmu)
+    taken = []
+    for place in range(len(data) - 8 * count, len(data), 8):
+        damaged = sealed(data[:place] + struct.pack("=d", math.nan) + data[place + 8 :])
+        if status(restore, fmu, damaged) != ERROR:
+            taken.append(place)
+    assert not taken
+    assert saved(fmu) == data
 
 
 @FMI

@@ -19,6 +19,10 @@ def test_scaled_condition_of_two_columns_follows_their_angle():
     assert scaled_condition(design * [3.0, 50.0]) == pytest.approx(1 / np.tan(angle / 2))
 
 
+def test_fewer_rows_than_unknowns_determine_nothing():
+    assert scaled_condition(np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5]])) == np.inf
+
+
 def test_correlation_has_ones_on_its_diagonal():
     covariance = np.array([[4.0, -3.0], [-3.0, 9.0]])
     np.testing.assert_allclose(correlation_matrix(covariance), [[1, -0.5], [-0.5, 1]])

@@ -106,6 +106,14 @@ def test_averages_become_dimensional_with_their_own_speed_and_repeated_rows_coun
     assert "1 of 3 rows" in read.remarks[0]
 
 
+@pytest.mark.parametrize("force", ["0", "1e-200", "-0"])
+def test_a_gauge_that_shows_nothing_in_any_row_of_averages_is_refused_by_its_column(tmp_path, force):
+    table = f"beta,delta,U,X',Y',N'\n0,5,0.6,-1e-4,2e-3,{force}\n6,0,1.2,-1e-4,4e-3,{force}\n"
+    (tmp_path / "table.csv").write_text(table)
+    with pytest.raises(InputError, match=r"table\.csv: column N': is zero in every row"):
+        read_campaign(campaign(tmp_path, AVERAGES, convention="hydrodynamic"))
+
+
 @pytest.mark.parametrize(
     ("change", "place", "told"),
     [
@@ -119,6 +127,8 @@ def test_averages_become_dimensional_with_their_own_speed_and_repeated_rows_coun
         (("drift_deg = 4.78", "drift_deg = 478"), "runs.0.drift_deg", "below 90"),
         (("x_G_m = 0.1", "x_G_m = nan"), "model.x_G_m", "finite"),
         (("[test]", "[test"), "line 7", ""),
+        (("length_m = 4.0", f"length_m = {'[' * 5000}{']' * 5000}"), "campaign.toml", "nested too deeply"),
+        (("length_m = 4.0", f"length_m = {'1' * 5000}"), "campaign.toml", "thousands of digits"),
     ],
 )
 def test_a_fault_of_the_file_is_told_with_its_key(folder, change, place, told):

@@ -54,6 +54,12 @@ def test_rows_without_a_reading_are_left_out(write):
         ("t_s", "time", "header: there is no column t_s"),
         ("10,0.03,", "5,0.03,", "line 4, column t_s: 5 does not come after 5 of the row before"),
         ("\n0,0,0", "\n-5,0,0", "line 2, column t_s: is before the release"),
+        ("20,0.05", "2e6,0.05", "line 6, column t_s: is 2000000 s after the release"),
+        (
+            "5,0.01,0.02\n10,0.03,\n15,0.04,0.06\n20,0.05,0.07",
+            "5,0.01,0\n10,0.03,\n15,0.04,1e-9\n20,0.05,0",
+            "column speed_2_mps: never reaches 1e-06 m/s",
+        ),
         ("speed_2_mps", "force_N", "column force_N: is no speed of a tow"),
         ("speed_2_mps", "speed_mps", "column speed_mps: is no speed of a tow"),
         ("speed_2_mps", "speed_2_knots", "column speed_2_knots: is no speed in m/s; convert it to m/s"),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tank2sim.simulation import ensemble as module
-from tank2sim.simulation.bands import figure_bands, history_bands, small_edge_first
+from tank2sim.simulation.bands import FOLLOWED, figure_bands, history_bands, small_edge_first, track_band
 from tank2sim.simulation.ensemble import Draws, Ensemble, MemberResult, ensemble
 
 COVARIANCE = np.array([[4.0, 1.0], [1.0, 9.0]])
@@ -192,3 +192,17 @@ def test_the_edge_of_the_small_figures_is_the_inner_one_of_a_turn(side: float) -
     small, large = small_edge_first(left, middle, right)
     assert small is inner and large is outer
     assert np.abs(small).max() < np.abs(large).max()
+
+
+def test_a_member_is_followed_for_ten_steps_to_the_next_normal_and_not_further():
+    """Two of ten ships go aside before they go on, parallel to the others; without them the band ends."""
+    count = 30
+    straight = np.column_stack([np.arange(count, dtype=float), np.zeros(count)])
+
+    def length(aside: float) -> int:
+        other = np.vstack([straight[:1], straight[:-1] + np.array([0.0, aside])])
+        band = track_band(np.array([straight] * 8 + [other] * 2), 20)
+        return int(np.isfinite(band.middle).all(axis=1).sum())
+
+    assert length(FOLLOWED - 1.0) == 20  # with the step ahead exactly as far as is followed
+    assert length(FOLLOWED - 0.75) == 1

@@ -170,24 +170,25 @@ def linear_card(card: Card) -> ManoeuvringCard:
 
 
 def _content(text: str, source: str) -> dict[str, Any]:
-    with _faults_of_toml(source):
+    with faults_of_toml(source):
         content = tomllib.loads(text.removeprefix(BYTE_ORDER_MARK))
     return content
 
 
 def _document(text: str, source: str) -> tomlkit.TOMLDocument:
     _content(text, source)  # unlike tomlkit, tomllib tells the place of every fault, a doubled key's too
-    with _faults_of_toml(source):
+    with faults_of_toml(source):
         document = tomlkit.parse(text.removeprefix(BYTE_ORDER_MARK))
     return document
 
 
 @contextmanager
-def _faults_of_toml(source: str) -> Iterator[None]:
+def faults_of_toml(source: str) -> Iterator[None]:
+    """Turn what a TOML parser raises on the text of the file `source` into an InputError that names the place."""
     try:
         yield
     except RecursionError:
-        raise InputError(source, "", "is nested too deeply", "a card has sections and their keys") from None
+        raise InputError(source, "", "is nested too deeply", "write sections and their keys") from None
     except (ValueError, TOMLKitError) as error:  # a ValueError also when an integer has thousands of digits
         problem, _, place = str(error).partition(" (at ")
         remedy = "give each key once" if "overwrite" in problem or "twice" in problem else "mend the TOML there"

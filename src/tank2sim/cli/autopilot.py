@@ -65,7 +65,12 @@ def command(card: str, *, track: Path | None, settings: tuple[str, ...], **more:
     export, page, json_file = (_path(more[key]) for key in ("export", "page", "json_file"))
     waypoints = None if track is None else read_waypoints(track)
     model = build(ship)
-    study = study_autopilot(ship, model, _settings(waypoints, **more))
+    try:
+        study = study_autopilot(ship, model, _settings(waypoints, **more))
+    except InputError as fault:
+        if track is None or fault.source != "--track":
+            raise
+        raise InputError(track, fault.place, fault.problem, fault.remedy) from None  # the library knows no file
     result: dict[str, object] = study.as_json()
     notices = [*study.notices, *([] if find_compiler() else [NO_COMPILER])]
     contents: dict[Path, str | bytes] = {}

@@ -108,12 +108,20 @@ def command(records: tuple[Path, ...], *, simulate: str | None, **options: objec
     if asked.card and not asked.output:
         raise InputError("--card", "", "has no file to be written to", "say which with -o CARD.toml")
     if simulate:
-        _simulate(simulate, records, driven)
+        source = _simulate(simulate, records, driven)
     elif driven["medium"] or driven["controller"] or driven["similar_to"]:
         options_told = "--medium, --controller, --similar-to"
         raise InputError(options_told, "", "are of a simulated rig", "give --simulate CARD as well")
     known = _known(asked.rig)
-    result = identify_yaw([read_yaw_record(path) for path in records], _options(asked, known))
+    try:
+        result = identify_yaw([read_yaw_record(path) for path in records], _options(asked, known))
+    except InputError as fault:
+        if not simulate:
+            raise
+        records[0].unlink()  # a refusal leaves nothing behind
+        if fault.source != str(records[0]):
+            raise
+        raise InputError(source, fault.place, f"the record simulated of it: {fault.problem}", fault.remedy) from None
     body = _floating_body(asked.theory) if asked.theory else None
     theory = theory_values(body, result.records[0].programme.max_rate_radps) if body else ()
     contents: dict[Path, str | bytes] = {}
@@ -134,7 +142,8 @@ def command(records: tuple[Path, ...], *, simulate: str | None, **options: objec
         screen.print(escape(told), soft_wrap=True)
 
 
-def _simulate(name: str, records: tuple[Path, ...], driven: Mapping[str, Any]) -> None:
+def _simulate(name: str, records: tuple[Path, ...], driven: Mapping[str, Any]) -> str:
+    """Write the record that the rig of a card would give, and return the card's file."""
     from tank2sim.simulation.yaw_record import simulated_record
 
     if len(records) != 1:
@@ -152,6 +161,7 @@ def _simulate(name: str, records: tuple[Path, ...], driven: Mapping[str, Any]) -
         programme=similar,
     )
     write_together({records[0]: yaw_record_text(record)}, inputs=[Path(card.source)])
+    return card.source
 
 
 def _similar(card: YawRigCard, text: str) -> YawProgramme:

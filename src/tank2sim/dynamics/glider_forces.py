@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-SLOWEST_MPS = 1e-8
+_SLOWEST_MPS = 1e-8
 """Added under the root of the speed: it keeps directions finite at rest, and is lost in rounding at any real speed."""
 
 
@@ -39,7 +39,7 @@ class Attitude(NamedTuple):
     @property
     def speed(self) -> ca.SX:
         """Speed through the water, m/s."""
-        return ca.sqrt(self.u**2 + self.w**2 + SLOWEST_MPS**2)
+        return ca.sqrt(self.u**2 + self.w**2 + _SLOWEST_MPS**2)
 
     @property
     def horizontal(self) -> ca.SX:
@@ -93,7 +93,7 @@ def glider_accelerations(at: Attitude, momentum: ca.SX, force: ca.SX, others: ca
     """
     # A path that is almost vertical has no course, and none of these equations tells how it would turn: beyond 84 deg
     # (a horizontal share of 0.1, a choice of ours) its course turns no faster than at that angle.
-    turned = ca.fmax(momentum[0], 0.1 * ca.norm_2(momentum) + SLOWEST_MPS)
+    turned = ca.fmax(momentum[0], 0.1 * ca.norm_2(momentum) + _SLOWEST_MPS)
     by_velocity = ca.jacobian(momentum, ca.vertcat(at.u, at.w))
     matrix = ca.horzcat(by_velocity, ca.vertcat(-momentum[1], turned, 0))
     return ca.solve(matrix, force - others)

@@ -13,6 +13,7 @@ from tank2sim.fmu.equations import fmu_equations
 from tank2sim.fmu.interface import Interface
 from tank2sim.fmu.templates import render
 from tank2sim.native.generate import generate_c, work_sizes
+from tank2sim.simulation.trajectory import TIMES_BEYOND
 
 _COMMON = ("instance.h", "instance.c", "values.c", "simulation.c", "derivatives.c", "snapshot.c")
 _OF_VERSION = {2: ("fmi2.c",), 3: ("fmi3.c", "fmi3_step.c", "fmi3_unsupported.c")}
@@ -46,7 +47,13 @@ def c_sources(model: Model, interface: Interface, fmi: int, token: str) -> dict[
     for name in ("equations.c", *SELDOM):
         chosen = [function for function in functions if _file_of(function.name()) == name]
         texts[name] = (_ONCE if name == _START else "") + generate_c(chosen, name.removesuffix(".c"))
-    values = {"interface": interface, "functions": functions, "work": work_sizes(functions), "token": token}
+    values = {
+        "interface": interface,
+        "functions": functions,
+        "work": work_sizes(functions),
+        "token": token,
+        "times_beyond": TIMES_BEYOND,
+    }
     texts["model.h"] = render("model.h", values)
     return texts
 

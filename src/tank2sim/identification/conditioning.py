@@ -21,7 +21,12 @@ def column_norms(design: Array) -> Array:
 
 
 def scaled_condition(design: Array) -> float:
-    """Condition number of a design matrix (rows, unknowns) whose columns are scaled to equal length."""
+    """Condition number of a design matrix (rows, unknowns) whose columns are scaled to equal length.
+
+    Infinite with fewer rows than unknowns: the singular values then leave out the directions that no row determines.
+    """
+    if design.shape[0] < design.shape[1]:
+        return np.inf
     return float(np.linalg.cond(design / column_norms(design)))
 
 

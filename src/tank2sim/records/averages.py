@@ -16,6 +16,10 @@ from tank2sim.files import read_text
 from tank2sim.records.campaign_form import CampaignFile
 from tank2sim.records.csv_table import LARGEST
 
+LEAST_FORCE = 1e-9
+"""A column of forces that stays below it (N, N m or prime) was not measured. Project choice: the resistance of a model,
+the smallest of them, is about 1e-3 in prime, and no gauge resolves a millionth of it."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Condition:
@@ -69,6 +73,9 @@ def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) 
             for line, row in zip(lines[1:], rows, strict=True)
         ]
         values[key] = [cell * factors.get(key, 1.0) for cell in cells]
+        if key in ("X", "Y", "N") and max(map(abs, cells)) < LEAST_FORCE:
+            remedy = "give the readings of the gauge"
+            raise InputError(file, f"column {heading}", "is zero in every row: the gauge is dead", remedy)
     if (averages.rudder_sign or form.test.rudder_sign) == "port" and "rudder_rad" in values:
         values["rudder_rad"] = [-angle for angle in values["rudder_rad"]]
     table = np.column_stack(list(values.values())) + 0.0  # + 0.0 turns -0.0 into 0.0

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
+from tank2sim.cards.reading import faults_of_toml
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.files import read_text
@@ -244,11 +245,10 @@ def together(faults: list[InputError]) -> InputError:
 
 
 def _parsed(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
-        problem, _, place = str(error).partition(" (at ")
-        raise InputError(path, place.rstrip(")"), problem, "mend the TOML there") from None
+    text = read_text(path)
+    with faults_of_toml(str(path)):
+        content = tomllib.loads(text)
+    return content
 
 
 def _refuse_doubled_names(form: CampaignFile, path: Path) -> None:

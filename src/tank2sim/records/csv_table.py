@@ -31,6 +31,9 @@ _QUOTED_LENGTH = 30
 SHORTEST_STEP = 1e-9
 """Least step of a quantity that must rise from row to row (a time, s): below, two rows are one, and slopes are noise of
 the last digit. Project choice, a thousand times faster than any gauge is read."""
+LONGEST_RUN_S = 2e5
+"""Longest run, s, that is simulated: beyond two days a manoeuvre or a tow is a mistake in units, and its motion (two
+million steps of 40 numbers) would fill gigabytes."""
 LARGEST = 1e15
 """Largest size of a number that a record may hold, in the unit of its column. No length, time, force or count of a
 ship is near it (an epoch is 1.8e9 s, or 1.8e12 ms), and squares and products of what is below stay far inside the

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.csv_table import CsvTable, read_table
+from tank2sim.records.csv_table import LONGEST_RUN_S, CsvTable, read_table
 
 _SPEED = re.compile(r"speed_([1-9]\d*)_mps")
 FEWEST_TIMES = 5
@@ -19,6 +19,10 @@ FEWEST_TIMES = 5
 
 FASTEST_MPS = 100.0
 """As for the speeds of a card (``tank2sim.cards.form.Speed``)."""
+
+_SLOWEST_MPS = 1e-6
+"""A tow whose fastest reading is below it did not move. Project choice: a hundredth of the last digit of the paper's
+speeds (Wilinski & Zellman, Table 1, prints 0.0001 m/s)."""
 
 BODY_KEYS = ("length_m", "beam_m", "volume_m3", "water_density_kgpm3", "kinematic_viscosity_m2ps")
 """Comments that describe the body and the water, all positive; they turn drag into coefficients."""
@@ -104,6 +108,11 @@ def read_tows(path: Path | str) -> Tows:
         raise InputError(
             table.path, table.place(0, "t_s"), "is before the release", "count the time from the release, t_s = 0"
         )
+    if time[-1] > LONGEST_RUN_S:
+        problem = f"is {time[-1]:.10g} s after the release, and at most {LONGEST_RUN_S:g} s can be simulated"
+        raise InputError(
+            table.path, table.place(len(time) - 1, "t_s"), problem, "count the time from the release, in s"
+        )
     names = tuple(name for name in table.columns if name != "t_s")
     for name in names:
         _check_name(table, name)
@@ -113,6 +122,9 @@ def read_tows(path: Path | str) -> Tows:
     for name, readings in zip(names, speed.T, strict=True):
         if np.isnan(readings).all():
             raise InputError(table.path, f"column {name}", "has no reading", "delete the column")
+        if np.nanmax(readings) < _SLOWEST_MPS:
+            remedy = "delete the column, or give the speeds in m/s"
+            raise InputError(table.path, f"column {name}", f"never reaches {_SLOWEST_MPS:g} m/s: no motion", remedy)
         if np.nanmax(np.abs(readings)) > FASTEST_MPS:
             row = int(np.nanargmax(np.abs(readings)))
             problem = f"{readings[row]:.6g} m/s is faster than any body is towed"

@@ -17,7 +17,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Input
 from tank2sim.errors import InputError
-from tank2sim.records.csv_table import read_table
+from tank2sim.records.csv_table import LONGEST_RUN_S, read_table
 from tank2sim.simulation.running import Running
 
 MANOEUVRE_FORMS = (
@@ -41,10 +41,6 @@ FULL_ASTERN = 0.7
 COASTING_END = 0.2
 """A ship whose engine is stopped coasts on without end: her run counts as ended at this share of the approach speed,
 where the rudder has lost most of its hold. A choice of ours."""
-
-LONGEST_RUN_S = 2e5
-"""Longest run, s: beyond two days a manoeuvre is a mistake in units, and its motion (two million steps of 40 numbers)
-would fill gigabytes."""
 
 STEADY_CHANGE = 1e-3
 """Steady: over two ship lengths the yaw rate changes by less than this share of itself, or of 0.01 u0/L if less."""

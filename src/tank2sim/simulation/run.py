@@ -9,10 +9,11 @@ import numpy as np
 
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.records.csv_table import LONGEST_RUN_S
 from tank2sim.simulation.card_range import CardRangeReading, reading
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
-from tank2sim.simulation.manoeuvres import LONGEST_RUN_S, Manoeuvre, Orders
+from tank2sim.simulation.manoeuvres import Manoeuvre, Orders
 from tank2sim.simulation.running import Running
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import in_words

@@ -14,7 +14,8 @@ from tank2sim.simulation.bracketed_root import bracketed_root
 from tank2sim.units import UNITS
 
 TIMES_BEYOND = 10.0
-"""A state this many times beyond the extent of its unit has left all that the equations can mean. Project choice."""
+"""A state this many times beyond the extent of its unit has left all that the equations can mean. Project choice:
+no manoeuvre comes near a single time. FMUs are written with the same number."""
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from tank2sim.analysis.catalogue.tables import (
@@ -149,6 +151,13 @@ def test_a_rudder_that_turns_the_ship_the_wrong_way_has_no_turn(card: SteeringCa
     model = model_of(card, "inoue-hirano")
     with pytest.raises(InputError, match="makes no steady turn"):
         TurningPoints(model).turn_at(0.3, {"coefficients.C_m_d": -1.63118, "coefficients.C_y_d": -0.15768})
+
+
+def test_the_model_of_a_steering_card_names_the_file_of_the_card(card: SteeringCard) -> None:
+    model = model_of(replace(card, source="mine/steering.toml"), "inoue-hirano")
+    assert model.origin == f"mine/steering.toml ({card.ship.name})"
+    with pytest.raises(InputError, match=r"^mine/steering\.toml .*does not turn the ship"):
+        TurningPoints(model).turn_at(0.0)
 
 
 def test_a_model_without_its_coefficients_is_refused_with_what_is_missing(card: SteeringCard) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -99,6 +100,16 @@ def test_the_robust_loop_is_robust_and_no_mode_of_it_is_slower_than_asked(name: 
     assert margins.phase_margin_deg > 38
     w = math.sqrt(design.found.nomoto.K_per_s / design.found.nomoto.T_s)
     assert max(pole.real for pole in margins.poles) < -0.99 * SHIFT * w
+
+
+@pytest.mark.skipif(importlib.util.find_spec("slycot") is None, reason=NO_SLYCOT)
+def test_a_ship_without_a_robust_controller_is_refused_by_its_file(mariner: Model) -> None:
+    from tank2sim.analysis.heading.robust import robust_design
+
+    plant = steering_plant(mariner)
+    nothing = replace(plant, A=np.full((4, 4), np.nan))
+    with pytest.raises(InputError, match=r"^hull\.toml \(Mariner\): no robust controller"):
+        robust_design(nothing, "pilot", "hull.toml (Mariner)")
 
 
 @pytest.mark.skipif(importlib.util.find_spec("slycot") is not None, reason="slycot is installed")

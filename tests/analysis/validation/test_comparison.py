@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -89,6 +90,20 @@ def test_a_stronger_rudder_turns_in_less_room(esso) -> None:
     assert rows["tactical_diameter_m"].in_errors(1) is None
     (rudder,) = [row.differences[0] for row in found.coefficients if row.name == "Nd"]
     assert rudder.standard_errors == pytest.approx(0.3 * 0.0015 / (math.sqrt(2) * 0.0006))
+
+
+def test_more_members_take_no_more_memory(mariner_card) -> None:
+    """A motion of some thousand rows is 1 MB: of each member the figures alone may stay."""
+
+    def peak(count: int) -> int:
+        tracemalloc.start()
+        compare_cards([mariner_card, mariner_card], count)
+        taken = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return taken
+
+    peak(1)  # what is computed once and kept
+    assert peak(12) < peak(2) + 2e6
 
 
 def test_one_card_alone_is_refused(esso) -> None:

@@ -102,6 +102,14 @@ def test_estimates_are_far_better_than_the_prior(pushed):
     assert np.all(np.abs(away[:, list(TRUTH).index("Nd")]) < 0.08)
 
 
+def test_information_is_what_the_trials_alone_say_whatever_the_prior(pushed):
+    problem, _, wide = pushed[0]
+    alone = np.sqrt(np.diag(np.linalg.inv(wide.information)))
+    sure = replace(problem, prior_mean=wide.values, prior_error=0.3 * alone)  # eleven times what the trials say
+    tight = kalman(sure, settings=KalmanSettings(scale_prior=False))
+    np.testing.assert_allclose(np.diag(tight.information), np.diag(wide.information), rtol=0.1)
+
+
 def test_noise_levels_are_found(pushed):
     process = np.array([[one.deviation for one in found.process_noise.values()] for *_, found in pushed])
     times = np.array([[one.time_s for one in found.process_noise.values()] for *_, found in pushed])

@@ -341,6 +341,7 @@ def test_units_and_signs_that_cannot_be_are_refused(folder, columns):
 
     tell("turns by .* where the programme turns by .* unit of the angle", psi=np.radians(columns["psi"]))
     tell("drives the body against its motion", I=-columns["I"])
+    tell("column current_A: stays below 1e-09 A", I=1e-200 * columns["I"])
     made = written(folder / "mA.csv", TRUTH, {**columns, "I": 1000 * columns["I"]}, max_current_A=1.0)
     with pytest.raises(InputError, match="divide it by 1000"):
         identify_yaw([read_yaw_record(made)])

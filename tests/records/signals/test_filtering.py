@@ -156,11 +156,19 @@ def test_what_is_no_filter_is_refused(text):
     ("text", "told"),
     [("lowpass:11", "not between"), ("bandpass:1,0.5", "that rise"), ("savgol:10,3", "odd number"),
      ("savgol:5001,3", "do not fit"), ("detrend:11", "no degree"), ("detrend:-1", "no degree"),
-     ("decimate:1", "factor"), ("decimate:100", "factor"), ("spline:0.001", "not between")],
+     ("decimate:1", "2 or more"), ("decimate:100", "2 or more"), ("spline:0.001", "not between")],
 )  # fmt: skip
 def test_numbers_that_do_not_fit_the_record_are_refused(text, told):
     with pytest.raises(InputError, match=told):
         parse_filter(text).apply(wave(0.3))
+
+
+@pytest.mark.parametrize("text", ["lowpass:11", "savgol:5001,3", "spline:0.001", "decimate:100"])
+def test_a_filter_that_does_not_fit_a_record_names_the_file_of_the_record(text):
+    record = wave(0.3)
+    with pytest.raises(InputError) as refusal:
+        parse_filter(text).apply(record)
+    assert str(refusal.value).startswith(f"{record.source}: filter {text.partition(':')[0]}: ")
 
 
 def test_side_lobes_upside_down_are_half_a_turn_and_no_more():

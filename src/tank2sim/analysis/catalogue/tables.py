@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -53,7 +53,7 @@ def complete(card: SteeringCard) -> tuple[str, ...]:
 
 
 def model_of(card: SteeringCard, name: str) -> Model:
-    """The model of one of a card's entries, parameters ``coefficients.*``.
+    """The model of one of a card's entries, parameters ``coefficients.*``; its messages name the card's file.
 
     Raises
     ------
@@ -71,7 +71,8 @@ def model_of(card: SteeringCard, name: str) -> Model:
     if missing := not_given(card, name):
         told = f"{form.title}: {', '.join(missing)} not given"
         raise InputError(card.source, place, told, "; ".join(form.missing) or "add them")
-    return steering_model(card.ship.name, form, given, card.ship.length_m, card.ship.speed_mps)
+    model = steering_model(card.ship.name, form, given, card.ship.length_m, card.ship.speed_mps)
+    return replace(model, source=card.source)
 
 
 @dataclass(frozen=True)

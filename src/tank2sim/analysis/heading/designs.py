@@ -132,7 +132,7 @@ def design_heading(
         case "robust":
             from tank2sim.analysis.heading.robust import robust_design
 
-            return robust_design(plant, name)
+            return robust_design(plant, name, ship.origin)
         case _:
             raise InputError("--design", "", f"there is no design {kind!r}", f"choose one of {', '.join(DESIGNS)}")
 
@@ -145,7 +145,7 @@ def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant
     slowest, fastest = values["ship.slowest"], values["ship.fastest"]
     if speed_mps is not None and not slowest <= speed_mps <= fastest:
         remedy = f"the card holds from {slowest:g} to {fastest:g} m/s"
-        raise InputError("--speed", "", f"{speed_mps:g} m/s is outside the range of {ship.name}", remedy)
+        raise InputError("--speed", "", f"{speed_mps:g} m/s is outside the range of {ship.origin}", remedy)
     point = straight_course(ship, speed_mps)
     hull = state_space(ship, point, states=["motion.v", "motion.r"], inputs=["rudder.angle"], outputs=["motion.r"])
     remedy = "check Yd and Nd of the card, and its rudder_sign"

@@ -37,8 +37,16 @@ LEAST_ERROR = 0.01
 """Share of BANDWIDTH at which W1 becomes flat: its pole has to be stable."""
 
 
-def robust_design(plant: SteeringPlant, name: str) -> HeadingDesign:
+def robust_design(plant: SteeringPlant, name: str, origin: str) -> HeadingDesign:
     """The mixed-sensitivity controller.
+
+    Parameters
+    ----------
+    plant : SteeringPlant
+    name : str
+        Name of the controller.
+    origin : str
+        :attr:`Model.origin` of the ship, for messages.
 
     Raises
     ------
@@ -50,7 +58,7 @@ def robust_design(plant: SteeringPlant, name: str) -> HeadingDesign:
     w = plant.frequency_radps
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FutureWarning)  # of a name inside python-control
-        core, gamma = _synthesis(plant)
+        core, gamma = _synthesis(plant, origin)
     core = _without_fast_modes(core, 1 / plant.step_s / w)
     A, B, C, D = core.A * w, core.B * w, core.C, core.D  # time back from 1/w to s
     n = len(A)
@@ -75,7 +83,7 @@ def robust_design(plant: SteeringPlant, name: str) -> HeadingDesign:
     return HeadingDesign(kind="robust", found=plant.found, gains=gains, source=source, autopilot=model)
 
 
-def _synthesis(plant: SteeringPlant) -> tuple[control.StateSpace, float]:
+def _synthesis(plant: SteeringPlant, origin: str) -> tuple[control.StateSpace, float]:
     """Controller without its integral (time in 1/w), and the gain reached."""
     w = plant.frequency_radps
     ship = control.ss(plant.A / w, plant.B / w, [[0, 0, 1, 0]], [[0]])
@@ -88,7 +96,7 @@ def _synthesis(plant: SteeringPlant) -> tuple[control.StateSpace, float]:
         found, _, reached = control.mixsyn(shifted, control.ss(W1), control.ss(W2), None)
     except (control.ControlArgument, ArithmeticError, ValueError) as error:
         remedy = "choose another design"
-        raise InputError(plant.found.name, "", f"no robust controller was found ({error})", remedy) from None
+        raise InputError(origin, "", f"no robust controller was found ({error})", remedy) from None
     back = control.ss(found.A - SHIFT * np.eye(found.nstates), found.B, found.C, found.D)
     return back, float(reached[0])
 

@@ -76,6 +76,10 @@ class TrackKeeping:
     mean_error_at_end_m: float
 
 
+LONGEST_TRACK_M = 1e6
+"""Longest track, m. Project choice: a day and a half at 15 kn; longer ones are mistakes in units, and take minutes."""
+
+
 @dataclass(frozen=True, eq=False)
 class TrackRun:
     """A track as it was sailed: the motion, and at each guidance step (n,) the leg (from 0) and cross-track error."""
@@ -100,7 +104,8 @@ def read_waypoints(path: Path | str) -> Array:
     Raises
     ------
     InputError
-        The file is no such table, a cell is empty, there are fewer than two, or two that follow are one place.
+        The file is no such table, a cell is empty, there are fewer than two, two that follow are one place, or the
+        track is longer than :data:`LONGEST_TRACK_M`.
     """
     table = read_table(path)
     points = np.column_stack([table.column("x_m"), table.column("y_m")])
@@ -110,6 +115,10 @@ def read_waypoints(path: Path | str) -> Array:
         raise InputError(path, table.place(row, ("x_m", "y_m")[column]), "is empty", "give each waypoint both numbers")
     if len(points) < 2:
         raise InputError(path, "", "has one waypoint", "give two or more: a track begins at the first")
+    length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    if length > LONGEST_TRACK_M:
+        problem = f"its track is {length / 1e3:.6g} km long, and at most {LONGEST_TRACK_M / 1e3:g} km can be sailed"
+        raise InputError(path, "", problem, "give x_m and y_m in m, and a shorter track")
     same = np.flatnonzero(np.hypot(*np.diff(points, axis=0).T) < 1e-6)
     if same.size:
         row = int(same[0]) + 1

@@ -31,6 +31,7 @@ from tank2sim.errors import InputError
 from tank2sim.marks import ASSUMED, EXTRAPOLATED
 from tank2sim.simulation.card_range import Numbers
 from tank2sim.simulation.manoeuvres import Manoeuvre
+from tank2sim.simulation.run import Run
 from tank2sim.simulation.trajectory import Trajectory
 
 SAME_SIZE = 0.03
@@ -276,8 +277,8 @@ def _trial(
         told += [f"{label}: {name}: {one}" for one in run.notices if EXTRAPOLATED in one or "not show" in one]
         outside.append(set(run.reading.outside_names))
         found.append(_scaled(figure_numbers(run.figures), ratio))
-        runs = [ship.run(manoeuvre, {**start, **member}) for member in own]
-        those = member_spread([{} if isinstance(one, str) else figure_numbers(one.figures) for one in runs])
+        # Of each member the numbers alone are kept: the motions of a thousand would fill gigabytes.
+        those = member_spread([_numbers(ship.run(manoeuvre, {**start, **member})) for member in own])
         deviations.append(_scaled(those, ratio))
         tracks.append(_track(label, run.trajectory, ratio))
     names = dict.fromkeys(one for figures in found for one in figures)
@@ -291,6 +292,11 @@ def _trial(
         for name in names
     )
     return TrialComparison(name, rows, tuple(tracks)), told
+
+
+def _numbers(run: Run | str) -> Numbers:
+    """Figures of a run; none of one that could not be run."""
+    return {} if isinstance(run, str) else figure_numbers(run.figures)
 
 
 def _approach(reference: ManoeuvringCard, card: ManoeuvringCard) -> float:

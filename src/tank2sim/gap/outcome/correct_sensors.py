@@ -162,7 +162,7 @@ def _as_wrapped(shown: Array, before: Array, after: Array, turn: float) -> Array
     """Headings after the correction, wrapped as the file has those before (from 0 to a turn, about 0, or not)."""
     found = shown + (after - before)
     lowest, highest = float(np.nanmin(shown)), float(np.nanmax(shown))
-    if highest - lowest > turn or highest - lowest < turn / 2:  # it does not wrap, or does not come to it
+    if highest - lowest < turn / 2:  # it does not come to where it would wrap
         return found
     if lowest >= 0 and highest <= turn:
         return np.asarray(np.mod(found, turn))

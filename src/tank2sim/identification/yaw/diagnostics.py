@@ -18,6 +18,8 @@ _FULL = 0.995
 _ANOTHER_UNIT = 20.0
 _STRONG_A = 20.0
 """More than a motor of such a rig takes; the paper's has 1 A."""
+_LEAST_A = 1e-9
+"""A current that stays below it turns no body. Project choice: a billionth of what the paper's motor takes (1 A)."""
 _NOT_THE_PROGRAMME = 1.5
 """A turn that is so many times more or less than programmed is a mistake of units, not of tracking."""
 _PULSE_RAD = 2 * math.pi / 3000
@@ -27,11 +29,14 @@ _SHARPER = 3.0
 
 
 def check_current(records: tuple[YawRecord, ...]) -> list[str]:
-    """What to say of the files and their currents; InputError where the motor is saturated in an interval."""
+    """What to say of the files and their currents; InputError where the motor is saturated in one or idle."""
     notes = []
     for record in records:
         notes += [f"{record.path.name}: {told}" for told in record.notes]
         largest = float(np.abs(record.current_A).max())
+        if largest < _LEAST_A:
+            problem, remedy = f"stays below {_LEAST_A:g} A: the motor did not turn the body", "give the current in A"
+            raise InputError(record.path, "column current_A", problem, remedy)
         if largest > _STRONG_A:
             notes.append(
                 f"{record.path.name}: the current reaches {largest:.3g} A; if the column is in mA, divide it by 1000."

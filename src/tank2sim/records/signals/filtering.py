@@ -101,7 +101,12 @@ def savitzky_golay(series: Series, samples: int, degree: int, *, derivative: int
     """
     if samples % 2 == 0 or not degree < samples <= len(series.values) or not 0 <= derivative <= degree:
         problem = f"{samples} samples of degree {degree} do not fit a record of {len(series.values)}"
-        raise InputError("savgol", "", problem, "give an odd number of samples above the degree, such as savgol:11,3")
+        raise InputError(
+            series.source,
+            "filter savgol",
+            problem,
+            "give an odd number of samples above the degree, such as savgol:11,3",
+        )
     values = signal.savgol_filter(series.values, samples, degree, deriv=derivative, delta=series.step_s)
     taps = signal.savgol_coeffs(samples, degree, deriv=derivative, delta=series.step_s)
     grid = effect_frequencies(series)
@@ -154,7 +159,9 @@ def decimate(series: Series, factor: int) -> Filtered:
     """
     if factor < 2 or len(series.values) // factor < FEWEST_SAMPLES:
         problem = f"every {factor}th of {len(series.values)} samples"
-        raise InputError("decimate", "", problem, f"give a factor of 2 or more that leaves {FEWEST_SAMPLES} samples")
+        raise InputError(
+            series.source, "filter decimate", problem, f"give 2 or more that leaves {FEWEST_SAMPLES} samples"
+        )
     edge = 0.8 / factor
     zeros, poles, gain = signal.cheby1(7, 0.05, edge, output="zpk")
     sections = signal.zpk2sos(zeros, poles, gain)
@@ -176,7 +183,9 @@ def _within(series: Series, filter_name: str, frequency_hz: float) -> float:
     low, high = 1.0 / series.duration_s, series.rate_hz / 2.0
     if not low < frequency_hz < high:
         problem = f"{frequency_hz:g} Hz is not between one period a record and half the sampling rate"
-        raise InputError(filter_name, "", problem, f"give a frequency from {low:.3g} to {high:.3g} Hz")
+        raise InputError(
+            series.source, f"filter {filter_name}", problem, f"give a frequency from {low:.3g} to {high:.3g} Hz"
+        )
     return float(frequency_hz)
 
 
