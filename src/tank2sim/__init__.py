@@ -9,8 +9,10 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tank2sim.api.fmu import FmuCheck, FmuFile, check_fmu
+    from tank2sim.api.fmu import CheckResult, ExportResult, check_fmu
+    from tank2sim.api.identification import IdentificationResult, identify
     from tank2sim.api.manoeuvre import ManoeuvreResult
+    from tank2sim.api.reduction import ReductionResult, reduce
     from tank2sim.api.result import Result, ResultTable
     from tank2sim.api.ship import Ship, load, ships
     from tank2sim.api.stability import StabilityResult
@@ -19,30 +21,38 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "FmuCheck": "api.fmu",
-    "FmuFile": "api.fmu",
+    "CheckResult": "api.fmu",
+    "ExportResult": "api.fmu",
+    "IdentificationResult": "api.identification",
     "InputError": "errors",
     "ManoeuvreResult": "api.manoeuvre",
+    "ReductionResult": "api.reduction",
     "Result": "api.result",
     "ResultTable": "api.result",
     "Ship": "api.ship",
     "StabilityResult": "api.stability",
     "check_fmu": "api.fmu",
+    "identify": "api.identification",
     "load": "api.ship",
+    "reduce": "api.reduction",
     "ships": "api.ship",
 }
 
 __all__ = [
-    "FmuCheck",
-    "FmuFile",
+    "CheckResult",
+    "ExportResult",
+    "IdentificationResult",
     "InputError",
     "ManoeuvreResult",
+    "ReductionResult",
     "Result",
     "ResultTable",
     "Ship",
     "StabilityResult",
     "check_fmu",
+    "identify",
     "load",
+    "reduce",
     "ships",
 ]
 

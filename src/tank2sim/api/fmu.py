@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Files = Mapping[Path, str | bytes]
 
 
-class FmuFile(Result):
+class ExportResult(Result):
     """An FMU that was made.
 
     Parameters
@@ -65,7 +65,7 @@ class FmuFile(Result):
         return ()
 
 
-class FmuCheck(Result):
+class CheckResult(Result):
     """The check of an FMU against its card.
 
     Parameters
@@ -137,7 +137,7 @@ def make_fmu_file(
     platforms: str = "host",
     ssp: Path | None = None,
     report: Callable[[str], None] = lambda _: None,
-) -> FmuFile:
+) -> ExportResult:
     """Make the FMU of a ship, without writing it: its bytes are in ``files``. Raises as :meth:`.Ship.to_fmu`.
 
     Parameters
@@ -158,10 +158,10 @@ def make_fmu_file(
         from tank2sim.fmu.ssp import ship_with_autopilot
 
         files[ssp] = ship_with_autopilot(ship.model, made, platforms=chosen, told=report)
-    return FmuFile(ship, path, made, ssp, files)
+    return ExportResult(ship, path, made, ssp, files)
 
 
-def check_fmu(path: str | Path, card: Ship | None = None) -> FmuCheck:
+def check_fmu(path: str | Path, card: Ship | None = None) -> CheckResult:
     """Validate an FMU and compare its outputs with the model of its card, in every kind of FMI it offers.
 
     It runs the FMU's own code with your rights: check only files from sources that you trust.
@@ -181,4 +181,4 @@ def check_fmu(path: str | Path, card: Ship | None = None) -> FmuCheck:
     text = embedded_card(Path(path)) if card is None else None
     inside = build(parse_card(text, f"{path}: resources/ship.toml")) if text is not None else None
     model = inside if card is None else card.model
-    return FmuCheck(check_against_model(Path(path), model=model))
+    return CheckResult(check_against_model(Path(path), model=model))

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import control
     import pandas as pd
 
-    from tank2sim.api.fmu import FmuFile
+    from tank2sim.api.fmu import ExportResult
     from tank2sim.api.manoeuvre import ManoeuvreResult
     from tank2sim.api.stability import StabilityResult
     from tank2sim.dynamics.model import Model
@@ -289,7 +289,7 @@ class Ship:
         names = [None if given is None else list(given) for given in (states, inputs, outputs)]
         return state_space(self.model, point, states=names[0], inputs=names[1], outputs=names[2])
 
-    def to_fmu(self, path: str | Path, *, fmi: int = 3, platforms: str = "host") -> FmuFile:
+    def to_fmu(self, path: str | Path, *, fmi: int = 3, platforms: str = "host") -> ExportResult:
         """Write the FMU (Model Exchange and Co-Simulation).
 
         Parameters
