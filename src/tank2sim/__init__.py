@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tank2sim.api.fmu import CheckResult, ExportResult, check_fmu
+    from tank2sim.api.gap import GapResult, find_gap
     from tank2sim.api.identification import IdentificationResult, identify
     from tank2sim.api.manoeuvre import ManoeuvreResult
     from tank2sim.api.reduction import ReductionResult, reduce
@@ -23,6 +24,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "CheckResult": "api.fmu",
     "ExportResult": "api.fmu",
+    "GapResult": "api.gap",
     "IdentificationResult": "api.identification",
     "InputError": "errors",
     "ManoeuvreResult": "api.manoeuvre",
@@ -32,6 +34,7 @@ _HOMES = {
     "Ship": "api.ship",
     "StabilityResult": "api.stability",
     "check_fmu": "api.fmu",
+    "find_gap": "api.gap",
     "identify": "api.identification",
     "load": "api.ship",
     "reduce": "api.reduction",
@@ -41,6 +44,7 @@ _HOMES = {
 __all__ = [
     "CheckResult",
     "ExportResult",
+    "GapResult",
     "IdentificationResult",
     "InputError",
     "ManoeuvreResult",
@@ -50,6 +54,7 @@ __all__ = [
     "Ship",
     "StabilityResult",
     "check_fmu",
+    "find_gap",
     "identify",
     "load",
     "reduce",

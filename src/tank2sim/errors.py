@@ -1,12 +1,14 @@
-"""The one kind of error a user sees: a fault in what was given, told in one line."""
+"""The one kind of error that a user sees: a fault in what was given, reported in one line."""
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from pathlib import Path
 
 
 class InputError(Exception):
-    """Something given to the program is wrong, and the user can mend it.
+    """Something given to the program is wrong, and the user can correct it.
 
     The command line prints it as one line and ends with exit code 2.
 
@@ -29,3 +31,10 @@ class InputError(Exception):
     def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
         """As it comes back from another process: pickle would call it with its one line alone."""
         return type(self), (self.source, self.place, self.problem, self.remedy)
+
+
+def close_name(name: str, known: Iterable[str]) -> str:
+    """A remedy for a name that is not known: the one that resembles it, or all of them."""
+    names = list(known)
+    close = difflib.get_close_matches(name, names, n=1)
+    return f"did you mean {close[0]}?" if close else f"known are: {', '.join(names)}"

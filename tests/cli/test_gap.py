@@ -73,7 +73,7 @@ def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[tuple[object,
             gap = replace(gap, passed=passed, where=where, missing_force=None, agreement={}, figures_before=())
             return gap if test else replace(gap, next_test=None)
 
-        monkeypatch.setattr("tank2sim.cli.gap.find_gap", find_gap)
+        monkeypatch.setattr("tank2sim.api.gap.run_workflow", find_gap)
         return calls
 
     return found

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from tank2sim.api.gap import improved_files
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance import Covariance, covariance_file, read_covariance, referring
 from tank2sim.cards.reading import changed_text
-from tank2sim.cli.gap_files import _with_covariance
 
 NAMES = ("derivatives.Yv", "derivatives.Nv")
 
@@ -21,7 +21,7 @@ def test_the_improved_card_has_its_covariance_beside_it_or_is_told_to_have_none(
     card = read_card(ship)
     assert isinstance(card, ManoeuvringCard)
     effect = "\n[[effects]]\nname = 'rudder_bias'\nparameters = {angle_deg = 1.0}\n"
-    files, told = _with_covariance(card, card.text + effect, out)
+    files, told = improved_files(card, card.text + effect, out)
     assert not told and set(files) == {out, covariance_file(out)}
     for path, content in files.items():
         path.write_text(content)
@@ -29,10 +29,10 @@ def test_the_improved_card_has_its_covariance_beside_it_or_is_told_to_have_none(
     assert found is not None and found.names == NAMES
     np.testing.assert_array_equal(found.matrix, matrix)
     changed = changed_text(card.text, card.source, {"derivatives.Yv": -0.01, "derivatives.Nv": -0.002})
-    files, told = _with_covariance(card, changed, out)
+    files, told = improved_files(card, changed, out)
     assert set(files) == {out} and "no covariance" in told[0]
     assert read_covariance(parse_card(str(files[out]), str(out))) is None
     # A search of an hour is not lost for a file that only ensembles need.
     covariance_file(ship).unlink()
-    files, told = _with_covariance(card, card.text + effect, out)
+    files, told = improved_files(card, card.text + effect, out)
     assert set(files) == {out} and "is missing" in told[0] and "# covariance" not in str(files[out])

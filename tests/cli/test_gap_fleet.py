@@ -57,8 +57,8 @@ def ships(tmp_path: Path) -> Path:
 @pytest.fixture
 def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
     """Lets each ship lack a current; gives the ships that were sought. Pages are left out: they take seconds."""
-    for module, name in (("gap_files", "_page"), ("gap_fleet", "render_page")):
-        monkeypatch.setattr(f"tank2sim.cli.{module}.{name}", lambda told: f"<html>{type(told).__name__}</html>")
+    for place in ("api.gap.GapResult.page", "cli.gap_fleet.render_page"):
+        monkeypatch.setattr(f"tank2sim.{place}", lambda told: f"<html>{type(told).__name__}</html>")
 
     def set_up(fails: dict[str, BaseException] | None = None) -> list[str]:
         calls: list[str] = []
@@ -80,7 +80,7 @@ def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
             return replace(gap, missing_force=None, agreement={}, figures_before=())
 
         monkeypatch.setattr("tank2sim.gap.fleet.search.find_gap", find_gap)
-        monkeypatch.setattr("tank2sim.cli.gap.find_gap", find_gap)
+        monkeypatch.setattr("tank2sim.api.gap.run_workflow", find_gap)
         return calls
 
     return set_up

@@ -35,12 +35,15 @@ class ResultTable:
         Cells: numbers, text, truth values, lists of numbers, or None where there is no value.
     notes : tuple of str
         Sentences under the table.
+    wide : bool
+        Names in it are never broken on the screen, however wide it becomes.
     """
 
     title: str
     columns: tuple[str, ...]
     rows: Sequence[Sequence[object]]
     notes: tuple[str, ...] = ()
+    wide: bool = False
 
     @property
     def df(self) -> pd.DataFrame:
@@ -108,15 +111,15 @@ class Result(ABC):
         plain: dict[str, object] = plain_json({"schema": self.schema, **self.content()})
         return plain
 
-    def to_json(self, path: str | Path | None = None) -> str:
-        """The result as JSON text, also written to `path`.
+    def to_json(self, path: str | Path | None = None, **more: object) -> str:
+        """The result as JSON text, also written to `path`; `more` are further keys at its end.
 
         Raises
         ------
         InputError
             The file cannot be written.
         """
-        text = json.dumps(self.to_dict(), indent=1, ensure_ascii=False) + "\n"
+        text = json.dumps({**self.to_dict(), **more}, indent=1, ensure_ascii=False) + "\n"
         if path is not None:
             write_together({Path(path): text})
         return text

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 from rich.markup import escape
+from rich.measure import Measurement
 from rich.table import Table
 
 from tank2sim.api.result import Result, cell_text
@@ -17,6 +18,9 @@ from tank2sim.marks import marked
 
 screen = Console(highlight=False)
 """Where summaries go."""
+
+_WIDEST = 1000
+"""Characters in which every table has room. Project choice."""
 
 
 def _standard_output(context: click.Context, parameter: click.Parameter, given: Path | None) -> Path | None:
@@ -37,16 +41,18 @@ json_option = click.option(
 """``--json FILE``, the same on every command."""
 
 
-def show_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Print a table; numbers are rounded to five figures and stand right."""
-    table = Table(title=escape(title), title_justify="left", header_style="bold", pad_edge=False)
+def show_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]], *, wide: bool = False) -> None:
+    """Print a table; numbers are rounded to five digits and aligned right. A wide one breaks no cell."""
+    table = Table(header_style="bold", pad_edge=False)
     rows = [list(row) for row in rows]
     for place, head in enumerate(heads):
         numeric = all(isinstance(row[place], int | float) or row[place] is None for row in rows)
-        table.add_column(escape(head), justify="right" if numeric else "left", overflow="fold")
+        table.add_column(escape(head), justify="right" if numeric else "left", overflow="fold", no_wrap=wide)
     for row in rows:
         table.add_row(*(escape(cell_text(value)) for value in row))
-    screen.print(table)
+    screen.print(escape(title), style="italic", soft_wrap=True)
+    needed = Measurement.get(screen, screen.options.update(width=_WIDEST), table).maximum if wide else 0
+    Console(width=max(needed, screen.width), highlight=False, stderr=screen.stderr).print(table)
 
 
 def show_notices(notices: Iterable[str]) -> None:
@@ -75,7 +81,7 @@ def show_result(result: Result) -> None:
     for line in result.headline:
         screen.print(escape(line), soft_wrap=True)
     for table in result.tables:
-        show_table(table.title, table.columns, table.rows)
+        show_table(table.title, table.columns, table.rows, wide=table.wide)
         for note in table.notes:
             screen.print(escape(note), soft_wrap=True)
     show_notices(others)

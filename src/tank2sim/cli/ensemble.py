@@ -5,20 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import click
 
 from tank2sim.analysis.ensemble.results import EnsembleRequest, Members, StabilityBands
 from tank2sim.cards import Card, ManoeuvringCard
-from tank2sim.cards.covariance import (
-    HOLDS,
-    carried,
-    not_referring,
-    read_covariance,
-)
 from tank2sim.cli.console import screen, show_marked, show_notices, show_table
 from tank2sim.errors import InputError
 from tank2sim.executors import EXECUTOR_FORMS, PROCESSES, check_executor, executing
@@ -69,32 +61,6 @@ def asked_of(given: Mapping[str, object]) -> EnsembleRequest | None:
             raise InputError("--executor", "", "has nothing to do without --ensemble", "give --ensemble N, too")
         return None
     return EnsembleRequest(int(str(given["ensemble"])), int(str(given["seed"])))
-
-
-def with_carried_covariance(card: Card, text: str, output: Path) -> tuple[dict[Path, str | bytes], list[str]]:
-    """Files of a card made of `card`, with what of the covariance of that still holds; and what is to be told of it.
-
-    Raises
-    ------
-    InputError
-        The covariance to which `card` refers is at fault.
-    """
-    known = read_covariance(card)
-    if known is None:
-        return {output: text}, []
-    kept = carried(card, text)
-    if kept is None:
-        return {output: not_referring(text)}, [
-            f"{output.name} has no covariance: all numbers of {card.source}'s changed"
-        ]
-    files = replace(card, text=text, covariance=kept).files(output)
-    if len(files) == 1 or len(kept.names) == len(known.names):
-        return files, []
-    changed = ", ".join(name.removeprefix("derivatives.") for name in known.names if name not in kept.names)
-    told = (
-        f"the covariance beside {output.name} is that of {len(kept.names)} numbers, moved by {HOLDS:g} standard error"
-    )
-    return files, [f"{told} at most; errors of the others are independent now: {changed}"]
 
 
 def uncertain_ship(card: Card) -> ManoeuvringCard:

@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tank2sim.api.gap import GapResult, misfit_text
+from tank2sim.api.gap_files import folder_made, put, refuse_early
 from tank2sim.api.trials import fitted_and_held
 from tank2sim.cards import read_card
-from tank2sim.cli.console import json_text, show_notices
-from tank2sim.cli.gap_files import folder_made, gap_file_contents, put, refuse_early
-from tank2sim.cli.gap_screen import hundredths, line, wide_table
+from tank2sim.cli.console import json_text, screen, show_notices, show_table
 from tank2sim.cli.progress import showing_stages
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
@@ -160,7 +160,7 @@ def _write(ship: Sought, gap: Gap, course: _Course, output: Path) -> Fault | Non
     folder = output / ship.folder.name
     record, why = course.wanted[ship.folder]
     try:
-        files, notices = gap_file_contents(gap, ship.fitted, ship.held, folder)
+        files, notices = GapResult(gap, ship.fitted, ship.held).files(folder)
     except InputError as error:
         return Fault(str(error))
     except OSError:
@@ -188,12 +188,14 @@ def _show(told: FleetTold, course: _Course, output: Path) -> None:
     rows: list[list[object]] = []
     for ship in told.ships:
         names = " + ".join(str(one["name"]) for one in ship.effects) or "-"
-        misfits = ["-" if one is None else hundredths(one) for one in ship.misfits()]
+        misfits = ["-" if one is None else misfit_text(one) for one in ship.misfits()]
         rows.append([ship.folder, ship.verdict or "no result", names, *misfits, course.done.get(ship.folder, "-")])
     heads = ["ship", "verdict", "effect", "before", "after", "result"]
-    wide_table("Misfit in units of the noise (1 is noise), of trials held out where there are some", heads, rows)
+    title = "Misfit in units of the noise (1 is noise), of trials held out where there are some"
+    show_table(title, heads, rows, wide=True)
     show_notices([*told.notices, *course.notices, *_without_ship(told, output)])
-    line(f"{output}: {JSON}, {PAGE}, and the folders of {len(course.done)} of {len(told.ships)} ships")
+    written = f"{output}: {JSON}, {PAGE}, and the folders of {len(course.done)} of {len(told.ships)} ships"
+    screen.print(written, soft_wrap=True, markup=False)
     for fault in dict.fromkeys(one.fault for one in told.faults):
         names = ", ".join(one.folder for one in told.faults if one.fault == fault)
         print(f"tank2sim: {names}: {' '.join(fault.split())}", file=sys.stderr)

@@ -18,9 +18,10 @@ from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, WITHIN, Means, Tu
 from tank2sim.analysis.tuning.targets import TARGET_OPTION, Wish, parse_wish
 from tank2sim.analysis.tuning.tune import tune
 from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.cards.covariance import with_carried_covariance
 from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.cli.console import json_option, json_text, screen, show_marked, show_notices, show_table
-from tank2sim.cli.ensemble import asked_of, computing, ensemble_options, show_bands, with_carried_covariance
+from tank2sim.cli.ensemble import asked_of, computing, ensemble_options, show_bands
 from tank2sim.cli.joint_variation import parse_agreed, parse_bounds
 from tank2sim.cli.overrides import parse_changes
 from tank2sim.cli.steering_card import refuse_options, show_steering_card

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning, WantedTurn, levers_of_ship, tune_to_two_points
 from tank2sim.cards import ManoeuvringCard
+from tank2sim.cards.covariance import with_carried_covariance
 from tank2sim.cards.reading import revised
 from tank2sim.cli.console import json_text, show_notices
-from tank2sim.cli.ensemble import with_carried_covariance
 from tank2sim.cli.steering_card import show_tuning
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError

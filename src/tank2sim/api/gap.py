@@ -1,0 +1,342 @@
+"""The missing physical effect of a model, by trials: a result with the improved card."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tank2sim.api.gap_files import CORRECTED, REPORT, GapFiles
+from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.ship import Ship, as_ship
+from tank2sim.api.trials import TrialPaths, fitted_and_held
+from tank2sim.cards import Card, parse_card
+from tank2sim.cards.covariance import not_referring, with_carried_covariance
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.errors import InputError, close_name
+from tank2sim.executors import PROCESSES, check_executor, executing
+from tank2sim.files import writable_folder, write_together
+from tank2sim.gap.diagnosis.error_intervals import acting
+from tank2sim.gap.fleet.search import can_lack
+from tank2sim.gap.fleet.ships import GAP, IMPROVED
+from tank2sim.gap.inference.fit_all import Progress
+from tank2sim.gap.outcome.correct_sensors import REMAINING_FAULTS, correct_sensor_faults, corrected_text
+from tank2sim.gap.outcome.export import (
+    NEXT_TEST_FILE,
+    estimate_in_file,
+    gap_as_json,
+    in_file_units,
+    joined,
+    measured_in,
+    signal_display_name,
+)
+from tank2sim.gap.outcome.improve_card import Found, card_with_effects_text
+from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap, Named
+from tank2sim.gap.workflow import GapOptions
+from tank2sim.gap.workflow import find_gap as run_workflow
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.signatures import with_fitted_trials
+from tank2sim.units import in_words
+
+if TYPE_CHECKING:
+    import altair as alt
+    import pandas as pd
+
+
+class GapResult(Result):
+    """The effect that a model lacks to follow trials, and the card with it.
+
+    Parameters
+    ----------
+    gap : Gap
+        SI and radians.
+    fitted, held : Measured
+        Trials that name the effect, and trials that only prove it.
+    """
+
+    command = "gap"
+
+    def __init__(self, gap: Gap, fitted: Measured, held: Measured) -> None:
+        self.gap, self.fitted, self.held = gap, fitted, held
+        self.notices = tuple(gap.notices)
+
+    @property
+    def verdict(self) -> str:
+        """``missing effect``, ``no missing effect``, ``ambiguous`` or ``outside the library``."""
+        return self.gap.verdict
+
+    @property
+    def effects(self) -> pd.DataFrame:
+        """Parameters of the effects that were named: effect, parameter, value, standard error, probability (0 to 1).
+
+        Units are in the names of the parameters; angles are in degrees.
+        """
+        import pandas as pd
+
+        rows = []
+        for effect in self.gap.effects:
+            for name, value in effect.parameters.items():
+                own, size = estimate_in_file(name, value)
+                rows.append((effect.name, own, size, _standard_error(effect, name), effect.confidence))
+        return pd.DataFrame(rows, columns=["effect", "parameter", "value", "standard_error", "probability"])
+
+    @property
+    def misfit(self) -> pd.DataFrame:
+        """Root mean square of (simulated - measured)/noise by trial, before and after: 1 is noise."""
+        import pandas as pd
+
+        rows = [
+            (trial.name, trial.held_out, trial.misfit("before"), trial.misfit("after"))
+            for trial in self.gap.passed
+            if measured_in(trial)
+        ]
+        return pd.DataFrame(rows, columns=["trial", "held_out", "before", "after"]).set_index("trial")
+
+    @cached_property
+    def improved(self) -> Card:
+        """The card with the effects; the given card where none of the ship was named."""
+        text = self._improved_text("the improved card")
+        card = parse_card(text, self.gap.card.source)
+        return replace(card, covariance=self.gap.card.covariance) if text == self.gap.card.text else card
+
+    @property
+    def ship(self) -> Ship:
+        """The ship of the improved card."""
+        return Ship(self.improved)
+
+    def content(self) -> Mapping[str, object]:
+        """As :meth:`.Result.content`."""
+        trials = (*self.fitted.trials, *self.held.trials)
+        return gap_as_json(self.gap, {trial.name: trial.path.name for trial in trials})
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """The verdict, its probabilities, and what these data cannot distinguish."""
+        from tank2sim.report.gap.text import probabilities_in_words, verdict_in_words
+
+        gap = self.gap
+        lines = [f"{gap.card.ship.name}: {verdict_in_words(gap)}", *probabilities_in_words(gap)]
+        if gap.alternatives:
+            lines.append(f"these data cannot tell it from: {'; '.join(joined(names) for names in gap.alternatives)}")
+        for place in gap.where[:1]:
+            signal = signal_display_name(place.signal).file
+            lines.append(
+                f"most of the misfit arises in {signal} of {place.trial}, {place.t_start_s:.4g} s to "
+                f"{place.t_end_s:.4g} s ({100 * place.share:.0f} %)"
+            )
+        for part in acting(gap)[:1]:
+            lines.append(
+                f"the cause acts most in {part.equation} of {part.trial}, {part.t_start_s:.4g} s to "
+                f"{part.t_end_s:.4g} s ({part.size:.2g} standard errors)"
+            )
+        if gap.next_test:
+            lines.append(f"next test: {gap.next_test.manoeuvre}. {gap.next_test.why}")
+        return tuple(lines)
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """Parameters of what was found and of other candidates, and the misfit before and after."""
+        from tank2sim.report.gap.text import sizes_of_candidates
+
+        gap = self.gap
+        columns = ("effect", "parameter", "value", "standard error", "unit")
+        found = "What the best of the candidates would be" if gap.verdict == AMBIGUOUS else "What was found"
+        others = sizes_of_candidates(gap)
+        tables = [
+            ResultTable(title, columns, rows, wide=True)
+            for title, effects in ((found, gap.effects), ("What the others would be", others))
+            if (rows := [row for effect in effects for row in _parameter_rows(effect)])
+        ]
+        heads = ("trial", "set", "before", "after")
+        title = "Misfit in units of the noise (1 is noise)"
+        return (*tables, ResultTable(title, heads, self._misfit_rows(), wide=True))
+
+    def charts(self) -> dict[str, alt.TopLevelMixin]:
+        """Tracks before and after, misfits, the missing force and rivals, by name."""
+        from tank2sim.report.gap.page import gap_charts
+
+        return dict(gap_charts(self.gap))
+
+    def page(self) -> str:
+        """As :meth:`.Result.page`."""
+        from tank2sim.report.gap.page import gap_charts, gap_page
+        from tank2sim.report.kit.page import render_page
+
+        return render_page(gap_page(self.gap, gap_charts(self.gap)))
+
+    def files(self, folder: Path) -> tuple[GapFiles, list[str]]:
+        """Path to content of the files that belong into a folder, and messages about them.
+
+        ``gap.json``, ``improved.toml`` with its covariance, ``report.html``, ``next_test.csv`` where a test would
+        decide, and ``corrected/`` where a sensor is at fault.
+        """
+        gap, trials = self.gap, (*self.fitted.trials, *self.held.trials)
+        text = self._improved_text(str(folder / IMPROVED))
+        improved, notices = improved_files(gap.card, text, folder / IMPROVED)
+        files: GapFiles = {**improved, folder / REPORT: self.page()}
+        if gap.next_test:
+            files[folder / NEXT_TEST_FILE] = gap.next_test.orders
+        if gap.verdict == MISSING and any(EFFECTS[effect.name].acts_on == "sensor" for effect in gap.effects):
+            for trial in trials:
+                corrected = corrected_text(trial.path, trial, self._found)
+                if corrected is not None:
+                    files[folder / CORRECTED / f"{trial.name}.csv"] = corrected
+                new = correct_sensor_faults(trial, self._found).notices[len(trial.notices) :]
+                notices += [f"{trial.path.name}: {text}" for text in new if text.startswith(REMAINING_FAULTS)]
+        own = sorted(path.relative_to(folder).as_posix() for path in (*files, folder / GAP))
+        files[folder / GAP] = self.to_json(files=own)
+        return files, notices
+
+    def save(self, folder: str | Path) -> tuple[str, ...]:
+        """Write :meth:`files` into a folder, which is made if need be; messages about them.
+
+        Raises
+        ------
+        InputError
+            The folder cannot be written.
+        """
+        writable_folder(Path(folder))
+        files, notices = self.files(Path(folder))
+        if any(path.parent.name == CORRECTED for path in files):
+            writable_folder(Path(folder) / CORRECTED)
+        inputs = [trial.path for trial in (*self.fitted.trials, *self.held.trials)]
+        write_together(files, inputs=inputs)
+        return tuple(notices)
+
+    @property
+    def _found(self) -> list[Found]:
+        return [(effect.name, effect.parameters, effect.standard_errors) for effect in self.gap.effects]
+
+    def _improved_text(self, source: str) -> str:
+        """Text of the improved card; raises InputError if it cannot be read again."""
+        gap = self.gap
+        text = gap.card.text
+        if gap.improved.text != text:
+            rivals = [joined(names) for names in gap.alternatives]
+            names = [trial.name for trial in self.fitted.trials]
+            text = card_with_effects_text(gap.improved, self._found, names, rivals)
+            text = with_fitted_trials(text, source, self.fitted.trials)
+        parse_card(text, source)
+        return text
+
+    def _misfit_rows(self) -> list[list[object]]:
+        gap = self.gap
+        rows: list[list[object]] = [
+            [
+                trial.name,
+                "held out" if trial.held_out else "fitted",
+                *(misfit_text(trial.misfit(which)) for which in ("before", "after")),
+            ]
+            for trial in gap.passed
+            if measured_in(trial)
+        ]
+        for word, held in (("fitted", False), ("held out", True)):
+            before, after = (gap.misfit(which, held_out=held) for which in ("before", "after"))
+            if before is not None and after is not None:
+                rows.append(["all", word, misfit_text(before), misfit_text(after)])
+        return rows
+
+
+def improved_files(card: Card, text: str, path: Path) -> tuple[GapFiles, list[str]]:
+    """Files of the improved card at `path`, with what of the covariance of `card` still holds; messages about it.
+
+    A covariance that cannot be read is left out with a message: an hour's search is not lost for it.
+    """
+    try:
+        return with_carried_covariance(card, text, path)
+    except InputError as error:
+        return {path: not_referring(text)}, [f"{path.name} has no covariance: {error}"]
+
+
+def misfit_text(misfit: float) -> str:
+    """A misfit as tables show it."""
+    return f"{misfit:.2f}" if math.isfinite(misfit) else "ran away"
+
+
+def _parameter_rows(effect: Named) -> list[list[object]]:
+    rows: list[list[object]] = []
+    for parameter, value in effect.parameters.items():
+        own, size = estimate_in_file(parameter, value)
+        error = _standard_error(effect, parameter)
+        words, unit = in_words(own)
+        finite = math.isfinite(size), math.isfinite(error)
+        rows.append(
+            [effect.name, words, size if finite[0] else None, float(f"{error:.2g}") if finite[1] else None, unit or "-"]
+        )
+    return rows
+
+
+def _standard_error(effect: Named, parameter: str) -> float:
+    """In the units of the card's file; nan if the parameter was not estimated."""
+    if parameter not in effect.standard_errors:
+        return math.nan
+    return in_file_units(parameter, effect.standard_errors[parameter])[1]
+
+
+def find_gap(
+    card: Ship | Card | str | Path,
+    trials: TrialPaths,
+    *,
+    holdout: TrialPaths = (),
+    effects: Sequence[str] = (),
+    without: Sequence[str] = (),
+    max_effects: int = 2,
+    executor: str = PROCESSES,
+    workers: int | None = None,
+    progress: Progress = lambda text: None,
+) -> GapResult:
+    """Find the physical effect that a model lacks to follow free-running trials, add it, and prove it.
+
+    Parameters
+    ----------
+    card : Ship, Card, str or path
+        The ship as it is known (an ``abkowitz`` card).
+    trials, holdout : path or sequence of paths
+        Trials that name the effect, and trials that only prove it; a folder stands for the trials in it.
+    effects, without : sequence of str
+        Look for these alone; do not look for these. By default the whole library.
+    max_effects : int
+        1 or 2 effects at a time.
+    executor : str
+        ``processes`` or ``dask://host:port``.
+    workers : int, optional
+        Processes; by default one for each core.
+    progress : callable
+        Called with the stage that begins.
+
+    Raises
+    ------
+    InputError
+        A file is at fault, a trial is too short, or an effect is not known or cannot be tried on this card.
+    """
+    ship = can_lack(as_ship(card).card)
+    options = gap_options(effects, without, max_effects, workers)
+    fitted, held = fitted_and_held(trials, holdout, ship)
+    with _cluster(executor) as pool:
+        return GapResult(run_workflow(ship, fitted, held, options, progress, pool), fitted, held)
+
+
+def gap_options(
+    effects: Sequence[str] = (), without: Sequence[str] = (), max_effects: int = 2, workers: int | None = None
+) -> GapOptions:
+    """Options of the search. Raises InputError for an effect that is not known."""
+    for option, names in (("--effects", effects), ("--without", without)):
+        for name in names:
+            if name not in EFFECTS:
+                raise InputError(option, "", f"{name!r} is no effect", close_name(name, EFFECTS))
+    return GapOptions(tuple(effects) or None, tuple(without), max_effects, workers)
+
+
+@contextmanager
+def _cluster(executor: str) -> Iterator[Executor | None]:
+    """The cluster; None for processes of this machine, which the search begins itself if it needs them."""
+    if check_executor(executor) == PROCESSES:
+        yield None
+        return
+    with executing(executor) as pool:
+        yield pool
