@@ -42,7 +42,7 @@ class ManoeuvreResult(Result):
     >>> import tank2sim as t2s
     >>> run = t2s.load("mariner").zigzag(20, 20)
     >>> round(run.figures["overshoot_1_deg"])
-    10
+    8
     >>> list(run.df.columns)[:3]
     ['t_s', 'delta_order_deg', 'delta_deg']
     """

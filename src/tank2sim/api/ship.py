@@ -55,7 +55,7 @@ class Ship:
     >>> import tank2sim as t2s
     >>> ship = t2s.load("mariner")
     >>> round(ship.turn(35).figures["tactical_diameter_lengths"], 1)
-    4.6
+    6.4
     """
 
     def __init__(self, card: Card) -> None:

@@ -1,0 +1,72 @@
+"""``import tank2sim``: what it gives, what it loads, and that the examples in its docstrings are true."""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+import os
+import subprocess
+import sys
+
+import pytest
+
+import tank2sim
+
+SLOW = ("numpy", "casadi", "pandas", "matplotlib", "control", "scipy", "altair", "pydantic")
+
+
+def loaded_by(code: str) -> set[str]:
+    """Modules that a new process has loaded after `code`."""
+    script = f"{code}\nimport sys; print(' '.join(sorted(name.partition('.')[0] for name in sys.modules)))"
+    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    return set(result.stdout.split())
+
+
+def test_importing_the_package_loads_no_library() -> None:
+    assert not loaded_by("import tank2sim") & set(SLOW)
+
+
+def test_a_simulation_loads_neither_control_nor_plots_nor_tables() -> None:
+    code = "import tank2sim; tank2sim.load('mariner').zigzag(20, 20).figures"
+    assert not loaded_by(code) & {"control", "matplotlib", "pandas", "altair", "numba", "statsmodels", "fmpy"}
+
+
+def test_every_name_is_there_with_a_docstring() -> None:
+    assert sorted(tank2sim.__all__) == tank2sim.__all__
+    for name in tank2sim.__all__:
+        assert inspect.getdoc(getattr(tank2sim, name)), name
+    assert set(tank2sim.__all__) <= set(dir(tank2sim))
+
+
+def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="simulat"):
+        tank2sim.simulat  # noqa: B018
+
+
+@pytest.mark.parametrize("name", tank2sim.__all__)
+def test_examples_in_docstrings_are_true(name: str, tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = doctest.DocTestFinder(recurse=False).find(getattr(tank2sim, name), name)
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    for test in found:
+        report: list[str] = []
+        assert runner.run(test, out=report.append).failed == 0, "".join(report)
+
+
+def test_a_script_that_uses_the_api_passes_strict_type_checks(tmp_path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import tank2sim as t2s\n"
+        "ship: t2s.Ship = t2s.load('mariner', {'derivatives.Yv': -0.012})\n"
+        "run = ship.zigzag(20, 20, duration_s=300.0)\n"
+        "overshoot: float = run.figures['overshoot_1_deg']\n"
+        "stable: bool = ship.stability().stable\n"
+        "t2s.check_fmu(ship.to_fmu('mariner.fmu', fmi=3).path).passed\n"
+        "t2s.reduce('campaign.toml').card.save('ship.toml')\n"
+        "fit = t2s.identify(ship, ['zz.csv'], holdout=['turn.csv'])\n"
+        "t2s.find_gap(fit.ship, ['zz.csv'], holdout=['turn.csv']).improved.save('better.toml')\n"
+    )
+    pytest.importorskip("mypy")
+    command = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path / "cache"), str(script)]
+    result = subprocess.run(command, capture_output=True, text=True, env={**os.environ}, cwd=tmp_path, check=False)
+    assert result.returncode == 0, result.stdout
