@@ -29,7 +29,7 @@ def test_angles_are_degrees(ship) -> None:
 
 def test_a_turn_to_port_goes_west(ship) -> None:
     port, starboard = ship.turn(-35), ship.turn(35)
-    assert port.df["y_m"].min() < -500 < 0 < 500 < starboard.df["y_m"].max()
+    assert port.df["y_m"].min() < -500 and starboard.df["y_m"].max() > 500
 
 
 def test_orders_of_a_data_frame_are_those_of_a_turn(ship) -> None:

@@ -74,3 +74,35 @@ def test_one_file_for_two_outputs_is_refused(tmp_path) -> None:
 def test_a_ship_may_be_named_like_markup(tmp_path) -> None:
     result = tank2sim("stability", "mariner", "--set", 'ship.name="[/] [bold]x"', cwd=tmp_path)
     assert result.returncode == 0 and "[/] [bold]x at" in result.stdout, result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "meant"),
+    [
+        (["simulat", "mariner"], "simulate"),
+        (["simulate", "marinner", "--manoeuvre", "turn:35"], "mariner"),
+        (["simulate", "mariner", "--manoeuvre", "tunr:35"], "turn"),
+        (["simulate", "mariner", "--manoeuvre", "turn:35", "--set", "Yv=1"], "derivatives.Yv"),
+        (["simulate", "mariner", "--manoeuvre", "turn:35", "--set", "length_m=100"], "ship.length_m"),
+        (["simulate", "mariner", "--manoeuvre", "turn:35", "--set", "derivatives.Yvv=1"], "Yvvv"),
+        (["simulate", "mariner", "--manouvre", "turn:35"], "--manoeuvre"),
+    ],
+)
+def test_a_name_that_resembles_a_known_one_is_suggested(arguments, meant, tmp_path) -> None:
+    refused(tank2sim(*arguments, cwd=tmp_path), "id you mean", meant)
+
+
+def test_every_command_is_in_one_group_of_the_help(tmp_path) -> None:
+    from tank2sim.cli import COMMANDS, GROUPS
+
+    modules = {path.stem for path in (MODELS.parent / "src/tank2sim/cli").glob("*.py")}
+    assert set(COMMANDS) <= modules and sum(map(len, GROUPS.values())) == len(COMMANDS)
+    helped = tank2sim("--help", cwd=tmp_path).stdout
+    assert all(f"\n{title}:\n" in helped for title in GROUPS)
+
+
+def test_a_shell_completes_commands(tmp_path) -> None:
+    completing = {"_TANK2SIM_COMPLETE": "bash_complete", "COMP_WORDS": "tank2sim sim", "COMP_CWORD": "1"}
+    command = [str(Path(sys.executable).parent / "tank2sim")]
+    done = subprocess.run(command, env=os.environ | completing, capture_output=True, text=True, check=False)
+    assert done.stdout == "plain,simulate\n"

@@ -1,4 +1,4 @@
-"""What pydantic objects to in a file that should follow one of our forms, as one line of ours."""
+"""Faults that pydantic finds in a file that should follow a form, as one line with place and remedy."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from tank2sim.cards.terms import parse_term
 from tank2sim.errors import InputError
 from tank2sim.units import from_si
 
@@ -18,13 +19,13 @@ _RELATIONS = {
     "less_than": ("lt", "below"),
     "less_than_equal": ("le", "of at most"),
 }
-"""Kind of fault to the name of the bound in pydantic's words and in ours."""
+"""Kind of fault to the name of the bound in pydantic's words and in a message."""
 
 
 def form_fault(
     error: ValidationError, source: str | Path, spelt: Mapping[str, str], *, form: type[BaseModel], what: str
 ) -> InputError:
-    """The first fault that pydantic found, as one line of ours.
+    """The first fault that pydantic found, as one line with place and remedy.
 
     Parameters
     ----------
@@ -41,7 +42,7 @@ def form_fault(
     first: Any = min(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
     place = ".".join(str(part) for part in first["loc"])
     place = spelt.get(place, place)
-    problem, remedy = _told(first, place.rpartition(".")[2], form, what)
+    problem, remedy = _problem_and_remedy(first, place.rpartition(".")[2], form, what)
     more = len(error.errors()) - 1
     after = f" ({more} more fault{'s' * (more > 1)} after this)" if more else ""
     return InputError(source, place, problem, remedy + after)
@@ -49,8 +50,8 @@ def form_fault(
 
 def short(value: object) -> str:
     """A value as it would stand in Python, cut to 80 characters."""
-    told = repr(value)
-    return told if len(told) <= 80 else f"{told[:77]}..."
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def suggestion(key: str, known: list[str]) -> str:
@@ -61,14 +62,25 @@ def suggestion(key: str, known: list[str]) -> str:
     return f"did you mean {best[0]}?" if best else f"known here: {', '.join(known)}" if known else "remove it"
 
 
-def _told(fault: Any, key: str, form: type[BaseModel], what: str) -> tuple[str, str]:
+def _in_a_section(key: str, form: Any) -> list[str]:
+    """Dotted keys of sections in which a key may be given that was given outside of them: ``derivatives.Yv``."""
+    found = ["derivatives." + key] if "derivatives" in form.model_fields and parse_term(key) else []
+    for name, field in form.model_fields.items():
+        for kind in (field.annotation, *getattr(field.annotation, "__args__", ())):
+            found += [f"{name}.{key}"] if key in getattr(kind, "model_fields", ()) else []
+    return found
+
+
+def _problem_and_remedy(fault: Any, key: str, form: type[BaseModel], what: str) -> tuple[str, str]:
     """Problem and remedy."""
     given, wanted = fault["input"], fault.get("ctx", {})
     match fault["type"]:
         case "missing":
             return "is missing", "add it"
         case "extra_forbidden":
-            return f"is no key of {what}", suggestion(key, _siblings(fault["loc"], form))
+            inside = _in_a_section(key, form) if len(fault["loc"]) == 1 else []
+            remedy = f"did you mean {inside[0]}?" if inside else suggestion(key, _siblings(fault["loc"], form))
+            return f"is no key of {what}", remedy
         case "finite_number":
             return f"is {short(given)}", "a finite number was expected"
         case "float_type" | "int_type":
@@ -81,7 +93,7 @@ def _told(fault: Any, key: str, form: type[BaseModel], what: str) -> tuple[str, 
         case "literal_error":
             return f"is {short(given)}", f"{wanted['expected']} was expected"
         case "value_error" if isinstance(given, dict):  # what is wrong with a section as a whole
-            return str(wanted["error"]), "mend its keys"
+            return str(wanted["error"]), "correct its keys"
         case "value_error":
             return f"is {short(given)}", str(wanted["error"])
         case _:

@@ -28,7 +28,7 @@ from tank2sim.cards.form import (
 from tank2sim.cards.form_faults import form_fault, short, suggestion
 from tank2sim.cards.scaling import Scales, file_factor
 from tank2sim.cards.terms import parse_term
-from tank2sim.errors import InputError
+from tank2sim.errors import InputError, close_name
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
 from tank2sim.units import to_si
 
@@ -63,7 +63,7 @@ def find_card(name: str) -> Path:
     ships = bundled_cards()
     if name.lower() in ships:
         return ships[name.lower()]
-    raise InputError(name, "", "is no file and no bundled ship", f"bundled are: {', '.join(ships)}")
+    raise InputError(name, "", "is neither a file nor a bundled ship", close_name(name.lower(), ships))
 
 
 def read_card(name: str | Path, changes: Mapping[str, object] | None = None) -> Card:

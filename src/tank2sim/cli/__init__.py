@@ -17,50 +17,72 @@ from pathlib import Path
 import click
 
 from tank2sim import __version__
-from tank2sim.errors import InputError
+from tank2sim.errors import InputError, close_name
 
-COMMANDS = {
-    "demo": "the whole way on bundled data: tows to an FMU, the Mariner to an FMU",
-    "ships": "the bundled ships, by the names that CARD takes",
-    "simulate": "a manoeuvre of a ship: turn, zigzag, pull-out, spiral, stop, orders of a file",
-    "reduce": "captive tests to derivatives",
-    "tow": "surge mass and drag from accelerating tows",
-    "yaw": "added yaw inertia and dissipation from records of a yaw rig",
-    "audit": "what is wrong with the data of a trial",
-    "identify": "coefficients from free-running trials",
-    "gap": "the physical effect that a card lacks",
-    "signals": "statistics, spectra and filters of a record",
-    "export": "the FMU, Model Exchange and Co-Simulation",
-    "check": "an FMU validated, and held against its reference",
-    "stability": "stability, steady turning, IMO criteria",
-    "autopilot": "heading controllers, designed, tried and exported",
-    "influence": "what moves a manoeuvring figure; tuning",
-    "glide": "an underwater glider: glides, paths, range",
-    "compare": "cards of one ship side by side",
-    "validate": "a validation report in the manner of ITTC 7.5-02-06-03",
-    "poster": "a wheelhouse poster (A3)",
-    "pilotcard": "a pilot card (A4)",
-    "steer": "a page in which the ship is steered",
-    "report": "one page of any result",
+GROUPS = {
+    "Measure": {
+        "reduce": "captive tests to derivatives",
+        "tow": "surge mass and drag from accelerating tows",
+        "yaw": "added yaw inertia and dissipation from records of a yaw rig",
+        "audit": "faults in the data of trials",
+        "signals": "statistics, spectra and filters of a record",
+    },
+    "Identify": {
+        "identify": "coefficients from free-running trials",
+        "gap": "the physical effect that a card lacks",
+        "validate": "a validation report after ITTC 7.5-02-06-03",
+        "compare": "cards of one ship side by side",
+    },
+    "Study": {
+        "simulate": "a manoeuvre: turn, zigzag, pull-out, spiral, stop, orders of a file",
+        "stability": "course stability, steady turning, IMO criteria",
+        "autopilot": "heading controllers, designed, simulated and exported",
+        "influence": "sensitivity of manoeuvring figures; tuning",
+        "glide": "an underwater glider: glides, paths, range",
+    },
+    "Export": {
+        "export": "the FMU, Model Exchange and Co-Simulation",
+        "check": "an FMU validated, and compared with its reference",
+    },
+    "Show": {
+        "ships": "the bundled ships, by the names that CARD takes",
+        "poster": "a wheelhouse poster (A3)",
+        "pilotcard": "a pilot card (A4)",
+        "steer": "a page on which the ship is steered",
+        "report": "one page of any result",
+        "demo": "the whole way on bundled data: tows to an FMU, the Mariner to an FMU",
+    },
 }
-"""Commands, with a few words on each: told without importing them, which takes seconds."""
+"""Commands by what people do, each with a few words; they are imported when they are called."""
+
+COMMANDS = {name: words for group in GROUPS.values() for name, words in group.items()}
 
 
 class _Commands(click.Group):
-    """Commands are imported when they are asked for, so that ``tank2sim ships`` does not wait for CasADi."""
+    """Commands are imported when they are called, so that ``tank2sim ships`` does not wait for CasADi."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+        width = max(map(len, COMMANDS))
+        for title, commands in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name.ljust(width), words) for name, words in commands.items()])
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
             return None
         command: click.Command = importlib.import_module(f"tank2sim.cli.{cmd_name}").command
         return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and not args[0].startswith("-") and args[0] not in COMMANDS:
+            remedy = close_name(args[0], COMMANDS)
+            raise click.UsageError(f"{args[0]!r} is not a command; {remedy}", ctx)
+        return super().resolve_command(ctx, args)
 
 
 @click.group(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Mapping
 
@@ -91,7 +92,9 @@ def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[str]]:
         for name in given:
             if name not in ALL_TERMS:
                 key = card.places.get(name, name)
-                remedy = f"the third-order model has {' '.join(ALL_TERMS)}"
+                close = difflib.get_close_matches(name, ALL_TERMS, n=1)
+                hint = f"did you mean {close[0]}? " if close else ""
+                remedy = f"{hint}the third-order model has {' '.join(ALL_TERMS)}"
                 raise card.fault(f"{section}.{key}", "is no term of (3.8)", remedy)
     if card.model.kind == "abkowitz":
         return list(ALL_TERMS), []

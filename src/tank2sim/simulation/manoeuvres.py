@@ -6,6 +6,7 @@ positive to starboard. What is read off the result is in :mod:`tank2sim.simulati
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -309,7 +310,9 @@ def parse_manoeuvre(text: str) -> Manoeuvre:
     }
     found = re.fullmatch(makers[kind][0], rest) if kind in makers else None
     if found is None:
-        raise InputError("--manoeuvre", "", f"{text!r} is no manoeuvre", f"one of: {MANOEUVRE_FORMS}")
+        close = difflib.get_close_matches(kind, [*makers, "stop", "file"], n=1)
+        hint = f"did you mean {close[0]}? " if close and close[0] != kind else ""
+        raise InputError("--manoeuvre", "", f"{text!r} is no manoeuvre", f"{hint}one of: {MANOEUVRE_FORMS}")
     angles = [float(group) for group in found.groups() if group is not None]
     if any(not 0 < abs(angle) < 90 for angle in angles) or (kind == "zigzag" and angles[1] < 0):
         remedy = (
