@@ -142,7 +142,16 @@ def read_covariance(card: Card) -> Covariance | None:
 
 
 def with_carried_covariance(card: Card, text: str, output: Path) -> tuple[dict[Path, str | bytes], list[str]]:
-    """Files of a card made from `card`, with what of the covariance of that still holds; and messages about it.
+    """Files of a card made from another one, with what of the covariance of that still holds; and messages about it.
+
+    Parameters
+    ----------
+    card : Card
+        The other one.
+    text : str
+        Of the new card.
+    output : Path
+        Where the new card is to be.
 
     Raises
     ------
