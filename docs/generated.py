@@ -43,6 +43,9 @@ FAMILIES = {
 }
 """Module of an effect's equations to the heading under which a reader looks for it."""
 
+OTHERS = "From installed packages"
+"""Heading of the effects that are not built in."""
+
 _SUFFIXES = {"rad": ("deg", 180 / math.pi), "radps": ("degps", 180 / math.pi)}
 _UNITS = {"deg": "deg", "degps": "deg/s", "mps": "m/s", "m": "m", "s": "s", "prime": "prime"}
 
@@ -51,7 +54,8 @@ def effects() -> str:
     """Every effect with its parameters, units and bounds, by family."""
     text: list[str] = []
     family = ""
-    for effect in sorted(EFFECTS.values(), key=lambda one: list(FAMILIES.values()).index(_family(one))):
+    families = [*FAMILIES.values(), OTHERS]
+    for effect in sorted(EFFECTS.values(), key=lambda one: families.index(_family(one))):
         if _family(effect) != family:
             family = _family(effect)
             text += [f"## {family}", ""]
@@ -60,6 +64,8 @@ def effects() -> str:
 
 
 def _family(effect: Effect) -> str:
+    if EFFECTS.origin(effect.name):
+        return OTHERS
     return next(
         family
         for module, family in FAMILIES.items()
@@ -68,9 +74,12 @@ def _family(effect: Effect) -> str:
 
 
 def _effect(effect: Effect) -> list[str]:
-    told = f"{effect.description} Acts on: {effect.acts_on}."
+    origin = EFFECTS.origin(effect.name)
+    whence = f"[Equation, source and test](../theory/effects.md#{effect.name})."
+    if origin:
+        whence = f"From the package {_text(origin.distribution)}. Source: {_text(effect.source)}."
     return [
-        *[f"### `{effect.name}`", "", f"{told} [Equation, source and test](../theory/effects.md#{effect.name}).", ""],
+        *[f"### `{effect.name}`", "", f"{effect.description} Acts on: {effect.acts_on}. {whence}", ""],
         *["| parameter | unit | bounds | where the card gives none | meaning |", "|---|---|---|---|---|"],
         *(_parameter(one) for one in effect.parameters),
         "",

@@ -11,12 +11,14 @@ import os
 import re
 import signal
 import threading
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 
 from tank2sim.cluster import EXECUTOR_OPTION, connected, working_for_another
 from tank2sim.errors import InputError
+from tank2sim.plugins import PluginWarning
 
 PROCESSES = "processes"
 EXECUTOR_FORMS = f"{PROCESSES}, or dask://host:port"
@@ -94,6 +96,7 @@ def _prepare() -> None:
     is busy for minutes does not outlive, unseen, the one that began it and was killed.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    warnings.simplefilter("ignore", PluginWarning)  # the process that began it has printed them
     parent = multiprocessing.parent_process()
     assert parent is not None
 

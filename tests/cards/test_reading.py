@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import parse_card, read_card, revised
+from tank2sim.cards.reading import changed_text
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 
@@ -264,3 +266,10 @@ def test_an_angle_can_be_told_as_the_file_has_it() -> None:
     place, value = card.in_file("effects.0.parameters.direction_rad", math.pi)
     assert place == "effects.0.parameters.direction_deg" and value == pytest.approx(180.0)
     assert card.in_file("ship.length_m", 3.0) == ("ship.length_m", 3.0)
+
+
+def test_a_changed_key_of_an_inline_table_leaves_the_card_readable() -> None:
+    text = SI_CARD + '\n[[effects]]\nname = "rudder_lag"\nparameters = {time_constant_s = 2.0} # measured\n'
+    changed = changed_text(text, "ship.toml", {"effects.0.parameters.time_constant_s": 3.0}, comment="identified")
+    assert tomllib.loads(changed)["effects"][0]["parameters"] == {"time_constant_s": 3.0}
+    assert changed.count("# measured") == 1

@@ -69,7 +69,7 @@ def test_a_folder_at_fault_is_told_and_does_not_hide_the_others(
         ((), "s/t.csv", "no column t_s"),
         (("s/u.csv",), "s/t.csv", "no column t_s"),
         (("s/u.csv",), "s/holdout/t.csv", "no column t_s"),
-        (("s/u.csv",), "s/t.dat", "its first line names neither MARIN nor HSVA"),
+        (("s/u.csv",), "s/t.dat", "it does not begin like free-running records of MARIN and HSVA (SIMMAN 2008)"),
     ],
 )
 def test_a_file_that_is_called_like_a_trial_and_is_none_is_a_fault(

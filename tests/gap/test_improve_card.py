@@ -14,19 +14,13 @@ from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import Model, build
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.outcome.improve_card import (
-    BUILT_ON_DERIVATIVES,
-    CHANGING_DERIVATIVES,
-    STATED_BY_EFFECT,
-    _rounded,
-    add_effects_to_card,
-    card_with_effects_text,
-)
+from tank2sim.gap.outcome.improve_card import _rounded, add_effects_to_card, card_with_effects_text
 from tank2sim.units import to_si
 from tests.dynamics.effects.ships import TYPICAL, card_with, mariner_text
 
 ON_THE_SHIP = [name for name, effect in EFFECTS.items() if effect.acts_on != "sensor"]
-KEYS = [*STATED_BY_EFFECT, *sorted(CHANGING_DERIVATIVES)]
+KEYS = [name for name, effect in EFFECTS.items() if effect.in_place_of or effect.changes]
+READING = [name for name, effect in EFFECTS.items() if effect.reads_derivatives]
 
 
 def si(name: str) -> dict[str, float]:
@@ -132,7 +126,7 @@ def test_the_improved_card_has_the_model_that_was_fitted(kind: str, name: str) -
     assert not np.allclose(after[:, : before.shape[1]], before, rtol=1e-7, atol=0), "it does nothing"
 
 
-@pytest.mark.parametrize("other", [*sorted(BUILT_ON_DERIVATIVES), "rudder_stall"])
+@pytest.mark.parametrize("other", [*READING, "rudder_stall"])
 def test_several_have_the_model_that_was_fitted_in_either_order(other: str) -> None:
     card = read(CARDS["total"])
     changes = ["linear_sway_damping", "cubic_yaw_damping", "rudder_effectiveness"]
@@ -140,12 +134,12 @@ def test_several_have_the_model_that_was_fitted_in_either_order(other: str) -> N
         found = [(name, si(name), {}) for name in names]
         improved = add_effects_to_card(card, found)
         same(build(improved), with_all(card, found))
-        assert len(improved.effects) == (4 if names[-1] in BUILT_ON_DERIVATIVES else 1)
+        assert len(improved.effects) == (4 if names[-1] in READING else 1)
 
 
 @pytest.mark.slow
-def test_the_list_of_effects_built_on_derivatives_is_complete() -> None:
-    """An effect that does another thing when derivatives are changed before it is on the list."""
+def test_every_effect_that_reads_derivatives_declares_it() -> None:
+    """An effect that does another thing when derivatives are changed before it says that it reads them."""
     card = read(CARDS["total"])
     kinds = (
         "linear_sway_damping",
@@ -162,7 +156,7 @@ def test_the_list_of_effects_built_on_derivatives_is_complete() -> None:
             before = rates(EFFECTS[name].apply(changed, si(name), card))
             after = rates(with_all(card, [other, *changes]))
             apart = not np.allclose(before, after, rtol=1e-9, atol=1e-15)
-            assert not apart or name in BUILT_ON_DERIVATIVES, name
+            assert not apart or name in READING, name
 
 
 def test_what_the_card_states_is_changed_there_and_the_old_value_is_a_comment() -> None:

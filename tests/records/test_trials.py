@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tank2sim.errors import InputError
-from tank2sim.records.reading import read_trial
+from tank2sim.records.reading import looks_like_a_trial, read_trial
 from tank2sim.records.trials import froude_scaled, sampling_step, window, with_signals
 from tests.records.motions import motion, trial
 
@@ -247,3 +247,22 @@ def test_free_text_stays_allowed(tmp_path, comment):
     path = tmp_path / "run.csv"
     path.write_text(f"{comment}\nt_s,delta_deg,u_mps\n0,5,5\n1,5,5\n")
     assert read_trial(path).scale is None
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.dat", "RUN.CSV"])
+@pytest.mark.parametrize("mark", ["", "\xef\xbb\xbf", "# a comment\n"])
+def test_what_a_folder_takes_for_a_trial_is_read_as_one(write, name, mark):
+    path = write(mark + GOOD, name)
+    assert looks_like_a_trial(path) and len(read_trial(path).time_s) == 3
+
+
+def test_what_no_format_recognises_is_refused_by_the_format_of_its_ending(write):
+    for name, text, problem in (
+        ("run.dat", "0 1 2\n", "its first line names neither"),
+        ("run.csv", "time,delta_deg\n0,1\n1,1\n", "there is no column t_s"),
+    ):
+        path = write(text, name)
+        assert not looks_like_a_trial(path)
+        with pytest.raises(InputError) as refusal:
+            read_trial(path)
+        assert refusal.value.source == str(path) and problem in refusal.value.problem

@@ -18,7 +18,7 @@ from tank2sim.api.trials import TrialPaths, fitted_and_held
 from tank2sim.cards import Card, parse_card
 from tank2sim.cards.covariance import not_referring, with_carried_covariance
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.errors import InputError, close_name
+from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
 from tank2sim.files import writable_folder, write_together
 from tank2sim.gap.diagnosis.error_intervals import acting
@@ -327,8 +327,8 @@ def gap_options(
     """Options of the search. Raises InputError for an effect that is not known."""
     for option, names in (("--effects", effects), ("--without", without)):
         for name in names:
-            if name not in EFFECTS:
-                raise InputError(option, "", f"{name!r} is no effect", close_name(name, EFFECTS))
+            if EFFECTS.get(name) is None:
+                raise InputError(option, "", f"{name!r} is not an effect", EFFECTS.remedy(name))
     return GapOptions(tuple(effects) or None, tuple(without), max_effects, workers)
 
 

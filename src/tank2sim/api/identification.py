@@ -27,12 +27,12 @@ from tank2sim.identification.trials.as_json import (
 )
 from tank2sim.identification.trials.assessment.notices import remarks
 from tank2sim.identification.trials.assessment.replays import replays, replays_as_json
-from tank2sim.identification.trials.identify import AUTO, TRIAL_METHODS, Identification, IdentificationOptions
+from tank2sim.identification.trials.identify import TRIAL_METHODS, Identification, IdentificationOptions
 from tank2sim.identification.trials.identify import identify as identify_trials
 from tank2sim.identification.trials.problem.estimation_problem import Progress, silent
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import with_fitted_trials
-from tank2sim.identification.trials.problem.structures import STRUCTURES
+from tank2sim.identification.trials.problem.structures import AUTO, STRUCTURES
 from tank2sim.marks import FORCED
 from tank2sim.units import in_words
 
@@ -225,7 +225,10 @@ def identify(
     InputError
         A file is at fault, the trials are not of the card's ship, or they do not determine the coefficients.
     """
-    for name, value, known in (("method", method, TRIAL_METHODS), ("structure", structure, (*STRUCTURES, AUTO))):
+    for name, value, known in (
+        ("method", method, TRIAL_METHODS),
+        ("structure", structure, (*STRUCTURES.names(), AUTO)),
+    ):
         if value not in known:
             raise InputError(name, "", f"{value!r} is not known", f"there are: {', '.join(known)}")
     if piece_s is not None and not 0 < piece_s < float("inf"):

@@ -9,7 +9,7 @@ from tank2sim.cards import ManoeuvringCard
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.identification.trials.problem.signatures import fitted_as
-from tank2sim.records.reading import looks_like_a_trial
+from tank2sim.records.reading import READERS, looks_like_a_trial
 from tank2sim.records.same_record import refuse_copies
 
 TrialPaths = Sequence[str | Path] | str | Path
@@ -27,7 +27,8 @@ def trial_files(given: TrialPaths) -> list[Path]:
     for path in [Path(given)] if isinstance(given, str | Path) else map(Path, given):
         inside = sorted(file for file in path.glob("*") if looks_like_a_trial(file)) if path.is_dir() else [path]
         if not inside:
-            raise InputError(path, "", "holds no trial", "a folder with trials (.csv or .dat) was expected")
+            endings = ", ".join(dict.fromkeys(ending for reader in READERS.values() for ending in reader.suffixes))
+            raise InputError(path, "", "holds no trial", f"a folder with trials ({endings}) was expected")
         found += inside
     return found
 

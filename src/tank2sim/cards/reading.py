@@ -129,7 +129,7 @@ def changed_text(text: str, source: str, changes: Mapping[str, object], *, comme
             if not isinstance(table, dict | list):
                 raise InputError(source, key, f"cannot be set: {section} is no section", "give section.key=value")
         table[last] = value
-        if comment is not None:
+        if comment is not None and not isinstance(table, tomlkit.items.InlineTable):  # {...} cannot hold comments
             table[last].comment(comment)
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
     return mark + tomlkit.dumps(document)

@@ -12,12 +12,17 @@ import os
 import sys
 import tempfile
 import traceback
+import warnings
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 
 from tank2sim import __version__
 from tank2sim.errors import InputError, close_name
+from tank2sim.plugins import PluginWarning
 
 GROUPS = {
     "Measure": {
@@ -100,7 +105,9 @@ def tank2sim(ctx: click.Context) -> None:
 
 def main() -> None:
     """Entry point of ``tank2sim``: runs a command and ends the process with its exit code."""
-    code = _run()
+    with warnings.catch_warnings():
+        warnings.showwarning = partial(_show_warning, warnings.showwarning)
+        code = _run()
     try:
         sys.stdout.flush()
     except BrokenPipeError:
@@ -140,6 +147,14 @@ def _run() -> int:
             f"a fault of the program, not of yours: {type(error).__name__}: {told}; please report {Path(log.name)}"
         )
     return result if isinstance(result, int) else 0
+
+
+def _show_warning(usual: Callable[..., None], message: Warning | str, category: type[Warning], *more: Any) -> None:
+    """Show a warning of a faulty plugin as one line, any other as usual."""
+    if issubclass(category, PluginWarning):
+        print(f"tank2sim: warning: {message}", file=sys.stderr)
+    else:
+        usual(message, category, *more)
 
 
 def _silence() -> None:

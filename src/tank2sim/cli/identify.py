@@ -13,8 +13,8 @@ from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import executor_option, page_option, plot_folder_option
 from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.trials import TakesSeveral
-from tank2sim.identification.trials.identify import AUTO, TRIAL_METHODS
-from tank2sim.identification.trials.problem.structures import STRUCTURES
+from tank2sim.identification.trials.identify import TRIAL_METHODS
+from tank2sim.identification.trials.problem.structures import AUTO, STRUCTURES
 
 
 @click.command("identify", cls=TakesSeveral, several=("--holdout",))
@@ -31,7 +31,7 @@ from tank2sim.identification.trials.problem.structures import STRUCTURES
 @click.option("--method", type=click.Choice(TRIAL_METHODS), default="output_error", show_default=True)
 @click.option(
     "--structure",
-    type=click.Choice((*STRUCTURES, AUTO)),
+    type=click.Choice((*STRUCTURES.names(), AUTO)),
     default="card",
     show_default=True,
     help="; ".join(f"{each.name}: {each.description}" for each in STRUCTURES.values())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import replace
 
 from tank2sim.cards.card import Card, GliderCard, ManoeuvringCard, SurgeBodyCard, YawRigCard
@@ -53,9 +52,7 @@ def _model(card: Card) -> Model:
 def _with_effect(model: Model, card: ManoeuvringCard, entry: EffectEntry, place: str) -> Model:
     effect = EFFECTS.get(entry.name)
     if effect is None:
-        close = difflib.get_close_matches(entry.name, EFFECTS, n=1)
-        remedy = f"did you mean {close[0]}?" if close else f"known are: {', '.join(EFFECTS)}"
-        raise card.fault(f"{place}.name", f"{entry.name!r} is no effect", remedy)
+        raise card.fault(f"{place}.name", f"{entry.name!r} is not an effect", EFFECTS.remedy(entry.name))
     known = {parameter.name: parameter for parameter in effect.parameters}
     for section, given in (("parameters", entry.parameters), ("uncertainty", entry.uncertainty)):
         for name in given:

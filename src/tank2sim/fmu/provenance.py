@@ -129,7 +129,8 @@ def _of_effects(card: ManoeuvringCard, document: Mapping[str, Any]) -> Iterator[
             error = entry.uncertainty.get(name)
             value = "default of the effect" if said is None else card.ship.source
             whence = NOT_STATED if error is None else STATED_ERROR
-            source = f"equation of the effect {entry.name}: {effect.source}; value: {value}"
+            package = f" ({origin.distribution})" if (origin := EFFECTS.origin(entry.name)) else ""
+            source = f"equation of the effect {entry.name}{package}: {effect.source}; value: {value}"
             yield variable, Origin(source, said or "", error, whence)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.fmu.interface import FmuVariable, Interface
 
 _DESCRIPTIONS = {
@@ -12,9 +13,6 @@ _DESCRIPTIONS = {
     "steering": "Steering gear: rudder order and angle, failure",
     "propulsion": "Propulsion: ordered and actual revolutions",
     "force": "Hydrodynamic forces and moment on the ship",
-    "current": "Current of the water over the ground",
-    "wind": "True wind",
-    "water": "Water under the ship",
     "heading": "Heading order",
     "buoyancy": "Net buoyancy: order and actual",
     "pitch": "Pitch: order and actual",
@@ -55,7 +53,15 @@ def terminals(interface: Interface) -> tuple[Terminal, ...]:
             continue
         members = grouped.setdefault(_TERMINAL_OF.get(first, first), {})
         members[variable.name if rest in members else rest] = variable
+    descriptions = _DESCRIPTIONS | _of_effects()
     return tuple(
-        Terminal(name, _DESCRIPTIONS.get(name, f"Signals {name}.*"), tuple(members.items()))
+        Terminal(name, descriptions.get(name, f"Signals {name}.*"), tuple(members.items()))
         for name, members in grouped.items()
     )
+
+
+def _of_effects() -> dict[str, str]:
+    """First part of the names of an effect's inputs to what the effect says that they are together."""
+    described = [effect for effect in EFFECTS.values() if effect.terminal]
+    named = [(parameter.input_name, effect.terminal) for effect in described for parameter in effect.parameters]
+    return {name.partition(".")[0]: description for name, description in named if name}

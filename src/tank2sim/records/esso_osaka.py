@@ -16,7 +16,7 @@ import numpy as np
 
 from tank2sim.errors import InputError
 from tank2sim.records.number_rows import number_rows, read_bytes_as_text
-from tank2sim.records.trials import Trial, unwrapped
+from tank2sim.records.trials import Trial, TrialReader, unwrapped
 from tank2sim.units import to_si
 
 _COLUMNS = {
@@ -72,3 +72,12 @@ def read_esso_osaka(path: Path | str) -> Trial:
     time = signals.pop("t_s")
     signals["psi_rad"] = unwrapped(signals["psi_rad"])
     return Trial(path, time, signals, columns=columns)
+
+
+ESSO_OSAKA = TrialReader(
+    name="esso_osaka",
+    description="CSV of the free-running Esso Osaka model (Osaka University 2020)",
+    suffixes=(".csv",),
+    recognises=is_esso_osaka,
+    read=read_esso_osaka,
+)

@@ -2,24 +2,56 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
 
 from tank2sim.errors import InputError
+from tank2sim.plugins import PluginWarning, Registry
 from tank2sim.records.csv_table import SHORTEST_STEP
-from tank2sim.records.esso_osaka import is_esso_osaka, read_esso_osaka
+from tank2sim.records.esso_osaka import ESSO_OSAKA
 from tank2sim.records.number_rows import read_bytes_as_text
-from tank2sim.records.simman import is_simman, read_simman
-from tank2sim.records.trial_csv import read_trial_csv
-from tank2sim.records.trials import Trial
+from tank2sim.records.simman import SIMMAN
+from tank2sim.records.trial_csv import TRIAL_CSV
+from tank2sim.records.trials import Trial, TrialReader, fault_of
 
 HEAD_BYTES = 4096
 """What of a file is looked at to tell whether it is a trial."""
 
+READERS: Registry[TrialReader] = Registry("tank2sim.trial_readers", (TRIAL_CSV, ESSO_OSAKA, SIMMAN), TrialReader)
+"""All formats of trials, with those of installed packages."""
+
+
+def reader_of(path: Path) -> TrialReader:
+    """The reader of a file: the first that recognises its beginning, else the first for its ending.
+
+    The latter says what is wrong with the file. A file with an ending that no format has is taken for a trial CSV.
+
+    Raises
+    ------
+    InputError
+        The file is missing or unreadable, or the reader of a package fails.
+    """
+    text = read_bytes_as_text(path)
+    for reader in READERS.values():
+        if _recognises(reader, text):
+            return reader
+    suffix = path.suffix.lower()
+    return next((reader for reader in READERS.values() if suffix in reader.suffixes), TRIAL_CSV)
+
+
+def _recognises(reader: TrialReader, text: str) -> bool:
+    """Whether a reader recognises a file; one that fails at this does not, and must not keep others from reading it."""
+    try:
+        return reader.recognises(text)
+    except InputError as error:
+        warnings.warn(str(error), PluginWarning, stacklevel=3)
+        return False
+
 
 def read_trial(path: Path | str, *, rising: bool = True) -> Trial:
-    """Read a trial; its first line tells the format: the project's CSV, a SIMMAN ``.dat`` or an Esso Osaka CSV.
+    """Read a trial of any format of :data:`READERS`; its beginning shows which.
 
     Parameters
     ----------
@@ -31,19 +63,13 @@ def read_trial(path: Path | str, *, rising: bool = True) -> Trial:
     Raises
     ------
     InputError
-        The file is missing or of no known format, or its content is faulty; the message tells line and column.
+        The file is missing or of no known format, or its content is faulty; the message names line and column.
     """
     path = Path(path)
-    text = read_bytes_as_text(path)
-    if is_esso_osaka(text):
-        trial = read_esso_osaka(path)
-    elif is_simman(text):
-        trial = read_simman(path)
-    elif path.suffix.lower() == ".dat":
-        problem = "is no record of MARIN or HSVA: its first line names neither"
-        raise InputError(path, "line 1", problem, "write it as a CSV with a header such as t_s,delta_deg,r_degps")
-    else:
-        trial = read_trial_csv(path)
+    reader = reader_of(path)
+    trial = reader.read(path)
+    if (origin := READERS.origin(reader.name)) and (problem := fault_of(trial)):
+        raise origin.fault(f"{path.name}: {problem}")
     if np.isnan(trial.time_s).any():
         row = int(np.flatnonzero(np.isnan(trial.time_s))[0]) + 1
         raise InputError(path, f"column {trial.heading('t_s')}", f"row {row} has no time", "give each row its time")
@@ -56,14 +82,18 @@ def read_trial(path: Path | str, *, rising: bool = True) -> Trial:
     return trial
 
 
+def called_like_a_trial(path: Path) -> bool:
+    """True if the name of a file ends like that of a trial of a known format."""
+    return any(path.suffix.lower() in reader.suffixes for reader in READERS.values())
+
+
 def looks_like_a_trial(path: Path) -> bool:
-    """True if a file's beginning is that of a trial of a known format: for folders that hold other files, too."""
-    if path.suffix.lower() not in (".csv", ".dat"):
+    """True if name and beginning of a file are those of a known format of trials: for folders with other files."""
+    if not called_like_a_trial(path):
         return False
     with path.open("rb") as file:
         text = file.read(HEAD_BYTES).decode("latin-1")
-    header = next((line for line in text.splitlines() if line.strip() and not line.startswith("#")), "")
-    return is_esso_osaka(text) or is_simman(text) or "t_s" in (name.strip() for name in header.split(","))
+    return any(_recognises(reader, text) for reader in READERS.values())
 
 
 def _refuse_falling_time(trial: Trial) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.records.number_rows import NumberRows, number_rows, read_bytes_as_text
-from tank2sim.records.trials import TRIAL_SIGNALS, Trial, unwrapped
+from tank2sim.records.trials import TRIAL_SIGNALS, Trial, TrialReader, unwrapped
 from tank2sim.units import to_si
 
 KVLCC2_SCALE = 45.714
@@ -66,7 +66,8 @@ def read_simman(path: Path | str) -> Trial:
     text = read_bytes_as_text(path)
     laboratory = _laboratory(text)
     if laboratory is None:
-        raise InputError(path, "line 1", "names neither MARIN nor HSVA", "give a record as it was published")
+        problem = "is no record of MARIN or HSVA: its first line names neither"
+        raise InputError(path, "line 1", problem, "write it as a CSV with a header such as t_s,delta_deg,r_degps")
     header, rows = _split(text)
     values = number_rows(path, rows, laboratory.columns)
     named = {
@@ -151,3 +152,12 @@ def _half_a_digit(cell: str) -> float:
     mantissa, _, exponent = cell.upper().partition("E")
     decimals = len(mantissa.partition(".")[2])
     return 0.5 * 10.0 ** (int(exponent or 0) - decimals)
+
+
+SIMMAN = TrialReader(
+    name="simman",
+    description="free-running records of MARIN and HSVA (SIMMAN 2008)",
+    suffixes=(".dat",),
+    recognises=is_simman,
+    read=read_simman,
+)

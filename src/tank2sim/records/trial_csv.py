@@ -10,7 +10,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.records.csv_table import CsvTable, read_table
-from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Trial, unwrapped
+from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Trial, TrialReader, unwrapped
 from tank2sim.units import to_si
 
 COMMENT_KEYS = ("rudder_sign", "noise", "scale")
@@ -110,3 +110,19 @@ def _noise(table: CsvTable) -> dict[str, float]:
             raise InputError(table.path, "comment noise", f"there is no column {words[0]}", "name a measured column")
         stated[name] = value
     return stated
+
+
+def _has_time_column(text: str) -> bool:
+    """Whether the first line that is not a comment names a column ``t_s``."""
+    lines = text.removeprefix("\xef\xbb\xbf").splitlines()
+    header = next((line for line in lines if line.strip() and not line.startswith("#")), "")
+    return "t_s" in (name.strip() for name in header.split(","))
+
+
+TRIAL_CSV = TrialReader(
+    name="trial_csv",
+    description="CSV whose column names have the units",
+    suffixes=(".csv",),
+    recognises=_has_time_column,
+    read=read_trial_csv,
+)

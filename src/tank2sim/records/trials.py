@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -67,6 +67,52 @@ class Trial:
     def heading(self, signal: str) -> str:
         """What the column of a signal is called in the file."""
         return self.columns.get(signal, signal)
+
+
+@dataclass(frozen=True)
+class TrialReader:
+    """A format of trial files.
+
+    Parameters
+    ----------
+    name : str
+        Under which it is registered.
+    description : str
+        A few words for people.
+    suffixes : tuple of str
+        Endings of the files, small letters with the dot: in a folder only such files are looked at.
+    recognises : callable
+        ``recognises(text) -> bool``: whether a file that begins with this text has the format. At least the first 4096
+        bytes are given, read as ISO 8859-1, ends of lines as in the file.
+    read : callable
+        ``read(path) -> Trial``: signals in SI, angles in rad, rudder positive to starboard. It raises InputError with
+        file, line or column, what is wrong and what to do.
+    """
+
+    name: str
+    description: str
+    suffixes: tuple[str, ...]
+    recognises: Callable[[str], bool]
+    read: Callable[[Path], Trial]
+
+
+def fault_of(trial: Trial) -> str:
+    """What of a trial is not as :class:`Trial` says, "" if nothing: for readers of other packages."""
+    if not isinstance(trial, Trial):
+        return f"a {type(trial).__name__} was read, and a Trial was expected"
+    if unknown := [name for name in trial.signals if name not in TRIAL_SIGNALS]:
+        return f"{unknown[0]} is not a signal of a trial; these are {', '.join(TRIAL_SIGNALS)}"
+    columns = {"time_s": trial.time_s, **trial.signals}
+    for name, values in columns.items():
+        if not isinstance(values, np.ndarray) or values.dtype != float or values.shape != (len(trial.time_s),):
+            return f"{name} is not an array of floats with one value for each of the {len(trial.time_s)} rows"
+    if len(trial.time_s) < 2:
+        return "there are fewer than two rows"
+    if not any(name in trial.signals for name in RUDDERS) or not any(
+        name in trial.signals for name in MEASURED_COLUMNS
+    ):
+        return f"it needs a rudder ({' or '.join(RUDDERS)}) and at least one measured signal of the motion"
+    return ""
 
 
 def sampling_step(trial: Trial) -> float:

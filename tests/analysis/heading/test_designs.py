@@ -27,6 +27,7 @@ from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tests.dynamics.effects.ships import ship
 
 NO_SLYCOT = "slycot is not installed"
 
@@ -148,3 +149,9 @@ def test_what_cannot_be_steered_is_told(mariner: Model) -> None:
             dead = dead.substitute(f"derivatives.{force}{term}", 0 * mariner.symbol("ship.length"))
     with pytest.raises(InputError, match=r"no effect|straight course"):
         design_heading(dead)
+
+
+def test_the_gear_of_the_plant_is_that_of_the_effect_in_its_place() -> None:
+    lagging = ship({"rudder_lag": {"time_constant_s": 3.0}})
+    assert steering_plant(lagging).A[3, 3] == pytest.approx(-1 / 3.0)
+    assert steering_plant(ship()).A[3, 3] == pytest.approx(-1 / read_card("mariner").steering_gear.time_constant_s)

@@ -21,6 +21,7 @@ from tank2sim.analysis.stability.straight_line import Stability, stability
 from tank2sim.arrays import Array
 from tank2sim.dynamics.autopilot import HeadingGains, autopilot_model
 from tank2sim.dynamics.autopilot_linear import LinearLaw, linear_autopilot_model
+from tank2sim.dynamics.effects import acting_variable
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
@@ -155,7 +156,7 @@ def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant
     K, T = found.nomoto.K_per_s, found.nomoto.T_s
     if not K / T > 0:
         raise InputError(ship.origin, "", "the rudder turns the ship the wrong way", remedy)
-    lag = values.get("rudder_lag.time_constant", values["steering.time_constant"])
+    lag = values[acting_variable(ship, "steering.time_constant")]
     A = np.zeros((4, 4))
     A[:2, :2], A[:2, 3:], A[2, 1], A[3, 3] = hull.A, hull.B, 1.0, -1 / lag
     B = np.array([[0.0], [0.0], [0.0], [1 / lag]])

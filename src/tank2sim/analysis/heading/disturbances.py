@@ -11,7 +11,7 @@ from scipy.linalg import expm, solve_discrete_lyapunov
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.autopilot_loop import with_yaw_disturbance
-from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.effects.surroundings import CURRENT, WIND
 from tank2sim.dynamics.model import Model
 
 
@@ -61,10 +61,9 @@ def in_weather(ship: Model, card: ManoeuvringCard, weather: Weather) -> tuple[Mo
 
     Effects that the card has already are not put on again; their inputs take the weather's values all the same.
     """
-    for name in ("current", "wind"):
-        if f"{name}.speed" not in ship:
-            nothing = {one.name: 0.0 for one in EFFECTS[name].parameters if one.default is None}
-            ship = EFFECTS[name].apply(ship, nothing, card)
+    for effect in (CURRENT, WIND):
+        if f"{effect.name}.speed" not in ship:
+            ship = effect.apply(ship, dict.fromkeys(effect.required(), 0.0), card)
     inputs = {
         "current.speed": weather.current_mps,
         "current.direction": weather.current_towards_rad,

@@ -13,6 +13,7 @@ from tank2sim.analysis.linearisation import OperatingPoint, state_space, straigh
 from tank2sim.analysis.stability.straight_line import settled_states
 from tank2sim.arrays import Array
 from tank2sim.dynamics.autopilot_loop import closed_loop_model
+from tank2sim.dynamics.effects import acting_variable
 from tank2sim.dynamics.model import Model
 from tank2sim.records.thinning import drawn_columns
 
@@ -214,7 +215,7 @@ def largest_steps(ship: Model, autopilot: Model, speed_mps: float | None = None)
     """Largest change of course whose linear answer keeps to the limits of the gear."""
     values = dict(zip(ship.parameter_names, ship.parameter_values().tolist(), strict=True))
     limits = dict(zip(autopilot.parameter_names, autopilot.parameter_values().tolist(), strict=True))
-    rate = values.get("rudder_rate_limit.max_rate", values.get("steering.max_rate", math.inf))
+    rate = values.get(acting_variable(ship, "steering.max_rate"), math.inf)
     whole = closed_loop_transfer(ship, autopilot, speed_mps)
     sizes = np.abs(whole.poles())
     peaks = np.zeros(3)

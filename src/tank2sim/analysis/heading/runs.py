@@ -11,6 +11,7 @@ import numpy as np
 from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
 from tank2sim.arrays import Array
 from tank2sim.dynamics.autopilot_loop import closed_loop_model
+from tank2sim.dynamics.effects import acting_variable
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.rows import Chain, RowFunction
@@ -209,9 +210,7 @@ def _reached(time: Array, values: Array, level: float) -> float | None:
 
 def _rate_limited(run: Trajectory) -> Array:
     """For each step (n - 1,), whether the rudder moved at its largest rate."""
-    limits = [one.start for one in run.model.parameters if one.name in _RATE_LIMITS]
+    limit = acting_variable(run.model, "steering.max_rate")
+    largest = next((known.start for known in run.model.parameters if known.name == limit), math.inf)
     moved = np.abs(np.diff(run["rudder.angle"])) / run.model.step_s
-    return np.asarray(moved > 0.999 * min(limits, default=math.inf))
-
-
-_RATE_LIMITS = ("steering.max_rate", "rudder_rate_limit.max_rate")
+    return np.asarray(moved > 0.999 * largest)

@@ -32,6 +32,7 @@ from tank2sim.analysis.heading.track_keeping import Guidance, TrackRun, keep_tra
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
+from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.trajectory import Trajectory
@@ -199,7 +200,7 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     outside, inputs = in_weather(ship, card, weather)
     loop = HeadingLoop(outside, design.autopilot)
     start = {} if settings.speed_mps is None else {"initial.u": settings.speed_mps}
-    ahead = {"current.speed": 0.0, "wind.speed": 0.0}
+    ahead = undisturbed_inputs(outside)
     unit = math.sqrt(design.found.nomoto.T_s / design.found.nomoto.K_per_s)
     runs, changes = _changes(loop, design, settings, ahead, start, _CHANGE_TIMES * unit)
     steps = round(_KEEPING_TIMES * unit / loop.model.step_s)

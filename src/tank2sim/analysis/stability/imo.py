@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading, entry_name
@@ -80,7 +81,7 @@ class _Trials:
     def run(self, manoeuvre: Manoeuvre) -> _Trial:
         """A trial, or why there is none."""
         # MSC.137(76) asks for calm water: a current on the card is part of one place, not of the ship.
-        calm = {name: 0.0 for name in self.model.input_names if name in ("current.speed", "wind.speed")}
+        calm = undisturbed_inputs(self.model)
         own, integrator = self.parameters, self.integrator
         try:
             run = simulate(self.model, manoeuvre, inputs=calm, parameters=own, integrator=integrator)

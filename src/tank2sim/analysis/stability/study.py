@@ -15,6 +15,7 @@ from tank2sim.analysis.stability.trim import TrimEffect, trim_effect
 from tank2sim.analysis.turning.characteristic import SteeringCharacteristic, steering_characteristic
 from tank2sim.analysis.turning.diagram import SteadyTurning, steady_turning
 from tank2sim.analysis.turning.spirals import SpiralPoints, direct_spiral, reverse_spiral
+from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
@@ -151,7 +152,7 @@ def _about_effects(found: Stability) -> list[str]:
 
 def _about_weather(model: Model) -> list[str]:
     values = dict(zip(model.input_names, model.input_values().tolist(), strict=True))
-    blowing = [name.partition(".")[0] for name in ("current.speed", "wind.speed") if values.get(name)]
+    blowing = [name.partition(".")[0] for name, absent in undisturbed_inputs(model).items() if values[name] != absent]
     if not blowing:
         return []
     return [

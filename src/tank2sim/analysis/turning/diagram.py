@@ -26,6 +26,7 @@ from tank2sim.analysis.linearisation import straight_course
 from tank2sim.analysis.turning import continuation
 from tank2sim.analysis.turning.continuation import Bounds, Curve, corrector_step, follow_branch
 from tank2sim.arrays import Array
+from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.marks import EXTRAPOLATED
@@ -165,7 +166,7 @@ def hull_states(model: Model, motion: Sequence[str] = _MOTION) -> tuple[str, ...
 
 def calm_inputs(model: Model) -> Array:
     """Inputs (nu,) in calm water: no current, no wind, revolutions as they start."""
-    return model.input_values({name: 0.0 for name in model.input_names if name in ("current.speed", "wind.speed")})
+    return model.input_values(undisturbed_inputs(model))
 
 
 class TurningEquations:

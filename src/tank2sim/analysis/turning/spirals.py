@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from tank2sim.analysis.stability.straight_line import Nomoto
 from tank2sim.analysis.turning.diagram import SteadyTurning, largest_rudder
 from tank2sim.arrays import Array
+from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Input, Model, Quantity, State
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
@@ -83,7 +84,7 @@ def direct_spiral(model: Model, turning: SteadyTurning, integrator: Integrator |
     largest = float(np.min(np.abs(turning.rudder_rad[[0, -1]])))
     there = [math.radians(angle) for angle in SPIRAL_RUDDERS_DEG if abs(math.radians(angle)) <= largest * (1 + 1e-9)]
     rudders = (*there, *there[-2::-1])
-    calm = {name: 0.0 for name in model.input_names if name in ("current.speed", "wind.speed")}
+    calm = undisturbed_inputs(model)
     trajectory = simulate(model, SpiralManoeuvre(rudders), inputs=calm, integrator=integrator).trajectory
     changes = np.flatnonzero(np.diff(trajectory["rudder.command"]) != 0)
     ends = np.append(changes[len(changes) - len(rudders) + 1 :] + 1, len(trajectory.t) - 1)
@@ -109,7 +110,7 @@ def reverse_spiral(model: Model, turning: SteadyTurning, nomoto: Nomoto) -> Spir
     largest = math.radians(SPIRAL_RUDDERS_DEG[0])
     inside = np.abs(turning.rudder_rad) <= largest
     rates = np.linspace(turning.yaw_rate_radps[inside].max(), turning.yaw_rate_radps[inside].min(), RATES)
-    calm = {name: 0.0 for name in held.input_names if name in ("current.speed", "wind.speed")}
+    calm = undisturbed_inputs(held)
     running = Running(Integrator(held), calm)
     rudders, steady = _held(running, rates, _ship_time(model))
     if not np.isfinite(rudders).all():

@@ -18,6 +18,7 @@ from tank2sim.analysis.stability.imo import TRIAL_RUDDER
 from tank2sim.analysis.validation.ship_track import ShipTrack, TrackMark, circle_track, stop_track
 from tank2sim.analysis.validation.standard_trials import TrialShip, ship_of
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.errors import InputError
 from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading
 from tank2sim.simulation.manoeuvres import COASTING_END, FULL_ASTERN, Stop, Turn, Zigzag
@@ -190,8 +191,8 @@ def steady_speed(ship: TrialShip, revolutions_radps: float) -> float | None:
     """
     model = ship.model
     p, x0 = model.parameter_values(), np.array(model.initial(model.parameter_values())).ravel()
-    inputs = {name: 0.0 for name in model.input_names if name in ("current.speed", "wind.speed", "rudder.command")}
-    u = model.input_values({**inputs, "propeller.speed": revolutions_radps})
+    inputs = {**undisturbed_inputs(model), "rudder.command": 0.0, "propeller.speed": revolutions_radps}
+    u = model.input_values(inputs)
     place, out = model.state_names.index("motion.u"), model.outputs.index("motion.udot")
 
     def pushed(speed: float) -> float:

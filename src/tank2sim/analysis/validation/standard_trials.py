@@ -14,6 +14,7 @@ from tank2sim.analysis.influence.parameters import card_parameters, study_model
 from tank2sim.analysis.stability.imo import TRIAL_RUDDER
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
+from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.card_range import Numbers, entry_name, single_figures
@@ -79,7 +80,7 @@ class TrialShip:
         parameters, inputs : mapping, optional
             Values in place of the model's, by name, SI.
         """
-        calm = {name: 0.0 for name in self.model.input_names if name in ("current.speed", "wind.speed")}
+        calm = undisturbed_inputs(self.model)
         try:
             return simulate(
                 self.model,

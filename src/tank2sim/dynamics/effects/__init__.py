@@ -11,11 +11,13 @@ from tank2sim.dynamics.effects import (
     sensors,
     surroundings,
 )
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, fault_of
+from tank2sim.dynamics.model import Model
+from tank2sim.plugins import Registry
 
-EFFECTS: dict[str, Effect] = {
-    effect.name: effect
-    for effect in (
+EFFECTS: Registry[Effect] = Registry(
+    "tank2sim.effects",
+    (
         surroundings.CURRENT,
         surroundings.WIND,
         surroundings.WAVE_DRIFT,
@@ -59,8 +61,35 @@ EFFECTS: dict[str, Effect] = {
         sensors.LOG_MISALIGNMENT,
         sensors.LOG_LEVER_ARM,
         sensors.RUDDER_TIME_OFFSET,
-    )
-}
-"""All effects by the name that cards use."""
+    ),
+    Effect,
+    fault=fault_of,
+)
+"""All effects by the name that cards use, with those of installed packages."""
 
-__all__ = ["EFFECTS", "Effect", "EffectParameter"]
+
+def acting_variable(model: Model, name: str) -> str:
+    """The variable that acts in a model for one of the steering gear: that of an effect in its place, or itself.
+
+    Parameters
+    ----------
+    model : Model
+    name : str
+        ``steering.max_rate`` or ``steering.time_constant``.
+    """
+    for effect in EFFECTS.values():
+        names = effect.model_names()
+        for parameter, replaced in effect.in_place_of.items():
+            if replaced == name and names[parameter] in model:
+                return names[parameter]
+    return name
+
+
+def undisturbed_inputs(model: Model) -> dict[str, float]:
+    """Inputs that effects add to a model, at the values (SI) at which the effects vanish: no current, no wind."""
+    parameters = [parameter for effect in EFFECTS.values() for parameter in effect.parameters]
+    absent = {parameter.input_name: parameter.absent for parameter in parameters if parameter.input_name}
+    return {name: value for name, value in absent.items() if value is not None and name in model.input_names}
+
+
+__all__ = ["EFFECTS", "Effect", "EffectParameter", "acting_variable", "undisturbed_inputs"]

@@ -78,6 +78,7 @@ CUBIC_YAW_DAMPING = Effect(
         EffectParameter("Nrrr", "change of Nrrr, prime, negative damps", -0.1, 0.1, absent=0.0, typical=(-1e-3,)),
     ),
     equations=_added,
+    changes=("Yrrr", "Nrrr"),
 )
 
 SWAY_YAW_COUPLING = Effect(
@@ -91,6 +92,7 @@ SWAY_YAW_COUPLING = Effect(
         EffectParameter("Nvrr", "change of Nvrr, prime", -0.5, 0.5, absent=0.0, typical=(-2e-3,)),
     ),
     equations=_added,
+    changes=("Yvrr", "Nvrr"),
 )
 
 TURNING_DRAG = Effect(
@@ -109,6 +111,7 @@ TURNING_DRAG = Effect(
         ),
     ),
     equations=_added,
+    changes=("Xvr",),
 )
 
 ADDED_YAW_INERTIA = Effect(
@@ -117,7 +120,8 @@ ADDED_YAW_INERTIA = Effect(
     description="More (or less) water turns with the ship when its rate of turn changes.",
     source="(3.7) of paper 2, Krezelewski and Misiag: J_z - Nrdot; Alyshev (2019)",
     parameters=(EffectParameter("factor", "relative change of Nrdot", -1.0, 5.0, absent=0.0, typical=(0.3,)),),
-    equations=_magnified(["Nrdot"]),
+    equations=_magnified(("Nrdot",)),
+    changes=("Nrdot",),
 )
 
 ADDED_SWAY_MASS = Effect(
@@ -126,7 +130,8 @@ ADDED_SWAY_MASS = Effect(
     description="More (or less) water moves with the ship when its drift changes.",
     source="(3.7) of paper 2, Krezelewski and Misiag: m - Yvdot",
     parameters=(EffectParameter("factor", "relative change of Yvdot", -0.9, 5.0, absent=0.0, typical=(0.2,)),),
-    equations=_magnified(["Yvdot"]),
+    equations=_magnified(("Yvdot",)),
+    changes=("Yvdot",),
 )
 
 LINEAR_YAW_DAMPING = Effect(
@@ -139,7 +144,8 @@ LINEAR_YAW_DAMPING = Effect(
             "factor", "relative change of the hydrodynamic Yr and Nr", -1.0, 5.0, absent=0.0, typical=(USUAL_CHANGE,)
         ),
     ),
-    equations=_magnified(["Yr", "Nr"]),
+    equations=_magnified(("Yr", "Nr")),
+    changes=("Yr", "Nr"),
 )
 
 LINEAR_SWAY_DAMPING = Effect(
@@ -150,7 +156,8 @@ LINEAR_SWAY_DAMPING = Effect(
     parameters=(
         EffectParameter("factor", "relative change of Yv and Nv", -1.0, 5.0, absent=0.0, typical=(USUAL_CHANGE,)),
     ),
-    equations=_magnified(["Yv", "Nv"]),
+    equations=_magnified(("Yv", "Nv")),
+    changes=("Yv", "Nv"),
 )
 
 
@@ -190,6 +197,7 @@ SHALLOW_WATER = Effect(
         ),
     ),
     equations=_in_shallow_water,
+    reads_derivatives=True,
 )
 
 
@@ -226,6 +234,8 @@ WATER_DEPTH = Effect(
         EffectParameter("depth_m", "depth of the water", _least_depth, 1e4, input_name="water.depth"),
     ),
     equations=_at_depth,
+    reads_derivatives=True,
+    terminal="Water under the ship",
 )
 
 
@@ -264,4 +274,5 @@ TRIM = Effect(
         ),
     ),
     equations=_trimmed,
+    reads_derivatives=True,
 )

@@ -59,6 +59,7 @@ FLOW_MEMORY = Effect(
         ),
     ),
     equations=_remembering,
+    reads_derivatives=True,
 )
 
 TYPICAL_STABILITY = 0.05

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity
 
 _UNITS = {"mps": "m/s", "radps": "rad/s", "rad": "rad", "m": "m", "s": "s", "prime": "1"}
@@ -133,6 +134,10 @@ def unchanged(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mode
     return model
 
 
+ACTIONS = ("force", "mass", "force and mass", "actuator", "propulsion", "kinematics", "sensor")
+"""What an effect may act on."""
+
+
 @dataclass(frozen=True)
 class Effect:
     """A physical effect on top of the polynomial.
@@ -142,7 +147,7 @@ class Effect:
     name : str
         Name in cards.
     acts_on : str
-        ``force``, ``mass``, ``force and mass``, ``actuator``, ``propulsion``, ``kinematics`` or ``sensor``.
+        One of :data:`ACTIONS`.
     description : str
         A sentence for people.
     source : str
@@ -157,6 +162,27 @@ class Effect:
     delays : mapping
         Name of an input to the parameter (a time, s) by which the ship answers late to the record of that input: it
         acts at t on what stands in the record at t - delay.
+    changes : tuple of str
+        Derivatives, where the effect is nothing but other values of these: once found, it is written into
+        ``[derivatives]`` of a card. Empty for all other effects.
+    magnified_by : str
+        Name of the parameter f, where the effect multiplies the forces of all terms in `changes` by 1 + f in place of
+        the derivatives themselves.
+    reads_derivatives : bool
+        True if its forces are made from ``derivatives.*`` of the model. Such an effect does not see what an earlier one
+        changed, and would if that were written into the card: both then stay ``[[effects]]`` in their order.
+    in_place_of : mapping
+        Parameter to the model's variable of the steering gear in whose place it acts (``steering.max_rate``), where it
+        states what ``[steering_gear]`` of the card may state under the name of the parameter: once found, it is written
+        there.
+    states_behind : mapping
+        State of its own that nothing but an order drives to the input of that order (``rudder.command``).
+    mistaken_for : str
+        What it looks like in trials, ``force`` or ``actuator``, where that is not what it acts on.
+    measured_as : mapping
+        Parameter to the signal of a trial that measures it (``wind_speed_mps``).
+    terminal : str
+        What its inputs are together, a few words for the FMI terminal that joins them.
     """
 
     name: str
@@ -167,6 +193,24 @@ class Effect:
     equations: EffectEquations = unchanged
     readings: Readings | None = None
     delays: Mapping[str, str] = field(default_factory=dict)
+    changes: tuple[str, ...] = ()
+    magnified_by: str = ""
+    reads_derivatives: bool = False
+    in_place_of: Mapping[str, str] = field(default_factory=dict)
+    states_behind: Mapping[str, str] = field(default_factory=dict)
+    mistaken_for: str = ""
+    measured_as: Mapping[str, str] = field(default_factory=dict)
+    terminal: str = ""
+
+    @property
+    def looks_like(self) -> str:
+        """What it looks like in trials: the first word of what it acts on, unless it is mistaken for something else."""
+        return self.mistaken_for or self.acts_on.partition(" ")[0]
+
+    @property
+    def inside_gear(self) -> bool:
+        """True if all of it is between the rudder order and a measured angle of the rudder."""
+        return self.acts_on == self.looks_like == "actuator"
 
     def required(self) -> tuple[str, ...]:
         """Names of the parameters without a default."""
@@ -201,11 +245,15 @@ class Effect:
         Raises
         ------
         InputError
-            The card lacks something that the effect needs.
+            The card lacks something that the effect needs, or the model has one of its variables already.
         KeyError
             A required value is missing.
         """
         variables = {one.stem: one.variable(self.name, one.value(values, card), card) for one in self.parameters}
+        taken = [variable.name for variable in variables.values() if variable.name in model]
+        if taken:
+            remedy = "leave one of the two out, or rename the variable of the effect"
+            raise card.fault("effects", f"{self.name} adds {taken[0]}, which the model has already", remedy)
         symbols = {stem: variable.symbol for stem, variable in variables.items()}
         changed = self.equations(model.extend(*variables.values()), symbols, card)
         if self.readings is None:
@@ -213,6 +261,21 @@ class Effect:
         return with_readings(
             changed, self.readings({name: model.symbol(name) for name in MEASURED_BEFOREHAND}, symbols)
         )
+
+
+def fault_of(effect: Effect) -> str:
+    """What is wrong with the declarations of an effect, "" if nothing: for those of other packages."""
+    parameters = {parameter.name for parameter in effect.parameters}
+    if effect.acts_on not in ACTIONS:
+        return f"acts_on is {effect.acts_on!r}; give one of {', '.join(ACTIONS)}"
+    if not effect.description or not effect.source:
+        return "description or source is empty"
+    named = {*effect.delays.values(), *effect.in_place_of, *effect.measured_as}
+    if wrong := [name for name in [*named, effect.magnified_by] if name and name not in parameters]:
+        return f"it names {wrong[0]}, which is not among its parameters"
+    if wrong := [name for name in effect.changes if name not in ALL_TERMS]:
+        return f"changes names {wrong[0]}, which is not a derivative"
+    return ""
 
 
 def with_readings(model: Model, shown: Mapping[str, ca.SX]) -> Model:

@@ -42,6 +42,7 @@ RUDDER_RATE_LIMIT = Effect(
         ),
     ),
     equations=_with_rate_limit,
+    in_place_of={"max_rate_radps": "steering.max_rate"},
 )
 
 
@@ -68,6 +69,7 @@ RUDDER_LAG = Effect(
         ),
     ),
     equations=_with_lag,
+    in_place_of={"time_constant_s": "steering.time_constant"},
 )
 
 
@@ -134,6 +136,7 @@ RUDDER_BACKLASH = Effect(
         ),
     ),
     equations=_with_backlash,
+    states_behind={"rudder_backlash.gear": "rudder.command"},
 )
 
 

@@ -68,4 +68,5 @@ LOADED_RUDDER = Effect(
         ),
     ),
     equations=_in_loaded_slipstream,
+    reads_derivatives=True,
 )

@@ -219,4 +219,5 @@ ENGINE_LAG = Effect(
     source="ITTC 7.5-02-06-03, validation of manoeuvring simulation models: time constant of the engine",
     parameters=(EffectParameter("time_constant_s", "time constant of the engine", 0.01, 600.0),),
     equations=_with_engine_lag,
+    states_behind={"engine_lag.speed": "propeller.speed"},
 )

@@ -7,6 +7,8 @@ import math
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.terms import known_term
+from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.model import Model
 
@@ -43,6 +45,7 @@ RUDDER_BIAS = Effect(
         ),
     ),
     equations=_biased,
+    mistaken_for="force",  # of a ship that is not alike to both sides
 )
 
 
@@ -67,6 +70,8 @@ RUDDER_EFFECTIVENESS = Effect(
         ),
     ),
     equations=_more_effective,
+    changes=tuple(name for name in ALL_TERMS if known_term(name).d),
+    magnified_by="factor",
 )
 
 

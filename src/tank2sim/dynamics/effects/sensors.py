@@ -210,6 +210,7 @@ RUDDER_TIME_OFFSET = Effect(
         ),
     ),
     delays={"rudder.command": "delay_s"},
+    mistaken_for="actuator",  # a gear that lags
 )
 
 

@@ -55,6 +55,7 @@ CURRENT = Effect(
         ),
     ),
     equations=_with_current,
+    terminal="Current of the water over the ground",
 )
 
 
@@ -176,6 +177,8 @@ WIND = Effect(
         ),
     ),
     equations=_with_wind,
+    measured_as={"speed_mps": "wind_speed_mps", "direction_rad": "wind_direction_rad"},
+    terminal="True wind",
 )
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from tank2sim.errors import InputError
 from tank2sim.files import read_exact_text
-from tank2sim.records.reading import looks_like_a_trial
+from tank2sim.records.reading import called_like_a_trial, looks_like_a_trial, reader_of
 
 HOLDOUT = "holdout"
 """Sub-folder of a ship with the trials that are held out."""
@@ -177,7 +177,7 @@ def _cards(folder: Path) -> list[Path]:
 
 def _trials(folder: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
     """Trials, and files that are called like one and are none."""
-    called = [one for one in sorted(_visible(folder)) if one.suffix.lower() in (".csv", ".dat") and one.is_file()]
+    called = [one for one in sorted(_visible(folder)) if called_like_a_trial(one) and one.is_file()]
     found = [path for path in called if _is_trial(path)]
     return tuple(found), tuple(path for path in called if path not in found)
 
@@ -185,7 +185,11 @@ def _trials(folder: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
 def _refuse(others: tuple[Path, ...]) -> None:
     """Files that are called like a trial and are none: a header that is mistyped, or something else."""
     for path in others[:1]:
-        why = "no column t_s" if path.suffix.lower() == ".csv" else "its first line names neither MARIN nor HSVA"
+        why = (
+            "no column t_s"
+            if path.suffix.lower() == ".csv"
+            else f"it does not begin like {reader_of(path).description}"
+        )
         raise InputError(path, "", f"is no trial: {why}", "mend its header, or put it elsewhere if it is none")
 
 

@@ -20,8 +20,6 @@ from tank2sim.gap.inference.likelihood import Likelihood
 
 Progress = Callable[[str], None]
 
-_ORDER = tuple(EFFECTS)
-
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
@@ -46,7 +44,7 @@ class Proposal:
     @property
     def effects(self) -> tuple[str, ...]:
         """In the order of the library: the same set is the same explanation."""
-        return tuple(sorted(self.thetas, key=_ORDER.index))
+        return tuple(sorted(self.thetas, key=list(EFFECTS).index))
 
 
 class Known:

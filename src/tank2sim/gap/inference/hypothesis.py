@@ -24,9 +24,6 @@ from tank2sim.simulation.rows import Chain
 CLOCK = "rudder.clock"
 """Among the parameters of which slopes are asked: how much later than the rudder's record the ship acts on it, s."""
 
-BEHIND_THE_GEAR = ("rudder.angle", "rudder_backlash.gear")
-"""States that nothing drives but the rudder order."""
-
 SENSED = (*MEASURED_STATES, "motion.u_ground", "motion.v_ground", "motion.sog")
 """What sensors may show."""
 
@@ -185,7 +182,9 @@ class Hypothesis:
         """
         if name != "rudder.command" or "rudder.angle" not in self.own:
             return ()
-        return tuple(place for place, one in enumerate(self.own) if one in BEHIND_THE_GEAR)
+        behind = {"rudder.angle"}
+        behind |= {state for effect in EFFECTS.values() for state, by in effect.states_behind.items() if by == name}
+        return tuple(place for place, one in enumerate(self.own) if one in behind)
 
     # -- what it would do --------------------------------------------------------------------------------------------
 

@@ -129,7 +129,6 @@ def candidate_explanations(card: ManoeuvringCard, driven_by: str) -> tuple[str, 
     have = {entry.name for entry in card.effects}
     chosen = []
     for name, effect in EFFECTS.items():
-        inside_the_gear = effect.acts_on == "actuator" and name != "rudder_bias"
-        if effect.tried(card) and name not in have and not (driven_by == "angle" and inside_the_gear):
+        if effect.tried(card) and name not in have and not (driven_by == "angle" and effect.inside_gear):
             chosen.append(name)
     return tuple(chosen)

@@ -17,10 +17,9 @@ from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
 from tank2sim.gap.outcome.improve_card import Found, in_short
 from tank2sim.records.audit import mended
 from tank2sim.records.csv_table import read_table
-from tank2sim.records.esso_osaka import is_esso_osaka
-from tank2sim.records.reading import read_trial
+from tank2sim.records.reading import read_trial, reader_of
 from tank2sim.records.signals.writing import trial_text
-from tank2sim.records.simman import is_simman
+from tank2sim.records.trial_csv import TRIAL_CSV
 from tank2sim.records.trials import RUDDERS, Trial
 from tank2sim.units import from_si
 
@@ -126,8 +125,7 @@ def _same(raw: Trial, own: Trial, names: Sequence[str]) -> bool:
 
 def _sheet(path: Path) -> str | None:
     """Text of a trial CSV; None if it is another format, or has quoted cells."""
-    data = path.read_bytes().decode("latin-1")
-    if is_esso_osaka(data) or is_simman(data) or '"' in data:
+    if reader_of(path) is not TRIAL_CSV or b'"' in path.read_bytes():
         return None
     return read_exact_text(path)
 

@@ -31,23 +31,6 @@ from tank2sim.units import from_si, in_words, to_si
 Found = tuple[str, Mapping[str, float], Mapping[str, float]]
 """Name of an effect, its parameters by name, and the standard errors of those that were estimated; SI."""
 
-STATED_BY_EFFECT = {"rudder_rate_limit": "steering_gear.max_rate_degps", "rudder_lag": "steering_gear.time_constant_s"}
-"""Effects of one parameter that stands in place of a key of the card, and that key as it is written anew."""
-
-_RUDDER = "rudder_effectiveness"
-
-CHANGING_DERIVATIVES = frozenset(
-    {
-        *("cubic_yaw_damping", "sway_yaw_coupling", "turning_drag", "linear_yaw_damping", "linear_sway_damping"),
-        *("added_yaw_inertia", "added_sway_mass", _RUDDER),
-    }
-)
-"""Effects that are nothing but other values of derivatives."""
-
-BUILT_ON_DERIVATIVES = frozenset({"flow_memory", "loaded_rudder", "shallow_water", "water_depth", "trim"})
-"""Effects whose forces hold derivatives. One that was fitted on top of a change of derivatives did not see that change
-(or magnified it alone), and would if it were written into the keys: then both stay ``[[effects]]``, in their order."""
-
 _DIGITS = 10
 """Significant digits of numbers without a standard error: a particular that is estimated must give the force that was
 fitted."""
@@ -80,10 +63,10 @@ def add_effects_to_card(card: ManoeuvringCard, found: Sequence[Found]) -> Manoeu
     for name in {entry.name for entry in card.effects} & {name for name, *_ in ship}:
         raise ValueError(f"the card has {name} already")
     for place, (name, values, errors) in enumerate(ship):
-        behind = {other for other, *_ in ship[place + 1 :]}
-        if name in STATED_BY_EFFECT:
-            card = _changed(card, dict([_stated(card, name, values, errors)]))
-        elif name in CHANGING_DERIVATIVES and not behind & BUILT_ON_DERIVATIVES:
+        read_later = any(EFFECTS[other].reads_derivatives for other, *_ in ship[place + 1 :])
+        if EFFECTS[name].in_place_of:
+            card = _changed(card, _stated(card, name, values, errors))
+        elif EFFECTS[name].changes and not read_later:
             card = _changed(card, _derivatives(card, name, values, errors))
         else:
             card = _with_entry(_with_particulars(card, name, values), name, values, errors)
@@ -104,7 +87,7 @@ def card_with_effects_text(
     text = changed_text(card.text, card.source, {"ship.source": f"{card.ship.source}; {how}"})
     told = [f"{name}: {in_short(name, values, errors)}" for name, values, errors in found if name in names]
     lines = [how, *told]
-    if any(name in STATED_BY_EFFECT or name in CHANGING_DERIVATIVES for name in names):
+    if any(EFFECTS[name].in_place_of or EFFECTS[name].changes for name in names):
         lines.append("Keys that were changed for this bear their old values in comments.")
     if rivals:
         lines.append(f"These trials cannot tell this from: {'; '.join(rivals)}.")
@@ -162,12 +145,16 @@ def _was(document: tomlkit.TOMLDocument, key: str, name: str) -> str:
 
 def _stated(
     card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
-) -> tuple[str, Change]:
-    (parameter,) = EFFECTS[name].parameters
-    key = card.spelt.get(f"steering_gear.{parameter.name}", STATED_BY_EFFECT[name])
-    value, error = (from_si(key, each.get(parameter.name, 0.0)) for each in (values, errors))
-    spread = f"; standard error {error:.2g}" if error else ""
-    return key, (_rounded(value, error), f"{_was(_document(card), key, name)}{spread}")
+) -> dict[str, Change]:
+    """Keys of ``[steering_gear]`` that an effect states otherwise."""
+    changes: dict[str, Change] = {}
+    for parameter in EFFECTS[name].in_place_of:
+        spelling = f"steering_gear.{in_file_units(parameter, 0.0)[0]}"
+        key = card.spelt.get(f"steering_gear.{parameter}", spelling)
+        value, error = (from_si(key, each.get(parameter, 0.0)) for each in (values, errors))
+        spread = f"; standard error {error:.2g}" if error else ""
+        changes[key] = _rounded(value, error), f"{_was(_document(card), key, name)}{spread}"
+    return changes
 
 
 # -- derivatives ---------------------------------------------------------------------------------------------------
@@ -194,8 +181,7 @@ def _derivatives(
 def changed_derivatives(
     card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
 ) -> Iterator[tuple[str, float, float, float]]:
-    """Derivatives that one of :data:`CHANGING_DERIVATIVES` changes: name, value then (prime), standard error by the
-    effect alone, and altogether.
+    """Derivatives that an effect changes: name, value then (prime), standard error by the effect alone, and altogether.
 
     The effect itself is asked: it is applied to a model that has each derivative as a quantity.
     """
@@ -205,15 +191,16 @@ def changed_derivatives(
         Quantity(name=f"changed.{one}", unit="1", description=one, value=model.symbol(f"derivatives.{one}"))
         for one in names
     ]
-    changed = EFFECTS[name].apply(model.extend(*asked), values, card)
+    effect = EFFECTS[name]
+    changed = effect.apply(model.extend(*asked), values, card)
     found = {one: changed.symbol(f"changed.{one}") for one in names}
-    if name == _RUDDER:  # which magnifies forces; these are sums of terms, each in proportion to its derivative
-        more = 1 + changed.symbol(f"{_RUDDER}.factor")
-        found |= {one: more * found[one] for one in names if known_term(one).d}
+    if effect.magnified_by:  # of forces that are sums of terms, each in proportion to its derivative
+        more = 1 + changed.symbol(effect.model_names()[effect.magnified_by])
+        found |= {term: more * found[term] for term in names if term in effect.changes}
     after, slopes = _values_and_slopes(changed, ca.vcat(list(found.values())))
     own = np.zeros(len(changed.parameters))
     card_error = np.zeros(len(changed.parameters))
-    for parameter, place in EFFECTS[name].model_names().items():
+    for parameter, place in effect.model_names().items():
         own[changed.parameter_names.index(place)] = errors.get(parameter, 0.0)
     for one in names:
         card_error[changed.parameter_names.index(f"derivatives.{one}")] = card.standard_error(one)

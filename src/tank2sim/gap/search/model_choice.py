@@ -21,7 +21,7 @@ from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.kalman_filter import FORCE_STATES
 from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.inference.prior import GEAR
-from tank2sim.gap.outcome.improve_card import CHANGING_DERIVATIVES, STATED_BY_EFFECT, changed_derivatives
+from tank2sim.gap.outcome.improve_card import changed_derivatives
 from tank2sim.gap.proof.cross_check import trial_consistency
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY
 from tank2sim.gap.search.explanations import Search
@@ -147,14 +147,8 @@ def _confidence(probabilities: Mapping[tuple[str, ...], float], effect: str) -> 
 
 def _share(pair: ExplanationFit) -> float:
     """Share of the whole gain that the second of two effects must have."""
-    kinds = {_kind(name) for name in pair.explained.effects}
+    kinds = {EFFECTS[name].looks_like for name in pair.explained.effects}
     return OF_ONE_KIND.get(kinds.pop(), 0.0) if len(kinds) == 1 else 0.0
-
-
-def _kind(name: str) -> str:
-    if name in ("rudder_bias", "rudder_time_offset"):
-        return {"rudder_bias": "force", "rudder_time_offset": "actuator"}[name]  # by what they look like
-    return EFFECTS[name].acts_on.partition(" ")[0]
 
 
 def stands_out(fit: ExplanationFit) -> bool:
@@ -172,9 +166,9 @@ def stands_out(fit: ExplanationFit) -> bool:
         ]
         if sizes and max(sizes) < STANDARD_ERRORS:
             return False
-        if name in CHANGING_DERIVATIVES and _change(fit, name) < STANDARD_ERRORS:
+        if EFFECTS[name].changes and _change(fit, name) < STANDARD_ERRORS:
             return False
-        if name in STATED_BY_EFFECT and _change_of_gear(fit, name) < STANDARD_ERRORS:
+        if EFFECTS[name].in_place_of and _change_of_gear(fit, name) < STANDARD_ERRORS:
             return False
     return True
 

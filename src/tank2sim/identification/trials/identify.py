@@ -39,7 +39,7 @@ from tank2sim.identification.trials.problem.estimation_problem import Estimate, 
 from tank2sim.identification.trials.problem.picklable import portable
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import answered, problem_from_card, with_range
-from tank2sim.identification.trials.problem.structures import STRUCTURES
+from tank2sim.identification.trials.problem.structures import AUTO, STRUCTURES
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.recorded import recorded
 
@@ -65,7 +65,7 @@ class IdentificationOptions:
     method : str
         One of :data:`TRIAL_METHODS`.
     structure : str
-        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, or :data:`AUTO`.
+        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, or :data:`.structures.AUTO`.
     inertia : bool
         Estimate acceleration derivatives, too.
     piece_s : float, optional
@@ -91,10 +91,6 @@ class IdentificationOptions:
     bootstrap: int = 0
     hold: tuple[str, ...] = ()
     force: bool = False
-
-
-AUTO = "auto"
-"""Structure that stands for the one cross-validation prefers."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from tank2sim.errors import InputError
 from tank2sim.records.signals.effect import Filtered, FilterEffect, decibel, effect_frequencies
 from tank2sim.records.signals.sampling import FEWEST_SAMPLES, Series
 
-_ORDER = 4
+ORDER = 4
 """Order of a Butterworth filter if none is given: 24 dB an octave, and twice that forwards and backwards."""
 
 _SETTLED = 0.01
@@ -32,7 +32,7 @@ class FilterType(StrEnum):
 
 
 def butterworth(
-    series: Series, kind: FilterType, cutoff_hz: Sequence[float], *, order: int = _ORDER, causal: bool = False
+    series: Series, kind: FilterType, cutoff_hz: Sequence[float], *, order: int = ORDER, causal: bool = False
 ) -> Filtered:
     """Butterworth filter, forwards and backwards without shift of phase, or forwards alone as a measuring chain does.
 

@@ -13,6 +13,7 @@ from enum import Enum
 
 from tank2sim.analysis.validation.bridge_data import ORDERS_AHEAD, Bridge, Telegraph
 from tank2sim.analysis.validation.ship_track import ShipTrack, quarter
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.report.bridge.drawings import clock, knots, metres
 from tank2sim.simulation.card_range import CardRangeReading
 from tank2sim.simulation.manoeuvres import FULL_ASTERN
@@ -31,7 +32,7 @@ class Blank(Enum):
 
 
 OUTSIDE = Blank.OUTSIDE
-Value = str | Blank | None
+_Value = str | Blank | None
 
 NOT_FOR_USE = "Hatched: outside the range of the card, which is not for use there. Fill in from trials."
 """The words under a table with such figures."""
@@ -42,7 +43,7 @@ class Row:
     """A label and its values; None is a blank to be filled in by hand."""
 
     label: str | None
-    values: tuple[Value, ...]
+    values: tuple[_Value, ...]
 
 
 @dataclass(frozen=True)
@@ -142,14 +143,14 @@ def telegraph(bridge: Bridge, other: Bridge | None) -> Box:
     return Box("Engine order", tuple(rows), ("Rpm / pitch", f"kn, {first}", f"kn, {second}"), note)
 
 
-def _speeds(one: Telegraph, other: Bridge | None) -> tuple[Value, ...]:
+def _speeds(one: Telegraph, other: Bridge | None) -> tuple[_Value, ...]:
     """Revolutions, speed, and the other condition's speed at the same revolutions."""
     same = (row for row in other.telegraph if math.isclose(row.rpm, one.rpm)) if other else ()
     rpm = f"{one.rpm:.0f}" if one.rpm >= 100 else f"{one.rpm:.3g}"
     return (rpm, _speed(one), _speed(next(iter(same), None)))
 
 
-def _speed(one: Telegraph | None) -> Value:
+def _speed(one: Telegraph | None) -> _Value:
     if one is None or one.speed_mps is None:
         return None
     return knots(one.speed_mps) if one.within else OUTSIDE
@@ -190,14 +191,14 @@ def turning(bridge: Bridge, circles: Sequence[ShipTrack]) -> Box:
     return Box("", tuple(rows), tuple(one.name for one in circles))
 
 
-def _told(one: CardRangeReading, name: str, words: Callable[[float], str]) -> Value:
+def _told(one: CardRangeReading, name: str, words: Callable[[float], str]) -> _Value:
     """A figure in words, if the card holds for it."""
     if one.outside(name):
         return OUTSIDE
     return words(one.figures[name]) if name in one.figures else None
 
 
-def _time_to(circle: ShipTrack, heading_deg: float) -> Value:
+def _time_to(circle: ShipTrack, heading_deg: float) -> _Value:
     mark = quarter(circle, heading_deg)
     if mark is None:
         return OUTSIDE if circle.left else None
@@ -223,9 +224,9 @@ def stopping(bridge: Bridge) -> Box:
     rows += list(given.values())
     note = ""
     if bridge.stops:
-        lag = (
-            "with the card's engine lag" if any(one.name == "engine_lag" for one in bridge.card.effects) else "at once"
-        )
+        effects = [EFFECTS[entry.name] for entry in bridge.card.effects]
+        lags = any("propeller.speed" in effect.states_behind.values() for effect in effects)
+        lag = "with the card's engine lag" if lags else "at once"
         note = (
             f"Simulated with {FULL_ASTERN:.0%} of the nominal revolutions astern, {lag}: an assumption, to be replaced "
             "by trials."

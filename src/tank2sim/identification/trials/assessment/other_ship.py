@@ -19,7 +19,7 @@ from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
 _LINEAR = tuple(f"derivatives.{name}" for name in ("Yv", "Yr", "Yd", "Nv", "Nr", "Nd"))
-_RUDDER = "derivatives.Nd"
+RUDDER = "derivatives.Nd"
 
 _FACTOR = 2.0
 """The rudder's moment by all trials together, over that of the card, within its interval: 0.8 to 1.3 on HSVA's and
@@ -38,7 +38,7 @@ _LEAST_RUDDER = np.deg2rad(1.0)
 
 def other_ship(problem: Problem) -> tuple[str, ...]:
     """What speaks against the runs being of the card's ship, in sentences; none if nothing does."""
-    if _RUDDER not in problem.free or not problem.prior_mean[problem.free.index(_RUDDER)]:
+    if RUDDER not in problem.free or not problem.prior_mean[problem.free.index(RUDDER)]:
         return ()
     rudder = problem.model.input_names.index("rudder.command")
     trials: dict[str, list[SampledRun]] = {}
@@ -80,5 +80,5 @@ def _ratio(problem: Problem, runs: Sequence[SampledRun]) -> tuple[float, float] 
         estimate = equation_error(asked, settings=EquationErrorSettings(scale_prior=False))
     except (InputError, np.linalg.LinAlgError):
         return None
-    place = linear.index(_RUDDER)
+    place = linear.index(RUDDER)
     return float(estimate.values[place] / mean[place]), float(estimate.standard_errors[place] / abs(mean[place]))

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.records.audit import Finding, audit_and_repair
 from tank2sim.records.reading import read_trial
@@ -92,10 +93,10 @@ def _refuse_open(finding: Finding) -> None:
 def _unused(trial: Trial, card: ManoeuvringCard) -> list[str]:
     """What of a trial does not enter, in words."""
     told = []
-    if {"wind_speed_mps", "wind_direction_rad"} <= set(trial.signals) and all(
-        one.name != "wind" for one in card.effects
-    ):
-        told.append(f"{trial.path.name}: wind was measured, and the card has no effect 'wind': it is not used")
+    for name, effect in EFFECTS.items():
+        signals = set(effect.measured_as.values())
+        if signals and signals <= set(trial.signals) and all(entry.name != name for entry in card.effects):
+            told.append(f"{trial.path.name}: {name} was measured, and the card has no effect {name!r}: it is not used")
     rudder = trial.signals.get("delta_rad", trial.signals.get("delta_order_rad"))
     empty = 0 if rudder is None else int(np.isnan(rudder).sum())
     if empty:

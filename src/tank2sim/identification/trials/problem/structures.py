@@ -6,7 +6,7 @@ Because it is a card, everything downstream (simulation, linearisation, FMU) tak
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import tomlkit
@@ -16,7 +16,9 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import linear_card, revised
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, LINEAR_TERMS
+from tank2sim.dynamics.effects import hull, loaded_rudder
 from tank2sim.files import BYTE_ORDER_MARK
+from tank2sim.plugins import Registry
 
 TYPICAL = {"v": 0.3, "r": 0.7, "d": 0.6, "u": 0.4}
 """Primes of a hard turn (v', r', rudder in rad, Du'): sizes at which terms are compared (KVLCC2, 35 deg turn)."""
@@ -72,11 +74,11 @@ def _as_it_is(card: ManoeuvringCard) -> ManoeuvringCard:
 
 def _linear(card: ManoeuvringCard) -> ManoeuvringCard:
     wanted = [name for force in "XYN" for name in LINEAR_TERMS[force]]
-    return linear_card(_with_terms(card, wanted))
+    return linear_card(with_terms(card, wanted))
 
 
 def _third_order(card: ManoeuvringCard) -> ManoeuvringCard:
-    return _with_terms(card, [*CUBIC_HULL["Y"], *CUBIC_HULL["N"], *ASYMMETRY, *TURNING])
+    return with_terms(card, [*CUBIC_HULL["Y"], *CUBIC_HULL["N"], *ASYMMETRY, *TURNING])
 
 
 def _cross_flow(card: ManoeuvringCard) -> ManoeuvringCard:
@@ -89,22 +91,28 @@ def _cross_flow(card: ManoeuvringCard) -> ManoeuvringCard:
     }
     replaced |= {name for name in ABKOWITZ_TERMS["X"] if known_term(name).d and name != "Xdd"}
     bare = _without(card, replaced)
-    bare = _with_terms(bare, [*ASYMMETRY, *TURNING, "Yd", "Nd"])
-    bare = _with_terms(bare, ["Nvvr", "Nvrr", "Nrrr"], SHARE_BESIDE_DRAG)
-    bare = _with_effect(bare, "cross_flow_drag", {"drag_coefficient": CROSS_FLOW})
-    return _with_effect(bare, "loaded_rudder", _LOADED_RUDDER)
+    bare = with_terms(bare, [*ASYMMETRY, *TURNING, "Yd", "Nd"])
+    bare = with_terms(bare, ["Nvvr", "Nvrr", "Nrrr"], SHARE_BESIDE_DRAG)
+    bare = with_effect(bare, hull.CROSS_FLOW_DRAG.name, {"drag_coefficient": CROSS_FLOW})
+    return with_effect(bare, loaded_rudder.LOADED_RUDDER.name, _LOADED_RUDDER)
 
 
-STRUCTURES: dict[str, ModelStructure] = {
-    one.name: one
-    for one in (
+AUTO = "auto"
+"""Name of the choice of the structure that cross-validation prefers."""
+
+STRUCTURES: Registry[ModelStructure] = Registry(
+    "tank2sim.structures",
+    (
         ModelStructure("linear", "linear derivatives alone (3.5)", _linear),
         ModelStructure("card", "the terms and effects that the card has", _as_it_is),
         ModelStructure("cross_flow", "linear hull, cross-flow drag, rudder in the propeller's slipstream", _cross_flow),
         ModelStructure("third_order", "the card's terms and all third-order terms in v and r", _third_order),
-    )
-}
-"""From the simplest to the one with most parameters: of two that predict alike the earlier is taken."""
+    ),
+    ModelStructure,
+    reserved=(AUTO,),
+)
+"""From the simplest to the one with most parameters, then those of installed packages: of two that predict alike the
+earlier is taken."""
 
 
 def prior_of_absent(card: ManoeuvringCard, name: str, share: float = SHARE_OF_LINEAR) -> tuple[float, float]:
@@ -132,8 +140,17 @@ def prior_of_absent(card: ManoeuvringCard, name: str, share: float = SHARE_OF_LI
     return 0.0, (SHARE_OF_ASYMMETRY if name in ASYMMETRY else share) * sizes[term.force] / size
 
 
-def _with_terms(card: ManoeuvringCard, names: list[str], share: float = SHARE_OF_LINEAR) -> ManoeuvringCard:
-    """The card with these terms: those that it has not, or has with no uncertainty, with their value before trials."""
+def with_terms(card: ManoeuvringCard, names: Sequence[str], share: float = SHARE_OF_LINEAR) -> ManoeuvringCard:
+    """The card with these terms: those that it lacks, or has without uncertainty, with their values before the trials.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    names : sequence of str
+        Derivatives, as ``Nvvr``.
+    share : float
+        Standard error of a term that the card lacks, as a share of the linear force in a hard turn.
+    """
     new: dict[str, tuple[float, float]] = {}
     for name in names:
         value, error = prior_of_absent(card, name, share)
@@ -154,8 +171,17 @@ def _without(card: ManoeuvringCard, names: set[str]) -> ManoeuvringCard:
     return _parsed(card, document)
 
 
-def _with_effect(card: ManoeuvringCard, name: str, parameters: Terms) -> ManoeuvringCard:
-    """The card with an effect; one that it has already stays as it is."""
+def with_effect(card: ManoeuvringCard, name: str, parameters: Terms) -> ManoeuvringCard:
+    """The card with an effect; one that it has already stays as it is.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    name : str
+        Of the effect.
+    parameters : mapping
+        Its parameters as a card spells them, to value and standard error before the trials.
+    """
     if any(entry.name == name for entry in card.effects):
         return card
     document = tomlkit.parse(card.text.removeprefix(BYTE_ORDER_MARK))

@@ -1,0 +1,221 @@
+"""Effects, trial readers and structures of other packages, found by entry points.
+
+Each kind has a :class:`Registry`: a mapping from name to value that holds the built-in values and, read once when it is
+first used, those of installed packages. An entry point has the name of its value::
+
+    [project.entry-points."tank2sim.effects"]
+    bow_thruster = "my_package:BOW_THRUSTER"
+
+A package that is faulty gives a :class:`PluginWarning` of one line where all values are listed, and an
+:class:`~tank2sim.errors.InputError` with the same words where its value is asked for.
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import re
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar
+
+from tank2sim.errors import InputError
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+REMEDY = "repair the package or uninstall it"
+
+_NAME = re.compile(r"[a-z][a-z0-9_]*")
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class PluginWarning(UserWarning):
+    """A value of another package cannot be used; the text is one line."""
+
+
+class Named(Protocol):
+    """What a registry holds: a frozen dataclass with a name."""
+
+    @property
+    def name(self) -> str:
+        """Name under which it is found."""
+
+
+_Value = TypeVar("_Value", bound=Named)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a value of another package is from.
+
+    Parameters
+    ----------
+    distribution : str
+        Name and version of the installed package.
+    place : str
+        The entry point: its group and name.
+    """
+
+    distribution: str
+    place: str
+
+    def fault(self, problem: str, remedy: str = REMEDY) -> InputError:
+        """The error that names distribution and entry point."""
+        return InputError(self.distribution, self.place, problem, remedy)
+
+    def guarded(self, function: Callable[P, R]) -> Callable[P, R]:
+        """The function, with whatever it raises turned into an InputError that names the package."""
+
+        @functools.wraps(function)
+        def call(*args: P.args, **kwargs: P.kwargs) -> R:
+            try:
+                return function(*args, **kwargs)
+            except InputError:
+                raise
+            except Exception as error:
+                raise self.fault(f"failed: {_in_short(error)}") from error
+
+        return call
+
+
+def _no_fault(value: Any) -> str:
+    return ""
+
+
+class Registry(Mapping[str, _Value]):
+    """Built-in values and those of installed packages, by name, the built-in ones first.
+
+    Parameters
+    ----------
+    group : str
+        Of the entry points, ``tank2sim.effects``.
+    builtin : iterable
+        In their order.
+    kind : type
+        What an entry point must give: a frozen dataclass. What its functions raise, in the value itself and in the
+        parts that its tuples hold, is turned into an InputError that names the package.
+    reserved : iterable of str
+        Names that no package may take, in addition to those of `builtin`.
+    fault : callable, optional
+        ``fault(value) -> str``: what is wrong with the value of a package, "" if nothing.
+
+    Notes
+    -----
+    ``registry[name]`` and ``registry.get(name)`` raise InputError for an entry point that cannot be used. Iteration and
+    ``in`` pass over it; the first of them gives a :class:`PluginWarning`.
+    """
+
+    def __init__(
+        self,
+        group: str,
+        builtin: Iterable[_Value],
+        kind: type[_Value],
+        *,
+        reserved: Iterable[str] = (),
+        fault: Callable[[_Value], str] = _no_fault,
+    ):
+        self.group, self.kind, self.fault = group, kind, fault
+        self.builtin: Mapping[str, _Value] = {value.name: value for value in builtin}
+        self.reserved = frozenset(reserved) | set(self.builtin)
+        self._origins: dict[str, Origin] = {}
+        self._found: Mapping[str, _Value | InputError] | None = None
+        self._warned: set[str] = set()
+
+    def __getitem__(self, name: str) -> _Value:
+        if name in self.builtin:
+            return self.builtin[name]
+        self._warned.add(name)  # the error says it
+        found = self._plugins()[name]
+        if isinstance(found, InputError):
+            raise found
+        return found
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.builtin or isinstance(self._plugins().get(str(name)), self.kind)
+
+    def __iter__(self) -> Iterator[str]:
+        yield from self.builtin
+        for name, found in self._plugins().items():
+            if not isinstance(found, InputError):
+                yield name
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def names(self) -> tuple[str, ...]:
+        """All names, with those of entry points that cannot be used: asking for such a value says why."""
+        return (*self.builtin, *(name for name in self._plugins() if name not in self.reserved))
+
+    def remedy(self, name: str) -> str:
+        """What to do about a name that is not there: the nearest one, or all that there are."""
+        if close := difflib.get_close_matches(name, self, n=1):
+            return f"did you mean {close[0]}?"
+        return f"known are: {', '.join(self)}; or install the package that has it"
+
+    def origin(self, name: str) -> Origin | None:
+        """The package that a value is from; None if it is built in."""
+        return None if name in self.builtin else self._origins[name]
+
+    def _plugins(self) -> Mapping[str, _Value | InputError]:
+        """Values of packages by name, or why they cannot be used."""
+        if self._found is None:
+            found: dict[str, _Value | InputError] = {}
+            for entry in entry_points(self.group):
+                distribution = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown package"
+                origin = Origin(distribution, f"entry point {self.group}: {entry.name}")
+                other = self._origins.setdefault(entry.name, origin)
+                if entry.name in self.reserved:
+                    found[entry.name] = origin.fault("its name is built in, and that one is used", "give it another")
+                elif other != origin:
+                    problem = f"{other.distribution} has an entry point of this name, too"
+                    found[entry.name] = origin.fault(problem, "uninstall one of the two")
+                elif entry.name not in found:  # a package may be found twice on the path
+                    found[entry.name] = self._loaded(entry, origin)
+            self._found = found
+        for name, each in self._found.items():
+            if isinstance(each, InputError) and name not in self._warned:
+                self._warned.add(name)
+                warnings.warn(str(each), PluginWarning, stacklevel=3)
+        return self._found
+
+    def _loaded(self, entry: EntryPoint, origin: Origin) -> _Value | InputError:
+        try:
+            value = entry.load()
+        except Exception as error:
+            return origin.fault(f"cannot be loaded: {_in_short(error)}")
+        kind = f"tank2sim {self.kind.__name__}"
+        if not isinstance(value, self.kind):
+            return origin.fault(f"gives a {type(value).__name__}, and a {kind} was expected")
+        if value.name != entry.name or not _NAME.fullmatch(entry.name):
+            remedy = "give both the same name, of small letters, digits and _"
+            return origin.fault(f"gives a {kind} with the name {value.name!r}", remedy)
+        try:
+            problem = self.fault(value)
+        except Exception as error:
+            problem = _in_short(error)
+        return origin.fault(f"gives a faulty {kind}: {problem}") if problem else _guarded(value, origin)
+
+
+def entry_points(group: str) -> Iterable[EntryPoint]:
+    """Entry points of installed packages."""
+    from importlib import metadata  # takes as long as all of the rest: not for a command that asks for no plugin
+
+    return metadata.entry_points(group=group)
+
+
+def _guarded(value: Any, origin: Origin) -> Any:
+    """A value whose functions are :meth:`Origin.guarded`, and those of the values in it."""
+    if isinstance(value, tuple):
+        return tuple(_guarded(each, origin) for each in value)
+    if is_dataclass(value) and not isinstance(value, type):
+        return replace(value, **{each.name: _guarded(getattr(value, each.name), origin) for each in fields(value)})
+    return origin.guarded(value) if callable(value) else value
+
+
+def _in_short(error: BaseException) -> str:
+    """Kind and text of an error, in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
