@@ -38,7 +38,7 @@ FAMILIES = {
     "gear": "Steering gear",
     "hull": "Hull",
     "derivatives": "Hull: derivatives and masses",
-    "memory": "Hull: states of their own",
+    "dynamic_effects": "Hull: states of their own",
     "sensors": "Sensors",
 }
 """Module of an effect's equations to the heading under which a reader looks for it."""

@@ -209,11 +209,11 @@ def test_the_page_of_effects_has_it(site: Path, work: Path) -> None:
 def test_gap_offers_it_as_a_candidate(site: Path, work: Path) -> None:
     code = """
 from tank2sim.cards import read_card
-from tank2sim.gap.inference.hypothesis import Explained
+from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.prior import candidates
 card = read_card("mariner.toml")
 print(*candidates(card, "angle"))
-print([(asked.variable, asked.parameter.name) for asked in Explained(card, "angle", ["bow_thruster"]).asked])
+print([(asked.variable, asked.parameter.name) for asked in Hypothesis(card, "angle", ["bow_thruster"]).asked])
 """
     offered, asked = done(python(site, code, cwd=work)).splitlines()
     assert "bow_thruster" in offered.split()

@@ -39,7 +39,7 @@ class FleetRequest:
     Parameters
     ----------
     folder, output : Path
-    options : Options
+    options : GapOptions
     executor : str
     again : bool
         Compute also what is there.

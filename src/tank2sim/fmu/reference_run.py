@@ -43,7 +43,7 @@ class ReferenceRun:
     ----------
     title : str
         What is done.
-    run : Manoeuvre
+    run : InputSequence
         Communication points and inputs.
     input_names, output_names : tuple of str
         The columns of the inputs and outputs.

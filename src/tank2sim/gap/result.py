@@ -252,7 +252,7 @@ class Gap:
         Explanations that these data cannot tell from the named one.
     rivals : tuple of Rival
         Best first; "none" is among them.
-    where : tuple of Place
+    where : tuple of MisfitPlace
         Largest first.
     equation : str
         In which equation the gap is: surge, sway, yaw, actuator, kinematics or sensor.
@@ -260,7 +260,7 @@ class Gap:
         Variable to (standard deviation, ``stated`` or ``estimated``), SI.
     passed : tuple of Passed
         Each trial.
-    figures_before, figures_after : tuple of Figure
+    figures_before, figures_after : tuple of FigureComparison
         Of turns and zigzags.
     missing_force : MissingForce or None
     could_hide : mapping

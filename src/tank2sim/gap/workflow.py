@@ -88,7 +88,7 @@ def find_gap(
         The ship as it is known.
     fitted, held : Measured
         Trials that name the effect, and trials that only prove it (may be none).
-    options : Options, optional
+    options : GapOptions, optional
     progress : callable
         Told what is being done.
     executor : Executor, optional

@@ -120,7 +120,7 @@ class Campaign:
         Its ``campaign.toml``.
     model, test, tank, uncertainty, full_scale
         Sections of the file, SI and radians (:mod:`tank2sim.records.campaign_form`). ``full_scale`` may be None.
-    runs : tuple of Run
+    runs : tuple of CaptiveRun
         In the order of the file.
     faults : tuple of InputError
         Runs that could not be read and were left out, because that was asked for.

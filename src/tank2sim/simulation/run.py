@@ -31,7 +31,7 @@ class Run:
         Manoeuvring figures, units in their names; None where the run was too short.
     notices : tuple of str
         What the user should know.
-    reading : Reading
+    reading : CardRangeReading
         Which figures were settled outside the range that the card was measured in.
     """
 

@@ -94,7 +94,7 @@ class Chance:
 
     Parameters
     ----------
-    criterion : Criterion
+    criterion : ImoCriterion
         With what was found for the card itself.
     met : float or None
         Share of all usable members that meet it; None where no member shows it.

@@ -48,7 +48,7 @@ class GlidePath:
         One for each step.
     durations_s : tuple of float
         Of the steps.
-    places : tuple of Place
+    places : tuple of PathPoint
         The start, and the end of each step.
     """
 

@@ -33,7 +33,7 @@ class GlideQuestion:
     angles_rad : tuple of float
         Paths of steady glides, + up, which all have `roll_rad` and a net buoyancy of the size `buoyancy_kg` (by default
         the card's).
-    programme : Programme, optional
+    programme : GlideProgramme, optional
         To be flown, by the steady glides and by the transient model.
     as_printed : bool
         True for the paper's own equations beside the corrected ones.

@@ -108,7 +108,7 @@ def design_heading(
         heading, rudder and integral, the two that no compass shows observed; ``robust``: mixed sensitivity.
     speed_mps : float, optional
         Speed of the design; by default that of expansion.
-    weights : Weights, optional
+    weights : LqrWeights, optional
         Of the LQR.
     wave_filter_radps : float, optional
         Of the PID: frequency of encounter of waves at which the rudder shall rest (:func:`_filtered`).

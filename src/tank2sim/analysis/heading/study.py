@@ -63,7 +63,7 @@ class StudySettings:
         One of :data:`tank2sim.analysis.heading.designs.DESIGNS`.
     speed_mps : float, optional
         Of the design; by default that of expansion.
-    weights : Weights
+    weights : LqrWeights
         Of the LQR.
     wave_filter_radps : float, optional
         Of the PID.

@@ -46,7 +46,7 @@ class CardInfluence:
     Parameters
     ----------
     ship : str
-    figures : tuple of Figure
+    figures : tuple of InfluenceFigure
     values : array (nf,)
         Of the figures.
     errors : JointErrors

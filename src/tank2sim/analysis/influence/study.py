@@ -44,7 +44,7 @@ class Study:
     ----------
     card : ManoeuvringCard
         The ship.
-    figures : sequence of Figure
+    figures : sequence of InfluenceFigure
         What is asked.
 
     Raises

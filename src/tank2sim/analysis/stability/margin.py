@@ -87,7 +87,7 @@ class Margin:
         C' in per cent of |Y'_v (N'_r - m' x'_G)|, its stabilising part.
     slopes : array (2, 2)
         Of Y' and N' by v' and r', the inertia of (3.1) included.
-    influences : tuple of Influence
+    influences : tuple of MarginInfluence
         The strongest first.
     speeds_mps, criteria, speed_slopes : arrays (k,)
         C' over speed and dC'/du (s/m); nan where there is no straight course. Without elements where forces do not

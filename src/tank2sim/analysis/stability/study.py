@@ -38,7 +38,7 @@ class StabilityStudy:
         At the speed of expansion; None where the ship has no steady motion, which `notices` tell.
     direct, reverse : SpiralPoints, optional
         Simulated spirals; None if not asked for or not possible.
-    imo : tuple of Criterion
+    imo : tuple of ImoCriterion
         At the speed of expansion.
     notices : tuple of str
         What the reader should know.

@@ -56,7 +56,7 @@ class SteeringCharacteristic:
     ----------
     yaw_rate_radps, rudder_rad : arrays (k,)
         H(r) as the diagram has it.
-    bech, norrbin : Cubic
+    bech, norrbin : CubicCharacteristic
         The nearest cubic, and the nearest that keeps place and slope of the straight course.
     slope_s : float
         dH/dr on the straight course, exact, s: the reciprocal of Nomoto's K if surge does not change with the rudder.

@@ -33,15 +33,15 @@ class ShipTrack:
     ----------
     name : str
     ahead_m, starboard_m : array (n,)
-    marks : tuple of Mark
+    marks : tuple of TrackMark
         At each quarter of a turn (turns), or at equal times (stops).
     figures : mapping
         Figures, also those that were settled outside what the card was measured in.
-    reading : Reading
+    reading : CardRangeReading
         Which those are.
     inside : int
         Points of the track until it leaves the card's range.
-    left : Mark, optional
+    left : TrackMark, optional
         Where it does; None if it does not.
     """
 

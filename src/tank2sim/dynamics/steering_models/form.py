@@ -49,7 +49,7 @@ class SteeringForm:
         Key in the catalogue; words for a reader.
     source : str
         Where the equations stand.
-    coefficients : tuple of Coefficient
+    coefficients : tuple of SteeringCoefficient
         In the order of the paper's tables, first those of Y.
     rates : callable
         The equations (:data:`Rates`).

@@ -73,7 +73,7 @@ def found_one_by_one(
     ----------
     ships : iterable of Sought
         Read as they are needed.
-    options : Options
+    options : GapOptions
     progress : callable
         Told of each stage of each ship.
     executor : Executor, optional

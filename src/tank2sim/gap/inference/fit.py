@@ -94,7 +94,7 @@ class ExplanationFit:
 
     Parameters
     ----------
-    explained : Explained
+    explained : Hypothesis
     theta : array (k,)
         Its parameters.
     covariance : array (k, k)

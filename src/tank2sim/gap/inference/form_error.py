@@ -21,7 +21,7 @@ class Forms:
 
     Parameters
     ----------
-    motion : Motion
+    motion : MeasuredBatch
     command : int
         Place of ``rudder.command`` among the inputs.
     """

@@ -72,7 +72,7 @@ class Hypothesis:
 
     Attributes
     ----------
-    asked : tuple of Asked
+    asked : tuple of EstimatedParameter
         The parameters that are estimated, in the order of every `theta`.
     """
 

@@ -115,7 +115,7 @@ class Observer:
     Parameters
     ----------
     what : Linear
-    noise : Noise
+    noise : NoiseLevels
     push : array (R, T - 1, 6, 3)
         Errors of the motion by the accelerations a block before.
     fading : array (nz - 6,)

@@ -58,11 +58,11 @@ class Likelihood:
 
     Parameters
     ----------
-    motion : Motion
+    motion : MeasuredBatch
         Of the trials, side by side.
-    none : Explained
+    none : Hypothesis
         The card without an effect.
-    coefficients : Coefficients
+    coefficients : NuisanceParameters
     belief : Belief
         Of the noise and of the coefficients' width.
     """
@@ -210,7 +210,7 @@ class Likelihood:
 
         Parameters
         ----------
-        explained : Explained
+        explained : Hypothesis
         theta : array (k,)
             Parameters to begin with.
         starts : sequence of arrays

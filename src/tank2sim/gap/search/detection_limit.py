@@ -44,7 +44,7 @@ def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
     Parameters
     ----------
     search : Search
-    best : Fit
+    best : ExplanationFit
         What is explained already.
     enough : float
         By how much the score must fall for an effect more, beyond its price.

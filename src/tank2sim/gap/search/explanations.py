@@ -54,7 +54,7 @@ class Search:
     ----------
     likelihood : Likelihood
         Linear about the motion of the best explanation.
-    fits : tuple of Fit
+    fits : tuple of ExplanationFit
         Every explanation that was fitted, "none" among them, the best (lowest score) first.
     variants : tuple of Variant
         All effects at their typical sizes.

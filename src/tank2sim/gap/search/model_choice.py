@@ -64,9 +64,9 @@ class Decision:
     ----------
     verdict : str
         One of :data:`.result.VERDICTS`.
-    best : Fit
+    best : ExplanationFit
         The explanation that is named, "none" among them; the best of all where a name is withheld.
-    alike : tuple of Fit
+    alike : tuple of ExplanationFit
         Others that are as good.
     probabilities : mapping
         Of each explanation that was fitted, by its effects.

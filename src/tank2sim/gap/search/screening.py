@@ -30,7 +30,7 @@ class Variant:
 
     Parameters
     ----------
-    explained : Explained
+    explained : Hypothesis
         The ship with this effect alone.
     theta : array (k,)
         Size and shape.
@@ -75,7 +75,7 @@ def variants(likelihood: Likelihood, explained: Hypothesis) -> tuple[Variant, ..
     Parameters
     ----------
     likelihood : Likelihood
-    explained : Explained
+    explained : Hypothesis
         With one effect.
     """
     card = likelihood.none.card
@@ -148,7 +148,7 @@ class Screen:
     Parameters
     ----------
     likelihood : Likelihood
-    base : Fit
+    base : ExplanationFit
         About which and at whose noise: of "none", or of what is taken as there already.
     every : sequence of Variant
     """

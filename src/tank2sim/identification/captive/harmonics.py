@@ -61,9 +61,9 @@ class ReducedRun:
 
     Parameters
     ----------
-    run : Run
+    run : CaptiveRun
         The record.
-    motion : Motion
+    motion : CaptiveMotion
         Its smooth motion.
     labels : tuple of str
         ``mean``, ``cos 1``, ``sin 1``, ..., and last ``trend`` (by the time over half the record's length).

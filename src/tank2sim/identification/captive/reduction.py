@@ -143,7 +143,7 @@ class Reduction:
     ----------
     campaign : Campaign
         As read.
-    options : Options
+    options : ReductionOptions
         As asked.
     runs : tuple of ReducedRun
         Those that were used.

@@ -139,7 +139,7 @@ def gauge_gains(
 
     Parameters
     ----------
-    equations : Equations
+    equations : CampaignEquations
         Without trends with frequency.
     spread : Spread
         Of the runs within each kind.

@@ -44,7 +44,7 @@ def cautions_of_test(
     ----------
     campaign : Campaign
         As read.
-    runs : tuple of Oscillation
+    runs : tuple of OscillationMotion
         Its oscillating runs, with frequencies as measured.
     ship : ManoeuvringCard, optional
         The ship that the model is to be similar to.

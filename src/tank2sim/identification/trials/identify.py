@@ -164,7 +164,7 @@ def identify(
         What is known of the ship; its standard errors say how well.
     trials, holdout : Measured
         Trials to fit, and trials only to compare with.
-    options : Options, optional
+    options : IdentificationOptions, optional
     progress : callable
         Told of each better estimate. A KeyboardInterrupt ends the search with the best so far.
     executor : concurrent.futures.Executor, optional

@@ -40,7 +40,7 @@ def butterworth(
     ----------
     series : Series
         What to filter.
-    kind : Pass
+    kind : FilterType
         Low, high or band pass.
     cutoff_hz : sequence of 1 or (band) 2 floats
         Where one pass has -3 dB; forwards and backwards together have -6 dB there.

@@ -167,7 +167,7 @@ def loop_chart(
 
     Parameters
     ----------
-    loops : sequence of Loop
+    loops : sequence of ForceLoop
         In one colour each.
     across : Across
         What `motion` is.

@@ -108,7 +108,7 @@ def track_chart(
 
     Parameters
     ----------
-    tracks : sequence of Track
+    tracks : sequence of TrackData
         Measured ones are drawn as open points, the others as lines. The start is marked.
     title : str
         Title of the chart.
@@ -158,7 +158,7 @@ def history_chart(
         Title of the chart.
     width_px, height_px : int
         Size of one panel.
-    marks : sequence of Mark
+    marks : sequence of TimeMark
         Places to tint.
     """
     look = _look(runs)

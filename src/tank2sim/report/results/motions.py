@@ -81,7 +81,7 @@ def motions(
         What the runs are.
     runs : mapping
         Label to columns; those in `measured` are drawn as points.
-    marks : sequence of Mark
+    marks : sequence of TimeMark
         By the name of the column without its unit.
     """
     tables = {label: _in_si(columns) for label, columns in runs.items()}

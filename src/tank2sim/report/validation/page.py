@@ -68,7 +68,7 @@ class ValidationEvidence:
     model : Model
     validation : Validation
     verified : tuple of Verified
-    criteria : tuple of Criterion
+    criteria : tuple of ImoCriterion
     replays : tuple of Passed
     notices : tuple of str
     """

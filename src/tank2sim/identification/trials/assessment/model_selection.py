@@ -127,9 +127,9 @@ class CrossValidation:
 
     Parameters
     ----------
-    single : tuple of Fold
+    single : tuple of HeldOutFold
         Each run left out once, in the order of the runs.
-    extrapolation : Fold
+    extrapolation : HeldOutFold
         The runs of largest amplitude left out together.
     """
 

@@ -88,7 +88,7 @@ def bands(
 
     Parameters
     ----------
-    ship : Ship
+    ship : PicklableShip
         Its card is driven by the rudder's order here, whatever drove the trials.
     estimate : Estimate
         Values and covariance of parameters of the ship's model; drawn values stay within the model's bounds.
@@ -96,7 +96,7 @@ def bands(
         One of :mod:`tank2sim.simulation.manoeuvres`, or a recorded one to be repeated from its start.
     disturbances : Disturbances, optional
         By default none: coefficients alone are uncertain.
-    settings : Settings, optional
+    settings : PredictionSettings, optional
     executor : concurrent.futures.Executor, optional
         By default one member after the other, here.
 

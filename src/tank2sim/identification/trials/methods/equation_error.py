@@ -51,7 +51,7 @@ class WhiteningWeights:
     ----------
     inverse : array (3, 3)
         L^-1, with L L' the covariance of the residuals, L lower triangular.
-    colour : tuple of Noise
+    colour : tuple of ColouredNoise
         Of the three components of L^-1 e.
     """
 
@@ -96,7 +96,7 @@ def equation_error(
         k free parameters.
     start : array (k,), optional
         Where the search begins; by default the prior's mean.
-    settings : Settings, optional
+    settings : EquationErrorSettings, optional
     progress : callable
         Told of each better estimate; what it raises passes through.
 

@@ -131,7 +131,7 @@ def kalman(
         k free parameters; the model has at least one of u, v and r as a state.
     start : array (k,), optional
         Where the search begins; by default the prior's mean.
-    settings : Settings, optional
+    settings : KalmanSettings, optional
     progress : callable
         Told of each better estimate; what it raises passes through.
     """

@@ -72,7 +72,7 @@ def output_error(
         k free parameters.
     start : array (k,), optional
         Where the search begins; by default the prior's mean.
-    settings : Settings, optional
+    settings : OutputErrorSettings, optional
     progress : callable
         Told of each better estimate; what it raises passes through.
     """

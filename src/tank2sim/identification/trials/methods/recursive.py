@@ -147,7 +147,7 @@ def recursive(
         its covariance.
     start : array (k,), optional
         Where the model is linearised at first; by default the prior's mean.
-    settings : Settings, optional
+    settings : RecursiveSettings, optional
     progress : callable
         Told of the estimate after each run; what it raises passes through.
 

@@ -29,7 +29,7 @@ class Pieces:
 
     Parameters
     ----------
-    run : Run
+    run : SampledRun
         Where they come from.
     inputs : array (pieces, n + 1, nu)
     measured : array (pieces, n + 1, ny)

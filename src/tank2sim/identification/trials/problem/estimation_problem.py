@@ -27,7 +27,7 @@ class Problem:
         Names of the k parameters to estimate.
     prior_mean, prior_error : array (k,)
         Value and standard error before the trials, in the parameter's own unit; the error is positive.
-    runs : tuple of Run
+    runs : tuple of SampledRun
         Each with the same `seen`.
     """
 
