@@ -210,9 +210,9 @@ def test_gap_offers_it_as_a_candidate(site: Path, work: Path) -> None:
     code = """
 from tank2sim.cards import read_card
 from tank2sim.gap.inference.hypothesis import Hypothesis
-from tank2sim.gap.inference.prior import candidates
+from tank2sim.gap.inference.prior import candidate_explanations
 card = read_card("mariner.toml")
-print(*candidates(card, "angle"))
+print(*candidate_explanations(card, "angle"))
 print([(asked.variable, asked.parameter.name) for asked in Hypothesis(card, "angle", ["bow_thruster"]).asked])
 """
     offered, asked = done(python(site, code, cwd=work)).splitlines()
