@@ -7,6 +7,7 @@ A page asks for one by a comment of its own, ``<!-- effects -->``, ``<!-- comman
 from __future__ import annotations
 
 import importlib
+import json
 import math
 import pkgutil
 import re
@@ -20,6 +21,7 @@ from sphinx.application import Sphinx
 from sphinx.util import logging
 
 import tank2sim
+from tank2sim.api.schemas import KEYS, json_schema
 from tank2sim.cards import form, read_card
 from tank2sim.cli import COMMANDS
 from tank2sim.cli import tank2sim as program
@@ -136,6 +138,15 @@ def _command(name: str, command: click.Command) -> list[str]:
     return [*lines, ""]
 
 
+def schemas() -> str:
+    """The JSON Schema of each command's JSON."""
+    parts = []
+    for command in sorted(KEYS):
+        text = json.dumps(json_schema(command), indent=1)
+        parts.append(f"## `{command}`\n\n```json\n{text}\n```\n")
+    return "\n".join(parts)
+
+
 def keys(name: str) -> str:
     """The keys of a section of a card or campaign, with what stands where the file gives none."""
     section: type[BaseModel] = getattr(form, name, None) or getattr(campaign_form, name)
@@ -211,6 +222,8 @@ def _fill(app: Sphinx, page: str, source: list[str]) -> None:
     text = source[0]
     if "<!-- effects -->" in text:
         text = text.replace("<!-- effects -->", effects())
+    if "<!-- schemas -->" in text:
+        text = text.replace("<!-- schemas -->", schemas())
     if "<!-- commands -->" in text:
         text = text.replace("<!-- commands -->", commands())
     text = re.sub(r"<!-- keys: (\w+) -->", lambda found: keys(found[1]), text)

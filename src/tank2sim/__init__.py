@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from tank2sim.api.manoeuvre import ManoeuvreResult
     from tank2sim.api.reduction import ReductionResult, reduce
     from tank2sim.api.result import Result, ResultTable
+    from tank2sim.api.schemas import json_schema
     from tank2sim.api.ship import Ship, load, ships
     from tank2sim.api.stability import StabilityResult
     from tank2sim.errors import InputError
@@ -36,6 +37,7 @@ _HOMES = {
     "check_fmu": "api.fmu",
     "find_gap": "api.gap",
     "identify": "api.identification",
+    "json_schema": "api.schemas",
     "load": "api.ship",
     "reduce": "api.reduction",
     "ships": "api.ship",
@@ -56,6 +58,7 @@ __all__ = [
     "check_fmu",
     "find_gap",
     "identify",
+    "json_schema",
     "load",
     "reduce",
     "ships",

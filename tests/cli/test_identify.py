@@ -340,7 +340,7 @@ def test_an_interrupt_keeps_the_best_card_so_far(folder: Path) -> None:
     program = """
 import signal
 from tank2sim.cli import main
-from tank2sim.identification.trials import output_error
+from tank2sim.identification.trials.methods import output_error
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a process in the background begins with it ignored
 # As Ctrl-C does, in the middle of the search: a first round is done, others would follow.

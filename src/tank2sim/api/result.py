@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     import altair as alt
     import pandas as pd
 
+SCHEMA_VERSION = 1
+"""Version of the JSON of all results: it grows when a key is removed or changes its meaning. Project choice."""
+
 REPR_ROWS = 20
 """Rows of a table in ``repr``: with its heading it fits a screen of 24 lines. Project choice."""
 
@@ -104,7 +107,7 @@ class Result(ABC):
     @property
     def schema(self) -> str:
         """Name and version of the JSON's schema, for example ``tank2sim/simulate/1``."""
-        return f"tank2sim/{self.command}/1"
+        return f"tank2sim/{self.command}/{SCHEMA_VERSION}"
 
     def to_dict(self) -> dict[str, object]:
         """The result as JSON values: lists for arrays, None for what is not a finite number."""

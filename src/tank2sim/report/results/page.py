@@ -82,7 +82,7 @@ def _page(result: Mapping[str, Json], kind: ResultType, source: str) -> Page:
     if checked:  # all but the largest errors, which the table of all of them has again
         rest = {key: value for key, value in rest.items() if key != "max_error"}
     sections = [_section(key, value) for key, value in rest.items() if key not in _TOLD and not is_scalar(value)]
-    overview = {key: value for key, value in scalars(result).items() if key not in (*_TOLD, "kind")}
+    overview = {key: value for key, value in scalars(result).items() if key not in (*_TOLD, "kind", "schema")}
     table = [quantities("The result", overview)] if overview else []
     first = [
         PageSection(heading="Overview", text=kind.beside, tables=table, charts=[checked] if checked else [], notes=told)
