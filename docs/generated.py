@@ -1,17 +1,20 @@
 """Parts of the manual that are read off the program: effects, commands, and the reference of its modules.
 
 A page asks for one by a comment of its own, ``<!-- effects -->``, ``<!-- commands -->``, ``<!-- reference: cards -->``,
-``<!-- keys: Glider -->`` or ``<!-- fmu: mariner -->``; nothing is written into the sources.
+``<!-- keys: Glider -->``, ``<!-- schemas -->``, ``<!-- project choices -->`` or ``<!-- fmu: mariner -->``; nothing is
+written into the sources.
 """
 
 from __future__ import annotations
 
+import ast
 import importlib
 import json
 import math
 import pkgutil
 import re
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import click
@@ -29,6 +32,8 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS, Effect, EffectParameter
 from tank2sim.fmu.interface import FmuVariable, interface
 from tank2sim.records import campaign_form
+
+SOURCES = Path(tank2sim.__file__).parent
 
 logger = logging.getLogger(__name__)
 
@@ -138,6 +143,28 @@ def _command(name: str, command: click.Command) -> list[str]:
     return [*lines, ""]
 
 
+def project_choices() -> str:
+    """Numbers that rest on no source: value, place and reason, from the constants' own docstrings."""
+    rows: dict[str, list[str]] = {}
+    for path in sorted(SOURCES.rglob("*.py")):
+        body = ast.parse(path.read_text(encoding="utf-8")).body
+        for node, after in pairwise(body):
+            if not (isinstance(node, ast.Assign | ast.AnnAssign) and isinstance(after, ast.Expr)):
+                continue
+            target = node.targets[0] if isinstance(node, ast.Assign) else node.target
+            reason = after.value.value if isinstance(after.value, ast.Constant) else None
+            if not isinstance(reason, str) or not re.search("project choice", reason, re.IGNORECASE):
+                continue
+            place = path.relative_to(SOURCES).with_suffix("").as_posix().replace("/", ".")
+            value = " ".join(ast.unparse(node.value).split()) if node.value else ""
+            cells = [f"`{place}.{ast.unparse(target)}`", f"`{value if len(value) < 60 else value[:57] + '...'}`"]
+            text = re.sub(r":\w+:`~?([^`]+)`", r"`\1`", " ".join(reason.split()))
+            line = " | ".join(cell.replace("|", "\\|") for cell in (*cells, text))
+            rows.setdefault(place.partition(".")[0], []).append(f"| {line} |")
+    heads = "| name | value | meaning and reason |\n|---|---|---|"
+    return "\n\n".join("\n".join([f"## {room}\n", heads, *lines]) for room, lines in rows.items())
+
+
 def schemas() -> str:
     """The JSON Schema of each command's JSON."""
     parts = []
@@ -222,6 +249,8 @@ def _fill(app: Sphinx, page: str, source: list[str]) -> None:
     text = source[0]
     if "<!-- effects -->" in text:
         text = text.replace("<!-- effects -->", effects())
+    if "<!-- project choices -->" in text:
+        text = text.replace("<!-- project choices -->", project_choices())
     if "<!-- schemas -->" in text:
         text = text.replace("<!-- schemas -->", schemas())
     if "<!-- commands -->" in text:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from itertools import chain
 
 import pytest
@@ -12,6 +14,7 @@ from tank2sim.cards import form
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.records import campaign_form
+from tests.conftest import ROOT
 
 from .examples import MANUAL
 
@@ -44,3 +47,11 @@ def test_every_derivative_is_in_the_manual() -> None:
 def test_the_page_of_effects_is_generated_from_the_library() -> None:
     assert "<!-- effects -->" in (MANUAL / "formats" / "effects.md").read_text(encoding="utf-8")
     assert len(EFFECTS) > 40
+
+
+def test_project_choices_are_listed_with_value_place_and_reason() -> None:
+    code = "import sys; sys.path.insert(0, 'docs'); import generated; print(generated.project_choices())"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    rows = [line.split(" | ") for line in done.stdout.splitlines() if line.startswith("| `")]
+    assert len(rows) > 50 and all(len(row) == 3 for row in rows)
+    assert any("`api.result.REPR_ROWS`" in row[0] and row[1] == "`20`" for row in rows)
