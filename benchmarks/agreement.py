@@ -12,7 +12,7 @@ from pathlib import Path
 
 from tank2sim.cards import linear_card, read_card
 from tank2sim.dynamics import build
-from tank2sim.fmu import check_fmu, write_fmu
+from tank2sim.fmu import compare_with_model, write_fmu
 
 
 def main() -> None:
@@ -30,7 +30,7 @@ def main() -> None:
                 begin = time.perf_counter()
                 write_fmu(model, path, fmi=fmi)
                 exported = time.perf_counter()
-                report = check_fmu(path, model=model)
+                report = compare_with_model(path, model=model)
                 worst = {kind: max(errors.values()) for kind, errors in report.errors.items()}
                 print(
                     f"{name}, FMI {fmi}: Co-Simulation {worst['CoSimulation']:.1e} (limit 1e-9), "

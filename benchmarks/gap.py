@@ -51,7 +51,7 @@ from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_L
 from tank2sim.gap.search.detection_limit import could_hide
 from tank2sim.gap.search.explanations import search
 from tank2sim.gap.search.model_choice import EVIDENCE_NEEDED, decide
-from tank2sim.gap.workflow import GapOptions, find_gap
+from tank2sim.gap.workflow import GapOptions, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import measured
 
 FIRST_SEED = 101
@@ -217,7 +217,7 @@ def _decided(group: str, made: Made, card: ManoeuvringCard, files: dict[str, lis
 
 def _proved(group: str, made: Made, card: ManoeuvringCard, files: dict[str, list[Path]]) -> Said:
     begin = time.perf_counter()
-    gap = find_gap(card, measured(files["fit"], card), measured(files["held"], card), GapOptions(workers=1))
+    gap = run_gap_workflow(card, measured(files["fit"], card), measured(files["held"], card), GapOptions(workers=1))
     return Said(
         group=group,
         truth=made.parameters,

@@ -22,7 +22,7 @@ from pathlib import Path
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.gap.outcome.export import estimate_in_file, in_file_units
 from tank2sim.gap.result import Gap
-from tank2sim.gap.workflow import GapOptions, find_gap
+from tank2sim.gap.workflow import GapOptions, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import measured
 
 DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data" / "gap_cases"
@@ -69,7 +69,7 @@ def _case(case: int, workers: int) -> bool:
     truth, card = _truth(case)
     begin = time.perf_counter()
     fitted, held = (measured(_files(case, truth[part]), card) for part in ("fit", "holdout"))
-    gap = find_gap(card, fitted, held, GapOptions(workers=workers))
+    gap = run_gap_workflow(card, fitted, held, GapOptions(workers=workers))
     took = time.perf_counter() - begin
     hidden = " + ".join(truth["parameters"])
     named = " + ".join(one.name for one in gap.effects) or "-"
@@ -106,13 +106,13 @@ def _timed(workers: int) -> None:
     truth, card = _truth(TIMED)
     names = truth["fit"] + truth["holdout"]
     none = measured([], card)
-    find_gap(
+    run_gap_workflow(
         card, measured(_files(TIMED, truth["fit"][:1]), card), none, GapOptions(effects=("current",), workers=workers)
     )
     begin = time.perf_counter()
     fitted = measured(_files(TIMED, names), card)
     read = time.perf_counter() - begin
-    gap = find_gap(card, fitted, none, GapOptions(workers=workers))
+    gap = run_gap_workflow(card, fitted, none, GapOptions(workers=workers))
     took = time.perf_counter() - begin
     named = " + ".join(one.name for one in gap.effects) or "-"
     rows = sum(len(trial.time_s) for trial in fitted.trials)

@@ -40,7 +40,7 @@ from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card, in_sho
 from tank2sim.gap.proof.replay import replay_trials
 from tank2sim.gap.result import Gap, Passed
 from tank2sim.gap.search.explanations import search
-from tank2sim.gap.workflow import GapOptions, find_gap
+from tank2sim.gap.workflow import GapOptions, run_gap_workflow
 from tank2sim.identification.trials import identify as identification
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.identification.trials.problem.problem_from_card import free_parameters
@@ -129,7 +129,7 @@ def _identified(card: ManoeuvringCard, trials: Measured, hold: Sequence[str] = (
     there = free_parameters(STRUCTURES[STRUCTURE].start(card))
     held = tuple(name.removeprefix("derivatives.") for name in hold if name in there)
     options = identification.IdentificationOptions(structure=STRUCTURE, members=0, hold=held)
-    return identification.identify(card, trials, options=options).card
+    return identification.identify_trials(card, trials, options=options).card
 
 
 def _without_wind(windy: ManoeuvringCard, whole: Measured, workers: int) -> None:
@@ -138,7 +138,7 @@ def _without_wind(windy: ManoeuvringCard, whole: Measured, workers: int) -> None
     blind = replace(whole, trials=tuple(_unmeasured(trial) for trial in whole.trials))
     fitted, held = replace(blind, trials=blind.trials[:-1]), replace(blind, trials=blind.trials[-1:])
     begin = time.perf_counter()
-    gap = find_gap(calm, fitted, held, GapOptions(workers=workers))
+    gap = run_gap_workflow(calm, fitted, held, GapOptions(workers=workers))
     _show(gap, time.perf_counter() - begin)
     alone = next(
         fit for fit in search(likelihood_from_card(calm, fitted), names=("wind",), most=1).fits if fit.explained.effects
@@ -197,7 +197,7 @@ def _kvlcc2(args: argparse.Namespace) -> None:
 
 def _kvlcc2_gap(card: ManoeuvringCard, fitted: Measured, held: Measured, workers: int) -> None:
     begin = time.perf_counter()
-    gap = find_gap(card, fitted, held, GapOptions(workers=workers))
+    gap = run_gap_workflow(card, fitted, held, GapOptions(workers=workers))
     _show(gap, time.perf_counter() - begin)
     whole = replace(fitted, trials=fitted.trials + held.trials)
     models = {"as given": (card, []), **_named(gap, fitted)}

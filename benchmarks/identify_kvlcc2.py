@@ -16,7 +16,7 @@ import numpy as np
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.identification.trials.assessment.comparison import Comparison
 from tank2sim.identification.trials.assessment.evaluation import FigureComparison, pooled
-from tank2sim.identification.trials.identify import IdentificationOptions, identify
+from tank2sim.identification.trials.identify import IdentificationOptions, identify_trials
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 
 DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data"
@@ -40,10 +40,10 @@ def main() -> None:
         held = []
         for names in HELD_OUT:
             fitted = _together(*(one for name, one in zigzags.items() if name not in names))
-            result = identify(card, fitted, _together(*(zigzags[name] for name in names)), options)
+            result = identify_trials(card, fitted, _together(*(zigzags[name] for name in names)), options)
             assert result.holdout is not None
             held.append(result.holdout)
-        final = identify(card, everything, marin, options)
+        final = identify_trials(card, everything, marin, options)
         assert final.holdout is not None
         _row(structure, held, final.holdout)
         if structure == STRUCTURES[-1]:

@@ -19,7 +19,7 @@ import numpy as np
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.cards.reading import revised
 from tank2sim.identification.trials.assessment.evaluation import Following
-from tank2sim.identification.trials.identify import IdentificationOptions, estimated, identify
+from tank2sim.identification.trials.identify import IdentificationOptions, estimated, identify_trials
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 
@@ -35,7 +35,7 @@ def main() -> None:
     _speed(_off(card, SEEDS[0]), files["fit"])
     for seed in SEEDS:
         off = _off(card, seed)
-        result = identify(
+        result = identify_trials(
             off, measured(files["fit"], off), measured(files["holdout"], off), IdentificationOptions(members=0)
         )
         assert result.holdout is not None and result.before_holdout is not None

@@ -99,7 +99,7 @@ def theory_numbers(number: PaperNumbers) -> None:
     literal = theory.ratio_by_7(own.length_m / own.beam_m, 2 * own.draught_m / own.beam_m, as_printed=True)
     number("(7) as printed, ratio to J*", 0.04311, literal, 2e-5)
     number("ratio to J* of the printed 509.7", 0.2764, printed, 5e-5)
-    first, second = theory.SHIP_T1, theory.SHIP_T2
+    first, second = theory.SHIP_MOTION_T1, theory.SHIP_MOTION_T2
     by_9 = 1e4 * theory.added_inertia_by_9(first)
     number("(9) ship T1", 263.0, by_9, None, "J* of (9) times the ratio of (7); (9) itself gives 497.4")
     number("(9) ship T1 by others", 497.4, by_9, 0.05)

@@ -37,7 +37,7 @@ class PluginWarning(UserWarning):
     """A value of another package cannot be used; the text is one line."""
 
 
-class Named(Protocol):
+class NamedValue(Protocol):
     """What a registry holds: a frozen dataclass with a name."""
 
     @property
@@ -45,7 +45,7 @@ class Named(Protocol):
         """Name under which it is found."""
 
 
-_Value = TypeVar("_Value", bound=Named)
+_Value = TypeVar("_Value", bound=NamedValue)
 
 
 @dataclass(frozen=True)

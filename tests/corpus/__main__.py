@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from tests.corpus.crew import Crew
 from tests.corpus.jobs import job
-from tests.corpus.test_corpus import Crew
 
 if __name__ == "__main__":
     crew = Crew()

@@ -6,32 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import quad
 
 from tank2sim.dynamics.ellipsoid import lamb_coefficients, lamb_integrals
+from tests.dynamics.ellipsoid_quadrature import by_quadrature, turning
 
 AXES = st.floats(0.2, 5.0)
-
-
-def by_quadrature(a: float, b: float, c: float) -> tuple[float, float, float]:
-    """abc int_0^inf ds/((x^2 + s) Delta), with s = tan(u)^2 so that the range is finite."""
-
-    def integral(own: float) -> float:
-        def integrand(u: float) -> float:
-            s, slope = math.tan(u) ** 2, 2 * math.tan(u) / math.cos(u) ** 2
-            return slope / ((own**2 + s) * math.sqrt((a * a + s) * (b * b + s) * (c * c + s)))
-
-        return a * b * c * quad(integrand, 0, math.pi / 2, epsabs=1e-13, epsrel=1e-13)[0]
-
-    return integral(a), integral(b), integral(c)
-
-
-def turning(a: float, b: float, alpha: float, beta: float) -> float:
-    return (
-        (a * a - b * b) ** 2
-        * (beta - alpha)
-        / ((a * a + b * b) * (2 * (a * a - b * b) + (a * a + b * b) * (alpha - beta)))
-    )
 
 
 @pytest.mark.parametrize("axes", [(0.335, 0.1, 0.08), (1.0, 2.0, 3.0), (3.0, 0.4, 0.9), (80.0, 12.0, 7.5)])

@@ -10,7 +10,7 @@ import pytest
 
 from tank2sim.cards import parse_card, read_card
 from tank2sim.dynamics import Model, build
-from tank2sim.dynamics.event_indicators import SHIFT, kinks
+from tank2sim.dynamics.event_indicators import EVENT_SHIFT, kinks
 from tests.fmu.conftest import coasting_body, gain, steered_hull
 
 
@@ -44,7 +44,7 @@ def test_the_rate_limit_of_a_gear_is_indicated_where_it_is_reached() -> None:
 def test_what_stays_at_a_kink_has_an_indicator_that_is_not_zero() -> None:
     mariner = build(read_card("mariner"))
     largest = mariner.parameter_values()[mariner.parameter_names.index("steering.max_angle")]
-    assert min(abs(value) for value in indicated(mariner, largest, largest).values()) >= 0.5 * SHIFT
+    assert min(abs(value) for value in indicated(mariner, largest, largest).values()) >= 0.5 * EVENT_SHIFT
 
 
 def test_models_without_kinks_have_no_indicators() -> None:

@@ -10,8 +10,7 @@ import pytest
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS, ALL_TERMS
-
-from ..cards.test_reading import SI_CARD
+from tests.cards.si_card import SI_CARD
 
 L, U0, RHO = 160.93, 7.7175, 1025.0
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tank2sim.dynamics import yaw_theory as theory
 from tank2sim.dynamics.ellipsoid import lamb_coefficients
-from tests.dynamics.test_ellipsoid import by_quadrature, turning
+from tests.dynamics.ellipsoid_quadrature import by_quadrature, turning
 
 TOP = math.pi / 12
 
@@ -39,9 +39,9 @@ def test_numbers_of_the_ellipsoid():
 
 
 def test_9_gives_the_papers_second_draught_and_not_its_first():
-    assert 1e4 * theory.added_inertia_by_9(theory.SHIP_T2) == pytest.approx(797.1, abs=0.05)
-    assert 1e4 * theory.added_inertia_by_9(theory.SHIP_T1) == pytest.approx(497.4, abs=0.05)
-    assert 1e4 * theory.ship_water_inertia(theory.SHIP_T2) == pytest.approx(1027.86, abs=0.01)
+    assert 1e4 * theory.added_inertia_by_9(theory.SHIP_MOTION_T2) == pytest.approx(797.1, abs=0.05)
+    assert 1e4 * theory.added_inertia_by_9(theory.SHIP_MOTION_T1) == pytest.approx(497.4, abs=0.05)
+    assert 1e4 * theory.ship_water_inertia(theory.SHIP_MOTION_T2) == pytest.approx(1027.86, abs=0.01)
 
 
 def test_8_as_printed_and_the_variant_that_comes_nearest_to_the_table():
@@ -49,7 +49,7 @@ def test_8_as_printed_and_the_variant_that_comes_nearest_to_the_table():
     printed |= {("T2", "accelerating"): 1078.9, ("T2", "braking"): 1097.2}
     near = {("T1", "accelerating"): 456.6, ("T1", "braking"): 464.4}
     near |= {("T2", "accelerating"): 1057.1, ("T2", "braking"): 1070.5}
-    bodies = {"T1": theory.SHIP_T1, "T2": theory.SHIP_T2}
+    bodies = {"T1": theory.SHIP_MOTION_T1, "T2": theory.SHIP_MOTION_T2}
     for (draught, stage), value in printed.items():
         body = bodies[draught]
         assert 1e4 * theory.added_inertia_by_8(body, TOP, stage) == pytest.approx(value, abs=0.1)
@@ -58,8 +58,8 @@ def test_8_as_printed_and_the_variant_that_comes_nearest_to_the_table():
 
 
 def test_8_hangs_on_the_block_coefficient():
-    assert 1e4 * theory.sensitivity_of_8(theory.SHIP_T1, TOP, "accelerating") == pytest.approx(107, abs=1)
-    assert 1e4 * theory.sensitivity_of_8(theory.SHIP_T2, TOP, "accelerating") == pytest.approx(169, abs=1)
+    assert 1e4 * theory.sensitivity_of_8(theory.SHIP_MOTION_T1, TOP, "accelerating") == pytest.approx(107, abs=1)
+    assert 1e4 * theory.sensitivity_of_8(theory.SHIP_MOTION_T2, TOP, "accelerating") == pytest.approx(169, abs=1)
 
 
 def test_7_outside_its_axes_and_8_without_block_are_refused():
@@ -70,7 +70,7 @@ def test_7_outside_its_axes_and_8_without_block_are_refused():
 
 
 def test_the_table_of_theory_tells_what_reproduces():
-    rows = {own.formula: own for own in theory.theory_values(theory.SHIP_T2, 0.2618)}
+    rows = {own.formula: own for own in theory.theory_values(theory.SHIP_MOTION_T2, 0.2618)}
     assert rows["(9)"].remark.startswith("the paper's number reproduces")
     assert rows["(8) braking"].remark.startswith("the paper's number does not")
     (only,) = theory.theory_values(theory.ELLIPSOID, 0.2618)

@@ -18,7 +18,7 @@ from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model, Parameter
 from tank2sim.errors import InputError
-from tank2sim.fmu.check import LIMITS, check_fmu
+from tank2sim.fmu.check import LIMITS, compare_with_model
 from tank2sim.fmu.comparison import description_differences
 from tank2sim.fmu.export import write_fmu
 from tank2sim.fmu.manoeuvre import manoeuvre
@@ -34,7 +34,7 @@ KINDS = ("ModelExchange", "CoSimulation")
 def test_an_fmu_agrees_with_its_model(
     name: str, fmi: int, fmu_file: Callable[[str, int], Path], models: dict[str, Model]
 ) -> None:
-    report = check_fmu(fmu_file(name, fmi), model=models[name])
+    report = compare_with_model(fmu_file(name, fmi), model=models[name])
     assert report.passed
     assert (report.kinds, report.validation, report.differences) == (KINDS, (), ())
     assert set(report.max_error) == set(models[name].outputs)
@@ -52,7 +52,7 @@ def test_a_bundled_ship_agrees_with_its_model(
         path = mariner_fmu(fmi)
     else:
         write_fmu(model, path, fmi=fmi)
-    report = check_fmu(path, model=model)
+    report = compare_with_model(path, model=model)
     assert (report.validation, report.differences) == ((), ())
     assert report.passed
 
@@ -71,7 +71,7 @@ def with_start(model: Model, name: str, start: float) -> Model:
 @pytest.mark.slow
 def test_another_coefficient_is_found_and_named(hull: Model, tmp_path: Path) -> None:
     write_fmu(with_start(hull, "derivatives.Yv", -0.1200001), tmp_path / "x.fmu")
-    report = check_fmu(tmp_path / "x.fmu", model=hull)
+    report = compare_with_model(tmp_path / "x.fmu", model=hull)
     assert not report.passed
     assert any("derivatives.Yv is -0.1200001 in the FMU and -0.12" in line for line in report.differences)
     assert report.errors["CoSimulation"]["motion.v"] > LIMITS["CoSimulation"]
@@ -90,7 +90,7 @@ def test_another_coefficient_is_found_and_named(hull: Model, tmp_path: Path) -> 
 def test_a_wrong_equation_fails(
     quantity: str, wrong: Callable[[ca.SX], ca.SX], hull: Model, fmu_file: Callable[[str, int], Path]
 ) -> None:
-    report = check_fmu(fmu_file("hull", 2), model=hull.redefine(quantity, wrong))
+    report = compare_with_model(fmu_file("hull", 2), model=hull.redefine(quantity, wrong))
     assert not report.passed
     for kind in KINDS:
         assert max(report.errors[kind].values()) > LIMITS[kind]  # type: ignore[index]
@@ -109,7 +109,7 @@ def test_a_sign_changed_in_the_generated_code_fails(
     generate = sources.generate_c
     monkeypatch.setattr(sources, "generate_c", tampered)
     write_fmu(hull, tmp_path / "x.fmu")
-    report = check_fmu(tmp_path / "x.fmu", model=hull)
+    report = compare_with_model(tmp_path / "x.fmu", model=hull)
     assert not report.passed
     assert report.max_error["motion.y"] > 0.1
 
@@ -117,7 +117,7 @@ def test_a_sign_changed_in_the_generated_code_fails(
 def test_an_fmu_of_another_ship_is_told_by_its_variables(
     models: dict[str, Model], fmu_file: Callable[[str, int], Path]
 ) -> None:
-    report = check_fmu(fmu_file("body", 2), model=models["hull"])
+    report = compare_with_model(fmu_file("body", 2), model=models["hull"])
     assert not report.passed
     assert "input rudder.command of the model is not in the FMU" in report.differences
     assert "parameter drag of the FMU is not in the model" in report.differences
@@ -127,7 +127,7 @@ def test_an_fmu_of_another_ship_is_told_by_its_variables(
 def test_a_library_that_fails_is_a_failed_check(hull: Model, tmp_path: Path) -> None:
     weak = with_start(hull, "derivatives.thrust", 1e308)
     write_fmu(with_start(weak, "derivatives.drag", -1e308), tmp_path / "x.fmu")
-    report = check_fmu(tmp_path / "x.fmu", model=hull)
+    report = compare_with_model(tmp_path / "x.fmu", model=hull)
     assert not report.passed
     assert any("not finite" in line for line in report.differences)
 
@@ -139,7 +139,7 @@ def test_a_description_with_a_fault_fails(fmu_file: Callable[[str, int], Path], 
             if entry.filename == "modelDescription.xml":
                 data = data.replace(b'unit="N.m"', b'unit="lbf.ft"')
             target.writestr(entry, data)
-    report = check_fmu(tmp_path / "x.fmu", model=hull)
+    report = compare_with_model(tmp_path / "x.fmu", model=hull)
     assert not report.passed
     assert any("lbf.ft" in problem for problem in report.validation)
     assert any("lbf.ft" in line for line in report.differences)
@@ -190,7 +190,7 @@ def test_an_fmu_with_a_falsified_description_fails(
     def falsify(name: str, data: bytes) -> bytes:
         return data.replace(old, old.split(b"=")[0] + b'="0.7"') if name == "modelDescription.xml" else data
 
-    report = check_fmu(rewritten(fmu_file("hull", 2), tmp_path / "x.fmu", falsify), model=hull)
+    report = compare_with_model(rewritten(fmu_file("hull", 2), tmp_path / "x.fmu", falsify), model=hull)
     assert not report.passed
     assert len(report.differences) == 1 and told in report.differences[0]
     assert max(report.errors["CoSimulation"].values()) < 1e-9
@@ -204,7 +204,7 @@ def test_another_spelling_of_a_number_is_no_difference(
 
     path = rewritten(fmu_file("body", 2), tmp_path / "x.fmu", respell)
     assert path.read_bytes() != fmu_file("body", 2).read_bytes()
-    assert check_fmu(path, model=models["body"]).passed
+    assert compare_with_model(path, model=models["body"]).passed
 
 
 def cut(name: str, data: bytes) -> bytes:
@@ -229,7 +229,7 @@ def test_a_library_that_cannot_be_used_is_a_failed_check(
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    report = check_fmu(rewritten(fmu_file("hull", fmi), tmp_path / "x.fmu", damage), model=hull)
+    report = compare_with_model(rewritten(fmu_file("hull", fmi), tmp_path / "x.fmu", damage), model=hull)
     assert not report.passed
     assert [line.split(":")[0] for line in report.differences] == list(KINDS)
     assert not any("\n" in line or "Traceback" in line for line in report.differences)
@@ -247,21 +247,21 @@ def test_a_library_that_ends_its_process_is_a_failed_check(
     deadly = f"\n#include <stdlib.h>\n__attribute__((constructor)) static void end(void) {{ {end}; }}\n"
     monkeypatch.setattr(sources, "generate_c", lambda functions, stem: generate(functions, stem) + deadly)
     write_fmu(hull, tmp_path / "x.fmu")
-    report = check_fmu(tmp_path / "x.fmu", model=hull)
+    report = compare_with_model(tmp_path / "x.fmu", model=hull)
     assert not report.passed
     assert all("ended the process" in line and told in line for line in report.differences)
     assert len(report.differences) == len(KINDS)
 
 
 def test_without_a_model_the_file_alone_is_validated(fmu_file: Callable[[str, int], Path]) -> None:
-    report = check_fmu(fmu_file("hull", 3))
+    report = compare_with_model(fmu_file("hull", 3))
     assert (report.passed, report.compared, report.max_error) == (True, False, {})
 
 
 def test_the_report_is_plain_data_and_nothing_is_printed(
     fmu_file: Callable[[str, int], Path], hull: Model, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    report = check_fmu(fmu_file("hull", 2), model=hull).as_json()
+    report = compare_with_model(fmu_file("hull", 2), model=hull).as_json()
     assert json.loads(json.dumps(report))["max_error"]["motion.x"] < 1e-6
     assert capfd.readouterr() == ("", "")
 
@@ -279,14 +279,14 @@ def test_files_that_are_no_fmu_are_told_in_one_line(
     for name, content in cases.items():
         (tmp_path / name).write_bytes(content)
         with pytest.raises(InputError, match=rf"{name}.*no FMU"):
-            check_fmu(tmp_path / name, model=hull)
+            compare_with_model(tmp_path / name, model=hull)
     with zipfile.ZipFile(tmp_path / "bare.fmu", "w") as archive:
         archive.writestr("readme.txt", "nothing here")
     with pytest.raises(InputError, match=r"no modelDescription\.xml"):
-        check_fmu(tmp_path / "bare.fmu", model=hull)
+        compare_with_model(tmp_path / "bare.fmu", model=hull)
     for path, problem in ((tmp_path / "none.fmu", "no such file"), (tmp_path, "cannot be read")):
         with pytest.raises(InputError, match=problem):
-            check_fmu(path, model=hull)
+            compare_with_model(path, model=hull)
         with pytest.raises(InputError, match=problem):
             embedded_card(path)
 
@@ -306,7 +306,7 @@ def test_a_description_that_cannot_be_used_is_told(
         for entry in source.infolist():
             target.writestr(entry, source.read(entry).replace(old, new))
     with pytest.raises(InputError, match=problem) as caught:
-        check_fmu(tmp_path / "x.fmu")
+        compare_with_model(tmp_path / "x.fmu")
     assert "\n" not in str(caught.value)
 
 

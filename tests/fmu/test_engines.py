@@ -25,7 +25,7 @@ from tank2sim.fmu.running import co_simulate, running
 from tank2sim.fmu.unpacking import UnpackedFmu, unpack
 from tank2sim.simulation.scheme import runge_kutta_step
 from tests.fmu import engines
-from tests.fmu.test_strict_readers import whole_description
+from tests.fmu.descriptions import whole_description
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 STEP, STEPS = 0.1, 1000

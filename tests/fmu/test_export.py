@@ -22,7 +22,7 @@ from tank2sim.bundled import bundled
 from tank2sim.dynamics.model import Model, Parameter
 from tank2sim.errors import InputError
 from tank2sim.fmu import sources
-from tank2sim.fmu.check import check_fmu
+from tank2sim.fmu.check import compare_with_model
 from tank2sim.fmu.export import Documents, write_fmu
 from tank2sim.fmu.interface import interface
 from tank2sim.fmu.templates import c_identifier
@@ -201,7 +201,7 @@ def test_names_that_resemble_markup_or_paths_do_no_harm(fmi: int, models: dict[s
         fmi=fmi,
         documents=Documents(card_text="name = 'ł'", source=everything, validity=everything),
     )
-    report = check_fmu(tmp_path / "x.fmu", model=model)
+    report = compare_with_model(tmp_path / "x.fmu", model=model)
     assert report.validation == ()
     assert report.passed
     with zipfile.ZipFile(io.BytesIO(exported.content)) as archive:

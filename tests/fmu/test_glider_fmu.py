@@ -9,7 +9,7 @@ import pytest
 
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
-from tank2sim.fmu.check import check_fmu
+from tank2sim.fmu.check import compare_with_model
 from tank2sim.fmu.documents import documents_of
 from tank2sim.fmu.export import write_fmu
 
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 def test_the_fmu_of_a_glider_agrees_with_its_model_and_tells_its_sources(fmi, tmp_path) -> None:
     model, path = build(PROBE), tmp_path / "glider.fmu"
     write_fmu(model, path, fmi=fmi, documents=documents_of(PROBE))
-    report = check_fmu(path, model=model)
+    report = compare_with_model(path, model=model)
     assert report.passed and (report.validation, report.differences) == ((), ())
     with zipfile.ZipFile(path) as content:
         description = content.read("modelDescription.xml").decode()

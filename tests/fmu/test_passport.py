@@ -20,7 +20,7 @@ from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.acceptance import passport_files, replay_in_fmu
-from tank2sim.fmu.check import check_fmu
+from tank2sim.fmu.check import compare_with_model
 from tank2sim.fmu.documents import Documents, documents_of
 from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.passport import PASSPORT_FILE, PASSPORT_PAGE, Replay, passport
@@ -228,7 +228,7 @@ def test_a_check_repeats_the_reference_result(mariner_fmu: Fmu, tmp_path: Path) 
 def test_a_reference_result_that_is_wrong_or_damaged_fails_the_check(
     name: str, change: Callable[[str], str], words: str, fmu_file: Callable[[str, int], Path], tmp_path: Path
 ) -> None:
-    report = check_fmu(rewritten(fmu_file("hull", 2), tmp_path / "x.fmu", name, change))
+    report = compare_with_model(rewritten(fmu_file("hull", 2), tmp_path / "x.fmu", name, change))
     assert not report.passed
     assert words in " ".join(report.differences)
 

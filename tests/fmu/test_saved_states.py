@@ -10,28 +10,9 @@ import pytest
 
 from tank2sim.fmu.running import RunningFmu
 from tests.fmu.driving import ERROR, STATES, Instantiate, Status, begun, steps
+from tests.fmu.saved_state import restore, saved
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
-
-
-def saved(fmu: RunningFmu) -> bytes:
-    instance = fmu.instance
-    state = instance.getFMUstate() if fmu.unpacked.fmi == 2 else instance.getFMUState()
-    data = instance.serializeFMUstate(state) if fmu.unpacked.fmi == 2 else instance.serializeFMUState(state)
-    (instance.freeFMUstate if fmu.unpacked.fmi == 2 else instance.freeFMUState)(state)
-    return bytes(data)
-
-
-def restore(fmu: RunningFmu, data: bytes) -> None:
-    instance = fmu.instance
-    if fmu.unpacked.fmi == 2:
-        state = instance.deSerializeFMUstate(data)
-        instance.setFMUstate(state)
-        instance.freeFMUstate(state)
-    else:
-        state = instance.deserializeFMUState(data)
-        instance.setFMUState(state)
-        instance.freeFMUState(state)
 
 
 @FMI

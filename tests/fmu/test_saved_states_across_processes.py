@@ -13,7 +13,7 @@ from tank2sim.fmu.running import running
 from tank2sim.fmu.unpacking import unpack
 from tests.conftest import ROOT
 from tests.fmu.driving import Instantiate, begun, steps
-from tests.fmu.test_saved_states import restore, saved
+from tests.fmu.saved_state import restore, saved
 
 LEG = 20
 _ENTRY = f"import sys; from {__name__} import one_leg; one_leg(*sys.argv[1:])"

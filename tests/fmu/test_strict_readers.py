@@ -19,40 +19,26 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
-from tank2sim.analysis.heading.control import heading_autopilot
 from tank2sim.bundled import bundled_cards
-from tank2sim.cards import read_card
-from tank2sim.dynamics import Model, build
+from tank2sim.dynamics import Model
 from tank2sim.fmu.acceptance import passport_files
 from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.export import description_text, write_fmu
 from tank2sim.fmu.passport import PASSPORT_PAGE, Replay
-from tank2sim.fmu.provenance import Origin
+from tank2sim.fmu.provenance import ValueOrigin
 from tank2sim.fmu.templates import c_identifier
 from tank2sim.fmu.unpacking import UnpackedFmu
 from tank2sim.simulation.card_range import CardRangeReading
 from tank2sim.simulation.run import Run
+from tests.fmu.descriptions import model_of, whole_description
 
 FMI = pytest.mark.parametrize("fmi", [2, 3])
 SHIPS = pytest.mark.parametrize("ship", [*bundled_cards(), "autopilot"])
 
 
 @cache
-def model_of(ship: str) -> Model:
-    if ship == "autopilot":
-        return heading_autopilot(build(read_card("mariner")))
-    return build(read_card(ship))
-
-
-@cache
 def description(ship: str, fmi: int) -> etree._Element:
     return etree.fromstring(description_text(model_of(ship), fmi=fmi).encode())
-
-
-def whole_description(ship: str, fmi: int) -> str:
-    """The description with a source file, which `description_text` does not know of."""
-    text = description_text(model_of(ship), fmi=fmi)
-    return text.replace("<SourceFiles>", '<SourceFiles><File name="equations.c"/>')
 
 
 def variables(root: etree._Element) -> list[dict[str, str]]:
@@ -252,12 +238,12 @@ def test_no_name_breaks_the_description(fmi: int, text: str, models: dict[str, M
 def test_no_name_breaks_the_passport(text: str, models: dict[str, Model]) -> None:
     strange = replace(models["gain"], name=text, description=text, notices=(text,))
     zigzag = Run(mock.Mock(), {"overshoots_deg": [1.0]}, (text,), CardRangeReading({}, {"x": 0.0}, 0.0, text))
-    documents = Documents(source=text, validity=text, origins={"command": Origin(text, text)})
+    documents = Documents(source=text, validity=text, origins={"command": ValueOrigin(text, text)})
     files = passport_files(strange, documents, {"zigzag_20_20": zigzag}, Replay(problem=text))
     tags = [one.tag for one in page_of(files).iter()]
     quiet = passport_files(
         replace(strange, name="x", description="x", notices=("x",)),
-        Documents(source="x", validity="x", origins={"command": Origin("x", "x")}),
+        Documents(source="x", validity="x", origins={"command": ValueOrigin("x", "x")}),
         {"zigzag_20_20": zigzag},
         Replay(problem="x"),
     )

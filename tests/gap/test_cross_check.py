@@ -11,7 +11,7 @@ from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.gap.proof.cross_check import black_box, closes, trial_consistency, worse
 from tank2sim.gap.result import Passed
 from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tests.gap.test_replay import NOISE
+from tests.gap.replay_noise import NOISE
 from tests.identification.trials import made_up_ship
 
 

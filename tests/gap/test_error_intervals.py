@@ -10,7 +10,7 @@ import pytest
 from tank2sim.gap.diagnosis.error_intervals import acting, contradiction, missing_force_intervals, missing_signal
 from tank2sim.gap.result import Acting, Named
 from tests.gap import made_up
-from tests.gap.test_misfit_location import TIME, motion
+from tests.gap.misfit_motion import TIME, motion
 
 FAULTS = [
     ({"bias": 5e-4}, "turning", -5e-4),

@@ -12,33 +12,18 @@ from scipy.optimize import minimize_scalar
 
 from tank2sim.gap.inference import form_error, kalman_kernels
 from tank2sim.gap.inference import likelihood as module
-from tank2sim.gap.inference.fit import Belief, ExplanationFit, NuisanceParameters
-from tank2sim.gap.inference.form_error import Forms
-from tank2sim.gap.inference.kalman_filter import NoiseLevels
+from tank2sim.gap.inference.fit import Belief, ExplanationFit
 from tank2sim.gap.inference.likelihood import COUNTED, LEAST_GAIN, WIDTHS, Likelihood
 from tests.gap.dense import Dense
 from tests.gap.toy import WHITE, Toy, toy_motion, toy_trials
+from tests.gap.toy_likelihood import LOGS, NOISE, WIDTH, forms_of, judge
 
-NOISE = NoiseLevels(WHITE, 0.5 * WHITE, np.full(6, 4.0), np.array([0.02, 0.02, 0.01]), np.full(3, 2.0))
-WIDTH = 0.8
-LOGS = np.append(NOISE.logs, np.log(WIDTH))
 NOTHING = np.zeros(0)
-
-
-def judge(motion=None, *, names=("0", "1"), errors=(0.5, 0.3), spread=0.5, mixing=None) -> Likelihood:
-    beliefs = Belief(LOGS + 0.1, np.full(len(LOGS), spread))
-    mixing = np.diag(errors[: len(names)]) if mixing is None else mixing
-    return Likelihood(motion or toy_motion(), Toy(), NuisanceParameters(names, mixing), beliefs)
 
 
 def fitted(of: Likelihood, toy: Toy, start=None, logs=LOGS) -> ExplanationFit:
     theta = np.zeros(len(toy.priors)) if start is None else start
     return of.at_best(toy, theta, [logs], [0])
-
-
-def forms_of(of: Likelihood, toy: Toy, theta) -> np.ndarray:
-    """By how much the effects may differ from their formula at some parameters."""
-    return Forms(of.motion, 0).columns(of.added(toy, theta)[0], directed=toy.directed)
 
 
 def dense_cost(of: Likelihood, toy: Toy, theta, *, about=None, marginal=()) -> float:

@@ -28,8 +28,8 @@ from tank2sim.gap.search.model_choice import (
     stands_out,
     strangeness,
 )
-from tests.gap.test_likelihood import LOGS, judge
 from tests.gap.toy import NAMES, Toy, toy_motion
+from tests.gap.toy_likelihood import LOGS, judge
 from tests.identification.trials import made_up_ship
 
 YAW, SURGE, SWAY, *_ = NAMES

@@ -18,12 +18,9 @@ from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.manoeuvres import Zigzag
 from tank2sim.simulation.run import simulate
+from tests.gap.replay_noise import NOISE
 from tests.identification.trials import made_up_ship
 
-NOISE = {
-    **{"motion.u": 0.01, "motion.v": 0.01, "motion.r": np.radians(0.02), "motion.psi": np.radians(0.05)},
-    **{"motion.x": 0.3, "motion.y": 0.3},
-}
 ZIGZAG = made_up_ship.zigzag(20.0)
 
 

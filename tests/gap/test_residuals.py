@@ -19,8 +19,8 @@ from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.inference.prior import likelihood_from_card
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tests.gap.dense import Dense
-from tests.gap.test_likelihood import LOGS, NOISE, WIDTH, forms_of, judge
 from tests.gap.toy import Toy, toy_motion
+from tests.gap.toy_likelihood import LOGS, NOISE, WIDTH, forms_of, judge
 
 # -- what each trial says ------------------------------------------------------------------------------------------
 

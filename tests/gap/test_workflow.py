@@ -12,7 +12,7 @@ from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.errors import InputError
 from tank2sim.gap.outcome.export import in_file_units
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Gap
-from tank2sim.gap.workflow import GapOptions, find_gap
+from tank2sim.gap.workflow import GapOptions, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import measured
 
 FOUR = ("zigzag20_20", "turn35_stbd", "pullout_stbd", "straight")
@@ -48,7 +48,7 @@ def sought(folder: Path, made: Made, held: tuple[str, ...] = (), options: GapOpt
     assert isinstance(card, ManoeuvringCard)
     groups = [[name for name in made.trials if (name in held) == out] for out in (False, True)]
     fitted, rest = (measured([folder / f"{name}.csv" for name in names], card) for names in groups)
-    return Case(made, find_gap(card, fitted, rest, options or GapOptions(workers=1)))
+    return Case(made, run_gap_workflow(card, fitted, rest, options or GapOptions(workers=1)))
 
 
 def hidden(folder: Path, *effects: str, trials=FOUR, held=()) -> Case:

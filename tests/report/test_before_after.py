@@ -16,7 +16,7 @@ from tank2sim.report.kit.charts import chart_specification
 from tank2sim.report.kit.page import render_page
 from tank2sim.report.kit.theme import DARK, DARK_TONE
 from tests.gap import made_up
-from tests.report.test_page_in_browser import CHROMIUM, opened
+from tests.report.opened_page import CHROMIUM, opened
 
 # Of every chart with a switch: what is drawn at first, after a key or click on "after", on paper, and afterwards.
 SWITCH = """<script>

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from tank2sim.cards import parse_card
 from tank2sim.cli.identify import command
 from tank2sim.identification.trials.assessment.evaluation import comparison_windows
-from tank2sim.identification.trials.identify import IdentificationOptions, identify
+from tank2sim.identification.trials.identify import IdentificationOptions, identify_trials
 from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
@@ -57,7 +57,7 @@ def found(trials):
     known = parse_card(text_of(OFF), "off.toml")
     fitted = Measured((trials["by_the_clock"],), "angle", ("mended",))
     held = Measured((trials["turn"],), "angle", ())
-    result = identify(known, fitted, held, IdentificationOptions(method="equation_error"))
+    result = identify_trials(known, fitted, held, IdentificationOptions(method="equation_error"))
     pairs = pairs_of(known, result, fitted), pairs_of(known, result, held)
     return result, pairs, identification_charts(result, *pairs)
 

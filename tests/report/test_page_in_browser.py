@@ -2,22 +2,13 @@
 
 import json
 import re
-import shutil
-import subprocess
 from html import unescape
 
 import pytest
 
 from tank2sim.report.kit.charts import TrackData, track_chart
 from tank2sim.report.kit.page import Illustration, Page, PageSection, render_page
-
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-CHROMIUM = next((path for name in NAMES if (path := shutil.which(name))), None)
-FLAGS = (
-    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-    "--disable-component-update --disable-sync --enable-logging=stderr --v=0 --window-size=1200,2000 "
-    "--virtual-time-budget=10000 --dump-dom"
-).split()
+from tests.report.opened_page import CHROMIUM, opened
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in")
 
@@ -47,15 +38,6 @@ setTimeout(() => {
   setTimeout(() => { seen.push(shown()); document.body.dataset.seen = JSON.stringify(seen); }, 400);
 }, 1500);
 </script>"""
-
-
-def opened(html, folder, *flags):
-    """The page after its scripts have run, and what stood in the console."""
-    file = folder / "page.html"
-    file.write_text(html, encoding="utf-8")
-    command = [CHROMIUM, *FLAGS, f"--user-data-dir={folder / 'profile'}", *flags, file.as_uri()]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
-    return run.stdout, [line for line in run.stderr.splitlines() if "CONSOLE" in line]
 
 
 @pytest.mark.slow

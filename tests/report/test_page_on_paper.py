@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tank2sim.report.kit.page import Column, Page, PageSection, PageTable, render_page
-from tests.report.test_page_in_browser import CHROMIUM
+from tests.report.opened_page import CHROMIUM
 
 PRINT = "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --no-pdf-header-footer".split()
 

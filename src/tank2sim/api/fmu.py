@@ -10,7 +10,7 @@ from tank2sim.api.result import Result, ResultTable
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
 from tank2sim.fmu.check import CheckReport
-from tank2sim.fmu.check import check_fmu as check_against_model
+from tank2sim.fmu.check import compare_with_model as check_against_model
 from tank2sim.fmu.documents import documents_of
 from tank2sim.fmu.export import ExportedFmu, make_fmu
 from tank2sim.fmu.platforms import named_platforms

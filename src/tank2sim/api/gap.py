@@ -24,7 +24,7 @@ from tank2sim.files import writable_folder, write_together
 from tank2sim.gap.diagnosis.error_intervals import acting
 from tank2sim.gap.fleet.search import can_lack
 from tank2sim.gap.fleet.ships import GAP, IMPROVED
-from tank2sim.gap.inference.fit_all import Progress
+from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.outcome.correct_sensors import REMAINING_FAULTS, correct_sensor_faults, corrected_text
 from tank2sim.gap.outcome.export import (
     NEXT_TEST_FILE,
@@ -38,7 +38,7 @@ from tank2sim.gap.outcome.export import (
 from tank2sim.gap.outcome.improve_card import Found, card_with_effects_text
 from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap, Named
 from tank2sim.gap.workflow import GapOptions
-from tank2sim.gap.workflow import find_gap as run_workflow
+from tank2sim.gap.workflow import run_gap_workflow as run_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import with_fitted_trials
 from tank2sim.units import in_words
@@ -288,7 +288,7 @@ def find_gap(
     max_effects: int = 2,
     executor: str = PROCESSES,
     workers: int | None = None,
-    progress: Progress = lambda text: None,
+    progress: StageReport = lambda text: None,
 ) -> GapResult:
     """Find the physical effect that a model lacks to follow free-running trials, add it, and prove it.
 

@@ -27,9 +27,13 @@ from tank2sim.identification.trials.as_json import (
 )
 from tank2sim.identification.trials.assessment.notices import remarks
 from tank2sim.identification.trials.assessment.replays import replays, replays_as_json
-from tank2sim.identification.trials.identify import TRIAL_METHODS, Identification, IdentificationOptions
-from tank2sim.identification.trials.identify import identify as identify_trials
-from tank2sim.identification.trials.problem.estimation_problem import Progress, silent
+from tank2sim.identification.trials.identify import (
+    TRIAL_METHODS,
+    Identification,
+    IdentificationOptions,
+    identify_trials,
+)
+from tank2sim.identification.trials.problem.estimation_problem import SearchReport, silent
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import with_fitted_trials
 from tank2sim.identification.trials.problem.structures import AUTO, STRUCTURES
@@ -185,7 +189,7 @@ def identify(
     bootstrap: int = 0,
     executor: str = PROCESSES,
     workers: int | None = None,
-    progress: Progress = silent,
+    progress: SearchReport = silent,
 ) -> IdentificationResult:
     """Identify the coefficients of a ship from free-running trials.
 

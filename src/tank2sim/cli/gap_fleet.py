@@ -23,7 +23,7 @@ from tank2sim.gap.fleet.run_record import NEW, RUN, fleet_run_record, stale, wit
 from tank2sim.gap.fleet.search import Fault, Sought, can_lack, fault_of_program, found_at_once, found_one_by_one
 from tank2sim.gap.fleet.ships import Fleet, ShipFolder, fleet_in
 from tank2sim.gap.fleet.summary import FleetTold, ShipTold, ship_told
-from tank2sim.gap.inference.fit_all import Progress
+from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.result import Gap
 from tank2sim.gap.workflow import GapOptions
 from tank2sim.report.gap.fleet_page import fleet_page
@@ -114,7 +114,7 @@ def _course(fleet: Fleet, asked: FleetRequest) -> _Course:
     return course
 
 
-def _compute(course: _Course, asked: FleetRequest, progress: Progress) -> None:
+def _compute(course: _Course, asked: FleetRequest, progress: StageReport) -> None:
     """Compute the ships that are wanted; each is written as soon as she is found."""
     if not course.wanted:
         return

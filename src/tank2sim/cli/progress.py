@@ -12,7 +12,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from tank2sim.arrays import Array
 
 if TYPE_CHECKING:  # the identification takes long to import, and most commands do without
-    from tank2sim.identification.trials.problem.estimation_problem import Progress as Told
+    from tank2sim.identification.trials.problem.estimation_problem import SearchReport as Told
 
 
 @contextmanager

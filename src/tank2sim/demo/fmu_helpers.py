@@ -10,7 +10,7 @@ from tank2sim.cards import Card
 from tank2sim.dynamics import Model
 from tank2sim.errors import InputError
 from tank2sim.files import write_whole
-from tank2sim.fmu.check import CheckReport, check_fmu
+from tank2sim.fmu.check import CheckReport, compare_with_model
 from tank2sim.fmu.documents import documents_of
 from tank2sim.fmu.export import write_fmu
 from tank2sim.report.kit.charts import OutputError
@@ -62,7 +62,7 @@ class Workshop:
         write_fmu(model, path, fmi=fmi, documents=documents_of(card))
         self.files.append(path.name)
         self.tell(f"{path.name}: checking")
-        report = check_fmu(path, model=model)
+        report = compare_with_model(path, model=model)
         if not report.passed:
             what = "; ".join((*report.validation, *report.differences)) or f"errors {report.max_error}"
             raise InputError(

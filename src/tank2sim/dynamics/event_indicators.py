@@ -14,7 +14,7 @@ import casadi as ca
 
 from tank2sim.dynamics.model import Model, Quantity
 
-SHIFT = 1e-9
+EVENT_SHIFT = 1e-9
 """An indicator is this much (SI) less than the difference that vanishes at its kink: a choice of ours, far above what
 rounds and far below what a ship or a solver notices. Many kinks are approached for ever or never left (a rudder at its
 order, an order at the largest angle), where the difference itself would change sign with each rounding."""
@@ -28,8 +28,8 @@ def kinks(model: Model) -> tuple[Quantity, ...]:
     """Quantities ``kinks.<quantity>[1]`` and on that change sign where the right-hand side of `model` has a kink.
 
     For each minimum, maximum or comparison of a and b in a quantity on which a derivative of a state depends, a - b
-    less :data:`SHIFT`; those that hold neither a state nor an input are left out. Their values are expanded, and they
-    are no part of the model.
+    less :data:`EVENT_SHIFT`; those that hold neither a state nor an input are left out. Their values are expanded,
+    and they are no part of the model.
     """
     variables = ca.vertcat(model.x, model.u)
     found: list[Quantity] = []
@@ -46,7 +46,7 @@ def _indicator(quantity: Quantity, place: int, difference: ca.SX) -> Quantity:
         name=f"kinks.{quantity.name}[{place}]",
         unit="1",
         description=f"Event indicator: changes sign where the equation of {quantity.name} has a kink, in its SI units",
-        value=difference - SHIFT,
+        value=difference - EVENT_SHIFT,
     )
 
 

@@ -45,8 +45,8 @@ class FloatingBody:
 
 ELLIPSOID = FloatingBody(length_m=0.67, beam_m=0.20, draught_m=0.08, depth_m=0.22)
 """The paper's ellipsoid at its draught T1."""
-SHIP_T1 = FloatingBody(length_m=0.67, beam_m=0.20, draught_m=0.08, depth_m=0.22, block_coefficient=0.47)
-SHIP_T2 = FloatingBody(length_m=0.685, beam_m=0.20, draught_m=0.10, depth_m=0.24, block_coefficient=0.49)
+SHIP_MOTION_T1 = FloatingBody(length_m=0.67, beam_m=0.20, draught_m=0.08, depth_m=0.22, block_coefficient=0.47)
+SHIP_MOTION_T2 = FloatingBody(length_m=0.685, beam_m=0.20, draught_m=0.10, depth_m=0.24, block_coefficient=0.49)
 """The paper's ship model at its two draughts."""
 
 
@@ -161,8 +161,8 @@ class TheoryValue:
 
 _PRINTED: dict[FloatingBody, dict[str, float]] = {
     ELLIPSOID: {"(7)": 509.7e-4},
-    SHIP_T1: {"(9)": 263.0e-4, "(8) accelerating": 456.6e-4, "(8) braking": 464.4e-4},
-    SHIP_T2: {"(9)": 797.6e-4, "(8) accelerating": 1056.8e-4, "(8) braking": 1070.3e-4},
+    SHIP_MOTION_T1: {"(9)": 263.0e-4, "(8) accelerating": 456.6e-4, "(8) braking": 464.4e-4},
+    SHIP_MOTION_T2: {"(9)": 797.6e-4, "(8) accelerating": 1056.8e-4, "(8) braking": 1070.3e-4},
 }
 """Table 1 of the paper, of its own bodies."""
 _SAME = 0.002

@@ -6,12 +6,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tank2sim.fmu.check import CheckReport, check_fmu
+    from tank2sim.fmu.check import CheckReport, compare_with_model
     from tank2sim.fmu.documents import Documents
     from tank2sim.fmu.export import ExportedFmu, write_fmu
     from tank2sim.fmu.unpacking import embedded_card
 
-__all__ = ["CheckReport", "Documents", "ExportedFmu", "check_fmu", "embedded_card", "write_fmu"]
+__all__ = ["CheckReport", "Documents", "ExportedFmu", "compare_with_model", "embedded_card", "write_fmu"]
 
 _MODULES = {
     **dict.fromkeys(("CheckReport", "check_fmu"), "check"),

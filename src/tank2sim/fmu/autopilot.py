@@ -20,7 +20,7 @@ from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.export import ExportedFmu, make_fmu
 from tank2sim.fmu.libraries import Told
 from tank2sim.fmu.platforms import Platform
-from tank2sim.fmu.provenance import Origin
+from tank2sim.fmu.provenance import ValueOrigin
 from tank2sim.fmu.running import RunningFmu, running
 from tank2sim.fmu.unpacking import unpack
 
@@ -49,7 +49,7 @@ def make_autopilot_fmu(
     ``rudder.command``. Parameters and errors are those of :func:`tank2sim.fmu.export.make_fmu`.
     """
     own = (one.name for one in design.autopilot.parameters if one.name.startswith("autopilot."))
-    documents = Documents(source=design.source, origins={name: Origin(design.source) for name in own})
+    documents = Documents(source=design.source, origins={name: ValueOrigin(design.source) for name in own})
     return make_fmu(design.autopilot, fmi=fmi, documents=documents, platforms=platforms, told=told)
 
 

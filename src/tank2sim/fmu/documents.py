@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from tank2sim.cards.card import Card, ManoeuvringCard
-from tank2sim.fmu.provenance import Origin, origins
+from tank2sim.fmu.provenance import ValueOrigin, origins
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +31,7 @@ class Documents:
     source: str = ""
     validity: str = ""
     speed_range_mps: tuple[float, float] | None = None
-    origins: Mapping[str, Origin] = field(default_factory=dict)
+    origins: Mapping[str, ValueOrigin] = field(default_factory=dict)
 
 
 def documents_of(card: Card) -> Documents:

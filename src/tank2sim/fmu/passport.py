@@ -11,7 +11,7 @@ from typing import Any
 
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.fmu.documents import Documents
-from tank2sim.fmu.provenance import ABSENT, Origin
+from tank2sim.fmu.provenance import ABSENT, ValueOrigin
 from tank2sim.fmu.reference_run import EXTRA
 from tank2sim.simulation.run import Run
 
@@ -94,7 +94,7 @@ def passport(model: Model, documents: Documents, manoeuvres: Mapping[str, Run], 
         validity=documents.validity,
         speed_range_mps=documents.speed_range_mps,
         coefficients=tuple(
-            _coefficient(one, documents.origins.get(one.name, Origin(ABSENT)))
+            _coefficient(one, documents.origins.get(one.name, ValueOrigin(ABSENT)))
             for one in variables
             if not one.name.startswith(_NOT_OF_THE_SHIP)
         ),
@@ -105,7 +105,7 @@ def passport(model: Model, documents: Documents, manoeuvres: Mapping[str, Run], 
     )
 
 
-def _coefficient(variable: Parameter | Input, origin: Origin) -> PassportCoefficient:
+def _coefficient(variable: Parameter | Input, origin: ValueOrigin) -> PassportCoefficient:
     return PassportCoefficient(
         variable=variable.name,
         description=variable.description,

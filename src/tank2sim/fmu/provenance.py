@@ -22,7 +22,7 @@ ABSENT = "not in the card: the program's default"
 
 
 @dataclass(frozen=True)
-class Origin:
+class ValueOrigin:
     """Where a coefficient comes from.
 
     Parameters
@@ -83,7 +83,7 @@ _PLACES = {
 }
 
 
-def origins(card: Card) -> dict[str, Origin]:
+def origins(card: Card) -> dict[str, ValueOrigin]:
     """Name of a parameter or input of the model to its origin; what the card does not give is left out."""
     document: Mapping[str, Any] = tomlkit.parse(card.text)
     particulars = {f"ship.{_stem(key)}": ("ship", key) for key in document["ship"] if _stem(key) != "length"}
@@ -92,21 +92,21 @@ def origins(card: Card) -> dict[str, Origin]:
         said = _beside(document.get(section), key)
         if said is not None:
             error, whence = _surge_error(card, key)
-            found[variable] = Origin(card.ship.source, said, error, whence)
+            found[variable] = ValueOrigin(card.ship.source, said, error, whence)
     if not isinstance(card, ManoeuvringCard):
         return found
     found = _of_low_speed() | found
     for name in card.derivatives:
         said = _beside(document.get("derivatives"), card.places.get(name, name))
         whence = STATED_ERROR if name in card.uncertainty else ASSUMED_ERROR
-        found[f"derivatives.{name}"] = Origin(card.ship.source, said or "", card.standard_error(name), whence)
+        found[f"derivatives.{name}"] = ValueOrigin(card.ship.source, said or "", card.standard_error(name), whence)
     return found | dict(_of_effects(card, document))
 
 
-def _of_low_speed() -> dict[str, Origin]:
+def _of_low_speed() -> dict[str, ValueOrigin]:
     """What the forces at low speed need and a card need not state: estimates and choices of the program."""
     estimates = {f"ship.{_stem(key)}": estimated_from(key) for key in ("draught_m", "propeller_diameter_m")}
-    return {name: Origin(f"not in the card: {source}") for name, source in (estimates | SOURCES).items()}
+    return {name: ValueOrigin(f"not in the card: {source}") for name, source in (estimates | SOURCES).items()}
 
 
 def _stem(key: str) -> str:
@@ -121,7 +121,7 @@ def _surge_error(card: Card, key: str) -> tuple[float | None, str]:
     return None, NOT_STATED
 
 
-def _of_effects(card: ManoeuvringCard, document: Mapping[str, Any]) -> Iterator[tuple[str, Origin]]:
+def _of_effects(card: ManoeuvringCard, document: Mapping[str, Any]) -> Iterator[tuple[str, ValueOrigin]]:
     for entry, table in zip(card.effects, document.get("effects", ()), strict=True):
         effect = EFFECTS[entry.name]
         for name, variable in effect.model_names().items():
@@ -131,7 +131,7 @@ def _of_effects(card: ManoeuvringCard, document: Mapping[str, Any]) -> Iterator[
             whence = NOT_STATED if error is None else STATED_ERROR
             package = f" ({origin.distribution})" if (origin := EFFECTS.origin(entry.name)) else ""
             source = f"equation of the effect {entry.name}{package}: {effect.source}; value: {value}"
-            yield variable, Origin(source, said or "", error, whence)
+            yield variable, ValueOrigin(source, said or "", error, whence)
 
 
 def _beside(section: Any, key: str) -> str | None:

@@ -14,7 +14,7 @@ from tank2sim.fmu.export import ExportedFmu, make_fmu, zipped
 from tank2sim.fmu.interface import FmuVariable, interface
 from tank2sim.fmu.libraries import Told
 from tank2sim.fmu.platforms import Platform
-from tank2sim.fmu.provenance import Origin
+from tank2sim.fmu.provenance import ValueOrigin
 from tank2sim.fmu.templates import render
 from tank2sim.units import UNITS
 
@@ -102,4 +102,4 @@ def _documents(ship: Model, autopilot: Model) -> Documents:
         f"model of {ship.name} at {found.speed_mps:.4g} m/s: K = {nomoto.K_per_s:.5g} 1/s, T = {nomoto.T_s:.5g} s"
     )
     own = (one.name for one in autopilot.parameters if one.name.startswith("autopilot."))
-    return Documents(source=source, origins={name: Origin(source) for name in own})
+    return Documents(source=source, origins={name: ValueOrigin(source) for name in own})

@@ -17,7 +17,7 @@ from tank2sim.executors import executing, processes_to_begin
 from tank2sim.gap.diagnosis.misfit_location import equation_of, figures, places
 from tank2sim.gap.diagnosis.residuals import each_trial, estimates, force_lacking
 from tank2sim.gap.inference.fit import ExplanationFit
-from tank2sim.gap.inference.fit_all import Progress
+from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.inference.hypothesis import CLOCK
 from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
@@ -72,12 +72,12 @@ class GapOptions:
     workers: int | None = None
 
 
-def find_gap(
+def run_gap_workflow(
     card: ManoeuvringCard,
     fitted: Measured,
     held: Measured,
     options: GapOptions | None = None,
-    progress: Progress = lambda text: None,
+    progress: StageReport = lambda text: None,
     executor: Executor | None = None,
 ) -> Gap:
     """Find where a card's model and trials differ, name what is missing, add it, and prove it.
@@ -133,7 +133,7 @@ def _processes(options: GapOptions, executor: Executor | None) -> Iterator[Execu
 
 
 def _told(
-    card: ManoeuvringCard, trials: tuple[Measured, Measured], found: Search, decision: Decision, progress: Progress
+    card: ManoeuvringCard, trials: tuple[Measured, Measured], found: Search, decision: Decision, progress: StageReport
 ) -> Gap:
     """Everything that follows from the decision."""
     fitted, held = trials
@@ -292,4 +292,4 @@ def _in_words(one: Strange) -> str:
     return f"{one.trial}: {when} the ship does what nothing in the library explains"
 
 
-__all__ = ["AMBIGUOUS", "MISSING", "NO_EFFECT_MISSING", "OUTSIDE_LIBRARY", "GapOptions", "find_gap"]
+__all__ = ["AMBIGUOUS", "MISSING", "NO_EFFECT_MISSING", "OUTSIDE_LIBRARY", "GapOptions", "run_gap_workflow"]

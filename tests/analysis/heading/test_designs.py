@@ -92,7 +92,7 @@ def test_a_ship_that_is_unstable_is_held_on_her_course(kvlcc2: Model, kind: str)
 @pytest.mark.skipif(importlib.util.find_spec("slycot") is None, reason=NO_SLYCOT)
 @pytest.mark.parametrize("name", ["mariner", "kvlcc2"])
 def test_the_robust_loop_is_robust_and_no_mode_of_it_is_slower_than_asked(name: str) -> None:
-    from tank2sim.analysis.heading.robust import SHIFT
+    from tank2sim.analysis.heading.robust import POLE_SHIFT
 
     ship = build(read_card(name))
     design = design_heading(ship, "robust")
@@ -100,7 +100,7 @@ def test_the_robust_loop_is_robust_and_no_mode_of_it_is_slower_than_asked(name: 
     assert margins.sensitivity_peak < 1.7
     assert margins.phase_margin_deg > 38
     w = math.sqrt(design.found.nomoto.K_per_s / design.found.nomoto.T_s)
-    assert max(pole.real for pole in margins.poles) < -0.99 * SHIFT * w
+    assert max(pole.real for pole in margins.poles) < -0.99 * POLE_SHIFT * w
 
 
 @pytest.mark.skipif(importlib.util.find_spec("slycot") is None, reason=NO_SLYCOT)

@@ -14,7 +14,7 @@ from tank2sim.analysis.stability.straight_line import stability
 from tank2sim.cards import linear_card, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tests.analysis.stability.test_straight_line import SYMMETRIC
+from tests.analysis.symmetric_ship import SYMMETRIC
 
 LINEAR_FIGURES = ("criterion_C", "K_prime", "steady_radius_m@10", "steady_rate_degpmin@10", "steady_drift_deg@-10")
 SIMULATED = (

@@ -14,10 +14,7 @@ from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Stop
 from tank2sim.simulation.run import simulate
-
-SYMMETRIC = dict.fromkeys(("derivatives.Y0", "derivatives.Y0u", "derivatives.Y0uu"), 0.0) | dict.fromkeys(
-    ("derivatives.N0", "derivatives.N0u", "derivatives.N0uu"), 0.0
-)
+from tests.analysis.symmetric_ship import SYMMETRIC
 
 
 def test_the_mariner_is_stable_with_the_criterion_computed_by_hand() -> None:

@@ -12,7 +12,7 @@ from tank2sim.analysis.tuning.targets import Wish, parse_wish
 from tank2sim.analysis.tuning.tune import tune
 from tank2sim.cards import linear_card, parse_card, read_card
 from tank2sim.errors import InputError
-from tests.analysis.stability.test_straight_line import SYMMETRIC
+from tests.analysis.symmetric_ship import SYMMETRIC
 
 FIGURES = ("steady_radius_m@20", "steady_drift_deg@20", "criterion_C")
 

@@ -13,7 +13,7 @@ from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.effects import EFFECTS, Effect, acting_variable, undisturbed_inputs
-from tank2sim.dynamics.effects.effect import fault_of
+from tank2sim.dynamics.effects.effect import sensor_fault_of
 from tank2sim.dynamics.model import Quantity
 from tank2sim.units import to_si
 
@@ -90,7 +90,7 @@ def test_without_disturbances_there_is_no_current_and_no_wind() -> None:
 
 @pytest.mark.parametrize("effect", EFFECTS.values(), ids=lambda effect: effect.name)
 def test_no_built_in_effect_is_at_fault(effect: Effect) -> None:
-    assert fault_of(effect) == ""
+    assert sensor_fault_of(effect) == ""
 
 
 def names_quoted(source: str, path: str) -> Iterator[tuple[int, str]]:

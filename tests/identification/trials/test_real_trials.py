@@ -9,7 +9,7 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.identification.trials.assessment.evaluation import pooled
-from tank2sim.identification.trials.identify import Identification, IdentificationOptions, identify
+from tank2sim.identification.trials.identify import Identification, IdentificationOptions, identify_trials
 from tank2sim.identification.trials.problem.prepare_trials import measured
 
 pytestmark = pytest.mark.slow
@@ -25,7 +25,7 @@ def result(data: Path) -> Identification:
         [data / f"data/kvlcc2_hsva/HSVA_CPMC_KVLCC2_Z_{name}.dat" for name in names] for names in (FITTED, HELD_OUT)
     ]
     marin = sorted((data / "data/kvlcc2_marin").glob("*.dat"))
-    return identify(
+    return identify_trials(
         card, measured(hsva[0], card), measured([*hsva[1], *marin], card), IdentificationOptions(structure="cross_flow")
     )
 

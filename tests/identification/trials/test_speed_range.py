@@ -9,7 +9,7 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.identification.trials.assessment.evaluation import comparison_windows
-from tank2sim.identification.trials.identify import IdentificationOptions, identify
+from tank2sim.identification.trials.identify import IdentificationOptions, identify_trials
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 
@@ -37,7 +37,9 @@ def test_a_turn_slower_than_the_trials_fitted_ends_where_the_ship_does() -> None
     fitted = trial(zigzag(15, 45.0), name="fitted", duration=220.0, step=0.5, noise=0.0)
     held = trial(turn(30), name="held", duration=400.0, step=0.5, noise=0.0)
     known = off_card()
-    card = identify(known, Measured((fitted,), "angle", ()), None, IdentificationOptions(method="equation_error")).card
+    card = identify_trials(
+        known, Measured((fitted,), "angle", ()), None, IdentificationOptions(method="equation_error")
+    ).card
     slowest = card.model.speed_range_mps[0]
     assert slowest > fitted.signals["u_mps"].min() - 0.1, "the range is that of the trials"
     assert held.signals["u_mps"].min() < 0.8 * slowest, "the turn goes well below it"
@@ -57,7 +59,9 @@ def test_the_range_is_written_in_the_units_of_the_card() -> None:
     turned = trial(turn(30), name="turned", duration=220.0, step=0.5, noise=0.0)
     stated = "# once: valid_drift_rad = 0.02\nvalid_drift_deg = 1.0\nvalid_rudder_rad = 0.1\nlow_speed_below_mps = 2.0"
     known = off_card(stated)
-    card = identify(known, Measured((turned,), "angle", ()), None, IdentificationOptions(method="equation_error")).card
+    card = identify_trials(
+        known, Measured((turned,), "angle", ()), None, IdentificationOptions(method="equation_error")
+    ).card
     drift = np.arctan2(np.abs(turned.signals["v_mps"]), turned.signals["u_mps"]).max()
     assert card.model.valid_drift_rad == pytest.approx(drift, rel=0.05)
     assert card.model.valid_rudder_rad == pytest.approx(np.deg2rad(30.0), rel=0.01)

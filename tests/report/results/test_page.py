@@ -12,7 +12,7 @@ from tank2sim.report.kit.page import Verdict, render_page
 from tank2sim.report.results.page import result_page
 from tank2sim.report.results.renderers import needs_of
 from tank2sim.report.results.result_types import RESULT_TYPES, kind_of
-from tests.report.test_page_in_browser import CHROMIUM, opened
+from tests.report.opened_page import CHROMIUM, opened
 
 GAP = {
     "verdict": "missing effect",

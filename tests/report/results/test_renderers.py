@@ -23,7 +23,7 @@ from tank2sim.report.kit.charts import chart_specification
 from tank2sim.report.kit.page import Illustration, Page, PageSection, render_page
 from tank2sim.report.results.page import result_page
 from tests.cli.command_line import tank2sim
-from tests.report.test_page_in_browser import CHROMIUM, opened
+from tests.report.opened_page import CHROMIUM, opened
 from tests.yaw_truth import Truth, record, written
 
 TIMES = [0.0, 1.0, 2.0, 3.0]

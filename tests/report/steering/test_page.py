@@ -19,7 +19,7 @@ from tank2sim.report.steering.page import steering_page
 from tank2sim.report.steering.ship import WEB, controls, has_compiler, ship_following_angle, ship_in_page
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
-from tests.report.test_page_in_browser import CHROMIUM, opened
+from tests.report.opened_page import CHROMIUM, opened
 
 in_browser = [
     pytest.mark.slow,

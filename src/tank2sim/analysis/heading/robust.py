@@ -23,7 +23,7 @@ from tank2sim.dynamics.autopilot_linear import LinearLaw, linear_autopilot_model
 from tank2sim.errors import InputError
 
 # All in w = sqrt(K/T) of the ship: choices of ours, tried on stable and unstable ships (Ms 1.4 to 1.7).
-SHIFT = 0.2
+POLE_SHIFT = 0.2
 """Every mode of the loop decays faster."""
 INTEGRAL = 0.3
 """Zero b of the integral; above the shift, so that it can be moved."""
@@ -89,7 +89,7 @@ def _synthesis(plant: SteeringPlant, origin: str) -> tuple[control.StateSpace, f
     ship = control.ss(plant.A / w, plant.B / w, [[0, 0, 1, 0]], [[0]])
     integral = control.ss([[0]], [[1]], [[INTEGRAL]], [[1]])
     together = control.series(integral, ship)
-    shifted = control.ss(together.A + SHIFT * np.eye(together.nstates), together.B, together.C, together.D)
+    shifted = control.ss(together.A + POLE_SHIFT * np.eye(together.nstates), together.B, together.C, together.D)
     W1 = control.tf([1 / PEAK, _BANDWIDTH], [1, LEAST_ERROR * _BANDWIDTH])
     W2 = control.tf([1, 0.2 * RUDDER_FREQUENCY], [0.01, RUDDER_FREQUENCY])
     try:
@@ -97,7 +97,7 @@ def _synthesis(plant: SteeringPlant, origin: str) -> tuple[control.StateSpace, f
     except (control.ControlArgument, ArithmeticError, ValueError) as error:
         remedy = "choose another design"
         raise InputError(origin, "", f"no robust controller was found ({error})", remedy) from None
-    back = control.ss(found.A - SHIFT * np.eye(found.nstates), found.B, found.C, found.D)
+    back = control.ss(found.A - POLE_SHIFT * np.eye(found.nstates), found.B, found.C, found.D)
     return back, float(reached[0])
 
 

@@ -11,7 +11,7 @@ from tank2sim.dynamics.effects import (
     sensors,
     surroundings,
 )
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, fault_of
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, sensor_fault_of
 from tank2sim.dynamics.model import Model
 from tank2sim.plugins import Registry
 
@@ -63,7 +63,7 @@ EFFECTS: Registry[Effect] = Registry(
         sensors.RUDDER_TIME_OFFSET,
     ),
     Effect,
-    fault=fault_of,
+    fault=sensor_fault_of,
 )
 """All effects by the name that cards use, with those of installed packages."""
 

@@ -263,7 +263,7 @@ class Effect:
         )
 
 
-def fault_of(effect: Effect) -> str:
+def sensor_fault_of(effect: Effect) -> str:
     """What is wrong with the declarations of an effect, "" if nothing: for those of other packages."""
     parameters = {parameter.name for parameter in effect.parameters}
     if effect.acts_on not in ACTIONS:

@@ -15,9 +15,9 @@ from itertools import islice
 from tank2sim.cards.card import Card, ManoeuvringCard
 from tank2sim.errors import InputError
 from tank2sim.gap.fleet.ships import ShipFolder
-from tank2sim.gap.inference.fit_all import Progress
+from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.result import Gap
-from tank2sim.gap.workflow import GapOptions, find_gap
+from tank2sim.gap.workflow import GapOptions, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 
 AHEAD = 256
@@ -65,7 +65,7 @@ class Fault:
 
 
 def found_one_by_one(
-    ships: Iterable[Sought], options: GapOptions, progress: Progress, executor: Executor | None = None
+    ships: Iterable[Sought], options: GapOptions, progress: StageReport, executor: Executor | None = None
 ) -> Iterator[tuple[Sought, Gap | Fault]]:
     """What each ship lacks, one after the other.
 
@@ -96,7 +96,7 @@ def found_one_by_one(
 
 
 def found_at_once(
-    ships: Iterable[Sought], options: GapOptions, progress: Progress, executor: Executor
+    ships: Iterable[Sought], options: GapOptions, progress: StageReport, executor: Executor
 ) -> Iterator[tuple[Sought, Gap | Fault]]:
     """What each ship lacks, as of :func:`found_one_by_one`, in the order in which the executor has done with them.
 
@@ -150,10 +150,10 @@ def _found_there(ship: Sought, options: GapOptions) -> Gap | Fault:
 
 
 def _found(
-    ship: Sought, options: GapOptions, progress: Progress = lambda text: None, executor: Executor | None = None
+    ship: Sought, options: GapOptions, progress: StageReport = lambda text: None, executor: Executor | None = None
 ) -> Gap | Fault:
     try:
-        return find_gap(ship.card, ship.fitted, ship.held, options, progress, executor)
+        return run_gap_workflow(ship.card, ship.fitted, ship.held, options, progress, executor)
     except InputError as error:
         return Fault(str(error))
     except (BrokenExecutor, CancelledError):

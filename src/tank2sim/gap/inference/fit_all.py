@@ -18,7 +18,7 @@ from tank2sim.gap.inference.fit import Belief, ExplanationFit, NuisanceParameter
 from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.likelihood import Likelihood
 
-Progress = Callable[[str], None]
+StageReport = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ class Fitting:
         Fits several explanations at once; the result does not depend on it.
     """
 
-    def __init__(self, likelihood: Likelihood, known: Known, progress: Progress, executor: Executor | None):
+    def __init__(self, likelihood: Likelihood, known: Known, progress: StageReport, executor: Executor | None):
         self.likelihood, self.known, self.progress, self.executor = likelihood, known, progress, executor
         self.found: dict[tuple[str, ...], ExplanationFit] = {}
         none = likelihood.none

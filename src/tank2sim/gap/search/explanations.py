@@ -16,7 +16,7 @@ import numpy as np
 
 from tank2sim.errors import InputError
 from tank2sim.gap.inference.fit import ExplanationFit
-from tank2sim.gap.inference.fit_all import Fitting, Known, Progress, Proposal, thetas_of
+from tank2sim.gap.inference.fit_all import Fitting, Known, Proposal, StageReport, thetas_of
 from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.inference.prior import candidate_explanations
 from tank2sim.gap.search.screening import Screen, Screened, Variant, variants
@@ -72,7 +72,7 @@ class Search:
 
 def search(
     likelihood: Likelihood,
-    progress: Progress = lambda text: None,
+    progress: StageReport = lambda text: None,
     executor: Executor | None = None,
     names: Sequence[str] | None = None,
     *,

@@ -11,7 +11,13 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.surge import SurgeCoefficients, drag
 from tank2sim.identification.conditioning import correlation_matrix, scaled_condition
 
-KEYS = {"M": "total_mass_kg", "B1": "B1_kgs2pm3", "B2": "B2_kgspm2", "B3": "B3_kgpm", "delay": "start_delay_s"}
+TOW_PARAMETERS = {
+    "M": "total_mass_kg",
+    "B1": "B1_kgs2pm3",
+    "B2": "B2_kgspm2",
+    "B3": "B3_kgpm",
+    "delay": "start_delay_s",
+}
 """Unknown of (1.5) to its name with unit, as in :class:`SurgeCoefficients`, the card and the JSON."""
 
 DELAY = "delay"
@@ -76,7 +82,7 @@ class TowFit:
     @property
     def coefficients(self) -> SurgeCoefficients:
         """The values for :func:`tank2sim.dynamics.surge.surge_model`; terms that were not estimated are 0."""
-        drags = {KEYS[name]: value for name, value in self.drag_terms.items()}
+        drags = {TOW_PARAMETERS[name]: value for name, value in self.drag_terms.items()}
         return SurgeCoefficients(total_mass_kg=float(self.values[0]), **drags)
 
     @property
@@ -87,7 +93,7 @@ class TowFit:
     @property
     def estimates(self) -> dict[str, float]:
         """Name with unit to estimate, the added mass among them."""
-        named = {KEYS[name]: float(value) for name, value in zip(self.unknowns, self.values, strict=True)}
+        named = {TOW_PARAMETERS[name]: float(value) for name, value in zip(self.unknowns, self.values, strict=True)}
         return {**named, "added_mass_kg": self.added_mass_kg}
 
     @property
@@ -96,7 +102,7 @@ class TowFit:
         if self.covariance is None:
             return {}
         errors = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        named = {KEYS[name]: float(error) for name, error in zip(self.unknowns, errors, strict=True)}
+        named = {TOW_PARAMETERS[name]: float(error) for name, error in zip(self.unknowns, errors, strict=True)}
         return {**named, "added_mass_kg": float(errors[0])}
 
     @property

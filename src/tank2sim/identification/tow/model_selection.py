@@ -16,7 +16,7 @@ from tank2sim.dynamics.surge import SurgeCoefficients, drag
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import COLLINEAR, SINGULAR_CONDITION, scaled_condition
 from tank2sim.identification.tow import equation_error
-from tank2sim.identification.tow.fit import DELAY, KEYS
+from tank2sim.identification.tow.fit import DELAY, TOW_PARAMETERS
 from tank2sim.identification.tow.output_error import OutputErrorFit, TowOptions, fit_speeds
 from tank2sim.records.tows import Tows
 
@@ -85,7 +85,7 @@ class FittedModel:
     def coefficients(self) -> SurgeCoefficients:
         """Mass and drag."""
         values = dict(zip(self.model.unknowns, self.fit.estimates.tolist(), strict=True))
-        return SurgeCoefficients(**{KEYS[name]: value for name, value in values.items() if name != DELAY})
+        return SurgeCoefficients(**{TOW_PARAMETERS[name]: value for name, value in values.items() if name != DELAY})
 
     @property
     def delay_s(self) -> float:

@@ -35,7 +35,7 @@ from tank2sim.identification.trials.methods.kalman import kalman
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.methods.recursive import recursive
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, Progress, silent
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 from tank2sim.identification.trials.problem.picklable import portable
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import answered, problem_from_card, with_range
@@ -148,12 +148,12 @@ class Identification:
     notices: tuple[str, ...]
 
 
-def identify(
+def identify_trials(
     card: ManoeuvringCard,
     trials: Measured,
     holdout: Measured | None = None,
     options: IdentificationOptions | None = None,
-    progress: Progress = silent,
+    progress: SearchReport = silent,
     executor: Executor | None = None,
 ) -> Identification:
     """Estimate the coefficients of a card from free-running trials.
@@ -190,7 +190,7 @@ def _identified(
     trials: Measured,
     holdout: Measured | None,
     options: IdentificationOptions,
-    how: tuple[Progress, Executor | None],
+    how: tuple[SearchReport, Executor | None],
 ) -> Identification:
     progress, executor = how
     tried = cross_validated(card, trials, options, executor) if options.structure == AUTO else {}
@@ -246,7 +246,7 @@ def _manoeuvres(card: ManoeuvringCard, trials: Sequence[Trial]) -> dict[str, str
     return {name: what.words for name, what in known.items() if what is not None}
 
 
-def estimated(problem: Problem, options: IdentificationOptions, progress: Progress = silent) -> Estimate:
+def estimated(problem: Problem, options: IdentificationOptions, progress: SearchReport = silent) -> Estimate:
     """The estimate by the method asked for; output error begins at what equation error found, if that is better."""
     if options.method == "kalman":
         return kalman(problem, progress=progress)
@@ -300,7 +300,7 @@ def _start(problem: Problem) -> Array | None:
         return None
 
 
-def _recursive(problem: Problem, options: IdentificationOptions, progress: Progress) -> Estimate:
+def _recursive(problem: Problem, options: IdentificationOptions, progress: SearchReport) -> Estimate:
     """The recursive estimator, which takes its prior as it is: widened first by what the weak form says of it."""
     if not options.scale_prior:
         return recursive(problem, progress=progress)

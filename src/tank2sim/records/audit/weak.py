@@ -15,7 +15,7 @@ from tank2sim.arrays import Array
 from tank2sim.records.trials import Trial, sampling_step
 
 Complex = NDArray[np.complex128]
-Number = TypeVar("Number", np.float64, np.complex128)
+AuditNumber = TypeVar("AuditNumber", np.float64, np.complex128)
 
 FALSE_ALARM = 1e-5
 """Probability with which a comparison of a right record may alarm: some ten comparisons of a hundred records then give
@@ -65,19 +65,19 @@ class AuditWindows:
         """Standard deviation, per s, that white noise in a signal leaves in :meth:`rate`."""
         return noise * float(np.sqrt(10 / 9 * (2 * np.pi) ** 2 * self.step_s / self.width_s**3))
 
-    def mean(self, values: NDArray[Number]) -> NDArray[Number]:
+    def mean(self, values: NDArray[AuditNumber]) -> NDArray[AuditNumber]:
         """Weighted mean in each window, (windows,); nan where a value is missing."""
         return self._convolved(values, 0)
 
-    def rate(self, values: NDArray[Number]) -> NDArray[Number]:
+    def rate(self, values: NDArray[AuditNumber]) -> NDArray[AuditNumber]:
         """Weighted mean of the first derivative in each window, (windows,), per s."""
         return self._convolved(values, 1)
 
-    def acceleration(self, values: NDArray[Number]) -> NDArray[Number]:
+    def acceleration(self, values: NDArray[AuditNumber]) -> NDArray[AuditNumber]:
         """Weighted mean of the second derivative in each window, (windows,), per s2."""
         return self._convolved(values, 2)
 
-    def _convolved(self, values: NDArray[Number], order: int) -> NDArray[Number]:
+    def _convolved(self, values: NDArray[AuditNumber], order: int) -> NDArray[AuditNumber]:
         if len(values) < self.samples:
             return np.empty(0, dtype=values.dtype)
         missing = ~np.isfinite(values)
@@ -86,7 +86,7 @@ class AuditWindows:
         offset = np.mean(filled)  # the kernels of derivatives sum to zero: less rounding
         inside = oaconvolve(filled - (offset if order else 0), kernel, mode="valid")
         holes = oaconvolve(missing.astype(float), np.ones(self.samples), mode="valid") > 0.5
-        picked: NDArray[Number] = np.where(holes, np.nan, inside)[:: self.hop or (self.samples + 1) // 2]
+        picked: NDArray[AuditNumber] = np.where(holes, np.nan, inside)[:: self.hop or (self.samples + 1) // 2]
         return picked
 
     def _kernel(self, order: int) -> Array:
@@ -126,7 +126,7 @@ def windows_for(noise: float, motion: float, step_s: float, count: int) -> Audit
     return AuditWindows(step_s, samples + 1 - samples % 2)
 
 
-def windows_of(values: NDArray[Number], noise: float, step_s: float) -> AuditWindows:
+def windows_of(values: NDArray[AuditNumber], noise: float, step_s: float) -> AuditWindows:
     """Windows fit for the rate of a signal (n,) with this noise, by :func:`windows_for` and its own motion."""
     windows = AuditWindows(step_s, 9)
     for _ in range(2):  # narrow windows still hold noise, which the second pass does not

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tank2sim.dynamics.surge_theory import DragPolynomial, TowedBody, drag_polynomial
 from tank2sim.files import plain_json
 from tank2sim.identification.tow import paper as tow_paper
-from tank2sim.identification.tow.fit import KEYS, TowFit
+from tank2sim.identification.tow.fit import TOW_PARAMETERS, TowFit
 from tank2sim.identification.tow.force import force_words
 from tank2sim.identification.tow.study import TowStudy
 from tank2sim.report.kit.json_values import Json
@@ -63,7 +63,7 @@ def _estimates(study: TowStudy) -> PageSection:
     rows: list[list[Cell]] = []
     for name in (*unknowns, "added mass"):
         unit = _UNITS.get(name, "kg")
-        key = KEYS.get(name, "added_mass_kg")
+        key = TOW_PARAMETERS.get(name, "added_mass_kg")
         cells = [cell for fit in result.fits.values() for cell in _cells(fit, key)]
         rows.append([f"{name}, {unit}", *cells])
     more = (

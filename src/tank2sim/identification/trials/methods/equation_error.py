@@ -18,7 +18,7 @@ from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, estimate_coloured_noise, white
 from tank2sim.identification.trials.methods.posterior import BLOCK, evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.weak_form import WEAK_EQUATIONS, WIDTH, WeakForm, WeakWindows
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, Progress, silent
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 
 TOLD_NOISE = 0.01
 """Share of noise in a regressor's variance from which the user is told: so much too small its coefficients may be."""
@@ -86,7 +86,7 @@ def equation_error(
     problem: Problem,
     start: Array | None = None,
     settings: EquationErrorSettings | None = None,
-    progress: Progress = silent,
+    progress: SearchReport = silent,
 ) -> Estimate:
     """Estimate the free parameters by equation error.
 
@@ -184,7 +184,11 @@ def normal_equations(form: WeakForm, windows: list[WeakWindows], weights: Whiten
 
 
 def _minimise(
-    form: WeakForm, values: Array, windows: list[WeakWindows], known: tuple[WhiteningWeights, Array], progress: Progress
+    form: WeakForm,
+    values: Array,
+    windows: list[WeakWindows],
+    known: tuple[WhiteningWeights, Array],
+    progress: SearchReport,
 ) -> tuple[Array, list[WeakWindows], _Normal]:
     """Damped Gauss-Newton steps; values, windows and normal equations at the best point."""
     weights, errors = known

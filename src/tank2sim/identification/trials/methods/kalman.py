@@ -23,7 +23,7 @@ from tank2sim.identification.trials.methods.kalman_gains import smooth_states
 from tank2sim.identification.trials.methods.kalman_pass import FilterPass
 from tank2sim.identification.trials.methods.kalman_search import SearchTask, Stand, maximised, normal, scores, task_of
 from tank2sim.identification.trials.methods.posterior import evidence_scale, sandwich, scaled_prior
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, Progress, silent
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 
 _ROUNDS = 3
 """Widths of the prior that are tried, at most."""
@@ -121,7 +121,10 @@ class KalmanEstimate(Estimate):
 
 
 def kalman(
-    problem: Problem, start: Array | None = None, settings: KalmanSettings | None = None, progress: Progress = silent
+    problem: Problem,
+    start: Array | None = None,
+    settings: KalmanSettings | None = None,
+    progress: SearchReport = silent,
 ) -> KalmanEstimate:
     """Estimate the free parameters and the noise levels by maximum likelihood of the innovations.
 

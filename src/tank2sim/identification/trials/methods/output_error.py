@@ -17,7 +17,7 @@ from tank2sim.arrays import Array
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, estimate_coloured_noise, white
 from tank2sim.identification.trials.methods.posterior import evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.shooting import Normal, Pieces, Shooting, cut
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, Progress, silent
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 
 LONGEST_SEARCH = 25
 """Steps after which a search ends; it needs 3 to 10."""
@@ -62,7 +62,7 @@ def output_error(
     problem: Problem,
     start: Array | None = None,
     settings: OutputErrorSettings | None = None,
-    progress: Progress = silent,
+    progress: SearchReport = silent,
 ) -> Estimate:
     """Estimate the free parameters by output error.
 
@@ -114,7 +114,7 @@ class _Work:
     shooting: Shooting
     pieces: list[Pieces]
     threads: ThreadPoolExecutor
-    progress: Progress
+    progress: SearchReport
 
     def normals(self, search: _Search) -> list[Normal]:
         """Normal equations of all runs where the search stands."""

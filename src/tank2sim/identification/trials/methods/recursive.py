@@ -28,7 +28,7 @@ from tank2sim.identification.trials.methods.kalman_gains import innovation_tange
 from tank2sim.identification.trials.methods.kalman_pass import FilterPass, filter_pass
 from tank2sim.identification.trials.methods.kalman_search import SearchTask, Stand, maximised, task_of
 from tank2sim.identification.trials.methods.posterior import BLOCK, sandwich
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, Progress, silent
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 
 _SETTLED = 2.0
 """A coefficient has settled when it stays within this many of its last standard errors of its last value (ours)."""
@@ -136,7 +136,10 @@ class _Step:
 
 
 def recursive(
-    problem: Problem, start: Array | None = None, settings: RecursiveSettings | None = None, progress: Progress = silent
+    problem: Problem,
+    start: Array | None = None,
+    settings: RecursiveSettings | None = None,
+    progress: SearchReport = silent,
 ) -> RecursiveEstimate:
     """Estimate the free parameters recursively.
 

@@ -126,7 +126,7 @@ class Estimate:
         return errors
 
 
-Progress = Callable[[str, Array, float], None]
+SearchReport = Callable[[str, Array, float], None]
 """Called as ``progress(stage, values, cost)`` whenever a better estimate is found; it may raise to stop."""
 
 

@@ -1,0 +1,41 @@
+"""A public name means one thing in the whole package, and tests share code through modules that are not tests."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections import defaultdict
+from pathlib import Path
+
+from .conftest import ROOT
+
+SOURCES = ROOT / "src" / "tank2sim"
+
+OF_EVERY_COMMAND = {"command"}
+"""Each module of a command has its function under this name, by which the command line finds it."""
+
+
+def public_names(path: Path) -> list[str]:
+    names = []
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            names.append(node.name)
+        elif isinstance(node, ast.Assign):
+            names += [target.id for target in node.targets if isinstance(target, ast.Name)]
+        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            names.append(node.target.id)
+    return [name for name in names if not name.startswith("_")]
+
+
+def test_no_public_name_is_defined_twice() -> None:
+    places: dict[str, set[str]] = defaultdict(set)
+    for path in SOURCES.rglob("*.py"):
+        for name in public_names(path):
+            places[name].add(path.relative_to(SOURCES).as_posix())
+    assert len(places) > 1500
+    assert {name: found for name, found in places.items() if len(found) > 1 and name not in OF_EVERY_COMMAND} == {}
+
+
+def test_no_test_imports_from_another_test() -> None:
+    importing = re.compile(r"^from [\w.]*\btest_\w+ import|^import [\w.]*\btest_\w+", re.MULTILINE)
+    assert [path.name for path in (ROOT / "tests").rglob("*.py") if importing.search(path.read_text("utf-8"))] == []
