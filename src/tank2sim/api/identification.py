@@ -93,11 +93,25 @@ class IdentificationResult(Result):
 
     @property
     def figures(self) -> pd.DataFrame:
-        """Figures of each trial: measured, by the card before and now, error, and its 95 % interval if held out."""
+        """Figures of each trial, units in their names: measured, by the card before and now, and the 95 % interval.
+
+        The interval (``low_95``, ``high_95``) is that in which the figure of a held-out trial was expected.
+        """
         import pandas as pd
 
-        columns = ["trial", "set", "figure", "measured", "before", "now", "error", "interval_95"]
-        return pd.DataFrame(figure_rows(self.identification), columns=columns)
+        found = self.identification
+        rows = []
+        for word, before, now in (
+            ("fitted", found.before, found.fit),
+            ("held out", found.before_holdout, found.holdout),
+        ):
+            earlier = {(figure.trial, figure.name): figure.predicted for figure in (before.figures if before else ())}
+            for figure in now.figures if now else ():
+                interval = figure.interval or (None, None)
+                known = earlier.get((figure.trial, figure.name))
+                rows.append((figure.trial, word, figure.name, figure.measured, known, figure.predicted, *interval))
+        columns = ["trial", "set", "figure", "measured", "before", "now", "low_95", "high_95"]
+        return pd.DataFrame(rows, columns=columns)
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""

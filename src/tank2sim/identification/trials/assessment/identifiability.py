@@ -103,7 +103,7 @@ def identifiability(problem: Problem, estimate: Estimate) -> Identifiability:
         pairs=pairs,
         unseen=unseen,
         share=1 - np.diag(np.linalg.inv(information + np.eye(len(unit)))),
-        notices=(*_told_pairs(pairs), *_told_directions(unseen)),
+        notices=(*_pair_messages(pairs), *_direction_messages(unseen)),
     )
 
 
@@ -223,16 +223,21 @@ def _directions(names: tuple[str, ...], vectors: Array) -> tuple[tuple[str, ...]
     )
 
 
-def _told_pairs(pairs: tuple[tuple[str, str, float], ...]) -> list[str]:
-    told = []
-    for one, other, value in pairs:
-        a, b = parse_term(one), parse_term(other)
-        if a is not None and b is not None and _drift(a, b):
-            why = "they drift together: sway and yaw are nearly proportional in these trials"
-        else:
-            why = "the trials tell them apart hardly"
-        told.append(f"{one} and {other} have a correlation of {value:.3f}; {why}")
-    return told
+def _pair_messages(pairs: tuple[tuple[str, str, float], ...]) -> list[str]:
+    """Correlated pairs by what they have in common, a message for each kind."""
+    drifting: list[str] = []
+    others: list[str] = []
+    for first, second, value in pairs:
+        a, b = parse_term(first), parse_term(second)
+        drifts = a is not None and b is not None and _drift(a, b)
+        (drifting if drifts else others).append(f"{first} and {second} ({value:.3f})")
+    messages = []
+    if drifting:
+        why = "sway and yaw are nearly proportional in these trials"
+        messages.append(f"the estimates of {_listed(drifting)} are correlated, and drift together: {why}")
+    if others:
+        messages.append(f"the estimates of {_listed(others)} are correlated: the trials hardly distinguish them")
+    return messages
 
 
 def _drift(one: Term, other: Term) -> bool:
@@ -241,12 +246,13 @@ def _drift(one: Term, other: Term) -> bool:
     return same and not (one.acceleration or other.acceleration) and one.v + one.r == other.v + other.r
 
 
-def _told_directions(unseen: tuple[tuple[str, ...], ...]) -> list[str]:
+def _direction_messages(unseen: tuple[tuple[str, ...], ...]) -> list[str]:
     single = [direction[0] for direction in unseen if len(direction) == 1]
-    several = [direction for direction in unseen if len(direction) > 1]
-    told = [f"the trials tell next to nothing of {_listed(single)}: the prior stands"] if single else []
-    told += [f"the trials do not tell {_listed(list(direction))} apart: only together" for direction in several]
-    return told
+    several = [f"{_listed(list(direction))}" for direction in unseen if len(direction) > 1]
+    messages = [f"the trials say next to nothing of {_listed(single)}: the prior remains"] if single else []
+    if several:
+        messages.append(f"the trials determine only a combination of {'; of '.join(several)}")
+    return messages
 
 
 def _listed(words: list[str]) -> str:
