@@ -31,7 +31,7 @@ from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.problem_from_card import driven_model, free_parameters
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, prepare
 from tank2sim.identification.trials.problem.structures import STRUCTURES
-from tank2sim.records.audit import mended
+from tank2sim.records.audit import repair_trial
 from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import Trial, unwrapped, window, with_signals
 
@@ -201,7 +201,7 @@ def read(data: Path) -> dict[str, Trial]:
     """The runs, mended by the audit, the wind's direction continuous."""
     found = {}
     for path in sorted(data.glob("*/*.csv")):
-        trial, _ = mended(read_trial(path))
+        trial, _ = repair_trial(read_trial(path))
         direction = unwrapped(trial.signals["wind_direction_rad"])
         found[trial.name] = with_signals(trial, {"wind_direction_rad": direction}, "wind direction made continuous")
     return found

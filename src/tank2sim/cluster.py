@@ -33,14 +33,14 @@ _Result = TypeVar("_Result")
 EXECUTOR_OPTION = "--executor"
 
 ANSWERS_WITHIN_S = 10.0
-"""A scheduler that has not answered by then is taken to be none (ours)."""
+"""A scheduler that has not answered by then is taken to be none (project choice)."""
 
 PATIENCE_S = 30.0
 """A cluster without workers, or whose scheduler is silent, is given up after this long: a worker that its nanny starts
-anew is back in a few seconds (ours)."""
+again is back in a few seconds (project choice)."""
 
 LOOKS_EVERY_S = 1.0
-"""How often the cluster is asked whether it has workers (ours)."""
+"""How often the cluster is asked whether it has workers (project choice)."""
 
 _COMPUTING = ("numpy", "scipy", "casadi", "numba")
 """Packages on whose version the digits of a result depend."""
@@ -85,7 +85,7 @@ def connected(text: str) -> Iterator[Executor]:
 
 
 class Cluster(Executor):
-    """What is submitted is done by any worker, and anew by another one if that is lost.
+    """What is submitted is done by any worker, and again by another one if that is lost.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ class Cluster(Executor):
                 with self._one:
                     waiting = list(self._waiting)
                 for promised in waiting:
-                    error = InputError(EXECUTOR_OPTION, "", trouble, "mend the cluster, or leave the option out")
+                    error = InputError(EXECUTOR_OPTION, "", trouble, "correct the cluster, or leave the option out")
                     self._settle(promised, partial(promised.set_exception, error))
 
     def _trouble(self) -> str:
@@ -202,7 +202,7 @@ class Cluster(Executor):
 
     def _lost(self) -> InputError:
         problem = f"the scheduler at {self._text} was lost during the work"
-        return InputError(EXECUTOR_OPTION, "", problem, "start it and its workers anew, or leave the option out")
+        return InputError(EXECUTOR_OPTION, "", problem, "start it and its workers again, or leave the option out")
 
 
 _ONE_AT_A_TIME = Lock()
@@ -229,8 +229,8 @@ def _client(text: str) -> Client:
     address = f"tcp://{text.removeprefix('dask://')}"
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of other versions; those that matter are told below
-            # What listens there and is no scheduler may keep Dask waiting longer than it was told to.
+            warnings.simplefilter("ignore")  # of other versions; those that matter are reported below
+            # What listens there and is no scheduler may keep Dask waiting longer than it was reported to.
             return _within(
                 2 * ANSWERS_WITHIN_S, lambda: Client(address, timeout=ANSWERS_WITHIN_S, set_as_default=False)
             )
@@ -244,7 +244,7 @@ def _refuse_other(there: Mapping[str, str], here: Mapping[str, str], address: st
         if there.get(name) != wanted:
             problem = f"has {name} {there[name]}, but here it is {wanted}" if name in there else f"lacks this {name}"
             raise InputError(
-                EXECUTOR_OPTION, f"worker {address}", problem, "install the same on both, and start the worker anew"
+                EXECUTOR_OPTION, f"worker {address}", problem, "install the same on both, and start the worker again"
             )
 
 

@@ -75,7 +75,7 @@ def processes_to_begin(workers: int | None = None) -> int:
 
 @contextmanager
 def _processes(workers: int | None) -> Iterator[Executor]:
-    """Processes that begin anew, as threads may be at work in this one."""
+    """Processes that begin again, as threads may be at work in this one."""
     context = multiprocessing.get_context("spawn")
     before = set(multiprocessing.active_children())
     with ProcessPoolExecutor(workers or os.cpu_count(), context, _prepare) as pool:

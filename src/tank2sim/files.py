@@ -38,7 +38,7 @@ def write_whole(path: Path, content: str | bytes, *, inputs: Iterable[Path] = ()
 def write_together(
     contents: Mapping[Path, str | bytes], *, inputs: Iterable[Path] = (), outputs: Iterable[Path | None] = ()
 ) -> None:
-    """Write several files, all or none: first all as temporary files beside their targets, then all are renamed.
+    """Write several files, all or none: first all as temporary files next to their targets, then all are renamed.
 
     A link keeps pointing where it does, and its target is replaced; what is no regular file (a device, a pipe) cannot
     be replaced and is written to.

@@ -195,7 +195,7 @@ def test_bad_ships_are_told_at_the_end_and_the_others_are_kept(ships: Path, tmp_
     result = tank2sim("gap", "ships", "-o", "out", *ONE, cwd=tmp_path)
     assert result.returncode == 2 and "Traceback" not in result.stderr
     card, trial = result.stderr.splitlines()
-    assert card.startswith("tank2sim: beta: ships/beta/ship.toml: line 2") and "mend the TOML" in card
+    assert card.startswith("tank2sim: beta: ships/beta/ship.toml: line 2") and "correct the TOML" in card
     assert trial.startswith("tank2sim: gamma ray #1: ships/gamma ray #1/slow.csv: ")
     assert "ships/empty: holds neither card nor trial, and was passed over" in result.stdout
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"alpha", "fleet.json", "fleet.html"}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults, corrected_text
-from tank2sim.records.audit import mended
+from tank2sim.records.audit import repair_trial
 from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import Trial, froude_scaled
 
@@ -155,7 +155,7 @@ def test_a_trial_without_what_the_sensor_shows_needs_no_file(tmp_path: Path) -> 
 
 def test_a_published_record_becomes_a_trial_csv(data: Path, tmp_path: Path) -> None:
     path = next(iter(sorted((data / "data" / "kvlcc2_hsva").glob("*.dat"))))
-    trial, _ = mended(read_trial(path))
+    trial, _ = repair_trial(read_trial(path))
     again = reread(tmp_path, corrected_text(path, trial, [("log_scale", {"factor": 0.05}, {})]))
     assert again.scale == trial.scale
     np.testing.assert_allclose(again.signals["u_mps"], trial.signals["u_mps"] / 1.05, rtol=1e-9)

@@ -190,7 +190,7 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> None:
     def find_gap(card, fitted, held, options, progress, executor=None):
         progress("looking")
         if card.source == "bad":
-            raise InputError("bad.csv", "row 3", "is torn", "mend it")
+            raise InputError("bad.csv", "row 3", "is torn", "correct it")
         if card.source == "odd":
             raise ZeroDivisionError("by zero")
         return f"gap of {card.source}"
@@ -208,7 +208,7 @@ def test_a_bad_ship_does_not_stop_the_others(mariner_card: ManoeuvringCard, fail
         ):
             results = {ship.folder.name: result for ship, result in found}
             assert results["a"] == "gap of a" and results["z"] == "gap of z"
-            assert results["bad"] == Fault("bad.csv: row 3: is torn; mend it")
+            assert results["bad"] == Fault("bad.csv: row 3: is torn; correct it")
             assert (
                 isinstance(results["odd"], Fault) and "not of yours: ZeroDivisionError: by zero" in results["odd"].line
             )

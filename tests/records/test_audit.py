@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.records.audit import audit, audit_and_repair, mended, record_noise
+from tank2sim.records.audit import audit, audit_and_repair, record_noise, repair_trial
 from tank2sim.records.audit.rudder import rudder_response
 from tank2sim.records.reading import read_trial
 from tank2sim.records.trials import select_rows
@@ -86,7 +86,7 @@ def test_a_wrong_column_is_named_and_mended(kind, name):
     (finding,) = audit(record)
     assert (finding.column, finding.kind) == (column, "fault")
     assert truth in finding.likely_truth
-    right, applied = mended(record)
+    right, applied = repair_trial(record)
     assert [one.column for one in applied] == [column]
     assert any(truth in notice for notice in right.notices) or "rudder" in name
     for signal in ("u_mps", "v_mps", "r_radps", "delta_rad", "x_m", "y_m"):
@@ -141,11 +141,11 @@ def test_lesser_faults_are_noted_with_their_size_and_left_as_they_are(name):
     for key, value in expected.items():
         tolerance = {"direction_deg": 8.0, "delay_s": 0.2}.get(key, 5 * error)
         assert finding.evidence[key] == pytest.approx(value, abs=tolerance)
-    right, applied = mended(record)
+    right, applied = repair_trial(record)
     assert not applied
     assert right is record
-    if finding.mend is not None and name in ("log", "compass", "gyro"):
-        assert not audit(finding.mend(record))
+    if finding.repair is not None and name in ("log", "compass", "gyro"):
+        assert not audit(finding.repair(record))
 
 
 def rows(*slices):
@@ -203,7 +203,7 @@ def test_faults_of_time_and_sensors_are_found(name):
 @pytest.mark.parametrize("name", ["repeated rows", "rows in disorder", "rounded times"])
 def test_a_mended_time_base_is_the_true_one(name):
     record = trial(MOTIONS["zigzag"])
-    right, (finding,) = mended(SENSORS[name][0](record))
+    right, (finding,) = repair_trial(SENSORS[name][0](record))
     np.testing.assert_allclose(right.time_s, record.time_s, atol=2e-3 * 400)
     np.testing.assert_array_equal(right.signals["x_m"], record.signals["x_m"])
     assert finding.column == "t_s"
@@ -211,7 +211,7 @@ def test_a_mended_time_base_is_the_true_one(name):
 
 
 def test_failed_readings_are_left_out_and_nothing_else():
-    right, _ = mended(put("u_mps", held(1000, 1400))(trial(MOTIONS["zigzag"])))
+    right, _ = repair_trial(put("u_mps", held(1000, 1400))(trial(MOTIONS["zigzag"])))
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(right.signals["u_mps"])), np.arange(1001, 1400))
 
 
@@ -285,7 +285,7 @@ def test_kvlcc2_velocities_are_found_to_be_earth_fixed(data):
         (finding,) = [one for one in audit(record) if one.kind == "fault"]
         assert finding.column == "u_mps, v_mps", file
         assert "earth-fixed" in finding.likely_truth
-        right, _ = mended(record)
+        right, _ = repair_trial(record)
         assert any("turned to body axes" in notice for notice in right.notices)
         assert np.nanmedian(right.signals["u_mps"]) > 0.5
         # a ship in a turn drifts outward: v against r
@@ -322,7 +322,7 @@ def test_time_in_another_unit_is_told_from_a_rate_in_another_unit(unit, name, ki
     wrong = replace(right, time_s=right.time_s / unit)
     (finding,) = [one for one in audit(wrong) if one.kind == "fault"]
     assert finding.columns == ("t_s",) and name in finding.likely_truth
-    np.testing.assert_allclose(mended(wrong)[0].time_s, right.time_s)
+    np.testing.assert_allclose(repair_trial(wrong)[0].time_s, right.time_s)
 
 
 def test_velocities_of_the_opposite_sign_are_a_fault():
@@ -376,7 +376,7 @@ def test_faults_that_depend_on_each_other_are_repaired_one_after_the_other(kind,
     noise = {of: value * shrink.get(of, 1.0) for of, value in NOISE.items()}
     record = trial({**true, **changed}, noise=noise)
     assert [one.column for one in audit(record)] == columns
-    right, _ = mended(record)
+    right, _ = repair_trial(record)
     for signal in ("delta_rad", "r_radps", "psi_rad", "u_mps", "v_mps", "x_m", "y_m"):
         # half a knot's third digit of the speed, six times the noise of the rest
         np.testing.assert_allclose(right.signals[signal], true[signal], atol=6 * NOISE.get(signal, 0.0) + 1e-9)
@@ -400,7 +400,7 @@ def test_a_factor_of_no_unit_is_a_fault_and_left_alone(kind, name):
     record = trial({**MOTIONS[kind], **change(MOTIONS[kind])})
     (finding,) = audit(record)
     assert (finding.column, finding.kind, finding.open) == (column, "fault", True)
-    right, applied = mended(record)
+    right, applied = repair_trial(record)
     assert not applied and right is record
 
 
@@ -423,7 +423,7 @@ def test_a_heading_to_port_without_rate_and_velocities_does_not_turn_the_rudder(
     kept = {name: m[name] for name in ("t_s", "delta_rad", "x_m", "y_m")}
     record = trial({**kept, "psi_rad": -m["psi_rad"]})
     assert audit(record)[0].column == "psi_deg, x_m, y_m"
-    np.testing.assert_array_equal(mended(record)[0].signals["delta_rad"], m["delta_rad"])
+    np.testing.assert_array_equal(repair_trial(record)[0].signals["delta_rad"], m["delta_rad"])
 
 
 @pytest.mark.parametrize("name", ["psi_rad", "r_radps", "delta_rad"])
@@ -435,7 +435,7 @@ def test_many_spikes_are_left_out_though_some_lie_close_together(name, count):
     record.signals[name][struck] += np.deg2rad(40) * rng.choice([-1, 1], count)
     (finding,) = audit(record)
     assert finding.evidence["spikes"] == count
-    assert np.flatnonzero(np.isnan(mended(record)[0].signals[name])).tolist() == struck.tolist()
+    assert np.flatnonzero(np.isnan(repair_trial(record)[0].signals[name])).tolist() == struck.tolist()
 
 
 @pytest.mark.parametrize(("row", "value"), [(0, -1.7e9), (2000, 1.7e9), (4000, 1.7e9), (4000, 1e15)])
@@ -445,7 +445,7 @@ def test_a_stray_time_is_named_and_its_row_left_out(row, value):
     times[row] = value
     findings = audit(replace(record, time_s=times))
     assert findings[0].columns == ("t_s",) and findings[0].evidence["first_row"] == row + 1
-    right, _ = mended(replace(record, time_s=times))
+    right, _ = repair_trial(replace(record, time_s=times))
     np.testing.assert_array_equal(right.time_s, np.delete(record.time_s, row))
 
 
@@ -493,7 +493,7 @@ def test_a_rudder_that_is_late_is_noted_and_left_as_it_is(late_s):
     (finding,) = audit(record)
     assert (finding.column, finding.kind, finding.safe) == ("delta_deg", "note", False)
     assert finding.evidence["delay_s"] == pytest.approx(late_s, abs=1.5)
-    assert mended(record)[0] is record
+    assert repair_trial(record)[0] is record
 
 
 @pytest.mark.parametrize("late_s", [0.0, -1.0, -3.0])
@@ -548,7 +548,7 @@ def test_the_sign_of_a_rudder_in_radians_is_judged_on_its_degrees(manoeuvre, mar
     noise = {"r_radps": np.radians(0.01), "psi_rad": np.radians(0.1)}
     record = trial({"t_s": run.t[::5], **signals, "delta_rad": DEG * signals["delta_rad"]}, noise=noise)
     assert [(one.column, one.likely_truth.split()[-1]) for one in audit(record)] == [("delta_deg", "degrees")]
-    np.testing.assert_allclose(mended(record)[0].signals["delta_rad"], signals["delta_rad"])
+    np.testing.assert_allclose(repair_trial(record)[0].signals["delta_rad"], signals["delta_rad"])
 
 
 def three_digits(degrees):

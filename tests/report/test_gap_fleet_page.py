@@ -24,7 +24,7 @@ ONE = ShipTold(
     trials={"fit": 2, "holdout": 1},
 )
 LOST = replace(ONE, folder="beta", verdict=NO_EFFECT_MISSING, effects=(), trials={"fit": 2, "holdout": 0}, misfit={})
-BAD = ShipTold("bad", fault="bad/ship.toml: line 2: is torn; mend it")
+BAD = ShipTold("bad", fault="bad/ship.toml: line 2: is torn; correct it")
 
 
 def test_ships_stand_in_a_table_with_what_they_lack() -> None:

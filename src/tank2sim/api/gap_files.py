@@ -76,19 +76,19 @@ def _of_earlier_run(folder: Path) -> set[Path]:
 
 def _tidied(folder: Path, earlier: set[Path], kept: set[Path]) -> list[str]:
     """Take away what an earlier run wrote and this one has no successor of; tells of it, and of what is not known."""
-    told = []
+    messages = []
     for path in (*(folder / name for name in SOMETIMES), *sorted((folder / CORRECTED).glob("*.csv"))):
         if path in kept or not path.exists():
             continue
         if path not in earlier or path.resolve() in kept:
-            told.append(f"{path} is not of this run, and was left")
+            messages.append(f"{path} is not of this run, and was left")
             continue
         try:
             path.unlink()
         except OSError:
-            told.append(f"{path} is of an earlier run, and could not be removed")
+            messages.append(f"{path} is of an earlier run, and could not be removed")
         else:
-            told.append(f"{path} was of an earlier run, and was removed")
+            messages.append(f"{path} was of an earlier run, and was removed")
     with contextlib.suppress(OSError):  # not there, or not empty
         (folder / CORRECTED).rmdir()
-    return told
+    return messages

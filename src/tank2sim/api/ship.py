@@ -316,7 +316,9 @@ class Ship:
         if isinstance(self.card, ManoeuvringCard):
             particulars += [f"L = {self.card.ship.length_m:g} m", f"u0 = {self.card.model.speed_mps:.4g} m/s"]
             particulars += [f"{len(self.card.derivatives)} derivatives"]
-            particulars += [f"effects: {', '.join(one.name for one in self.card.effects)}"] if self.card.effects else []
+            particulars += (
+                [f"effects: {', '.join(effect.name for effect in self.card.effects)}"] if self.card.effects else []
+            )
         return f"{self.name} ({', '.join(particulars)}); {self.card.source}"
 
 

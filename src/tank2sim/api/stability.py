@@ -113,7 +113,10 @@ class StabilityResult(Result):
         influences = ResultTable(
             "What moves C' most",
             ("coefficient", "C' for 10 % more (%)", "change to neutral (%)"),
-            _rounded([one.short_name, one.percent, one.neutral_percent] for one in margin.influences[:STRONGEST]),
+            _rounded(
+                [influence.short_name, influence.percent, influence.neutral_percent]
+                for influence in margin.influences[:STRONGEST]
+            ),
         )
         tables = (eigenvalues, nomoto, influences, _criteria(self.study.imo))
         if self.bands is None:

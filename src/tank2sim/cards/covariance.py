@@ -1,4 +1,4 @@
-"""The covariance of a card's numbers: a JSON file beside the card, to which a comment line of the card refers.
+"""The covariance of a card's numbers: a JSON file next to the card, to which a comment line of the card refers.
 
 ``# covariance: ship.covariance.json`` names the file, relative to the card's folder. It has ``format``
 (:data:`_FORMAT`), ``names`` (dotted keys of the card, ``derivatives.Yv``) and ``covariance``, a row for each name, in
@@ -30,11 +30,12 @@ _ROUNDING = 0.006
 """Share by which a standard error of the card, three figures, may differ from that of the covariance."""
 
 NEGATIVE = 1e-8
-"""Share of the largest eigenvalue of the correlations by which rounding may make one negative (ours)."""
+"""Share of the largest eigenvalue of the correlations by which rounding may make one negative (project choice)."""
 
 HOLDS = 1.0
 """Standard errors by which a number may be moved (tuned) and still be the one that the covariance is of: tuning by the
-most uncertain moves nearly all numbers a little, and without the covariance they would seem known far worse (ours)."""
+most uncertain moves nearly all numbers a little, and without the covariance they would seem known far worse (project
+choice)."""
 
 _LINE = re.compile(r"^#[ \t]*covariance:[ \t]*(\S[^\r\n]*?)[ \t]*\r?$", re.MULTILINE)
 _WHOLE_LINE = re.compile(_LINE.pattern + r"\n?", re.MULTILINE)
@@ -63,12 +64,12 @@ class Covariance:
 
 
 def covariance_file(card: Path) -> Path:
-    """Where the covariance of a card lies: ``ship.covariance.json`` beside ``ship.toml``."""
+    """Where the covariance of a card lies: ``ship.covariance.json`` next to ``ship.toml``."""
     return card.with_name(f"{card.stem}.covariance.json")
 
 
 def referring(text: str, card: Path) -> str:
-    """A card's text with the line that refers to the file beside `card`, in place of any that it had.
+    """A card's text with the line that refers to the file next to `card`, in place of any that it had.
 
     It stands after the comment with which the card begins.
     """
@@ -132,7 +133,7 @@ def read_covariance(card: Card) -> Covariance | None:
         return None
     path = Path(card.source).parent / found[1]
     if not path.is_file():
-        remedy = f"put it beside the card, or take the line '# covariance: {found[1]}' out"
+        remedy = f"put it next to the card, or take the line '# covariance: {found[1]}' out"
         raise InputError(path, "", f"is missing, and {card.source} refers to it", remedy)
     names, rows = _form(path)
     matrix = _matrix(path, names, rows)
@@ -180,7 +181,7 @@ def _form(path: Path) -> tuple[list[str], object]:
     try:
         content = json.loads(read_text(path))
     except (ValueError, RecursionError) as error:
-        raise InputError(path, "", f"is no JSON ({error})", "write it anew with reduce or identify") from None
+        raise InputError(path, "", f"is no JSON ({error})", "write it again with reduce or identify") from None
     if not isinstance(content, dict) or content.get("format") != _FORMAT:
         raise InputError(path, "format", f"is not {_FORMAT!r}", "give a file that reduce or identify wrote")
     names = content.get("names")
@@ -202,14 +203,14 @@ def _matrix(path: Path, names: Sequence[str], rows: object) -> Array:
     errors = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     size = np.outer(errors, errors)
     if np.any(np.diag(matrix) < 0) or np.any(np.abs(matrix - matrix.T) > 1e-9 * size):
-        raise InputError(path, "covariance", "is not symmetric with variances on its diagonal", "write it anew")
+        raise InputError(path, "covariance", "is not symmetric with variances on its diagonal", "write it again")
     correlation = np.divide(matrix, size, out=np.zeros_like(matrix), where=size > 0)
     if np.any(matrix[size == 0] != 0):
-        raise InputError(path, "covariance", "has a number that is exact and yet varies with others", "write it anew")
+        raise InputError(path, "covariance", "has a number that is exact and yet varies with others", "write it again")
     values = np.linalg.eigvalsh(correlation)
     if values[0] < -NEGATIVE * max(values[-1], 1.0):
         problem = "is not positive semidefinite: no numbers vary like that"
-        raise InputError(path, "covariance", problem, "write it anew")
+        raise InputError(path, "covariance", problem, "write it again")
     return matrix
 
 

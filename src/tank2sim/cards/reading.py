@@ -191,7 +191,7 @@ def faults_of_toml(source: str) -> Iterator[None]:
         raise InputError(source, "", "is nested too deeply", "write sections and their keys") from None
     except (ValueError, TOMLKitError) as error:  # a ValueError also when an integer has thousands of digits
         problem, _, place = str(error).partition(" (at ")
-        remedy = "give each key once" if "overwrite" in problem or "twice" in problem else "mend the TOML there"
+        remedy = "give each key once" if "overwrite" in problem or "twice" in problem else "correct the TOML there"
         if "integer string conversion" in problem:
             problem, remedy = "an integer has thousands of digits", "give a number of a plausible size"
         raise InputError(source, place.rstrip(")"), problem, remedy) from None

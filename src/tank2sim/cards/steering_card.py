@@ -171,7 +171,7 @@ def parse_steering_card(text: str, source: str) -> SteeringCard:
     try:
         content = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(source, "", f"is no TOML: {error}", "mend the TOML there") from None
+        raise InputError(source, "", f"is no TOML: {error}", "correct the TOML there") from None
     spelt: dict[str, str] = {}
     _to_radians(content, spelt)
     try:

@@ -84,11 +84,11 @@ def _show(one: _Judged) -> None:
         markup=False,
     )
     # in the units of the file
-    told = [
+    messages = [
         f"{trial.heading(name)} {from_si(trial.heading(name), sigma):.2g}{'' if name in trial.noise else '*'}"
         for name, sigma in one.noise.items()
     ]
-    screen.print(f"noise (* estimated): {', '.join(told)}", soft_wrap=True, markup=False)
+    screen.print(f"noise (* estimated): {', '.join(messages)}", soft_wrap=True, markup=False)
     show_notices(trial.notices)
     if not one.findings:
         screen.print("nothing is found wrong\n")

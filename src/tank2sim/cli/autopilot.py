@@ -138,27 +138,27 @@ def _show(study: AutopilotStudy) -> None:
     heads = ["speed (m/s)", "gain up", "gain down to", "phase (deg)", "delay (s)", "Ms", "-3 dB (rad/s)", "stable"]
     rows = [
         [
-            one.speed_mps,
+            margin.speed_mps,
             *(
-                float(f"{value:.3g}")  # more digits do not go beside each other, and mean nothing
+                float(f"{value:.3g}")  # more digits do not go next to each other, and mean nothing
                 for value in (
-                    one.gain_margin_up,
-                    one.gain_margin_down,
-                    one.phase_margin_deg,
-                    one.delay_margin_s,
-                    one.sensitivity_peak,
-                    one.bandwidth_radps,
+                    margin.gain_margin_up,
+                    margin.gain_margin_down,
+                    margin.phase_margin_deg,
+                    margin.delay_margin_s,
+                    margin.sensitivity_peak,
+                    margin.bandwidth_radps,
                 )
             ),
-            one.stable,
+            margin.stable,
         ]
-        for one in study.margins
+        for margin in study.margins
     ]
     show_table("Margins with the steering gear, the first at the speed of the design", heads, rows)
     limits = [math.degrees(one) for one in (study.steps.within_rate_rad, study.steps.within_angle_rad)]
     screen.print(f"Linear up to a step of {limits[0]:.3g} deg (rate of the gear) and {limits[1]:.3g} deg (angle)")
     heads = ["run", "ordered (deg)", "rise (s)", "overshoot (deg)", "settled (s)", "rudder (deg)", "at full rate (s)"]
-    show_table("Course changes", heads, [[name, *vars(one).values()] for name, one in study.changes.items()])
+    show_table("Course changes", heads, [[name, *vars(change).values()] for name, change in study.changes.items()])
     kept = study.keeping
     screen.print(
         f"Course keeping in current, wind and waves over {kept.duration_s:.0f} s: heading error "
@@ -169,15 +169,15 @@ def _show(study: AutopilotStudy) -> None:
     )
     if study.tracks:
         heads = ["guidance", "length (m)", "time (s)", "finished", "largest (m)", "rms (m)", "on legs (m)", "stays (m)"]
-        tracks = [[name, *vars(one.figures).values()] for name, one in study.tracks.items()]
+        tracks = [[name, *vars(track.figures).values()] for name, track in study.tracks.items()]
         show_table("Cross-track error", heads, tracks)
 
 
 def _limits(limits: Mapping[str, float]) -> str:
-    told = f"Rudder ordered up to {limits['largest_rudder_deg']:.3g} deg"
+    text = f"Rudder ordered up to {limits['largest_rudder_deg']:.3g} deg"
     if "anti_windup_time_s" in limits:
-        told += f"; the integral takes up to {math.degrees(INTEGRAL_BAND_RAD):.3g} deg of a heading error"
-    return told
+        text += f"; the integral takes up to {math.degrees(INTEGRAL_BAND_RAD):.3g} deg of a heading error"
+    return text
 
 
 def _show_export(path: Path, told: object) -> None:

@@ -85,7 +85,7 @@ def parse_orders(given: Iterable[str]) -> dict[str, float]:
         elif len(name) > LONGEST_ORDER:
             problem = f"has no room on the form: up to {LONGEST_ORDER} characters have"
         elif len({one.casefold() for one in (*found, name)} - _ON_FORM) > MORE_ORDERS:
-            problem = f"has no room on the form: {MORE_ORDERS} orders have beside {', '.join(ORDERS_AHEAD)}"
+            problem = f"has no room on the form: {MORE_ORDERS} orders have next to {', '.join(ORDERS_AHEAD)}"
         if problem:
             raise InputError("--order", text, problem, "give, for example, --order 'Half ahead=56'")
         found[name] = rpm
@@ -93,14 +93,14 @@ def parse_orders(given: Iterable[str]) -> dict[str, float]:
 
 
 def check_ballast(loaded: ManoeuvringCard, ballast: ManoeuvringCard) -> list[str]:
-    """What is to be told of a ballast card beside the loaded one.
+    """What is to be reported of a ballast card next to the loaded one.
 
     Raises
     ------
     InputError
         It is of a ship of another length or breadth, or its draught is not smaller.
     """
-    remedy = "give the card of the same ship in ballast, as large as she is"
+    remedy = "give the card of the same ship in ballast, as large as it is"
     if apart := differences_of_size(loaded, ballast):
         raise InputError(ballast.source, "ship", f"is not of the ship of {loaded.source}: {'; '.join(apart)}", remedy)
     deep, light = loaded.ship.draught_m, ballast.ship.draught_m

@@ -56,7 +56,7 @@ def show_table(title: str, heads: Sequence[str], rows: Iterable[Sequence[object]
 
 
 def show_notices(notices: Iterable[str]) -> None:
-    """Print what the user should be told, a line each."""
+    """Print what the user should know, a line each."""
     for notice in notices:
         screen.print(f"[yellow]note:[/yellow] {escape(notice)}", soft_wrap=True)
 

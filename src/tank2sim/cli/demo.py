@@ -50,7 +50,7 @@ def command(output: Path, json_file: Path | None) -> None:
         result = run_demo(folder, tell)
     if json_file:
         write_whole(json_file, json_text(result))
-    screen.print(f"{folder / PAGE}: the page that shows it all, beside {len(_files(result)) - 1} files", markup=False)
+    screen.print(f"{folder / PAGE}: the page that shows it all, next to {len(_files(result)) - 1} files", markup=False)
     screen.print(f"done in {time.monotonic() - begin:.0f} s")
 
 

@@ -87,13 +87,13 @@ def computing(asked: EnsembleRequest, executor: object) -> Iterator[Executor | N
 
 
 def show_bands(bands: Mapping[str, Band], asked: Members, told: Sequence[str] = ()) -> None:
-    """Print the bands of figures, and what is to be told of the members and was not `told` before."""
+    """Print the bands of figures, and what is to be reported of the members and was not `told` before."""
     rows = []
     for name, band in bands.items():
         kind, at, argument = name.partition("@")
         words, unit = in_words(kind)
         rows.append([words + at + argument, unit, band.low, band.median, band.high, band.shown])
-    remaining = show_marked(one for one in asked.notices if one not in told)
+    remaining = show_marked(notice for notice in asked.notices if notice not in told)
     title = f"Ensemble of {asked.members}, seed {asked.seed}: nine of ten lie between 5 and 95 %"
     show_table(title, ["figure", "unit", "5 %", "50 %", "95 %", "shown by"], rows)
     show_notices(remaining)
@@ -106,17 +106,17 @@ def show_stability_bands(found: StabilityBands) -> None:
         screen.print(f"Stable on a straight course with probability {found.stable:.3g}")
     rows = [
         [
-            one.criterion.name,
-            *((f"{value:.4g}" for value in (one.band.low, one.band.high)) if one.band else (None, None)),
-            f"{one.criterion.allowed:.4g} {one.criterion.unit}",
-            None if one.met is None else "beyond card" if one.criterion.beyond_card else f"{one.met:.3g}",
+            chance.criterion.name,
+            *((f"{value:.4g}" for value in (chance.band.low, chance.band.high)) if chance.band else (None, None)),
+            f"{chance.criterion.allowed:.4g} {chance.criterion.unit}",
+            None if chance.met is None else "beyond card" if chance.criterion.beyond_card else f"{chance.met:.3g}",
             None
-            if one.criterion.beyond_card
-            else f"{one.between[0]:.3f} to {one.between[1]:.3f}"
-            if one.between
+            if chance.criterion.beyond_card
+            else f"{chance.between[0]:.3f} to {chance.between[1]:.3f}"
+            if chance.between
             else None,
         ]
-        for one in found.chances
+        for chance in found.chances
     ]
     heads = ["criterion", "5 %", "95 %", "allowed", "P(met)", "interval of P"]
     show_table("IMO MSC.137(76), worse side, over the ensemble", heads, rows)

@@ -61,11 +61,11 @@ class _Course:
     Parameters
     ----------
     wanted : dict
-        Ship's folder to (her record, why she is computed), of those that are to be computed.
+        Ship's folder to (its record, why it is computed), of those that are to be computed.
     done : dict
-        Ship's folder to how her results came about.
+        Ship's folder to how its results came about.
     faults : dict
-        Ship's folder to why she has none.
+        Ship's folder to why it has none.
     notices : list of str
     """
 
@@ -101,7 +101,7 @@ def _course(fleet: Fleet, asked: FleetRequest) -> _Course:
         try:
             refuse_early(output, None, ship.inputs)
             if output.exists() and not output.is_dir():
-                raise InputError(output, "", "is no folder, and her results belong there", "give another with -o")
+                raise InputError(output, "", "is no folder, and its results belong there", "give another with -o")
             record = fleet_run_record(ship, asked.options)
         except InputError as error:
             course.faults[ship.name] = str(error)
@@ -115,7 +115,7 @@ def _course(fleet: Fleet, asked: FleetRequest) -> _Course:
 
 
 def _compute(course: _Course, asked: FleetRequest, progress: StageReport) -> None:
-    """Compute the ships that are wanted; each is written as soon as she is found."""
+    """Compute the ships that are wanted; each is written as soon as it is found."""
     if not course.wanted:
         return
     with _working(asked, len(course.wanted)) as (find, executor):
@@ -133,8 +133,8 @@ Find = Callable[..., Iterator[tuple[Sought, Gap | Fault]]]
 def _working(asked: FleetRequest, count: int) -> Iterator[tuple[Find, Executor | None]]:
     """How the ships are sought, and by whom.
 
-    One ship alone has the explanations of her search spread over the executor. Of several, each is one task: the
-    search of a ship has parts that nothing else can be done beside, and then one of several cores is busy.
+    One ship alone has the explanations of its search spread over the executor. Of several, each is one task: the
+    search of a ship has parts that nothing else can be done next to, and then one of several cores is busy.
     """
     here = asked.executor == PROCESSES
     workers = asked.options.workers or os.cpu_count() or 1
@@ -172,7 +172,7 @@ def _write(ship: Sought, gap: Gap, course: _Course, output: Path) -> Fault | Non
     writable_folder(folder)
     tidied = put(files, folder, ship.folder.inputs)
     course.done[folder.name] = "computed" if why == NEW else f"computed: {why}"
-    course.notices += [f"{folder.name}: {one}" for one in (*notices, *tidied)]
+    course.notices += [f"{folder.name}: {notice}" for notice in (*notices, *tidied)]
     return None
 
 
@@ -187,7 +187,7 @@ def _told(fleet: Fleet, course: _Course, output: Path) -> FleetTold:
 def _show(told: FleetTold, course: _Course, output: Path) -> None:
     rows: list[list[object]] = []
     for ship in told.ships:
-        names = " + ".join(str(one["name"]) for one in ship.effects) or "-"
+        names = " + ".join(str(effect["name"]) for effect in ship.effects) or "-"
         misfits = ["-" if one is None else misfit_text(one) for one in ship.misfits()]
         rows.append([ship.folder, ship.verdict or "no result", names, *misfits, course.done.get(ship.folder, "-")])
     heads = ["ship", "verdict", "effect", "before", "after", "result"]
@@ -196,14 +196,14 @@ def _show(told: FleetTold, course: _Course, output: Path) -> None:
     show_notices([*told.notices, *course.notices, *_without_ship(told, output)])
     written = f"{output}: {JSON}, {PAGE}, and the folders of {len(course.done)} of {len(told.ships)} ships"
     screen.print(written, soft_wrap=True, markup=False)
-    for fault in dict.fromkeys(one.fault for one in told.faults):
+    for fault in dict.fromkeys(fault.fault for fault in told.faults):
         names = ", ".join(one.folder for one in told.faults if one.fault == fault)
         print(f"tank2sim: {names}: {' '.join(fault.split())}", file=sys.stderr)
 
 
 def _without_ship(told: FleetTold, output: Path) -> list[str]:
     """Results of a ship that is no longer in the fleet."""
-    ships = {one.folder for one in told.ships}
+    ships = {ship.folder for ship in told.ships}
     return [
         f"{path.parent} is of an earlier run: there is no such ship now; it was left"
         for path in sorted(output.glob(f"*/{RUN}"))

@@ -43,7 +43,7 @@ _PROBE = "kulikovsky-velikanov"
 def command(**options: object) -> None:
     """Fly an underwater glider: steady glides at given angles, the path of a programme, and what is best.
 
-    The transient model flies the programme beside the strung steady glides, and tells how far they are apart.
+    The transient model flies the programme next to the strung steady glides, and tells how far they are apart.
     """
     wanted = _Wanted(**options)  # type: ignore[arg-type]  # click has checked them
     card = wanted.glider()
@@ -125,7 +125,7 @@ def _page(found: GlideStudy) -> str:
 _HEADS = ("path (deg)", "alpha (deg)", "pitch (deg)", "v (m/s)", "C_L", "C_D", "R (m)")
 """Of a steady glide; all have one roll and one size of buoyancy."""
 _ROUNDING_N = 1e-9
-"""Forces below this are what arithmetic leaves of an equilibrium: a choice of ours."""
+"""Forces below this are what arithmetic leaves of an equilibrium: project choice."""
 
 
 def _show(found: GlideStudy) -> None:
@@ -171,9 +171,9 @@ def _show_glides(found: GlideStudy) -> None:
     if found.printed:
         show_table("The same as the paper prints it", _HEADS, [_row(glide) for glide in found.printed])
         ratios = [a.speed_mps / b.speed_mps for a, b in zip(found.printed, found.glides, strict=True)]
-        told = ", ".join(f"{ratio:.3g}" for ratio in ratios)
+        text = ", ".join(f"{ratio:.3g}" for ratio in ratios)
         why = "the drag that they balance, alpha (C_D0 + C_D alpha), is not that of (7)"
-        screen.print(f"Printed speeds are {told} times the right ones: {why}", soft_wrap=True)
+        screen.print(f"Printed speeds are {text} times the right ones: {why}", soft_wrap=True)
         printed, right = _unbalance(found, found.printed), _unbalance(found, found.glides)
         screen.print(
             f"By lift and drag of (6) and (7) the printed glides are off balance by {printed}, those above by {right}",

@@ -39,11 +39,11 @@ DEFAULT_FIGURES = (
     "tactical_diameter_m@35",
     "overshoot1_deg@20/20",
 )
-"""Figures where none is asked: one of each kind that is most looked at (a choice of ours)."""
+"""Figures where none is asked: one of each kind that is most looked at (project choice)."""
 
 _ALONE = (
     "tuning takes standard errors as if they were independent: its bounds, and what counts as a small move, leave out "
-    "the covariance beside the card"
+    "the covariance next to the card"
 )
 
 ROWS = 15
@@ -125,7 +125,8 @@ def command(
     CARD may be a steering card (poznyakov-yudin): then the models on it are compared.
 
     K % is the change of a figure for 10 % more of one number, by exact slopes and by a 10 % difference. Wishes that
-    contradict each other within the bounds are told, with the nearest that can be reached; with -o that is an error.
+    contradict each other within the bounds are reported, with the nearest that can be reached; with -o that is an
+    error.
     """
     asked = asked_of(more)
     if steering := find_steering_card(card):
@@ -154,7 +155,7 @@ def command(
     bands = None
     if asked:
         with computing(asked, more["executor"]) as pool:
-            bands = named_bands(ship, [one.text for one in study.figures], asked, pool)
+            bands = named_bands(ship, [figure.text for figure in study.figures], asked, pool)
     written, of_card = with_carried_covariance(ship, tuned_text(ship, tuned), output) if output and tuned else ({}, [])
     notices = [*result.notices, *([_ALONE] if tuned and result.errors.together else []), *of_card]
     notices = list(dict.fromkeys([*notices, *([] if find_compiler() else [NO_COMPILER])]))
@@ -225,7 +226,7 @@ def _told(study: Study, result: CardInfluence, tuned: Tuned | None, bands: Figur
     told = result.as_json()
     if tuned:
         after = study.figures_at(tuned.values).tolist()
-        told["tuned"] = tuned.as_json(dict(zip((one.text for one in study.figures), after, strict=True)))
+        told["tuned"] = tuned.as_json(dict(zip((figure.text for figure in study.figures), after, strict=True)))
     return told | ({"ensemble": bands.as_json()} if bands else {})
 
 
@@ -250,8 +251,8 @@ def _show(result: CardInfluence) -> None:
         "Figures",
         ["figure", "value", "standard error", "most of it from"],
         [
-            [one.text, float(result.values[row]), float(result.standard_errors[row]), _largest_shares(result, row)]
-            for row, one in enumerate(result.figures)
+            [figure.text, float(result.values[row]), float(result.standard_errors[row]), _largest_shares(result, row)]
+            for row, figure in enumerate(result.figures)
         ],
     )
     screen.print(result.of_errors[:1].upper() + result.of_errors[1:], soft_wrap=True)

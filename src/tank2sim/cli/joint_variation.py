@@ -69,7 +69,7 @@ def _from_file(path: Path) -> dict[str, float]:
     try:
         content = tomllib.loads(read_exact_text(path))
     except ValueError as error:
-        raise InputError(path, "", str(error), "mend the TOML") from None
+        raise InputError(path, "", str(error), "correct the TOML") from None
     return _flat(content, path, "")
 
 

@@ -92,10 +92,10 @@ def _filtering(trials: list[Trial], request: FilterRequest, settings: SignalSett
     before = [even_series(trial, name, settings.max_gap_s) for name in names]
     results = [request.apply(one) for one in before]
     what = "all columns but orders" if request.thins else SignalName(names[0]).file
-    told = f"{what} filtered by {request.text}: {results[0].effect.sentence}"
-    new = thinned(trial, results, told) if request.thins else with_filtered(trial, results[0], told)
-    text = trial_text(new, [f"tank2sim signals, from {trial.path.name}", told])
-    return _Filtering(before[0], request.text, results[0], told, text)
+    message = f"{what} filtered by {request.text}: {results[0].effect.sentence}"
+    new = thinned(trial, results, message) if request.thins else with_filtered(trial, results[0], message)
+    text = trial_text(new, [f"tank2sim signals, from {trial.path.name}", message])
+    return _Filtering(before[0], request.text, results[0], message, text)
 
 
 def _as_json(analyses: list[TrialAnalysis], filtering: _Filtering | None) -> dict[str, object]:

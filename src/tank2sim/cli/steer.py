@@ -31,7 +31,7 @@ from tank2sim.identification.trials.problem.prepare_trials import measured
     "--ghost",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="TRIAL",
-    help="A measured trial beside the ship.",
+    help="A measured trial next to the ship.",
 )
 @click.option(
     "--set", "settings", multiple=True, metavar="KEY=VALUE", help="A value in place of the card's, by dotted key."
@@ -58,11 +58,11 @@ def command(card: str, page: Path, ghost: Path | None, settings: tuple[str, ...]
         if not has_compiled(WEB):
             screen.print("the compiler makes its own library first, once: about a minute")
         library = ship_in_page(model)
-    told = [*(trial.notices if trial else ()), *(beside.notices if beside else ()), *model.notices]
-    text = steering_page(model, library, beside, told)
+    messages = [*(trial.notices if trial else ()), *(beside.notices if beside else ()), *model.notices]
+    text = steering_page(model, library, beside, messages)
     write_whole(page, text, inputs=[Path(ship.source), *([ghost] if ghost else [])])
     screen.print(f"{escape(ship.ship.name)}: {escape(str(page))}, {len(text.encode()) / 1e3:.0f} kB", soft_wrap=True)
-    show_notices([*([] if library else [NO_WASM_COMPILER]), *told])
+    show_notices([*([] if library else [NO_WASM_COMPILER]), *messages])
 
 
 def _refuse_steering_card(name: str) -> None:

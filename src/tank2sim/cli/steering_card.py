@@ -74,26 +74,31 @@ def _show_predictions(card: SteeringCard, found: SteeringComparison) -> None:
     if not found.predictions:
         return
     rows = []
-    for name, one in found.predictions.items():
-        rows.append(["printed K, right pairs", card.models[name].title, one.percent, one.predicted_m])
+    for name, prediction in found.predictions.items():
+        rows.append(["printed K, right pairs", card.models[name].title, prediction.percent, prediction.predicted_m])
         rows.append(
-            ["printed K, as the source pairs them", card.models[name].title, one.misread_percent, one.misread_m]
+            [
+                "printed K, as the source pairs them",
+                card.models[name].title,
+                prediction.misread_percent,
+                prediction.misread_m,
+            ]
         )
-        rows.append(["K computed here", card.models[name].title, one.own_percent, one.own_m])
-        percent = 100 * (one.direct_m / one.radius_m - 1)
-        rows.append(["the model itself", card.models[name].title, percent, one.direct_m])
-        percent = 100 * (one.direct_misread_m / one.radius_m - 1)
-        rows.append(["the model with the source's slip", card.models[name].title, percent, one.direct_misread_m])
+        rows.append(["K computed here", card.models[name].title, prediction.own_percent, prediction.own_m])
+        percent = 100 * (prediction.direct_m / prediction.radius_m - 1)
+        rows.append(["the model itself", card.models[name].title, percent, prediction.direct_m])
+        percent = 100 * (prediction.direct_misread_m / prediction.radius_m - 1)
+        rows.append(["the model with the source's slip", card.models[name].title, percent, prediction.direct_misread_m])
     show_table("Agreed variation of all coefficients", ["by", "to", "change (%)", "radius (m)"], rows)
 
 
 def _show_manoeuvres(card: SteeringCard, found: SteeringComparison) -> None:
     keys = ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m")
     rows = []
-    for name, one in found.runs.items():
-        overshoots = one.zigzag_figures["overshoots_deg"]
+    for name, run in found.runs.items():
+        overshoots = run.zigzag_figures["overshoots_deg"]
         first = overshoots[:2] if isinstance(overshoots, list) else []
-        rows.append([card.models[name].title, *(one.turn_figures[key] for key in keys), [float(x) for x in first]])
+        rows.append([card.models[name].title, *(run.turn_figures[key] for key in keys), [float(x) for x in first]])
     heads = ["model", *(key.removesuffix("_m").replace("_", " ") + " (m)" for key in keys), "10/10 overshoots (deg)"]
     show_table(f"Turning circle at {found.rudder_deg:g} deg, zigzag", heads, rows)
 

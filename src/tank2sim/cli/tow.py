@@ -50,7 +50,7 @@ class _Asked:
 @click.option(
     "--mass-kg", "mass", type=float, metavar="M", help="Mass with the water inside, kg; else that in the file."
 )
-@click.option("--terms", default="B3,B2,B1", show_default=True, help="Drag terms of (1.5) beside M; or none.")
+@click.option("--terms", default="B3,B2,B1", show_default=True, help="Drag terms of (1.5) next to M; or none.")
 @click.option("--start-delay", is_flag=True, help="Let the body start late, by a time that output_error estimates.")
 @click.option("--total-mass-kg", "total_mass", type=float, metavar="M", help="Hold M at this; estimate drag alone.")
 @click.option("--length-m", type=float, metavar="L", help="Length, for drag coefficients; else that in the file.")
@@ -144,12 +144,12 @@ def _estimate(fit: TowFit, name: str) -> str:
 
 def _show_study(study: TowStudy) -> None:
     rows: list[list[object]] = []
-    for one in study.models:
-        fit = one.fit
+    for model in study.models:
+        fit = model.fit
         mass = f"{fit.estimates[0]:.0f} ± {fit.half_widths[0]:.0f}"
-        drag = "ok" if one.plausible else "negative"
+        drag = "ok" if model.plausible else "negative"
         rows.append(
-            [one.model.label, mass, f"{fit.scatter_mps:.5f}", f"{fit.aic:.1f}", f"{fit.condition_scaled:.2g}", drag]
+            [model.model.label, mass, f"{fit.scatter_mps:.5f}", f"{fit.aic:.1f}", f"{fit.condition_scaled:.2g}", drag]
         )
     show_table(
         "Output error, models of different size", ("model", "M ± 95 % (kg)", "s (m/s)", "AIC", "cond.", "drag"), rows

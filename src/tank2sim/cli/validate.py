@@ -80,8 +80,8 @@ def command(card: str, trials: tuple[Path, ...], **options: Any) -> None:
             "source": ship.ship.source,
             **found.as_json(),
             "verification": [{**vars(one), "U_num": one.numerical} for one in verified],
-            "imo": [one.as_json() for one in criteria],
-            "replays": [_replay_as_json(one) for one in replays],
+            "imo": [criterion.as_json() for criterion in criteria],
+            "replays": [_replay_as_json(replay) for replay in replays],
             "notices": notices,
         }
         contents[json_file] = json_text(result)
@@ -99,15 +99,15 @@ def command(card: str, trials: tuple[Path, ...], **options: Any) -> None:
 
 
 def _replays(card: ManoeuvringCard, given: Measured) -> tuple[tuple[Passed, ...], tuple[str, ...]]:
-    """The replays, each by itself, so that one that cannot be replayed is told and spoils no other."""
+    """The replays, each by itself, so that one that cannot be replayed is reported and spoils no other."""
     found: list[Passed] = []
-    told: list[str] = []
+    messages: list[str] = []
     for trial in given.trials:
         try:
             found += replay_by_card(card, Measured((trial,), given.driven_by, ()))
         except InputError as error:
-            told.append(f"{trial.name}: not replayed: {error.problem}")
-    return tuple(found), tuple(told)
+            messages.append(f"{trial.name}: not replayed: {error.problem}")
+    return tuple(found), tuple(messages)
 
 
 def _replay_as_json(one: Passed) -> dict[str, object]:
@@ -129,15 +129,15 @@ def _show(card: ManoeuvringCard, found: Validation, verified: tuple[Verified, ..
             ["trial", "figure", "measured", "simulated", "E", "U_val", "verdict"],
             [
                 [
-                    one.trial,
-                    " ".join(part for part in in_words(one.name) if part),
-                    one.measured,
-                    one.simulated,
-                    one.error,
-                    one.uncertainty,
-                    str(one.outcome),
+                    figure.trial,
+                    " ".join(part for part in in_words(figure.name) if part),
+                    figure.measured,
+                    figure.simulated,
+                    figure.error,
+                    figure.uncertainty,
+                    str(figure.outcome),
                 ]
-                for one in found.figures
+                for figure in found.figures
             ],
         )
     shares = [100 * abs(one.numerical / one.value) for one in verified if one.numerical is not None and one.value]

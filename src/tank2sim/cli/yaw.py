@@ -46,7 +46,7 @@ _POSITIVE = click.FloatRange(min=0, min_open=True)
 
 @dataclass(frozen=True, kw_only=True)
 class _Asked:
-    """The options beside the records."""
+    """The options next to the records."""
 
     inertia_kgm2: float | None
     inertia_error: float | None
@@ -85,7 +85,7 @@ class _Asked:
 @click.option("--reference", type=click.Path(path_type=Path), metavar="AIR.csv", help="Take k_t from a body in air ...")
 @click.option("--reference-inertia-kgm2", "reference_inertia", type=_POSITIVE, help="... of this known inertia.")
 @click.option("--rig", metavar="CARD", help="Card of the rig: its walls, gravity, accelerating and braking count.")
-@click.option("--terms", metavar="LIST", help=f"Terms beside the inertia, of {', '.join(list(ENERGY_TERMS)[1:])}.")
+@click.option("--terms", metavar="LIST", help=f"Terms next to the inertia, of {', '.join(list(ENERGY_TERMS)[1:])}.")
 @click.option("--mirror-percent", type=click.FloatRange(0, 1000), default=25.0, show_default=True,
               help="Largest difference of mirror images, % of the largest rate.")  # fmt: skip
 @click.option(
@@ -165,7 +165,8 @@ def _simulate(name: str, records: tuple[Path, ...], driven: Mapping[str, Any]) -
 
 
 def _similar(card: YawRigCard, text: str) -> YawProgramme:
-    """The programme that is a ship's motion ``L,B,R,T`` at the size of the card's body; it is told on the screen."""
+    """The programme that is a ship's motion ``L,B,R,T`` at the size of the card's body; it is reported on the
+    screen."""
     try:
         length, beam, rate_degpmin, time_s = (float(word) for word in text.split(","))
     except ValueError:
@@ -269,7 +270,7 @@ def _card(result: YawResult, asked: _Asked, known: YawRig | None, contents: dict
     ship = read_card(asked.card)
     if not isinstance(ship, ManoeuvringCard):
         raise ship.fault("model.kind", f"is {ship.model.kind!r}, which has no N_rdot", "give --card a ship's card")
-    known_added_inertia(result, asked.method)  # the first thing to be told, if it is not known
+    known_added_inertia(result, asked.method)  # the first thing to be reported, if it is not known
     length = body_length(result, asked.length_m)
     new = with_nrdot(ship, result, asked.method, length)
     contents[asked.output] = new.text

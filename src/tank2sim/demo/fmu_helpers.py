@@ -1,4 +1,4 @@
-"""What both halves of the demo share: where files go, how progress is told, and how a checked FMU is made."""
+"""What both halves of the demo share: where files go, how progress is reported, and how a checked FMU is made."""
 
 from __future__ import annotations
 

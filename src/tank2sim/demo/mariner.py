@@ -42,7 +42,7 @@ def mariner(workshop: Workshop) -> DemoOutcome:
     """Export and check four FMUs, simulate two manoeuvres on the desk and in the FMU, judge stability."""
     card = read_card("mariner")
     cards = {THIRD: card, FIRST: linear_card(card)}
-    models = {name: build(one) for name, one in cards.items()}
+    models = {name: build(card) for name, card in cards.items()}
     names = {THIRD: "mariner", FIRST: "mariner-linear"}
     checked = [workshop.checked_fmu(cards[kind], models[kind], names[kind], fmi) for kind in names for fmi in (2, 3)]
     path, reports = checked[0][0], [report for _, report in checked]
@@ -183,7 +183,10 @@ def _stability_section(
         title="Yaw rate by rudder order",
     )
     verdicts = {True: Verdict.PASSED, False: Verdict.FAILED, None: Verdict.NONE}
-    rows = [[one.name, one.found, one.allowed, one.unit, verdicts[one.passed]] for one in criteria]
+    rows = [
+        [criterion.name, criterion.found, criterion.allowed, criterion.unit, verdicts[criterion.passed]]
+        for criterion in criteria
+    ]
     imo = PageTable(
         caption="IMO MSC.137(76), the worse of the two sides",
         columns=[Column(title=head) for head in ("criterion", "found", "allowed", "unit", "verdict")],

@@ -1,4 +1,4 @@
-"""First half of the demo: the five tows of paper 1 become an FMU, which is towed again beside them."""
+"""First half of the demo: the five tows of paper 1 become an FMU, which is towed again next to them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tank2sim.report.kit.charts import Tow, chart_png, tow_chart
 from tank2sim.report.kit.page import Column, Illustration, KeyFigure, PageSection, PageTable, Verdict
 
 WELL_POSED = ("B3",)
-"""Drag terms that these tows can tell (with M); the paper's B1 and B2 beside them cannot be identified."""
+"""Drag terms that these tows can tell (with M); the paper's B1 and B2 next to them cannot be identified."""
 
 
 NAME = "Wilinski-Zellman underwater vehicle"
@@ -33,7 +33,7 @@ LENGTH_M = 3.8
 
 
 def towed_vehicle(workshop: Workshop) -> DemoOutcome:
-    """Identify, write the card, export and check the FMU, and tow it through fmpy beside the measured tows."""
+    """Identify, write the card, export and check the FMU, and tow it through fmpy next to the measured tows."""
     workshop.tell("five tows of an underwater vehicle: identifying mass and drag")
     tows = read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
     paper, chosen = identify_tow(tows), identify_tow(tows, terms=WELL_POSED)
@@ -143,7 +143,7 @@ def _misses(tows: Tows, times: Array, speed: Array) -> list[dict[str, float]]:
 
 def _miss_table(misses: list[dict[str, float]]) -> PageTable:
     return PageTable(
-        caption="The FMU beside each tow",
+        caption="The FMU next to each tow",
         columns=[
             Column(title="tow", digits=1),
             Column(title="rms difference", unit="m/s", digits=2),

@@ -8,7 +8,7 @@
 The integral takes no more of a heading error than its band, so that a change of course, which is no disturbance, does
 not fill it. The term in Tt empties the integral z while the rudder is at its limit (back-calculation): Astrom &
 Hagglund (2006), Advanced PID Control, 3.5. It empties z and no more: a large change of course alone orders far more
-than the limit, and would fill z the other way, so that the ship crept to her new course.
+than the limit, and would fill z the other way, so that the ship crept to its new course.
 
 The yaw rate r takes the place of the derivative of the heading, so that a new order gives no kick: Fossen (2011),
 Handbook of Marine Craft Hydrodynamics and Motion Control, 12.2.

@@ -21,7 +21,7 @@ def closed_loop_model(ship: Model, autopilot: Model) -> Model:
     """
     joints: list[Quantity] = []
     for receiver, sender in ((ship, autopilot), (autopilot, ship)):
-        sent = {one.name: one for one in (*sender.states, *sender.quantities)}
+        sent = {state.name: state for state in (*sender.states, *sender.quantities)}
         joints += [_joint(one, sent[one.name]) for one in receiver.inputs if one.name in sent]
     joined = {joint.name.removeprefix("joint.") for joint in joints}
     return Model(

@@ -1,7 +1,7 @@
 """Where the right-hand side of a model has kinks, found in its equations: the event indicators of an FMU.
 
 A solver with variable steps loses its order in a step across a kink (a rate limit that is reached, a dead band that is
-left). It steps up to the kink instead if it is told a function that changes sign there (Hairer, Norsett and Wanner
+left). It steps up to the kink instead if it is reported a function that changes sign there (Hairer, Norsett and Wanner
 1993, Solving Ordinary Differential Equations I, II.6).
 """
 
@@ -15,7 +15,7 @@ import casadi as ca
 from tank2sim.dynamics.model import Model, Quantity
 
 EVENT_SHIFT = 1e-9
-"""An indicator is this much (SI) less than the difference that vanishes at its kink: a choice of ours, far above what
+"""An indicator is this much (SI) less than the difference that vanishes at its kink: project choice, far above what
 rounds and far below what a ship or a solver notices. Many kinks are approached for ever or never left (a rudder at its
 order, an order at the largest angle), where the difference itself would change sign with each rounding."""
 

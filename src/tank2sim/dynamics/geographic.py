@@ -27,7 +27,7 @@ FLATTENING = 1 / 298.257223563
 """Flattening of WGS 84 (same source)."""
 
 HIGHEST_LATITUDE = math.radians(85.0)
-"""Origins nearer to a pole are taken as lying here, where the series is regular: a choice of ours, beyond harbours."""
+"""Origins nearer to a pole are taken as lying here, where the series is regular: project choice, beyond harbours."""
 
 NOMINAL_ANGLE = 1e-4
 """What matters of a latitude or longitude, rad: a few ship lengths, 640 m."""

@@ -25,10 +25,10 @@ from tank2sim.dynamics.glider_forces import (
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
 
 SMALL_INCIDENCE = math.radians(10.0)
-"""The coefficients are fits at "small incidence" (paper, before (6)); that this ends at 10 deg is a choice of ours."""
+"""The coefficients are fits at "small incidence" (paper, before (6)); that this ends at 10 deg is project choice."""
 
 LARGEST_INCIDENCE = math.radians(30.0)
-"""Beyond it the coefficients stay what they are there. A choice of ours: at rest and when it turns over a glider moves
+"""Beyond it the coefficients stay what they are there. Project choice: at rest and when it turns over a glider moves
 across its hull, where polynomials of alpha would give drags of hundreds; held, C_D is at most 9, and the motion of
 such moments is a rough guess, for which ``validity`` is 0."""
 
@@ -46,22 +46,22 @@ def glider_warnings(card: GliderCard) -> tuple[str, ...]:
     Both are so in the paper's own data.
     """
     own, density = card.glider, card.environment.water_density_kgpm3
-    told = []
+    messages = []
     light = density * own.volume_m3 - own.mass_kg
     if abs(light) > 0.02 * own.mass_kg:
-        told.append(
+        messages.append(
             f"the card contradicts itself: {own.volume_m3:g} m3 displace {density * own.volume_m3:.4g} kg and the mass "
             f"is {own.mass_kg:g} kg, a net buoyancy of {light:+.3g} kg where the glider has {own.buoyancy_kg:g} kg "
             f"({own.mass_kg:g} kg displace {own.mass_kg / density:.4g} m3); mass and net buoyancy are used as they "
             "are, the volume in the ballast (1) alone"
         )
     if math.isclose(own.reference_area_m2, own.volume_m3 ** (2 / 3), rel_tol=1e-3):
-        told.append(
+        messages.append(
             f"the coefficients are referred to V^(2/3) = {own.reference_area_m2:.4g} m2; those of gliders are by "
             "custom referred to the frontal area, with which speeds are higher by the root of the ratio: state the "
             "area that belongs to them in glider.reference_area_m2"
         )
-    return tuple(told)
+    return tuple(messages)
 
 
 def glider_model(card: GliderCard) -> Model:
@@ -73,8 +73,8 @@ def glider_model(card: GliderCard) -> Model:
     it turns to port.
     """
     inputs, parameters = _inputs(card), _parameters(card)
-    states = _states(card, {one.name: one for one in inputs}, {one.name: one for one in parameters})
-    symbols = {one.name: one.symbol for one in (*states, *inputs, *parameters)}
+    states = _states(card, {one.name: one for one in inputs}, {parameter.name: parameter for parameter in parameters})
+    symbols = {state.name: state.symbol for state in (*states, *inputs, *parameters)}
     quantities = (*_rates_of_orders(symbols), *_dynamics(symbols, card))
     return Model(
         name=card.ship.name,

@@ -92,7 +92,7 @@ def glider_accelerations(at: Attitude, momentum: ca.SX, force: ca.SX, others: ca
         Rate of the momentum by the rates of pitch and roll alone.
     """
     # A path that is almost vertical has no course, and none of these equations tells how it would turn: beyond 84 deg
-    # (a horizontal share of 0.1, a choice of ours) its course turns no faster than at that angle.
+    # (a horizontal share of 0.1, project choice) its course turns no faster than at that angle.
     turned = ca.fmax(momentum[0], 0.1 * ca.norm_2(momentum) + _SLOWEST_MPS)
     by_velocity = ca.jacobian(momentum, ca.vertcat(at.u, at.w))
     matrix = ca.horzcat(by_velocity, ca.vertcat(-momentum[1], turned, 0))

@@ -29,7 +29,7 @@ from tank2sim.dynamics.rigid_body import Inertia, inertia, inertial_forces, rigi
 VALIDITY_MARGIN = 0.2
 """Above the card's range of speeds ``validity`` falls from 1 to 0 over this share of the speed of expansion.
 
-A choice of ours: forces grow with the square of speed, so 20 % of speed is 44 % of force."""
+Project choice: forces grow with the square of speed, so 20 % of speed is 44 % of force."""
 
 DRIFT_MARGIN, YAW_RATE_MARGIN, RUDDER_MARGIN = 0.5, 1.0, 0.35
 """Beyond the largest abs(v'), abs(r') and abs(delta) (rad) of the card ``validity`` falls from 1 to 0 over these: those
@@ -224,21 +224,21 @@ def _force_quantities(hull: Hull) -> tuple[Quantity, ...]:
         Quantity(
             name="force.X",
             unit="N",
-            description=f"Surge force but for that of acceleration, {equations}, positive forward",
+            description=f"Surge force except for that of acceleration, {equations}, positive forward",
             nominal=1e5,
             value=f1,
         ),
         Quantity(
             name="force.Y",
             unit="N",
-            description=f"Sway force but for that of acceleration, {equations}, positive to starboard",
+            description=f"Sway force except for that of acceleration, {equations}, positive to starboard",
             nominal=1e5,
             value=f2,
         ),
         Quantity(
             name="force.N",
             unit="N.m",
-            description=f"Yaw moment about midships but for that of acceleration, {equations}, positive to starboard",
+            description=f"Yaw moment about midships without that of acceleration, {equations}, positive to starboard",
             nominal=1e7,
             value=f3,
         ),

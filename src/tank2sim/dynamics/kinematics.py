@@ -9,7 +9,7 @@ import casadi as ca
 from tank2sim.dynamics.model import Parameter, Quantity, State, Variable
 
 _STILL_MPS = 1e-8
-"""Speed over ground below which a ship is at rest, so that speed and course have a slope there: a choice of ours. At
+"""Speed over ground below which a ship is at rest, so that speed and course have a slope there: project choice. At
 0.1 m/s it changes the speed by less than 1e-14 of itself."""
 
 

@@ -35,7 +35,7 @@ Oltmann and Sharma (1984), Simulation of combined engine and rudder maneuvers us
 hull-propeller-rudder interactions, 15th Symposium on Naval Hydrodynamics (the same division: lift, cross-flow drag,
 resistance, rudder in the race); Hooft (1994), The cross flow drag on a manoeuvring ship, Ocean Engineering 21,
 329-342; Faltinsen (1990), Sea Loads, 6.4; Brix (ed.) (1993), Manoeuvring Technical Manual (momentum theory of the
-race). That the card's linear terms are taken as they are is a choice of ours.
+race). That the card's linear terms are taken as they are is project choice.
 """
 
 from __future__ import annotations
@@ -59,20 +59,20 @@ Forces = tuple[Any, Any, Any]
 
 LEAST_BOUND, LARGEST_BOUND = 0.05, 0.9
 """Bounds of u_b over u0: a card that holds down to rest still divides by U there, and the thrust of a card without
-propulsion is told from how X falls between u_b and u0. Choices of ours."""
+propulsion is reported from how X falls between u_b and u0. Choices of ours."""
 
 BLEND = 0.5
-"""The polynomial's share falls from 1 at u_b to 0 at this share of u_b^2 (0.71 u_b): a choice of ours, narrow because a
+"""The polynomial's share falls from 1 at u_b to 0 at this share of u_b^2 (0.71 u_b): project choice, narrow because a
 polynomial soon departs from the truth beyond its range, and as wide as the KVLCC2 needs to turn steadily within it. In
-the hull's surge force it is the cube of that: the Mariner's polynomial would drive her on with a stopped engine."""
+the hull's surge force it is the cube of that: the Mariner's polynomial would drive its on with a stopped engine."""
 
 STILL_SPEED = 1e-7
-"""Speed over u0 at which the ship counts as at rest: a choice of ours. Above 0.1 u0 it changes U by less than 1e-12 of
+"""Speed over u0 at which the ship counts as at rest: project choice. Above 0.1 u0 it changes U by less than 1e-12 of
 itself."""
 
 LINEAR_DAMPING = 0.025
-"""e over u0, the speed at which a ship at rest is damped: small beside cross-flow drag at any speed that matters, but
-it brings the ship to rest. A choice of ours."""
+"""e over u0, the speed at which a ship at rest is damped: small next to cross-flow drag at any speed that matters, but
+it brings the ship to rest. Project choice."""
 
 LEAST_SHARE, LEAST_RESISTANCE = 0.7, 1e-4
 """R_b is not taken to be less than this share of (u_b/u0)^2 times the resistance at u0, of which waves, that fall away,
@@ -85,14 +85,14 @@ are sharp and have more of it than midships."""
 
 RUDDER_ASTERN = 0.5
 """Rudder force going astern over that ahead at one speed: the flow comes from the trailing edge, with less lift and an
-earlier stall. A choice of ours."""
+earlier stall. Project choice."""
 
 THRUST_DEDUCTION, WAKE = 0.2, 0.3
 """t and w of usual ships with one screw (Harvald 1983, Resistance and Propulsion of Ships)."""
 
 LEAST_RUDDER = 0.3
 """k is not taken to be less than this share of (u_b/u0)^2, which a polynomial has whose rudder goes with the square of
-speed: some lose it all at the lower end of their range (the Mariner at u0/2). A choice of ours."""
+speed: some lose it all at the lower end of their range (the Mariner at u0/2). Project choice."""
 
 STRAIGHTENING = 0.5
 """gamma, the share of the stern's cross flow that reaches a rudder in the race: between the 0.40 and 0.64 of the KVLCC2

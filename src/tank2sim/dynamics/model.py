@@ -123,7 +123,7 @@ class Quantity(Variable):
 
 TRIM_STRIDE = 0.2
 """Longest Newton step towards steady motion, over the nominal size of a state: longer ones leap over the steady motion
-near the start, above all near rest, where forces have little slope. A choice of ours."""
+near the start, above all near rest, where forces have little slope. Project choice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,7 @@ class Model:
     step_s : float
         Step for fixed-step integration (classical Runge-Kutta) at which it is accurate, s.
     notices : tuple of str
-        What a user of this model should be told (assumptions taken, keys not used).
+        What a user of this model should know (assumptions taken, keys not used).
     source : str
         The file that it was built from, for messages; empty if it is of none.
 
@@ -251,8 +251,10 @@ class Model:
     def with_values(self, changed: Mapping[str, float]) -> Model:
         """The model with parameters that start at the values of `changed` (by name) in place of their own."""
         parameters = (
-            _same_symbol(one, replace(one, start=changed[one.name])) if one.name in changed else one
-            for one in self.parameters
+            _same_symbol(parameter, replace(parameter, start=changed[parameter.name]))
+            if parameter.name in changed
+            else parameter
+            for parameter in self.parameters
         )
         return replace(self, parameters=tuple(parameters))
 
@@ -280,14 +282,17 @@ class Model:
         def changed(expression: ca.SX | float) -> ca.SX:
             return ca.substitute(ca.SX(expression), old, value)
 
-        quantities = tuple(_same_symbol(one, replace(one, value=changed(one.value))) for one in self.quantities)
+        quantities = tuple(
+            _same_symbol(quantity, replace(quantity, value=changed(quantity.value))) for quantity in self.quantities
+        )
         states = tuple(
             _same_symbol(
-                one, replace(one, start=changed(one.start), trim=None if one.trim is None else changed(one.trim))
+                state,
+                replace(state, start=changed(state.start), trim=None if state.trim is None else changed(state.trim)),
             )
-            for one in self.states
+            for state in self.states
         )
-        kept = tuple(one for one in self.parameters if one.name != name or ca.depends_on(value, old))
+        kept = tuple(parameter for parameter in self.parameters if parameter.name != name or ca.depends_on(value, old))
         return replace(self, quantities=quantities, states=states, parameters=kept)
 
     def extend(self, *variables: Variable, outputs: Iterable[str] = (), notices: Iterable[str] = ()) -> Model:

@@ -12,7 +12,7 @@ UNSTATED_LAG = 0.01
 
 
 def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[Variable, ...], list[str]]:
-    """Variables of the gear, and what a user should be told.
+    """Variables of the gear, and what a user should know.
 
     d(delta)/dt = sat((sat(order) - delta)/T), 0 while the gear has failed.
 
@@ -63,7 +63,7 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
 
 
 def assumed_lag_notice(ship_time_s: float) -> str:
-    """What a user is told where a card states no time constant; L/u0 in s."""
+    """What a user is reported where a card states no time constant; L/u0 in s."""
     return (
         "the card states no time constant of the steering gear: "
         f"{UNSTATED_LAG * ship_time_s:.3g} s is taken ({UNSTATED_LAG} L/u0)"

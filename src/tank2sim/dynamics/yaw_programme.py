@@ -178,7 +178,7 @@ def programme_of(card: YawRigCard) -> YawProgramme:
             humps=own.humps,
         )
     except ValueError as error:
-        raise card.fault("programme", str(error), "mend its keys") from None
+        raise card.fault("programme", str(error), "correct its keys") from None
     return full_turns(programme) if own.kind == "full_turn" else programme
 
 

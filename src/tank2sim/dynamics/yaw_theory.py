@@ -166,7 +166,7 @@ _PRINTED: dict[FloatingBody, dict[str, float]] = {
 }
 """Table 1 of the paper, of its own bodies."""
 _SAME = 0.002
-"""Two numbers that differ by so little, relatively, are the same but for the print's rounding."""
+"""Two numbers that differ by so little, relatively, are the same except for the print's rounding."""
 
 
 def theory_values(body: FloatingBody, rate_radps: float) -> tuple[TheoryValue, ...]:

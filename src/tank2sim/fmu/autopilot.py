@@ -48,7 +48,7 @@ def make_autopilot_fmu(
     Inputs ``motion.psi``, ``motion.r`` (as the ship's FMU has them among its outputs) and ``heading.command``, output
     ``rudder.command``. Parameters and errors are those of :func:`tank2sim.fmu.export.make_fmu`.
     """
-    own = (one.name for one in design.autopilot.parameters if one.name.startswith("autopilot."))
+    own = (parameter.name for parameter in design.autopilot.parameters if parameter.name.startswith("autopilot."))
     documents = Documents(source=design.source, origins={name: ValueOrigin(design.source) for name in own})
     return make_fmu(design.autopilot, fmi=fmi, documents=documents, platforms=platforms, told=told)
 
@@ -58,7 +58,7 @@ def co_simulate_heading(
 ) -> SteeredRun:
     """Co-simulate a ship and an autopilot through FMPy: one change of the ordered heading at t = 0.
 
-    At each communication point the autopilot hears heading and yaw rate, and the ship its rudder order, which she holds
+    At each communication point the autopilot hears heading and yaw rate, and the ship its rudder order, which it holds
     for the step; then both go on. The order is half a step old on average, so that the error falls in proportion to the
     step. Both may be of FMI 2.0 or 3.0.
 
@@ -143,7 +143,7 @@ def loop_difference(
     steps_s : sequence of float
         Communication steps to try, whole numbers of the models' steps, two at least.
     """
-    values = {one.name: one.start for one in ship.parameters}
+    values = {parameter.name: parameter.start for parameter in ship.parameters}
     longest = max(steps_s)
     duration = longest * round(20 * values["ship.length"] / values["ship.speed"] / longest)
     direct = HeadingLoop(ship, design.autopilot).run({"heading.command": heading_rad}, duration)

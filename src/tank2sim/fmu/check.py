@@ -68,7 +68,7 @@ class CheckReport:
 
 
 def compare_with_model(path: Path, *, model: Model | None = None) -> CheckReport:
-    """Validate an FMU, and drive it in every kind it offers through steps of all inputs, beside the model.
+    """Validate an FMU, and drive it in every kind it offers through steps of all inputs, next to the model.
 
     The library runs in processes of its own: one that cannot be loaded, or ends its process, is a failed check.
 

@@ -1,4 +1,4 @@
-"""The description of an FMU beside the one its model would have: every unit, variable and dependency."""
+"""The description of an FMU next to the one its model would have: every unit, variable and dependency."""
 
 from __future__ import annotations
 

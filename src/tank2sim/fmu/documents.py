@@ -1,4 +1,4 @@
-"""What an FMU says of its ship beside the equations: drawn from the card."""
+"""What an FMU says of its ship next to the equations: drawn from the card."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tank2sim.fmu.provenance import ValueOrigin, origins
 
 @dataclass(frozen=True, kw_only=True)
 class Documents:
-    """What an FMU says of its ship beside the equations.
+    """What an FMU says of its ship next to the equations.
 
     Parameters
     ----------
@@ -40,8 +40,8 @@ def documents_of(card: Card) -> Documents:
     validity = f"The card holds for speeds through the water of {speeds[0]:g} to {speeds[1]:g} m/s." if speeds else ""
     if isinstance(card, ManoeuvringCard) and card.propulsion is None:
         validity += (
-            " It states no propulsion: the ship holds her revolutions at every speed, so that she leaves rest by "
-            "herself and cannot be stopped."
+            " It states no propulsion: the ship holds its revolutions at every speed, so that it leaves rest by "
+            "itself and cannot be stopped."
         )
     return Documents(
         card_text=card.text,

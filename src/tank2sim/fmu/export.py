@@ -40,7 +40,7 @@ _NO_TOKEN = "{00000000-0000-0000-0000-000000000000}"
 _DESCRIPTION = "modelDescription.xml"
 _ICON_FILES = ("icon.png", "icon.svg")
 
-# OSP's engine looks for a copy of this beside the FMU, under the name <modelName>_OspModelDescription.xml.
+# OSP's engine looks for a copy of this next to the FMU, under the name <modelName>_OspModelDescription.xml.
 _OSP_FILE = "extra/com.open-simulation-platform/OspModelDescription.xml"
 
 _FIRST_TIME_OF_ZIP = 315532800  # 1980-01-01T00:00:00Z
@@ -127,7 +127,8 @@ def make_fmu(
 
 
 def description_text(model: Model, *, fmi: int) -> str:
-    """The ``modelDescription.xml`` that :func:`make_fmu` would write, but for its token, documents and source files."""
+    """The ``modelDescription.xml`` that :func:`make_fmu` would write, except for its token, documents and source
+    files."""
     return render(f"modelDescription-fmi{fmi}.xml", _values(model, interface(model), fmi, Documents()))
 
 

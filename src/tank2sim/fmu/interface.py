@@ -17,7 +17,7 @@ TRIM_SWITCH = "initial.trim"
 
 MAX_STEP = "solver.max_step"
 
-# The structured names of FMI 2.0 (2.2.9), but for quoted parts, which C and file names would not bear.
+# The structured names of FMI 2.0 (2.2.9), except for quoted parts, which C and file names would not bear.
 _STRUCTURED_NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
 
 

@@ -16,7 +16,7 @@ from tank2sim.native.universal import universal
 Told = Callable[[str], None]
 """Hears, in a few words, what is being done."""
 
-# A choice of ours: the compiler uses the processors itself too, so more at a time bring nothing.
+# Project choice: the compiler uses the processors itself too, so more at a time bring nothing.
 _AT_A_TIME = 2
 
 # A library bears neither the name of its file nor the time of its making, so that it is the same each time.
@@ -80,7 +80,7 @@ def _compiled(sources: Mapping[str, str], platforms: Sequence[Platform], told: T
         told(f"{len(made)} of {len(platforms)} libraries compiled; left: {left or 'none'}")
 
     with ThreadPoolExecutor(_AT_A_TIME) as pool:
-        # What takes longest first, so that no processor is idle beside it.
+        # What takes longest first, so that no processor is idle next to it.
         first = sorted(platforms, key=lambda platform: not waiting[platform])
         jobs = {pool.submit(cross_compiled, sources, platform.target): platform for platform in first}
         tell()

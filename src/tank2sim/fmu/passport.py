@@ -94,9 +94,9 @@ def passport(model: Model, documents: Documents, manoeuvres: Mapping[str, Run], 
         validity=documents.validity,
         speed_range_mps=documents.speed_range_mps,
         coefficients=tuple(
-            _coefficient(one, documents.origins.get(one.name, ValueOrigin(ABSENT)))
-            for one in variables
-            if not one.name.startswith(_NOT_OF_THE_SHIP)
+            _coefficient(variable, documents.origins.get(variable.name, ValueOrigin(ABSENT)))
+            for variable in variables
+            if not variable.name.startswith(_NOT_OF_THE_SHIP)
         ),
         notices=model.notices,
         figures={name: run.figures for name, run in manoeuvres.items()},

@@ -30,7 +30,7 @@ class ValueOrigin:
     source : str
         The card's source, with that of the equation for an effect.
     remark : str
-        What the card says beside the value (``# ESTIMATED: ...``); may be empty.
+        What the card says next to the value (``# ESTIMATED: ...``); may be empty.
     standard_error : float, optional
         In the unit of the coefficient; None if nothing is known.
     error_from : str
@@ -135,7 +135,7 @@ def _of_effects(card: ManoeuvringCard, document: Mapping[str, Any]) -> Iterator[
 
 
 def _beside(section: Any, key: str) -> str | None:
-    """The comment beside a key, which the file may spell in another unit; None if it has no such key."""
+    """The comment next to a key, which the file may spell in another unit; None if it has no such key."""
     if section is None:
         return None
     for own in section:

@@ -83,7 +83,7 @@ def relative_errors(
     nominals : mapping
         Their nominal values; 0 counts as 1.
     angles : collection of str
-        Those (rad) that are calculated anew at each point: they may jump by a full turn, a moment sooner or later.
+        Those (rad) that are calculated again at each point: they may jump by a full turn, a moment sooner or later.
     """
     errors = {}
     for name, signal in expected.items():

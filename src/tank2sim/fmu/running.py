@@ -138,7 +138,7 @@ def exchange(fmu: RunningFmu, run: InputSequence, inputs: Sequence[str], outputs
 
 
 def _solve(fmu: RunningFmu, solver: Any, begin: float, end: float) -> None:
-    """From `begin` to `end`, anew from each place where an event indicator changes sign."""
+    """From `begin` to `end`, again from each place where an event indicator changes sign."""
     now = begin
     while now < end:
         event, _, now = solver.step(now, end)

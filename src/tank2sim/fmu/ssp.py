@@ -59,14 +59,14 @@ def ship_with_autopilot(
     autopilot = heading_autopilot(ship)
     steered = make_fmu(autopilot, fmi=made.fmi, documents=_documents(ship, autopilot), platforms=platforms, told=told)
     parts, joints = _joined({"ship": ship, "autopilot": autopilot})
-    lengths = {one.name: one.start for one in ship.parameters}
+    lengths = {parameter.name: parameter.start for parameter in ship.parameters}
     values = {
         "name": f"{ship.name} with heading autopilot",
         "description": "A ship on a heading that its autopilot keeps: heading.command of autopilot, rad",
         "version": version("tank2sim"),
         "parts": parts,
         "connections": joints,
-        "units": [UNITS[name] for name in sorted({one.unit for part in parts for one in part.connectors})],
+        "units": [UNITS[name] for name in sorted({connector.unit for part in parts for connector in part.connectors})],
         "stop_time": float(round(_STOP_SHIP_TIMES * lengths["ship.length"] / lengths["ship.speed"])),
     }
     contents = {
@@ -101,5 +101,5 @@ def _documents(ship: Model, autopilot: Model) -> Documents:
         f"Pole placement (relative damping {DAMPING:g}, integral {SLOWNESS:g} of the natural frequency) on Nomoto's "
         f"model of {ship.name} at {found.speed_mps:.4g} m/s: K = {nomoto.K_per_s:.5g} 1/s, T = {nomoto.T_s:.5g} s"
     )
-    own = (one.name for one in autopilot.parameters if one.name.startswith("autopilot."))
+    own = (parameter.name for parameter in autopilot.parameters if parameter.name.startswith("autopilot."))
     return Documents(source=source, origins={name: ValueOrigin(source) for name in own})

@@ -220,11 +220,11 @@ class NextTest:
     orders : str
         CSV text ``t_s,delta_order_deg,n_rpm`` that `simulate --manoeuvre file:` runs.
     why : str
-        A sentence: what it would tell apart, and how clearly (expected gain of the score).
+        A sentence: what it would distinguish, and how clearly (expected gain of the score).
     expected : mapping
         Each manoeuvre that was considered to the score by which it would tell the explanations apart.
     sizes : mapping
-        Each effect of the explanations that are to be told apart to (parameters, standard errors), SI, as the first
+        Each effect of the explanations that are to be distinguished to (parameters, standard errors), SI, as the first
         explanation that has it estimates it.
     """
 
@@ -291,7 +291,7 @@ class Gap:
 
     def misfit(self, which: str, *, held_out: bool) -> float | None:
         """Root mean square over all fitting (or held-out) trials of (simulated - measured)/noise; None without any."""
-        trials = [one for one in self.passed if one.held_out == held_out]
-        if not trials or (which == "black_box" and not all(one.black_box for one in trials)):
+        trials = [replay for replay in self.passed if replay.held_out == held_out]
+        if not trials or (which == "black_box" and not all(trial.black_box for trial in trials)):
             return None
-        return float(np.sqrt(np.mean([one.misfit(which) ** 2 for one in trials])))
+        return float(np.sqrt(np.mean([trial.misfit(which) ** 2 for trial in trials])))

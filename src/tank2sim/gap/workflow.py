@@ -44,10 +44,10 @@ from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.trials import Trial
 
 RIVALS = 12
-"""Explanations that are told of."""
+"""Explanations that are reported of."""
 
 DOUBT = 1e-3
-"""Probability below which trials that disagree about a parameter are told of."""
+"""Probability below which trials that disagree about a parameter are reported of."""
 
 
 @dataclass(frozen=True)
@@ -230,7 +230,7 @@ def _rivals(found: Search, decision: Decision) -> tuple[Rival, ...]:
 
 
 def _next(card: ManoeuvringCard, found: Search, decision: Decision, noise: Mapping[str, float]) -> NextTest | None:
-    """The manoeuvre that would tell apart what these trials could not."""
+    """The manoeuvre that would distinguish what these trials could not."""
     if decision.verdict != AMBIGUOUS:
         return None
     rivals = [_explanation(card, found, fit) for fit in (decision.best, *decision.alike)]
@@ -245,8 +245,8 @@ def _explanation(card: ManoeuvringCard, found: Search, fit: ExplanationFit) -> E
     ]
     whole = replace(card, effects=(*card.effects, *entries))
     coefficients = found.likelihood.coefficients
-    names = (*(one.variable for one in fit.explained.asked), *(one for one in coefficients.names if one != CLOCK))
-    kept = [place for place, one in enumerate(coefficients.names) if one != CLOCK]
+    names = (*(one.variable for one in fit.explained.asked), *(name for name in coefficients.names if name != CLOCK))
+    kept = [place for place, name in enumerate(coefficients.names) if name != CLOCK]
     shared = fit.width * coefficients.mixing[kept]
     spread = np.zeros((len(names), len(names)))
     spread[len(fit.theta) :, len(fit.theta) :] = shared @ shared.T
@@ -271,7 +271,7 @@ def _notices(
     if card.effects:
         have = ", ".join(entry.name for entry in card.effects)
         notices.append(f"{have}: held as the card has it, and not sought")
-    left = float(np.sqrt(np.mean([one.misfit("after") ** 2 for one in results])))
+    left = float(np.sqrt(np.mean([result.misfit("after") ** 2 for result in results])))
     if decision.verdict != OUTSIDE_LIBRARY and left > MUCH:
         notices.append(
             f"the trials are still missed by {left:.3g} times the noise: forces that vary by chance (gusts, waves), "

@@ -7,7 +7,7 @@ import numpy as np
 from tank2sim.arrays import Array
 
 COLLINEAR = 30.0
-"""Scaled condition number of a design matrix from which its columns can no longer be told apart by data of ordinary
+"""Scaled condition number of a design matrix from which its columns can no longer be distinguished by data of ordinary
 accuracy (Belsley, Kuh & Welsch 1980, Regression Diagnostics, ch. 3). That of the normal matrix is its square, 900."""
 
 SINGULAR_CONDITION = 1e7
@@ -31,7 +31,7 @@ def scaled_condition(design: Array) -> float:
 
 
 def correlation_matrix(covariance: Array) -> Array:
-    """Correlations (unknowns, unknowns) of a covariance matrix; 0 beside an unknown without variance."""
+    """Correlations (unknowns, unknowns) of a covariance matrix; 0 next to an unknown without variance."""
     variance = np.diag(covariance)
     deviation = np.sqrt(np.where(variance > 0, variance, 1.0))
     matrix: Array = covariance / np.outer(deviation, deviation)

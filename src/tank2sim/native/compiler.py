@@ -53,7 +53,7 @@ def require_compiler(purpose: str) -> list[str]:
     trouble = _trouble(command)
     if trouble is not None:
         problem = f"this C compiler does not work, and {purpose} needs one ({_first_error(trouble)})"
-        raise InputError(source, "", problem, "mend it, or name another in the environment variable CC")
+        raise InputError(source, "", problem, "correct it, or name another in the environment variable CC")
     return list(command)
 
 
@@ -117,7 +117,7 @@ def _refusal(
     """What the compiler said when it made no library; None if it made one."""
     with tempfile.TemporaryDirectory(prefix="tank2sim-") as name, ThreadPoolExecutor(os.cpu_count()) as pool:
         command, folder = [*compiler, *FLAGS, *flags], sources[0].parent
-        # The longest first, so that no processor is idle beside it at the end.
+        # The longest first, so that no processor is idle next to it at the end.
         sources = sorted(sources, key=lambda source: (-source.stat().st_size, source.name))
         objects = [Path(name, f"{place}.o") for place in range(len(sources))]
         less = {source: [_LESS] if source.name in seldom else [] for source in sources}

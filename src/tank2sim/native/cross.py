@@ -39,7 +39,7 @@ class Target:
             exports = (f"-Wl,--export={name}" for name in self.exports)
             compiling = (flag for flag in FLAGS if flag != "-fPIC")
             return ("-target", self.triple, *compiling, "-s", "-mexec-model=reactor", *exports)
-        # Code for Windows is always independent of its place, and the compiler refuses to be told so.
+        # Code for Windows is always independent of its place, and the compiler refuses to be reported so.
         compiling = (flag for flag in FLAGS if not (flag == "-fPIC" and self.suffix == ".dll"))
         return ("-target", self.triple, *compiling, *_LINK_FLAGS, *_LINK_FLAGS_OF[self.suffix])
 

@@ -39,7 +39,7 @@ class Condition:
 
 
 def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) -> tuple[list[Condition], list[str]]:
-    """Every distinct row of the table that ``[averages]`` names, and what should be told of reading it.
+    """Every distinct row of the table that ``[averages]`` names, and what should know of reading it.
 
     Only the columns that ``[averages.columns]`` names are read; others may hold text.
 
@@ -86,8 +86,8 @@ def read_averages(form: CampaignFile, factors: Mapping[str, float], path: Path) 
         for row in distinct
     ]
     repeated = len(rows) - len(distinct)
-    told = f"{file.name}: {repeated} of {len(rows)} rows repeat another to the last digit; each is counted once."
-    return conditions, [told] if repeated else []
+    text = f"{file.name}: {repeated} of {len(rows)} rows repeat another to the last digit; each is counted once."
+    return conditions, [text] if repeated else []
 
 
 def _cells(file: Path) -> tuple[list[int], list[list[str]]]:

@@ -125,7 +125,7 @@ class Campaign:
     faults : tuple of InputError
         Runs that could not be read and were left out, because that was asked for.
     remarks : tuple of str
-        What was done on reading and should be told.
+        What was done on reading and should know.
     """
 
     path: Path
@@ -170,7 +170,8 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
     Raises
     ------
     InputError
-        The campaign's file is at fault; or a run is, and `keep_going` is not asked for: then all such runs are told.
+        The campaign's file is at fault; or a run is, and `keep_going` is not asked for: then all such runs are
+        reported.
     """
     path = Path(path)
     form, factors = campaign_file(_parsed(path), path)
@@ -195,7 +196,7 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
     if faults and not keep_going:
         raise together(faults)
     if not runs:
-        raise InputError(path, "runs", "no run can be used", f"mend them first: {faults[0]}")
+        raise InputError(path, "runs", "no run can be used", f"correct them first: {faults[0]}")
     return Campaign(
         path=path,
         model=form.model,
@@ -236,7 +237,7 @@ def _copies(runs: list[CaptiveRun]) -> dict[str, InputError]:
 
 
 def together(faults: list[InputError]) -> InputError:
-    """Several faults as one error: each is told, the remedy is the first one's and to go on without those runs."""
+    """Several faults as one error: each is reported, the remedy is the first one's and to go on without those runs."""
     first, *others = faults
     also = "".join(f"; {': '.join((Path(o.source).name, *filter(None, [o.place]), o.problem))}" for o in others)
     return InputError(

@@ -1,4 +1,5 @@
-"""Rows of numbers as other laboratories write them: ``nan`` is understood, and a fault is told by line and column."""
+"""Rows of numbers as other laboratories write them: ``nan`` is understood, and a fault is reported by line and
+column."""
 
 from __future__ import annotations
 
@@ -46,7 +47,7 @@ def number_rows(path: Path, rows: NumberRows, names: Sequence[str]) -> NDArray[n
     for line, cells in rows:
         if len(cells) != len(names):
             problem = f"the number of cells is {len(cells)}, and that of columns {len(names)}"
-            raise InputError(path, f"line {line}", problem, "mend or delete the line")
+            raise InputError(path, f"line {line}", problem, "correct or delete the line")
     values = np.array([[_number(cell) for cell in cells] for _, cells in rows])
     faulty = np.argwhere(np.abs(values) > LARGEST)
     if faulty.size:

@@ -67,7 +67,7 @@ def refuse_copies(trials: Sequence[Trial], others: Sequence[Trial] | None = None
 
 
 def same_record(one: Trial, other: Trial) -> bool:
-    """True if all signals that both measured are the same at the same times, but for their printed digits.
+    """True if all signals that both measured are the same at the same times, except for their printed digits.
 
     Times count from the first row of each, or as they are, whichever fits. Both are at the size of one ship. A signal
     that does not move says nothing.
@@ -100,7 +100,8 @@ def signature(trial: Trial) -> tuple[list[float], dict[str, list[float]]]:
     time = _rounded(trial.time_s[rows], 1e-3 * sampling_step(trial))
     signals = {name: trial.signals[name] for name in names}
     return time, {
-        name: _rounded(one[rows], 1e-5 * float(np.nanmax(one) - np.nanmin(one))) for name, one in signals.items()
+        name: _rounded(signal[rows], 1e-5 * float(np.nanmax(signal) - np.nanmin(signal)))
+        for name, signal in signals.items()
     }
 
 

@@ -124,7 +124,7 @@ def _begins_rows(cells: list[str]) -> bool:
 
 
 def _uniform_time(path: Path, rows: NumberRows) -> tuple[Array, str]:
-    """Times of equal step that agree with every time printed, and what is told of them.
+    """Times of equal step that agree with every time printed, and what is reported of them.
 
     A time printed as 1.23E+02 lies within half a unit of its last digit, evenly: the step is the least-squares one
     with these halves as weights. A sample lost or doubled would shift the rest by a step, so that every time printed
@@ -140,11 +140,11 @@ def _uniform_time(path: Path, rows: NumberRows) -> tuple[Array, str]:
         place = f"line {rows[int(missed[0])][0] if missed.size else rows[0][0]}, column t_s"
         problem = "the times do not rise, and no uniform step explains them"
         raise InputError(path, place, problem, "give each row a time of its own")
-    told = (
+    text = (
         "times are printed with so few digits that some repeat: replaced by a uniform step of "
         f"{step:.6g} s, which agrees with all of them"
     )
-    return time, told
+    return time, text
 
 
 def _half_a_digit(cell: str) -> float:

@@ -24,7 +24,7 @@ def thin_line(columns: Sequence[Array], limit: int) -> Indices:
     columns : sequence of (n,) arrays
         What is drawn: ``[y]`` against an even time, ``[x, y]`` for a track. The unit does not matter.
     limit : int
-        Samples to keep at most, but for gaps and the two ends; a shorter line keeps all.
+        Samples to keep at most, except for gaps and the two ends; a shorter line keeps all.
 
     Returns
     -------

@@ -44,8 +44,8 @@ def read_trial_csv(path: Path | str) -> Trial:
     _check_content(table, signals)
     notices = []
     if left_out:
-        told = ", ".join(table.heading(name) for name in left_out)
-        notices.append(f"columns that are no part of the trial format are left out: {told}")
+        text = ", ".join(table.heading(name) for name in left_out)
+        notices.append(f"columns that are no part of the trial format are left out: {text}")
     if "psi_rad" in signals:
         signals["psi_rad"] = unwrapped(signals["psi_rad"])
     if _rudder_sign(table) == "port":

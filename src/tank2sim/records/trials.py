@@ -1,4 +1,4 @@
-"""Free-running trials: what was measured while a ship or a model manoeuvred by herself."""
+"""Free-running trials: what was measured while a ship or a model manoeuvred by itself."""
 
 from __future__ import annotations
 

@@ -162,12 +162,12 @@ def _programme(table: CsvTable, time: Array) -> tuple[YawProgramme, list[str]]:
         humps = _humps(table, time, programme, kind)
         whole = replace(programme, humps=humps, kind="reversing" if kind == "reversing" else "unidirectional")
     except ValueError as error:
-        raise InputError(table.path, "programme", str(error), "mend the comments that tell of it") from None
+        raise InputError(table.path, "programme", str(error), "correct the comments that tell of it") from None
     return whole, missing
 
 
 def _rate(table: CsvTable) -> float | None:
-    """The programme's rate in rad/s, from whichever unit it is told in; its sign is that of the turn."""
+    """The programme's rate in rad/s, from whichever unit it is reported in; its sign is that of the turn."""
     for key in ("max_rate_degps", "max_rate_radps"):
         value = table.comment_number(key)
         if value is not None:
@@ -188,5 +188,5 @@ def _humps(table: CsvTable, time: Array, programme: YawProgramme, kind: str) -> 
             f"lasts from {time[0]:g} to {time[-1]:g} s, and {max(humps, 1)} humps of the programme take from "
             f"{programme.start_s:g} s to {programme.start_s + (max(humps, 1) - 1) * programme.period_s + length:g} s"
         )
-        raise InputError(table.path, "", problem, "give the whole record, or mend start_s, rise_s or humps")
+        raise InputError(table.path, "", problem, "give the whole record, or correct start_s, rise_s or humps")
     return humps

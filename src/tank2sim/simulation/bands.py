@@ -17,16 +17,17 @@ QUANTILES = (0.05, 0.50, 0.95)
 
 STILL_RUNNING = 0.99
 """A band over time ends where fewer than this share of the members still run: those that have ended are the quick ones,
-all on one side of the band, and with each of them its edge jumps. Of the 5 % beyond an edge this is a fifth (ours)."""
+all on one side of the band, and with each of them its edge jumps. Of the 5 % beyond an edge this is a fifth (project
+choice)."""
 
 
 FOLLOWED = 10.0
-"""Steps of the leading track within which a member beside it is to pass the next normal: it does within one, longer or
-shorter by its distance over the radius of the track; a lap, which is not to be left out, has more (ours)."""
+"""Steps of the leading track within which a member next to it is to pass the next normal: it does within one, longer or
+shorter by its distance over the radius of the track; a lap, which is not to be left out, has more (project choice)."""
 
 _ROUNDED = 0.001
 """Part of a step by which a track may fall short of a normal or pass it backwards: positions are kept in single
-precision (ours)."""
+precision (project choice)."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class TrackBand:
 
     One member's track leads: that which keeps nearest to the median of x and y at equal time. Where it is at the times
     of the bands stands a normal to it, at which each member's track passes at some distance to starboard; low, middle
-    and high are the quantiles of these distances. So a member that is ahead or astern on the same track is not beside
+    and high are the quantiles of these distances. So a member that is ahead or astern on the same track is not next to
     it, and on a second lap each passes on its second lap.
 
     It ends (nan from there on) where fewer than :data:`STILL_RUNNING` of the members have come to the normal: they lag

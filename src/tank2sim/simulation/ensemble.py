@@ -22,16 +22,16 @@ from tank2sim.arrays import Array
 Histories = NDArray[np.float32]
 
 BATCH = 32
-"""Members of a batch: long against what handing one over takes, short against the whole (ours)."""
+"""Members of a batch: long against what handing one over takes, short against the whole (project choice)."""
 
 KEPT = 10_000
 """Members whose histories are kept for the bands of tracks, 4 bytes a sample: the first ones. The share below a
-quantile is known from them to 0.2 %; figures are those of all members (ours)."""
+quantile is known from them to 0.2 %; figures are those of all members (project choice)."""
 
 
 DRAWS = 1000
-"""Times that a member is drawn until it is within all bounds (ours). Nearly all are at once; of parameters on their
-bound every other draw is, of ten such still one of a thousand."""
+"""Times that a member is drawn until it is within all bounds (project choice). Nearly all are at once; of parameters
+on their bound every other draw is, of ten such still one of a thousand."""
 
 NOT_WITHIN = f"not one of {DRAWS} draws is within the bounds of all parameters"
 
@@ -48,7 +48,7 @@ class Draws:
     root : array (k, k)
         A root of their covariance: root @ root.T.
     lowest, highest : array (k,)
-        Values that the parameters cannot leave. What is drawn beyond is drawn anew as a whole, from the same stream:
+        Values that the parameters cannot leave. What is drawn beyond is drawn again as a whole, from the same stream:
         the normal distribution cut off there, in which numbers still go together. Put at the bound they would not.
     seed : int
     """
@@ -91,7 +91,7 @@ class Drawn(NamedTuple):
 
 class MemberResult(NamedTuple):
     """What one member answers: figures by name, histories (signals, times), nan where it shows none; why a member
-    cannot be used, if so; and, put in by :func:`ensemble`, the parameters for which it was drawn anew."""
+    cannot be used, if so; and, put in by :func:`ensemble`, the parameters for which it was drawn again."""
 
     figures: Mapping[str, float]
     histories: Histories | None = None
@@ -112,7 +112,7 @@ class Question(Protocol):
 
 @dataclass(frozen=True)
 class Redrawn:
-    """How many members were drawn anew, and the parameters that had been beyond their bounds, to how many times."""
+    """How many members were drawn again, and the parameters that had been beyond their bounds, to how many times."""
 
     members: int
     beyond: Mapping[str, int]
@@ -124,13 +124,13 @@ class Redrawn:
         return Redrawn(sum(map(bool, beyond)), dict(counted.most_common()))
 
     def in_words(self, members: int) -> list[str]:
-        """What the user should be told of it, of so many members."""
+        """What the user should know of it, of so many members."""
         if not self.members:
             return []
         which = ", ".join(f"{name} {count}" for name, count in self.beyond.items())
         share = 100 * self.members / members
         return [
-            f"{self.members} of {members} members ({share:.2g} %) were drawn anew, being beyond what numbers can be "
+            f"{self.members} of {members} members ({share:.2g} %) were drawn again, being beyond what numbers can be "
             f"({which}): their distribution is normal, cut off there"
         ]
 
@@ -165,9 +165,9 @@ class Ensemble:
 
     @property
     def notices(self) -> list[str]:
-        """What the user should be told: members that were drawn anew, or that cannot be used."""
-        told = [f"{count} of {self.members} members cannot be used: {why}" for why, count in self.unusable.items()]
-        return [*self.redrawn.in_words(self.members), *told]
+        """What the user should know: members that were drawn again, or that cannot be used."""
+        messages = [f"{count} of {self.members} members cannot be used: {why}" for why, count in self.unusable.items()]
+        return [*self.redrawn.in_words(self.members), *messages]
 
 
 def ensemble(

@@ -22,7 +22,7 @@ LOOP_HEIGHT = 0.05
 less is what waiting for the steady state leaves."""
 
 AT_REST = 1e-6
-"""A speed that is less than this share of the run's largest is none: a choice of ours, above rounding."""
+"""A speed that is less than this share of the run's largest is none: project choice, above rounding."""
 
 
 def figures_of(manoeuvre: object, trajectory: Trajectory, length: float) -> Figures:
@@ -188,7 +188,7 @@ def _spiral(run: Trajectory, rudders: tuple[float, ...]) -> Figures:
 def _stop(run: Trajectory, stop: Stop, length: float) -> Figures:
     """Track reach along the path, head reach along the initial course, side reach across it, to starboard: all of the
     origin from the order until the ship is dead in the water (IMO MSC.137(76), ITTC 7.5-04-02-01), or coasts at the
-    speed that is told."""
+    speed that is reported."""
     final = stop.final_speed(float(run["motion.u"][0]))
     time = _first(run.crossings("motion.u", "motion.udot", final))
     if time is None and run["motion.u"][-1] <= final + AT_REST * run["motion.speed"][0]:

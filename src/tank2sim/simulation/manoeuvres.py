@@ -36,12 +36,12 @@ SPIRAL_RUDDERS_DEG = (20, 15, 10, 7, 5, 4, 3, 2, 1, 0, -1, -2, -3, -4, -5, -7, -
 """Rudder angles of a direct spiral on its way to port, deg; it comes back through the same ones."""
 
 FULL_ASTERN = 0.7
-"""Full astern, as a share of the nominal revolutions: about what a diesel reaches against the stream. A choice of ours;
+"""Full astern, as a share of the nominal revolutions: about what a diesel reaches against the stream. Project choice;
 ``stop:RPM`` states another."""
 
 COASTING_END = 0.2
-"""A ship whose engine is stopped coasts on without end: her run counts as ended at this share of the approach speed,
-where the rudder has lost most of its hold. A choice of ours."""
+"""A ship whose engine is stopped coasts on without end: its run counts as ended at this share of the approach speed,
+where the rudder has lost most of its hold. Project choice."""
 
 STEADY_CHANGE = 1e-3
 """Steady: over two ship lengths the yaw rate changes by less than this share of itself, or of 0.01 u0/L if less."""

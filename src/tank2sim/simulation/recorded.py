@@ -51,13 +51,13 @@ FED = {
     "wind_speed_mps": "wind.speed",
     "wind_direction_rad": "wind.direction",
 }
-"""Signal of a trial to the input of a model that it gives, beside the rudder."""
+"""Signal of a trial to the input of a model that it gives, next to the rudder."""
 
 SMOOTHING = 0.3
 """Recorded signals are smoothed over this many L/u0 before figures are read off (ours: below the time of any peak)."""
 
 COURSE_ERROR = math.radians(0.25)
-"""Standard error of a zigzag's course as the heading of the approach shows it, beside what the heading wanders there:
+"""Standard error of a zigzag's course as the heading of the approach shows it, next to what the heading wanders there:
 the courses of MARIN's zigzags lie 0.1 to 0.2 deg off the headings with which their records begin (project choice)."""
 
 LAG = 0.1
@@ -334,7 +334,7 @@ def _usual(reversals: _Reversals, noise: float, rudder_deg: int) -> tuple[_Fit, 
     )
     for angles in choices:
         agreeing = []
-        for angle in (math.radians(one) for one in angles if one > 0):
+        for angle in (math.radians(angle) for angle in angles if angle > 0):
             fitted = reversals.fit(noise, angle)
             if count == 3:
                 fitted = reversals.fit(max(noise, math.sqrt(fitted.squares)), angle)

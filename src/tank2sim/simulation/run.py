@@ -1,4 +1,4 @@
-"""One call from a model and a manoeuvre to trajectory, figures and what the user should be told."""
+"""One call from a model and a manoeuvre to trajectory, figures and what the user should know."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from tank2sim.simulation.yaw_rig_control import Controller, TunedController
 def yaw_record(
     run: YawRun, rig: YawRig, path: Path, constants: Mapping[str, float] | None = None, *, medium: Medium = "water"
 ) -> YawRecord:
-    """The record of a run; `constants` are told in it besides the torque constant and the largest current."""
+    """The record of a run; `constants` are reported in it besides the torque constant and the largest current."""
     return YawRecord(
         path=path,
         time_s=run.time_s,

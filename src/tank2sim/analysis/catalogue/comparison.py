@@ -1,4 +1,4 @@
-"""The models of a steering card beside each other: steady turns, manoeuvres, influence, and what is not known."""
+"""The models of a steering card next to each other: steady turns, manoeuvres, influence, and what is not known."""
 
 from __future__ import annotations
 
@@ -109,25 +109,27 @@ class SteeringComparison:
             "steady_turns": {one.model: [turn.as_json() for turn in one.turns] for one in self.turns},
             "influence": {one.model: vars(one) for one in self.influence},
             "manoeuvres": {
-                name: {"turn": dict(one.turn_figures), "zigzag": dict(one.zigzag_figures)}
-                for name, one in self.runs.items()
+                name: {"turn": dict(run.turn_figures), "zigzag": dict(run.zigzag_figures)}
+                for name, run in self.runs.items()
             },
-            "combined_predictions": {name: vars(one) for name, one in self.predictions.items()},
+            "combined_predictions": {name: vars(prediction) for name, prediction in self.predictions.items()},
             "influence_over_draught": {name: list(values) for name, values in self.polynomials.items()},
             "two_point_tuning": tuning,
             "missing": {name: list(words) for name, words in self.missing.items()},
             "titles": dict(self.titles),
             "diagrams": self._diagrams(),
-            "histories": {self.titles[name]: _circle(one.turn) for name, one in self.runs.items()},
+            "histories": {self.titles[name]: _circle(run.turn) for name, run in self.runs.items()},
         }
 
     def _diagrams(self) -> dict[str, object]:
         names = ("rudder_deg", "yaw_rate_degpmin")
         points = []
-        for one in self.points:
-            rate = one.yaw_rate_radps or math.copysign(self.speed_mps / (one.radius_m or math.inf), one.rudder_rad)
-            told = {"rudder_deg": math.degrees(one.rudder_rad), "yaw_rate_degpmin": 60 * math.degrees(rate)}
-            points.append({"label": one.label, "source": one.source, **told})
+        for point in self.points:
+            rate = point.yaw_rate_radps or math.copysign(
+                self.speed_mps / (point.radius_m or math.inf), point.rudder_rad
+            )
+            told = {"rudder_deg": math.degrees(point.rudder_rad), "yaw_rate_degpmin": 60 * math.degrees(rate)}
+            points.append({"label": point.label, "source": point.source, **told})
         models = {
             label: {name: [turn.as_json()[name] for turn in turns] for name in names}
             for label, turns in self.diagrams.items()

@@ -44,7 +44,11 @@ def form_of(card: SteeringCard, name: str) -> SteeringForm:
 def not_given(card: SteeringCard, name: str) -> tuple[str, ...]:
     """Coefficients that one of the card's models needs and does not have."""
     given = card.models[name].coefficients
-    return tuple(one.name for one in form_of(card, name).coefficients if one.default is None and one.name not in given)
+    return tuple(
+        coefficient.name
+        for coefficient in form_of(card, name).coefficients
+        if coefficient.default is None and coefficient.name not in given
+    )
 
 
 def complete(card: SteeringCard) -> tuple[str, ...]:
@@ -64,13 +68,13 @@ def model_of(card: SteeringCard, name: str) -> Model:
     form = form_of(card, name)
     place = f"{card.place(name)}.coefficients"
     given = card.models[name].coefficients
-    known = [one.name for one in form.coefficients]
+    known = [coefficient.name for coefficient in form.coefficients]
     for key in given:
         if key not in known:
             raise InputError(card.source, f"{place}.{key}", f"is no coefficient of {form.name}", ", ".join(known))
     if missing := not_given(card, name):
-        told = f"{form.title}: {', '.join(missing)} not given"
-        raise InputError(card.source, place, told, "; ".join(form.missing) or "add them")
+        text = f"{form.title}: {', '.join(missing)} not given"
+        raise InputError(card.source, place, text, "; ".join(form.missing) or "add them")
     model = steering_model(card.ship.name, form, given, card.ship.length_m, card.ship.speed_mps)
     return replace(model, source=card.source)
 
@@ -180,7 +184,7 @@ class CombinedPrediction:
 
 
 def combined_prediction(card: SteeringCard, other: str) -> CombinedPrediction:
-    """Table 5: what the K foretell for another model of the card (another draught), and what that model gives.
+    """Table 5: what the K predict for another model of the card (another draught), and what that model gives.
 
     Raises
     ------

@@ -44,7 +44,7 @@ EVERY = 10
 """Of so many steps one is kept: a twentieth of a ship length (:class:`tank2sim.simulation.integrator.Integrator`)."""
 
 _LONGEST = 200_000
-"""Steps of the longest run that a whole batch makes at once: the batch then takes some 40 MB (ours)."""
+"""Steps of the longest run that a whole batch makes at once: the batch then takes some 40 MB (project choice)."""
 
 # Of all outputs those that figures are read off: the others would take longer than the motion itself.
 _READ_OFF: Mapping[type, tuple[str, ...]] = {
@@ -147,7 +147,7 @@ class OfFigures:
         from tank2sim.analysis.influence.study import Study
 
         study = Study(self.ship.card(), [parse_figure(text) for text in self.figures])
-        names, own = [one.name for one in study.parameters], _parameters(study.model)
+        names, own = [parameter.name for parameter in study.parameters], _parameters(study.model)
 
         def ask(values: Mapping[str, float]) -> MemberResult:
             if fault := mass_fault(own | dict(values)):
@@ -180,7 +180,9 @@ class OfCriteria:
             if fault := mass_fault(own | given):
                 return MemberResult({}, trouble=fault)
             criteria = imo_criteria(model, given, integrator)
-            return MemberResult({one.name: math.nan if one.found is None else one.found for one in criteria})
+            return MemberResult(
+                {criterion.name: math.nan if criterion.found is None else criterion.found for criterion in criteria}
+            )
 
         return _each(ask)
 

@@ -1,4 +1,4 @@
-"""What an ensemble of a ship says of a manoeuvre, of her stability and the IMO criteria, and of figures by name."""
+"""What an ensemble of a ship says of a manoeuvre, of its stability and the IMO criteria, and of figures by name."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tank2sim.simulation.manoeuvres import Manoeuvre
 from tank2sim.units import in_words
 
 TIMES = 201
-"""Times of the bands of histories and tracks, over the run of the card itself (ours)."""
+"""Times of the bands of histories and tracks, over the run of the card itself (project choice)."""
 
 STRAIGHT = ("criterion_C", "K_prime", "T_prime", "T_s", "T3_s")
 """Figures of the straight course of which there are bands."""
@@ -44,7 +44,7 @@ class EnsembleRequest:
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """Who was asked: members, seed, those that cannot be used and why, and what is to be told."""
+    """Who was asked: members, seed, those that cannot be used and why, and what is to be reported."""
 
     members: int
     seed: int
@@ -128,7 +128,7 @@ class Chance:
 
 @dataclass(frozen=True, eq=False)
 class StabilityBands:
-    """Bands of the straight course at the card's speed, how probable it is that she is stable there, and the chances
+    """Bands of the straight course at the card's speed, how probable it is that it is stable there, and the chances
     of each criterion."""
 
     asked: Members
@@ -206,7 +206,7 @@ def stability_bands(
     except InputError as error:
         straight = Ensemble(asked.members, asked.seed, {})
         told.append(f"no bands of the straight course: {error.problem}")
-    chances = tuple(chance(one, trials) for one in criteria)
+    chances = tuple(chance(criterion, trials) for criterion in criteria)
     unseen = answering_states(build(card))
     if unseen:
         told.append(
@@ -238,7 +238,8 @@ def named_bands(
 
 
 def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
-    """Bands of figures by name, but for those of :data:`POLES` that go through infinity, and what is told of these."""
+    """Bands of figures by name, except for those of :data:`POLES` that go through infinity, and what is reported of
+    these."""
     bands = figure_bands(found)
     own = [name for name in POLES if name in bands]
     if not own:
@@ -250,8 +251,8 @@ def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
         return bands, []
     usable, words = found.usable, " and ".join(in_words(name)[0] for name in gone)
     above = int(np.sum(signs[gone[0]] > 0))
-    told = f"no band of {words}: {above} of {usable} members have C' above zero, the others below, and between these "
-    return {name: band for name, band in bands.items() if name not in gone}, [f"{told}they go through infinity"]
+    text = f"no band of {words}: {above} of {usable} members have C' above zero, the others below, and between these "
+    return {name: band for name, band in bands.items() if name not in gone}, [f"{text}they go through infinity"]
 
 
 def chance(criterion: ImoCriterion, found: Ensemble) -> Chance:

@@ -1,4 +1,4 @@
-"""Bands of what a ship's stability page draws: her steady turns against the rudder, and her linear response to it."""
+"""Bands of what a ship's stability page draws: its steady turns against the rudder, and its linear response to it."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from tank2sim.simulation.ensemble import Ask, Draws, Ensemble, MemberResult, ens
 
 CURVES = 200
 """Members of the bands of curves: the first ones. Each takes half a second, and the share below a quantile is known
-from them to 1.5 % (ours)."""
+from them to 1.5 % (project choice)."""
 
 _POINTS = 121
-"""Points of every curve (ours)."""
+"""Points of every curve (project choice)."""
 
 FROM_STARBOARD, FROM_PORT, MAGNITUDE, PHASE, STEP = (
     "yaw_rate_from_starboard_degps",
@@ -44,7 +44,7 @@ _CURVES = (FROM_STARBOARD, FROM_PORT, MAGNITUDE, PHASE, STEP)
 class Grid:
     """Where curves are read off, (n,) each: rudder (rad), frequency (rad/s) and time after a step (s).
 
-    `phase_deg` is that of the ship herself at the highest frequency: those of the members are within half a turn of it.
+    `phase_deg` is that of the ship itself at the highest frequency: those of the members are within half a turn of it.
     """
 
     rudder_rad: Array
@@ -54,7 +54,7 @@ class Grid:
 
     @staticmethod
     def of(model: Model, response: SteeringResponse) -> Grid:
-        """The rudder that the gear allows, and what the response of the ship herself is drawn over."""
+        """The rudder that the gear allows, and what the response of the ship itself is drawn over."""
         largest = largest_rudder(model) * (1 - 1e-9)
         omega = np.geomspace(response.omega_radps[0], response.omega_radps[-1], _POINTS)
         phase = float(np.degrees(np.unwrap(np.angle(response.response)))[-1])
@@ -65,7 +65,7 @@ class Grid:
 
 @dataclass(frozen=True, eq=False)
 class OfSteering:
-    """Curves of a member over the grid, (5, n), and her hysteresis loop."""
+    """Curves of a member over the grid, (5, n), and its hysteresis loop."""
 
     ship: ShipText
     speed_mps: float | None
@@ -104,7 +104,7 @@ class SteeringBands:
     members : int
         Whose curves these are, and can be used.
     own : mapping
-        The curves of the ship herself.
+        The curves of the ship itself.
     with_loop : int
         Members that have a loop; the width of the others is 0.
     """
@@ -149,18 +149,18 @@ def steering_bands(
     found = ensemble(question, draws, min(members, CURVES), executor)
     if found.histories is None or own.histories is None:
         return None
-    told = [f"no steady turns: {one}" for one in found.notices if "cannot be used" in one]
+    messages = [f"no steady turns: {notice}" for notice in found.notices if "cannot be used" in notice]
     if members > CURVES:
-        told.append(f"bands of steady turns, Bode diagram and step are of the first {CURVES} members")
+        messages.append(f"bands of steady turns, Bode diagram and step are of the first {CURVES} members")
     width = found.figures["loop_width_deg"]
     loops = int(np.sum(width > 0))
     herself = {name: row.astype(float) for name, row in zip(_CURVES, own.histories, strict=True)}
     bands = {name: _band(found, row) for row, name in enumerate(_CURVES)}
     if not all(np.isfinite(bands[name].low).all() for name in (FROM_STARBOARD, FROM_PORT)):
         share = f"{100 * (1 - STILL_RUNNING):.2g} % of the members"
-        told.append(f"bands of steady turns leave out rudders at which more than {share} have no stable turn")
+        messages.append(f"bands of steady turns leave out rudders at which more than {share} have no stable turn")
     loop = figure_bands(found).get("loop_width_deg")
-    return SteeringBands(grid, found.usable, herself, bands, loop, loops, tuple(told))
+    return SteeringBands(grid, found.usable, herself, bands, loop, loops, tuple(messages))
 
 
 def branches(turning: SteadyTurning, rudder_rad: Sequence[float] | Array) -> tuple[Array, Array]:

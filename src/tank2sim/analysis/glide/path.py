@@ -59,13 +59,13 @@ class GlidePath:
     @property
     def length_m(self) -> float:
         """Length of the path through the water."""
-        return math.fsum(one.speed_mps * time for one, time in zip(self.glides, self.durations_s, strict=True))
+        return math.fsum(glide.speed_mps * time for glide, time in zip(self.glides, self.durations_s, strict=True))
 
     def orders(self) -> list[dict[str, float]]:
         """The orders with which the transient model flies the same glides."""
         return [
-            {"buoyancy.command": one.buoyancy_kg, "pitch.command": one.pitch_rad, "roll.command": one.roll_rad}
-            for one in self.glides
+            {"buoyancy.command": glide.buoyancy_kg, "pitch.command": glide.pitch_rad, "roll.command": glide.roll_rad}
+            for glide in self.glides
         ]
 
     def sampled(self) -> Array:

@@ -119,7 +119,7 @@ def ballast_kg(card: GliderCard, buoyancy_kg: float) -> float | None:
     ballast = displaced - hull - buoyancy_kg
     if ballast < 0:
         problem = f"leaves {ballast:.4g} kg of ballast: {displaced:.5g} kg displaced, net buoyancy {buoyancy_kg:+g} kg"
-        raise card.fault("glider.hull_mass_kg", problem, "mend the volume or the mass of the hull")
+        raise card.fault("glider.hull_mass_kg", problem, "correct the volume or the mass of the hull")
     return ballast
 
 

@@ -1,4 +1,4 @@
-"""All that is asked of a glider at once: steady glides, paths, what is best, and the transient model beside them."""
+"""All that is asked of a glider at once: steady glides, paths, what is best, and the transient model next to them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class GlideQuestion:
     programme : GlideProgramme, optional
         To be flown, by the steady glides and by the transient model.
     as_printed : bool
-        True for the paper's own equations beside the corrected ones.
+        True for the paper's own equations next to the corrected ones.
     budget_kg, depth_m : float, optional
         Ballast that can be pushed out, and the depth from which: how far does it carry? Both or neither.
     views : bool
@@ -55,7 +55,7 @@ class GlideQuestion:
 
 @dataclass(frozen=True, kw_only=True)
 class GlideStudy:
-    """What was found; tuples beside `glides` are parallel to it.
+    """What was found; tuples next to `glides` are parallel to it.
 
     Parameters
     ----------

@@ -187,7 +187,7 @@ def quasi_steady_error(
 ) -> tuple[ProgrammeError, ...]:
     """How far the paper's assumption leads from the transient model, against the length of the steps.
 
-    Four steps, from a steady glide, of three kinds (a choice of ours): from dive to climb and back, from a shallow to a
+    Four steps, from a steady glide, of three kinds (project choice): from dive to climb and back, from a shallow to a
     steep dive and back, and with roll to starboard and to port; all from 6 deg above the smallest angle.
     """
     shallow = math.radians(math.ceil(math.degrees(smallest_angle(card)) + 6))

@@ -16,7 +16,7 @@ SLOWNESS = 0.1
 """The pole of the integral over the natural frequency, so that it does not disturb a course change (Fossen, 12.2)."""
 
 INTEGRAL_BAND_RAD = math.radians(2.0)
-"""Beyond it a heading error is a change of course, no disturbance: a choice of ours, twice what a helmsman corrects."""
+"""Beyond it a heading error is a change of course, no disturbance: project choice, twice what a helmsman corrects."""
 
 LARGEST_RUDDER_RAD = math.radians(35.0)
 """Limit where the card states none: the rudder angle that SOLAS II-1, regulation 29 asks a gear for."""
@@ -26,7 +26,7 @@ def heading_gains(nomoto: Nomoto, largest_rudder_rad: float = LARGEST_RUDDER_RAD
     """Gains that put the poles of heading, yaw rate and integral where (s^2 + 2 z w s + w^2)(s + a) = 0.
 
     With T dr/dt + r = K delta the loop is T s^3 + (1 + K Kd) s^2 + K Kp s + K Ki; w = sqrt(K/T), which makes the
-    rudder that a heading error orders about as large as the error (a choice of ours, amid the 0.5 to 2 of practice),
+    rudder that a heading error orders about as large as the error (project choice, amid the 0.5 to 2 of practice),
     z is :data:`DAMPING` and a is :data:`SLOWNESS` w. It also holds for a ship that is unstable (K and T negative).
 
     Raises
@@ -59,7 +59,7 @@ def heading_autopilot(ship: Model) -> Model:
     InputError
         The model is no ship, holds no straight course, or its rudder turns it the wrong way.
     """
-    limits = [one.start for one in ship.parameters if one.name == "steering.max_angle"]
+    limits = [parameter.start for parameter in ship.parameters if parameter.name == "steering.max_angle"]
     try:
         gains = heading_gains(stability(ship).nomoto, min([*limits, LARGEST_RUDDER_RAD]))
     except ValueError as error:

@@ -26,7 +26,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
 NOTCH_DAMPING = 0.1
-"""Share of waves at the frequency of a wave filter that passes: a choice of ours, as narrow as their own band."""
+"""Share of waves at the frequency of a wave filter that passes: project choice, as narrow as their own band."""
 
 DESIGNS = ("pd", "pid", "lqr", "robust")
 """Ways of design, by the names of ``--design``."""
@@ -36,7 +36,7 @@ DESIGNS = ("pd", "pid", "lqr", "robust")
 class LqrWeights:
     """What the LQR weighs against each other (Bryson & Ho, 1975): errors that are equally bad, rad.
 
-    Equal ones make a heading error worth as much rudder, as in the design by pole placement (a choice of ours).
+    Equal ones make a heading error worth as much rudder, as in the design by pole placement (project choice).
     """
 
     heading_rad: float = math.radians(5.0)

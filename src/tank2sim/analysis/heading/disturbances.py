@@ -1,4 +1,4 @@
-"""What a ship is steered in: current, wind, and waves that turn her to and fro at their own frequency."""
+"""What a ship is steered in: current, wind, and waves that turn its to and fro at their own frequency."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def wave_yaw_acceleration(weather: Weather, step_s: float, count: int) -> Array:
 
     White noise through 2 z w s/(s^2 + 2 z w s + w^2) (Fossen 2011, 8.2), exact for noise held over a step, and from
     the beginning as it is in the long run. Its standard deviation is w^2 times that of the heading: at wave frequency
-    a ship answers to a moment as her inertia alone.
+    a ship answers to a moment as its inertia alone.
     """
     w, z = weather.wave_radps, weather.wave_damping
     A = np.array([[0.0, 1.0], [-(w**2), -2 * z * w]])

@@ -24,7 +24,7 @@ _OFF_THE_KINK = 1e-6
 """rad: far below any rudder angle that matters."""
 
 _TAKES_PART = 0.1
-"""Participation in a mode from which a state is named (a choice of ours)."""
+"""Participation in a mode from which a state is named (project choice)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ class LoopMargins:
     speed_mps : float
     gain_margin_up, gain_margin_down : float
         By how much the loop gain may grow, and to what share it may fall; inf and 0 if by any amount. A ship that is
-        unstable by herself has the second one above 0: she needs her helmsman.
+        unstable by itself has the second one above 0: it needs its helmsman.
     phase_margin_deg : float
         The least of all crossovers.
     delay_margin_s : float
@@ -103,7 +103,7 @@ class LoopResponse:
 
 
 _DECADES = (-2.0, 1.3)
-"""What frequencies are told, in decades from the crossover (ours)."""
+"""What frequencies are reported, in decades from the crossover (project choice)."""
 _FREQUENCIES = 500
 
 

@@ -152,7 +152,7 @@ class CourseKeeping:
 
 def without_anti_windup(autopilot: Model) -> dict[str, float]:
     """Parameters with which the integral goes on at the limit, and takes the whole of a course change; none of a PD."""
-    starts = {one.name: one.start for one in autopilot.parameters}
+    starts = {parameter.name: parameter.start for parameter in autopilot.parameters}
     if "autopilot.anti_windup_time" not in starts:
         return {}
     changed = {"autopilot.anti_windup_time": 1e6, "autopilot.integral_band": math.pi}

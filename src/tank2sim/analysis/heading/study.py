@@ -47,10 +47,10 @@ _KEEPING_TIMES = 120
 """Length of course keeping in 1/w; figures are those of its later half."""
 
 _WAVES_TOLD = 40
-"""Of course keeping, in the histories (ours)."""
+"""Of course keeping, in the histories (project choice)."""
 
 _BUSY_PERCENT = 10.0
-"""Share of the time at full rate from which a gear is said to be overworked by waves (a choice of ours)."""
+"""Share of the time at full rate from which a gear is said to be overworked by waves (project choice)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,7 +134,11 @@ class AutopilotStudy:
             "autopilot.integral_band": "integral_band_rad",
             "autopilot.integral_limit": "integral_limit_radps",
         }
-        found = {names[one.name]: one.start for one in self.design.autopilot.parameters if one.name in names}
+        found = {
+            names[parameter.name]: parameter.start
+            for parameter in self.design.autopilot.parameters
+            if parameter.name in names
+        }
         if "autopilot.integral" not in self.design.autopilot:
             found.pop("anti_windup_time_s", None)
         return _in_degrees(found)
@@ -150,21 +154,21 @@ class AutopilotStudy:
             "source": self.design.source,
             "gains": dict(self.design.gains),
             "limits": self.limits,
-            "margins": {"at_design": first.as_json(), "at_speeds": [one.as_json() for one in self.margins]},
+            "margins": {"at_design": first.as_json(), "at_speeds": [margin.as_json() for margin in self.margins]},
             "closed_loop": {
                 "poles": [[pole.real, pole.imag] for pole in first.poles],
                 "bandwidth_radps": first.bandwidth_radps,
                 "largest_step_within_rate_limit_deg": math.degrees(self.steps.within_rate_rad),
                 "largest_step_within_angle_limit_deg": math.degrees(self.steps.within_angle_rad),
-                "course_changes": {name: asdict(one) for name, one in self.changes.items()},
+                "course_changes": {name: asdict(change) for name, change in self.changes.items()},
                 "course_keeping": asdict(self.keeping),
             },
             "weather": _in_degrees(asdict(self.weather)),
-            "track": {name: asdict(one.figures) for name, one in self.tracks.items()},
+            "track": {name: asdict(track.figures) for name, track in self.tracks.items()},
             "ship_alone": alone,
-            "responses": [one.as_json() for one in self.responses],
+            "responses": [response.as_json() for response in self.responses],
             "histories": self._histories(),
-            "track_histories": {name: one.as_json() for name, one in self.tracks.items()},
+            "track_histories": {name: track.as_json() for name, track in self.tracks.items()},
             "waypoints_m": [] if self.waypoints is None else self.waypoints.tolist(),
             "notices": list(self.notices),
         }
@@ -195,7 +199,7 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     margins, told = _margins(ship, design, settings.speed_mps, only_own=only)
     if not margins[0].stable:
         raise _not_stable(ship, design, settings.speed_mps)
-    values = {one.name: one.start for one in ship.parameters}
+    values = {parameter.name: parameter.start for parameter in ship.parameters}
     weather = weather_for(values["ship.length"], **settings.weather)
     outside, inputs = in_weather(ship, card, weather)
     loop = HeadingLoop(outside, design.autopilot)
@@ -266,11 +270,11 @@ def _design(ship: Model, settings: StudySettings) -> HeadingDesign:
 def _margins(
     ship: Model, design: HeadingDesign, speed: float | None, *, only_own: bool
 ) -> tuple[tuple[LoopMargins, ...], list[str]]:
-    """At the speed of the design and at five across the card's range; and what is to be told of those without.
+    """At the speed of the design and at five across the card's range; and what is to be reported of those without.
 
     The forces of a linear card are those at its own speed by definition: others would repeat its margins.
     """
-    values = {one.name: one.start for one in ship.parameters}
+    values = {parameter.name: parameter.start for parameter in ship.parameters}
     own = values["ship.speed"] if speed is None else speed
     found, told = [loop_margins(ship, design.autopilot, own)], []
     if only_own:
@@ -286,7 +290,7 @@ def _margins(
 
 
 def _responses(ship: Model, design: HeadingDesign, margins: tuple[LoopMargins, ...]) -> tuple[LoopResponse, ...]:
-    first, speeds = margins[0], [one.speed_mps for one in margins]
+    first, speeds = margins[0], [margin.speed_mps for margin in margins]
     shown = dict.fromkeys((first.speed_mps, min(speeds), max(speeds)))
     return tuple(loop_response(ship, design.autopilot, speed, first.crossover_radps) for speed in shown)
 
@@ -316,32 +320,34 @@ def _notices(
     changes: Mapping[str, CourseChange],
     tracks: Mapping[str, TrackRun],
 ) -> list[str]:
-    told = [f"the loop is not stable at {one.speed_mps:.4g} m/s" for one in margins if not one.stable]
-    told += [
+    messages = [f"the loop is not stable at {margin.speed_mps:.4g} m/s" for margin in margins if not margin.stable]
+    messages += [
         f"the course change {name!r} is not settled after {runs[name].t[-1]:.0f} s"
-        for name, one in changes.items()
-        if one.settling_time_s is None
+        for name, change in changes.items()
+        if change.settling_time_s is None
     ]
-    return told + [f"the track is not finished, {name}" for name, one in tracks.items() if not one.figures.finished]
+    return messages + [
+        f"the track is not finished, {name}" for name, track in tracks.items() if not track.figures.finished
+    ]
 
 
 def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weather: Weather) -> list[str]:
     """What is asked of the gear in waves, and where the autopilot stops short of it."""
-    told = []
+    messages = []
     if kept.rate_limited_percent > _BUSY_PERCENT:
         remedy = f"--wave-filter {weather.wave_radps:.3g}" if design.kind == "pid" else "--design pid --wave-filter"
         filtered = "wave_filter_radps" in design.gains
-        told.append(
+        messages.append(
             f"keeping a course in waves the rudder is at full rate {kept.rate_limited_percent:.0f} % of the time: "
             + ("the waves are more than this gear can follow" if filtered else f"{remedy} lets it rest")
         )
-    limit = {one.name: one.start for one in ship.parameters}.get("steering.max_angle", 0.0)
+    limit = {parameter.name: parameter.start for parameter in ship.parameters}.get("steering.max_angle", 0.0)
     if limit > LARGEST_RUDDER_RAD * (1 + 1e-9):
-        told.append(
+        messages.append(
             f"the autopilot orders no more than {math.degrees(LARGEST_RUDDER_RAD):.0f} deg of rudder, the angle that "
             f"SOLAS II-1, regulation 29, asks a gear for; this gear goes to {math.degrees(limit):.3g} deg"
         )
-    return told
+    return messages
 
 
 def _begun_at(speed: float | None) -> list[str]:

@@ -35,7 +35,7 @@ class Guidance:
     Parameters
     ----------
     lookahead_lengths : float
-        D: a choice of ours; shorter ones come to the track sooner, and swing across it.
+        D: project choice; shorter ones come to the track sooner, and swing across it.
     acceptance_lengths : float
         Radius about a waypoint in which the next leg begins; 2 by Fossen (2011), 10.3.2.
     integral_share : float
@@ -160,7 +160,7 @@ def keep_track(
     InputError
         A leg is shorter than the circle of acceptance, or the motion leaves all bounds.
     """
-    values = {one.name: one.start for one in loop.model.parameters}
+    values = {parameter.name: parameter.start for parameter in loop.model.parameters}
     length, speed = values["ship.length"], values["ship.speed"]
     _refuse_short_legs(waypoints, guidance.acceptance_lengths * length)
     first = waypoints[1] - waypoints[0]

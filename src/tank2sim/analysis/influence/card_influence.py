@@ -2,7 +2,7 @@
 
 By exact slopes, K = 10 c/F dF/dc, and by the 10 % difference of the paper
 (:mod:`tank2sim.analysis.influence.percent`), side by side; and what the standard errors of the card, and
-their covariance where one stands beside it, make of each figure.
+their covariance where one is next to it, make of each figure.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 
 CURVED = 1.5
-"""A slope and a 10 % difference that differ by this factor are told: the figure bends or jumps there (ours)."""
+"""A slope and a 10 % difference that differ by this factor are reported: the figure bends or jumps there (project
+choice)."""
 
 TOLD_FROM = 0.5
 """... where either is at least so many per cent of the figure."""
@@ -30,7 +31,7 @@ TOLD_FROM = 0.5
 
 @dataclass(frozen=True)
 class Agreed:
-    """An agreed variation: Kc % by parameter, and for each figure what the sum of Kc K / 10 foretells, by exact slopes
+    """An agreed variation: Kc % by parameter, and for each figure what the sum of Kc K / 10 predicts, by exact slopes
     and by 10 % differences, and what computing it directly gives; per cent of the figure."""
 
     percent: Mapping[str, float]
@@ -76,7 +77,7 @@ class CardInfluence:
     @property
     def exact(self) -> Array:
         """K % (nf, k) by exact slopes, 10 c/F dF/dc; nan where a figure is zero."""
-        c = np.array([one.value for one in self.parameters])
+        c = np.array([parameter.value for parameter in self.parameters])
         with np.errstate(divide="ignore", invalid="ignore"):
             found = STEP_PERCENT * c * self.slopes / self.values[:, None]
         return np.where(np.isfinite(found), found, np.nan)
@@ -106,7 +107,7 @@ class CardInfluence:
             return "standard errors of figures are from those of the card's numbers, as if these were independent"
         others = "" if len(self.errors.together) == len(self.parameters) else ", others as if independent"
         count = len(self.errors.together)
-        return f"standard errors of figures are from the covariance beside the card ({count} numbers{others})"
+        return f"standard errors of figures are from the covariance next to the card ({count} numbers{others})"
 
     @property
     def _variances(self) -> Array:
@@ -120,7 +121,7 @@ class CardInfluence:
         Parameters have their dotted keys in the card's file, and their values as they stand there.
         """
         exact, errors, shares = self.exact, self.standard_errors, self.shares
-        names = [one.key for one in self.parameters]
+        names = [parameter.key for parameter in self.parameters]
         rows = range(len(self.figures))
         result: dict[str, object] = {
             "ship": self.ship,
@@ -134,13 +135,13 @@ class CardInfluence:
                 for row in rows
             },
             "parameters": {
-                one.key: {
-                    "value": one.value * one.factor,
-                    "standard_error": one.standard_error * abs(one.factor),
-                    "assumed": one.assumed,
-                    "name": one.short,
+                parameter.key: {
+                    "value": parameter.value * parameter.factor,
+                    "standard_error": parameter.standard_error * abs(parameter.factor),
+                    "assumed": parameter.assumed,
+                    "name": parameter.short,
                 }
-                for one in self.parameters
+                for parameter in self.parameters
             },
             "influence_percent": {
                 self.figures[row].text: {
@@ -156,7 +157,7 @@ class CardInfluence:
 
     def _agreed_as_json(self, agreed: Agreed) -> dict[str, object]:
         columns = zip(self.figures, agreed.foretold, agreed.foretold_by_difference, agreed.direct, strict=True)
-        keys = {one.name: one.key for one in self.parameters}
+        keys = {parameter.name: parameter.key for parameter in self.parameters}
         return {
             "percent": {keys[name]: percent for name, percent in agreed.percent.items()},
             "figures": {
@@ -187,8 +188,8 @@ def influence(study: Study, agreed: Mapping[str, float] | None = None) -> CardIn
     together = None
     if agreed:
         together = _agreed(study, whole, agreed_by_name(agreed, study.parameters))
-    told = [*study.notices, *errors.in_words, *_not_smooth(whole), *_differing(study, values)]
-    return replace(whole, agreed=together, notices=tuple(told))
+    messages = [*study.notices, *errors.in_words, *_not_smooth(whole), *_differing(study, values)]
+    return replace(whole, agreed=together, notices=tuple(messages))
 
 
 def _differences(study: Study) -> Array:
@@ -212,7 +213,7 @@ def _change(study: Study, values: Array) -> list[float]:
 
 
 def _agreed(study: Study, found: CardInfluence, percent: Mapping[str, float]) -> Agreed:
-    names = [one.name for one in study.parameters]
+    names = [parameter.name for parameter in study.parameters]
     values = dict(zip(names, study.values.tolist(), strict=True))
     changed = changed_together(values, percent)
     direct = _change(study, np.array([changed[name] for name in names]))
@@ -231,7 +232,7 @@ def _differing(study: Study, sloped: Array) -> Iterable[str]:
 
 
 def _not_smooth(found: CardInfluence) -> list[str]:
-    told = []
+    messages = []
     exact = found.exact
     for row, figure in enumerate(found.figures):
         gone, bent = [], []
@@ -244,7 +245,9 @@ def _not_smooth(found: CardInfluence) -> list[str]:
             elif slope * step <= 0 or not 1 / CURVED < abs(step / slope) < CURVED:
                 bent.append(parameter.short)
         if gone:
-            told.append(f"{figure.text}: 10 % more of {', '.join(gone)} and the ship does not show it any more")
+            messages.append(f"{figure.text}: 10 % more of {', '.join(gone)} and the ship does not show it any more")
         if bent:
-            told.append(f"{figure.text} is not smooth or strongly curved in {', '.join(bent)}: slope and 10 % disagree")
-    return told
+            messages.append(
+                f"{figure.text} is not smooth or strongly curved in {', '.join(bent)}: slope and 10 % disagree"
+            )
+    return messages

@@ -23,7 +23,7 @@ class JointErrors:
     covariance : array (k, k)
         In the units of the parameters' values.
     together : frozenset of str
-        Keys of those in the covariance beside the card; all others are independent. Empty where the card has none.
+        Keys of those in the covariance next to the card; all others are independent. Empty where the card has none.
     """
 
     parameters: tuple[CardParameter, ...]
@@ -32,14 +32,14 @@ class JointErrors:
 
     @property
     def in_words(self) -> list[str]:
-        """What a user should be told of them."""
+        """What a user should know of them."""
         told = standard_errors_in_words(self.parameters, self.together)
         return [self.together_in_words, *told] if self.together else told
 
     @property
     def together_in_words(self) -> str:
         """Which of them go together."""
-        return f"errors of {len(self.together)} numbers go together, as the covariance beside the card says"
+        return f"errors of {len(self.together)} numbers go together, as the covariance next to the card says"
 
 
 def joint_errors(card: ManoeuvringCard, parameters: Sequence[CardParameter]) -> JointErrors:
@@ -51,11 +51,11 @@ def joint_errors(card: ManoeuvringCard, parameters: Sequence[CardParameter]) -> 
         The covariance to which the card refers is at fault.
     """
     known = read_covariance(card)
-    own = np.array([one.standard_error for one in parameters])
+    own = np.array([parameter.standard_error for parameter in parameters])
     covariance = np.diag(own**2)
     if known is None:
         return JointErrors(tuple(parameters), covariance, frozenset())
-    places = {one.key: place for place, one in enumerate(parameters)}
+    places = {parameter.key: place for place, parameter in enumerate(parameters)}
     names = [name for name in known.names if name in places]
     rows = [places[name] for name in names]
     here = [known.names.index(name) for name in names]

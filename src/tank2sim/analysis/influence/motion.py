@@ -233,7 +233,7 @@ class _Course:
 
 
 def _orders(course: Trajectory | _Course) -> NDArray[np.int64]:
-    """Rows at which new inputs are given, but for the first."""
+    """Rows at which new inputs are given, except for the first."""
     return np.flatnonzero(np.any(np.diff(course.u, axis=0) != 0, axis=1)) + 1
 
 

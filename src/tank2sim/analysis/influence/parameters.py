@@ -65,7 +65,7 @@ def study_model(card: ManoeuvringCard) -> Model:
 
 
 def card_parameters(card: ManoeuvringCard, model: Model) -> tuple[CardParameter, ...]:
-    """Parameters of a card that are in its model, but for those that are zero without a standard error."""
+    """Parameters of a card that are in its model, except for those that are zero without a standard error."""
     found = (*_derivatives(card, model), *_rigid_body(card), *_gear(card), *_propulsion(card), *_effects(card, model))
     known = set(model.parameter_names)
     return tuple(one for one in found if one.name in known and (one.value != 0 or one.standard_error > 0))
@@ -79,11 +79,13 @@ def find_parameter(parameters: Sequence[CardParameter], name: str, option: str) 
     InputError
         The card has no such parameter, or it is zero and known to be so.
     """
-    by_name = {key: one for one in parameters for key in (one.key, one.short, one.name)}
+    by_name = {key: parameter for parameter in parameters for key in (parameter.key, parameter.short, parameter.name)}
     if name in by_name:
         return by_name[name]
     close = difflib.get_close_matches(name, by_name, n=1)
-    remedy = f"did you mean {close[0]}?" if close else f"there are: {', '.join(one.short for one in parameters)}"
+    remedy = (
+        f"did you mean {close[0]}?" if close else f"there are: {', '.join(parameter.short for parameter in parameters)}"
+    )
     raise InputError(option, name, "is no parameter of this card that is not zero", remedy)
 
 
@@ -100,7 +102,7 @@ def _derivatives(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
             key=f"derivatives.{card.places.get(name, name)}",
             factor=file_factor(known_term(name), scales, rudder_to_port=to_port),
         )
-        for name in (one.removeprefix("derivatives.") for one in model.parameter_names)
+        for name in (name.removeprefix("derivatives.") for name in model.parameter_names)
         if name in stated
     ]
 
@@ -168,20 +170,20 @@ def _effects(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
 
 
 def standard_errors_in_words(parameters: Sequence[CardParameter], known: Collection[str] = frozenset()) -> list[str]:
-    """What a user should be told of the standard errors that are taken; those of the keys `known` stand elsewhere."""
-    others = [one for one in parameters if one.key not in known]
-    assumed = [one.short for one in others if one.assumed and one.standard_error > 0]
-    exact = [one.short for one in others if one.standard_error == 0]
-    told = []
+    """What a user should know of the standard errors that are taken; those of the keys `known` stand elsewhere."""
+    others = [parameter for parameter in parameters if parameter.key not in known]
+    assumed = [other.short for other in others if other.assumed and other.standard_error > 0]
+    exact = [other.short for other in others if other.standard_error == 0]
+    messages = []
     if assumed:
         every = len(assumed) + len(exact) == len(parameters)
         which = "any number" if every else ", ".join(assumed)
         mark = f"{ASSUMED}, not measured ones: " if every else ""
         share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of the value is taken"
-        told.append(f"{mark}the card states no standard error of {which}: {share}")
+        messages.append(f"{mark}the card states no standard error of {which}: {share}")
     if exact:
-        told.append(f"taken as exact, for a card states no standard error of them: {', '.join(exact)}")
-    return told
+        messages.append(f"taken as exact, for a card states no standard error of them: {', '.join(exact)}")
+    return messages
 
 
 def agreed_by_name(

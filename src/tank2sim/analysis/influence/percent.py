@@ -44,7 +44,7 @@ def change_percent(value: float, base: float) -> float:
 
 
 def combined_percent(influence: Mapping[str, float], agreed: Mapping[str, float]) -> float:
-    """Change of a figure in per cent that an agreed variation foretells: sum of Kc K / 10.
+    """Change of a figure in per cent that an agreed variation predicts: sum of Kc K / 10.
 
     Parameters
     ----------

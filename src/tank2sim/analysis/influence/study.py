@@ -1,4 +1,4 @@
-"""A ship with figures asked of her: their values and exact slopes at any values of her parameters."""
+"""A ship with figures asked of it: their values and exact slopes at any values of its parameters."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import Run, simulate
 
 NO_TURN = 1e-4
-"""A ship whose steady yaw rate is less than this share of u0/L goes straight: a circle of 10 000 lengths (ours)."""
+"""A ship whose steady yaw rate is less than this share of u0/L goes straight: a circle of 10 000 lengths (project
+choice)."""
 
 PLACE_FELT = 1e-20
 """Squared slopes of the scaled accelerations by place and heading from which no turn is steady: rounding is below."""
@@ -57,11 +58,11 @@ class Study:
         self.card, self.figures = card, tuple(figures)
         self.model = study_model(card)
         self.parameters: tuple[CardParameter, ...] = card_parameters(card, self.model)
-        self.values: Array = np.array([one.value for one in self.parameters])
+        self.values: Array = np.array([parameter.value for parameter in self.parameters])
         self._integrator = Integrator(self.model)
         own = dict(zip(self.model.parameter_names, self.model.parameter_values().tolist(), strict=True))
         self._length, self._speed = own["ship.length"], own["ship.speed"]
-        self._places = [self.model.parameter_names.index(one.name) for one in self.parameters]
+        self._places = [self.model.parameter_names.index(parameter.name) for parameter in self.parameters]
         self._rest_near: dict[float, Array] = {}
         self._long_enough: dict[Turn | Zigzag, float] = {}
         self._told: dict[str, None] = dict.fromkeys(self.model.notices)
@@ -77,7 +78,7 @@ class Study:
 
     @cached_property
     def _motion(self) -> MotionSlopes:
-        return MotionSlopes(self._integrator, [one.name for one in self.parameters])
+        return MotionSlopes(self._integrator, [parameter.name for parameter in self.parameters])
 
     @cached_property
     def _turning(self) -> EquilibriumFigures:
@@ -89,11 +90,11 @@ class Study:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What a user should be told of the ship of the card and of her manoeuvres."""
+        """What a user should know of the ship of the card and of its manoeuvres."""
         return tuple(self._told)
 
     def figures_at(self, values: Array) -> Array:
-        """Figures (nf,) of the ship with parameters `values` (k,); nan for those that she does not show."""
+        """Figures (nf,) of the ship with parameters `values` (k,); nan for those that it does not show."""
         return self._evaluated(values, sloped=False)[0]
 
     def slopes_at(self, values: Array) -> tuple[Array, Array]:
@@ -102,8 +103,10 @@ class Study:
 
     def _evaluated(self, values: Array, *, sloped: bool) -> tuple[Array, Array]:
         found, slopes = np.full(len(self.figures), np.nan), np.full((len(self.figures), len(values)), np.nan)
-        for family, angles in dict.fromkeys((one.kind.family, one.angles) for one in self.figures):
-            rows = [n for n, one in enumerate(self.figures) if (one.kind.family, one.angles) == (family, angles)]
+        for family, angles in dict.fromkeys((figure.kind.family, figure.angles) for figure in self.figures):
+            rows = [
+                n for n, figure in enumerate(self.figures) if (figure.kind.family, figure.angles) == (family, angles)
+            ]
             named = self._family(self.figures[rows[0]], values, sloped)
             for row in rows:
                 if self.figures[row].kind.name in named:
@@ -164,12 +167,16 @@ class Study:
             problem = f"{self.card.ship.name} does not turn steadily to the side of {degrees}"
             raise InputError(FIGURE_OPTION, text, problem, "ask at more rudder")
         if found[1][3] > PLACE_FELT:
-            problem = f"{self.card.ship.name} feels where she is or heads (wind or waves): no turn is steady"
+            problem = f"{self.card.ship.name} feels where it is or heads (wind or waves): no turn is steady"
             raise InputError(FIGURE_OPTION, text, problem, "take that effect off the card, or ask for advance_m@35")
         return found[0]
 
     def _simulated(self, manoeuvre: Turn | Zigzag, p: Array, sloped: bool) -> dict[str, tuple[float, Array | None]]:
-        names = {one.kind.name for one in self.figures if one.manoeuvre == manoeuvre and one.kind.family != STEADY}
+        names = {
+            figure.kind.name
+            for figure in self.figures
+            if figure.manoeuvre == manoeuvre and figure.kind.family != STEADY
+        }
         run = self._run(manoeuvre, p, self._long_enough.get(manoeuvre))
         found = named_figures(run.figures)
         if manoeuvre in self._long_enough and not names <= set(found):
@@ -189,7 +196,7 @@ class Study:
             angles = [manoeuvre.rudder, *([manoeuvre.heading] if isinstance(manoeuvre, Zigzag) else [])]
             words = f"{type(manoeuvre).__name__.lower()} {'/'.join(f'{math.degrees(angle):.4g}' for angle in angles)}"
             marked = {f"{words}: {run.reading.message}": None} if run.reading.message else {}
-            self._told |= marked | dict.fromkeys(one for one in run.notices if one != run.reading.message)
+            self._told |= marked | dict.fromkeys(notice for notice in run.notices if notice != run.reading.message)
         return run
 
 

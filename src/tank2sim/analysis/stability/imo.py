@@ -28,11 +28,11 @@ SHORTEST_SHIP_M = 100.0
 
 _SCALE = (
     "MSC.137(76) is for ships of 100 m and more: its limits of the 10/10 overshoots go with L/V in seconds, which a "
-    "model does not keep, and the card tells no scale: judge the overshoots of the ship she stands for"
+    "model does not keep, and the card tells no scale: judge the overshoots of the ship it stands for"
 )
 
 _TURNED = math.radians(90.0)
-"""A ship that has turned so far against her rudder does not answer late, but the wrong way. A choice of ours."""
+"""A ship that has turned so far against its rudder does not answer late, but the wrong way. Project choice."""
 
 
 @dataclass(frozen=True)
@@ -133,19 +133,19 @@ class _Worse:
 
 
 def _wrong_way(manoeuvre: Manoeuvre, run: Trajectory) -> str:
-    """A cause that shows nothing else: a ship that turns against her rudder."""
+    """A cause that shows nothing else: a ship that turns against its rudder."""
     if not isinstance(manoeuvre, Turn | Zigzag):
         return ""
     turned = float(run["motion.psi"][-1] - run["motion.psi"][0])
     # A zigzag that is carried out ends on either side, yet never goes far.
     against = turned * manoeuvre.rudder < 0 and abs(turned) > _TURNED
-    return "the ship turns against her rudder: see the signs of Yd and Nd and the card's rudder_sign" if against else ""
+    return "the ship turns against its rudder: see the signs of Yd and Nd and the card's rudder_sign" if against else ""
 
 
 def imo_criteria(
     model: Model, changed: Mapping[str, float] | None = None, integrator: Integrator | None = None
 ) -> tuple[ImoCriterion, ...]:
-    """Turning, initial turning, yaw checking and stopping of a ship at her speed of expansion (5.3.1 to 5.3.4).
+    """Turning, initial turning, yaw checking and stopping of a ship at its speed of expansion (5.3.1 to 5.3.4).
 
     The worse of starboard and port is taken. A trial that cannot be run leaves its criteria open, with the reason.
 
@@ -176,8 +176,8 @@ def imo_criteria(
     (of_twenty,) = trials.worst([Zigzag(twenty, twenty), Zigzag(-twenty, twenty)], ("overshoots_deg", 0))
 
     def criterion(name: str, found: _Worse, allowed: float, unit: str, remark: str = "") -> ImoCriterion:
-        told = "; ".join(one for one in (found.remark, remark) if one)
-        return ImoCriterion(name, found.value, allowed, unit, told, found.beyond)
+        text = "; ".join(one for one in (found.remark, remark) if one)
+        return ImoCriterion(name, found.value, allowed, unit, text, found.beyond)
 
     return (
         criterion("advance", advance, 4.5, "L"),

@@ -1,4 +1,4 @@
-"""How far a ship is from neutral straight-line stability, and what moves her: derivatives, speed, trim.
+"""How far a ship is from neutral straight-line stability, and what moves it: derivatives, speed, trim.
 
     C' = Y'_v (N'_r - m' x'_G u') - N'_v (Y'_r - m' u')
 
@@ -23,10 +23,11 @@ from tank2sim.dynamics.model import Model, Parameter
 from tank2sim.errors import InputError
 
 SPEEDS = 25
-"""Speeds at which C' is told, evenly over the card's range."""
+"""Speeds at which C' is reported, evenly over the card's range."""
 
 CHANGE = 0.1
-"""Change of a derivative whose effect is told: 10 %, as influence coefficients are (Poznyakov and Yudin, paper 4)."""
+"""Change of a derivative whose effect is reported: 10 %, as influence coefficients are (Poznyakov and Yudin, paper
+4)."""
 
 _NOTHING = 0.1
 """Per cent of C' below which an influence is none: what an asymmetry of the straight course leaves."""
@@ -117,7 +118,7 @@ class Margin:
             "sway_lever_lengths": self.sway_lever,
             "lever_margin_lengths": self.lever,
             "margin_percent": self.percent,
-            "derivatives": [one.as_json() for one in self.influences],
+            "derivatives": [influence.as_json() for influence in self.influences],
             "speed": {
                 "speed_mps": self.speeds_mps,
                 "C_prime": self.criteria,
@@ -214,7 +215,7 @@ def stability_margin(model: Model, speed_mps: float | None = None) -> Margin:
         for name in names
         if (name.startswith("derivatives.") or name in _BODY) and point.p[names.index(name)] != 0
     ]
-    moving = [one for one in influences if abs(one.percent) > _NOTHING]
+    moving = [influence for influence in influences if abs(influence.percent) > _NOTHING]
     speeds, criteria, by_speed = _over_speed(criterion, point)
     return Margin(
         criterion=value,
@@ -267,7 +268,7 @@ def _over_speed(criterion: StabilityCriterion, point: OperatingPoint) -> tuple[A
     model = criterion.model
     if not criterion.by_speed:
         return np.zeros(0), np.zeros(0), np.zeros(0)
-    start = {one.name: one.start for one in model.parameters if isinstance(one, Parameter)}
+    start = {parameter.name: parameter.start for parameter in model.parameters if isinstance(parameter, Parameter)}
     speeds = np.linspace(start["ship.slowest"], start["ship.fastest"], SPEEDS)
     rows = []
     for speed in speeds:

@@ -58,8 +58,8 @@ class SteeringResponse:
         """Complex numbers as [real, imaginary]; gain in dB of 1/s, phase in deg."""
         return {
             "system": self.label,
-            "poles": [[one.real, one.imag] for one in self.poles],
-            "zeros": [[one.real, one.imag] for one in self.zeros],
+            "poles": [[pole.real, pole.imag] for pole in self.poles],
+            "zeros": [[zero.real, zero.imag] for zero in self.zeros],
             "gain_per_s": self.gain_per_s,
             "bode": {
                 "omega_radps": self.omega_radps,

@@ -191,7 +191,7 @@ def speed_acts(model: Model, point: OperatingPoint) -> bool:
     own = float(point.p[model.parameter_names.index("ship.speed")])
     fastest = float(point.p[model.parameter_names.index("ship.fastest")])
     found = []
-    # both where the card holds: below her slowest speed a linear card, too, goes over to the forces at low speed
+    # both where the card holds: below its slowest speed a linear card, too, goes over to the forces at low speed
     for speed in (own, 0.5 * (own + fastest) if fastest > own else 1.01 * own):
         x = point.x.copy()
         x[place] = speed

@@ -20,10 +20,10 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
 _FAR = 0.05
-"""A steady point of a spiral that lies further from the diagram than this share of its largest yaw rate is told."""
+"""A steady point of a spiral that lies further from the diagram than this share of its largest yaw rate is reported."""
 
 _SAME_SPEED = 0.01
-"""Speeds that differ by less than this share are one (ours)."""
+"""Speeds that differ by less than this share are one (project choice)."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class StabilityStudy:
             **self.stability.as_json(),
             "margins": self.margin.as_json(),
             "trim": self.trim.as_json(),
-            "responses": [one.as_json() for one in self.responses],
+            "responses": [response.as_json() for response in self.responses],
             "steady_turning": self.turning and self.turning.as_json(),
             "characteristic": self.characteristic and self.characteristic.as_json(),
             "spirals": {
@@ -74,7 +74,7 @@ class StabilityStudy:
 
 
 def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bool = True) -> StabilityStudy:
-    """Stability and manoeuvrability of a ship, the straight course by default at her speed of expansion.
+    """Stability and manoeuvrability of a ship, the straight course by default at its speed of expansion.
 
     What a ship does not have (a steady turn, a trial that ends) is left out and told; only a straight course is needed.
 
@@ -120,34 +120,34 @@ def _reason(error: InputError) -> str:
 def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[str]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     slowest, fastest, own = values["ship.slowest"], values["ship.fastest"], values["ship.speed"]
-    told = []
+    messages = []
     if not by_speed:
-        told.append(
+        messages.append(
             f"the forces of this card do not change with speed: a linear card is that of {own:.4g} m/s alone, C' and "
             "the prime numbers are made with that speed, and there is no curve over speed"
         )
     if not slowest <= found.speed_mps <= fastest:
-        told.append(f"{found.speed_mps:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
+        messages.append(f"{found.speed_mps:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
     if abs(found.speed_mps / own - 1) > _SAME_SPEED:
-        told.append(f"steady turns, spirals and the IMO criteria are those at the card's speed, {own:.4g} m/s")
-    return told
+        messages.append(f"steady turns, spirals and the IMO criteria are those at the card's speed, {own:.4g} m/s")
+    return messages
 
 
 def _about_effects(found: Stability) -> list[str]:
     """What C' and Nomoto's models leave out, and where the modes say something else."""
-    told = []
+    messages = []
     if found.effect_states:
-        told.append(
+        messages.append(
             f"C', its margin and Nomoto's K and T are those of slow motions, which {', '.join(found.effect_states)} "
-            "follow at once; T1 and T2 are then no time constants of the whole ship: her eigenvalues, the word stable "
+            "follow at once; T1 and T2 are then no time constants of the whole ship: its eigenvalues, the word stable "
             "or unstable, and the response to the rudder are with these states"
         )
     if not found.criterion_decides and found.criterion > 0:
-        told.append(
-            f"C' > 0, and yet a mode grows at {found.growth_per_s:.3g} 1/s: she is unstable, and the margin of C' says "
+        messages.append(
+            f"C' > 0, and yet a mode grows at {found.growth_per_s:.3g} 1/s: it is unstable, and the margin of C' says "
             "nothing of that"
         )
-    return told
+    return messages
 
 
 def _about_weather(model: Model) -> list[str]:
@@ -162,30 +162,30 @@ def _about_weather(model: Model) -> list[str]:
 
 
 def _spirals(model: Model, turning: SteadyTurning) -> tuple[SpiralPoints | None, SpiralPoints | None, list[str]]:
-    """The two spirals, and what is to be told of them."""
-    told: list[str] = []
+    """The two spirals, and what is to be reported of them."""
+    messages: list[str] = []
     direct = reverse = None
     try:
         if turning.stable.any():
             direct = direct_spiral(model, turning)
         else:
-            told.append("no spiral: no steady turn is stable with the rudder held")
+            messages.append("no spiral: no steady turn is stable with the rudder held")
     except InputError as error:
-        told.append(f"no spiral: {_reason(error)}")
+        messages.append(f"no spiral: {_reason(error)}")
     try:
         reverse = reverse_spiral(model, turning, stability(model).nomoto)
         if reverse is None:
-            told.append("no reverse spiral: the rudder turns the ship the wrong way, or not at all")
+            messages.append("no reverse spiral: the rudder turns the ship the wrong way, or not at all")
     except InputError as error:
-        told.append(f"no reverse spiral: {_reason(error)}")
+        messages.append(f"no reverse spiral: {_reason(error)}")
     most = float(np.max(np.abs(turning.yaw_rate_radps)))
     for name, points in (("spiral", direct), ("reverse spiral", reverse)):
         if points is None:
             continue
         off = int(np.sum(points.steady & ~(points.distance_radps < _FAR * most)))
         if off:
-            told.append(
+            messages.append(
                 f"{off} steady points of the {name} lie on no branch of the diagram: the ship has turns that are not "
-                "joined to her straight course, or the diagram ends before them"
+                "joined to its straight course, or the diagram ends before them"
             )
-    return direct, reverse, told
+    return direct, reverse, messages

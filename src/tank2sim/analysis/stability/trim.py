@@ -3,7 +3,8 @@
 Two sources, side by side. Both speak of the hydrodynamic derivatives, without the inertia of (3.1).
 
 Paper 2 (Krezelewski and Misiag, section 5): a change of trim of 1 % changes one of the two most significant
-coefficients by 7.5 %; the print is damaged, and which of Y_r and N_r it is cannot be decided. Both readings are told.
+coefficients by 7.5 %; the print is damaged, and which of Y_r and N_r it is cannot be decided. Both readings are
+reported.
 
 Inoue, Hirano and Kijima (1981), Hydrodynamic derivatives on ship manoeuvring, Int. Shipbuilding Progress 28(321), from
 tests of models on even keel and trimmed, with tau the trim by the stern and d the mean draught (factors as they are
@@ -32,7 +33,7 @@ INOUE = {"Yv": 2 / 3, "Yr": 0.80, "Nv": -0.27, "Nr": 0.30}
 """Relative change by tau/d (Inoue et al. 1981); that of N_v over its lever N_v/Y_v in ship lengths."""
 
 TRIMS = np.linspace(-0.01, 0.01, 21)
-"""Trim by the stern over ship length at which C' is told."""
+"""Trim by the stern over ship length at which C' is reported."""
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ def parse_wish(text: str) -> Wish:
 
 def _possible(kind: FigureKind, value: float) -> bool:
     """Whether a ship can have a figure: sizes, times and rates of a manoeuvre are positive; a ship that loses all of
-    her speed turns no more."""
+    its speed turns no more."""
     if kind.family == STRAIGHT or kind.name == "transfer_m":
         return True
     if kind.name == "steady_drift_deg":

@@ -5,7 +5,7 @@ variation (Kc). Figures F are nonlinear in them with exact slopes (:mod:`tank2si
 
 - ``uncertain``: min sum z^2 with F(z) as wished and |z| within bounds (sequential quadratic programming, SLSQP).
 - ``fewest``: the smallest set of unknowns that reaches the wishes to first order, by mixed-integer programming (HiGHS),
-  with least sum |z| among equals; then the nonlinear problem in that set, anew from there if it fails.
+  with least sum |z| among equals; then the nonlinear problem in that set, again from there if it fails.
 
 Wishes that cannot all be reached: the smallest set of them that contradicts itself, found by leaving out one after the
 other (deletion filter, Chinneck and Dravnieks 1991), and the nearest that can be reached, in least squares; of all
@@ -90,20 +90,28 @@ class _Problem:
         parameters, means = self.study.parameters, self.means
         held = {find_parameter(parameters, name, "--hold").name for name in means.hold}
         stated = {find_parameter(parameters, name, "--bound").name: pair for name, pair in means.bounds.items()}
-        for one in (one for one in parameters if one.name in stated and one.name in self._agreed):
+        for one in (
+            parameter for parameter in parameters if parameter.name in stated and parameter.name in self._agreed
+        ):
             remedy = "leave out the bound, or take the parameter out of --agreed"
             raise InputError("--bound", one.short, "moves with the agreed variation alone", remedy)
         columns, ends = [], []
-        for place, one in enumerate(parameters):
-            size = one.standard_error
-            if one.name in stated and not size:  # what is taken as exact moves only where it is allowed to
-                size = abs(stated[one.name][1] - stated[one.name][0]) / abs(one.factor) / (2 * means.within)
-            if one.name in held or one.name in self._agreed or not size:
+        for place, parameter in enumerate(parameters):
+            size = parameter.standard_error
+            if parameter.name in stated and not size:  # what is taken as exact moves only where it is allowed to
+                size = (
+                    abs(stated[parameter.name][1] - stated[parameter.name][0])
+                    / abs(parameter.factor)
+                    / (2 * means.within)
+                )
+            if parameter.name in held or parameter.name in self._agreed or not size:
                 continue
             columns.append(size * np.eye(len(parameters))[place])
-            ends.append(_ends(one, size, means.within, stated.get(one.name)))
+            ends.append(_ends(parameter, size, means.within, stated.get(parameter.name)))
         if self._agreed:
-            columns.append(np.array([one.value * self._agreed.get(one.name, 0.0) / 100 for one in parameters]))
+            columns.append(
+                np.array([parameter.value * self._agreed.get(parameter.name, 0.0) / 100 for parameter in parameters])
+            )
             ends.append((-means.within, means.within))
         if not columns:
             raise InputError("--tune", "", "nothing is left to change", "hold fewer parameters, or state --bound")
@@ -302,9 +310,9 @@ class _Problem:
         z = np.where(np.abs(z) < _MOVED, 0.0, z)
         values = self.values(z)
         moves = [
-            Move(one, one.value, float(after))
-            for one, after in zip(self.study.parameters, values, strict=True)
-            if after != one.value
+            Move(parameter, parameter.value, float(after))
+            for parameter, after in zip(self.study.parameters, values, strict=True)
+            if after != parameter.value
         ]
         moves.sort(key=lambda move: -abs(move.in_standard_errors or np.inf))
         return Tuned(

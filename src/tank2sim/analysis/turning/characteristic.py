@@ -1,4 +1,4 @@
-"""The nonlinear steering characteristic of a ship, taken off her steady-turning diagram: Bech's and Norrbin's.
+"""The nonlinear steering characteristic of a ship, taken off its steady-turning diagram: Bech's and Norrbin's.
 
 Bech and Wagner Smith (1969): T1 T2 r'' + (T1 + T2) r' + K H(r) = K (delta + T3 delta'), so that in a steady turn
 H(r) = delta: the diagram itself, and here the cubic b3 r^3 + b2 r^2 + b1 r + b0 that is nearest to it. Norrbin (1963):
@@ -20,7 +20,7 @@ from tank2sim.analysis.turning.diagram import SteadyTurning
 from tank2sim.arrays import Array
 
 FITTED_RUDDER = math.radians(20.0)
-"""The cubics are fitted up to this rudder, that of a spiral: hard over no cubic follows a ship. A choice of ours."""
+"""The cubics are fitted up to this rudder, that of a spiral: hard over no cubic follows a ship. Project choice."""
 
 _RATES = 201
 

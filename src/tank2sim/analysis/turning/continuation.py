@@ -20,11 +20,11 @@ ContinuationEquations = Callable[[Array], tuple[Array, Array]]
 """Residual (n,) and its Jacobian (n, n + 1) at a point (n + 1,)."""
 
 LARGEST_STEP = 0.04
-"""Arc length of a step, in the scaled unknowns. A choice of ours: half a turn of the diagram takes some fifty."""
+"""Arc length of a step, in the scaled unknowns. Project choice: half a turn of the diagram takes some fifty."""
 
 LEAST_STEP = 1e-7
 LARGEST_BEND = 0.1
-"""Largest angle between neighbouring tangents, rad: what keeps the curve smooth in a chart. A choice of ours."""
+"""Largest angle between neighbouring tangents, rad: what keeps the curve smooth in a chart. Project choice."""
 
 _ACCURACY = 1e-11
 _ITERATIONS = 8

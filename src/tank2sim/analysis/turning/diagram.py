@@ -39,7 +39,7 @@ _MOTION = ("motion.u", "motion.v", "motion.r")
 _PLACE = ("motion.x", "motion.y", "motion.psi")
 _FASTEST, _MOST_YAW, _MOST_ELSE = 2.5, 12.0, 50.0
 """Bounds of u/u0 and v/u0, of r L/u0, and of other states over their nominal size. No ship turns in a circle of a
-sixth of her length: what goes beyond has left every ship's range. A choice of ours."""
+sixth of its length: what goes beyond has left every ship's range. Project choice."""
 
 
 @dataclass(frozen=True)
@@ -139,8 +139,8 @@ class SteadyTurning:
             "height_degps": None if self.loop.height_radps is None else math.degrees(self.loop.height_radps),
         }
         folds = [
-            {"rudder_deg": math.degrees(one.rudder_rad), "yaw_rate_degps": math.degrees(one.yaw_rate_radps)}
-            for one in self.folds
+            {"rudder_deg": math.degrees(fold.rudder_rad), "yaw_rate_degps": math.degrees(fold.yaw_rate_radps)}
+            for fold in self.folds
         ]
         return {
             "points": points,
@@ -160,7 +160,7 @@ def hull_states(model: Model, motion: Sequence[str] = _MOTION) -> tuple[str, ...
     for name in found:  # grows on the way
         rate = model.expand(model.symbol(derivative[name]))
         held = (*_PLACE, *_MOTION, "rudder.angle", *found)
-        found += [one for one in model.state_names if one not in held and ca.depends_on(rate, model.symbol(one))]
+        found += [name for name in model.state_names if name not in held and ca.depends_on(rate, model.symbol(name))]
     return tuple(found)
 
 
@@ -231,7 +231,7 @@ class TurningEquations:
 
 
 def steady_turning(model: Model) -> SteadyTurning:
-    """The steady-turning diagram of a ship, by continuation from her straight course at constant revolutions.
+    """The steady-turning diagram of a ship, by continuation from its straight course at constant revolutions.
 
     Raises
     ------
@@ -320,7 +320,7 @@ def _with_folds(
 
 
 def _judged(model: Model, found: SteadyTurning) -> SteadyTurning:
-    """With its loop and what is to be told of it."""
+    """With its loop and what is to be reported of it."""
     before = [fold for fold in found.folds if fold.place <= found.straight]
     after = [fold for fold in found.folds if fold.place > found.straight]
     loop = None
@@ -338,14 +338,14 @@ def _how_it_ends(found: SteadyTurning) -> list[str]:
         continuation.STALLED: "breaks off: no steady turn was found beyond",
         continuation.LONG: "goes on beyond the steps allowed, from",
     }
-    told = []
+    messages = []
     for side, row, ended in (("port", 0, found.ended[0]), ("starboard", -1, found.ended[1])):
         if ended in words:
             rudder, rate = np.degrees([found.rudder_rad[row], found.yaw_rate_radps[row]])
-            told.append(
+            messages.append(
                 f"the steady-turning diagram {words[ended]} {rudder:.3g} deg of rudder and {rate:.3g} deg/s (to {side})"
             )
-    return told
+    return messages
 
 
 def _out_of_range(model: Model, found: SteadyTurning) -> list[str]:

@@ -21,10 +21,10 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
 _MOST, _MOST_YAW = 10.0, 12.0
-"""Bounds of the scaled unknowns, and of r L/u0: no ship turns in a circle of a sixth of her length. Ours."""
+"""Bounds of the scaled unknowns, and of r L/u0: no ship turns in a circle of a sixth of its length. Project choice."""
 
 _LEAST_YAW = 1e-6
-"""r L/u0 below which a ship goes straight. Ours."""
+"""r L/u0 below which a ship goes straight. Project choice."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class TurningPoints:
     def turn_at(self, rudder_rad: float, parameters: Mapping[str, float] | None = None) -> tuple[SteadyTurn, Array]:
         """The steady turn to the side of a rudder angle, and its unknowns y (n + 1,).
 
-        With the rudder amidships it is the turn to starboard that an unstable ship makes by herself.
+        With the rudder amidships it is the turn to starboard that an unstable ship makes by itself.
 
         Parameters
         ----------
@@ -116,7 +116,7 @@ class TurningPoints:
         # Before a fold the rudder lies beyond the straight course's: only the side of the turn has a limit.
         most[-1], least[-1] = (rudder_rad, -math.pi) if side > 0 else (math.pi, rudder_rad)
         if side * straight[-1] > side * rudder_rad + 1e-9:
-            raise self._fault(rudder_rad, "holds the ship on the other side of her straight course")
+            raise self._fault(rudder_rad, "holds the ship on the other side of its straight course")
         curve = follow_branch(self._equations(p), straight, side * self.yaw, Bounds(least, most))
         last: Array = curve.points[-1]
         if curve.ended != EDGE or abs(last[-1] - rudder_rad) > 1e-9:  # the far edge is none of the turn's

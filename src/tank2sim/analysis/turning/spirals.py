@@ -31,7 +31,7 @@ RATES = 21
 
 _BANDWIDTH = 1.0
 """Natural frequency of the yaw-rate loop, in u0/L, with damping 1: slow against the gear, fast against the hull's own
-growth. A choice of ours."""
+growth. Project choice."""
 
 STEADY_RUDDER = math.radians(0.002)
 """Steady: over two ship lengths the rudder moves by less, and the yaw rate is within :data:`_HELD` of its order. A
@@ -97,7 +97,7 @@ def direct_spiral(model: Model, turning: SteadyTurning, integrator: Integrator |
 
 
 def reverse_spiral(model: Model, turning: SteadyTurning, nomoto: Nomoto) -> SpiralPoints | None:
-    """The reverse spiral of a ship over the yaw rates of the diagram; None if her rudder has no linear hold on her.
+    """The reverse spiral of a ship over the yaw rates of the diagram; None if its rudder has no linear hold on it.
 
     Raises
     ------

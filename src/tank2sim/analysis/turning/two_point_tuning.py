@@ -39,14 +39,16 @@ from tank2sim.dynamics.steering_models import SteeringForm
 from tank2sim.errors import InputError
 
 LARGEST_FACTOR = 5.0
-"""Beyond this factor (or below its inverse) a scaled hull or rudder is no longer the ship of the card. Ours."""
+"""Beyond this factor (or below its inverse) a scaled hull or rudder is no longer the ship of the card. Project
+choice."""
 
 _LEAST_STEP = 1e-3
 _ACCURACY = 1e-10
 _ITERATIONS = 12
 _SINGULAR = 1e13
 _ALIKE = 20.0
-"""Condition of the two factors against the two measures above which the points ask the same thing of them. Ours."""
+"""Condition of the two factors against the two measures above which the points ask the same thing of them. Project
+choice."""
 
 
 @dataclass(frozen=True)
@@ -270,8 +272,8 @@ class _System:
 
     def fault(self, problem: str) -> InputError:
         """An error about the two points."""
-        told = " and ".join(_told(one) for one in self.wanted)
-        return InputError(self._model.origin, told, problem, "check both points, or change other coefficients first")
+        text = " and ".join(_told(one) for one in self.wanted)
+        return InputError(self._model.origin, text, problem, "check both points, or change other coefficients first")
 
 
 def _told(wanted: WantedTurn) -> str:

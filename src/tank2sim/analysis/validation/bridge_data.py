@@ -1,4 +1,4 @@
-"""What a bridge wants to know of a ship (IMO A.601(15)): circles, stops, speeds by revolutions, zigzags, from her card.
+"""What a bridge wants to know of a ship (IMO A.601(15)): circles, stops, speeds by revolutions, zigzags, from its card.
 
 Only what the card tells is here; what it does not tell is None, and stays a blank on the pilot card and the poster. So
 does a figure whose manoeuvre had left what the card holds for: it is marked here, and no bridge document prints it.
@@ -28,16 +28,16 @@ SHALLOW = 1.2
 """Depth over draught in shallow water (A.601(15), appendix 2)."""
 
 DEEP = 20.0
-"""Depth over draught in deep water: a choice of ours, far beyond the 4 that MSC.137(76) asks for."""
+"""Depth over draught in deep water: project choice, far beyond the 4 that MSC.137(76) asks for."""
 
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
-"""Revolutions over nominal ones at which speeds are told where no telegraph orders are given: a choice of ours."""
+"""Revolutions over nominal ones at which speeds are reported where no telegraph orders are given: project choice."""
 
 ORDERS_AHEAD = ("Full sea speed", "Full ahead", "Half ahead", "Slow ahead", "Dead slow ahead")
 """Orders ahead of the wheelhouse poster's form (A.601(15), appendix 2)."""
 
 _LARGEST_SHARE = 2.0
-"""Revolutions of an order over the nominal ones beyond which it is a slip: engines trip far below. A choice of ours."""
+"""Revolutions of an order over the nominal ones beyond which it is a slip: engines trip far below. Project choice."""
 
 LARGEST_RPM = 10_000.0
 """The same where the card tells no nominal revolutions: propellers of the smallest models turn slower."""
@@ -74,7 +74,7 @@ class StopFrom:
 
 @dataclass(frozen=True, eq=False)
 class Bridge:
-    """One loading condition of a ship, as far as her card tells it.
+    """One loading condition of a ship, as far as its card tells it.
 
     Parameters
     ----------
@@ -118,8 +118,8 @@ class Bridge:
             "rudder_deg": self.rudder_deg,
             "turning_circles_deep": [one.as_json() for one in self.deep],
             "turning_circles_shallow": [one.as_json() for one in self.shallow],
-            "stops": [one.as_json() for one in self.stops],
-            "zigzags": {name: {"figures": one.figures, **one.as_json()} for name, one in self.zigzags.items()},
+            "stops": [stop.as_json() for stop in self.stops],
+            "zigzags": {name: {"figures": zigzag.figures, **zigzag.as_json()} for name, zigzag in self.zigzags.items()},
             "telegraph": [vars(one) for one in self.telegraph],
             "full_astern_from": [vars(one) for one in self.stops_from],
             "hard_over_to_hard_over_s": self.hard_over_s,
@@ -187,7 +187,7 @@ def steady_speed(ship: TrialShip, revolutions_radps: float) -> float | None:
     """Speed (m/s) that the ship keeps straight ahead at these revolutions; None if there is none.
 
     The highest at which the surge acceleration without drift, turn and rudder falls through zero. A ship that is
-    unstable on her course, or asymmetric, is held on it by a rudder whose drag is left out.
+    unstable on its course, or asymmetric, is held on it by a rudder whose drag is left out.
     """
     model = ship.model
     p, x0 = model.parameter_values(), np.array(model.initial(model.parameter_values())).ravel()
@@ -233,23 +233,23 @@ def _depths(ship: TrialShip) -> dict[str, dict[str, float]]:
 def _circles(
     ship: TrialShip, rudder: float, depths: Mapping[str, Mapping[str, float]]
 ) -> tuple[dict[str, list[ShipTrack]], list[str]]:
-    """Circles by depth, to starboard and port, and what is to be told of them."""
+    """Circles by depth, to starboard and port, and what is to be reported of them."""
     found: dict[str, list[ShipTrack]] = {}
-    told = []
+    messages = []
     if rudder > TRIAL_RUDDER * (1 + 1e-9):
         shown = f"{math.degrees(rudder):.3g} deg, the largest of the gear"
-        told.append(f"turning circles with {shown}: the card does not say how far its rudder was tested")
+        messages.append(f"turning circles with {shown}: the card does not say how far its rudder was tested")
     for where, inputs in depths.items():
         for side, sign in (("starboard", 1.0), ("port", -1.0)):
             name = f"turn to {side}, {where} water"
             run = ship.run(Turn(sign * rudder), inputs=inputs)
             if isinstance(run, str):
-                told.append(f"{name}: {run}")
+                messages.append(f"{name}: {run}")
                 continue
             track = circle_track(side, run)
             found.setdefault(where, []).append(track)
-            told += _left(name, track.left)
-    return found, told
+            messages += _left(name, track.left)
+    return found, messages
 
 
 def _left(name: str, left: TrackMark | None) -> list[str]:
@@ -273,7 +273,7 @@ def _stops(ship: TrialShip, inputs: Mapping[str, float]) -> tuple[tuple[ShipTrac
         if isinstance(run, str):
             told.append(f"{name}: {run}")
             continue
-        told += [f"{name}: {one}" for one in run.notices if "not show" in one]
+        told += [f"{name}: {notice}" for notice in run.notices if "not show" in notice]
         track = stop_track(name, run)
         found.append(track)
         told += _left(name, track.left)

@@ -33,7 +33,7 @@ _SAME_SPEED = 1e-3
 """Froude numbers that differ by less than this share are one."""
 
 BEYOND_STANDARD_ERRORS = 2.0
-"""Differences of more standard errors than this are told as such: 5 % of those by chance alone."""
+"""Differences of more standard errors than this are reported as such: 5 % of those by chance alone."""
 
 _ABSENT = 1e-12
 _RIGID_BODY = ("mass", "yaw_inertia", "x_G")
@@ -78,8 +78,8 @@ class CoefficientRow:
         """As JSON has it."""
         return {
             "name": self.name,
-            "cards": [vars(one) for one in self.cards],
-            "differences": [vars(one) for one in self.differences],
+            "cards": [vars(card) for card in self.cards],
+            "differences": [vars(difference) for difference in self.differences],
         }
 
 
@@ -108,15 +108,15 @@ def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[Coeffi
     expansions = [expanded_as(card, reference) for card in cards]
     rows = []
     for name in (*_RIGID_BODY, *ALL_TERMS):
-        if not any(name in one.coefficients for one in expansions):
+        if not any(name in expansion.coefficients for expansion in expansions):
             continue
-        found = tuple(_in_sign_of(reference, name, one.coefficients.get(name)) for one in expansions)
+        found = tuple(_in_sign_of(reference, name, expansion.coefficients.get(name)) for expansion in expansions)
         differences = tuple(
-            Difference(why=one.refused[name]) if name in one.refused else _difference(found[0], own)
-            for one, own in zip(expansions[1:], found[1:], strict=True)
+            Difference(why=expansion.refused[name]) if name in expansion.refused else _difference(found[0], own)
+            for expansion, own in zip(expansions[1:], found[1:], strict=True)
         )
         rows.append(CoefficientRow(name, found, differences))
-    return tuple(rows), tuple(note for one in expansions[1:] for note in one.notes)
+    return tuple(rows), tuple(note for expansion in expansions[1:] for note in expansion.notes)
 
 
 def _in_sign_of(reference: ManoeuvringCard, name: str, found: CardCoefficient | None) -> CardCoefficient:
@@ -172,7 +172,7 @@ def _of_effects(card: ManoeuvringCard, model: Model) -> dict[str, CardCoefficien
 
 
 def _same(one: float, other: float) -> bool:
-    """One number but for rounding, as it is left by a change of convention."""
+    """One number except for rounding, as it is left by a change of convention."""
     return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-15)
 
 
@@ -240,15 +240,15 @@ def _d(name: str) -> int:
 
 
 def _notes(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float) -> tuple[str, ...]:
-    told = []
+    messages = []
     if ratio != 1:
-        told.append(f"re-expanded about {ratio:.4g} times its own Froude number, to the third order")
+        messages.append(f"re-expanded about {ratio:.4g} times its own Froude number, to the third order")
     own, other = card.model, reference.model
     if own.speed_scale != other.speed_scale:
-        told.append(f"primes by the {own.speed_scale} speed converted to the {other.speed_scale} one")
+        messages.append(f"primes by the {own.speed_scale} speed converted to the {other.speed_scale} one")
     if own.yaw_rate_terms != other.yaw_rate_terms:
-        told.append(f"yaw rate terms converted from {own.yaw_rate_terms} to {other.yaw_rate_terms}")
-    return tuple(f"{card.ship.name} ({card.source}): {one}" for one in told)
+        messages.append(f"yaw rate terms converted from {own.yaw_rate_terms} to {other.yaw_rate_terms}")
+    return tuple(f"{card.ship.name} ({card.source}): {message}" for message in messages)
 
 
 def _conversion(

@@ -35,7 +35,8 @@ from tank2sim.simulation.run import Run
 from tank2sim.simulation.trajectory import Trajectory
 
 SAME_SIZE = 0.03
-"""Lengths and breadths that differ by less than this share are those of one ship: not all count them alike. Ours."""
+"""Lengths and breadths that differ by less than this share are those of one ship: not all count them alike. Project
+choice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +121,8 @@ class CardComparison:
         return (*self.coefficients, *self.effects)
 
     def in_errors(self, place: int) -> tuple[float, ...]:
-        """All differences of a card (1 is the first after the reference) in standard errors, but for :data:`.SAME`."""
+        """All differences of a card (1 is the first after the reference) in standard errors, except for
+        :data:`.SAME`."""
         found = [row.differences[place - 1].standard_errors for row in self.rows]
         return tuple(one for one in found if one is not None)
 
@@ -211,8 +213,8 @@ def compare_cards(cards: Sequence[ManoeuvringCard], count: int = MEMBERS) -> Car
     ships = [ship_of(card) for card in cards]
     rows, notes = compare_coefficients(cards)
     drawn = [members(ship.card, ship.model, count) for ship in ships]
-    told = [f"{label}: {one}" for label, (_, those) in zip(labels, drawn, strict=True) for one in those]
-    notices, trials = [*_notices(cards, labels), *told, *notes], []
+    messages = [f"{label}: {one}" for label, (_, those) in zip(labels, drawn, strict=True) for one in those]
+    notices, trials = [*_notices(cards, labels), *messages, *notes], []
     for name, manoeuvre in standard_trials(ships).items():
         trial, trouble = _trial(name, manoeuvre, ships, labels, [those for those, _ in drawn])
         trials.append(trial)
@@ -274,14 +276,16 @@ def _trial(
             deviations.append({})
             outside.append(set())
             continue
-        told += [f"{label}: {name}: {one}" for one in run.notices if EXTRAPOLATED in one or "not show" in one]
+        told += [
+            f"{label}: {name}: {notice}" for notice in run.notices if EXTRAPOLATED in notice or "not show" in notice
+        ]
         outside.append(set(run.reading.outside_names))
         found.append(_scaled(figure_numbers(run.figures), ratio))
         # Of each member the numbers alone are kept: the motions of a thousand would fill gigabytes.
         those = member_spread([_numbers(ship.run(manoeuvre, {**start, **member})) for member in own])
         deviations.append(_scaled(those, ratio))
         tracks.append(_track(label, run.trajectory, ratio))
-    names = dict.fromkeys(one for figures in found for one in figures)
+    names = dict.fromkeys(figure for figures in found for figure in figures)
     rows = tuple(
         FigureRow(
             name,
@@ -300,7 +304,7 @@ def _numbers(run: Run | str) -> Numbers:
 
 
 def _approach(reference: ManoeuvringCard, card: ManoeuvringCard) -> float:
-    """The reference's speed at the size of the card's ship, m/s; her own where the two are one but for rounding."""
+    """The reference's speed at the size of the card's ship, m/s; its own where the two are one except for rounding."""
     speed = reference.model.speed_mps * math.sqrt(card.ship.length_m / reference.ship.length_m)
     return card.model.speed_mps if math.isclose(speed, card.model.speed_mps, rel_tol=1e-6) else speed
 
@@ -316,32 +320,34 @@ def _track(label: str, run: Trajectory, ratio: float) -> CardTrack:
 
 
 def _notices(cards: Sequence[ManoeuvringCard], labels: Sequence[str]) -> list[str]:
-    told = []
+    messages = []
     reference = cards[0]
     for card, label in zip(cards, labels, strict=True):
         ratio = reference.ship.length_m / card.ship.length_m
         if apart := differences_of_size(reference, card, 1 / ratio):
             form = "; ".join(apart)
-            told.append(f"{label}: is of another form than {labels[0]} (at its size {form}): two ships are compared")
+            messages.append(
+                f"{label}: is of another form than {labels[0]} (at its size {form}): two ships are compared"
+            )
         elif not math.isclose(ratio, 1.0, rel_tol=SAME_SIZE):
-            told.append(f"{label}: is of another size than {labels[0]}: ships or models of one form are compared")
+            messages.append(f"{label}: is of another size than {labels[0]}: ships or models of one form are compared")
         present = [name for name, value in card.derivatives.items() if value]
         if assumed := [name for name in present if name not in card.uncertainty]:
             mark = f"{ASSUMED}, not measured ones: " if assumed == present else ""
             share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of their value is taken"
-            told.append(f"{label}: {mark}{len(assumed)} derivatives state no standard error: {share}")
+            messages.append(f"{label}: {mark}{len(assumed)} derivatives state no standard error: {share}")
         if not math.isclose(ratio, 1.0, rel_tol=1e-6):
-            told.append(f"{label}: figures and tracks scaled by Froude's law to a ship {ratio:.4g} times as long")
+            messages.append(f"{label}: figures and tracks scaled by Froude's law to a ship {ratio:.4g} times as long")
         speed = _approach(reference, card)
         if not math.isclose(speed, card.model.speed_mps, rel_tol=1e-3):
-            told.append(f"{label}: its trials begin at the reference's speed, {speed:.4g} m/s at its own size")
+            messages.append(f"{label}: its trials begin at the reference's speed, {speed:.4g} m/s at its own size")
         if _effects(card) != _effects(reference):
             own, other = (", ".join(_effects(one)) or "none" for one in (card, reference))
-            told.append(f"{label}: its effects ({own}) are not the reference's ({other}); the trials have them")
+            messages.append(f"{label}: its effects ({own}) are not the reference's ({other}); the trials have them")
         if (card.propulsion is None) != (reference.propulsion is None):
-            told.append(f"{label}: only one of it and the reference has propulsion: no stop is compared")
-    return told
+            messages.append(f"{label}: only one of it and the reference has propulsion: no stop is compared")
+    return messages
 
 
 def _effects(card: ManoeuvringCard) -> list[str]:
-    return sorted(one.name for one in card.effects)
+    return sorted(effect.name for effect in card.effects)

@@ -66,7 +66,7 @@ class ShipTrack:
             "figures": self.figures,
             **self.reading.as_json(),
             "left_card_range_at": vars(self.left) if self.left else None,
-            "marks": [vars(one) for one in self.marks],
+            "marks": [vars(mark) for mark in self.marks],
             "ahead_m": self.ahead_m[::every],
             "starboard_m": self.starboard_m[::every],
         }
@@ -103,7 +103,7 @@ def _track(name: str, run: Run, change: Array, rows: list[int], end: int) -> Shi
 
 def quarter(path: ShipTrack, change_deg: float) -> TrackMark | None:
     """The mark at a change of heading; None if the turn does not reach it."""
-    return next((one for one in path.marks if one.heading_change_deg >= change_deg), None)
+    return next((mark for mark in path.marks if mark.heading_change_deg >= change_deg), None)
 
 
 def _in_first_axes(run: Trajectory) -> tuple[Array, Array]:

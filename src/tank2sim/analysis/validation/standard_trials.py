@@ -1,4 +1,4 @@
-"""The standard trials of a ship in calm water, and what the errors of her card make of their figures."""
+"""The standard trials of a ship in calm water, and what the errors of its card make of their figures."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.run import Run, simulate
 
 MEMBERS = 40
-"""Members of an ensemble: the deviation that they give is itself uncertain by 15 % or so. A choice of ours."""
+"""Members of an ensemble: the deviation that they give is itself uncertain by 15 % or so. Project choice."""
 
 SEED = 601
 """Where the members' random numbers start; any number does."""
@@ -126,9 +126,10 @@ def figure_numbers(figures: Figures) -> Numbers:
 def members(
     card: ManoeuvringCard, model: Model, count: int, seed: int = SEED
 ) -> tuple[tuple[dict[str, float], ...], tuple[str, ...]]:
-    """Parameters of `count` ships such as the card may mean, drawn within its errors; and what is to be told of them.
+    """Parameters of `count` ships such as the card may mean, drawn within its errors; and what is to be reported of
+    them.
 
-    Errors of all numbers are normal, and go together as the covariance beside the card says; without one they are
+    Errors of all numbers are normal, and go together as the covariance next to the card says; without one they are
     independent. Each member has a random number generator of its own, so that it does not depend on how many there are.
     What is no parameter of the `model` but an input (a current) is calm in the trials, and not drawn.
 
@@ -146,9 +147,7 @@ def members(
     drawn = tuple({name: value for name, value in one.values.items() if name in known} for one in found)
     if errors.together:
         return drawn, (errors.together_in_words, *told)
-    alone = (
-        "no covariance stands beside the card: errors are taken as independent, and deviations of figures may be too"
-    )
+    alone = "no covariance is next to the card: errors are taken as independent, and deviations of figures may be too"
     return drawn, (f"{alone} large where errors go together", *told)
 
 

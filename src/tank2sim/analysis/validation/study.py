@@ -57,10 +57,10 @@ SAFETY = 3.0
 """Factor of safety of a convergence index from two grids (Roache 1998)."""
 
 REQUIRED = 20.0
-"""U_reqd in per cent of the measured figure, where none is asked for: a choice of ours."""
+"""U_reqd in per cent of the measured figure, where none is asked for: project choice."""
 
 READINGS = 12
-"""Times that a trial's figures are read off with noise: enough to see whether that matters. A choice of ours."""
+"""Times that a trial's figures are read off with noise: enough to see whether that matters. Project choice."""
 
 TURN_FIGURES = ("advance_m", "transfer_m", "tactical_diameter_m", "time_90_s", "time_180_s")
 ZIGZAG_FIGURES = ("overshoot_1_deg", "overshoot_2_deg", "initial_turning_time_s", "reach_s")
@@ -181,22 +181,22 @@ class Validation:
 
     def count(self, outcome: ComparisonOutcome) -> int:
         """How many figures end so."""
-        return sum(one.outcome is outcome for one in self.figures)
+        return sum(figure.outcome is outcome for figure in self.figures)
 
     @property
     def verdict(self) -> str:
         """In words."""
         if not self.figures:
             return "not validated: there is no trial to compare with"
-        told = [f"{self.count(one)} {one}" for one in ComparisonOutcome if self.count(one)]
-        return f"of {len(self.figures)} figures {', '.join(told)}"
+        messages = [f"{self.count(one)} {one}" for one in ComparisonOutcome if self.count(one)]
+        return f"of {len(self.figures)} figures {', '.join(messages)}"
 
     def as_json(self) -> dict[str, object]:
         """All of it."""
         return {
             "verdict": self.verdict,
             "counts": {str(one): self.count(one) for one in ComparisonOutcome},
-            "figures": [one.as_json() for one in self.figures],
+            "figures": [figure.as_json() for figure in self.figures],
             "members": self.members,
         }
 
@@ -222,12 +222,12 @@ def validate(
     engines = Integrator(model), Integrator(finer)
     drawn, of_errors = members(card, model, count)
     known = [(trial, recorded(trial, model)) for trial in trials]
-    told = [
+    messages = [
         f"{trial.name}: neither a turning circle nor a zigzag with speed, yaw rate and track: only replayed"
         for trial, what in known
         if what is None
     ]
-    told += [*standard_errors_in_words(card_parameters(card, study_model(card))), *of_errors]
+    messages += [*standard_errors_in_words(card_parameters(card, study_model(card))), *of_errors]
     whats = [what for _, what in known if what is not None]
     between = _between_repeats(whats)
     figures: list[Validated] = []
@@ -238,15 +238,19 @@ def validate(
         copied = fitted_as(card, trial)
         own = copied is not None or made_card(card, trial.name)
         figures += [replace(one, required_percent=required_percent, made_card=own) for one in found]
-        told += trouble
+        messages += trouble
         if own:
             named = f" (as {copied})" if copied not in (None, trial.name) else ""
-            told.append(f"{trial.name}: the card was identified from this trial{named}: its figures are only fitted")
+            messages.append(
+                f"{trial.name}: the card was identified from this trial{named}: its figures are only fitted"
+            )
     if whats and not between:
-        told.append("no manoeuvre was run twice alike: u_D is of the noise of the signals alone, and so a lower bound")
+        messages.append(
+            "no manoeuvre was run twice alike: u_D is of the noise of the signals alone, and so a lower bound"
+        )
     if not count:
-        told.append("no ensemble was run: u_input and U_val are not known, and no figure can be judged")
-    return Validation(tuple(figures), count, tuple(told))
+        messages.append("no ensemble was run: u_input and U_val are not known, and no figure can be judged")
+    return Validation(tuple(figures), count, tuple(messages))
 
 
 def made_card(card: ManoeuvringCard, trial: str) -> bool:
@@ -255,8 +259,8 @@ def made_card(card: ManoeuvringCard, trial: str) -> bool:
     What ``identify`` writes is looked through for any name; the rest of the source for names with a digit or an
     underscore, which are no words.
     """
-    told = f"{card.ship.source}; {card.ship.notes or ''}"
-    looked = told if re.search(r"[\d_]", trial) else "; ".join(re.findall(_IDENTIFIED, told))
+    text = f"{card.ship.source}; {card.ship.notes or ''}"
+    looked = text if re.search(r"[\d_]", trial) else "; ".join(re.findall(_IDENTIFIED, text))
     return re.search(rf"(?<![\w-]){re.escape(trial)}(?![\w-])", looked) is not None
 
 
@@ -266,20 +270,20 @@ def verify(ship: TrialShip, count: int = MEMBERS) -> tuple[tuple[Verified, ...],
     finer = TrialShip(ship.card, model, Integrator(model))
     drawn, _ = members(ship.card, ship.model, count)
     rows: list[Verified] = []
-    told: list[str] = []
+    messages: list[str] = []
     for trial, manoeuvre in standard_trials([ship]).items():
         run, fine = ship.run(manoeuvre), finer.run(manoeuvre)
         if isinstance(run, str) or isinstance(fine, str):
-            told.append(f"{trial}: {run if isinstance(run, str) else fine}")
+            messages.append(f"{trial}: {run if isinstance(run, str) else fine}")
             continue
-        told += [f"{trial}: {one}" for one in run.notices if EXTRAPOLATED in one or "not show" in one]
+        messages += [f"{trial}: {notice}" for notice in run.notices if EXTRAPOLATED in notice or "not show" in notice]
         many = [ship.run(manoeuvre, member) for member in drawn]
         deviation = member_spread([{} if isinstance(one, str) else figure_numbers(one.figures) for one in many])
         halved = figure_numbers(fine.figures)
         for name, value in figure_numbers(run.figures).items():
             halving = halved[name] - value if name in halved else None
             rows.append(Verified(trial, name, value, halving, deviation.get(name)))
-    return tuple(rows), tuple(told)
+    return tuple(rows), tuple(messages)
 
 
 def _validated(
@@ -292,13 +296,13 @@ def _validated(
     (coarse, read), (fine, _) = (_repeated(what, engine) for engine in engines)
     ensemble = [_repeated(what, engines[0], member)[0] for member in drawn]
     inputs, data = member_spread(ensemble), _read_again(what, engines[0].model)
-    told = [
+    messages = [
         f"{what.trial.name}: {name}: too few members of the ensemble reach it to tell u_input"
         for name in measured
         if drawn and name in coarse and name not in inputs
     ]
     if beyond := [name for name in measured if read.outside(name) and name in coarse]:
-        told.insert(0, f"{what.trial.name}: {', '.join(beyond)}: {read.message}")
+        messages.insert(0, f"{what.trial.name}: {', '.join(beyond)}: {read.message}")
     rows = []
     for name, value in measured.items():
         simulated, finer = coarse.get(name), fine.get(name)
@@ -308,7 +312,7 @@ def _validated(
         u_input = inputs.get(name)
         u_num = SAFETY * halving / COVERAGE
         rows.append(Validated(what.trial.name, what.words, name, value, simulated, u_num, u_input, u_data))
-    return rows, told
+    return rows, messages
 
 
 def compare_figures(what: Recorded) -> Numbers:

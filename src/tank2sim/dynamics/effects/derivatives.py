@@ -17,7 +17,7 @@ from tank2sim.dynamics.model import Model
 
 USUAL_CHANGE = 0.15
 """Relative change of linear damping at which a search begins: as derivatives of one ship from different tanks differ
-(SIMMAN 2008); a choice of ours. Added masses, which are measured less well, have more."""
+(SIMMAN 2008); project choice. Added masses, which are measured less well, have more."""
 
 
 def with_changes(model: Model, changes: Mapping[str, ca.SX], card: ManoeuvringCard) -> Model:
@@ -73,7 +73,7 @@ CUBIC_YAW_DAMPING = Effect(
     description="The hull resists fast turning more than in proportion to the rate of turn.",
     source="(3.8) of paper 2, Krezelewski and Misiag; Abkowitz (1964)",
     parameters=(
-        # About 15 % of the Mariner's N by turning at r' = 0.5, as cubic terms have there (ours).
+        # About 15 % of the Mariner's N by turning at r' = 0.5, as cubic terms have there (project choice).
         EffectParameter("Yrrr", "change of Yrrr, prime", -0.1, 0.1, absent=0.0, typical=(1e-3,)),
         EffectParameter("Nrrr", "change of Nrrr, prime, negative damps", -0.1, 0.1, absent=0.0, typical=(-1e-3,)),
     ),
@@ -87,7 +87,7 @@ SWAY_YAW_COUPLING = Effect(
     description="Drifting and turning together give a force and a moment that neither gives alone.",
     source="(3.8) of paper 2, Krezelewski and Misiag; Abkowitz (1964)",
     parameters=(
-        # At v' = 0.2 and r' = 0.5 about 15 % of the forces of the linear terms (ours).
+        # At v' = 0.2 and r' = 0.5 about 15 % of the forces of the linear terms (project choice).
         EffectParameter("Yvrr", "change of Yvrr, prime", -0.5, 0.5, absent=0.0, typical=(-5e-3,)),
         EffectParameter("Nvrr", "change of Nvrr, prime", -0.5, 0.5, absent=0.0, typical=(-2e-3,)),
     ),
@@ -107,7 +107,9 @@ TURNING_DRAG = Effect(
             -0.05,
             0.05,
             absent=0.0,
-            typical=(2e-3,),  # a quarter of the m' of a cargo ship, which X_vr + m' holds with added mass (ours)
+            typical=(
+                2e-3,
+            ),  # a quarter of the m' of a cargo ship, which X_vr + m' holds with added mass (project choice)
         ),
     ),
     equations=_added,
@@ -175,7 +177,7 @@ def _in_shallow_water(model: Model, given: EffectSymbols, card: ManoeuvringCard)
 
     Under a small keel clearance the flow goes round the ends instead of below, and all these rise together, to
     several times at H/T = 1.2: Brix (ed.) (1993), Manoeuvring Technical Manual; Vantorre (2003). One factor for all
-    is a choice of ours, for the data rarely show more; :data:`WATER_DEPTH` has the published factors.
+    is project choice, for the data rarely show more; :data:`WATER_DEPTH` has the published factors.
     """
     names = [name for name in MAGNIFIED_BY_SHALLOW_WATER if f"derivatives.{name}" in model]
     return with_changes(model, {name: given["magnification"] * hydrodynamic(model, name, card) for name in names}, card)
@@ -193,7 +195,7 @@ SHALLOW_WATER = Effect(
             -0.5,
             5.0,
             absent=0.0,
-            typical=(0.3,),  # damping at a depth of some three draughts, by the factors below (ours)
+            typical=(0.3,),  # damping at a depth of some three draughts, by the factors below (project choice)
         ),
     ),
     equations=_in_shallow_water,
@@ -270,7 +272,7 @@ TRIM = Effect(
             -10.0,
             10.0,
             absent=0.0,
-            typical=lengths(0.005),  # a tenth of a usual draught (ours)
+            typical=lengths(0.005),  # a tenth of a usual draught (project choice)
         ),
     ),
     equations=_trimmed,

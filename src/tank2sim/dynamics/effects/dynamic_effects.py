@@ -141,14 +141,15 @@ ROLL_COUPLING = Effect(
     description="The ship heels in a turn, and a heeled hull is pushed and turned aside.",
     source="Hirano and Takashina (1980), Trans. West Japan Soc. Naval Arch. 59; Son and Nomoto (1981)",
     parameters=(
-        # 0.05 rad of heel then give some 5 % of the forces of a hard turn (ours).
+        # 0.05 rad of heel then give some 5 % of the forces of a hard turn (project choice).
         EffectParameter(
             "Yphi", "sway force by heel, prime, both positive to starboard", -0.05, 0.05, absent=0.0, typical=(1e-3,)
         ),
         EffectParameter(
             "Nphi", "yaw moment by heel, prime, both positive to starboard", -0.05, 0.05, absent=0.0, typical=(-5e-4,)
         ),
-        # Period and damping are known about so well (ours). The ratio stays: only its product with Yphi and Nphi acts.
+        # Period and damping are known about so well (project choice). The ratio stays: only its product with Yphi and
+        # Nphi acts.
         EffectParameter(
             "roll_period_s",
             "natural period of roll",

@@ -214,21 +214,27 @@ class Effect:
 
     def required(self) -> tuple[str, ...]:
         """Names of the parameters without a default."""
-        return tuple(one.name for one in self.parameters if one.default is None)
+        return tuple(parameter.name for parameter in self.parameters if parameter.default is None)
 
     def free(self, card: ManoeuvringCard) -> tuple[str, ...]:
         """Names of the parameters that a search estimates: the required ones, and those with a spread."""
         required = self.required()
-        return tuple(one.name for one in self.parameters if one.name in required or one.spread_value(card) is not None)
+        return tuple(
+            parameter.name
+            for parameter in self.parameters
+            if parameter.name in required or parameter.spread_value(card) is not None
+        )
 
     def tried(self, card: ManoeuvringCard) -> bool:
         """True if a search can begin: every required parameter has typical values on this ship."""
         required = self.required()
-        return all(one.typical_values(card) for one in self.parameters if one.name in required)
+        return all(parameter.typical_values(card) for parameter in self.parameters if parameter.name in required)
 
     def model_names(self) -> dict[str, str]:
         """Name of each parameter (in SI) to the name of the model's variable that holds it."""
-        return {one.name: one.input_name or f"{self.name}.{one.stem}" for one in self.parameters}
+        return {
+            parameter.name: parameter.input_name or f"{self.name}.{parameter.stem}" for parameter in self.parameters
+        }
 
     def apply(self, model: Model, values: Mapping[str, float], card: ManoeuvringCard) -> Model:
         """The model with this effect.
@@ -249,7 +255,10 @@ class Effect:
         KeyError
             A required value is missing.
         """
-        variables = {one.stem: one.variable(self.name, one.value(values, card), card) for one in self.parameters}
+        variables = {
+            parameter.stem: parameter.variable(self.name, parameter.value(values, card), card)
+            for parameter in self.parameters
+        }
         taken = [variable.name for variable in variables.values() if variable.name in model]
         if taken:
             remedy = "leave one of the two out, or rename the variable of the effect"
@@ -290,7 +299,7 @@ def with_readings(model: Model, shown: Mapping[str, ca.SX]) -> Model:
     """
     names = {name: name.replace("motion.", "sensor.") for name in shown}
     faulty = [name for name in shown if names[name] in model]
-    earlier = {one.name: one.value for one in model.quantities if one.name.startswith("sensor.")}
+    earlier = {quantity.name: quantity.value for quantity in model.quantities if quantity.name.startswith("sensor.")}
     symbols, values = [model.symbol(name) for name in faulty], [earlier[names[name]] for name in faulty]
     for name, expression in shown.items():
         true = model[name]

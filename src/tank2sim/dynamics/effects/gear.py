@@ -65,7 +65,7 @@ RUDDER_LAG = Effect(
             "time constant of the steering gear",
             0.01,
             100.0,
-            typical=time_scale_passages(0.1, 0.05, 0.2),  # 1 to 4 s where L/u0 is 20 s (ours)
+            typical=time_scale_passages(0.1, 0.05, 0.2),  # 1 to 4 s where L/u0 is 20 s (project choice)
         ),
     ),
     equations=_with_lag,
@@ -80,7 +80,7 @@ def _beyond(value: ca.SX, limit: ca.SX) -> ca.SX:
 
 CONTACT = 0.005
 """Time in which the rudder follows the gear once the gap between them is closed, in L/u0: a stiff contact, a tenth of a
-second on a ship of 160 m (ours); the play operator is its limit at 0."""
+second on a ship of 160 m (project choice); the play operator is its limit at 0."""
 
 
 def _with_backlash(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
@@ -132,7 +132,7 @@ RUDDER_BACKLASH = Effect(
             0.0,
             math.radians(20.0),
             absent=0.0,
-            typical=(math.radians(2.0),),  # worn, but not yet out of the rules (ours)
+            typical=(math.radians(2.0),),  # worn, but not yet out of the rules (project choice)
         ),
     ),
     equations=_with_backlash,
@@ -160,7 +160,7 @@ RUDDER_DEAD_BAND = Effect(
             0.0,
             math.radians(10.0),
             absent=0.0,
-            typical=(math.radians(1.0),),  # half the play above, either way (ours)
+            typical=(math.radians(1.0),),  # half the play above, either way (project choice)
         ),
     ),
     equations=_with_dead_band,
@@ -211,7 +211,7 @@ TELEMOTOR_LAG = Effect(
             "time constant before the steering gear",
             0.01,
             100.0,
-            typical=time_scale_passages(0.05, 0.025, 0.1),  # half those of the gear itself (ours)
+            typical=time_scale_passages(0.05, 0.025, 0.1),  # half those of the gear itself (project choice)
         ),
     ),
     equations=_with_telemotor_lag,

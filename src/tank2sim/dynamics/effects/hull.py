@@ -49,7 +49,9 @@ CROSS_FLOW_DRAG = Effect(
             -1.0,
             3.0,
             absent=0.0,
-            typical=(0.3,),  # of 0.6 to 1 for whole hulls (Faltinsen 1990, 6.4) what cubic terms may leave out (ours)
+            typical=(
+                0.3,
+            ),  # of 0.6 to 1 for whole hulls (Faltinsen 1990, 6.4) what cubic terms may leave out (project choice)
         ),
     ),
     equations=_with_cross_flow_drag,
@@ -74,7 +76,7 @@ HULL_FOULING = Effect(
             -0.005,
             0.005,
             absent=0.0,
-            typical=(-1e-4,),  # a sixth of a usual resistance (ours)
+            typical=(-1e-4,),  # a sixth of a usual resistance (project choice)
         ),
     ),
     equations=_with_fouling,
@@ -85,7 +87,7 @@ def _with_hump(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mod
     """X = 1/2 rho L^2 u^2 X' exp(-1/2 ((u - u_h)/w)^2), X' negative: a hump of the resistance by waves at u_h.
 
     The waves of bow and stern add up at some speeds and cancel at others: Havelock (1909); Faltinsen (2005),
-    Hydrodynamics of High-Speed Marine Vehicles, 4.2. The Gaussian is a choice of ours for one hump.
+    Hydrodynamics of High-Speed Marine Vehicles, 4.2. The Gaussian is project choice for one hump.
     """
     u = model.symbol("motion.u")
     place = (u - given["speed"]) / given["width"]
@@ -104,14 +106,14 @@ HUMP_RESISTANCE = Effect(
             -0.005,
             0.005,
             absent=0.0,
-            typical=(-1e-4,),  # a sixth of a usual resistance (ours)
+            typical=(-1e-4,),  # a sixth of a usual resistance (project choice)
         ),
         EffectParameter(
             "speed_mps",
             "speed of the hump through the water",
             0.0,
             50.0,
-            typical=speeds(0.8, 0.7, 0.9, 0.6, 1.0),  # what a turn sweeps, at about the width below (ours)
+            typical=speeds(0.8, 0.7, 0.9, 0.6, 1.0),  # what a turn sweeps, at about the width below (project choice)
         ),
         EffectParameter(
             "width_mps",
@@ -143,7 +145,7 @@ ASYMMETRIC_TURNING = Effect(
     description="The ship turns more tightly to one side than to the other.",
     source="Abkowitz (1964), HyA report Hy-5: even terms of an asymmetric ship",
     parameters=(
-        # About 5 % of Nr r at r' = 0.5, as tactical diameters of SIMMAN 2008 differ between the sides (ours).
+        # About 5 % of Nr r at r' = 0.5, as tactical diameters of SIMMAN 2008 differ between the sides (project choice).
         EffectParameter(
             "Yrr",
             "coefficient of r^2 in Y, prime, positive to starboard",

@@ -11,7 +11,7 @@ from tank2sim.dynamics.model import Model
 
 LEAST_INFLOW = 0.05
 """The flow over the rudder is never slower than this share of u0: the formula does not hold for a propeller that turns
-astern, and must not divide by zero there (a choice of ours)."""
+astern, and must not divide by zero there (project choice)."""
 
 
 def _in_loaded_slipstream(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:

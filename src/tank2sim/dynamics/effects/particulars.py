@@ -24,7 +24,7 @@ AREA_ERROR = 0.4
 """Standard error of such an area, relative: the distance from the middle to those of tanker and container ship."""
 
 FULLEST, FINEST = 0.95, 0.3
-"""Block coefficients are held within these bounds where mass and an estimated draught disagree (ours)."""
+"""Block coefficients are held within these bounds where mass and an estimated draught disagree (project choice)."""
 
 
 def _beam(card: ManoeuvringCard) -> float:

@@ -35,7 +35,7 @@ def _side_force(Y: float, N: float) -> tuple[EffectParameter, EffectParameter]:
 
 RESISTANCE = 6e-4
 """Resistance, and so effective thrust, at u0 over 1/2 rho L^2 u0^2 where a card states no propulsion: between those of
-a tanker (5e-4) and of the Mariner (8e-4); a choice of ours."""
+a tanker (5e-4) and of the Mariner (8e-4); project choice."""
 
 
 def _relative_revolutions(model: Model) -> ca.SX:
@@ -85,7 +85,7 @@ PROPELLER_WALK = Effect(
     acts_on="force",
     description="A propeller that turns astern throws the stern to one side.",
     source="Brix (ed.) (1993), Manoeuvring Technical Manual",
-    # A few times the side force ahead (ours).
+    # A few times the side force ahead (project choice).
     parameters=_side_force(-2e-4, 1e-4),
     equations=_with_walk,
 )
@@ -110,7 +110,7 @@ LOADING_SIDE_FORCE = Effect(
     description="The harder the propeller works for the ship's speed, the more it pushes the stern to one side.",
     source="form of ours, after the asymmetry of the KVLCC2 in SIMMAN 2008",
     parameters=(
-        # The Mariner's side force, at the loading of a ship that has lost a third of its speed (ours).
+        # The Mariner's side force, at the loading of a ship that has lost a third of its speed (project choice).
         EffectParameter(
             "Y_prime",
             "sway force by propeller loading, prime, positive to starboard",
@@ -136,16 +136,16 @@ def _with_droop(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     """n = order (1 - droop (1 - u/u0)): the engine is not held at its revolutions when the ship slows.
 
     First order in the loss of speed of an engine at constant torque or power, whose propeller load rises in a turn: the
-    propulsion strategies that ITTC 7.5-02-06-01, free running model tests, tells apart. On a card without propulsion
+    propulsion strategies that ITTC 7.5-02-06-01, free running model tests, distinguishes. On a card without propulsion
     the order is the nominal one, and :data:`RESISTANCE` stands for Xnn.
     """
     loss = 1 - model.symbol("motion.u") / model.symbol("ship.speed")
     if "propeller.speed_actual" in model:
         return model.redefine("propeller.speed_actual", lambda order: order * (1 - given["droop"] * loss))
-    told = f"the card states no propulsion: engine_droop takes Xnn = {RESISTANCE:g}, a typical resistance at u0"
+    text = f"the card states no propulsion: engine_droop takes Xnn = {RESISTANCE:g}, a typical resistance at u0"
     lost = propeller_force(1 - given["droop"] * loss, ca.SX(1), ca.SX(RESISTANCE))
     thrust = scales(model, model.symbol("ship.speed")).force * lost
-    return with_forces(model.extend(notices=[told]), X=thrust)
+    return with_forces(model.extend(notices=[text]), X=thrust)
 
 
 ENGINE_DROOP = Effect(
@@ -160,7 +160,9 @@ ENGINE_DROOP = Effect(
             -1.0,
             1.0,
             absent=0.0,
-            typical=(0.3,),  # between constant revolutions (0) and torque in proportion to n^2 (towards 1) (ours)
+            typical=(
+                0.3,
+            ),  # between constant revolutions (0) and torque in proportion to n^2 (towards 1) (project choice)
         ),
     ),
     equations=_with_droop,
@@ -170,7 +172,7 @@ ENGINE_DROOP = Effect(
 def _with_engine_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """dn/dt = (order - n)/T: the engine's gear between telegraph and propeller, of the first order.
 
-    ITTC 7.5-02-06-03 asks for the time constant of the engine beside that of the steering gear. A diesel that must be
+    ITTC 7.5-02-06-03 asks for the time constant of the engine next to that of the steering gear. A diesel that must be
     stopped before it is reversed takes longer still.
     """
     if "propeller.speed_actual" not in model:

@@ -13,7 +13,7 @@ from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymb
 from tank2sim.dynamics.model import Model
 
 STALL_WIDTH = math.radians(5.0)
-"""Range of angle over which a stalling rudder loses its share of force, rad: a choice of ours. The lift of all-movable
+"""Range of angle over which a stalling rudder loses its share of force, rad: project choice. The lift of all-movable
 rudders falls off over some degrees past its maximum (Molland and Turnock 2007, Marine Rudders and Control Surfaces)."""
 
 
@@ -41,7 +41,7 @@ RUDDER_BIAS = Effect(
             -0.35,
             0.35,
             absent=0.0,
-            typical=(math.radians(1.0),),  # what a linkage or an indicator is out by (ours)
+            typical=(math.radians(1.0),),  # what a linkage or an indicator is out by (project choice)
         ),
     ),
     equations=_biased,
@@ -66,7 +66,7 @@ RUDDER_EFFECTIVENESS = Effect(
             -1.0,
             3.0,
             absent=0.0,
-            typical=(0.15,),  # as rudder coefficients of model and ship differ, by wake and thrust (ours)
+            typical=(0.15,),  # as rudder coefficients of model and ship differ, by wake and thrust (project choice)
         ),
     ),
     equations=_more_effective,
@@ -97,7 +97,7 @@ RUDDER_SLIPSTREAM = Effect(
             -3.0,
             5.0,
             absent=0.0,
-            typical=(0.7,),  # below the 1 or 2 of a jet that keeps its speed altogether (ours)
+            typical=(0.7,),  # below the 1 or 2 of a jet that keeps its speed altogether (project choice)
         ),
     ),
     equations=_in_slipstream,

@@ -40,7 +40,7 @@ GYRO_BIAS = Effect(
             -0.2,
             0.2,
             absent=0.0,
-            typical=rates(0.02),  # 0.06 deg/s where L/u0 is 20 s, a twentieth of the rate in a turn (ours)
+            typical=rates(0.02),  # 0.06 deg/s where L/u0 is 20 s, a twentieth of the rate in a turn (project choice)
         ),
     ),
     readings=_biased_gyro,
@@ -58,7 +58,8 @@ GYRO_SCALE = Effect(
     description="The rate gyro shows every turn faster (or slower) than it is.",
     source="Titterton and Weston (2004), Strapdown Inertial Navigation Technology: scale factor error",
     parameters=(
-        # 5 %: what turns up when a range or a unit is set wrongly is larger, what calibration leaves smaller (ours).
+        # 5 %: what turns up when a range or a unit is set wrongly is larger, what calibration leaves smaller (project
+        # choice).
         EffectParameter("factor", "relative excess of the rate shown", -0.9, 2.0, absent=0.0, typical=(0.05,)),
     ),
     readings=_scaled_gyro,
@@ -82,7 +83,7 @@ HEADING_OFFSET = Effect(
             -math.pi / 2,
             math.pi / 2,
             absent=0.0,
-            typical=(math.radians(2.0),),  # as compasses are mounted, and what their drift leaves (ours)
+            typical=(math.radians(2.0),),  # as compasses are mounted, and what their drift leaves (project choice)
         ),
     ),
     readings=_turned_compass,
@@ -111,7 +112,7 @@ ANTENNA_LEVER_ARM = Effect(
             -300.0,
             300.0,
             absent=0.0,
-            typical=lengths(-0.3),  # over a bridge aft (ours)
+            typical=lengths(-0.3),  # over a bridge aft (project choice)
         ),
         EffectParameter(
             "starboard_m", "antenna to starboard of the centreline", -50.0, 50.0, absent=0.0, typical=lengths(0.02)
@@ -188,7 +189,9 @@ LOG_LEVER_ARM = Effect(
             -300.0,
             300.0,
             absent=0.0,
-            typical=lengths(0.3),  # logs stand in the forebody, out of the boundary layer and the bubbles (ours)
+            typical=lengths(
+                0.3
+            ),  # logs stand in the forebody, out of the boundary layer and the bubbles (project choice)
         ),
     ),
     readings=_log_forward,
@@ -206,7 +209,7 @@ RUDDER_TIME_OFFSET = Effect(
             -60.0,
             60.0,
             absent=0.0,
-            typical=time_scale_passages(0.05),  # 1 s where L/u0 is 20 s (ours)
+            typical=time_scale_passages(0.05),  # 1 s where L/u0 is 20 s (project choice)
         ),
     ),
     delays={"rudder.command": "delay_s"},
@@ -257,7 +260,7 @@ def _measured(signals: _Columns, effect: Effect, values: Mapping[str, float]) ->
     """What sensors measured where they show `signals`: the readings s = A x + b, solved for x."""
     assert effect.readings is not None
     motion = {name: ca.SX.sym(name) for name in MEASURED_BEFOREHAND}
-    given = {one.stem: ca.SX(values[one.name]) for one in effect.parameters}
+    given = {parameter.stem: ca.SX(values[parameter.name]) for parameter in effect.parameters}
     readings = effect.readings(motion, given)
     names = [name for name in readings if _SIGNALS[name] in signals]
     if not names:

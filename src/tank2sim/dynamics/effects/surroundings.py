@@ -43,7 +43,7 @@ CURRENT = Effect(
             5.0,
             input_name="current.speed",
             absent=0.0,
-            typical=speeds(0.05),  # 0.4 m/s at 15 knots (ours)
+            typical=speeds(0.05),  # 0.4 m/s at 15 knots (project choice)
         ),
         EffectParameter(
             "direction_rad",
@@ -123,7 +123,7 @@ WIND = Effect(
             60.0,
             input_name="wind.speed",
             absent=0.0,
-            typical=wave_speeds(0.25),  # 10 m/s, a fresh breeze (Beaufort 5), for a ship of 160 m (ours)
+            typical=wave_speeds(0.25),  # 10 m/s, a fresh breeze (Beaufort 5), for a ship of 160 m (project choice)
         ),
         EffectParameter(
             "direction_rad",
@@ -173,7 +173,7 @@ WIND = Effect(
             1.0,
             1.0,
             absent=0.0,
-            spread=0.5,  # cards seldom say which it is (ours)
+            spread=0.5,  # cards seldom say which it is (project choice)
         ),
     ),
     equations=_with_wind,
@@ -218,7 +218,7 @@ WAVE_DRIFT = Effect(
             0.0,
             20.0,
             absent=0.0,
-            typical=lengths(0.0125),  # 2 m, sea state 4, for a ship of 160 m (ours)
+            typical=lengths(0.0125),  # 2 m, sea state 4, for a ship of 160 m (project choice)
         ),
         EffectParameter(
             "direction_rad",
@@ -227,7 +227,7 @@ WAVE_DRIFT = Effect(
             2 * math.pi,
             typical=DIRECTION_SIGNS,
         ),
-        # Spreads: waves that are not short are reflected in part, and hulls differ (ours).
+        # Spreads: waves that are not short are reflected in part, and hulls differ (project choice).
         EffectParameter(
             "surge_coefficient", "wave drift coefficient in surge, on the beam", 0.0, 3.0, 2 / 3, spread=0.3
         ),
@@ -256,7 +256,7 @@ BANK_SUCTION = Effect(
     description="A bank or wall alongside draws the ship to it and turns its bow away.",
     source="Norrbin (1974), 10th Symposium on Naval Hydrodynamics, 71-88",
     parameters=(
-        # A tenth of the Mariner's force and moment at 10 deg of rudder: a bank that is felt (ours).
+        # A tenth of the Mariner's force and moment at 10 deg of rudder: a bank that is felt (project choice).
         EffectParameter(
             "Y_prime", "sway force by a bank, prime, positive to starboard", -0.01, 0.01, absent=0.0, typical=(5e-5,)
         ),

@@ -59,7 +59,7 @@ BASE = SteeringForm(
     coefficients=(*EQUATION_1, *_OF_TABLE_2),
     rates=_rates,
     missing=(
-        "its coefficients are not printed but for C_m_b = 0.4 and C_m_w = 0.46, so that its Tables 1 and 2 cannot be "
+        "its coefficients are not printed, except C_m_b = 0.4 and C_m_w = 0.46, so that its Tables 1 and 2 cannot be "
         "computed from the paper",
         "the terms of C_m_bb, C_m_ww and C_m_wwb, which Table 2 varies, are not printed",
     ),

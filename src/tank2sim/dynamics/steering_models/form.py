@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 Rates = Callable[[Mapping[str, ca.SX], ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]]
-"""``rates(coefficients, beta, r, delta) -> (Y, N)``, all without units but for the angles in rad."""
+"""``rates(coefficients, beta, r, delta) -> (Y, N)``, all without units except for the angles in rad."""
 
 
 @dataclass(frozen=True, kw_only=True)

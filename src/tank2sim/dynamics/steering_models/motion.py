@@ -44,7 +44,7 @@ def steering_model(
     ValueError
         A coefficient without default is not given, or one is given that the form does not have.
     """
-    known = {one.name: one.default for one in form.coefficients}
+    known = {coefficient.name: coefficient.default for coefficient in form.coefficients}
     values = known | dict(coefficients)
     wrong = [name for name, value in values.items() if value is None or name not in known]
     if wrong:
@@ -84,8 +84,13 @@ def _ship(length_m: float, speed_mps: float) -> tuple[Parameter, ...]:
 
 def _coefficients(form: SteeringForm, values: Mapping[str, float]) -> tuple[Parameter, ...]:
     return tuple(
-        Parameter(name=f"coefficients.{one.name}", unit="1", description=one.description, start=values[one.name])
-        for one in form.coefficients
+        Parameter(
+            name=f"coefficients.{coefficient.name}",
+            unit="1",
+            description=coefficient.description,
+            start=values[coefficient.name],
+        )
+        for coefficient in form.coefficients
     )
 
 
@@ -117,7 +122,7 @@ def _quantities(form: SteeringForm, symbols: Mapping[str, ca.SX]) -> tuple[Quant
     beta, r = symbols["motion.beta"], symbols["motion.r"]
     speed = symbols["ship.speed"]
     per_second = speed / symbols["ship.length"]
-    own = {one.name: symbols[f"coefficients.{one.name}"] for one in form.coefficients}
+    own = {coefficient.name: symbols[f"coefficients.{coefficient.name}"] for coefficient in form.coefficients}
     sway, yaw = form.rates(own, beta, r / per_second, symbols["rudder.effective"])
 
     def quantity(name: str, unit: str, description: str, value: ca.SX) -> Quantity:

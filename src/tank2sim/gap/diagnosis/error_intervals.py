@@ -36,10 +36,10 @@ def acting(gap: Gap) -> tuple[Acting, ...]:
     nothing but kinematics or sensors is at fault there are no forces.
     """
     signals = {signal.quantity: signal for signal in _lacking(gap.passed)}
-    told = [*_passages("heading", [signals[name] for name in TURNING if name in signals])]
-    told += _passages("track", [signals[name] for name in TRACK[:2] if name in signals])
+    messages = [*_passages("heading", [signals[name] for name in TURNING if name in signals])]
+    messages += _passages("track", [signals[name] for name in TRACK[:2] if name in signals])
     force = missing_force_intervals(gap)
-    return (*most_telling(told), *(force.passages if force is not None else ()))
+    return (*most_telling(messages), *(force.passages if force is not None else ()))
 
 
 def earth_bound(gap: Gap) -> bool:
@@ -49,7 +49,7 @@ def earth_bound(gap: Gap) -> bool:
 
 def missing_force_intervals(gap: Gap) -> MissingForce | None:
     """The force that the model lacks; None where nothing but kinematics or sensors is at fault."""
-    if earth_bound(gap) and all(EFFECTS[one.name].acts_on in _EARTH_BOUND for one in gap.effects):
+    if earth_bound(gap) and all(EFFECTS[effect.name].acts_on in _EARTH_BOUND for effect in gap.effects):
         return None
     return gap.missing_force
 
@@ -62,8 +62,8 @@ def contradiction(gap: Gap) -> MissingSignal | None:
 def missing_signal(passed: Sequence[Passed]) -> MissingSignal | None:
     """What the records lack to agree with each other, in the quantity in which it is simplest; None if they agree.
 
-    Of velocities to north and east, ahead and to starboard that one is told which is largest and goes best with a state
-    of the ship: a current is constant in earth axes, a fault of the log is not.
+    Of velocities to north and east, ahead and to starboard that one is reported which is largest and goes best with a
+    state of the ship: a current is constant in earth axes, a fault of the log is not.
     """
     found = _lacking(passed)
     return max(found, key=_simply_told, default=None)
@@ -78,7 +78,7 @@ def _lacking(passed: Sequence[Passed]) -> list[MissingSignal]:
     """Each quantity of the records that contradict each other by more than they may."""
     check = kinematic_consistency(passed)
     names = [*(TURNING if check.turning > CONTRADICTED else ()), *(TRACK if check.track > CONTRADICTED else ())]
-    parts = [(one, _series(one)) for one in passed]
+    parts = [(replay, _series(replay)) for replay in passed]
     made = []
     for name in names:
         there = [(one, own) for one, own in parts if name in own]
@@ -110,7 +110,7 @@ def _series(one: Passed) -> dict[str, tuple[Array, float]]:
             rate(seen[axis]) - _mean(over)
             for axis, over in zip("xy", recorded_earth_velocity(seen["u"], seen["v"], psi), strict=True)
         )
-        # Turned into the ship's axes step by step: she may turn by much over the span.
+        # Turned into the ship's axes step by step: it may turn by much over the span.
         step, between = span_s / SPAN, 0.5 * (psi[1:] + psi[:-1])
         made = recorded_earth_velocity(np.diff(seen["x"]) / step, np.diff(seen["y"]) / step, -between)
         ahead, starboard = (_sliding(over) - _mean(seen[name]) for name, over in zip("uv", made, strict=True))
@@ -195,7 +195,7 @@ def _passages(equation: str, signals: Sequence[MissingSignal]) -> list[Acting]:
     if not signals:
         return []
     of, found = signals[0], []
-    z = np.sqrt(np.mean([(one.values / one.errors) ** 2 for one in signals], axis=0))
+    z = np.sqrt(np.mean([(signal.values / signal.errors) ** 2 for signal in signals], axis=0))
     trials = np.array(of.trials, dtype=object)
     for trial in dict.fromkeys(of.trials):
         rows = np.flatnonzero(trials == trial)

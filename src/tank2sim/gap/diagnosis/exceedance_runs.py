@@ -13,7 +13,8 @@ EXCEEDANCE_WINDOW = 21
 """Instants over which the square of a residual is averaged to tell a stretch of misfit from noise: half of L/u0."""
 
 BEYOND = 4.0
-"""A mean square belongs to a stretch if it exceeds that of noise by this many of its own standard deviations (ours)."""
+"""A mean square belongs to a stretch if it exceeds that of noise by this many of its own standard deviations (project
+choice)."""
 
 
 def stretches(z: Array, limit: float | None = None, width: int = EXCEEDANCE_WINDOW) -> list[tuple[int, int, float]]:

@@ -16,7 +16,7 @@ ENDS = 20
 """The motion at an end of a trial is read off a straight line through this many instants (half of L/u0)."""
 
 CONTRADICTED = 4.0
-"""Records that contradict themselves by more standard errors than this are at fault, not the hull (ours)."""
+"""Records that contradict themselves by more standard errors than this are at fault, not the hull (project choice)."""
 
 
 @dataclass(frozen=True)
@@ -42,16 +42,18 @@ def kinematic_consistency(passed: Sequence[Passed]) -> Kinematics:
     integrated.
     """
     turning, track = [], []
-    for one in passed:
-        seen = readable(one)
-        noise = {name.removeprefix("motion."): error for name, error in one.noise.items()}
+    for replay in passed:
+        seen = readable(replay)
+        noise = {name.removeprefix("motion."): error for name, error in replay.noise.items()}
         if {"motion.psi", "motion.r"} <= seen.keys():
-            turning.append(_contradiction(one.time_s, seen["motion.psi"], noise["psi"], seen["motion.r"], noise["r"]))
+            turning.append(
+                _contradiction(replay.time_s, seen["motion.psi"], noise["psi"], seen["motion.r"], noise["r"])
+            )
         if {f"motion.{name}" for name in ("psi", "u", "v", "x", "y")} <= seen.keys():
             u, v, psi = (seen[f"motion.{name}"] for name in ("u", "v", "psi"))
             over = math.hypot(noise["u"], noise["v"], float(np.max(np.hypot(u, v))) * noise["psi"])
             for axis, rate in zip("xy", recorded_earth_velocity(u, v, psi), strict=True):
-                track.append(_contradiction(one.time_s, seen[f"motion.{axis}"], noise[axis], rate, over))
+                track.append(_contradiction(replay.time_s, seen[f"motion.{axis}"], noise[axis], rate, over))
     return Kinematics(*(float(np.sqrt(np.mean(np.square(z)))) if z else 0.0 for z in (turning, track)))
 
 

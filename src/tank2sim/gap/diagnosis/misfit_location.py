@@ -30,18 +30,19 @@ from tank2sim.identification.trials.assessment.evaluation import FigureCompariso
 from tank2sim.records.trials import Trial
 
 NOISE_SURE = 1.1
-"""A signal of a trial whose misfit is below this has no stretches: its noise is not known better (ours), and slow noise
-has stretches of its own."""
+"""A signal of a trial whose misfit is below this has no stretches: its noise is not known better (project choice),
+and slow noise has stretches of its own."""
 
 GROWING = 8.0
 """A difference grows if the mean square of its growth is this much beyond that of white noise: three standard errors
-(ours). Neighbouring values of a growth share their readings, and the noise of positions is slow besides."""
+(project choice). Neighbouring values of a growth share their readings, and the noise of positions is slow besides."""
 
 USUAL = 0.5
-"""A force is at work where its square is above this share of its mean square over all trials (ours)."""
+"""A force is at work where its square is above this share of its mean square over all trials (project choice)."""
 
 CLEAR = 8.0
-"""And where the mean square of the ratio to its standard error is this much above 1: three standard errors (ours)."""
+"""And where the mean square of the ratio to its standard error is this much above 1: three standard errors (project
+choice)."""
 
 _SHORT = 4
 """Blocks of the smoother over which that mean is taken: half of L/u0."""
@@ -68,11 +69,11 @@ def places(passed: Sequence[Passed], limit: int = 12) -> tuple[MisfitPlace, ...]
     counts as the largest before it.
     """
     found = [
-        (excess, MisfitPlace(one.name, signal, float(one.time_s[begin]), float(one.time_s[end - 1]), 0.0))
-        for one in passed
-        for signal in one.noise
-        if one.misfit("before", signal) > NOISE_SURE
-        for begin, end, excess in _where_it_arises(one, signal)
+        (excess, MisfitPlace(replay.name, signal, float(replay.time_s[begin]), float(replay.time_s[end - 1]), 0.0))
+        for replay in passed
+        for signal in replay.noise
+        if replay.misfit("before", signal) > NOISE_SURE
+        for begin, end, excess in _where_it_arises(replay, signal)
     ]
     whole = sum(excess for excess, _ in found)
     found.sort(key=lambda pair: -pair[0])
@@ -147,7 +148,7 @@ def figures(
     which : str
         ``before`` or ``after``.
     """
-    own = [figure for one in passed for figure in _ends(one, which)]
+    own = [figure for replay in passed for figure in _ends(replay, which)]
     steered = predicted_figures(card, trials)
     order = {trial.name: place for place, trial in enumerate(trials)}
     return tuple(sorted((*steered, *own), key=lambda figure: order.get(figure.trial, len(order))))

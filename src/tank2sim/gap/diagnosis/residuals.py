@@ -51,7 +51,7 @@ def force_lacking(likelihood: Likelihood, fit: ExplanationFit) -> MissingForce |
 def _inertia(explained: Hypothesis) -> Array:
     """Mass matrix (3, 3): forces X, Y (N) and N (N m) by accelerations of surge, sway and yaw at the design speed."""
     pushes = [Parameter(name=f"push.{axis}", unit="1", description="A force", start=0.0) for axis in "XYN"]
-    X, Y, N = (one.symbol for one in pushes)
+    X, Y, N = (push.symbol for push in pushes)
     model = with_forces(explained.model.extend(*pushes), X=X, Y=Y, N=N)
     places = [model.state_names.index(name) for name in ("motion.u", "motion.v", "motion.r")]
     slope = ca.jacobian(model.rates[places], ca.vertcat(X, Y, N))

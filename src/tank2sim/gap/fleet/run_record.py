@@ -14,7 +14,7 @@ from tank2sim.gap.fleet.ships import ShipFolder
 from tank2sim.gap.workflow import GapOptions
 
 RUN = "run.json"
-"""File beside ``gap.json``."""
+"""File next to ``gap.json``."""
 
 _FORMAT = "tank2sim-run/1"
 

@@ -21,7 +21,7 @@ from tank2sim.gap.workflow import GapOptions, run_gap_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 
 AHEAD = 256
-"""Ships that are read and handed out before the first of them is done: a bound on memory (ours)."""
+"""Ships that are read and handed out before the first of them is done: a bound on memory (project choice)."""
 
 
 def can_lack(card: Card) -> ManoeuvringCard:
@@ -42,7 +42,7 @@ def can_lack(card: Card) -> ManoeuvringCard:
 
 @dataclass(frozen=True, eq=False)
 class Sought:
-    """A ship as she was read, all that is needed to find what her card lacks.
+    """A ship as it was read, all that is needed to find what its card lacks.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def found_one_by_one(
         Read as they are needed.
     options : GapOptions
     progress : callable
-        Told of each stage of each ship.
+        Called with each stage of each ship.
     executor : Executor, optional
         For the explanations of each ship; by default they are fitted in this process, or in others of this machine.
 
@@ -158,12 +158,12 @@ def _found(
         return Fault(str(error))
     except (BrokenExecutor, CancelledError):
         raise
-    except Exception as error:  # one ship at which the program fails does not take the others with her
+    except Exception as error:  # one ship at which the program fails does not take the others with it
         return fault_of_program(error)
 
 
 def fault_of_program(error: Exception) -> Fault:
-    """What is told of an `error` that no check of the input foresaw."""
+    """What is reported of an `error` that no check of the input foresaw."""
     words = " ".join(str(error).split())[:200]
-    remedy = "run 'tank2sim gap' with her card and trials alone, and report what it says"
+    remedy = "run 'tank2sim gap' with its card and trials alone, and report what it says"
     return Fault(f"a fault of the program, not of yours: {type(error).__name__}: {words}; {remedy}")

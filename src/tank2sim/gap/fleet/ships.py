@@ -1,4 +1,4 @@
-"""A fleet: a folder with a sub-folder for each ship, in which lie her card and beside it her trials.
+"""A fleet: a folder with a sub-folder for each ship, in which lie its card and next to it its trials.
 
 ::
 
@@ -99,7 +99,7 @@ def fleet_in(folder: Path, output: Path) -> Fleet:
         else:
             passed_over.append(path)
     if not ships and not faults:
-        remedy = "a folder with a sub-folder for each ship was expected, in it her card (.toml) and her trials"
+        remedy = "a folder with a sub-folder for each ship was expected, in it its card (.toml) and its trials"
         raise InputError(folder, "", "holds no ship", remedy)
     return Fleet(folder, tuple(ships), faults, tuple(passed_over))
 
@@ -110,20 +110,20 @@ def ship_in(folder: Path) -> ShipFolder | None:
     Raises
     ------
     InputError
-        There is a card and no trial, a trial and no card, or more than one card; a file beside the card is called like
-        a trial and is none: without it, she would be judged by less than what was measured; or a file cannot be read.
+        There is a card and no trial, a trial and no card, or more than one card; a file next to the card is called like
+        a trial and is none: without it, it would be judged by less than what was measured; or a file cannot be read.
     """
     cards, (trials, others) = _cards(folder), _trials(folder)
     if not cards:
         if not trials:
             return None
-        raise InputError(folder, "", "holds trials and no ship card", "put her card (.toml) beside them")
+        raise InputError(folder, "", "holds trials and no ship card", "put its card (.toml) next to them")
     if len(cards) > 1:
         names = ", ".join(path.name for path in cards)
         raise InputError(folder, "", f"holds {len(cards)} cards ({names})", "leave one of them there")
     _refuse(others)
     if not trials:
-        raise InputError(folder, "", "holds a card and no trial", "put her trials (.csv or .dat) beside the card")
+        raise InputError(folder, "", "holds a card and no trial", "put its trials (.csv or .dat) next to the card")
     held: tuple[Path, ...] = ()
     if (folder / HOLDOUT).is_dir():
         held, others = _trials(folder / HOLDOUT)
@@ -190,7 +190,7 @@ def _refuse(others: tuple[Path, ...]) -> None:
             if path.suffix.lower() == ".csv"
             else f"it does not begin like {reader_of(path).description}"
         )
-        raise InputError(path, "", f"is no trial: {why}", "mend its header, or put it elsewhere if it is none")
+        raise InputError(path, "", f"is no trial: {why}", "correct its header, or put it elsewhere if it is none")
 
 
 def _is_trial(path: Path) -> bool:

@@ -14,7 +14,7 @@ from tank2sim.errors import InputError
 from tank2sim.gap.fleet.ships import GAP, IMPROVED
 
 REPORT_FILE = "report.html"
-"""Page of a ship, beside her ``gap.json``."""
+"""Page of a ship, next to it ``gap.json``."""
 
 
 @dataclass(frozen=True)
@@ -24,22 +24,22 @@ class ShipTold:
     Parameters
     ----------
     folder : str
-        Name of her folder, and of that of her results.
+        Name of its folder, and of that of its results.
     name : str
-        Of the ship, as her card has it.
+        Of the ship, as its card has it.
     verdict : str
         One of :data:`.result.VERDICTS`.
     effects : tuple of mappings
         As in ``gap.json``: ``name``, ``parameters``, ``standard_errors``, ``confidence``; in the units of their names.
     alternatives : tuple of str
-        What her trials cannot tell from them.
+        What its trials cannot tell from them.
     misfit : mapping
         ``before`` and ``after`` to {``fit``, ``holdout``}: units of the noise, None without such trials or where a
         simulation left all bounds.
     trials : mapping
         Numbers of trials, by ``fit`` and ``holdout``.
     fault : str
-        Why she has no result, in one line; all but `folder` is then empty.
+        Why it has no result, in one line; all but `folder` is then empty.
     """
 
     folder: str
@@ -57,7 +57,7 @@ class ShipTold:
         return "holdout" if self.trials.get("holdout") else "fit"
 
     def misfits(self) -> tuple[float | None, float | None]:
-        """Misfit before and after of the trials by which she is judged."""
+        """Misfit before and after of the trials by which it is judged."""
         before, after = (self.misfit.get(which, {}).get(self.judged_by) for which in ("before", "after"))
         return before, after
 
@@ -97,20 +97,20 @@ class FleetTold:
     @property
     def verdicts(self) -> dict[str, int]:
         """Verdict to the number of ships that have it."""
-        words = [one.verdict for one in self.ships if not one.fault]
+        words = [ship.verdict for ship in self.ships if not ship.fault]
         return {word: words.count(word) for word in sorted(set(words))}
 
     @property
     def faults(self) -> tuple[ShipTold, ...]:
         """The ships without a result."""
-        return tuple(one for one in self.ships if one.fault)
+        return tuple(ship for ship in self.ships if ship.fault)
 
     def as_json(self) -> dict[str, object]:
         """In the form of ``fleet.json``."""
         return {
             "fleet": self.name,
             "verdicts": self.verdicts,
-            "ships": [one.as_json() for one in self.ships],
+            "ships": [ship.as_json() for ship in self.ships],
             "notices": list(self.notices),
         }
 

@@ -26,7 +26,8 @@ from tank2sim.simulation.recorded import SMOOTHING
 _Truths = NDArray[np.bool_]
 
 BLOCKS_PER_SHIP_TIME = 8
-"""Blocks in L/u0: two fifths of the fastest motion of a hull, whose yaw rate answers in about 0.3 L/u0 (ours)."""
+"""Blocks in L/u0: two fifths of the fastest motion of a hull, whose yaw rate answers in about 0.3 L/u0 (project
+choice)."""
 
 FINE_PER_SHIP_TIME = 200
 """Fine steps in L/u0 at most, if the record has so many samples: a step of the rudder order must not be averaged with
@@ -38,7 +39,8 @@ far below the noise of any sensor)."""
 
 
 GUESSED = (0.1, 0.1, 1e-3, 0.01, 1.0, 1.0)
-"""Error of the smoothed motion in u, v (m/s), r (rad/s), psi (rad), x and y (m) where they were derived (ours)."""
+"""Error of the smoothed motion in u, v (m/s), r (rad/s), psi (rad), x and y (m) where they were derived (project
+choice)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from tank2sim.gap.inference.kalman_filter import NoiseLevels
 
 @dataclass(frozen=True, eq=False)
 class NuisanceParameters:
-    """What may be a little wrong beside the effects: the card's coefficients, and the clock of the rudder's record.
+    """What may be a little wrong next to the effects: the card's coefficients, and the clock of the rudder's record.
 
     Parameters
     ----------

@@ -96,11 +96,11 @@ class Fitting:
     def fit(self, proposals: Sequence[Proposal]) -> None:
         """Fit what is proposed, and keep the better of it and what was found before."""
         if self.executor is None:
-            for one in proposals:
-                self.progress(" and ".join(one.effects) or "the card as it is")
-                self._keep(one, _fitted(self.likelihood, self.known, one))
+            for proposal in proposals:
+                self.progress(" and ".join(proposal.effects) or "the card as it is")
+                self._keep(proposal, _fitted(self.likelihood, self.known, proposal))
             return
-        waiting = [(one, self.executor.submit(_fitted_there, self._sent, one)) for one in proposals]
+        waiting = [(proposal, self.executor.submit(_fitted_there, self._sent, proposal)) for proposal in proposals]
         for one, future in waiting:
             self.progress(" and ".join(one.effects) or "the card as it is")
             self._keep(one, future.result())

@@ -83,13 +83,17 @@ class Hypothesis:
         asked: list[EstimatedParameter] = []
         for name in self.effects:
             effect = EFFECTS[name]
-            start = {one.name: one.typical_values(card)[0] for one in effect.parameters if one.typical_values(card)}
+            start = {
+                parameter.name: parameter.typical_values(card)[0]
+                for parameter in effect.parameters
+                if parameter.typical_values(card)
+            }
             model = effect.apply(model, start, card)
             places = effect.model_names()
             asked += [
-                EstimatedParameter(name, one, places[one.name])
-                for one in effect.parameters
-                if one.name in effect.free(card)
+                EstimatedParameter(name, parameter, places[parameter.name])
+                for parameter in effect.parameters
+                if parameter.name in effect.free(card)
             ]
         self.model = model
         self.asked = tuple(asked)
@@ -223,7 +227,7 @@ class Hypothesis:
         return _rowwise(self._rates, x, xi, self.inputs(motion, theta), self.parameters(theta))
 
     def readings(self, motion: MeasuredBatch, theta: Array, own: Array | None = None) -> Array:
-        """What the sensors would show in the middle of each block, but for their noise (R, T, ny)."""
+        """What the sensors would show in the middle of each block, except for their noise (R, T, ny)."""
         return _rowwise(self._readings(motion.seen), *self._in_blocks(motion, theta, own), self.parameters(theta))
 
     def slopes(self, motion: MeasuredBatch, theta: Array) -> tuple[Array, Array]:
@@ -369,7 +373,7 @@ class Hypothesis:
         return ca.Function("newton", [own, known, u, p], [own_rates, ca.jacobian(own_rates, own)], {"cse": True})
 
     def _settled(self, x: Array, u: Array, p: Array) -> Array:
-        """Own states at rest beside a motion that stands still: where trims are known they are taken."""
+        """Own states at rest next to a motion that stands still: where trims are known they are taken."""
         states = {state.name: state for state in self.model.states}
         xi = np.array(self._begin(np.zeros(len(self.own)), x, u, p)).ravel()
         moving = np.array([states[name].trim is None and states[name].steady for name in self.own])
@@ -392,4 +396,4 @@ def _rowwise(function: ca.Function, *arguments: Array) -> Array:
 def _late(rows: Array, steps: float) -> Array:
     """Values (R, n) as they would have been `steps` (a real number) later; the first one held before."""
     places = np.arange(rows.shape[1])
-    return np.array([np.interp(places - steps, places, one) for one in rows])
+    return np.array([np.interp(places - steps, places, row) for row in rows])

@@ -4,7 +4,7 @@
 
 e are the innovations of :mod:`.observer` in units of their standard deviation, linear in the k parameters of the
 effects and in the coefficients of the card, c in units of their standard error beforehand; Jc are their columns. The
-coefficients are integrated out, the noise is estimated anew for each explanation, "none" as well: else a rival that
+coefficients are integrated out, the noise is estimated again for each explanation, "none" as well: else a rival that
 adapts the noise would win without an effect. T is -2 log of the likelihood; of two explanations the one with the
 smaller T holds, by more than chance if T differs by some 10.
 """
@@ -33,8 +33,8 @@ WIDE_PRIOR = 10.0
 """Error of the smoothed motion at the beginning of a run, in its noise: wide, so that no initial state is assumed."""
 
 LARGEST_FORM, IMPOSSIBLE = 3.5, 1000.0
-"""Standard deviations by which a form may differ, and what each beyond costs (ours): a force that is all but taken back
-by its form is none, and its slope is then that of another force."""
+"""Standard deviations by which a form may differ, and what each beyond costs (project choice): a force that is all
+but taken back by its form is none, and its slope is then that of another force."""
 
 BY_FORMULA = (6, 4)
 """Iterations on the noise, for parameters by the formula alone: the noise must first cover what the formula lacks."""
@@ -44,7 +44,7 @@ REMEMBERED = 100
 
 LEAST_TOLD = 0.02
 """A combination of coefficients whose variance the trials would lessen by less than this share is left out while the
-noise is sought (ours); the score is of all."""
+noise is sought (project choice); the score is of all."""
 
 LEAST_GAIN = 0.1
 """Gauss-Newton stops where the next step promises less of the score than this."""

@@ -22,33 +22,35 @@ from tank2sim.identification.trials.problem.problem_from_card import free_parame
 from tank2sim.records.trials import sampling_step
 
 SLOW_SHARE = 0.3
-"""Slow error of a sensor over its white noise at 10 samples in a block, before the trials tell (ours)."""
+"""Slow error of a sensor over its white noise at 10 samples in a block, before the trials tell (project choice)."""
 
 SLOW_TIME = 3.0
-"""Time constant of a sensor's slow error before the trials tell, in L/u0 (ours): it outlasts a manoeuvre's phases."""
+"""Time constant of a sensor's slow error before the trials tell, in L/u0 (project choice): it outlasts a manoeuvre's
+phases."""
 
 FORCE_SHARE = 0.01
-"""Unexplained acceleration before the trials tell, as a share of what the ship's accelerations are (ours)."""
+"""Unexplained acceleration before the trials tell, as a share of what the ship's accelerations are (project choice)."""
 
 FORCE_TIME = 0.5
-"""Time constant of the unexplained acceleration before the trials tell, in L/u0 (ours): that of gusts."""
+"""Time constant of the unexplained acceleration before the trials tell, in L/u0 (project choice): that of gusts."""
 
 GEAR, ASSUMED_GEAR = 0.02, 0.5
 """Standard error of what a card states of its steering gear, as that of a coefficient without one, and of the time
-constant that is assumed where it states none (ours)."""
+constant that is assumed where it states none (project choice)."""
 
 BEGINNING = 0.1
-"""Standard deviation of the first state about the measured one, in u0, u0/L, rad and 3 L (ours): more than a log, a
-gyro, a compass or the place of an antenna is wrong by."""
+"""Standard deviation of the first state about the measured one, in u0, u0/L, rad and 3 L (project choice): more than
+a log, a gyro, a compass or the place of an antenna is wrong by."""
 
 CLOCK_SHARE = 0.5
-"""Standard error of the time of the rudder's record, in sampling steps (ours)."""
+"""Standard error of the time of the rudder's record, in sampling steps (project choice)."""
 
 LARGEST_SHARE = 0.1
-"""A group of coefficients is wrong together by no more than this share of their values (ours)."""
+"""A group of coefficients is wrong together by no more than this share of their values (project choice)."""
 
 BELIEVED = {"white": 0.5, "slow": 1.5, "slow_s": 0.7, "force": 2.5, "force_s": 0.7, "width": 0.7}
-"""Standard deviation of the logarithm of each, before the trials tell (ours): noise may be anything within reason."""
+"""Standard deviation of the logarithm of each, before the trials tell (project choice): noise may be anything within
+reason."""
 
 
 def likelihood_from_card(card: ManoeuvringCard, measured: Measured) -> Likelihood:

@@ -1,4 +1,4 @@
-"""Trials without the faults of sensors that were found in them, and their files written anew."""
+"""Trials without the faults of sensors that were found in them, and their files written again."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.sensors import correct_reading as without_fault
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
 from tank2sim.gap.outcome.improve_card import Found, in_short
-from tank2sim.records.audit import mended
+from tank2sim.records.audit import repair_trial
 from tank2sim.records.csv_table import read_table
 from tank2sim.records.reading import read_trial, reader_of
 from tank2sim.records.signals.writing import trial_text
@@ -27,7 +27,7 @@ REMAINING_FAULTS = "left as it is"
 """How a notice begins of a fault that cannot be corrected in a trial."""
 
 DIGITS_OF_A_CORRECTION = 2
-"""A corrected column has at least so many digits of the correction (ours); others have those of the file."""
+"""A corrected column has at least so many digits of the correction (project choice); others have those of the file."""
 
 
 def correct_sensor_faults(trial: Trial, found: Sequence[Found]) -> Trial:
@@ -43,29 +43,29 @@ def correct_sensor_faults(trial: Trial, found: Sequence[Found]) -> Trial:
     """
     signals = dict(trial.signals)
     faults = [(name, values) for name, values, _ in found if EFFECTS[name].acts_on == "sensor"]
-    told = []
+    messages = []
     for name, values in reversed(faults):  # the last fault acts on what the others show
         try:
             signals = without_fault(trial.time_s, signals, EFFECTS[name], values)
         except ValueError as error:
-            told.append(f"{REMAINING_FAULTS}: {error}")
+            messages.append(f"{REMAINING_FAULTS}: {error}")
         else:
-            told.append(f"corrected for {name}")
-    return replace(trial, signals=signals, notices=(*trial.notices, *told))
+            messages.append(f"corrected for {name}")
+    return replace(trial, signals=signals, notices=(*trial.notices, *messages))
 
 
 def corrected_text(path: Path, trial: Trial, found: Sequence[Found]) -> str | None:
     """Text of a trial's file with the columns corrected that faulty sensors had shown, and a comment that says so.
 
     Comments, other columns and their digits stay as they are in a trial CSV. Files of other formats, and those of which
-    a corrected column had to be mended before use, are written in the trial format at the size of the file.
+    a corrected column had to be repaired before use, are written in the trial format at the size of the file.
 
     Parameters
     ----------
     path : Path
         The file as it was measured.
     trial : Trial
-        What was read from it, mended and scaled to the ship to which `found` applies.
+        What was read from it, repaired and scaled to the ship to which `found` applies.
     found : sequence of Found
         See :func:`correct_sensor_faults`.
 
@@ -80,7 +80,7 @@ def corrected_text(path: Path, trial: Trial, found: Sequence[Found]) -> str | No
         The file cannot be read any more.
     """
     raw = read_trial(path, rising=False)
-    own, _ = mended(raw)
+    own, _ = repair_trial(raw)
     sized = _at_size_of(own, trial, found)
     fixed = correct_sensor_faults(own, sized)
     touched = [
@@ -90,11 +90,12 @@ def corrected_text(path: Path, trial: Trial, found: Sequence[Found]) -> str | No
         return None
     faults = [one for one in sized if EFFECTS[one[0]].acts_on == "sensor"]
     columns = ", ".join(own.heading(name) for name in touched)
-    told = f"{columns} corrected by tank2sim gap for {' and '.join(f'{one[0]} ({in_short(*one)})' for one in faults)}"
+    names = " and ".join(f"{fault[0]} ({in_short(*fault)})" for fault in faults)
+    text = f"{columns} corrected by tank2sim gap for {names}"
     sheet = _sheet(path)
     if sheet is None or not _same(raw, own, touched):
-        return trial_text(fixed, [f"from {path.name}", told])
-    return _edited(sheet, _Columns(path, raw, fixed, touched), f"# {' '.join(told.split())}")
+        return trial_text(fixed, [f"from {path.name}", text])
+    return _edited(sheet, _Columns(path, raw, fixed, touched), f"# {' '.join(text.split())}")
 
 
 def _at_size_of(own: Trial, trial: Trial, found: Sequence[Found]) -> list[Found]:
@@ -132,7 +133,7 @@ def _sheet(path: Path) -> str | None:
 
 @dataclass(frozen=True, eq=False)
 class _Columns:
-    """Columns of a file to be written anew: what was read, what shall be read, and the names of those signals."""
+    """Columns of a file to be written again: what was read, what shall be read, and the names of those signals."""
 
     path: Path
     raw: Trial

@@ -18,13 +18,13 @@ from tank2sim.records.signals.columns import SignalName
 from tank2sim.units import from_si, in_words
 
 NEXT_TEST_FILE = "next_test.csv"
-"""File beside ``gap.json`` with the orders of the next test."""
+"""File next to ``gap.json`` with the orders of the next test."""
 
 NOISE_FLOOR = 1.0
 """Misfit of a perfect model: it is counted in standard deviations of the measurement noise."""
 
 _MOST_PASSAGES = 24
-"""Passages in which the model is wrong that are told, the most telling (ours)."""
+"""Passages in which the model is wrong that are reported, the most telling (project choice)."""
 
 _IN_FILE = {"rad": "deg", "radps": "degps"}
 
@@ -38,11 +38,11 @@ def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, o
     files : mapping, optional
         Trial's name to its file's; by default that of the trial format, ``<name>.csv``.
     """
-    names = {one.name: (files or {}).get(one.name, f"{one.name}.csv") for one in gap.passed}
+    names = {replay.name: (files or {}).get(replay.name, f"{replay.name}.csv") for replay in gap.passed}
     return {
         "verdict": gap.verdict,
-        "effects": [_effect(one) for one in gap.effects],
-        "alternatives": [joined(one) for one in gap.alternatives],
+        "effects": [_effect(effect) for effect in gap.effects],
+        "alternatives": [joined(alternative) for alternative in gap.alternatives],
         "where": _where(gap, names),
         "acting": _acting(gap, names),
         "equation": gap.equation,
@@ -59,10 +59,10 @@ def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, o
         },
         "next_test": _next_test(gap.next_test),
         "rivals": [
-            {"effects": list(one.effects), "loss": _finite(one.loss), "probability": _finite(one.probability)}
-            for one in gap.rivals
+            {"effects": list(rival.effects), "loss": _finite(rival.loss), "probability": _finite(rival.probability)}
+            for rival in gap.rivals
         ],
-        "trials": [_trial(one, names[one.name]) for one in gap.passed],
+        "trials": [_trial(replay, names[replay.name]) for replay in gap.passed],
         "figures": _figures(gap, names),
         "agreement": _agreement(gap, names),
         "missing_force": _missing(missing_force_intervals(gap)),
@@ -73,7 +73,7 @@ def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, o
 
 def hidden(gap: Gap) -> dict[str, Mapping[str, float]]:
     """What could be there without showing; what was named, or may be what is missing, is not among it."""
-    possible = {one.name for one in gap.effects} | {name for names in gap.alternatives for name in names}
+    possible = {effect.name for effect in gap.effects} | {name for names in gap.alternatives for name in names}
     return {effect: sizes for effect, sizes in gap.could_hide.items() if effect not in possible}
 
 
@@ -87,10 +87,10 @@ def hidden_in_words(effect: str, parameter: str, size: float) -> str:
     """``angle up to 0.25 deg would not show``, or ``max rate of 5 deg/s in place of the card's would not show``."""
     own, value = in_file_units(parameter, size)
     words, unit = in_words(own)
-    told = f"{value:.2g}{f' {unit}' if unit else ''}"
+    text = f"{value:.2g}{f' {unit}' if unit else ''}"
     if replaces(effect, parameter):
-        return f"{words} of {told} in place of the card's would not show"
-    return f"{words} up to {told} would not show"
+        return f"{words} of {text} in place of the card's would not show"
+    return f"{words} up to {text} would not show"
 
 
 def joined(effects: tuple[str, ...]) -> str:

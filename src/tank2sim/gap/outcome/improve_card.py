@@ -85,8 +85,8 @@ def card_with_effects_text(
         return card.text
     how = f"{' and '.join(names)} added by tank2sim gap from {', '.join(trials)}"
     text = changed_text(card.text, card.source, {"ship.source": f"{card.ship.source}; {how}"})
-    told = [f"{name}: {in_short(name, values, errors)}" for name, values, errors in found if name in names]
-    lines = [how, *told]
+    messages = [f"{name}: {in_short(name, values, errors)}" for name, values, errors in found if name in names]
+    lines = [how, *messages]
     if any(EFFECTS[name].in_place_of or EFFECTS[name].changes for name in names):
         lines.append("Keys that were changed for this bear their old values in comments.")
     if rivals:
@@ -97,19 +97,19 @@ def card_with_effects_text(
 
 def in_short(name: str, values: Mapping[str, float], errors: Mapping[str, float]) -> str:
     """Parameters of an effect with their standard errors, in words: ``speed 0.45 m/s (standard error 0.02)``."""
-    told = []
+    messages = []
     for parameter in EFFECTS[name].parameters:
         if parameter.name not in values:
             continue
         own, value, error = _written(parameter, values, errors)
         words, unit = in_words(own)
         spread = f" (standard error {error:.2g})" if error else ""
-        told.append(f"{words} {value:.6g}{f' {unit}' if unit else ''}{spread}")
-    return ", ".join(told)
+        messages.append(f"{words} {value:.6g}{f' {unit}' if unit else ''}{spread}")
+    return ", ".join(messages)
 
 
 Change = tuple[object, str]
-"""New value of a key as the file has it, and the comment beside it."""
+"""New value of a key as the file has it, and the comment next to it."""
 
 
 def _changed(card: ManoeuvringCard, changes: Mapping[str, Change]) -> ManoeuvringCard:
@@ -186,14 +186,14 @@ def changed_derivatives(
     The effect itself is asked: it is applied to a model that has each derivative as a quantity.
     """
     model = build(card)
-    names = [one for one in ALL_TERMS if f"derivatives.{one}" in model]
+    names = [term for term in ALL_TERMS if f"derivatives.{term}" in model]
     asked = [
-        Quantity(name=f"changed.{one}", unit="1", description=one, value=model.symbol(f"derivatives.{one}"))
-        for one in names
+        Quantity(name=f"changed.{name}", unit="1", description=name, value=model.symbol(f"derivatives.{name}"))
+        for name in names
     ]
     effect = EFFECTS[name]
     changed = effect.apply(model.extend(*asked), values, card)
-    found = {one: changed.symbol(f"changed.{one}") for one in names}
+    found = {name: changed.symbol(f"changed.{name}") for name in names}
     if effect.magnified_by:  # of forces that are sums of terms, each in proportion to its derivative
         more = 1 + changed.symbol(effect.model_names()[effect.magnified_by])
         found |= {term: more * found[term] for term in names if term in effect.changes}
@@ -252,7 +252,7 @@ def _with_entry(
 def _with_particulars(card: ManoeuvringCard, name: str, values: Mapping[str, float]) -> ManoeuvringCard:
     """The card with the particulars that an effect took for want of stated ones."""
     model = build(card)
-    notices = [one for one in EFFECTS[name].apply(model, values, card).notices if one not in model.notices]
+    notices = [notice for notice in EFFECTS[name].apply(model, values, card).notices if notice not in model.notices]
     changes: dict[str, Change] = {}
     for key in type(card.ship).model_fields:
         for notice in notices:

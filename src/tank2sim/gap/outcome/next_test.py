@@ -29,26 +29,29 @@ from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.scheme import runge_kutta_step
 
 LENGTH = 24.0
-"""Length of a test, L/u0: a turn with 35 deg goes round once and a half, a zigzag reverses four times (ours)."""
+"""Length of a test, L/u0: a turn with 35 deg goes round once and a half, a zigzag reverses four times (project
+choice)."""
 
 DECIDES = 10.0
 """Gain of the score that decides: as for naming an effect."""
 
 AS_GOOD = 0.9
-"""Of manoeuvres with this share of the best score the first in the list is chosen: standard ones stand first (ours)."""
+"""Of manoeuvres with this share of the best score the first in the list is chosen: standard ones stand first (project
+choice)."""
 
 READ_S = 1.0
-"""Readings are compared this far apart, s; nearer ones are taken to err together (ours)."""
+"""Readings are compared this far apart, s; nearer ones are taken to err together (project choice)."""
 
 _WINDOW = 3.0
-"""Length of a window, L/u0 (ours): the slowest transients of a hull are in it, and a gust that lasts is as good as
-constant."""
+"""Length of a window, L/u0 (project choice): the slowest transients of a hull are in it, and a gust that lasts is as
+good as constant."""
 
 GUSTS = math.radians(0.25)
-"""Wind, waves and what else no model foresees are as strong as this much rudder (ours)."""
+"""Wind, waves and what else no model foresees are as strong as this much rudder (project choice)."""
 
 FREE = 0.1
-"""The first motion of a window is known to this share of nominal values beforehand: as good as not at all (ours)."""
+"""The first motion of a window is known to this share of nominal values beforehand: as good as not at all (project
+choice)."""
 
 TO_FEEL = 0.1
 """Differences by a parameter are taken over this share of its standard deviation."""
@@ -103,10 +106,10 @@ def next_test(
     duration_s: float | None = None,
     correlation_s: float = 0.0,
 ) -> NextTest | None:
-    """The manoeuvre by which the first explanation is told apart best from all the others.
+    """The manoeuvre by which the first explanation is reported apart best from all the others.
 
     A manoeuvre's score is the loss of the wrong explanation that is to be expected, the mean over which of the two is
-    true, against the rival that it tells apart worst: ``d' (I - J (J'J + P^-1)^-1 J') d``, d the difference of what
+    true, against the rival that it distinguishes worst: ``d' (I - J (J'J + P^-1)^-1 J') d``, d the difference of what
     both foresee in noise units, J its derivatives by all that the wrong one could still be: its parameters and its
     card's coefficients within their covariance P. Both foresee windows of :data:`_WINDOW` L/u0 from the motion of the
     first explanation, each with a first state and constant disturbances of its own that absorb what they can: at sea,
@@ -138,7 +141,9 @@ def next_test(
     if not np.isfinite(scores := each.min(axis=0)).any():
         return None
     best, least = _best_and_least(scores)
-    why = _why(of[best], [one.name for one in explanations], each[:, best], (float(scores[least]), of[least]))
+    why = _why(
+        of[best], [explanation.name for explanation in explanations], each[:, best], (float(scores[least]), of[least])
+    )
     return NextTest(
         manoeuvre=of[best].manoeuvre or "file:next_test.csv",
         orders=orders_csv(ships[0].step_s, {name: values[best] for name, values in orders.items()}, why),
@@ -150,13 +155,13 @@ def next_test(
 
 def _ships(explanations: Sequence[Explanation], noise: Mapping[str, float], correlation_s: float) -> list[_Ship]:
     """The ship of each explanation, with the sensors that there are and that all models know."""
-    models = [driven_model(one.card, "order") for one in explanations]
+    models = [driven_model(explanation.card, "order") for explanation in explanations]
     seen = {
         name: noise[name]
         for name in OBSERVED_SIGNALS.values()
         if name in noise and all(name in model for model in models)
     }
-    return [_Ship(one, seen, correlation_s) for one in explanations]
+    return [_Ship(explanation, seen, correlation_s) for explanation in explanations]
 
 
 def _best_and_least(scores: Array) -> tuple[int, int]:
@@ -167,8 +172,12 @@ def _best_and_least(scores: Array) -> tuple[int, int]:
 
 def _sizes(explanations: Sequence[Explanation]) -> dict[str, tuple[Mapping[str, float], Mapping[str, float]]]:
     """Each effect to its parameters and standard errors; what all explanations have alike was on the card before."""
-    had = [entry for entry in explanations[0].card.effects if all(entry in one.card.effects for one in explanations)]
-    entries = [entry for one in explanations for entry in one.card.effects if entry not in had]
+    had = [
+        entry
+        for entry in explanations[0].card.effects
+        if all(entry in explanation.card.effects for explanation in explanations)
+    ]
+    entries = [entry for explanation in explanations for entry in explanation.card.effects if entry not in had]
     return {entry.name: (entry.parameters, entry.uncertainty) for entry in reversed(entries)}
 
 
@@ -196,7 +205,10 @@ def _left(difference: Array, wrong: _Seen) -> Array:
 def _with_headings(of: Sequence[Candidate], explanations: Sequence[Explanation]) -> list[Candidate]:
     """Those that keep to one heading on another one too, where an explanation has a direction of its own."""
     directed = any(
-        key.startswith("direction") for one in explanations for e in one.card.effects for key in e.parameters
+        key.startswith("direction")
+        for explanation in explanations
+        for e in explanation.card.effects
+        for key in e.parameters
     )
     return [*of, *(on_heading(one, math.pi / 2) for one in of if one.on_course)] if directed else list(of)
 
@@ -206,17 +218,17 @@ def _why(best: Candidate, names: Sequence[str], each: Array, least: tuple[float,
     first, *rivals = names
     apart = " and ".join(f"{math.sqrt(score):.2g} from {name}" for score, name in zip(each, rivals, strict=True))
     if min(each) < DECIDES:
-        told = f"No manoeuvre considered would tell {first} from {' and '.join(rivals)} for sure; nearest"
+        text = f"No manoeuvre considered would tell {first} from {' and '.join(rivals)} for sure; nearest"
     else:
-        told = f"The manoeuvre that would tell {first} from {' and '.join(rivals)} best"
-    told += (
+        text = f"The manoeuvre that would tell {first} from {' and '.join(rivals)} best"
+    text += (
         f" is {best.name}: what {first} foresees differs there by {apart}, in standard deviations of the noise of all "
         f"readings together and beyond what uncertain parameters can make up for; {math.sqrt(DECIDES):.2g} would "
         f"decide. The least telling, {least[1].name}, would give {math.sqrt(max(least[0], 0.0)):.1g}."
     )
     if best.heading:
-        told += f" Begin on heading {math.degrees(best.heading):.0f} deg (initial.psi), which orders cannot say."
-    return told
+        text += f" Begin on heading {math.degrees(best.heading):.0f} deg (initial.psi), which orders cannot say."
+    return text
 
 
 class _Ship:
@@ -262,7 +274,7 @@ class _Ship:
         return {name: inputs[:, :, names.index(name)] for name in ordered}, motion
 
     def foreseen(self, of: Sequence[Candidate], orders: Mapping[str, Array], motion: Array) -> _Seen:
-        """What the sensors would show in windows that begin with the motion (c, n, 6) of another, under her orders."""
+        """What the sensors would show in windows that begin with the motion (c, n, 6) of another, under its orders."""
         c, n, _ = motion.shape
         own = np.tile(self.model.input_values(), (c, n, 1))
         for name, values in orders.items():
@@ -298,7 +310,7 @@ class _Ship:
         return np.stack([np.array(self.model.initial(one)).ravel() for one in p])
 
     def _begins(self, of: Sequence[Candidate], inputs: Array, motion: Array) -> Array:
-        """States (c, n, nx): the motion, and this ship's own rudder, heel and whatever else she has."""
+        """States (c, n, nx): the motion, and this ship's own rudder, heel and whatever else it has."""
         x = self._starts(np.array([one.heading for one in of]))
         acting = self._acting(inputs, {})
         states = np.empty((*motion.shape[:2], len(self.model.states)))

@@ -17,7 +17,7 @@ _LARGEST_RUDDER = math.radians(35.0)
 """Largest rudder of a standard manoeuvre (IMO MSC.137(76)), where the gear does not stop before."""
 
 SMALL_RUDDER = math.radians(5.0)
-"""Largest rudder of course keeping (ours)."""
+"""Largest rudder of course keeping (project choice)."""
 
 SLOW = 0.6
 """Share of the nominal revolutions to which a slow-down goes: u falls to about this share, inside any card's range."""
@@ -33,7 +33,7 @@ class Candidate:
     Parameters
     ----------
     name : str
-        For people, and the key under which its score is told.
+        For people, and the key under which its score is reported.
     manoeuvre : str
         As ``simulate --manoeuvre`` takes it; "" for those that only a file can tell.
     helmsman : callable
@@ -69,7 +69,11 @@ def candidate_manoeuvres(card: ManoeuvringCard, length: float) -> tuple[Candidat
     )
     rudders = sorted({min(math.radians(angle), largest) for angle in (10, 20, 35)})
     zigzags = ((5, 5), (10, 10), (20, 20), (20, 10))
-    of = [_named(f"turn:{math.degrees(side * one):.4g}", _held(side * one)) for one in rudders for side in (1, -1)]
+    of = [
+        _named(f"turn:{math.degrees(side * rudder):.4g}", _held(side * rudder))
+        for rudder in rudders
+        for side in (1, -1)
+    ]
     of += [
         replace(
             _named(f"zigzag:{rudder}/{heading}", _zigzag(math.radians(rudder), math.radians(heading))), on_course=True

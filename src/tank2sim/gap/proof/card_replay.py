@@ -12,7 +12,7 @@ from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.audit.noise import record_noise
 
 _LEAST = 1e-6
-"""Noise of a record without any, SI: all its signals then weigh alike. A choice of ours."""
+"""Noise of a record without any, SI: all its signals then weigh alike. Project choice."""
 
 
 def replay_by_card(card: ManoeuvringCard, measured: Measured) -> tuple[Passed, ...]:

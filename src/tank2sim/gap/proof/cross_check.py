@@ -26,10 +26,11 @@ TRIED = 3
 """Terms that are fitted to choose one of them (ours: far from the truth the linearised gain errs)."""
 
 MUCH = 3.0
-"""Misfit in noise units beyond which a name must close something of the gap (ours): below, noise is most of it."""
+"""Misfit in noise units beyond which a name must close something of the gap (project choice): below, noise is most of
+it."""
 
 CLOSES = 0.9
-"""Share of the misfit before that may be left after, in the middle of all signals of all trials (ours)."""
+"""Share of the misfit before that may be left after, in the middle of all signals of all trials (project choice)."""
 
 REACH = 1e-3
 """Differences by a coefficient are taken over this share of the largest linear one (ours: rounding and curvature are
@@ -56,7 +57,7 @@ def black_box(card: ManoeuvringCard, measured: Measured, noise: Mapping[str, flo
     """What a mere refit would reach: as many linear terms of :data:`_LINEAR` as an effect has parameters.
 
     The terms are chosen one after another by what they gain, and fitted by output error to the whole trials; at the end
-    the initial states are settled and the terms fitted anew. What is made least is the very misfit that is shown
+    the initial states are settled and the terms fitted again. What is made least is the very misfit that is shown
     afterwards, so that the black box does as well as it can.
 
     Parameters
@@ -120,7 +121,7 @@ class _Fit:
         self.starts = [replayer.first(record, self.sigma, p) for record in records]
 
     def settle(self, names: Sequence[str], changes: Array) -> None:
-        """Find the initial states anew."""
+        """Find the initial states again."""
         p = self._parameters(names, changes)
         self.starts = [self.replayer.settled(record, self.sigma, p) for record in self.records]
 
@@ -160,10 +161,10 @@ def closes(passed: Sequence[Passed]) -> bool:
     By the middle of the ratios of misfits after and before, over all signals of all trials, for a simulation that runs
     away in one of them outweighs all others in a mean.
     """
-    rms = [np.array([one.misfit(which) for one in passed]) for which in ("before", "after")]
+    rms = [np.array([replay.misfit(which) for replay in passed]) for which in ("before", "after")]
     if min(np.sqrt(np.mean(one**2)) for one in rms) < MUCH:
         return True
-    shown = [(one, name) for one in passed for name in one.noise if np.isfinite(one.measured[name]).any()]
+    shown = [(replay, name) for replay in passed for name in replay.noise if np.isfinite(replay.measured[name]).any()]
     pairs = [(one.misfit("before", name), one.misfit("after", name)) for one, name in shown]
     ratios = [1.0 if before == after else after / before if np.isfinite(before) else 0.0 for before, after in pairs]
     return bool(np.median(ratios) < CLOSES)
@@ -180,19 +181,19 @@ def worse(passed: Sequence[Passed], tolerance: float = 0.05) -> tuple[str, ...]:
         Share of the misfit before (at least of 1, the noise) by which the misfit after may be larger. The default of
         0.05 is ours: the estimated size of a true effect is not exact either.
     """
-    pairs = [(one.name, one.misfit("before"), one.misfit("after")) for one in passed]
+    pairs = [(replay.name, replay.misfit("before"), replay.misfit("after")) for replay in passed]
     return tuple(name for name, before, after in pairs if after > before + tolerance * max(before, 1.0))
 
 
 REMAINS = 1.5
-"""Misfit in noise units from which a part of the gap is said to remain (ours): what is left beyond the noise is then as
-large as the noise, sqrt(1.5^2 - 1) = 1.1."""
+"""Misfit in noise units from which a part of the gap is said to remain (project choice): what is left beyond the
+noise is then as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
 
 EVEN = 0.5
 """A probability below which the opposite is likelier."""
 
 _BETTER = 0.05
-"""A black box follows better if its misfit is smaller by this share (ours), as in :func:`worse`."""
+"""A black box follows better if its misfit is smaller by this share (project choice), as in :func:`worse`."""
 
 
 def proof_cautions(gap: Gap) -> tuple[str, ...]:
@@ -201,7 +202,7 @@ def proof_cautions(gap: Gap) -> tuple[str, ...]:
     Both are asked of the held-out trials, or of the fitting ones where none was held out. The share that remains is the
     root of the mean square beyond the noise after, over that before.
     """
-    held = any(one.held_out for one in gap.passed)
+    held = any(replay.held_out for replay in gap.passed)
     before, after, box = (gap.misfit(which, held_out=held) for which in ("before", "after", "black_box"))
     if gap.verdict not in (MISSING, AMBIGUOUS) or not gap.effects or before is None or after is None:
         return ()
@@ -236,7 +237,7 @@ def _what_remains(before: float, after: float, of: str, begin: str) -> str:
 
 
 OUTLYING = 3.0
-"""A trial is named as an outlier if it lies this many standard errors from what all others say (ours)."""
+"""A trial is named as an outlier if it lies this many standard errors from what all others say (project choice)."""
 
 
 @dataclass(frozen=True)

@@ -33,10 +33,10 @@ FIRST = 0.25
 """The initial state is read off the first quarter of L/u0 (ours: nothing of a ship's motion changes much in it)."""
 
 TRUST = 2.0
-"""That reading is trusted to this many of its standard errors, as the motion is not quite straight (ours)."""
+"""That reading is trusted to this many of its standard errors, as the motion is not quite straight (project choice)."""
 
 ASTERN = 0.2
-"""Standard deviation of an initial speed that nothing tells of, as a share of the nominal one (ours)."""
+"""Standard deviation of an initial speed that nothing tells of, as a share of the nominal one (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class InputRecord:
         Each row held for a step: as fine as the sampling, for the mean of two orders is an order that nobody gave, and
         a gear with a largest rate makes something else of it.
     every : int
-        Each so-manieth instant is compared.
+        Each n-th instant is compared.
     readings : array (m, ny)
         Single readings at those instants; nan where there is none.
     """
@@ -73,17 +73,17 @@ class InputRecord:
 
 
 _LEAST_RUDDER = math.radians(1.0)
-"""A first order below this is no execute (ours)."""
+"""A first order below this is no execute (project choice)."""
 
 _ROUNDS = 5
-"""Gauss-Newton steps, and times that the weights of signals are found anew; both settle in two or three."""
+"""Gauss-Newton steps, and times that the weights of signals are found again; both settle in two or three."""
 
 _SETTLED = 0.02
 """A step below this share of the trust in the first reading ends the search."""
 
 _NEAR = 2.0
 """A model that follows a record to within this many times the noise is taken as right when its initial state is sought
-(ours): what is left then is too small to bend it far."""
+(project choice): what is left then is too small to bend it far."""
 
 
 class Replayer:
@@ -121,7 +121,7 @@ class Replayer:
         return states
 
     def seen_along(self, start: Array, inputs: Array, step_s: float, p: Array, every: int) -> Array:
-        """What the sensors show (m, ny) at every so-manieth of the instants of :meth:`states`."""
+        """What the sensors show (m, ny) at every n-th of the instants of :meth:`states`."""
         states = self.states(start, inputs, step_s, p)[::every]
         return self._shown(states, inputs[::every], p)[0]
 
@@ -134,8 +134,8 @@ class Replayer:
 
         `sigma` (ny,) is the noise of the signals. If with the least squares in noise units the model follows the record
         to within :data:`_NEAR`, these have the word. Else the model is wrong, and would bend its heading and speed to
-        mend its track: then a signal weighs less by the size of its own residual beyond the noise (the likelihood of a
-        deviation that is not known), of which only one value in L/u0 counts as independent.
+        correct its track: then a signal weighs less by the size of its own residual beyond the noise (the likelihood
+        of a deviation that is not known), of which only one value in L/u0 counts as independent.
         """
         start, left = self._settled_from(record, sigma, p, wrong=False)
         return start if left < _NEAR else self._settled_from(record, sigma, p, wrong=True)[0]

@@ -42,7 +42,7 @@ def replay_trials(
     corrected : Measured, optional
         The same trials without the faults of sensors that were found. The improved card then follows these; its motion
         is shown as the faulty sensor would have it, with what the correction took away put back, so that it stands
-        beside what was recorded and its misfit is that in the corrected data.
+        next to what was recorded and its misfit is that in the corrected data.
 
     Raises
     ------
@@ -71,10 +71,10 @@ def with_black_box(
     replayer = _replayer(box, measured, noise)
     trials = {trial.name: trial for trial in measured.trials}
     boxed = []
-    for one in results:
-        simulated = _simulated(replayer, input_record(replayer, trials[one.name]), noise)
+    for result in results:
+        simulated = _simulated(replayer, input_record(replayer, trials[result.name]), noise)
         columns = dict(zip(replayer.seen, simulated.T, strict=True))
-        boxed.append(replace(one, black_box={name: columns[name] for name in one.noise}))
+        boxed.append(replace(result, black_box={name: columns[name] for name in result.noise}))
     return tuple(boxed)
 
 

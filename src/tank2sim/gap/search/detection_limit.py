@@ -26,20 +26,21 @@ SIZES = (1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0)
 """Shares of its typical value at which an effect without amplitude is asked whether it would show."""
 
 LOUDER = 3.0
-"""Factor on the level of one slow error or one force at a time, of the noises that may hide an effect (ours)."""
+"""Factor on the level of one slow error or one force at a time, of the noises that may hide an effect (project
+choice)."""
 
 SURE = float(norm.ppf(0.95))
 """Standard deviations by which a size must be beyond what is enough, to show in 95 of 100 such sets of trials."""
 
 _ROUNDS = 2
-"""How often the size is sought at which an effect shows (ours): its force need not grow with it."""
+"""How often the size is sought at which an effect shows (project choice): its force need not grow with it."""
 
 _NEAR = 1.2
 """A size that the next round would change by less than this factor is found."""
 
 
 def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
-    """Effect to {parameter: size} below which the trials could not show it, beside what is explained already.
+    """Effect to {parameter: size} below which the trials could not show it, next to what is explained already.
 
     Parameters
     ----------
@@ -56,7 +57,9 @@ def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
         furthest from being visible at which it still is not.
     """
     likelihood = search.likelihood
-    sized = [one for one in search.variants if one.amplitudes and one.effect not in best.explained.effects]
+    sized = [
+        variant for variant in search.variants if variant.amplitudes and variant.effect not in best.explained.effects
+    ]
     for _ in range(_ROUNDS):
         shares = _shares(likelihood, [best], sized, enough)
         sized = [_at_its_size(likelihood, one, own) for one, own in zip(sized, shares, strict=True)]
@@ -69,7 +72,7 @@ def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
             size = min(float(abs(one.theta[amplitude]) * share), largest)
             known = sizes.setdefault(one.effect, {})
             known[parameter.name] = max(size, known.get(parameter.name, 0.0))
-    others = {one.effect: one for one in search.variants if not one.amplitudes}
+    others = {variant.effect: variant for variant in search.variants if not variant.amplitudes}
     for one in (other for name, other in others.items() if name not in best.explained.effects):
         value = _hidden_value(likelihood, best, one, enough)
         if value is not None:
@@ -96,7 +99,7 @@ def _shares(
     likelihood: Likelihood, noises: Sequence[ExplanationFit], every: Sequence[Variant], enough: float
 ) -> list[Array]:
     """Shares of each variant's amplitudes, each alone, at which it would show even at the noise that hides it best."""
-    screens = [Screen(likelihood, one, every) for one in noises]
+    screens = [Screen(likelihood, noise, every) for noise in noises]
     shares = []
     for place, one in enumerate(every):
         priced = int(np.count_nonzero(one.explained.prior[1] == 0))

@@ -1,6 +1,6 @@
 """The search for the explanation: none, single effects, pairs; screened together, then each fitted by itself.
 
-The screen is linear and at one noise, the fit is not and estimates the noise anew; so the screen only proposes. It is
+The screen is linear and at one noise, the fit is not and estimates the noise again; so the screen only proposes. It is
 asked at the noise of "none" (large, for it must cover what is missing), and again at that of the best explanation so
 far. Pairs are screened as pairs, for with two effects missing the best single one is often neither of them; and each
 half of the best pair is tried with all others.
@@ -23,17 +23,18 @@ from tank2sim.gap.search.screening import Screen, Screened, Variant, variants
 
 FIRST_SINGLES, FIRST_PAIRS = 4, 2
 SINGLES, PAIRS, WITH_THE_BEST, SWAPS = 4, 3, 3, 2
-"""How many proposals of each screen are fitted (ours)."""
+"""How many proposals of each screen are fitted (project choice)."""
 
 WORTH = 5.0
-"""Proposals whose gain in the screen is further below 0 are not fitted (ours)."""
+"""Proposals whose gain in the screen is further below 0 are not fitted (project choice)."""
 
 HOPELESS = 100.0
-"""Nor those whose gain, or whose score when fitted roughly, is so far behind the best of their kind (ours)."""
+"""Nor those whose gain, or whose score when fitted roughly, is so far behind the best of their kind (project
+choice)."""
 
 _FAR = 300.0
 """An explanation so far behind the best at the noise of the best has its own noise not sought, nor is it tried again
-(ours)."""
+(project choice)."""
 
 ROUNDS_OF_NONE, ROUNDS, LAST_ROUNDS = (15,), (0, 10), (20,)
 """Iterations on the noise after each solution for the parameters, see :meth:`.likelihood.Likelihood.at_best`. A score
@@ -43,7 +44,7 @@ SAME_NOISE = (0,)
 """Rounds that only ask for the parameters, at the nearest of the noises given."""
 
 CLOSE = 30.0
-"""Explanations within this of the best are fitted once more at the end (ours)."""
+"""Explanations within this of the best are fitted once more at the end (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +68,7 @@ class Search:
     @property
     def none(self) -> ExplanationFit:
         """The card as it is."""
-        return next(one for one in self.fits if not one.explained.effects)
+        return next(fit for fit in self.fits if not fit.explained.effects)
 
 
 def search(
@@ -129,8 +130,8 @@ def _explore(fitting: Fitting, every: Sequence[Variant], believed: np.ndarray, m
     starts = [best.logs, believed]
     second = Screen(fitting.likelihood, replace(fitting.best(0), logs=best.logs), every)
     singles, pairs = second.singles(), second.pairs() if most > 1 else ()
-    proposed = [one for one in singles[:SINGLES] if one.gain > singles[0].gain - HOPELESS]
-    proposed += [one for one in pairs[:PAIRS] if one.gain > singles[0].gain]
+    proposed = [single for single in singles[:SINGLES] if single.gain > singles[0].gain - HOPELESS]
+    proposed += [pair for pair in pairs[:PAIRS] if pair.gain > singles[0].gain]
     if len(best.explained.effects) == 1 and most > 1:
         proposed += _on_top_of(fitting, best, every)[:WITH_THE_BEST]
     fitting.fit(_proposals(fitting, proposed, starts, least=1, limit=best.score + _FAR))
@@ -172,7 +173,7 @@ def _polish(fitting: Fitting) -> None:
 def _on_top_of(fitting: Fitting, base: ExplanationFit, every: Sequence[Variant]) -> list[Screened]:
     """Each effect together with those of `base`."""
     proposals = Screen(fitting.likelihood, base, every).singles()
-    return [Screened({**thetas_of(base), **one.thetas}, one.gain) for one in proposals]
+    return [Screened({**thetas_of(base), **proposal.thetas}, proposal.gain) for proposal in proposals]
 
 
 def _proposals(

@@ -1,7 +1,7 @@
 """What may be said of the scores: a name, none, several names, or that nothing in the library fits.
 
 An explanation needs a score well below that of "none"; a second effect one well below that of the best single effect.
-All that is as good as the best is named beside it. And something always fits: where the innovations of the best
+All that is as good as the best is named next to it. And something always fits: where the innovations of the best
 explanation are not noise, a name would be a guess, and is withheld.
 """
 
@@ -34,26 +34,28 @@ ALIKE = EVIDENCE_NEEDED
 """Explanations within this of the best are as good."""
 
 OF_ONE_KIND = {"actuator": 0.25, "force": 0.1}
-"""Share of the whole gain that a second effect of the same kind must have (ours): less is what the first one's formula
-may be wrong by, beyond what :data:`.forms.FORM` covers."""
+"""Share of the whole gain that a second effect of the same kind must have (project choice): less is what the first
+one's formula may be wrong by, beyond what :data:`.forms.FORM` covers."""
 
 LIKELY = 0.5
-"""A name less probable than this is none (ours): then all that have :data:`RIVAL` of its probability are named."""
+"""A name less probable than this is none (project choice): then all that have :data:`RIVAL` of its probability are
+named."""
 
 RIVAL = 0.1
-"""Share of the best name's probability that makes another one its rival (ours): odds of 10 to 1, from which Jeffreys
-(1961), Theory of Probability, calls evidence strong."""
+"""Share of the best name's probability that makes another one its rival (project choice): odds of 10 to 1, from which
+Jeffreys (1961), Theory of Probability, calls evidence strong."""
 
 STANDARD_ERRORS = 3.0
 """An effect is named if its size exceeds so many of its standard errors."""
 
 TEMPER = 3.0
-"""Scores are divided by this before they become probabilities (ours): trials have less to say than their scores, for
-noise has colour and formulas have errors. benchmarks/gap.py prints what was claimed beside what was there."""
+"""Scores are divided by this before they become probabilities (project choice): trials have less to say than their
+scores, for noise has colour and formulas have errors. benchmarks/gap.py prints what was claimed next to what was
+there."""
 
 
 SUREST = 0.99
-"""No name is surer than this: something outside the library may look like it (ours)."""
+"""No name is surer than this: something outside the library may look like it (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +195,7 @@ def _change_of_gear(fit: ExplanationFit, name: str) -> float:
 
 
 _WINDOWS = (6, 12, 24, 48)
-"""Lengths of the passages that are looked at, in blocks: 0.75 to 6 L/u0 (ours)."""
+"""Lengths of the passages that are looked at, in blocks: 0.75 to 6 L/u0 (project choice)."""
 
 RARE = {"passage": 3e-3, "period": 1e-12, "trial": 1e-6, "push": 1e-9}
 """Probability in all trials together below which noise is no explanation (ours, on made-up trials with nothing missing:
@@ -223,12 +225,13 @@ def _passages(likelihood: Likelihood, e: Array) -> list[Strange]:
     """The strangest passage of each trial: sums of squares over windows, against chi squared.
 
     Noise of another colour than the filter's (waves) makes these sums vary more than they should, everywhere alike; by
-    how much is told by the middle of their spread, and their degrees of freedom are fewer by as much (Satterthwaite).
+    how much is reported by the middle of their spread, and their degrees of freedom are fewer by as much
+    (Satterthwaite).
     """
     motion = likelihood.motion
     squares, counts = (e**2).sum(axis=2), likelihood.known.sum(axis=2)
     strangest = {name: Strange("passage", name, 0.0, 0.0, -np.inf) for name in motion.names}
-    for length in (one for one in _WINDOWS if one <= motion.blocks):
+    for length in (window for window in _WINDOWS if window <= motion.blocks):
         sums, degrees = (
             np.array([np.convolve(run, np.ones(length), "valid") for run in one]) for one in (squares, counts)
         )
@@ -247,7 +250,7 @@ def _passages(likelihood: Likelihood, e: Array) -> list[Strange]:
 
 
 def _pushes(likelihood: Likelihood, fit: ExplanationFit) -> list[Strange]:
-    """The passage of all trials with the largest force that nobody modelled, beside what that force commonly is.
+    """The passage of all trials with the largest force that nobody modelled, next to what that force commonly is.
 
     Gusts and waves push at all times alike; a tug pushes once. The filter follows both, and its innovations tell
     neither. A window holds as many independent values of the force as it holds twice its time constant.
@@ -257,7 +260,7 @@ def _pushes(likelihood: Likelihood, fit: ExplanationFit) -> list[Strange]:
     inside = motion.inside
     for axis, time in enumerate(fit.noise.force_s):
         squares = np.where(inside, states[..., 6 + axis] ** 2, 0.0)
-        for length in (one for one in _WINDOWS[1:] if one <= motion.blocks):
+        for length in (window for window in _WINDOWS[1:] if window <= motion.blocks):
             window = np.ones(length)
             sums = np.array([np.convolve(run, window, "valid") for run in squares])
             whole = np.array([np.convolve(run, window, "valid") for run in inside.astype(float)]) > length - 0.5

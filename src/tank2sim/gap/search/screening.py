@@ -143,7 +143,7 @@ class Screen:
     Attributes
     ----------
     cost : float
-        Score of `base` at this noise, but for a constant.
+        Score of `base` at this noise, except for a constant.
 
     Parameters
     ----------
@@ -222,10 +222,10 @@ class Screen:
         found = []
         for places in chosen:
             gain, shares = self.of(places)
-            begins = np.cumsum([0] + [len(self.places[one]) for one in places])
+            begins = np.cumsum([0] + [len(self.places[place]) for place in places])
             starts = [
-                self.every[one].start(shares[begin : begin + len(self.places[one])])
-                for one, begin in zip(places, begins, strict=False)
+                self.every[place].start(shares[begin : begin + len(self.places[place])])
+                for place, begin in zip(places, begins, strict=False)
             ]
-            found.append(Screened(dict(zip((self.every[one].effect for one in places), starts, strict=True)), gain))
+            found.append(Screened(dict(zip((self.every[place].effect for place in places), starts, strict=True)), gain))
         return tuple(sorted(found, key=lambda one: -one.gain))

@@ -21,12 +21,12 @@ from tank2sim.records.campaign_form import OSCILLATING
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign
 
 _TIMES_USUAL = 8.0
-"""Least misfit of a contradicted run, in those usual in the campaign. Sound runs of made-up campaigns reach 6 beside
+"""Least misfit of a contradicted run, in those usual in the campaign. Sound runs of made-up campaigns reach 6 next to
 noise; a gauge in kN or of the wrong sign gives 20 and more."""
 _SHARE = 0.5
 """Least misfit of a contradicted run as a share of its force. Noise-free campaigns, in which 8 times the usual
 misfit is still nothing, stay far below, and gauges coarse by 8 times the noise below 0.4; a wrong sign gives 2 (0.8
-beside the body's own inertia), a dead gauge or kN 1 (0.6)."""
+next to the body's own inertia), a dead gauge or kN 1 (0.6)."""
 _SMALL = 0.05
 """Share of the largest force in runs of its type below which a run's own force is no measure."""
 _FEWEST = 8

@@ -25,7 +25,7 @@ from tank2sim.records.campaigns import Campaign
 
 SPEED_RANGE = 0.03
 """Relative change of the speed between runs from which terms in Du are candidates, and within which a run counts as
-one at the test speed. A choice of ours: 3 % of speed is 6 % of force, and carriages hold 0.1 %."""
+one at the test speed. Project choice: 3 % of speed is 6 % of force, and carriages hold 0.1 %."""
 _ACTIVE = 1e-3
 """A term is excited if its product of motions reaches this share of the product of the campaign's largest motions."""
 

@@ -20,7 +20,7 @@ _REPEATED_ENOUGH = 3
 
 
 def reduction_findings(reduction: Reduction) -> tuple[str, ...]:
-    """Everything to be told of a reduction, the gravest first."""
+    """Everything to be reported of a reduction, the gravest first."""
     found = [
         *implausible(reduction),
         *(f"left out, for it is at fault: {fault}" for fault in reduction.faults),
@@ -155,9 +155,9 @@ def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator
         )
     test = result.asymmetry
     if test is not None and test.names:
-        told = "does not hold" if test.chance < _ASYMMETRIC else "holds"
+        text = "does not hold" if test.chance < _ASYMMETRIC else "holds"
         yield (
-            f"Symmetry of {force} to port and starboard {told} (chance {test.chance:.2g}; tested: "
+            f"Symmetry of {force} to port and starboard {text} (chance {test.chance:.2g}; tested: "
             f"{', '.join(test.names)})."
         )
 

@@ -120,7 +120,7 @@ def _oscillating(run: CaptiveRun) -> CaptiveMotion:
         raise InputError(run.name, "", f"has {len(run.time_s)} readings only", "a whole period of them is needed")
     if np.ptp(leading(run)) == 0.0:
         name = "v_mps" if run.type == "pure_sway" else "r_radps"
-        raise InputError(run.name, f"column {name}", f"does not change, in a run of {run.type}", "mend its type")
+        raise InputError(run.name, f"column {name}", f"does not change, in a run of {run.type}", "correct its type")
     frequency = measured_frequency(run)
     kept, periods = _whole_periods(run, frequency)
     time = run.time_s[kept]

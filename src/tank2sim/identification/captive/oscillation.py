@@ -172,14 +172,14 @@ def _from_amplitude(rows: Sequence[OscillationDerivatives], name: str) -> tuple[
 
 def cubic_findings(found: Sequence[CubicByTwoWays]) -> list[str]:
     """Sentences on third-order terms that the third harmonic and the amplitude give differently."""
-    told = []
+    messages = []
     for cubic in found:
         if cubic.from_amplitude is None or abs(cubic.ratio) <= _DIFFER:
             continue
         (one, error), (other, its_error) = cubic.from_third_harmonic, cubic.from_amplitude
-        told.append(
+        messages.append(
             f"{cubic.name} is {one:.3g} ± {error:.2g} by the third harmonic and {other:.3g} ± {its_error:.2g} by the "
             f"amplitude, {abs(cubic.ratio):.1f} standard errors apart: the force is no cubic in this range, or it "
             "depends on the frequency."
         )
-    return told
+    return messages

@@ -35,7 +35,7 @@ _SIGNIFICANT = 2.0
 def force_convention(
     derivatives: Mapping[str, float], mass_prime: float, inertia_prime: float, convention: str
 ) -> Iterator[Caution]:
-    """Added masses that no body has, and whether the opposite sign of the forces would mend them.
+    """Added masses that no body has, and whether the opposite sign of the forces would correct them.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def added_masses(
     mass_prime: float,
     inertia_prime: float | None,
 ) -> Iterator[Caution]:
-    """Added mass or yaw inertia that no known ship has in deep water beside its own, by more than two standard errors.
+    """Added mass or yaw inertia that no known ship has in deep water next to its own, by more than two standard errors.
 
     Of positive derivatives :func:`force_convention` speaks.
     """

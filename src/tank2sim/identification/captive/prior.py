@@ -3,9 +3,9 @@
 Small angles do not show the third order. To drop a term because it does not differ from zero would be to claim that it
 is zero, and would make its linear term look better known than it is (post-selection inference; Leeb & Pötscher 2005,
 Econometric Theory 21). To leave it free would let noise at 10 degrees of rudder speak of 35. So every term that the
-campaign can tell apart stays in the regression, held loosely about zero: its ratio to the linear term of the same force
-has a standard deviation as wide as the ratios of known ships. Where the tests show a term this moves it by nothing; the
-values come from the tests alone, or are not in the card.
+campaign can distinguish stays in the regression, held loosely about zero: its ratio to the linear term of the same
+force has a standard deviation as wide as the ratios of known ships. Where the tests show a term this moves it by
+nothing; the values come from the tests alone, or are not in the card.
 """
 
 from __future__ import annotations

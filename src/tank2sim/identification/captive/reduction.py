@@ -1,7 +1,7 @@
 """A captive campaign to hydrodynamic derivatives with uncertainty: the whole way.
 
 Every run is reduced to mean and harmonics; two ways lead on to the derivatives of (3.8): one weighted regression over
-the whole campaign, whose numbers are the result, and beside it the paper's order, from the simplest tests to the more
+the whole campaign, whose numbers are the result, and next to it the paper's order, from the simplest tests to the more
 complex. The numbers are prime, instantaneous, "hydrodynamic", starboard-positive, expanded at the test speed.
 """
 
@@ -43,7 +43,7 @@ from tank2sim.identification.captive.warnings import body_of
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, together
 
 DISAGREEMENT_LIMIT = 3.5
-"""Standard errors by which the two ways may differ before it is told."""
+"""Standard errors by which the two ways may differ before it is reported."""
 THRUST_LIMIT = 4.0
 """Standard errors by which a resistance must be negative to be refused: chance does so once in 30 000 campaigns."""
 ESSENTIAL = ("Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot", "Yv", "Nv", "Yr", "Nr", "Yd", "Nd")
@@ -88,7 +88,7 @@ class Derivative:
     type_b : mapping
         Source to standard error from what was stated of the campaign, and from systematic errors that it shows.
     found_in : tuple of str
-        Types of run on which it rests most, told by the paper's order; empty if that does not give it.
+        Types of run on which it rests most, determined by the paper's order; empty if that does not give it.
     """
 
     value: float
@@ -184,8 +184,8 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
     Raises
     ------
     InputError
-        Runs are at fault and `keep_going` is not asked for (all are told); no run is left; or a key that the runs need
-        is missing; or a number of ``[model]``, or the sign of the resistance, cannot be.
+        Runs are at fault and `keep_going` is not asked for (all are reported); no run is left; or a key that the runs
+        need is missing; or a number of ``[model]``, or the sign of the resistance, cannot be.
     """
     options = options or ReductionOptions()
     _refuse_impossible_body(campaign)
@@ -199,8 +199,8 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
     runs = [run for run in runs if run.run.name not in odd]
     used, not_used = _used_runs(campaign, moderated(runs), options)
     if not used:
-        told = [*map(str, faults), *(f"{name}, for {reason}" for name, reason in not_used.items())]
-        remedy = f"the first was left out: {told[0]}" if told else "give it runs"
+        messages = [*map(str, faults), *(f"{name}, for {reason}" for name, reason in not_used.items())]
+        remedy = f"the first was left out: {messages[0]}" if messages else "give it runs"
         raise InputError(campaign.path, "runs", "no run can be used", remedy)
     selections = {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCE_COLUMNS}
     delays = force_delays({force: selection.equations for force, selection in selections.items()})

@@ -224,7 +224,7 @@ def fitted_spread(equations: CampaignEquations, *, by_type: bool = True) -> Spre
 
     One zero variance serves all types of run, unless the likelihood speaks clearly for one each: the tests at large
     angles, say, do not follow (3.8). Where every run is a single reading (averages, steady runs alone) the two factors
-    cannot be told apart, and the noise within a run is taken as it is.
+    cannot be distinguished, and the noise within a run is taken as it is.
     """
     single = len(equations.values) == len(equations.runs)
     common, least = _best(equations, {"": _starting_zero(equations)}, single)

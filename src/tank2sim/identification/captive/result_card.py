@@ -203,14 +203,14 @@ def _in_figures(particulars: Mapping[str, float | str]) -> dict[str, float | str
 
 
 def _notes(reduction: Reduction, card: Contents, scale: float) -> str:
-    told = [f"From {len(reduction.runs)} captive runs."]
+    messages = [f"From {len(reduction.runs)} captive runs."]
     if card.estimated:
-        told.append(f"Estimated, not measured: {', '.join(card.estimated)}.")
+        messages.append(f"Estimated, not measured: {', '.join(card.estimated)}.")
     if card.missing:
-        told.append(f"Neither measured nor estimated, and zero here: {', '.join(card.missing)}.")
+        messages.append(f"Neither measured nor estimated, and zero here: {', '.join(card.missing)}.")
     if scale != 1.0:
-        told.append(f"Froude-scaled from the model by {scale:g}; no correction for the Reynolds number was made.")
-    return " ".join(told)
+        messages.append(f"Froude-scaled from the model by {scale:g}; no correction for the Reynolds number was made.")
+    return " ".join(messages)
 
 
 def reynolds_ratio(campaign: Campaign, scale: float) -> float:

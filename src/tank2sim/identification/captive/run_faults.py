@@ -24,7 +24,7 @@ _DRIFT_TOLERANCE_RAD = math.radians(1.0)
 _SAME_RATE = 0.1
 """Relative difference by which v may differ from dy/dt, and r from dpsi/dt."""
 _STEP_RATIO, _STEP_BESIDE_DRIFT = 9.0, 5.5
-"""Standard errors that a step in the zero must reach, by itself and beside a linear drift of the zero; chance, which
+"""Standard errors that a step in the zero must reach, by itself and next to a linear drift of the zero; chance, which
 comes to 5 among the hundreds of records of a campaign, does not do both."""
 _LARGEST_PRIME = {"X": 0.5, "Y": 0.5, "N": 0.25}
 """No hull's coefficients come near: a flat plate broadside has Y' of about T/L."""
@@ -107,16 +107,16 @@ def _other_motion(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:
     """A motion that is not what the type of the run says."""
     speed, length = float(np.mean(run.speed_mps)), campaign.model.length_m
     if speed <= 0:
-        return  # a fault of the speed, which is told by itself
+        return  # a fault of the speed, which is reported by itself
     sway, yaw = _swing(run.v_mps) / speed, _swing(run.r_radps) * length / speed
     turning = abs(float(np.mean(run.r_radps))) * length / speed
-    remedy = "mend its type in the campaign, or the record"
+    remedy = "correct its type in the campaign, or the record"
     own = {"pure_sway": sway, "pure_yaw": yaw, "yaw_with_drift": yaw}.get(run.type)
     foreign = {"pure_sway": ("yaw rate", yaw), "pure_yaw": ("sway", sway), "yaw_with_drift": ("sway", sway)}
     if own is not None:
         name, other = foreign[run.type]
         if other > _OTHER_MOTION * own or own == 0.0:
-            problem = f"is said to be {run.type}, and its {name} swings by {other:.3g} beside {own:.3g} (prime)"
+            problem = f"is said to be {run.type}, and its {name} swings by {other:.3g} next to {own:.3g} (prime)"
             yield InputError(run.name, "", problem, remedy)
     elif max(sway, yaw) > 0.02 or turning > 0.02:
         problem = (
@@ -130,7 +130,7 @@ def _angles(reduced: ReducedRun) -> Iterator[InputError]:
     run, motion = reduced.run, reduced.motion
     sine = -float(np.mean(motion.v_mps)) / motion.mean_speed_mps
     drift = math.asin(float(np.clip(sine, -1.0, 1.0)))
-    remedy = "mend its type in the campaign, or the record"
+    remedy = "correct its type in the campaign, or the record"
     expected = {"pure_sway": 0.0, "pure_yaw": 0.0, "static_rudder": 0.0}.get(run.type, run.sheet.drift_rad)
     if expected is not None and abs(drift - expected) > _DRIFT_TOLERANCE_RAD:
         problem = (
@@ -140,8 +140,8 @@ def _angles(reduced: ReducedRun) -> Iterator[InputError]:
         yield InputError(run.name, "column v_mps", problem, "drift is -asin(v/U); " + remedy)
     rudder = float(np.mean(motion.delta_rad))
     if run.sheet.rudder_rad is not None and abs(rudder - run.sheet.rudder_rad) > _DRIFT_TOLERANCE_RAD:
-        told = f"is {math.degrees(rudder):.3g} deg, and {math.degrees(run.sheet.rudder_rad):.3g} deg by the sheet"
-        yield InputError(run.name, "column delta_rad", told, "mend the sheet or the record")
+        text = f"is {math.degrees(rudder):.3g} deg, and {math.degrees(run.sheet.rudder_rad):.3g} deg by the sheet"
+        yield InputError(run.name, "column delta_rad", text, "correct the sheet or the record")
 
 
 def _swing(values: Array) -> float:
@@ -173,7 +173,7 @@ def _dead(campaign: Campaign, run: CaptiveRun, force: str) -> Iterator[InputErro
     """A gauge that shows one value from end to end, where the model's motion or the gauge's usual noise forbids it."""
     values = run.force(force)
     if np.ptp(values) > 0.0 or np.min(run.speed_mps) <= 0:
-        return  # without speed there is no drift angle; that fault is told by itself
+        return  # without speed there is no drift angle; that fault is reported by itself
     angles = (float(np.mean(run.v_mps / run.speed_mps)), float(np.mean(run.delta_rad)))
     # Drift and rudder together may cancel, and a coarse gauge reads nothing at a small angle.
     nothing = float(values[0]) == 0.0 and max(map(abs, angles)) > _NO_SMALL_ANGLE and 0.0 in angles
@@ -193,7 +193,8 @@ def _usually_noisy(campaign: Campaign, force: str) -> bool:
 def _clipped(run: CaptiveRun, force: str) -> Iterator[InputError]:
     """A plateau at the top or bottom of a record: many equal readings in a row, and nothing beyond.
 
-    A gauge that shows a few levels only is coarse beside what it measures, and its outermost may well be the usual one.
+    A gauge that shows a few levels only is coarse next to what it measures, and its outermost may well be the usual
+    one.
     """
     values = run.force(force)
     stands, counts = np.unique(values, return_counts=True)
@@ -234,7 +235,7 @@ def _step(run: ReducedRun, force: str) -> tuple[float, float, float] | None:
 
 
 def _largest_step(record: Array, basis: Array) -> tuple[int, float, float]:
-    """Row, size and ratio of the step that is likeliest beside the columns of a basis.
+    """Row, size and ratio of the step that is likeliest next to the columns of a basis.
 
     It is fitted together with them, at the row where the sum of the residuals departs most.
     """

@@ -1,4 +1,4 @@
-"""Which terms of (3.8) a campaign can give: every term left out is told, with the reason.
+"""Which terms of (3.8) a campaign can give: every term left out is reported, with the reason.
 
 Every term that the campaign excites and can tell from the others is in the regression, third-order terms held loosely
 about zero (:mod:`tank2sim.identification.captive.prior`). Whether a term is reported depends on the design of the tests
@@ -61,7 +61,8 @@ class Choice:
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The regression over the whole campaign: equations of all terms that it can tell apart, and each candidate's fate.
+    """The regression over the whole campaign: equations of all terms that it can distinguish, and each candidate's
+    fate.
 
     Of the terms in the regression those that the tests do not determine have ``kept`` false: they are not reported.
     """
@@ -116,7 +117,7 @@ def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_te
 def told_apart(
     campaign: Campaign, runs: Sequence[ReducedRun], force: str, choices: dict[str, Choice]
 ) -> CampaignEquations:
-    """The equations of all terms that the runs excite and can tell apart; the fate of the others goes to `choices`."""
+    """The equations of all terms that the runs excite and can distinguish; the fate of the others goes to `choices`."""
     active = []
     for term in candidate_terms(force):
         if excited(campaign, runs, term):
@@ -155,7 +156,7 @@ def _order(term: Term) -> int:
 
 
 def _told_apart(full: CampaignEquations, choices: dict[str, Choice]) -> list[str]:
-    """Terms that the campaign can tell apart, taken from the simplest to the most mixed: each that joins must leave
+    """Terms that the campaign can distinguish, taken from the simplest to the most mixed: each that joins must leave
     the condition number bearable."""
     kept: list[str] = []
     conditions = _conditions(full)
@@ -163,8 +164,8 @@ def _told_apart(full: CampaignEquations, choices: dict[str, Choice]) -> list[str
         # The zero of Y and N is an unknown, whether or not its term is in the result.
         spare = 0 if full.force == "X" or {"Y0", "N0"} & {name, *kept} else 1
         if len(kept) + spare >= conditions or (conditions < 2 and name != "X0"):
-            told = f"{conditions} distinct condition{'s' * (conditions > 1)} cannot show it beside the zero"
-            choices[name] = Choice(name, False, "not excited", f"{' and '.join([told, *kept])}")
+            text = f"{conditions} distinct condition{'s' * (conditions > 1)} cannot show it next to the zero"
+            choices[name] = Choice(name, False, "not excited", f"{' and '.join([text, *kept])}")
             continue
         part = full.of_terms([*kept, name])
         weighted = Spread(1.0, usual_zero(full)).weighted(part, part.design)
@@ -175,11 +176,11 @@ def _told_apart(full: CampaignEquations, choices: dict[str, Choice]) -> list[str
         column, others = weighted[:, -1], weighted[:, :-1]
         alone = column - others @ np.linalg.lstsq(others, column, rcond=None)[0]
         inflation = float(column @ column / max(float(alone @ alone), 1e-300))
-        told = (
+        text = (
             f"the runs cannot tell it from simpler terms: variance inflation {inflation:.3g}, scaled condition number "
             f"{condition:.3g} with it, and {COLLINEAR:g} can be borne"
         )
-        choices[name] = Choice(name, False, "collinear", told, inflation)
+        choices[name] = Choice(name, False, "collinear", text, inflation)
     return [name for name in full.names if name in kept]
 
 
@@ -201,5 +202,5 @@ def _simplicity(name: str) -> tuple[int, ...]:
 
 
 def usual_zero(full: CampaignEquations) -> float:
-    """A zero error that makes every mean as good as the others: what can be told apart hangs on the tests alone."""
+    """A zero error that makes every mean as good as the others: what can be distinguished hangs on the tests alone."""
     return float(np.median([root[0, 0] for root in full.roots])) ** 2

@@ -123,7 +123,7 @@ def _joined(held: Array, inverse: Array, leaning: Array) -> Array:
 
 
 def _new_terms(part: CampaignEquations, spread: Spread, found: set[str], motions: str) -> list[str]:
-    """Terms not found yet that act in these runs, in the step's motions alone, and can be told apart there."""
+    """Terms not found yet that act in these runs, in the step's motions alone, and can be distinguished there."""
     reach = np.abs(spread.weighted(part, part.design)).max(axis=0)
     new: list[str] = []
     for name, reached in zip(part.names, reach, strict=True):

@@ -1,8 +1,8 @@
 """The symmetry that (3.8) uses, tested: are there terms of the other parity?
 
-By the symmetry of a hull to port and starboard X has even terms and Y, N odd ones, but for Y0, N0 and their change with
-speed, which (3.8) has for a single screw. What the other parity would add has no place in a card; that it is small is
-worth knowing.
+By the symmetry of a hull to port and starboard X has even terms and Y, N odd ones, except for Y0, N0 and their change
+with speed, which (3.8) has for a single screw. What the other parity would add has no place in a card; that it is
+small is worth knowing.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Asymmetry:
     names : tuple of str
         Terms of the other parity that the campaign excites.
     values, standard_errors : tuple of float
-        Prime, with them all beside the terms of the result.
+        Prime, with them all next to the terms of the result.
     chance : float
         Probability of values as large as these together if the symmetry holds (Wald's test); 1 without terms.
     """
@@ -43,7 +43,7 @@ class Asymmetry:
 
 
 def asymmetry(campaign: Campaign, selection: Selection) -> Asymmetry:
-    """Terms of the other parity beside those of the result."""
+    """Terms of the other parity next to those of the result."""
     force, runs = selection.equations.force, selection.equations.runs
     kept, prior = selection.equations.names, selection.equations.prior
     other: list[str] = []

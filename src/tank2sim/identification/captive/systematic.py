@@ -156,7 +156,7 @@ def gauge_gains(
         if solution.condition < SINGULAR_CONDITION and abs(solution.value("gain")) > max(
             _LEAST_GAIN, _SUSPECT * solution.error("gain")
         ):
-            # Scatter within kinds still holds what a gauge in error does: that beside the error is what counts.
+            # Scatter within kinds still holds what a gauge in error does: that next to the error is what counts.
             solution = solve(joined, fitted_spread(joined, by_type=False))
         size, error = solution.value("gain"), solution.error("gain")
         if solution.condition > SINGULAR_CONDITION or _SHOWN * error > VISIBLE_GAIN:

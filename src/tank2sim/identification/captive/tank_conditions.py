@@ -23,10 +23,10 @@ LARGEST_REDUCED_FREQUENCY = {"sway": 2.0, "yaw": 3.0}
 """omega L/U above which the flow remembers. ITTC quotes limits of 1 to 2 in sway and 2 to 3 in yaw; the upper ones."""
 
 NEAR_RESONANCE = 0.1
-"""A harmonic of the motion this near (relatively) to a standing wave of the tank excites it: a choice of ours."""
+"""A harmonic of the motion this near (relatively) to a standing wave of the tank excites it: project choice."""
 
 LARGEST_BLOCKAGE = 0.01
-"""Midship section over tank section: a choice of ours; blockage corrections of resistance begin to matter there."""
+"""Midship section over tank section: project choice; blockage corrections of resistance begin to matter there."""
 
 LEAST_DEPTH_RATIO = 4.0
 """Depth over draught of deep water: IMO MSC.137(76), standards for ship manoeuvrability."""
@@ -35,7 +35,7 @@ LARGEST_DEPTH_FROUDE = 0.6
 """U/sqrt(g h) at which the bottom changes the model's waves by 1 %: they have k h = 1/Fn_h^2, and tanh(k h) = 0.99."""
 
 BLOCK_TOLERANCE = 0.05
-"""Relative difference between a stated block coefficient and that of the mass: a choice of ours."""
+"""Relative difference between a stated block coefficient and that of the mass: project choice."""
 
 BLOCK_COEFFICIENTS = (0.4, 0.9)
 """Mass over rho L B T of ships: 0.45 (destroyers) to 0.87 (tankers); a project choice on either side."""
@@ -49,7 +49,7 @@ POSSIBLE_MASSES = (5e-4, 0.1)
 a stubby barge's 0.95, 0.4, 0.13."""
 
 RADII_OF_GYRATION = (0.18, 0.32)
-"""In yaw, in lengths, about midships: 0.25 is usual; a choice of ours on either side."""
+"""In yaw, in lengths, about midships: 0.25 is usual; project choice on either side."""
 
 POSSIBLE_RADII = (0.1, 0.5)
 """Above: a body of length L has at most L/2, all its mass at its ends. Below: all mass within 0.17 L of midships; a
@@ -62,7 +62,7 @@ CENTRES_OF_GRAVITY = 0.1
 """|x_G| in lengths of ships that float on even keel: some 0.05 at most; a project choice beyond it."""
 
 SIMILARITY = {"m'": (0.02, "relative"), "J_z'": (0.05, "relative"), "x_G'": (0.005, ""), "z_G'": (0.005, "")}
-"""How far model and ship may be apart, relative or in lengths: a choice of ours, paper 2 asks for equality."""
+"""How far model and ship may be apart, relative or in lengths: project choice, paper 2 asks for equality."""
 
 
 @dataclass(frozen=True)

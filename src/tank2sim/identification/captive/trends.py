@@ -63,14 +63,14 @@ def trends(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[T
     shown: list[str] = []
     while True:
         found = [_trend(full, names, name, selection) for name in candidates if name not in shown]
-        told = [trend for trend in found if trend is not None]
-        best = max(told, key=_ratio, default=None)
+        messages = [trend for trend in found if trend is not None]
+        best = max(messages, key=_ratio, default=None)
         if best is None or _ratio(best) < _SHOWN:
             break
         shown.append(best.name)
         names.append(_slope(best.name))
     if not shown:
-        return selection, tuple(told)
+        return selection, tuple(messages)
     chosen = [
         Choice(_slope(name), True, "trend", f"{name} changes with the frequency; its value is that at zero frequency")
         for name in shown
@@ -78,7 +78,7 @@ def trends(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[T
     widened = full.of_terms(names)
     result = replace(selection, equations=widened, spread=fitted_spread(widened), choices=(*selection.choices, *chosen))
     kept = [_trend(full, [other for other in names if other != _slope(name)], name, result) for name in shown]
-    return result, (*(replace(trend, used=True) for trend in kept if trend is not None), *told)
+    return result, (*(replace(trend, used=True) for trend in kept if trend is not None), *messages)
 
 
 def _slope(name: str) -> str:
@@ -86,7 +86,7 @@ def _slope(name: str) -> str:
 
 
 def _trend(full: CampaignEquations, names: Sequence[str], name: str, selection: Selection) -> Trend | None:
-    """The trend of one term beside the named terms; None if the runs cannot tell it from them."""
+    """The trend of one term next to the named terms; None if the runs cannot tell it from them."""
     part = full.of_terms([*names, _slope(name)])
     solution = solve(part, selection.spread)
     if solution.condition > COLLINEAR:

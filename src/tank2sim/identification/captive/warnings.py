@@ -76,7 +76,7 @@ def cautions_of_result(
     assert mass is not None
     body = body_of(campaign)
     deep = not (campaign.tank.depth_m and body.draught_m) or campaign.tank.depth_m >= LEAST_DEPTH_RATIO * body.draught_m
-    # A positive added mass is told once, with its likely cause.
+    # A positive added mass is reported once, with its likely cause.
     others = {name: value for name, value in derivatives.items() if name not in ADDED_MASSES}
     return (
         *force_convention(derivatives, mass, inertia or 0.0, campaign.test.force_convention),

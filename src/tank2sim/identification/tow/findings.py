@@ -34,12 +34,12 @@ def tow_findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping
     fits : mapping
         Method to its fit. The method of the paper is left out where QR, with the same estimates, is there.
     """
-    told = [fit for name, fit in fits.items() if name != "paper" or "qr" not in fits]
-    yield from _identifiability(told)
-    for fit in told:
+    messages = [fit for name, fit in fits.items() if name != "paper" or "qr" not in fits]
+    yield from _identifiability(messages)
+    for fit in messages:
         yield from _plausibility(fit, tows.top_speed_mps)
-    if any(fit.method != "output_error" for fit in told):
-        yield from _polynomial_findings(tows, speed, told[0])
+    if any(fit.method != "output_error" for fit in messages):
+        yield from _polynomial_findings(tows, speed, messages[0])
     if "output_error" in fits:
         fit = fits["output_error"]
         speeds = simulated_speeds(fit.coefficients, force, tows.time_s, fit.start_delay_s)
@@ -51,11 +51,11 @@ def tow_findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping
                 f"{abs(fast):.3g} m/s too {'fast' if fast > 0 else 'slow'}; "
                 f"{'' if fit.start_delay_s else 'a late start or '}a force that (1.5) lacks is likely."
             )
-    yield from _disagreement(told)
+    yield from _disagreement(messages)
 
 
 def identifiable_terms(fits: Sequence[TowFit]) -> tuple[str, ...]:
-    """The most drag terms that every one of the fits (of one model) can tell apart from M and each other.
+    """The most drag terms that every one of the fits (of one model) can distinguish from M and each other.
 
     Where there is a choice, the lower powers of the speed are taken.
     """
@@ -96,7 +96,7 @@ def _identifiability(fits: Sequence[TowFit]) -> Iterator[str]:
             if _TWO_SIDED_95 * error > abs(value)
         ]
         if uncertain:
-            yield f"{fit.method}: not to be told from zero at 95 %: {', '.join(uncertain)}."
+            yield f"{fit.method}: not to be reported from zero at 95 %: {', '.join(uncertain)}."
 
 
 def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[str]:

@@ -21,7 +21,7 @@ TOW_PARAMETERS = {
 """Unknown of (1.5) to its name with unit, as in :class:`SurgeCoefficients`, the card and the JSON."""
 
 DELAY = "delay"
-"""Unknown beside those of (1.5): how much later than t = 0 the body starts, s."""
+"""Unknown next to those of (1.5): how much later than t = 0 the body starts, s."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

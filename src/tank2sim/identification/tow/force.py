@@ -56,6 +56,6 @@ def mean_force(force: Polynomial, times_s: Array) -> float:
 
 
 def force_words(force: Polynomial) -> str:
-    """How a reader is told the force: ``T = 11.63 N``, ``T = 11.6 + 0.02 t N``."""
+    """How a reader is reported the force: ``T = 11.63 N``, ``T = 11.6 + 0.02 t N``."""
     powers = [f"{value:+.6g}" + ("" if k == 0 else " t" if k == 1 else f" t^{k}") for k, value in enumerate(force.coef)]
     return "T = " + " ".join(powers).lstrip("+").replace(" +", " + ").replace(" -", " - ") + " N"

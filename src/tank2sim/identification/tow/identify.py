@@ -53,7 +53,7 @@ class TowResult:
     fits : dict
         Method to its estimates.
     options : TowOptions
-        What was assumed beside (1.5).
+        What was assumed next to (1.5).
     warnings : tuple of str
         What the user should know before using them, in whole sentences.
     """
@@ -119,7 +119,7 @@ def identify_tow(
     mass_kg : float, optional
         Mass m with the water in the body; by default that in the file of the tows.
     terms : iterable of str
-        Drag terms to estimate beside M, any of B1, B2, B3; the others are zero.
+        Drag terms to estimate next to M, any of B1, B2, B3; the others are zero.
     speed_degree : int
         Degree of the speed polynomial of the first two methods, at least 2; the paper has 2.
     options : TowOptions

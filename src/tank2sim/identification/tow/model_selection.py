@@ -22,12 +22,12 @@ from tank2sim.records.tows import Tows
 
 _NO_DELAY_S = 1e-3
 _FAR_BEHIND = 20.0
-"""AIC above the best at which a model is out: a choice of ours. The usual 10 (Burnham & Anderson 2002) is for readings
+"""AIC above the best at which a model is out: project choice. The usual 10 (Burnham & Anderson 2002) is for readings
 that err independently, and those of one tow may err together."""
 
 
 class TowModel(NamedTuple):
-    """Drag terms beside M, in the order of (1.5), and whether the body starts late."""
+    """Drag terms next to M, in the order of (1.5), and whether the body starts late."""
 
     terms: tuple[str, ...]
     start_delay: bool = False
@@ -77,7 +77,8 @@ class FittedModel:
 
     @property
     def determined(self) -> bool:
-        """The estimates can be told apart (scaled condition number at most 900), and a delay is not at its bound, 0."""
+        """The estimates can be distinguished (scaled condition number at most 900), and a delay is not at its bound,
+        0."""
         late = not self.model.start_delay or self.fit.estimates[-1] > _NO_DELAY_S
         return late and self.fit.condition_scaled <= COLLINEAR**2
 

@@ -34,7 +34,7 @@ _LATEST_START = 0.5
 
 @dataclass(frozen=True)
 class TowOptions:
-    """What is assumed of the tows beside (1.5).
+    """What is assumed of the tows next to (1.5).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What paper 1 (Wilinski & Zellman 1984) prints, to be held beside what its data give."""
+"""What paper 1 (Wilinski & Zellman 1984) prints, to be held next to what its data give."""
 
 from __future__ import annotations
 

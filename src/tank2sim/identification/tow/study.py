@@ -99,7 +99,7 @@ class TowStudy:
     @property
     def best(self) -> FittedModel | None:
         """The model of the lowest AIC among those that these tows determine and a hull can have."""
-        usable = [one for one in self.models if one.plausible and one.determined]
+        usable = [model for model in self.models if model.plausible and model.determined]
         return min(usable, key=lambda one: one.fit.aic, default=None)
 
     def simulated(self) -> tuple[Array, dict[str, Array]]:
@@ -130,7 +130,7 @@ class TowStudy:
     @property
     def ellipses(self) -> tuple[Ellipse, ...]:
         """Of M and B3, without and with a start delay."""
-        found = [confidence_ellipse(one) for one in self.models if one.model in (SIMPLE, SIMPLE_LATE)]
+        found = [confidence_ellipse(model) for model in self.models if model.model in (SIMPLE, SIMPLE_LATE)]
         return tuple(found)
 
     @property
@@ -141,11 +141,11 @@ class TowStudy:
     def as_json(self) -> dict[str, Any]:
         """The study as plain data: that of the result, and more."""
         more: dict[str, Any] = {
-            "speed_polynomials": [one._asdict() for one in self.polynomials],
-            "models": [one.as_json() for one in self.models],
+            "speed_polynomials": [polynomial._asdict() for polynomial in self.polynomials],
+            "models": [model.as_json() for model in self.models],
             "mass_range_kg": self.mass_range_kg,
             "tow_by_tow": {one.label: one.as_json() for one in self.by_tow},
-            "confidence_ellipses": [one._asdict() for one in self.ellipses],
+            "confidence_ellipses": [ellipse._asdict() for ellipse in self.ellipses],
             "mass_by_theory": [one.as_json() for one in self.theory],
             "speeds": self._speeds_as_json(),
         }
@@ -153,8 +153,8 @@ class TowStudy:
             factor = self.body.area_ratio
             more["body"] = dict(vars(self.body))
             more["drag_coefficients"] = {
-                name: {"by_length_squared": one.as_json(), "by_volume_two_thirds": one.times(factor).as_json()}
-                for name, one in self.drags.items()
+                name: {"by_length_squared": drag.as_json(), "by_volume_two_thirds": drag.times(factor).as_json()}
+                for name, drag in self.drags.items()
             }
         return {**self.result.as_json(), **more, "warnings": list(self.notes)}
 
@@ -263,10 +263,14 @@ def _notes(study: TowStudy) -> Iterator[str]:
     if best is not None and not (best.plausible and best.determined):
         yield (
             f"The lowest AIC has the model {best.model.label}, with "
-            + ("a drag that is negative at some speeds" if not best.plausible else "unknowns that cannot be told apart")
+            + (
+                "a drag that is negative at some speeds"
+                if not best.plausible
+                else "unknowns that cannot be distinguished"
+            )
             + "; a better fit is no better model."
         )
-    late = {one.model: one.fit.aic for one in study.models}
+    late = {model.model: model.fit.aic for model in study.models}
     if not result.options.start_delay and late.get(SIMPLE_LATE, 0.0) < late.get(SIMPLE, 0.0) - 4:
         yield "A start delay explains these tows much better than none (--start-delay)."
     if any(fit.condition_scaled > COLLINEAR**2 for fit in result.fits.values()):

@@ -24,7 +24,7 @@ FIGURES_ARE = "simulated in closed loop with the card found, from each trial's m
 def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -> dict[str, object]:
     """Everything a script may want: ``derivatives``, ``effects``, ``misfit``, ``figures``, ``identifiability``, ...
 
-    `told` is what the user was told beside the notices of the result.
+    `told` is what the user was reported next to the notices of the result.
     """
     estimate, known = result.estimate, result.identifiability
     parameters = _parameters(result)
@@ -48,8 +48,11 @@ def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -
             "holdout": [_figure(figure) for figure in result.holdout.figures] if result.holdout else [],
         },
         "structures": {
-            name: {"errors": one.errors, "left_out": [list(fold.left_out) for fold in (*one.single, one.extrapolation)]}
-            for name, one in result.structures.items()
+            name: {
+                "errors": structure.errors,
+                "left_out": [list(fold.left_out) for fold in (*structure.single, structure.extrapolation)],
+            }
+            for name, structure in result.structures.items()
         },
         "criteria": None if result.criteria is None else asdict(result.criteria),
         "bootstrap": _bootstrap(result),
@@ -135,8 +138,8 @@ def following_rows(result: Identification) -> list[list[object]]:
 def structure_rows(result: Identification) -> list[list[object]]:
     """Structure, mean yaw-rate error of runs left out one at a time, and of those of largest amplitude, %."""
     return [
-        [name, 100 * float(np.mean(one.errors[:-1])), 100 * float(one.errors[-1])]
-        for name, one in result.structures.items()
+        [name, 100 * float(np.mean(structure.errors[:-1])), 100 * float(structure.errors[-1])]
+        for name, structure in result.structures.items()
     ]
 
 
@@ -175,9 +178,7 @@ def identified_card_text(result: Identification, trials: list[str]) -> str:
     changes: dict[str, object] = {"ship.source": f"{card.ship.source}; {how}"}
     if card.ship.notes:
         changes["ship.notes"] = f"Before it was {how}: {card.ship.notes}"
-    head = (
-        f"# {how[0].upper()}{how[1:]}.\n# Comments below are of the card before, but for keys marked as identified.\n"
-    )
+    head = f"# {how[0].upper()}{how[1:]}.\n# Comments below are of the card before, except keys marked as identified.\n"
     text = changed_text(card.text, card.source, changes)
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
     return mark + head + text.removeprefix(mark)

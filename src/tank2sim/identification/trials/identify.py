@@ -51,7 +51,8 @@ LEAST_PIECE = 0.5
 """Shortest piece, in L/u0: in less the state hardly answers the rudder, and there are more initial states than data."""
 
 WHOLE_RUN_MISFIT = 3.0
-"""Whole runs are fitted when the model follows them, too: to this many times the noise, in every signal (ours)."""
+"""Whole runs are fitted when the model follows them, too: to this many times the noise, in every signal (project
+choice)."""
 
 TRIAL_METHODS: tuple[str, ...] = ("output_error", "equation_error", "kalman", "recursive")
 
@@ -125,7 +126,7 @@ class Identification:
         Information criteria of the fit, to compare with those of another model of the same trials; None where the
         velocities for them were not measured.
     bootstrap : array (members, k) or None
-        Estimates from trials that were simulated anew with the estimate (:mod:`.prediction`), where asked for.
+        Estimates from trials that were simulated again with the estimate (:mod:`.prediction`), where asked for.
     notices : tuple of str
     """
 
@@ -166,7 +167,7 @@ def identify_trials(
         Trials to fit, and trials only to compare with.
     options : IdentificationOptions, optional
     progress : callable
-        Told of each better estimate. A KeyboardInterrupt ends the search with the best so far.
+        Called with each better estimate. A KeyboardInterrupt ends the search with the best so far.
     executor : concurrent.futures.Executor, optional
         For the fits of cross-validation and bootstrap, and the simulations behind intervals.
 
@@ -318,8 +319,8 @@ def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
 def _told_unseen(names: Sequence[str]) -> Sequence[str]:
     if not names:
         return ()
-    told = ", ".join(name.removeprefix("derivatives.") for name in names)
-    return (f"the trials show nothing of {told}: held as the card has them",)
+    text = ", ".join(name.removeprefix("derivatives.") for name in names)
+    return (f"the trials show nothing of {text}: held as the card has them",)
 
 
 def _told(card: ManoeuvringCard) -> Sequence[str]:

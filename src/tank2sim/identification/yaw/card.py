@@ -68,8 +68,8 @@ def body_length(result: YawResult, given_m: float | None) -> float:
 
 def tank_density(result: YawResult) -> float:
     """Density of the tank's water, kg/m3."""
-    told = [record.constants.get("water_density_kgpm3") for record in result.records]
-    return next((value for value in told if value is not None), TANK_WATER_KGPM3)
+    messages = [record.constants.get("water_density_kgpm3") for record in result.records]
+    return next((value for value in messages if value is not None), TANK_WATER_KGPM3)
 
 
 def with_nrdot(card: ManoeuvringCard, result: YawResult, method: str, length_m: float) -> ManoeuvringCard:

@@ -1,4 +1,4 @@
-"""What is looked at before and after an estimate from records of the yaw rig, and what the user is told."""
+"""What is looked at before and after an estimate from records of the yaw rig, and what the user is reported."""
 
 from __future__ import annotations
 
@@ -161,7 +161,7 @@ def judged(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[str]:
 
 
 def _compared(best: YawEstimate, other: YawEstimate | None) -> list[str]:
-    """The energy least squares beside the nonlinear ones, where these say more, or something else."""
+    """The energy least squares next to the nonlinear ones, where these say more, or something else."""
     if other is None or not best.inertia_error_kgm2 or not other.inertia_error_kgm2:
         return []
     apart = abs(best.total_inertia_kgm2 - other.total_inertia_kgm2)

@@ -187,7 +187,7 @@ class YawResult:
 def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None) -> YawResult:
     """Estimate the added yaw inertia and the dissipation of one body.
 
-    Records in air give J_zz, if there are any beside those in water; alone, they are themselves what is looked at.
+    Records in air give J_zz, if there are any next to those in water; alone, they are themselves what is looked at.
 
     Raises
     ------

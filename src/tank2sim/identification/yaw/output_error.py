@@ -81,7 +81,7 @@ def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, i
     first : YawEstimate
         Where to start, and the terms to fit.
     ideal : Interval
-        The programme's, whose dissipation is told.
+        The programme's, whose dissipation is reported.
     """
     terms = tuple(term for term in (*_NAMES, *_GRAVITY) if term == "inertia" or term in first.friction)
     humps = [hump for record in records for hump in _humps(record)]
@@ -157,7 +157,7 @@ def _from_current(parts: list[Array], humps: list[_Hump], gain: tuple[float, flo
 def _covariance(residuals: Array, design: Array, humps: list[_Hump], gain: tuple[float, float]) -> Array:
     """Covariance; the residuals hang together over seconds, and from hump to hump.
 
-    The largest of four, term by term: residuals taken as independent, with what the noise of the current does beside;
+    The largest of four, term by term: residuals taken as independent, with what the noise of the current does next to;
     each hump as one draw, with Student's factor for how few they are; and the humps one by one and laid upon each
     other, with the correlation along them (Newey & West 1987). The last sees what is alike in every hump, as the
     encoder's errors are where the humps turn by whole counts. `gain` is k_t/J and the decay of the rate.

@@ -1,4 +1,4 @@
-"""What is drawn of records of the yaw rig: histories beside the programme, the energy balance part by part, residuals.
+"""What is drawn of records of the yaw rig: histories next to the programme, the energy balance part by part, residuals.
 
 As JSON has it: plain lists, thinned to draw.
 """

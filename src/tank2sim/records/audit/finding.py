@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from tank2sim.records.trials import Trial
 
-Mend = Callable[[Trial], Trial]
+Repair = Callable[[Trial], Trial]
 
 
 @dataclass(frozen=True)
@@ -31,12 +31,12 @@ class Finding:
         (a current, a small bias, a gap).
     evidence : mapping
         Figures, the unit in the name.
-    mend : callable or None
-        Trial to mended trial.
+    correct : callable or None
+        Trial to repaired trial.
     safe : bool
-        Whether the mend only restates what was measured (a frame, a sign, a unit, a time base, a failed sensor left
-        out), so that :func:`tank2sim.records.audit.mended` applies it. The others (a bias, a scale, a clock) change
-        measured values by an estimate and are for the user, or for the gap workflow, to decide.
+        Whether the correct only restates what was measured (a frame, a sign, a unit, a time base, a failed sensor left
+        out), so that :func:`tank2sim.records.audit.repair_trial` applies it. The others (a bias, a scale, a clock)
+        change measured values by an estimate and are for the user, or for the gap workflow, to decide.
     places_s : tuple of (float, float)
         From when to when it is seen, in the time of the file; empty where it is of the whole record.
     """
@@ -47,7 +47,7 @@ class Finding:
     likely_truth: str
     kind: Literal["fault", "note"] = "fault"
     evidence: Mapping[str, float] = field(default_factory=dict)
-    mend: Mend | None = None
+    repair: Repair | None = None
     safe: bool = False
     places_s: tuple[tuple[float, float], ...] = ()
 
@@ -58,16 +58,18 @@ class Finding:
 
     @property
     def open(self) -> bool:
-        """Whether it is a fault that :func:`tank2sim.records.audit.mended` leaves: the trial is then not to be used."""
-        return self.kind == "fault" and not (self.safe and self.mend is not None)
+        """Whether it is a fault that :func:`tank2sim.records.audit.repair_trial` leaves: the trial is then not to be
+        used."""
+        return self.kind == "fault" and not (self.safe and self.repair is not None)
 
     def as_json(self) -> list[dict[str, Any]]:
-        """One entry a column: file, column, what, likely_truth, kind, mended (by the safe mends), evidence, places."""
+        """One entry a column: file, column, what, likely_truth, kind, repaired (by the safe mends), evidence,
+        places."""
         rest = {
             "what": self.what,
             "likely_truth": self.likely_truth,
             "kind": self.kind,
-            "mended": self.safe and self.mend is not None,
+            "mended": self.safe and self.repair is not None,
             "evidence": dict(self.evidence),
             "places_s": [list(place) for place in self.places_s],
         }

@@ -12,7 +12,7 @@ from tank2sim.records.trials import MEASURED_COLUMNS, Trial
 
 WINDOW, DEGREE = 7, 3
 """Samples and degree of the Savitzky-Golay filter: a cubic through seven samples follows a ship at any usual rate, and
-leaves enough of the noise (0.67 of its variance) to measure it. A choice of ours."""
+leaves enough of the noise (0.67 of its variance) to measure it. Project choice."""
 _MAD = 1.4826  # of the median absolute deviation to the standard deviation of normal noise
 
 

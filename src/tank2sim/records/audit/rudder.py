@@ -15,13 +15,13 @@ SIDEWAYS = np.pi / 2
 """No rudder turns as far; beyond it an angle is not in its unit."""
 
 FAR_OVER = np.deg2rad(8.0)
-"""Rudder that leaves the spiral loop of any usual course-unstable ship: she then turns with her rudder."""
+"""Rudder that leaves the spiral loop of any usual course-unstable ship: it then turns with its rudder."""
 _STEADY = 0.9
-"""Cosine between rudder and rate of turn from which a turn is steady. A choice of ours, as the one above."""
+"""Cosine between rudder and rate of turn from which a turn is steady. Project choice, as the one above."""
 
 
 MOVES = 0.3
-"""Spread of a rudder over its size from which it is moved about, not held: a choice of ours."""
+"""Spread of a rudder over its size from which it is moved about, not held: project choice."""
 
 
 def rudder_unit_findings(trial: Trial) -> list[Finding]:
@@ -35,8 +35,8 @@ def rudder_unit_findings(trial: Trial) -> list[Finding]:
             findings.append(_too_large(trial, name, largest))
         elif _too_small(trial, name, largest):
             found = _in_radians(trial, name, largest)
-            assert found.mend is not None
-            if rudder_response(found.mend(trial), name):
+            assert found.repair is not None
+            if rudder_response(found.repair(trial), name):
                 findings.append(found)
     return findings
 
@@ -108,9 +108,9 @@ def _too_large(trial: Trial, name: str, largest: float) -> Finding:
     def in_degrees(other: Trial) -> Trial:
         return with_signals(other, {name: np.deg2rad(other.signals[name])}, f"{name}: {truth}")
 
-    mend = in_degrees if "deg" not in trial.heading(name) and largest < np.rad2deg(SIDEWAYS) else None
+    repair = in_degrees if "deg" not in trial.heading(name) and largest < np.rad2deg(SIDEWAYS) else None
     evidence = {"largest_deg": float(np.rad2deg(largest))}
-    return Finding(trial.path, (trial.heading(name),), what, truth, "fault", evidence, mend, safe=mend is not None)
+    return Finding(trial.path, (trial.heading(name),), what, truth, "fault", evidence, repair, safe=repair is not None)
 
 
 def _too_small(trial: Trial, name: str, largest: float) -> bool:
@@ -148,8 +148,8 @@ def _wrong_sign(trial: Trial, name: str, response: float) -> Finding:
     truth = "the rudder is positive to port (rudder_sign: port); or heading, rate of turn, v and y all are"
 
     def turned(other: Trial) -> Trial:
-        told = f"{name}: positive to port in the file, by the turn that it causes"
-        return with_signals(other, {name: 0.0 - other.signals[name]}, told)
+        text = f"{name}: positive to port in the file, by the turn that it causes"
+        return with_signals(other, {name: 0.0 - other.signals[name]}, text)
 
     evidence = {"standard_errors_from_zero": response}
     return Finding(trial.path, (trial.heading(name),), what, truth, "fault", evidence, turned, safe=True)

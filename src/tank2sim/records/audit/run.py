@@ -40,23 +40,24 @@ def audit(trial: Trial) -> tuple[Finding, ...]:
 
     Checked are the time base; each sensor by itself (missing, stuck, spikes); r against dpsi/dt; velocities against
     positions in body and earth axes with both signs; the rudder against the turn and against its order. A column that
-    is found to be something else is taken for that in the checks that follow, so that one fault is told once.
+    is found to be something else is taken for that in the checks that follow, so that one fault is reported once.
     """
     return audit_and_repair(trial)[1]
 
 
-def mended(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
-    """The trial with every safe mend applied (frames, signs, units, time base, failed readings left out), and what for.
+def repair_trial(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
+    """The trial with every safe correct applied (frames, signs, units, time base, failed readings left out), and what
+    for.
 
-    The notices of the trial tell each change. Findings without a safe mend (:class:`Finding`) are not among those
+    The notices of the trial tell each change. Findings without a safe correct (:class:`Finding`) are not among those
     returned: biases, scales and clocks stay as measured.
     """
     repaired, findings = audit_and_repair(trial)
-    return repaired, tuple(finding for finding in findings if finding.safe and finding.mend is not None)
+    return repaired, tuple(finding for finding in findings if finding.safe and finding.repair is not None)
 
 
 def audit_and_repair(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
-    """The trial as :func:`mended` gives it, and all that is wrong with it, as :func:`audit` does.
+    """The trial as :func:`repair_trial` gives it, and all that is wrong with it, as :func:`audit` does.
 
     After a fault that is not repaired (:attr:`.Finding.open`) nothing more is: what follows may depend on it, and is
     reported only where it is about other columns. After one of the time nothing else can be judged.
@@ -71,8 +72,8 @@ def audit_and_repair(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
             found = [replace(finding, safe=False) for finding in found]
         findings += found
         for finding in found:
-            if finding.safe and finding.mend is not None:
-                trial = _without_empty(finding.mend(trial))
+            if finding.safe and finding.repair is not None:
+                trial = _without_empty(finding.repair(trial))
     return trial, tuple(findings)
 
 

@@ -12,7 +12,7 @@ from scipy.signal import savgol_coeffs
 from scipy.stats import norm
 
 from tank2sim.arrays import Array
-from tank2sim.records.audit.finding import Finding, Mend
+from tank2sim.records.audit.finding import Finding, Repair
 from tank2sim.records.audit.noise import DEGREE, WINDOW, record_noise, white_noise
 from tank2sim.records.audit.weak import FALSE_ALARM
 from tank2sim.records.trials import MEASURED_COLUMNS, Trial, sampling_step, with_signals
@@ -32,11 +32,11 @@ _ROUNDING = 1e-9
 """Share of a signal below which its noise is that of the arithmetic: the signal was calculated, not measured."""
 _SHORT = 0.05
 """Share of a record up to which failed readings of one sensor are noted rather than called its fault: they are left
-out, and nothing is lost. A choice of ours."""
+out, and nothing is lost. Project choice."""
 
 
 def sensor_findings(trial: Trial) -> list[Finding]:
-    """Faults of single sensors; failed values are mended by leaving them out (nan)."""
+    """Faults of single sensors; failed values are repaired by leaving them out (nan)."""
     findings = []
     noise = record_noise(trial)
     for name, values in trial.signals.items():
@@ -110,10 +110,12 @@ def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
     what = f"stands still for {seconds:.3g} s in all, first at {trial.time_s[first.start]:.6g} s"
     evidence = {"runs": float(len(stuck)), "seconds": seconds, "longest_samples": float(longest + 1)}
     rows = np.concatenate([np.arange(run.start + 1, run.stop + 1) for run in stuck])
-    mend = _left_out(name, rows, "where the sensor stood still")
+    repair = _left_out(name, rows, "where the sensor stood still")
     kind = _kind(len(rows), values)
     truth, places = "the sensor was stuck", _places(trial, stuck)
-    return [Finding(trial.path, (trial.heading(name),), what, truth, kind, evidence, mend, safe=True, places_s=places)]
+    return [
+        Finding(trial.path, (trial.heading(name),), what, truth, kind, evidence, repair, safe=True, places_s=places)
+    ]
 
 
 def _jumps(values: Array, run: slice, usual: float) -> bool:
@@ -137,7 +139,7 @@ def _stands_still(trial: Trial, name: str, noise: dict[str, float]) -> list[Find
     def without(other: Trial) -> Trial:
         return with_signals(other, {name: None}, f"{name} left out: {truth}")
 
-    return [Finding(trial.path, (trial.heading(name),), what, truth, mend=without, safe=True)]
+    return [Finding(trial.path, (trial.heading(name),), what, truth, repair=without, safe=True)]
 
 
 def _spikes(trial: Trial, name: str, values: Array, noise: float, least: float = 0.0) -> list[Finding]:
@@ -162,10 +164,12 @@ def _spikes(trial: Trial, name: str, values: Array, noise: float, least: float =
     rows = np.concatenate([known[run] for run in runs])
     what = f"{len(runs)} spikes, the first at {trial.time_s[rows[0]]:.6g} s"
     evidence = {"spikes": float(len(runs)), "largest_in_noise": float(np.max(np.abs(away)) / usual) if usual else 0.0}
-    mend = _left_out(name, rows, "spikes")
+    repair = _left_out(name, rows, "spikes")
     truth, kind = "disturbed readings", _kind(len(rows), values)
     places = _places(trial, [slice(known[run.start], known[run.stop - 1] + 1) for run in runs])
-    return [Finding(trial.path, (trial.heading(name),), what, truth, kind, evidence, mend, safe=True, places_s=places)]
+    return [
+        Finding(trial.path, (trial.heading(name),), what, truth, kind, evidence, repair, safe=True, places_s=places)
+    ]
 
 
 def _isolated(values: Array, far: NDArray[np.bool_]) -> list[slice]:
@@ -192,7 +196,7 @@ def _kind(rows: int, values: Array) -> Literal["fault", "note"]:
     return "fault" if rows > _SHORT * len(values) else "note"
 
 
-def _left_out(name: str, rows: NDArray[np.int64], why: str) -> Mend:
+def _left_out(name: str, rows: NDArray[np.int64], why: str) -> Repair:
     def left_out(trial: Trial) -> Trial:
         values = trial.signals[name].copy()
         values[rows] = np.nan

@@ -63,8 +63,8 @@ def speed_unit_findings(trial: Trial) -> list[Finding]:
         findings.append(found)
         if found.open:
             break
-        if found.mend is not None:
-            trial = found.mend(trial)
+        if found.repair is not None:
+            trial = found.repair(trial)
     return findings
 
 

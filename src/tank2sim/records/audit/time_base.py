@@ -27,7 +27,7 @@ def time_findings(trial: Trial) -> list[Finding]:
     stray = _stray(trial)
     if stray is None:
         return _of_steps(trial)
-    return [stray] if stray.mend is None else [stray, *_of_steps(stray.mend(trial))]
+    return [stray] if stray.repair is None else [stray, *_of_steps(stray.repair(trial))]
 
 
 def _stray(trial: Trial) -> Finding | None:
@@ -48,7 +48,7 @@ def _stray(trial: Trial) -> Finding | None:
     def left_out(other: Trial) -> Trial:
         return replace(select_rows(other, np.flatnonzero(~far)), notices=(*other.notices, f"time: {truth}"))
 
-    return replace(found, likely_truth=truth, mend=left_out, safe=True)
+    return replace(found, likely_truth=truth, repair=left_out, safe=True)
 
 
 def _of_steps(trial: Trial) -> list[Finding]:
@@ -98,11 +98,11 @@ def _not_rising(trial: Trial, steps: NDArray[np.float64]) -> Finding:
             rising,
         )
 
-    def mend(other: Trial) -> Trial:
+    def repair(other: Trial) -> Trial:
         return replace(select_rows(other, rows), notices=(*other.notices, f"time: {truth}"))
 
     enough = len(rows) > 1
-    return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", evidence, mend, safe=enough)
+    return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", evidence, repair, safe=enough)
 
 
 def _repeats(trial: Trial) -> NDArray[np.bool_]:
@@ -127,8 +127,8 @@ def _uniform(trial: Trial, what: str, evidence: dict[str, float]) -> Finding:
     step = float(np.polyfit(count, trial.time_s, 1)[0])
     truth = f"times are rounded: the step is uniform, {step:.5g} s"
 
-    def mend(other: Trial) -> Trial:
+    def repair(other: Trial) -> Trial:
         return replace(other, time_s=other.time_s[0] + step * count, notices=(*other.notices, f"time: {truth}"))
 
     figures = {**evidence, "step_s": step}
-    return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", figures, mend, safe=True)
+    return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", figures, repair, safe=True)

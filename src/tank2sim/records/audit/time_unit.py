@@ -41,8 +41,8 @@ def time_unit_findings(trial: Trial) -> list[Finding]:
     found = Finding(trial.path, (trial.heading("t_s"),), what, "", evidence=evidence)
     for factor, name in _UNITS.items():
         if abs(gone / factor - 1) < AGREEMENT:
-            mend = partial(_in_seconds, factor=factor, name=name)
-            return [replace(found, likely_truth=f"time is in {name}", mend=mend, safe=True)]
+            repair = partial(_in_seconds, factor=factor, name=name)
+            return [replace(found, likely_truth=f"time is in {name}", repair=repair, safe=True)]
     if max(gone, 1 / gone) < 1 + MISCALIBRATED:
         return []
     truth = f"a second of the file is {gone:.3g} s: its clock or its sampling rate is another"
@@ -50,8 +50,8 @@ def time_unit_findings(trial: Trial) -> list[Finding]:
 
 
 def _in_seconds(trial: Trial, factor: float, name: str) -> Trial:
-    told = f"time was in {name} and is in seconds now"
-    return replace(trial, time_s=factor * trial.time_s, notices=(*trial.notices, told))
+    text = f"time was in {name} and is in seconds now"
+    return replace(trial, time_s=factor * trial.time_s, notices=(*trial.notices, text))
 
 
 def _turned(trial: Trial) -> float | None:

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.records.audit.finding import Finding, Mend
+from tank2sim.records.audit.finding import Finding, Repair
 from tank2sim.records.audit.noise import record_noise
 from tank2sim.records.audit.time_unit import MISCALIBRATED
 from tank2sim.records.audit.weak import AuditWindows, Complex, WeakFit, fit, on_uniform_time, windows_of
@@ -131,8 +131,8 @@ def _of_pair(trial: Trial, pair: tuple[str, str]) -> list[Finding]:
     earth = frame is not None and frame.likely_truth in _EARTH
     if frame is not None:
         findings.append(frame)
-        assert frame.mend is not None
-        trial = frame.mend(trial)
+        assert frame.repair is not None
+        trial = frame.repair(trial)
         track = audited_track(trial)
         given = track.signals[pair[0]] + 1j * track.signals[pair[1]]
     lesser = _lesser(trial, track, pair, given)
@@ -163,9 +163,9 @@ def _frame(trial: Trial, track: AuditedTrack, pair: tuple[str, str], given: Comp
         f"by {labelled:.2g} m/s rms, and by {misfit:.2g} m/s if read otherwise"
     )
     evidence = {"misfit_as_labelled_mps": labelled, "misfit_mps": misfit, "speed_mps": track.speed}
-    mend = _mend(best, pair, f"{', '.join(names)}: {truth}", 1j**quarters)
+    repair = _repaired_by(best, pair, f"{', '.join(names)}: {truth}", 1j**quarters)
     explained = misfit < MISCALIBRATED * track.speed  # else more is wrong than the frame
-    return Finding(trial.path, columns, what, truth, "fault", evidence, mend, safe=explained)
+    return Finding(trial.path, columns, what, truth, "fault", evidence, repair, safe=explained)
 
 
 def _misfit(track: AuditedTrack, reading: TrackReading, given: Complex, turn: Complex) -> tuple[float, float]:
@@ -185,7 +185,7 @@ def _signal(pair: tuple[str, str], name: str) -> str:
     return {"u": pair[0], "v": pair[1], "x": "x_m", "y": "y_m", "psi": "psi_rad", "r": "r_radps"}[name]
 
 
-def _mend(reading: TrackReading, pair: tuple[str, str], notice: str, quarter: complex) -> Mend:
+def _repaired_by(reading: TrackReading, pair: tuple[str, str], notice: str, quarter: complex) -> Repair:
     if reading.earth:
         notice += "; turned to body axes by psi (those through the water are the same if there is no current)"
 

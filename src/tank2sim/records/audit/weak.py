@@ -19,7 +19,7 @@ AuditNumber = TypeVar("AuditNumber", np.float64, np.complex128)
 
 FALSE_ALARM = 1e-5
 """Probability with which a comparison of a right record may alarm: some ten comparisons of a hundred records then give
-one false alarm in a hundred audits. A choice of ours."""
+one false alarm in a hundred audits. Project choice."""
 SHARE = 0.01
 """The noise that a rate may keep, as a share of the motion: below most of the differences that matter."""
 FEWEST_WINDOWS = 12
@@ -155,7 +155,7 @@ class WeakFit:
 def fit(target: Array | Complex, regressors: Sequence[Array | Complex]) -> WeakFit | None:
     """Regression of a target (windows,) on regressors, real or complex.
 
-    None if there are too few windows, or the regressors cannot be told apart.
+    None if there are too few windows, or the regressors cannot be distinguished.
 
     Complex ones give two coefficients each, real and imaginary part. Standard errors are those of Newey & West (1987)
     with residuals correlated over four half-overlapping windows, so that they hold for coloured noise, or the

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import correlate, correlation_lags
 
 from tank2sim.arrays import Array
-from tank2sim.records.audit.finding import Finding, Mend
+from tank2sim.records.audit.finding import Finding, Repair
 from tank2sim.records.audit.noise import record_noise, rounding
 from tank2sim.records.audit.rudder import rudder_response
 from tank2sim.records.audit.time_unit import MISCALIBRATED
@@ -22,7 +22,7 @@ or of a rate per minute. Project choice."""
 COARSE = 0.3
 """The same for the course of a track over the heading, for the drift angle turns as well."""
 _FACTOR = 0.02
-"""Scale error of a rate of turn worth a word: above what rate gyros are usually calibrated to. A choice of ours."""
+"""Scale error of a rate of turn worth a word: above what rate gyros are usually calibrated to. Project choice."""
 _ROUNDED = 1.5
 """Times what rounding is expected to leave that is put down to it: errors of rounding are not quite so random (project
 choice)."""
@@ -43,8 +43,8 @@ def heading_unit_findings(trial: Trial) -> list[Finding]:
         return []
     truth = "psi is in radians" if degrees else "psi is in degrees"
     what = f"the course over ground turns {abs(slope):.3g} times as far as psi"
-    mend = _scaled("psi_rad", factor, truth)
-    return [Finding(trial.path, (heading,), what, truth, "fault", {"factor": slope}, mend, safe=True)]
+    repair = _scaled("psi_rad", factor, truth)
+    return [Finding(trial.path, (heading,), what, truth, "fault", {"factor": slope}, repair, safe=True)]
 
 
 def rate_unit_findings(trial: Trial) -> list[Finding]:
@@ -237,7 +237,7 @@ def _bias(trial: Trial, bias: float, error: float) -> Finding:
         return with_signals(other, {"r_radps": other.signals["r_radps"] - bias}, f"r: bias of {bias:.3g} rad/s removed")
 
     note = _note(trial, "r differs from dpsi/dt by a constant", truth, in_degrees)
-    return replace(note, mend=unbiased)
+    return replace(note, repair=unbiased)
 
 
 def _factor(trial: Trial, found: _Comparison) -> Finding:
@@ -252,7 +252,7 @@ def _factor(trial: Trial, found: _Comparison) -> Finding:
         columns = (trial.heading("r_radps"), trial.heading("psi_rad"))
         return Finding(trial.path, columns, what, truth, "fault", evidence)
     truth = f"r is to be multiplied by {factor:.4g} if the heading is right"
-    return replace(_note(trial, what, truth, evidence), mend=_scaled("r_radps", factor, truth))
+    return replace(_note(trial, what, truth, evidence), repair=_scaled("r_radps", factor, truth))
 
 
 def _unit(trial: Trial, found: _Comparison) -> Finding | None:
@@ -279,11 +279,11 @@ def _unit(trial: Trial, found: _Comparison) -> Finding | None:
         truth = ", or ".join(truth for *_, truth in readings) or "one of them is in another unit, not that of its name"
         return replace(fault, likely_truth=truth)
     ((name, scale, truth),) = readings
-    mend = _scaled(name, scale, truth)
-    return replace(fault, columns=(trial.heading(name),), likely_truth=truth, mend=mend, safe=True)
+    repair = _scaled(name, scale, truth)
+    return replace(fault, columns=(trial.heading(name),), likely_truth=truth, repair=repair, safe=True)
 
 
-def _scaled(name: str, factor: float, notice: str) -> Mend:
+def _scaled(name: str, factor: float, notice: str) -> Repair:
     def scaled(trial: Trial) -> Trial:
         values = trial.signals[name] * factor
         return with_signals(trial, {name: unwrapped(values) if name == "psi_rad" else values}, notice)

@@ -139,14 +139,14 @@ def _steering(series: dict[str, Series], segment_s: float | None) -> Steering | 
 
 
 def _cautions(correlation: Correlation, transfer: Transfer, step_s: float) -> tuple[str, ...]:
-    told = []
+    messages = []
     segment = transfer.averaging.samples * step_s
     lag = correlation.largest[0]
     if abs(lag) > 0.1 * segment:
-        told.append(
+        messages.append(
             f"the yaw rate is most like the rudder of {lag:.3g} s before, which is long for spectral segments of "
             f"{segment:.3g} s: gain and coherence come out low; a longer --segment helps"
         )
     if not np.any(transfer.sure):
-        told.append("no coherence of rudder and yaw rate is above chance: the transfer function says nothing")
-    return tuple(told)
+        messages.append("no coherence of rudder and yaw rate is above chance: the transfer function says nothing")
+    return tuple(messages)

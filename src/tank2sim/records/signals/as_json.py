@@ -15,7 +15,7 @@ def analysis_as_json(analysis: TrialAnalysis) -> dict[str, Any]:
     """One trial: ``columns`` by name in the trial format, ``rudder_to_yaw_rate`` and ``notices``."""
     return {
         "trial": analysis.trial.path,
-        "columns": {SignalName(one.series.name).file: _column(one) for one in analysis.columns},
+        "columns": {SignalName(column.series.name).file: _column(column) for column in analysis.columns},
         "rudder_to_yaw_rate": _steering(analysis.steering) if analysis.steering else None,
         "notices": analysis.notices,
     }

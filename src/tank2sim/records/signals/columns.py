@@ -88,8 +88,8 @@ def find_signal(asked: str, trial: Trial) -> str:
         The trial has no such signal.
     """
     name = to_si(asked, 1.0)[0]
-    for one in trial.signals:
-        if name in (one, SignalName(one).stem) or asked == trial.heading(one):
-            return one
-    columns = ", ".join(SignalName(one).file for one in trial.signals)
+    for signal in trial.signals:
+        if name in (signal, SignalName(signal).stem) or asked == trial.heading(signal):
+            return signal
+    columns = ", ".join(SignalName(signal).file for signal in trial.signals)
     raise InputError(trial.path, f"column {asked}", "is not in the trial", f"give --column one of {columns}")

@@ -71,7 +71,7 @@ class Filtered:
 
 
 def effect_frequencies(series: Series) -> Array:
-    """Frequencies (Hz) at which an effect is told, evenly spread over their logarithm, (400,)."""
+    """Frequencies (Hz) at which an effect is reported, evenly spread over their logarithm, (400,)."""
     # Not quite to Nyquist, where low-pass filters have a zero and no phase.
     grid: Array = np.geomspace(1.0 / series.duration_s, 0.499 * series.rate_hz, _FREQUENCIES)
     return grid

@@ -115,8 +115,8 @@ def savitzky_golay(series: Series, samples: int, degree: int, *, derivative: int
     found = _falls_to_half(grid, np.abs(response) / (2.0 * np.pi * grid) ** derivative)
     limit = f"{decibel(0.5)} at {found:.3g} Hz" if found else "more than half the amplitude at all frequencies"
     what = f"derivative of order {derivative} without delay" if derivative else "no phase shift"
-    told = f"{what}, {limit}, side lobes above, some upside down; fit one-sided over {half:.3g} s at both ends"
-    return Filtered(series.with_values(values), FilterEffect(grid, response, np.zeros(len(grid)), (half, half), told))
+    text = f"{what}, {limit}, side lobes above, some upside down; fit one-sided over {half:.3g} s at both ends"
+    return Filtered(series.with_values(values), FilterEffect(grid, response, np.zeros(len(grid)), (half, half), text))
 
 
 def smoothing_spline(series: Series, cutoff_hz: float) -> Filtered:
@@ -142,8 +142,8 @@ def smoothing_spline(series: Series, cutoff_hz: float) -> Filtered:
     grid = effect_frequencies(series)
     response = _centred_response(taps, grid, series)
     end = 1.0 / (2.0 * math.pi * cutoff_hz) * math.sqrt(2.0) * math.log(1.0 / _SETTLED)
-    told = f"no phase shift, {decibel(0.5)} at {cutoff_hz:.3g} Hz, ends freer over {end:.3g} s"
-    return Filtered(series.with_values(values), FilterEffect(grid, response, np.zeros(len(grid)), (end, end), told))
+    text = f"no phase shift, {decibel(0.5)} at {cutoff_hz:.3g} Hz, ends freer over {end:.3g} s"
+    return Filtered(series.with_values(values), FilterEffect(grid, response, np.zeros(len(grid)), (end, end), text))
 
 
 def decimate(series: Series, factor: int) -> Filtered:
@@ -171,12 +171,12 @@ def decimate(series: Series, factor: int) -> Filtered:
     settling = _settling(sections, series)
     kept = edge * series.rate_hz / 2.0
     nyquist = series.rate_hz / factor / 2.0
-    told = (
+    text = (
         f"no phase shift, one sample in {factor}: amplitudes kept to {kept:.3g} Hz, nothing above {nyquist:.3g} Hz; "
         f"ends distorted over {settling:.3g} s"
     )
     thinner = replace(series, step_s=factor * series.step_s, values=values)
-    return Filtered(thinner, FilterEffect(grid, response, np.zeros(len(grid)), (settling, settling), told))
+    return Filtered(thinner, FilterEffect(grid, response, np.zeros(len(grid)), (settling, settling), text))
 
 
 def _within(series: Series, filter_name: str, frequency_hz: float) -> float:

@@ -13,15 +13,15 @@ from tank2sim.records.signals.columns import DIRECTION_COLUMNS, HELD_COLUMNS, Si
 from tank2sim.records.trials import Trial
 
 FEWEST_SAMPLES = 50
-"""Samples below which nothing is analysed; a choice of ours: eight spectral segments of eleven samples."""
+"""Samples below which nothing is analysed; project choice: eight spectral segments of eleven samples."""
 
 GAP_STEPS = 5
-"""Longest gap that is bridged unasked, in sampling steps; a choice of ours. A straight line over five steps loses what
+"""Longest gap that is bridged unasked, in sampling steps; project choice. A straight line over five steps loses what
 has a period below about ten steps, which is already near the end of the spectrum."""
 
 _JITTER = 0.05
 """Part of a step by which times may miss an even grid and be taken as even: at half the Nyquist frequency it is an
-error of phase of 4.5 deg, and of times written with two digits at 10 Hz it is the rounding. A choice of ours."""
+error of phase of 4.5 deg, and of times written with two digits at 10 Hz it is the rounding. Project choice."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from tank2sim.records.signals.sampling import Series, at_common_times
 CONFIDENCE = 0.95
 
 _SEGMENTS = 8
-"""Segments by default, each overlapping half of the next; a choice of ours between scatter and resolution."""
+"""Segments by default, each overlapping half of the next; project choice between scatter and resolution."""
 
 _CORRELATION_TIMES = 20.0
 """Correlation times that a segment lasts by default if half the record allows it, whatever that does to their number:
@@ -105,7 +105,7 @@ class Spectrum:
 class Transfer:
     """Linear response of one signal to another, estimated as cross spectrum over spectrum of the input.
 
-    What the output has beside the response (noise, wind) does not bias it unless it comes back in the input: in a
+    What the output has next to the response (noise, wind) does not bias it unless it comes back in the input: in a
     zigzag the rudder follows the heading, and the estimate holds where the coherence is high only.
 
     Parameters
@@ -253,7 +253,7 @@ def _without_scaling(options: dict[str, object]) -> dict[str, object]:
 
 
 def _inner(averaging: Averaging) -> slice:
-    """Frequencies but for zero and, of an even number of samples, Nyquist."""
+    """Frequencies except for zero and, of an even number of samples, Nyquist."""
     return slice(1, averaging.samples // 2 if averaging.samples % 2 == 0 else averaging.samples // 2 + 1)
 
 

@@ -123,7 +123,7 @@ class Normality:
 
 @dataclass(frozen=True, eq=False)
 class Density:
-    """Probability density beside that of a normal distribution of the same mean and standard deviation.
+    """Probability density next to that of a normal distribution of the same mean and standard deviation.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def stationarity(series: Series, correlation: Autocorrelation) -> Stationarity:
     """Augmented Dickey-Fuller and KPSS tests (statsmodels), and the two halves side by side.
 
     The tests look back over a number of lags that grows with the number of samples only. So the signal is averaged
-    over blocks of half a correlation time, but not to fewer than 200 nor more than 1000 values; a choice of ours.
+    over blocks of half a correlation time, but not to fewer than 200 nor more than 1000 values; project choice.
     """
     values = series.values
     fewest, most = _BLOCKS
@@ -183,8 +183,8 @@ def normality(series: Series, correlation: Autocorrelation) -> Normality:
     thinned = values[::apart]
     skewness, kurtosis = float(stats.skew(values)), float(stats.kurtosis(values))
     if len(thinned) < FEWEST_INDEPENDENT or np.ptp(thinned) == 0.0:
-        told = f"too few samples ({len(thinned)})"
-        return Normality(told, None, {}, len(thinned), skewness, kurtosis)
+        text = f"too few samples ({len(thinned)})"
+        return Normality(text, None, {}, len(thinned), skewness, kurtosis)
     p_values = {
         "dagostino_pearson": float(stats.normaltest(thinned).pvalue),
         "jarque_bera": float(stats.jarque_bera(thinned).pvalue),
@@ -192,8 +192,8 @@ def normality(series: Series, correlation: Autocorrelation) -> Normality:
         "anderson_darling": float(normal_ad(thinned)[1]),
     }
     normal = min(p_values.values()) * len(p_values) >= SIGNIFICANCE
-    told = f"may be ({len(thinned)})" if normal else f"no, {_shape(skewness, kurtosis)} ({len(thinned)})"
-    return Normality(told, normal, p_values, len(thinned), skewness, kurtosis)
+    text = f"may be ({len(thinned)})" if normal else f"no, {_shape(skewness, kurtosis)} ({len(thinned)})"
+    return Normality(text, normal, p_values, len(thinned), skewness, kurtosis)
 
 
 def probability_density(series: Series) -> Density:

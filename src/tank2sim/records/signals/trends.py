@@ -10,7 +10,7 @@ from tank2sim.records.signals.effect import Filtered, FilterEffect, effect_frequ
 from tank2sim.records.signals.sampling import Series
 
 HIGHEST_DEGREE = 10
-"""A choice of ours: higher polynomials are high-pass filters with bad ends; a Butterworth filter is better."""
+"""Project choice: higher polynomials are high-pass filters with bad ends; a Butterworth filter is better."""
 
 
 def detrend(series: Series, degree: int) -> Filtered:

@@ -25,7 +25,8 @@ from tank2sim.report.kit.chart_parts import (
 from tank2sim.report.kit.theme import CROSS
 
 _HALF = 2.5
-"""Half of the height of a Nyquist chart: what lies farther from the critical point endangers nothing (ours)."""
+"""Half of the height of a Nyquist chart: what lies farther from the critical point endangers nothing (project
+choice)."""
 
 _NYQUIST_TOOLTIP = [
     alt.Tooltip("run:N", title="loop"),
@@ -88,14 +89,14 @@ def sensitivity_chart(
     responses: Sequence[FrequencyResponse], *, title: str = "", width_px: int = 720, height_px: int = 300
 ) -> alt.LayerChart:
     """Magnitudes (dB) against angular frequency, logarithmic: S and T of a loop, at one speed or several."""
-    look = series_look([one.label for one in responses])
+    look = series_look([response.label for response in responses])
     rows = []
-    for one in responses:
-        omega = vector(one.omega_radps)
-        decibel = 20 * np.log10(np.abs(np.asarray(one.response, dtype=complex)))
+    for response in responses:
+        omega = vector(response.omega_radps)
+        decibel = 20 * np.log10(np.abs(np.asarray(response.response, dtype=complex)))
         shown = decibel > -60
         kept = thin_line([decibel[shown]], LINE_SAMPLES)
-        rows += records(one.label, {"w": omega[shown][kept], "v": decibel[shown][kept]})
+        rows += records(response.label, {"w": omega[shown][kept], "v": decibel[shown][kept]})
     x = alt.X(
         "w:Q", title="angular frequency (rad/s)", scale=alt.Scale(type="log", nice=False), axis=alt.Axis(format="~g")
     )
@@ -117,7 +118,7 @@ def sensitivity_chart(
         title=title,
         width=width_px,
         height=height_px,
-        description=f"Magnitude over frequency of {', '.join(one.label for one in responses)}.",
+        description=f"Magnitude over frequency of {', '.join(response.label for response in responses)}.",
     )
 
 

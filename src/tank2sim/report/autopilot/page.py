@@ -59,7 +59,7 @@ def _figures(found: Json) -> list[KeyFigure]:
     first, speeds = found["margins"]["at_design"], found["margins"]["at_speeds"]
     change, keeping = found["closed_loop"]["course_changes"]["change"], found["closed_loop"]["course_keeping"]
     peak = Verdict.PASSED if first["sensitivity_peak"] <= HIGHEST_PEAK else Verdict.CAUTION
-    stable = sum(one["stable"] for one in speeds)
+    stable = sum(speed["stable"] for speed in speeds)
     return [
         KeyFigure(label="Phase margin", value=first["phase_margin_deg"], unit="deg"),
         KeyFigure(label="Ms", value=first["sensitivity_peak"], verdict=peak, note=f"no more than {HIGHEST_PEAK:g}"),
@@ -85,7 +85,7 @@ def _controller(found: Json) -> PageSection:
     alone, limits = found["ship_alone"], found["limits"]
     text = (
         f"The ship at {alone['speed_mps']:.4g} m/s: K = {alone['K_per_s']:.4g} 1/s, T = {alone['T_s']:.4g} s, "
-        f"{'stable' if alone['stable'] else 'unstable'} on a straight course by herself."
+        f"{'stable' if alone['stable'] else 'unstable'} on a straight course by itself."
     )
     text += f"\n\nThe rudder is ordered no further than {limits['largest_rudder_deg']:.3g} deg either way."
     if "anti_windup_time_s" in limits:
@@ -123,19 +123,19 @@ def _loop(found: Json) -> PageSection:
     limits |= {"largest rudder": "largest_step_within_angle_limit_deg"}
     steps = [f"{loop[key]:.3g} deg ({name})" for name, key in limits.items() if loop[key] is not None]
     linear = f" Changes of course stay linear up to {' and '.join(steps)}." if steps else ""
-    text = f"The ship with her steering gear, linearised at each speed, and the gains of the design.{linear}"
+    text = f"The ship with its steering gear, linearised at each speed, and the gains of the design.{linear}"
     return PageSection(heading="Loop", text=text, tables=[_margins(margins)], charts=charts)
 
 
 def loop_charts(responses: Sequence[Mapping[str, Json]], first: Mapping[str, Json]) -> list[Illustration]:
     """Bode diagram, Nyquist curve and sensitivities; `first` are the margins at the speed of the design."""
     loops, sensitivities, closed = [], [], []
-    for one in responses:
-        omega, label = np.array(one["omega_radps"], dtype=float), f"{one['speed_mps']:.3g} m/s"
-        loop, heading = (_complex(one, name) for name in ("loop", "heading"))
+    for response in responses:
+        omega, label = np.array(response["omega_radps"], dtype=float), f"{response['speed_mps']:.3g} m/s"
+        loop, heading = (_complex(response, name) for name in ("loop", "heading"))
         loops.append(_from_the_near_end(label, omega, loop))
         sensitivities.append(FrequencyResponse(label=f"S, {label}", omega_radps=omega, response=1 / (1 + loop)))
-        if one["speed_mps"] == first["speed_mps"]:
+        if response["speed_mps"] == first["speed_mps"]:
             label = f"heading by its order, {label}"
             closed.append(FrequencyResponse(label=label, omega_radps=omega, response=heading))
     return [
@@ -186,17 +186,17 @@ def _margins(margins: Sequence[Mapping[str, Json]]) -> PageTable:
     keys = ("gain_margin_down", "phase_margin_deg", "delay_margin_s", "sensitivity_peak", "bandwidth_radps", "stable")
     rows: list[list[Cell]] = [
         [
-            one["speed_mps"],
-            "any" if one["gain_margin_up"] is None else one["gain_margin_up"],
-            *(one[key] for key in keys),
+            margin["speed_mps"],
+            "any" if margin["gain_margin_up"] is None else margin["gain_margin_up"],
+            *(margin[key] for key in keys),
         ]
-        for one in margins
+        for margin in margins
     ]
     return PageTable(caption="Margins, the first at the speed of the design", columns=columns, rows=rows)
 
 
 def _history(label: str, columns: Mapping[str, Json]) -> History:
-    values = {one.name: np.radians(np.array(columns[one.name], dtype=float)) for one in _SIGNALS}
+    values = {signal.name: np.radians(np.array(columns[signal.name], dtype=float)) for signal in _SIGNALS}
     return History(label=label, time_s=columns["t_s"], values=values)
 
 
@@ -211,7 +211,7 @@ def _calm(found: Json) -> PageSection:
         Column(title="largest rudder", unit="deg", digits=3),
         Column(title="at full rate", unit="s", digits=3),
     ]
-    rows: list[list[Cell]] = [[name, *one.values()] for name, one in changes.items()]
+    rows: list[list[Cell]] = [[name, *change.values()] for name, change in changes.items()]
     large = [_history(name, one) for name, one in found["histories"].items() if name.startswith("large")]
     ordinary = f"{changes['change']['ordered_deg']:.3g} deg"
     charts = [

@@ -77,10 +77,10 @@ def draughts(bridge: Bridge, other: Bridge | None) -> Box:
     rows = (
         Row("Forward", (None, None)),
         Row("Aft", (None, None)),
-        Row("Mean", tuple(_number(one.draught_m, "m") if one else None for one in ships)),
-        Row("Displacement", tuple(_tonnes(one.displacement_kg) if one else None for one in ships)),
-        Row("Block coefficient", tuple(_number(one.block_coefficient, "") if one else None for one in ships)),
-        Row("Trial / estimated", tuple("estimated" if one else None for one in ships)),
+        Row("Mean", tuple(_number(ship.draught_m, "m") if ship else None for ship in ships)),
+        Row("Displacement", tuple(_tonnes(ship.displacement_kg) if ship else None for ship in ships)),
+        Row("Block coefficient", tuple(_number(ship.block_coefficient, "") if ship else None for ship in ships)),
+        Row("Trial / estimated", tuple("estimated" if ship else None for ship in ships)),
     )
     return Box("Draught of the manoeuvring data", rows, conditions(bridge, other))
 
@@ -93,12 +93,12 @@ def _tonnes(kilograms: float | None) -> str | None:
 
 
 def present_condition() -> Box:
-    """The ship as she is today: the pilot card is of that, and no card knows it."""
+    """The ship as it is today: the pilot card is of that, and no card knows it."""
     return Box("Present draught", tuple(Row(label, (None,)) for label in ("Forward", "Aft", "Displacement")))
 
 
 def anchors(*more: str) -> Box:
-    """Anchor chain; `more` are heads beside the number of shackles."""
+    """Anchor chain; `more` are heads next to the number of shackles."""
     blanks = (None,) * (1 + len(more))
     rows = tuple(Row(where, blanks) for where in ("Port", "Starboard", "Stern"))
     last = Row("1 shackle, m", (None,))
@@ -182,13 +182,15 @@ def turning(bridge: Bridge, circles: Sequence[ShipTrack]) -> Box:
     )
     length = bridge.card.ship.length_m
     rows = [
-        Row(label, tuple(_told(one.reading, name, lambda value: _distance(value, length)) for one in circles))
+        Row(label, tuple(_told(circle.reading, name, lambda value: _distance(value, length)) for circle in circles))
         for label, name in names
     ]
-    rows += [Row(f"Time to {heading}°", tuple(_time_to(one, heading) for one in circles)) for heading in (90, 180, 360)]
-    speeds = (_told(one.reading, "steady_speed_mps", lambda value: f"{knots(value)} kn") for one in circles)
+    rows += [
+        Row(f"Time to {heading}°", tuple(_time_to(circle, heading) for circle in circles)) for heading in (90, 180, 360)
+    ]
+    speeds = (_told(circle.reading, "steady_speed_mps", lambda value: f"{knots(value)} kn") for circle in circles)
     rows.append(Row("Final speed", tuple(speeds)))
-    return Box("", tuple(rows), tuple(one.name for one in circles))
+    return Box("", tuple(rows), tuple(circle.name for circle in circles))
 
 
 def _told(one: CardRangeReading, name: str, words: Callable[[float], str]) -> _Value:
@@ -241,11 +243,11 @@ def zigzags(bridge: Bridge) -> Box:
         Row(
             name,
             (
-                *(_told(one, f"overshoot_{place}_deg", lambda value: f"{value:.3g}°") for place in (1, 2)),
-                _told(one, "initial_turning_distance_m", lambda value: _distance(value, length)),
+                *(_told(zigzag, f"overshoot_{place}_deg", lambda value: f"{value:.3g}°") for place in (1, 2)),
+                _told(zigzag, "initial_turning_distance_m", lambda value: _distance(value, length)),
             ),
         )
-        for name, one in bridge.zigzags.items()
+        for name, zigzag in bridge.zigzags.items()
     ]
     return Box("Zigzags and initial turning", tuple(rows), ("1st overshoot", "2nd", "to first heading"))
 
@@ -280,7 +282,7 @@ def overboard() -> Box:
         "Keep the look-out",
         "Recovery turn, rudder reversed at",
     )
-    rows = tuple(Row(f"{place}. {one}", (None,)) for place, one in enumerate(actions, start=1))
+    rows = tuple(Row(f"{place}. {action}", (None,)) for place, action in enumerate(actions, start=1))
     return Box("Man overboard rescue manoeuvre", rows)
 
 

@@ -154,7 +154,7 @@ def circles_drawing(
 ) -> Drawing:
     """Both turning circles over a grid, with heading, time and speed at each quarter, and the ship at the order.
 
-    A track ends where it leaves the card's range, and says so. Her outline is to scale, and left out where the card has
+    A track ends where it leaves the card's range, and says so. Its outline is to scale, and left out where the card has
     no beam.
     """
     across = [float(one) for path in circles for one in path.starboard_m[: path.inside]]
@@ -212,7 +212,7 @@ def _blocks(words: Sequence[Word], dots: Sequence[tuple[float, float]]) -> list[
 def _outline(frame: _Frame, length: float, beam: float) -> str:
     half, bow = beam / 2, length / 2
     corners = ((0.0, bow), (half, 0.3 * length), (half, -bow), (-half, -bow), (-half, 0.3 * length), (0.0, bow))
-    return frame.points([one[0] for one in corners], [one[1] for one in corners])
+    return frame.points([corner[0] for corner in corners], [corner[1] for corner in corners])
 
 
 def _grid(frame: _Frame) -> tuple[tuple[Line, ...], tuple[Word, ...]]:
@@ -259,7 +259,7 @@ def stops_drawing(stops: Sequence[ShipTrack], *, width: float, height: float) ->
         pairs = zip(starboard[kept], ahead[kept], strict=True)
         lines.append(Line(" ".join(f"{zero + scale * a:.2f},{base - scale * b:.2f}" for a, b in pairs), "track stop"))
         last = -math.inf
-        # The marks crowd together where the ship is slow: the last one counts, so they are told from the end.
+        # The marks crowd together where the ship is slow: the last one counts, so they are reported from the end.
         ends = [(path.left, "warn")] if path.left else []
         within = [(mark, "word") for mark in reversed(path.marks) if not path.outside(mark)]
         for mark, style in (*ends, *within):

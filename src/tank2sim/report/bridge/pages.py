@@ -24,12 +24,12 @@ CARD_MM = (88.0, 50.0)
 WARNING = "Performance may differ from this record due to environmental, hull and loading conditions"
 
 _NAME, _SOURCE, _NOTICE, _NOTICES = 60, 260, 140, 4
-"""Characters of the ship's name, of her source and of a notice, and notices, that one sheet has room for."""
+"""Characters of the ship's name, of its source and of a notice, and notices, that one sheet has room for."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """Something to be ticked on the pilot card; with `field` something is to be written beside it."""
+    """Something to be ticked on the pilot card; with `field` something is to be written next to it."""
 
     label: str
     field: bool = False
@@ -162,7 +162,7 @@ def _circles_title(bridge: Bridge) -> str:
 
 def _notices(*bridges: Bridge | None) -> list[str]:
     """As many as one sheet has room for: the command tells them all."""
-    told = list(dict.fromkeys(_cut(text, _NOTICE) for one in bridges if one for text in one.notices))
+    told = list(dict.fromkeys(_cut(text, _NOTICE) for bridge in bridges if bridge for text in bridge.notices))
     rest = len(told) - _NOTICES
     return told if rest <= 0 else [*told[:_NOTICES], f"and {rest} more, which the command tells"]
 

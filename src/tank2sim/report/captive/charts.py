@@ -248,18 +248,22 @@ def residual_chart(
     width_px, height_px : int
         Size of one panel.
     """
-    runs = list(dict.fromkeys(one.run for one in residuals))
-    kinds = list(dict.fromkeys(one.kind for one in residuals))
-    forces = list(dict.fromkeys(one.force for one in residuals))
+    runs = list(dict.fromkeys(residual.run for residual in residuals))
+    kinds = list(dict.fromkeys(residual.kind for residual in residuals))
+    forces = list(dict.fromkeys(residual.force for residual in residuals))
     look = series_look(kinds, as_points=kinds)
-    low, high = extent(vector([one.value for one in residuals]))
+    low, high = extent(vector([residual.value for residual in residuals]))
     reach = 1.1 * max(_USUAL_LIMIT, -low, high)
     panels = []
     for force in forces:
         x = _runs_axis("name:N", runs, named=force == forces[-1])
         scale = alt.Scale(domain=[-reach, reach], nice=False)
         y = alt.Y("v:Q", axis=axis_above(f"{force}: residual / standard error", tickCount=5), scale=scale)
-        rows = [{"run": one.kind, "name": one.run, "v": plain(one.value)} for one in residuals if one.force == force]
+        rows = [
+            {"run": residual.kind, "name": residual.run, "v": plain(residual.value)}
+            for residual in residuals
+            if residual.force == force
+        ]
         tooltip = [alt.Tooltip("name:N", title="run"), alt.Tooltip("v:Q", title="residual", format=NUMBER)]
         limits = [{"v": -_USUAL_LIMIT}, {"v": 0.0}, {"v": _USUAL_LIMIT}]
         rules = alt.Chart(data(limits)).mark_rule(style="reference", strokeDash=[2, 3]).encode(y="v:Q")

@@ -33,7 +33,7 @@ def reduction_page(
     sections = [
         PageSection(
             heading="Derivatives",
-            text="One weighted regression over the whole campaign, and beside it the paper's order of tests.",
+            text="One weighted regression over the whole campaign, and next to it the paper's order of tests.",
             tables=[_derivatives(reduction, card)],
             notes=warnings,
         ),

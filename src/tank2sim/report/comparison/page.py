@@ -19,7 +19,7 @@ from tank2sim.units import in_words
 _COEFFICIENTS = (
     "Prime system, in the convention of the first card, the sign of its rudder included. A coefficient belongs to the "
     "speed about which forces are expanded, to the speed that makes them non-dimensional and to what of the inertia is "
-    "in it; where cards differ in these, the forces are expanded anew to the third order, and the standard errors go "
+    "in it; where cards differ in these, the forces are expanded again to the third order, and the standard errors go "
     "with them. A difference is divided by the root of both variances: beyond 2 it is unlikely to be chance. A number "
     "that is the reference's own to the last digit was taken over, and is not compared."
 )
@@ -65,8 +65,8 @@ def _figure(one: Mapping[str, Json]) -> KeyFigure:
 
 def _cards(cards: Sequence[Mapping[str, Json]]) -> PageSection:
     rows: list[list[Cell]] = [
-        [one["label"] + (" (reference)" if place == 0 else ""), one["ship"], one["source"]]
-        for place, one in enumerate(cards)
+        [card["label"] + (" (reference)" if place == 0 else ""), card["ship"], card["source"]]
+        for place, card in enumerate(cards)
     ]
     columns = [Column(title="card"), Column(title="ship"), Column(title="source")]
     return PageSection(heading="Cards", tables=[PageTable(caption="What is compared.", columns=columns, rows=rows)])

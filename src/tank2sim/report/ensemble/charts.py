@@ -39,7 +39,7 @@ def curve_charts(curves: Json) -> list[Illustration]:
         none = "" if with_loop == curves["members"] else " (none counted as 0)"
         turns += (
             f" {with_loop} of them have a hysteresis loop, {loop['p5']:.3g} to {loop['p95']:.3g} deg of rudder wide"
-            f"{none}; in it the turn is the one she comes from."
+            f"{none}; in it the turn is the one it comes from."
         )
     return [
         Illustration(chart=turns_chart(turning, title="Stable turns over the ensemble"), caption=turns),
@@ -93,7 +93,7 @@ def step_band_chart(step: Json, *, title: str = "") -> alt.LayerChart:
 def _band_rows(
     label: str, x: Array, band: Mapping[str, Json], shown: NDArray[np.bool_] | None = None
 ) -> list[ChartRecord]:
-    """Rows of the ship herself and of the 5 and 95 % quantiles; `part` numbers stretches without a gap, `band` those of
+    """Rows of the ship itself and of the 5 and 95 % quantiles; `part` numbers stretches without a gap, `band` those of
     the band."""
     columns = {"x": x, "v": vector(band["own"]), "low": vector(band["p5"]), "high": vector(band["p95"])}
     rows = records(label, columns)

@@ -1,4 +1,4 @@
-"""Bands of an ensemble: beside the run of the card itself in a picture, and as a section of a page."""
+"""Bands of an ensemble: next to the run of the card itself in a picture, and as a section of a page."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import in_words
 
 _TEXT = (
-    "Members of the ensemble are this ship with numbers drawn from the standard errors of her card, and from their "
+    "Members of the ensemble are this ship with numbers drawn from the standard errors of its card, and from their "
     "covariance where the card has one. Nine of ten lie between the 5 and the 95 % quantile. Each member has a random "
     "stream of its own, so that the same seed gives the same members everywhere."
 )
 _CHANCES = (
     " A criterion is met with the probability told: the share of all usable members that meet it, with the 95 % "
     "interval that their number leaves (Wilson). A member whose trial does not show the figure counts as one that "
-    "does not meet it. Where the trial of the card itself leaves the card's range no probability is told."
+    "does not meet it. Where the trial of the card itself leaves the card's range no probability is reported."
 )
 
 
@@ -60,16 +60,18 @@ def banded_chart(label: str, run: Trajectory, bands: ManoeuvreBands) -> alt.VCon
 def stability_section(found: StabilityBands) -> PageSection:
     """The section of a page of stability."""
     rows: list[list[Cell]] = []
-    for one in found.chances:
-        ends: list[Cell] = [one.band.low, one.band.median, one.band.high] if one.band else [None, None, None]
-        between = f"{one.between[0]:.3f} to {one.between[1]:.3f}" if one.between else None
-        criterion = one.criterion
-        met: Cell = BEYOND_CARD_TEXT if criterion.beyond_card and one.met is not None else one.met
+    for chance in found.chances:
+        ends: list[Cell] = (
+            [chance.band.low, chance.band.median, chance.band.high] if chance.band else [None, None, None]
+        )
+        between = f"{chance.between[0]:.3f} to {chance.between[1]:.3f}" if chance.between else None
+        criterion = chance.criterion
+        met: Cell = BEYOND_CARD_TEXT if criterion.beyond_card and chance.met is not None else chance.met
         between = None if criterion.beyond_card else between
-        rows.append([criterion.name, *ends, criterion.allowed, criterion.unit, met, between, one.left_open])
+        rows.append([criterion.name, *ends, criterion.allowed, criterion.unit, met, between, chance.left_open])
     heads = ["criterion", LOW, MIDDLE, HIGH, "allowed", "unit", "probability met", "95 % interval", "not shown by"]
     columns = [Column(title=head) for head in heads]
-    stable = "" if found.stable is None else f" She is stable on a straight course with probability {found.stable:.3g}."
+    stable = "" if found.stable is None else f" It is stable on a straight course with probability {found.stable:.3g}."
     criteria = PageTable(caption="IMO MSC.137(76), worse side, over the ensemble.", columns=columns, rows=rows)
     straight = _table("The straight course at the card's speed.", found.figures)
     return PageSection(

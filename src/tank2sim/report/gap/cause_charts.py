@@ -19,13 +19,13 @@ from tank2sim.report.kit.numbers import format_number
 from tank2sim.units import in_words
 
 BINS = 12
-"""Bins over the state that explains the missing force (ours): a rudder's range in steps of about 6 deg."""
+"""Bins over the state that explains the missing force (project choice): a rudder's range in steps of about 6 deg."""
 
 FORCE_POINTS = 500
 """Rows of the missing force that are drawn, of all trials together; all of them make the means."""
 
 MOST_RIVALS = 12
-"""Explanations, and manoeuvres for the next test, that are shown: the best (ours)."""
+"""Explanations, and manoeuvres for the next test, that are shown: the best (project choice)."""
 
 NORMAL = 1.959964
 """Half a 95 % interval in standard errors."""
@@ -48,7 +48,7 @@ Lacking = MissingForce | MissingSignal
 """What the model lacks, instant by instant."""
 
 _STRIPS = 90
-"""Instants of a trial that are drawn beside each other, each the mean of what it covers."""
+"""Instants of a trial that are drawn next to each other, each the mean of what it covers."""
 _TURN = 2 * math.pi
 
 
@@ -132,7 +132,7 @@ def when_chart(lacking: Lacking, *, title: str = "") -> alt.LayerChart:
 
 
 DIVERGING = ("#D55E00", "#f7f7f7", "#0072B2")
-"""Colours of a size to either side: two of the palette that any eye tells apart."""
+"""Colours of a size to either side: two of the palette that any eye distinguishes."""
 
 
 def binned(state: Array, force: Array, trials: np.ndarray) -> list[ChartRecord]:
@@ -261,7 +261,7 @@ def _agreement_panel(
     words, unit = in_words(in_file_units(parameter, 0.0)[0])
     whole = next((one for one in gap.effects if one.name == effect and parameter in one.parameters), None)
     middle = estimate_in_file(parameter, whole.parameters[parameter])[1] if whole else None
-    held = {one.name: one.held_out for one in gap.passed}
+    held = {replay.name: replay.held_out for replay in gap.passed}
     rows: list[ChartRecord] = []
     for trial, (value, error) in trials.items():
         own, half = estimate_in_file(parameter, value)[1], NORMAL * in_file_units(parameter, error)[1]
@@ -272,9 +272,9 @@ def _agreement_panel(
             | {"v": plain(own), "low": plain(own - half), "high": plain(own + half)}
         )
     band = NORMAL * in_file_units(parameter, whole.standard_errors.get(parameter, 0.0))[1] if whole else 0.0
-    told = [row for row in rows if row["low"] is not None and row["high"] is not None]
-    least = min((row["high"] - row["low"] for row in told), default=0.0)
-    telling = [row for row in told if row["high"] - row["low"] <= TELLS_LITTLE * least] or told
+    messages = [row for row in rows if row["low"] is not None and row["high"] is not None]
+    least = min((row["high"] - row["low"] for row in messages), default=0.0)
+    telling = [row for row in messages if row["high"] - row["low"] <= TELLS_LITTLE * least] or messages
     ends = [row[key] for row in telling for key in ("low", "high")]
     ends += [] if middle is None else [middle - band, middle + band]
     low, high = extent(np.array(ends, dtype=float))
@@ -282,7 +282,7 @@ def _agreement_panel(
     scale = alt.Scale(domain=[low - margin, high + margin], nice=False, zero=False)
     x = alt.X("v:Q", title=with_unit(words, unit), scale=scale, axis=alt.Axis(tickCount=5))
     side = {} if named else {"labels": False, "ticks": False}
-    names = [one.name for one in gap.passed if one.name in trials]
+    names = [replay.name for replay in gap.passed if replay.name in trials]
     y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, grid=True, labelLimit=220, **side))
     look = series_look(list(SETS), as_points=list(SETS))
     tooltip = [

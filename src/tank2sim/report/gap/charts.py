@@ -39,10 +39,10 @@ from tank2sim.report.kit.chart_parts import (
 )
 
 MOST_TRIALS_DRAWN = 12
-"""Tracks in one picture: those of the largest misfit before; more are hard to look at (ours)."""
+"""Tracks in one picture: those of the largest misfit before; more are hard to look at (project choice)."""
 
 MOST_PLACES = 6
-"""Worst places that are shown over time: two rows of pictures (ours)."""
+"""Worst places that are shown over time: two rows of pictures (project choice)."""
 
 _PER_SHEET = 6
 """Trials in one picture of histories: as many as are readable on a sheet of paper."""
@@ -71,9 +71,9 @@ SETS = {"held out": True, "fitting": False}
 def changes_simulation(gap: Gap) -> bool:
     """Whether anything was added to the card, or found in the records, that changes a simulation."""
     return any(
-        not np.array_equal(one.before[name], one.after[name], equal_nan=True)
-        for one in gap.passed
-        for name in one.noise
+        not np.array_equal(replay.before[name], replay.after[name], equal_nan=True)
+        for replay in gap.passed
+        for name in replay.noise
     )
 
 
@@ -87,7 +87,7 @@ def gap_tracks(gap: Gap, *, held_out: bool, title: str = "") -> alt.ConcatChart 
 
     Of many trials those are shown whose misfit before was largest.
     """
-    chosen = [one for one in gap.passed if one.held_out == held_out]
+    chosen = [replay for replay in gap.passed if replay.held_out == held_out]
     worst = {one.name for one in sorted(chosen, key=lambda one: -one.misfit("before"))[:MOST_TRIALS_DRAWN]}
     return track_grid([_pair(one) for one in chosen if one.name in worst], title=title)
 
@@ -97,7 +97,9 @@ def gap_histories(gap: Gap, *, held_out: bool, title: str = "") -> list[alt.Conc
 
     Of many trials those are shown whose misfit before was largest.
     """
-    chosen = [one for one in gap.passed if one.held_out == held_out and set(HISTORIES) & set(measured_in(one))]
+    chosen = [
+        replay for replay in gap.passed if replay.held_out == held_out and set(HISTORIES) & set(measured_in(replay))
+    ]
     worst = {one.name for one in sorted(chosen, key=lambda one: -one.misfit("before"))[:MOST_TRIALS_DRAWN]}
     pairs = [_pair(one) for one in chosen if one.name in worst]
     sheets = [pairs[first : first + _PER_SHEET] for first in range(0, len(pairs), _PER_SHEET)]
@@ -115,13 +117,13 @@ def _pair(one: Passed) -> BeforeAfter:
 
 def shown_places(gap: Gap) -> list[MisfitPlace]:
     """The worst places, one of each signal of a trial; where none were found, the signals of the largest misfit."""
-    known = {one.name: one for one in gap.passed}
+    known = {replay.name: replay for replay in gap.passed}
     found = [place for place in gap.where if place.trial in known and place.signal in measured_in(known[place.trial])]
     if not found:
         whole = [
-            MisfitPlace(one.name, name, float(one.time_s[0]), float(one.time_s[-1]), math.nan)
-            for one in gap.passed
-            for name in measured_in(one)
+            MisfitPlace(replay.name, name, float(replay.time_s[0]), float(replay.time_s[-1]), math.nan)
+            for replay in gap.passed
+            for name in measured_in(replay)
         ]
         found = sorted(whole, key=lambda place: -known[place.trial].misfit("before", place.signal))
     first = {(place.trial, place.signal): place for place in reversed(found)}
@@ -133,7 +135,7 @@ def place_chart(gap: Gap, *, title: str = "") -> alt.ConcatChart | None:
 
     The shaded time is that of the place. None without any measurement.
     """
-    known = {one.name: one for one in gap.passed}
+    known = {replay.name: replay for replay in gap.passed}
     panels = [_place_panels(known[place.trial], place) for place in shown_places(gap)]
     if not panels:
         return None
@@ -141,7 +143,7 @@ def place_chart(gap: Gap, *, title: str = "") -> alt.ConcatChart | None:
     shared = grid.resolve_scale(color="shared", strokeDash="shared", shape="shared")
     return shared.properties(
         title=alt.Title(title, subtitle="Above: the signal. Below: simulated less measured; grey: 95 % of the noise."),
-        description="Time histories of the worst places, and what is left beside the noise.",
+        description="Time histories of the worst places, and what is left next to the noise.",
     )
 
 
@@ -188,7 +190,7 @@ def _over_time(
 ) -> list[alt.Chart]:
     axis = alt.Axis(title="time (s)", tickCount=4) if labelled else alt.Axis(title=None, labels=False, ticks=False)
     x = alt.X("t:Q", scale=alt.Scale(domain=list(times), nice=False, zero=False), axis=axis)
-    # The scale is told: it stays when the switch takes a line away.
+    # The scale is reported: it stays when the switch takes a line away.
     ends = [row["v"] for row in rows if row["v"] is not None] + list(besides)
     scale = alt.Scale(domain=list(extent(np.array(ends, dtype=float))), nice=True, zero=False)
     y = alt.Y("v:Q", scale=scale, axis=axis_above(up, tickCount=3))
@@ -208,19 +210,19 @@ def _over_time(
 
 def misfit_chart(gap: Gap, *, title: str = "") -> alt.VConcatChart:
     """Misfit of each signal in each trial in noise units, to switch between before, after and both side by side."""
-    there = {name for one in gap.passed for name in measured_in(one)}
+    there = {name for replay in gap.passed for name in measured_in(replay)}
     signals = [name for name in OBSERVED_SIGNALS.values() if name in there] + sorted(
         there - set(OBSERVED_SIGNALS.values())
     )
     words = {name: signal_display_name(name).file.rpartition("_")[0].replace("_", " ") for name in signals}
     rows = [
-        {"group": f"{word} trials", "trial": one.name, "signal": words[name], "model": which}
-        | {"misfit": one.misfit(which, name)}
+        {"group": f"{word} trials", "trial": replay.name, "signal": words[name], "model": which}
+        | {"misfit": replay.misfit(which, name)}
         for word, held in SETS.items()
-        for one in gap.passed
-        if one.held_out == held
+        for replay in gap.passed
+        if replay.held_out == held
         for name in signals
-        if name in measured_in(one)
+        if name in measured_in(replay)
         for which in shown_models(gap)
     ]
     return misfit_maps(rows, shown_models(gap), title=title)
@@ -233,8 +235,8 @@ def small(text: str) -> alt.Title:
 
 def signal_misfit(gap: Gap, which: str, variable: str, *, held_out: bool) -> float | None:
     """Misfit of one signal over all trials of a set that measured it, in noise units; None without any."""
-    trials = [one for one in gap.passed if one.held_out == held_out and variable in measured_in(one)]
-    if not trials or (which == "black_box" and not all(variable in one.black_box for one in trials)):
+    trials = [replay for replay in gap.passed if replay.held_out == held_out and variable in measured_in(replay)]
+    if not trials or (which == "black_box" and not all(variable in trial.black_box for trial in trials)):
         return None
-    squares: Array = np.array([one.misfit(which, variable) ** 2 for one in trials])
+    squares: Array = np.array([trial.misfit(which, variable) ** 2 for trial in trials])
     return float(np.sqrt(squares.mean()))

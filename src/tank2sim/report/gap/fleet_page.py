@@ -1,4 +1,4 @@
-"""The page of a fleet: all ships in one table, each with the way to her own page."""
+"""The page of a fleet: all ships in one table, each with the way to its own page."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _BEFORE, _AFTER = "card as given", "card found"
 
 
 def fleet_page(told: FleetTold) -> Page:
-    """The page; it stands in the folder in which each ship has one of her own."""
-    found = [one for one in told.ships if not one.fault]
+    """The page; it stands in the folder in which each ship has one of its own."""
+    found = [ship for ship in told.ships if not ship.fault]
     sections = []
     if found:
         chart = _misfit_chart(found)
@@ -36,7 +36,7 @@ def fleet_page(told: FleetTold) -> Page:
             )
         )
     if told.faults:
-        rows: list[list[Cell]] = [[one.folder, one.fault] for one in told.faults]
+        rows: list[list[Cell]] = [[fault.folder, fault.fault] for fault in told.faults]
         columns = [Column(title="ship"), Column(title="why")]
         table = PageTable(caption="Ships that could not be judged", columns=columns, rows=rows)
         sections.append(PageSection(heading="Without a result", tables=[table]))
@@ -82,9 +82,9 @@ def _ships(found: list[ShipTold]) -> PageTable:
 
 def _effects(ship: ShipTold) -> str:
     """Effects with their parameters, ± one standard error; or all that it may be."""
-    named = "; ".join(_effect(one) for one in ship.effects)
+    named = "; ".join(_effect(effect) for effect in ship.effects)
     if ship.verdict == AMBIGUOUS:
-        return " or ".join([named, *(effect_in_words(one) for one in ship.alternatives)])
+        return " or ".join([named, *(effect_in_words(alternative) for alternative in ship.alternatives)])
     return named if ship.verdict == MISSING else ""
 
 

@@ -47,7 +47,7 @@ from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page
 from tank2sim.units import in_words
 
 _SURE = 0.9
-"""Confidence from which a name is shown without caution (ours)."""
+"""Confidence from which a name is shown without caution (project choice)."""
 
 
 def gap_charts(gap: Gap) -> dict[str, alt.TopLevelMixin]:
@@ -113,9 +113,9 @@ def gap_page(gap: Gap, charts: Mapping[str, alt.TopLevelMixin]) -> Page:
         sections.append(PageSection(heading="What could hide", text=_COULD_HIDE, tables=[hidden]))
     sections.append(PageSection(heading="Next test", text=_next_test(gap), charts=drawn("expected")))
     # One section: a tenth would not find room for its number in the list of contents.
-    noise = [_noise(gap), *([_table("Notices", ("",), [[one] for one in gap.notices])] if gap.notices else [])]
+    noise = [_noise(gap), *([_table("Notices", ("",), [[notice] for notice in gap.notices])] if gap.notices else [])]
     sections.append(PageSection(heading="Noise and notices" if gap.notices else "Noise", text=_NOISE, tables=noise))
-    fitting = sum(not one.held_out for one in gap.passed)
+    fitting = sum(not replay.held_out for replay in gap.passed)
     subtitle = (
         f"What the model lacks, from {_count(fitting, 'trial')} and {len(gap.passed) - fitting or 'none'} held out"
     )
@@ -142,9 +142,9 @@ _AGREEMENT = (
     "A true effect has the same size in every trial. Where trials want different sizes, the name is wrong or not all."
 )
 _COULD_HIDE = (
-    "Effects up to this size could be there without showing in these data, each beside what was found. Limits and time "
+    "Effects up to this size could be there without showing in these data, each with what was found. Limits and time "
     "constants of the gear have no such size, for the ship has them anyway: of them the value furthest from the card's "
-    "is told that would not show in its place."
+    "is reported that would not show in its place."
 )
 _NOISE = (
     "By these standard deviations misfits are counted. Stated: by the files; estimated: from the records themselves."
@@ -180,13 +180,13 @@ _CAPTIONS = {
 
 
 def _key_figures(gap: Gap) -> list[KeyFigure]:
-    named = ", ".join(effect_in_words(one.name) for one in gap.effects)
+    named = ", ".join(effect_in_words(effect.name) for effect in gap.effects)
     caution = (
         Verdict.NONE if gap.verdict in (MISSING, NO_EFFECT_MISSING) and not proof_cautions(gap) else Verdict.CAUTION
     )
     figures = [KeyFigure(label="Verdict", value=gap.verdict, verdict=caution, note=named)]
     if gap.effects:
-        least = min(one.confidence for one in gap.effects)
+        least = min(effect.confidence for effect in gap.effects)
         unsure = Verdict.CAUTION if not least >= _SURE else Verdict.NONE
         note = "alone or with another effect" if len(gap.effects) == 1 else "of the less sure one, in any company"
         figures.append(
@@ -207,7 +207,9 @@ def _key_figures(gap: Gap) -> list[KeyFigure]:
 
 def _parameters(gap: Gap) -> list[PageTable]:
     rows: list[list[Cell]] = [
-        [effect_in_words(one.name), *parameter_cells(one, name)] for one in gap.effects for name in one.parameters
+        [effect_in_words(effect.name), *parameter_cells(effect, name)]
+        for effect in gap.effects
+        for name in effect.parameters
     ]
     heads = ("effect", "parameter", "value", "unit", "meaning")
     what = "What the best of the candidates would be" if gap.verdict == AMBIGUOUS else "What was found"
@@ -227,33 +229,36 @@ def _candidates(gap: Gap) -> list[PageTable]:
 
 def _explanations(gap: Gap) -> list[PageTable]:
     """What each effect does that is no more than possible."""
-    named = [one.name for one in gap.effects] if gap.verdict == AMBIGUOUS else []
-    possible = dict.fromkeys([*named, *(name for one in gap.alternatives for name in one)])
+    named = [effect.name for effect in gap.effects] if gap.verdict == AMBIGUOUS else []
+    possible = dict.fromkeys([*named, *(name for alternative in gap.alternatives for name in alternative)])
     rows: list[list[Cell]] = [
         [effect_in_words(name), EFFECTS[name].description] for name in possible if name in EFFECTS
     ]
-    return [_table("Effects that these data cannot tell apart", ("effect", "in words"), rows)] if rows else []
+    return [_table("Effects that these data cannot distinguish", ("effect", "in words"), rows)] if rows else []
 
 
 def _black_box(gap: Gap) -> bool:
-    return any(one.black_box for one in gap.passed)
+    return any(replay.black_box for replay in gap.passed)
 
 
 def _trials(gap: Gap) -> PageTable:
     rows: list[list[Cell]] = [
-        [one.name, word]
-        + [_cell(None if which == "black_box" and not one.black_box else one.misfit(which)) for which in _compared(gap)]
+        [replay.name, word]
+        + [
+            _cell(None if which == "black_box" and not replay.black_box else replay.misfit(which))
+            for which in _compared(gap)
+        ]
         for word, held in SETS.items()
-        for one in gap.passed
-        if one.held_out == held and measured_in(one)
+        for replay in gap.passed
+        if replay.held_out == held and measured_in(replay)
     ]
     heads = ("trial", "set", *(which.replace("_", " ") for which in _compared(gap)))
     return _table("Misfit of each trial, noise units", heads, rows, digits=_ALL)
 
 
 def _signals(gap: Gap) -> PageTable:
-    there = {name for one in gap.passed for name in measured_in(one)}
-    words = [word for word, held in SETS.items() if any(one.held_out == held for one in gap.passed)]
+    there = {name for replay in gap.passed for name in measured_in(replay)}
+    words = [word for word, held in SETS.items() if any(replay.held_out == held for replay in gap.passed)]
     columns = [(word, which) for word in words for which in _compared(gap)]
     rows: list[list[Cell]] = [
         [signal_display_name(name).words]
@@ -297,11 +302,11 @@ def _acting_text(gap: Gap) -> str:
         none = "the records do not contradict each other" if earth_bound(gap) else "no force stands out of its error"
         return f"At what moments the cause acts cannot be said: {none}." + without
     first = found[0]
-    told = (
+    text = (
         f"The cause acts most in {_ACTING.get(first.equation, first.equation)}, from "
         f"{first.t_start_s:.0f} s to {first.t_end_s:.0f} s of {first.trial}."
     )
-    return told + without
+    return text + without
 
 
 def _passages(gap: Gap) -> list[PageTable]:
@@ -318,7 +323,7 @@ def _passages(gap: Gap) -> list[PageTable]:
 
 
 _MOST_PASSAGES = 12
-"""Passages in a table (ours)."""
+"""Passages in a table (project choice)."""
 
 _ACTING = {
     "surge": "the force ahead",
@@ -347,7 +352,7 @@ def _places(gap: Gap) -> list[PageTable]:
 
 
 def _track_text(gap: Gap) -> str:
-    counts = {word: sum(one.held_out == held for one in gap.passed) for word, held in SETS.items()}
+    counts = {word: sum(replay.held_out == held for replay in gap.passed) for word, held in SETS.items()}
     many = [
         f"{word}: the {MOST_TRIALS_DRAWN} of {count} with the largest misfit before"
         for word, count in counts.items()
@@ -357,7 +362,7 @@ def _track_text(gap: Gap) -> str:
 
 
 def _figures(gap: Gap) -> list[PageTable]:
-    held = {one.name: one.held_out for one in gap.passed}
+    held = {replay.name: replay.held_out for replay in gap.passed}
     groups: dict[str, list[list[Cell]]] = {}
     for before, now in sorted(paired_figures(gap), key=lambda pair: not held.get(pair[1].trial)):
         words, unit = in_words(now.name)

@@ -13,8 +13,8 @@ from tank2sim.report.kit.page import Cell
 from tank2sim.units import in_words, to_si
 
 GOOD = 1.5
-"""Misfit in noise units up to which a model is said to follow the measurements (ours): its own error is then about as
-large as the noise, sqrt(1.5^2 - 1) = 1.1."""
+"""Misfit in noise units up to which a model is said to follow the measurements (project choice): its own error is
+then about as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
 
 
 def effect_in_words(name: str) -> str:
@@ -31,29 +31,29 @@ def probabilities_in_words(gap: Gap) -> list[str]:
     """What each probability is of: an effect, in whatever company, and one explanation as a whole."""
     if not gap.effects:
         return []
-    each = "; ".join(f"{effect_in_words(one.name)} {as_percent(one.confidence)}" for one in gap.effects)
-    names = tuple(one.name for one in gap.effects)
-    told = [f"probability that the effect is there, alone or with another one: {each}"]
-    whole = next((one for one in gap.rivals if set(one.effects) == set(names)), None)
+    each = "; ".join(f"{effect_in_words(effect.name)} {as_percent(effect.confidence)}" for effect in gap.effects)
+    names = tuple(effect.name for effect in gap.effects)
+    messages = [f"probability that the effect is there, alone or with another one: {each}"]
+    whole = next((rival for rival in gap.rivals if set(rival.effects) == set(names)), None)
     if whole is not None:
         alone = f"{effect_in_words(names[0])} alone" if len(names) == 1 else " with ".join(map(effect_in_words, names))
-        told.append(
+        messages.append(
             f"probability that {alone} is all that is missing, among the explanations compared: "
             f"{as_percent(whole.probability)}"
         )
-    return told
+    return messages
 
 
 def sizes_of_candidates(gap: Gap) -> list[Named]:
-    """The effects of an ambiguous verdict beside the first explanation, of the size that each would have."""
+    """The effects of an ambiguous verdict next to the first explanation, of the size that each would have."""
     sizes = gap.next_test.sizes if gap.next_test is not None else {}
-    known = {one.name for one in gap.effects}
+    known = {effect.name for effect in gap.effects}
     others = dict.fromkeys(name for names in gap.alternatives for name in names if name not in known)
     return [Named(name, *sizes[name], _sure(gap, name)) for name in others if name in sizes]
 
 
 def _sure(gap: Gap, name: str) -> float:
-    return min(sum(one.probability for one in gap.rivals if name in one.effects), 1.0)
+    return min(sum(rival.probability for rival in gap.rivals if name in rival.effects), 1.0)
 
 
 def as_percent(probability: float) -> str:
@@ -68,16 +68,16 @@ def _found(gap: Gap) -> str:
     after = gap.misfit("after", held_out=False)
     follows = "" if after is None else f" follows the fitting trials to {noises(after)}"
     if gap.verdict == MISSING and gap.effects:
-        names = " and ".join(_with_values(one) for one in gap.effects)
-        told = " ".join(EFFECTS[one.name].description for one in gap.effects if one.name in EFFECTS)
-        if all(one.name in EFFECTS and EFFECTS[one.name].acts_on == "sensor" for one in gap.effects):
-            return f"A sensor is at fault, not the model: {names}. {told}".strip()
-        return f"The model lacks {'an effect' if len(gap.effects) == 1 else 'effects'}: {names}. {told}".strip()
+        names = " and ".join(_with_values(effect) for effect in gap.effects)
+        text = " ".join(EFFECTS[effect.name].description for effect in gap.effects if effect.name in EFFECTS)
+        if all(effect.name in EFFECTS and EFFECTS[effect.name].acts_on == "sensor" for effect in gap.effects):
+            return f"A sensor is at fault, not the model: {names}. {text}".strip()
+        return f"The model lacks {'an effect' if len(gap.effects) == 1 else 'effects'}: {names}. {text}".strip()
     if gap.verdict == AMBIGUOUS:
         candidates = dict.fromkeys(
-            [*([tuple(one.name for one in gap.effects)] if gap.effects else []), *gap.alternatives]
+            [*([tuple(effect.name for effect in gap.effects)] if gap.effects else []), *gap.alternatives]
         )
-        names = ", or ".join(" with ".join(map(effect_in_words, one)) for one in candidates)
+        names = ", or ".join(" with ".join(map(effect_in_words, candidate)) for candidate in candidates)
         return f"Something is missing, but these data cannot tell which of several effects it is: {names}."
     if gap.verdict == NO_EFFECT_MISSING:
         good = after is None or after <= GOOD
@@ -99,15 +99,15 @@ def _with_values(one: Named) -> str:
 
 def beside_verdict(gap: Gap) -> list[str]:
     """Confidence, rivals and place, a paragraph each."""
-    told = [f"{one[0].upper()}{one[1:]}." for one in probabilities_in_words(gap)]
+    messages = [f"{one[0].upper()}{one[1:]}." for one in probabilities_in_words(gap)]
     if gap.alternatives and gap.verdict != AMBIGUOUS:
-        names = "; ".join(" with ".join(map(effect_in_words, one)) for one in gap.alternatives)
-        told.append(f"What else it could be: {names}. These data cannot tell them apart.")
+        names = "; ".join(" with ".join(map(effect_in_words, alternative)) for alternative in gap.alternatives)
+        messages.append(f"What else it could be: {names}. These data cannot tell them apart.")
     elif gap.effects and gap.verdict == MISSING:
-        told.append("What else it could be: none of the explanations without it comes near.")
+        messages.append("What else it could be: none of the explanations without it comes near.")
     if gap.verdict != NO_EFFECT_MISSING and gap.equation:
-        told.append(f"The gap is in {_EQUATIONS.get(gap.equation, gap.equation)}.")
-    return told
+        messages.append(f"The gap is in {_EQUATIONS.get(gap.equation, gap.equation)}.")
+    return messages
 
 
 _EQUATIONS = {
@@ -125,12 +125,12 @@ def parameter_cells(one: Named, name: str) -> list[Cell]:
     own, value = estimate_in_file(name, one.parameters[name])
     words, unit = parameter_in_words(one.name, own)
     error = in_file_units(name, one.standard_errors[name])[1] if name in one.standard_errors else math.nan
-    told = f"{meaning(one.name, name)}{'' if name in one.standard_errors else ' (held)'}"
-    return [words, with_error(value, error), unit or "-", told]
+    text = f"{meaning(one.name, name)}{'' if name in one.standard_errors else ' (held)'}"
+    return [words, with_error(value, error), unit or "-", text]
 
 
 def parameter_in_words(effect: str, own: str) -> tuple[str, str]:
-    """Words and unit of a parameter by its name in a file; a direction is told to be that from or towards which."""
+    """Words and unit of a parameter by its name in a file; a direction is reported to be that from or towards which."""
     words, unit = in_words(own)
     told = meaning(effect, to_si(own, 0.0)[0])
     way = next((word for word in ("from", "towards") if f"direction {word} which" in told), "")

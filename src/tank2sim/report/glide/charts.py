@@ -52,13 +52,13 @@ def corners_of(places: Sequence[Mapping[str, float]]) -> SpacePath:
 
 def plan_chart(paths: Sequence[SpacePath], *, title: str = "") -> alt.LayerChart:
     """Paths from above: north up, east to the right, one scale."""
-    drawn = [(one.label, vector(one.east_m), vector(one.north_m)) for one in paths]
+    drawn = [(path.label, vector(path.east_m), vector(path.north_m)) for path in paths]
     return _plane(drawn, ("east y (m)", "north x (m)"), title=title, height_px=480)
 
 
 def elevation_chart(paths: Sequence[SpacePath], *, title: str = "") -> alt.LayerChart:
     """Paths from the side, rolled out: height above the start against the way over the ground, one scale."""
-    drawn = [(one.label, _way(one), vector(one.height_m)) for one in paths]
+    drawn = [(path.label, _way(path), vector(path.height_m)) for path in paths]
     return _plane(drawn, ("way over the ground (m)", "height (m)"), title=title, height_px=360)
 
 
@@ -156,13 +156,13 @@ def programme_chart(transient: Json, *, title: str = "") -> alt.VConcatChart:
 
 def quasi_steady_chart(errors: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
     """Largest distance from the transient path, per cent of the way, against the length of a step."""
-    series = [(one["label"], vector(one["duration_s"]), vector(one["share"])) for one in errors]
+    series = [(error["label"], vector(error["duration_s"]), vector(error["share"])) for error in errors]
     return _errors(series, ("length of a step (s)", "distance of the paths (% of the way)"), title=title)
 
 
 def swing_chart(errors: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
     """Error of velocity or rate of turn, per cent, against the period of a swing."""
-    series = [(one["label"], vector(one["period_s"]), vector(one["share"])) for one in errors]
+    series = [(error["label"], vector(error["period_s"]), vector(error["share"])) for error in errors]
     return _errors(series, ("period of the swing (s)", "error (%)"), title=title)
 
 
@@ -180,9 +180,9 @@ def _errors(series: Sequence[tuple[str, Array, Array]], titles: tuple[str, str],
     base = alt.Chart(data(rows)).encode(x=x, y=y, color=look.colour)
     line = base.mark_line(clip=True).encode(strokeDash=look.dash, order="i:Q").properties(name="plot")
     dots = base.mark_point(clip=True, filled=True).encode(tooltip=tooltip)
-    told = ", ".join(label for label, _, _ in series)
+    text = ", ".join(label for label, _, _ in series)
     return alt.layer(line, dots, params=[pan_zoom("x", "y", views=["plot"])]).properties(
-        title=title, width=680, height=340, description=f"{titles[1]} against {titles[0]} of {told}."
+        title=title, width=680, height=340, description=f"{titles[1]} against {titles[0]} of {text}."
     )
 
 

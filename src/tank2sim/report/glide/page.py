@@ -114,7 +114,7 @@ def glides_drawn(found: Json) -> list[PageSection]:
         sections.append(PageSection(heading="Path of the programme", charts=_paths(found)))
     if errors := found.get("quasi_steady_error"):
         sections.append(_quasi_steady(errors))
-    return [one for one in sections if one.charts]
+    return [section for section in sections if section.charts]
 
 
 def _polar(found: Json) -> list[Illustration]:

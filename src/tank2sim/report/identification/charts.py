@@ -1,4 +1,4 @@
-"""Charts of an identification from trials: tracks and histories beside simulations, errors, parameters, figures."""
+"""Charts of an identification from trials: tracks and histories next to simulations, errors, parameters, figures."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ MODEL_SERIES = {"before": BEFORE, "after": AFTER}
 """Word of the switch to the series that it shows."""
 
 PANELS_PER_ROW = 3
-"""Trials beside each other in a picture."""
+"""Trials next to each other in a picture."""
 
 MODEL_SAMPLES, MEASURED_SAMPLES = 140, 40
 """Samples of a line, and points of a series, in a small panel (about 200 px wide)."""
@@ -69,7 +69,7 @@ _SHARED = {"color": "shared", "strokeDash": "shared", "shape": "shared"}
 
 @dataclass(frozen=True, kw_only=True)
 class BeforeAfter:
-    """One trial beside the card before, and beside the card found."""
+    """One trial next to the card before, and next to the card found."""
 
     before: Passage
     after: Passage
@@ -114,9 +114,9 @@ def track_grid(pairs: Sequence[BeforeAfter], *, title: str = "") -> alt.ConcatCh
         panels.append(layers.properties(title=_small(pair.name), width=frame.width_px, height=frame.height_px))
     if not panels:
         return None
-    told = f"Tracks of {', '.join(rows_of)}, measured and simulated; north is up."
+    text = f"Tracks of {', '.join(rows_of)}, measured and simulated; north is up."
     slender = all(panel.width <= 110 for panel in panels)
-    chart = _grid(panels, title, told, columns=PANELS_PER_ROW + slender).properties(usermeta={"equal_scales": True})
+    chart = _grid(panels, title, text, columns=PANELS_PER_ROW + slender).properties(usermeta={"equal_scales": True})
     return _with_rows(chart, rows_of)
 
 
@@ -125,8 +125,8 @@ def history_grid(
 ) -> alt.ConcatChart:
     """Signals over time, a column of panels a trial; `signals` as :data:`_SIGNALS` has them, angles in degrees."""
     made = {pair.name: _histories(pair, signals) for pair in pairs}
-    told = f"Time histories of {', '.join(made)}, measured and simulated."
-    chart = _grid([panels for panels, _ in made.values()], title, told)
+    text = f"Time histories of {', '.join(made)}, measured and simulated."
+    chart = _grid([panels for panels, _ in made.values()], title, text)
     return _with_rows(chart, {name: rows for name, (_, rows) in made.items()})
 
 
@@ -178,7 +178,7 @@ def window_chart(
     title : str
         Of the chart.
     """
-    every = [one for pair in sets.values() for results in pair for one in results]
+    every = [result for pair in sets.values() for results in pair for result in results]
     signals = [SYMBOLS[name][0] for name in SYMBOLS if any(name in one.windows for one in every)]
     rows = []
     for word, pair in sets.items():
@@ -195,17 +195,17 @@ def window_chart(
 
 def _window_map(results: Sequence[Following], signals: Sequence[str], title: str, *, named: bool) -> alt.LayerChart:
     rows = []
-    for one in results:
-        for name, (error, _) in one.windows.items():
+    for result in results:
+        for name, (error, _) in result.windows.items():
             symbol, unit = SYMBOLS.get(name, (name, "1"))
             shown, factor = shown_unit(unit)
-            share = 100 * one.relative(name)
+            share = 100 * result.relative(name)
             rows.append(
-                {"trial": one.name, "signal": symbol, "share": plain(share), "text": _in_three(share)}
+                {"trial": result.name, "signal": symbol, "share": plain(share), "text": _in_three(share)}
                 | {"error": f"{factor * error:.3g} {shown}".strip()}
             )
     side = alt.Axis(title=None, labelLimit=230) if named else alt.Axis(title=None, labels=False, ticks=False)
-    y = alt.Y("trial:N", sort=[one.name for one in results], axis=side)
+    y = alt.Y("trial:N", sort=[result.name for result in results], axis=side)
     x = alt.X("signal:N", sort=list(signals), scale=alt.Scale(domain=list(signals)))
     x = x.axis(title="signal", orient="bottom", labelAngle=0)
     colours = alt.Scale(type="log", domain=[1, 100], scheme="blues", clamp=True)
@@ -253,9 +253,9 @@ def _figure_rows(
 ) -> Iterable[ChartRecord]:
     for word, pair in sets.items():
         for label, figures in zip((BEFORE, AFTER), pair, strict=True):
-            for one in figures:
-                if one.name.endswith(ending):
-                    yield {"run": label, "set": word} | _figure_row(one, ending)
+            for figure in figures:
+                if figure.name.endswith(ending):
+                    yield {"run": label, "set": word} | _figure_row(figure, ending)
 
 
 def _figure_row(one: FigureComparison, ending: str) -> ChartRecord:
@@ -357,11 +357,12 @@ def _thinned(label: str, columns: Sequence[Array]) -> Indices:
 
 
 def _marks(position: Position, tooltip: Sequence[alt.Tooltip]) -> list[alt.Chart]:
-    # The data stand once for all panels of a trial: what is a line and what a point is told by the series. Encodings
-    # are handed over as dictionaries: Altair copies its own objects, with all they leave open, at every level.
+    # The data stand once for all panels of a trial: what is a line and what a point is reported by the series.
+    # Encodings are handed over as dictionaries: Altair copies its own objects, with all they leave open, at every
+    # level.
     place = {name: channel.to_dict() for name, channel in position.items()}
-    told = [one.to_dict() for one in tooltip]
-    points = place | _POINT_LOOK | {"tooltip": told}
+    messages = [one.to_dict() for one in tooltip]
+    points = place | _POINT_LOOK | {"tooltip": messages}
     lines = place | _LINE_LOOK | {"order": {"field": "i", "type": "quantitative"}}
     return [_drawn("point", "==", points, size=14, strokeWidth=1), _drawn("line", "!=", lines, strokeWidth=1.5)]
 

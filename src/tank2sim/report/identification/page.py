@@ -34,14 +34,14 @@ FITTED, HELD_OUT = "fitted", "held out"
 
 MOST_TRIALS = 12
 """Trials of which tracks and histories are shown: those with the largest error of yaw rate. More are hard to look at,
-and make the page slow (ours)."""
+and make the page slow (project choice)."""
 
 _PER_SHEET = 6
 """Trials in one picture of histories: as many as are readable on a sheet of paper."""
 
 
 def pairs_of(card: ManoeuvringCard, result: Identification, trials: Measured) -> tuple[BeforeAfter, ...]:
-    """Each trial beside `card`, the one that was given, and beside the card found."""
+    """Each trial next to `card`, the one that was given, and next to the card found."""
     return tuple(BeforeAfter(before=before, after=after) for before, after in replays(card, result, trials))
 
 
@@ -111,9 +111,9 @@ def identification_page(result: Identification, charts: Mapping[str, alt.TopLeve
         stem = word.replace(" ", "_")
         if charts_there := drawn(f"tracks_{stem}", f"histories_{stem}"):
             count = len(_sets(result)[word][1].following)
-            told = f"The {MOST_TRIALS} of {count} trials with the largest error of yaw rate."
+            text = f"The {MOST_TRIALS} of {count} trials with the largest error of yaw rate."
             sections.append(
-                PageSection(heading=f"Trials {word}", text=told if count > MOST_TRIALS else "", charts=charts_there)
+                PageSection(heading=f"Trials {word}", text=text if count > MOST_TRIALS else "", charts=charts_there)
             )
     sections.append(
         PageSection(
@@ -130,7 +130,7 @@ def identification_page(result: Identification, charts: Mapping[str, alt.TopLeve
     if result.notices:
         rows: list[list[object]] = [[notice] for notice in result.notices]
         sections.append(
-            PageSection(heading="Notices", tables=[_table("What was mended, scaled and assumed", ("",), rows)])
+            PageSection(heading="Notices", tables=[_table("What was repaired, scaled and assumed", ("",), rows)])
         )
     subtitle = f"Coefficients from free-running trials by {result.estimate.method.replace('_', ' ')}"
     return Page(title=result.card.ship.name, subtitle=subtitle, figures=_key_figures(result), sections=sections)
@@ -204,7 +204,7 @@ def _compared(label: str, word: str, unit: str, before: float, now: float) -> Ke
 
 
 def _rms(comparison: Comparison, names: Sequence[str], factor: float) -> float:
-    errors = [factor * one.error for one in comparison.figures if one.name in names]
+    errors = [factor * figure.error for figure in comparison.figures if figure.name in names]
     known = [error for error in errors if not np.isnan(error)]
     return float(np.sqrt(np.mean(np.square(known)))) if known else np.nan
 
@@ -213,8 +213,8 @@ def _widened(result: Identification) -> str:
     wide = {group: factor for group, factor in result.estimate.prior_scale.items() if factor > 1}
     if not wide:
         return ""
-    told = ", ".join(f"{group} {factor:.3g} times" for group, factor in sorted(wide.items()))
-    return f" The card's standard errors were widened as the trials demanded: {told}."
+    text = ", ".join(f"{group} {factor:.3g} times" for group, factor in sorted(wide.items()))
+    return f" The card's standard errors were widened as the trials demanded: {text}."
 
 
 def _figure_tables(result: Identification) -> list[PageTable]:

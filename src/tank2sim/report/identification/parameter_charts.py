@@ -1,4 +1,4 @@
-"""Charts of estimated parameters: beside what was known of them, how they hang together, what the trials tell."""
+"""Charts of estimated parameters: next to what was known of them, how they hang together, what the trials tell."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Parameters:
 
 
 def parameter_chart(these: Parameters, *, title: str = "") -> alt.HConcatChart:
-    """Estimates with their 95 % intervals beside the priors', in standard errors of the prior; shares beside."""
+    """Estimates with their 95 % intervals next to the priors', in standard errors of the prior; shares next to."""
     rows = [_parameter_row(these, place) for place in range(len(these.names))]
     farthest = max((abs(row[key]) for row in rows for key in ("low", "high")), default=1.0)
     # A few derivatives may move by dozens of standard errors, where the others move by one.
@@ -88,8 +88,8 @@ def correlation_chart(known: Identifiability, *, title: str = "") -> alt.LayerCh
     names = [name.removeprefix("derivatives.") for name in known.free]
     step = max(8, min(24, 560 // len(names)))
     rows: list[ChartRecord] = [
-        {"one": one, "other": other, "c": plain(known.correlation[row, column])}
-        for row, one in enumerate(names)
+        {"one": name, "other": other, "c": plain(known.correlation[row, column])}
+        for row, name in enumerate(names)
         for column, other in enumerate(names)
     ]
     axis = alt.Axis(title=None, labelLimit=200, ticks=False)
@@ -103,11 +103,11 @@ def correlation_chart(known: Identifiability, *, title: str = "") -> alt.LayerCh
     close = [row for row in rows if row["one"] != row["other"] and abs(row["c"] or 0.0) > CLOSE_CORRELATION]
     frames = alt.Chart(data(close)).mark_rect(filled=False, stroke="black", strokeWidth=2)
     layers = [cells, *([frames.encode(x=x, y=y, tooltip=tooltip)] if close else [])]
-    told = f"Framed: {len(known.pairs)} pairs above {CLOSE_CORRELATION:g} either way, which are known only together."
+    text = f"Framed: {len(known.pairs)} pairs above {CLOSE_CORRELATION:g} either way, which are known only together."
     size = {"width": step * len(names), "height": step * len(names)}
     return alt.layer(*layers).properties(
-        title=alt.Title(title, subtitle=f"Colour: correlation (-). {told}"),
-        description=f"Correlation of {len(names)} parameters. {told}",
+        title=alt.Title(title, subtitle=f"Colour: correlation (-). {text}"),
+        description=f"Correlation of {len(names)} parameters. {text}",
         **size,
     )
 

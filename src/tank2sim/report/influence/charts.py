@@ -1,4 +1,4 @@
-"""Charts of influence coefficients: K % by exact slopes beside the 10 % difference, variances, and tuning."""
+"""Charts of influence coefficients: K % by exact slopes next to the 10 % difference, variances, and tuning."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class InfluenceData:
             return table({text: {key: one[name] for key, one in row.items()} for text, row in figures.items()})
 
         shares = table({text: found["figures"][text]["share_of_variance"] for text in figures})
-        names = tuple(short_name(key, one) for key, one in parameters.items())
+        names = tuple(short_name(key, parameter) for key, parameter in parameters.items())
         return InfluenceData(tuple(figures), names, part("exact"), part("difference"), shares)
 
 
@@ -66,7 +66,7 @@ def most_influential(result: InfluenceData, limit: int = _MOST_ROWS) -> list[int
 
 
 def influence_charts(result: InfluenceData) -> list[alt.HConcatChart]:
-    """K % of the most influential parameters: bars by exact slopes, points by the 10 % difference; figures beside
+    """K % of the most influential parameters: bars by exact slopes, points by the 10 % difference; figures next to
     each other, :data:`PANELS` to a chart."""
     order = most_influential(result)
     return [_bars(result, order, rows) for rows in figure_groups(len(result.figures), PANELS)]

@@ -26,7 +26,7 @@ from tank2sim.units import in_words
 
 _COEFFICIENTS = (
     "K is the change of a figure in per cent when one number on the card grows by 10 %. Bars are by exact slopes "
-    "(10 c/F dF/dc), points by computing the ship anew with 10 % more; where they differ, the figure is curved.\n\n"
+    "(10 c/F dF/dc), points by computing the ship again with 10 % more; where they differ, the figure is curved.\n\n"
     "Slopes of steady turns and straight courses are by the implicit function theorem, those of manoeuvres by forward "
     "sensitivities through the events, whose times move, too."
 )
@@ -42,7 +42,7 @@ def influence_page(result: CardInfluence, tuned: Tuned | None = None, after: Arr
     told = result.as_json()
     if tuned is not None:
         values = [] if after is None else after.tolist()
-        told["tuned"] = tuned.as_json(dict(zip((one.text for one in result.figures), values, strict=False)))
+        told["tuned"] = tuned.as_json(dict(zip((figure.text for figure in result.figures), values, strict=False)))
     return influenced_page(plain_json(told))
 
 
@@ -120,16 +120,16 @@ def _uncertainty(found: Json, coefficients: InfluenceData) -> PageSection:
     figures: Mapping[str, Mapping[str, Json]] = found["figures"]
     text = _ERRORS.format(found.get("standard_errors", "from the card's standard errors"))
     rows: list[Sequence[Cell]] = []
-    for name, one in figures.items():
-        relative = 100 * abs(one["standard_error"] / one["value"]) if one["value"] else None
-        rows.append([name, one["value"], one["standard_error"], _cell(relative)])
+    for name, figure in figures.items():
+        relative = 100 * abs(figure["standard_error"] / figure["value"]) if figure["value"] else None
+        rows.append([name, figure["value"], figure["standard_error"], _cell(relative)])
     columns = [
         Column(title="figure"),
         Column(title="value"),
         Column(title="standard error", digits=3),
         Column(title="relative", unit="%", digits=3),
     ]
-    known = any(one["standard_error"] > 0 for one in figures.values())
+    known = any(figure["standard_error"] > 0 for figure in figures.values())
     charts = [Illustration(chart=variance_chart(coefficients))] if known else []
     table = PageTable(caption="Figures and their standard errors", columns=columns, rows=rows)
     return PageSection(heading="What is known of the figures", text=text, charts=charts, tables=[table])
@@ -150,7 +150,7 @@ def _together(agreed: Mapping[str, Json]) -> PageSection:
     percent = [Column(title=title, unit="%") for title in ways.values()]
     return PageSection(
         heading="Agreed variation",
-        text="All these change together. To first order a figure changes by the sum of Kc K / 10; beside it, what "
+        text="All these change together. To first order a figure changes by the sum of Kc K / 10; next to it, what "
         "computing the changed ship gives.",
         tables=[
             PageTable(
@@ -201,7 +201,8 @@ def _tuning(found: Json, tuned: Mapping[str, Json]) -> PageSection:
 
 def _moves(parameters: Mapping[str, Mapping[str, Json]]) -> PageSection:
     rows: list[Sequence[Cell]] = [
-        [key, one["before"], one["after"], one["standard_errors"]] for key, one in parameters.items()
+        [key, parameter["before"], parameter["after"], parameter["standard_errors"]]
+        for key, parameter in parameters.items()
     ]
     columns = [
         Column(title="key"),

@@ -130,14 +130,14 @@ def pole_zero_chart(
 
 
 def error_chart(errors: Sequence[OutputError], *, title: str = "", width_px: int = 720) -> alt.FacetChart:
-    """Largest error of every output on a logarithmic scale beside its limit, one panel a kind of check.
+    """Largest error of every output on a logarithmic scale next to its limit, one panel a kind of check.
 
     An error of exactly 0 (or one that is not finite) cannot stand on a logarithmic scale: it is drawn at the left
     (right) edge, and its tooltip says what it is.
     """
     kinds = list(dict.fromkeys(error.kind for error in errors))
     outputs = list(dict.fromkeys(error.output for error in errors))
-    sizes = [size for one in errors for size in (one.error, one.limit) if math.isfinite(size) and size > 0]
+    sizes = [size for error in errors for size in (error.error, error.limit) if math.isfinite(size) and size > 0]
     low, high = 10.0 ** math.floor(math.log10(min(sizes)) - 0.01), 10.0 ** math.ceil(math.log10(max(sizes)) + 0.01)
     rows = [_error_row(error, low, high) for error in errors]
     decades = round(math.log10(high / low))

@@ -14,7 +14,7 @@ BOTH, ALL = "both", "all"
 """What a switch stands at first, and on paper: two series together, or more of them."""
 
 MISFIT_SHOWN = 100.0
-"""Misfit in noise units at which the darkest colour begins (ours): far from any doubt."""
+"""Misfit in noise units at which the darkest colour begins (project choice): far from any doubt."""
 
 _NAME = "shown"
 
@@ -52,7 +52,7 @@ def misfit_maps(rows: Sequence[ChartRecord], models: Sequence[str], *, title: st
     rows : sequence of record
         ``group`` (words for a kind of trials, or nothing), ``trial``, ``signal``, ``model`` and ``misfit`` (-) each.
     models : sequence of str
-        What is to be switched between, in the order in which they stand beside each other.
+        What is to be switched between, in the order in which they stand next to each other.
     title : str
         Of the chart.
     """

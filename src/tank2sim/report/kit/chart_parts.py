@@ -105,7 +105,7 @@ def series_look(labels: Sequence[str], as_points: Collection[str] = ()) -> Serie
     dashes = [[1, 0] if label in as_points else list(DASHES[n % len(DASHES)]) for n, label in enumerate(labels)]
     points = [label for label in labels if label in as_points]
     shapes = [SHAPES[points.index(label) % len(SHAPES)] if label in points else STROKE for label in labels]
-    # Where a chart has lines alone no shape enters the legend, and its symbol is to be told.
+    # Where a chart has lines alone no shape enters the legend, and its symbol is to be reported.
     symbol = {} if as_points else {"symbolType": STROKE}
     legend = None if len(labels) == 1 else alt.Legend(title=None, **symbol)
     return SeriesLook(

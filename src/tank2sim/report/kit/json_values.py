@@ -13,16 +13,17 @@ Json = Any
 """What JSON holds: numbers, text, truth values, None, lists and objects of these."""
 
 LONGEST_LIST = 12
-"""Numbers of a list that stand in one cell; longer ones are series. A choice of ours."""
+"""Numbers of a list that stand in one cell; longer ones are series. Project choice."""
 
 _MOST_ROWS = 400
-"""Rows of a table; what is beyond is left to the JSON. A choice of ours."""
+"""Rows of a table; what is beyond is left to the JSON. Project choice."""
 
 MOST_COLUMNS, FEW_ROWS = 8, 4
-"""More columns than fit on a sheet in the type of the text, and so few rows that the table is turned. Ours."""
+"""More columns than fit on a sheet in the type of the text, and so few rows that the table is turned. Project
+choice."""
 
 _WIDE = 300.0
-"""Largest over smallest number of a column that still have their digits in common. A choice of ours."""
+"""Largest over smallest number of a column that still have their digits in common. Project choice."""
 
 VERDICT_TEXTS = ("passed", "met", "within", "stable", "finished", "course_stable_before", "course_stable_after")
 """Keys whose truth is good."""
@@ -204,12 +205,12 @@ def _turned(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], keys:
     """A row a key and a column an object, for few objects with many keys: on paper a wide table is cut off."""
     units = [words(key)[1] for key in keys]
     heads = [name or f"no. {place}" if len(named) > 1 else name or "value" for place, (name, _) in enumerate(named, 1)]
-    told = [Column(title=head) for head in ("quantity", *heads, *(["unit"] if any(units) else []))]
+    messages = [Column(title=head) for head in ("quantity", *heads, *(["unit"] if any(units) else []))]
     rows = [
         [words(key)[0], *(_shown(key, one.get(key), True) for _, one in named), *([unit] if any(units) else [])]
         for key, unit in zip(keys, units, strict=True)
     ]
-    return PageTable(caption=caption, columns=told, rows=rows)
+    return PageTable(caption=caption, columns=messages, rows=rows)
 
 
 def _wide(named: Sequence[tuple[str, Mapping[str, Json]]], keys: Sequence[str]) -> set[str]:
@@ -229,9 +230,9 @@ def _shown(key: str, value: Json, wide: bool) -> Cell:
 
 def alike(values: Mapping[str, Json]) -> bool:
     """Whether these are objects of one kind: two or more that share at least half of what they have in cells."""
-    if len(values) < 2 or not all(isinstance(one, Mapping) for one in values.values()):
+    if len(values) < 2 or not all(isinstance(value, Mapping) for value in values.values()):
         return False
-    keys = [set(scalars(one)) or set(one) for one in values.values()]
+    keys = [set(scalars(value)) or set(value) for value in values.values()]
     return 2 * len(set.intersection(*keys)) >= len(set.union(*keys))
 
 
@@ -248,15 +249,16 @@ def _as_long(one: list[Json], all_of_them: Any) -> bool:
 
 
 def numbered(caption: str, values: Mapping[str, list[Json]]) -> PageTable:
-    """Short lists beside each other, one row a place, counted from 1."""
-    longest = max(len(one) for one in values.values())
+    """Short lists next to each other, one row a place, counted from 1."""
+    longest = max(len(value) for value in values.values())
     columns = [Column(title="no."), *(Column(title=words(key)[0], unit=words(key)[1]) for key in values)]
     rows = [
-        [place + 1, *(one[place] if place < len(one) else None for one in values.values())] for place in range(longest)
+        [place + 1, *(value[place] if place < len(value) else None for value in values.values())]
+        for place in range(longest)
     ]
     return PageTable(caption=caption, columns=columns, rows=rows)
 
 
 def rises(values: Sequence[Json]) -> bool:
     """Whether numbers rise all the way."""
-    return all(is_number_value(one) for one in values) and all(low < high for low, high in pairwise(values))
+    return all(is_number_value(value) for value in values) and all(low < high for low, high in pairwise(values))

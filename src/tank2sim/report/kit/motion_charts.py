@@ -294,7 +294,7 @@ def _history_layers(runs: Sequence[History], signal: Signal, look: SeriesLook, x
 def _marked(marks: Sequence[TimeMark], signal: Signal, x: alt.X) -> list[alt.Chart]:
     """Tinted spans, each with a line where it begins, for the shortest are no wider than that."""
     rows: list[ChartRecord] = [
-        {"t": one.begin_s, "end": one.end_s, "text": one.text} for one in marks if one.signal == signal.name
+        {"t": mark.begin_s, "end": mark.end_s, "text": mark.text} for mark in marks if mark.signal == signal.name
     ]
     if not rows:
         return []

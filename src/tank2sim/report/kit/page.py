@@ -252,7 +252,7 @@ def json_in_html(value: object) -> Markup:
 
 
 def beside(name: str) -> str:
-    """Text of a file that lies beside this one."""
+    """Text of a file that lies next to this one."""
     return importlib.resources.files("tank2sim.report").joinpath(name).read_text(encoding="utf-8")
 
 

@@ -148,7 +148,7 @@ def heat_map(
 
 
 def matrix_chart(heading: str, value: Mapping[str, Json]) -> Illustration | None:
-    """The correlation of what is named beside it (``of`` or ``names``), where that is given."""
+    """The correlation of what is named next to it (``of`` or ``names``), where that is given."""
     names = value.get("of") or value.get("names")
     matrix: Json = value.get("matrix") or value.get("correlation")
     if not (isinstance(names, list) and is_matrix(matrix) and len(names) == len(matrix) == len(matrix[0])):
@@ -162,9 +162,9 @@ def matrix_chart(heading: str, value: Mapping[str, Json]) -> Illustration | None
 def error_bars(heading: str, values: Mapping[str, Mapping[str, Json]]) -> Illustration | None:
     """Standard errors of named values, in per cent of each, the surest at the top; None where none has one."""
     known = [
-        {"name": name, "percent": _plain(100 * abs(one["standard_error"] / one["value"])), "value": one["value"]}
-        for name, one in values.items()
-        if is_number_value(one.get("value")) and is_number_value(one.get("standard_error")) and one["value"] != 0
+        {"name": name, "percent": _plain(100 * abs(value["standard_error"] / value["value"])), "value": value["value"]}
+        for name, value in values.items()
+        if is_number_value(value.get("value")) and is_number_value(value.get("standard_error")) and value["value"] != 0
     ]
     known = sorted((row for row in known if row["percent"]), key=lambda row: float(row["percent"]))[:_MOST_BARS]
     if len(known) < 2:
@@ -187,10 +187,10 @@ def error_bars(heading: str, values: Mapping[str, Mapping[str, Json]]) -> Illust
 def force_fit(heading: str, runs: Sequence[Mapping[str, Json]]) -> Illustration | None:
     """Measured against predicted, one point a run; a point off the diagonal is a run that the fit does not follow."""
     rows: list[ChartRecord] = [
-        {"run": str(one.get("run", "")), "type": str(one.get("type", "")).replace("_", " ")}
-        | {"measured": _plain(one["measured"]), "predicted": _plain(one["predicted"])}
-        for one in runs
-        if is_number_value(one.get("measured")) and is_number_value(one.get("predicted"))
+        {"run": str(run.get("run", "")), "type": str(run.get("type", "")).replace("_", " ")}
+        | {"measured": _plain(run["measured"]), "predicted": _plain(run["predicted"])}
+        for run in runs
+        if is_number_value(run.get("measured")) and is_number_value(run.get("predicted"))
     ]
     if len(rows) < 3:
         return None
@@ -243,7 +243,7 @@ def poles(heading: str, label: str, found: Json, zeros: Json = ()) -> Illustrati
 
 
 def errors(heading: str, found: Json, limits: Json) -> Illustration | None:
-    """Errors of an FMU's outputs, by kind, each beside its limit; None where these are none."""
+    """Errors of an FMU's outputs, by kind, each next to its limit; None where these are none."""
     if not (isinstance(found, Mapping) and isinstance(limits, Mapping)):
         return None
     all_of_them = [

@@ -9,7 +9,7 @@ from tank2sim.report.gap.fleet_page import fleet_page
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Link, Page, PageSection, PageTable
 
-_WHERE = f"Each ship has a page of her own, {REPORT_FILE}, in the folder of her name beside fleet.json."
+_WHERE = f"Each ship has a page of its own, {REPORT_FILE}, in the folder of its name next to fleet.json."
 
 
 def told_fleet_page(result: Json) -> Page:
@@ -25,7 +25,7 @@ def told_fleet_page(result: Json) -> Page:
         for one in result["ships"]
     )
     page = fleet_page(FleetTold(name=str(result["fleet"]), ships=ships, notices=tuple(result.get("notices") or ())))
-    return replace(page, sections=[_without_links(one) for one in page.sections])
+    return replace(page, sections=[_without_links(section) for section in page.sections])
 
 
 def _without_links(section: PageSection) -> PageSection:

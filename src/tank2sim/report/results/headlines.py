@@ -71,7 +71,7 @@ def _gap(result: Mapping[str, Json]) -> list[KeyFigure]:
 
 
 def _identified(result: Mapping[str, Json]) -> list[KeyFigure]:
-    """How the card found follows the trials held out, beside the card given."""
+    """How the card found follows the trials held out, next to the card given."""
     misfit = result.get("misfit") or {}
     return _misfit(misfit.get("before") or {}, misfit)
 
@@ -92,9 +92,11 @@ def _reduced(result: Mapping[str, Json]) -> list[KeyFigure]:
     """How many derivatives, and the least sure of them."""
     derivatives = result["derivatives"]
     relative = {
-        name: 100 * abs(one["standard_error"] / one["value"])
-        for name, one in derivatives.items()
-        if is_number_value(one.get("standard_error")) and is_number_value(one.get("value")) and one["value"] != 0
+        name: 100 * abs(derivative["standard_error"] / derivative["value"])
+        for name, derivative in derivatives.items()
+        if is_number_value(derivative.get("standard_error"))
+        and is_number_value(derivative.get("value"))
+        and derivative["value"] != 0
     }
     figures = [KeyFigure(label="Derivatives found", value=len(derivatives))]
     if relative:

@@ -1,4 +1,4 @@
-"""Where in a result a page was, so that a value it cannot draw is told by its key."""
+"""Where in a result a page was, so that a value it cannot draw is reported by its key."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ class _Watched(dict[str, Json]):
     """An object of JSON that notes each key as it is read."""
 
     def __init__(self, values: dict[str, Json], path: str, place: _Place):
-        super().__init__({key: _watched(one, f"{path}.{key}" if path else key, place) for key, one in values.items()})
+        super().__init__(
+            {key: _watched(value, f"{path}.{key}" if path else key, place) for key, value in values.items()}
+        )
         self._path, self._place = path, place
 
     def __getitem__(self, key: str) -> Json:
@@ -54,7 +56,7 @@ def drawn_from(result: Json, source: str, draw: Callable[[Json], _T]) -> _T:
     Raises
     ------
     InputError
-        It fails on the shape of a value, which is then no longer as the command wrote it; told by its key.
+        It fails on the shape of a value, which is then no longer as the command wrote it; determined by its key.
     """
     place = _Place()
     try:

@@ -60,7 +60,7 @@ _UNITS = {
 _TRACK = ("x_m", "y_m")
 
 _MOST_RECORDS = 12
-"""Records drawn in one page, a quarter of a MB each (ours)."""
+"""Records drawn in one page, a quarter of a MB each (project choice)."""
 
 
 def is_columns(value: Json) -> bool:
@@ -138,7 +138,7 @@ def audit_sections(result: Json) -> list[PageSection]:
 
 
 def identified(result: Json) -> list[PageSection]:
-    """Each trial as measured beside the card that was given and the card found, those held out first."""
+    """Each trial as measured next to the card that was given and the card found, those held out first."""
     charts: list[Illustration] = []
     for one in sorted(result["replays"], key=lambda one: not one["held_out"])[:_MOST_RECORDS]:
         runs = {"measured": one["measured"], "card given": one["before"], "card found": one["found"]}
@@ -206,7 +206,7 @@ def _bands(ensemble: Mapping[str, Json]) -> dict[str, _Columns]:
 def _in_si(columns: _Columns) -> dict[str, Array]:
     found = {}
     for name, values in columns.items():
-        numbers = np.array([np.nan if one is None else one for one in values], dtype=float)
+        numbers = np.array([np.nan if value is None else value for value in values], dtype=float)
         si, factor = to_si(name, 1.0)
         found[si] = factor * numbers
     return found

@@ -75,7 +75,7 @@ def result_page(result: Json, source: str) -> Page:
 def _page(result: Mapping[str, Json], kind: ResultType, source: str) -> Page:
     if whole := whole_page(kind.title, result):
         return whole
-    told = [str(note) for key in _TOLD for note in result.get(key) or []]
+    messages = [str(note) for key in _TOLD for note in result.get(key) or []]
     name = next((result[key] for key in ("ship", "campaign", "glider", "path") if isinstance(result.get(key), str)), "")
     checked = charts.errors("Errors of the outputs", result.get("errors"), result.get("limits"))
     own, rest = render_charts(kind.title, result)
@@ -85,16 +85,18 @@ def _page(result: Mapping[str, Json], kind: ResultType, source: str) -> Page:
     overview = {key: value for key, value in scalars(result).items() if key not in (*_TOLD, "kind", "schema")}
     table = [quantities("The result", overview)] if overview else []
     first = [
-        PageSection(heading="Overview", text=kind.beside, tables=table, charts=[checked] if checked else [], notes=told)
+        PageSection(
+            heading="Overview", text=kind.beside, tables=table, charts=[checked] if checked else [], notes=messages
+        )
     ]
     return Page(
         title=f"{kind.title}: {Path(name).name}" if name else kind.title,
         subtitle=f"From {source}",
         figures=headlines(result, kind),
         sections=[
-            *(first if overview or told or kind.beside else []),
+            *(first if overview or messages or kind.beside else []),
             *own,
-            *(one for one in sections if one.tables or one.charts),
+            *(section for section in sections if section.tables or section.charts),
         ],
     )
 
@@ -105,7 +107,7 @@ def _section(key: str, value: Json) -> PageSection:
     heading = "IMO criteria" if key == "imo" else title[:1].upper() + title[1:]
     _fill(parts, heading, key, value, 0)
     notes = [f"{parts.left_out} longer or deeper parts stand in the JSON alone."] if parts.left_out else []
-    tables = [one for one in parts.tables if one.rows and [column.title for column in one.columns] != ["name"]]
+    tables = [table for table in parts.tables if table.rows and [column.title for column in table.columns] != ["name"]]
     return PageSection(heading=heading, tables=tables, charts=parts.charts, notes=notes)
 
 
@@ -217,9 +219,9 @@ def _each(parts: _Parts, caption: str, values: Mapping[str, Json], depth: int) -
     small = {k: v for k, v in values.items() if isinstance(v, Mapping) and v and all(map(is_scalar, v.values()))}
     if len(small) > 1:  # one table in place of many of two rows
         parts.tables.append(grouped(caption, small))
-        values = {name: one for name, one in values.items() if name not in small}
-    for name, one in values.items():
-        _fill(parts, f"{caption}: {words(name)[0]}", name, one, depth + 1)
+        values = {name: value for name, value in values.items() if name not in small}
+    for name, value in values.items():
+        _fill(parts, f"{caption}: {words(name)[0]}", name, value, depth + 1)
 
 
 def _draw_series(parts: _Parts, caption: str, series: Mapping[str, list[Json]]) -> None:

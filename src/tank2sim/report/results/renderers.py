@@ -1,4 +1,4 @@
-"""What is drawn of the results of each command beside their tables, by the functions of the command's own page."""
+"""What is drawn of the results of each command next to their tables, by the functions of the command's own page."""
 
 from __future__ import annotations
 

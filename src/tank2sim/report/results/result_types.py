@@ -25,7 +25,7 @@ class ResultType:
     headlines : tuple of str
         Paths of the values that the reader looks for first, with dots between keys; for those that are
         worked out see :mod:`tank2sim.report.results.headlines`.
-    beside : str
+    next to : str
         What the JSON has not, and where it is.
     """
 
@@ -37,7 +37,7 @@ class ResultType:
 
 
 _BESIDE_GAP = (
-    "Tracks and time histories are not in gap.json: they are in report.html, which tank2sim gap wrote beside it."
+    "Tracks and time histories are not in gap.json: they are in report.html, which tank2sim gap wrote next to it."
 )
 
 RESULT_TYPES = (

@@ -56,15 +56,15 @@ def _drawn(title: str, of: str, value: Mapping[str, Json]) -> Illustration | Non
 def _table(caption: str, columns: Mapping[str, Mapping[str, Json]]) -> PageTable:
     """What stands in cells of each signal, with the peak of its spectrum."""
     rows = []
-    for name, one in columns.items():
-        peak = (one.get("spectrum") or {}).get("peak") or {}
-        own = {key: value for key, value in one.items() if key not in _NOT_TOLD}
+    for name, column in columns.items():
+        peak = (column.get("spectrum") or {}).get("peak") or {}
+        own = {key: value for key, value in column.items() if key not in _NOT_TOLD}
         rows.append((words(name)[0], own | {told: peak[key] for key, told in _PEAK.items() if key in peak}))
     return rows_of(caption, rows, "signal")
 
 
 def _statistic(kind: str, columns: Mapping[str, Mapping[str, Json]]) -> PageTable:
-    rows = [(words(name)[0], _flat(one[kind], "")) for name, one in columns.items() if one.get(kind)]
+    rows = [(words(name)[0], _flat(column[kind], "")) for name, column in columns.items() if column.get(kind)]
     return rows_of(titled(kind).capitalize(), rows, "signal")
 
 

@@ -37,7 +37,7 @@ _PHASE = "phase (deg), below zero: later"
 
 
 def density_chart(name: SignalName, density: Density, *, title: str = "") -> alt.LayerChart:
-    """Probability density of a signal beside the normal one, in the unit of its column."""
+    """Probability density of a signal next to the normal one, in the unit of its column."""
     x = alt.X("x:Q", title=with_unit(name.words, name.unit), scale=alt.Scale(zero=False, nice=False))
     up = with_unit("probability density", f"1/({name.unit})")
     curves = {"estimated": density.density, "normal": density.normal}

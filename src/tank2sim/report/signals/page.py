@@ -141,7 +141,7 @@ def _filter_charts(before: Series, text: str, filtered: Filtered) -> dict[ChartK
 
 def _caption(kind: str) -> str:
     captions = {
-        "density": "Kernel estimate beside the normal density of the same mean and standard deviation.",
+        "density": "Kernel estimate next to the normal density of the same mean and standard deviation.",
         "cross_correlation": "Red: the lag of the largest. Dotted: what 95 % of the coefficients of two independent "
         "signals stay within. Right: the yaw rate comes after the rudder.",
         "correlation": "Red: the correlation time.",

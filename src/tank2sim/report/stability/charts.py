@@ -103,8 +103,8 @@ def _turning_panel(
     ]
     points = [
         row
-        for label, one in spirals.items()
-        for row in records(label, {"d": vector(one["rudder_deg"]), "v": vector(one["yaw_rate_degps"])})
+        for label, spiral in spirals.items()
+        for row in records(label, {"d": vector(spiral["rudder_deg"]), "v": vector(spiral["yaw_rate_degps"])})
     ]
     if points:
         layers.append(
@@ -147,13 +147,13 @@ def step_chart(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> a
     """Yaw rate after a step of one degree of rudder (or of its order), deg/s; from ``responses`` of the JSON."""
     rows = [
         row
-        for one in responses
+        for response in responses
         for row in records(
-            one["system"],
-            {"x": vector(one["step"]["time_s"]), "y": vector(one["step"]["yaw_rate_per_rudder_per_s"])},
+            response["system"],
+            {"x": vector(response["step"]["time_s"]), "y": vector(response["step"]["yaw_rate_per_rudder_per_s"])},
         )
     ]
-    look = series_look([one["system"] for one in responses])
+    look = series_look([response["system"] for response in responses])
     chart = _curves(rows, look, across="time after the step (s)", up="yaw rate per degree of rudder (deg/s)")
     return chart.properties(title=title, description="Yaw rate over time after a step of the rudder.")
 
@@ -170,7 +170,7 @@ def steering_bode(responses: Sequence[Mapping[str, Json]], *, title: str = "") -
 
 def steering_poles(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.LayerChart:
     """Poles and zeros of the hull, and of Nomoto's first order; those of the gear lie far out and are left out."""
-    shown = [one for one in responses if one["system"] in (responses[0]["system"], FIRST_ORDER)]
+    shown = [response for response in responses if response["system"] in (responses[0]["system"], FIRST_ORDER)]
     systems = [
         PolesZeros(
             label=one["system"],

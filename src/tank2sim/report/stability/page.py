@@ -46,13 +46,13 @@ _TRIM = (
 )
 _RESPONSE = (
     "Of the linear equations about the straight course, yaw rate by rudder. The gear acts with its lag; its rate "
-    "limit is not linear and left out. The poles of an unstable ship lie in the tinted half, and her Bode diagram is "
+    "limit is not linear and left out. The poles of an unstable ship lie in the tinted half, and its Bode diagram is "
     "what a controller works with, not what a ship with a fixed rudder does."
 )
 _TURNING = (
     "All steady turns that are joined to the straight course, at constant revolutions in calm water, followed by "
     "continuation through the folds. Solid: stable with the rudder held (all eigenvalues decay). Dashed: the ship "
-    "leaves the turn by herself, and only a rudder at work holds her there."
+    "leaves the turn by itself, and only a rudder at work holds its there."
 )
 _SPIRALS = (
     "The spiral holds each rudder until the turn is steady, so its points lie on the stable branches and jump at the "
@@ -62,7 +62,7 @@ _SPIRALS = (
 _CHARACTERISTIC = (
     "Bech: H(r) = δ is the diagram itself, here with the nearest cubic. Norrbin: n3 r³ + n2 r² + n1 r + n0 = K δ "
     "keeps place and slope of the straight course, so that n1 is 1 or −1. Both are fitted in rudder angle up to 20 "
-    "deg; the error beyond is told."
+    "deg; the error beyond is reported."
 )
 _IMO = (
     "The worse of starboard and port, at the card's speed in calm water. A margin is what is left to the limit; "
@@ -80,7 +80,7 @@ def stability_page(study: StabilityStudy, notices: Sequence[str]) -> Page:
         sections.append(_characteristic(study.characteristic))
     sections.append(PageSection(heading="IMO criteria", text=_IMO, tables=[_imo(study.imo)]))
     if notices:
-        rows: list[list[Cell]] = [[one] for one in notices]
+        rows: list[list[Cell]] = [[notice] for notice in notices]
         table = PageTable(caption="What the reader should know.", columns=[Column(title="")], rows=rows)
         sections.append(PageSection(heading="Notices", tables=[table]))
     subtitle = f"Stability and manoeuvrability, {found.speed_mps:.4g} m/s"
@@ -130,7 +130,10 @@ def _margin_figure(study: StabilityStudy) -> KeyFigure:
 def _straight(study: StabilityStudy) -> PageSection:
     found, margin = study.stability, study.margin
     with_effects = "".join(f", {name}" for name in found.effect_states)
-    modes = [[one.real, one.imag, -1 / one.real if one.real else None] for one in found.eigenvalues]
+    modes = [
+        [eigenvalue.real, eigenvalue.imag, -1 / eigenvalue.real if eigenvalue.real else None]
+        for eigenvalue in found.eigenvalues
+    ]
     eigenvalues = PageTable(
         caption=f"Eigenvalues of surge, sway and yaw{with_effects}.",
         columns=[
@@ -170,7 +173,8 @@ def _straight(study: StabilityStudy) -> PageSection:
 def _moving(study: StabilityStudy) -> PageSection:
     margin = study.margin
     rows: list[list[Cell]] = [
-        [one.short_name, one.value, one.percent, one.neutral_value, one.neutral_percent] for one in margin.influences
+        [influence.short_name, influence.value, influence.percent, influence.neutral_value, influence.neutral_percent]
+        for influence in margin.influences
     ]
     table = PageTable(
         caption="Exact sensitivity of C′, and the value at which the ship is neutral, all else unchanged.",
@@ -198,7 +202,7 @@ def _response(study: StabilityStudy) -> PageSection:
     return PageSection(
         heading="Response to the rudder",
         text=_RESPONSE,
-        charts=_response_charts([plain_json(one.as_json()) for one in responses]),
+        charts=_response_charts([plain_json(response.as_json()) for response in responses]),
     )
 
 
@@ -216,10 +220,10 @@ def _turning(study: StabilityStudy, turning: SteadyTurning) -> PageSection:
     ]
     if turning.folds:
         folds: list[list[Cell]] = [
-            [math.degrees(one.rudder_rad), math.degrees(one.yaw_rate_radps)] for one in turning.folds
+            [math.degrees(fold.rudder_rad), math.degrees(fold.yaw_rate_radps)] for fold in turning.folds
         ]
         heads = [Column(title="rudder", unit="deg"), Column(title="yaw rate", unit="deg/s")]
-        tables.append(PageTable(caption="Folds, where the ship leaves her branch.", columns=heads, rows=folds))
+        tables.append(PageTable(caption="Folds, where the ship leaves its branch.", columns=heads, rows=folds))
     spirals = study.direct is not None or study.reverse is not None
     run = {"direct": study.direct, "reverse": study.reverse}
     told = {name: one.as_json() for name, one in run.items() if one is not None}
@@ -328,16 +332,16 @@ def imo_verdict(one: ImoCriterion) -> Cell:
 def _imo(criteria: Sequence[ImoCriterion]) -> PageTable:
     rows: list[list[Cell]] = [
         [
-            one.name,
-            one.found,
-            one.allowed,
-            one.unit,
-            imo_verdict(one),
-            None if one.beyond_card else one.margin,
-            None if one.beyond_card else one.margin_percent,
-            one.remark,
+            criterion.name,
+            criterion.found,
+            criterion.allowed,
+            criterion.unit,
+            imo_verdict(criterion),
+            None if criterion.beyond_card else criterion.margin,
+            None if criterion.beyond_card else criterion.margin_percent,
+            criterion.remark,
         ]
-        for one in criteria
+        for criterion in criteria
     ]
     columns = [
         Column(title="criterion"),

@@ -1,4 +1,4 @@
-"""A measured trial beside the ship that one steers: its track, what steered it, and where it began."""
+"""A measured trial next to the ship that one steers: its track, what steered it, and where it began."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from tank2sim.records.trials import Trial
 from tank2sim.units import KNOT_MPS
 
 APPROACH = 20
-"""The approach is taken as the first of so many parts of a track (ours) where a trial tells no speed or heading."""
+"""The approach is taken as the first of so many parts of a track (project choice) where a trial tells no speed or
+heading."""
 
 _START = (("x", "m"), ("y", "m"), ("v", "mps"), ("r", "radps"))
 _SPEEDS = {"u_ground_mps": "its speed over the ground", "sog_mps": "its speed over the ground"}
@@ -23,7 +24,7 @@ _SPEEDS = {"u_ground_mps": "its speed over the ground", "sog_mps": "its speed ov
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ghost:
-    """A measured trial beside the ship, SI, rad, arrays (n,); nan where nothing was measured.
+    """A measured trial next to the ship, SI, rad, arrays (n,); nan where nothing was measured.
 
     `rudder_rad` is the measured angle if `by_angle`, else the order. `start` holds the start of the ship on it
     (``initial.*``) and `held` inputs at their mean (the wind), by name; `notices` what was taken for what.
@@ -45,7 +46,7 @@ class Ghost:
 def ghost_of(trial: Trial, model: Model) -> Ghost:
     """A trial as a ghost: its track from its first row on, and the rudder that steered it.
 
-    That is the measured angle where there is one, as in identification and validation: what her gear made of the
+    That is the measured angle where there is one, as in identification and validation: what its gear made of the
     orders is in the record. Without it, the order.
 
     Raises
@@ -66,7 +67,7 @@ def ghost_of(trial: Trial, model: Model) -> Ghost:
     by_angle = "delta_rad" in signals
     if by_angle:
         start["initial.rudder_angle"] = _first(signals["delta_rad"])
-        told.append("steered as in the trial, the rudder follows the measured angle: not through her steering gear")
+        told.append("steered as in the trial, the rudder follows the measured angle: not through its steering gear")
     held, wind = _wind(signals, model)
     return Ghost(
         label=trial.name,
@@ -84,7 +85,7 @@ def ghost_of(trial: Trial, model: Model) -> Ghost:
 
 
 def _speed(signals: Mapping[str, Array], way: float) -> tuple[float, list[str]]:
-    """Speed ahead at the start, m/s, and what a user should be told of it."""
+    """Speed ahead at the start, m/s, and what a user should know of it."""
     if "u_mps" in signals:
         return _first(signals["u_mps"]), []
     for name, what in _SPEEDS.items():
@@ -95,14 +96,14 @@ def _speed(signals: Mapping[str, Array], way: float) -> tuple[float, list[str]]:
 
 
 def _wind(signals: Mapping[str, Array], model: Model) -> tuple[dict[str, float], list[str]]:
-    """The mean wind of a record, as a vector, as inputs of the model; and what a user should be told."""
+    """The mean wind of a record, as a vector, as inputs of the model; and what a user should know."""
     if not {"wind_speed_mps", "wind_direction_rad"} <= set(signals) or "wind.speed" not in model.input_names:
-        return {}, []  # that a card without wind leaves it out is told where the trial is read
+        return {}, []  # that a card without wind leaves it out is reported where the trial is read
     speed, come = signals["wind_speed_mps"], signals["wind_direction_rad"]
     north, east = float(np.nanmean(speed * np.cos(come))), float(np.nanmean(speed * np.sin(come)))
     mean, come_from = math.hypot(north, east), math.atan2(east, north) % math.tau
-    told = f"the wind is set to the mean of the record, {mean:.3g} m/s from {math.degrees(come_from):.0f} deg"
-    return {"wind.speed": mean, "wind.direction": come_from}, [told]
+    text = f"the wind is set to the mean of the record, {mean:.3g} m/s from {math.degrees(come_from):.0f} deg"
+    return {"wind.speed": mean, "wind.direction": come_from}, [text]
 
 
 def _first(values: Array) -> float:

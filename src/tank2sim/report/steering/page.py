@@ -1,4 +1,4 @@
-"""The page one steers on: the ship herself in it, rudder and engine, her track, and a measured trial as a ghost."""
+"""The page one steers on: the ship itself in it, rudder and engine, its track, and a measured trial as a ghost."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ LONGEST_ZIGZAG = 150.0
 """A zigzag that has not ended after so many ship lengths is given up, as in the simulation."""
 
 HISTORY = 25.0
-"""Ship lengths that the chart over time shows at first, rounded to :data:`_WINDOWS`. A choice of ours."""
+"""Ship lengths that the chart over time shows at first, rounded to :data:`_WINDOWS`. Project choice."""
 
 _WINDOWS = (10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200)
-"""Stretches of time, s, that the chart over time may show: round ones, a choice of ours."""
+"""Stretches of time, s, that the chart over time may show: round ones, project choice."""
 
 FASTEST_APPROACH = 2.0
-"""Fastest approach that the page takes, in highest speeds of the card: beyond it nothing is known (ours)."""
+"""Fastest approach that the page takes, in highest speeds of the card: beyond it nothing is known (project choice)."""
 
 _SCRIPTS = ("ship.js", "voyage.js", "pen.js", "track.js", "history.js", "page.js")
 _BEAM = 1 / 7
@@ -62,7 +62,7 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
     ghost : Ghost, optional
         A measured trial.
     notices : sequence of str
-        What the user should be told.
+        What the user should know.
 
     Raises
     ------
@@ -77,8 +77,8 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
         loader=jinja2.PackageLoader("tank2sim", "report"), autoescape=True, undefined=jinja2.StrictUndefined
     )
     rudder, *others = _controls(model, ghost)
-    engine = next((one for one in others if one.name == "propeller.speed"), None)
-    set_by_hand = [one for one in others if one is not engine]
+    engine = next((other for other in others if other.name == "propeller.speed"), None)
+    set_by_hand = [other for other in others if other is not engine]
     environment.trim_blocks = environment.lstrip_blocks = True
     return environment.get_template("steering/page.html.j2").render(
         name=model.name,
@@ -102,7 +102,7 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
 
 def _data(model: Model, library: str | None, ghost: Ghost | None) -> dict[str, Any]:
     length, speed = _start(model, "ship.length"), _start(model, "ship.speed")
-    gear = [math.degrees(one.start) for one in model.parameters if one.name == "steering.max_angle"]
+    gear = [math.degrees(parameter.start) for parameter in model.parameters if parameter.name == "steering.max_angle"]
     return {
         "name": model.name,
         "library": library,

@@ -43,14 +43,14 @@ _LARGEST_RUDDER = math.radians(35.0)
 """End of the rudder slider where a card states no largest angle: the hard-over of IMO MSC.137(76)."""
 
 FULL_AHEAD, FULL_ASTERN = 1.2, -1.0
-"""Ends of the engine slider, in nominal revolutions. A choice of ours: the little overload that engines bear, and as
+"""Ends of the engine slider, in nominal revolutions. Project choice: the little overload that engines bear, and as
 much astern as ahead."""
 
 GHOST_STEERS, GHOST_RATE = "ghost.steers", "ghost.rudder_rate"
 """Inputs of a model that can follow a measured rudder (:func:`ship_following_angle`)."""
 
 _SMALL = {"deg": 1.0, "knots": 0.1, "rpm": 1.0}
-"""By what a control moves at a time, in the unit shown. A choice of ours."""
+"""By what a control moves at a time, in the unit shown. Project choice."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,7 +126,7 @@ def _control(model: Model, variable: Input) -> Control:
     unit, factor = shown_in(variable)
     low, high = _bounds(variable)
     if variable.name == "rudder.command":
-        limits = [one.start for one in model.parameters if one.name == "steering.max_angle"]
+        limits = [parameter.start for parameter in model.parameters if parameter.name == "steering.max_angle"]
         high = limits[0] if limits else _LARGEST_RUDDER
         low = -high
     if variable.name == "propeller.speed":
@@ -145,7 +145,12 @@ def _control(model: Model, variable: Input) -> Control:
 
 def _bounds(variable: Input) -> tuple[float | None, float | None]:
     """Bounds of an input, SI: for what an effect takes from its surroundings those of a card, which the model lacks."""
-    known = [one for effect in EFFECTS.values() for one in effect.parameters if one.input_name == variable.name]
+    known = [
+        parameter
+        for effect in EFFECTS.values()
+        for parameter in effect.parameters
+        if parameter.input_name == variable.name
+    ]
     if not known:
         return variable.minimum, variable.maximum
     lowest = known[0].minimum

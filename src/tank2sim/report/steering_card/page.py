@@ -1,4 +1,4 @@
-"""The page of a steering card: its models beside each other by turns, tracks and influence, and what is missing."""
+"""The page of a steering card: its models next to each other by turns, tracks and influence, and what is missing."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ def _diagram(lines: list[ChartRecord], points: list[ChartRecord]) -> alt.LayerCh
     ]
     line = alt.Chart(data(lines), name="plot").mark_line(clip=True)
     unseen = alt.Chart(data(lines)).mark_point(opacity=0, filled=True, size=110, clip=True)
-    below = alt.Legend(title=None, orient="bottom")  # beside the lines they would be too wide for the page
+    below = alt.Legend(title=None, orient="bottom")  # next to the lines they would be too wide for the page
     shape = alt.Shape("run:N", scale=alt.Scale(domain=marked, range=list(SHAPES[: len(marked)])), legend=below)
     point = alt.Chart(data(points)).mark_point(style="start", filled=False, strokeWidth=1.8, clip=True)
     layers = [
@@ -196,18 +196,18 @@ def influence_bars(models: Mapping[str, Mapping[str, float]]) -> alt.LayerChart:
 
 def _agreed(card: SteeringCard, found: SteeringComparison) -> PageSection:
     rows: list[list[Cell]] = []
-    for name, one in found.predictions.items():
+    for name, prediction in found.predictions.items():
         title = card.models[name].title
         rows += [
-            [title, "printed K, right pairs", one.percent, one.predicted_m],
-            [title, "printed K, as the source pairs them", one.misread_percent, one.misread_m],
-            [title, "K computed here", one.own_percent, one.own_m],
-            [title, "the model itself", 100 * (one.direct_m / one.radius_m - 1), one.direct_m],
+            [title, "printed K, right pairs", prediction.percent, prediction.predicted_m],
+            [title, "printed K, as the source pairs them", prediction.misread_percent, prediction.misread_m],
+            [title, "K computed here", prediction.own_percent, prediction.own_m],
+            [title, "the model itself", 100 * (prediction.direct_m / prediction.radius_m - 1), prediction.direct_m],
             [
                 title,
                 "the model with the source's slip",
-                100 * (one.direct_misread_m / one.radius_m - 1),
-                one.direct_misread_m,
+                100 * (prediction.direct_misread_m / prediction.radius_m - 1),
+                prediction.direct_misread_m,
             ],
         ]
     columns = [
@@ -217,14 +217,16 @@ def _agreed(card: SteeringCard, found: SteeringComparison) -> PageSection:
         Column(title="radius", unit="m"),
     ]
     names = list(next(iter(found.predictions.values())).agreed_percent)
-    agreed: list[list[Cell]] = [[k, *(one.agreed_percent.get(k) for one in found.predictions.values())] for k in names]
+    agreed: list[list[Cell]] = [
+        [k, *(prediction.agreed_percent.get(k) for prediction in found.predictions.values())] for k in names
+    ]
     heads = [Column(title=""), *(Column(title=card.models[name].title) for name in found.predictions)]
     slip = ", ".join(
         f"{one} with the K of {other}" for one, other in (card.influence.misread_as if card.influence else {}).items()
     )
     return PageSection(
         heading="Agreed variation",
-        text="Kc: change of each coefficient in % with 1 % of draught. The sum of Kc K / 10 foretells the radius.",
+        text="Kc: change of each coefficient in % with 1 % of draught. The sum of Kc K / 10 predicts the radius.",
         tables=[
             PageTable(caption="Kc, %", columns=heads, rows=agreed),
             PageTable(caption="Foretold and computed radius", columns=columns, rows=rows),
@@ -236,9 +238,9 @@ def _agreed(card: SteeringCard, found: SteeringComparison) -> PageSection:
 def _manoeuvres(card: SteeringCard, found: SteeringComparison, told: Json) -> PageSection:
     keys = ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m")
     rows: list[list[Cell]] = []
-    for name, one in found.runs.items():
-        numbers = [one.turn_figures[key] for key in keys]
-        overshoots = one.zigzag_figures["overshoots_deg"]
+    for name, run in found.runs.items():
+        numbers = [run.turn_figures[key] for key in keys]
+        overshoots = run.zigzag_figures["overshoots_deg"]
         first = [float(x) for x in overshoots[:2]] if isinstance(overshoots, list) else []
         cells: list[Cell] = [float(x) if isinstance(x, int | float) else None for x in (*numbers, *first)]
         rows.append([card.models[name].title, *cells, *[None] * (2 - len(first))])

@@ -138,15 +138,15 @@ _VERDICTS = ("usable", "not determined", "drag negative somewhere")
 
 def model_chart(models: Sequence[Mapping[str, Json]], *, width_px: int = 340) -> alt.HConcatChart:
     """M with its 95 % interval, and AIC above the lowest, of each of the ``models`` of the JSON."""
-    lowest = min(one["aic"] for one in models)
-    names = [", ".join(one["unknowns"]) for one in models]
+    lowest = min(model["aic"] for model in models)
+    names = [", ".join(model["unknowns"]) for model in models]
     rows: list[ChartRecord] = []
-    for name, one in zip(names, models, strict=True):
-        mass, half = one["estimates"]["M"], one["half_widths_95"]["M"]
+    for name, model in zip(names, models, strict=True):
+        mass, half = model["estimates"]["M"], model["half_widths_95"]["M"]
         ends = (None, None) if half is None else (plain(mass - half), plain(mass + half))
         rows.append(
-            {"name": name, "run": _verdict(one), "m": plain(mass)}
-            | {"low": ends[0], "high": ends[1], "aic": plain(one["aic"] - lowest)}
+            {"name": name, "run": _verdict(model), "m": plain(mass)}
+            | {"low": ends[0], "high": ends[1], "aic": plain(model["aic"] - lowest)}
         )
     shown = [verdict for verdict in _VERDICTS if any(row["run"] == verdict for row in rows)]
     look = series_look(shown, as_points=shown)

@@ -77,7 +77,7 @@ def _estimates(study: TowStudy) -> PageSection:
         "M dv/dt + B1 v⁴ + B2 v³ + B3 v² = T (1.5). The method of the paper and QR put a polynomial through the mean "
         "speeds and solve the least squares of the equation; output error integrates the equation and fits all "
         "readings. ± is one standard error. A force that is wrong by one per cent makes all of them wrong by one per "
-        "cent: a constant force beside T cannot be found."
+        "cent: a constant force next to T cannot be found."
     )
     tables = [PageTable(caption="Estimates by method", columns=columns, rows=[[_text(c) for c in row] for row in rows])]
     return PageSection(heading="Estimates", text=text, tables=[*tables, _polynomials(study)], notes=study.notes)
@@ -104,14 +104,14 @@ def _polynomials(study: TowStudy) -> PageTable:
     columns = [Column(title=head, unit="m/s" if head.startswith("rms") else "", digits=4) for head in heads]
     rows: list[list[Cell]] = []
     printed = tow_paper.are_of_the_paper(study.result.tows)
-    for one in study.polynomials:
-        coefficients: list[Cell] = [*one.coefficients, *[None] * (3 - one.degree)]
-        rows.append([f"{one.degree}", *coefficients, one.rms_mps, one.rms_less_one_mps])
+    for polynomial in study.polynomials:
+        coefficients: list[Cell] = [*polynomial.coefficients, *[None] * (3 - polynomial.degree)]
+        rows.append([f"{polynomial.degree}", *coefficients, polynomial.rms_mps, polynomial.rms_less_one_mps])
         if printed:
-            values, error = tow_paper.TABLE_2[one.degree]
-            rows.append([f"{one.degree}, printed", *values, *[None] * (3 - one.degree), error, None])
+            values, error = tow_paper.TABLE_2[polynomial.degree]
+            rows.append([f"{polynomial.degree}, printed", *values, *[None] * (3 - polynomial.degree), error, None])
     caption = "Polynomials v = α₀ + α₁ t + ... through the mean speeds, m/s over s"
-    beside = ", beside Table 2 of the paper, which no single change of its Table 1 gives" if printed else ""
+    beside = ", next to Table 2 of the paper, which no single change of its Table 1 gives" if printed else ""
     return PageTable(caption=caption + beside, columns=columns, rows=rows)
 
 
@@ -161,14 +161,14 @@ def _models(study: TowStudy) -> PageSection:
         Column(title="drag nowhere negative"),
     ]
     rows: list[list[Cell]] = []
-    for one in study.models:
-        fit = one.fit
-        told = [
+    for model in study.models:
+        fit = model.fit
+        messages = [
             f"{name} {format_number(float(value))} ± {format_number(float(half), 2)}"
-            for name, value, half in zip(one.model.unknowns, fit.estimates, fit.half_widths, strict=True)
+            for name, value, half in zip(model.model.unknowns, fit.estimates, fit.half_widths, strict=True)
         ]
         aic, condition = round(fit.aic, 1), float(f"{fit.condition_scaled:.2g}")
-        rows.append([one.model.label, "; ".join(told), fit.scatter_mps, aic, condition, one.plausible])
+        rows.append([model.model.label, "; ".join(messages), fit.scatter_mps, aic, condition, model.plausible])
     charts = model_illustrations(plain_json(study.as_json()))
     return PageSection(
         heading="What these tows can tell",
@@ -181,7 +181,7 @@ def _models(study: TowStudy) -> PageSection:
 
 _MODELS = (
     "A lower AIC is a better fit for the number of unknowns; it counts readings as independent, and differences below "
-    "4 say little. A model whose unknowns cannot be told apart, or whose drag pushes, is no more than a curve."
+    "4 say little. A model whose unknowns cannot be distinguished, or whose drag pushes, is no more than a curve."
 )
 _ELLIPSES = (
     "Regions are linearised and take the readings as independent; the points are the same models fitted to each tow by "

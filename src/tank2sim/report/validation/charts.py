@@ -1,4 +1,4 @@
-"""Charts of a validation: comparison errors beside their uncertainty, and replays of trials."""
+"""Charts of a validation: comparison errors next to their uncertainty, and replays of trials."""
 
 from __future__ import annotations
 
@@ -41,14 +41,17 @@ _REPLAY = (
 
 
 def comparison_error_chart(figures: Sequence[Mapping[str, Json]]) -> alt.LayerChart:
-    """E of each of the ``figures`` of the JSON beside plus and minus U_val, in per cent of D."""
+    """E of each of the ``figures`` of the JSON next to plus and minus U_val, in per cent of D."""
     rows = []
-    for one in figures:
-        if one["error"] is None or not one["measured"]:
+    for figure in figures:
+        if figure["error"] is None or not figure["measured"]:
             continue
-        own = {"name": f"{one['trial']}: {in_words(one['name'])[0]}", "e": 100 * one["error"] / abs(one["measured"])}
-        level = one["level_percent"] or 0.0
-        rows.append({**own, "low": -level, "high": level, "run": str(one["outcome"])})
+        own = {
+            "name": f"{figure['trial']}: {in_words(figure['name'])[0]}",
+            "e": 100 * figure["error"] / abs(figure["measured"]),
+        }
+        level = figure["level_percent"] or 0.0
+        rows.append({**own, "low": -level, "high": level, "run": str(figure["outcome"])})
     names = [str(row["name"]) for row in rows]
     y = alt.Y("name:N", sort=names, title=None, axis=alt.Axis(labelLimit=320))
     outcomes = list(dict.fromkeys(str(row["run"]) for row in rows))
@@ -72,6 +75,6 @@ def comparison_error_chart(figures: Sequence[Mapping[str, Json]]) -> alt.LayerCh
         title="Comparison error and validation uncertainty",
         width=430,
         height=alt.Step(18),
-        description=f"Comparison error of {len(rows)} figures beside the validation uncertainty.",
+        description=f"Comparison error of {len(rows)} figures next to the validation uncertainty.",
     )
     return chart

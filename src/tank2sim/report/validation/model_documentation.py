@@ -38,7 +38,7 @@ def documentation(card: ManoeuvringCard, system: Model) -> PageSection:
         ["Steering gear", steering],
         ["Autopilot", "none: rudder by the manoeuvre (zigzag reversed at its heading) or by the record"],
         ["Propulsion", _propulsion(card)],
-        ["Effects", "; ".join(one.name for one in card.effects) or "none"],
+        ["Effects", "; ".join(effect.name for effect in card.effects) or "none"],
         ["Environment", _environment(card)],
         ["Integration", f"classical Runge-Kutta, fourth order, step {system.step_s:.3g} s"],
         [

@@ -1,4 +1,4 @@
-"""The validation report of a simulation model, with what ITTC 7.5-02-06-03 wants to be told of it."""
+"""The validation report of a simulation model, with what ITTC 7.5-02-06-03 wants to be reported of it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _METHOD = (
 _SOURCES_OF_U = (
     "u_num comes from repeating the simulation with half the step (three times the change, Roache's factor for two "
     "grids, at the first order); u_input from ships drawn within the standard errors of the card, with "
-    "their covariance where one stands beside it; u_D from reading the trial off again with its noise, and from "
+    "their covariance where one is next to it; u_D from reading the trial off again with its noise, and from "
     "repeats of one manoeuvre "
     "where there are any."
 )
@@ -94,7 +94,7 @@ def validation_page(evidence: ValidationEvidence) -> Page:
         sections.append(_replays(evidence.replays))
     sections += [_standards(evidence.criteria), _limits(evidence)]
     if evidence.notices:
-        rows: list[list[Cell]] = [[one] for one in evidence.notices]
+        rows: list[list[Cell]] = [[notice] for notice in evidence.notices]
         table = PageTable(caption="What the reader should know.", columns=[Column(title="")], rows=rows)
         sections.append(PageSection(heading="Notices", tables=[table]))
     subtitle = "Validation of the manoeuvring simulation model, in the manner of ITTC 7.5-02-06-03"
@@ -111,8 +111,12 @@ def _figures(evidence: ValidationEvidence) -> list[KeyFigure]:
         verdict = Verdict.PASSED if found.count(ComparisonOutcome.VALIDATED) == total else worst
         value = f"{found.count(ComparisonOutcome.VALIDATED)} of {total}"
         shown = [KeyFigure(label="Figures validated", value=value, verdict=verdict, note=found.verdict)]
-        errors = [abs(one.error / one.measured) for one in found.figures if one.error is not None and one.measured]
-        levels = [one.level_percent for one in found.figures if one.level_percent is not None]
+        errors = [
+            abs(figure.error / figure.measured)
+            for figure in found.figures
+            if figure.error is not None and figure.measured
+        ]
+        levels = [figure.level_percent for figure in found.figures if figure.level_percent is not None]
         if errors:
             shown.append(KeyFigure(label="Median error |E|", value=100 * float(np.median(errors)), unit="% of D"))
         if levels:
@@ -173,12 +177,12 @@ def _comparison(found: Validation) -> PageSection:
         return PageSection(heading="Validation", text=text, notes=[found.verdict])
     rows: list[list[Cell]] = []
     manoeuvres: dict[str, str] = {}
-    for one in found.figures:
-        manoeuvres[one.trial] = one.manoeuvre
-        parts = (one.measured, one.simulated, one.error), (one.inputs, one.data, one.uncertainty)
+    for figure in found.figures:
+        manoeuvres[figure.trial] = figure.manoeuvre
+        parts = (figure.measured, figure.simulated, figure.error), (figure.inputs, figure.data, figure.uncertainty)
         values = [_text(value) for value in parts[0]] + [_text(value, 3) for value in parts[1]]
-        number = list(manoeuvres).index(one.trial) + 1
-        rows.append([f"{number}: {_named(one.name)}", *values, one.level_percent, str(one.outcome)])
+        number = list(manoeuvres).index(figure.trial) + 1
+        rows.append([f"{number}: {_named(figure.name)}", *values, figure.level_percent, str(figure.outcome)])
     trials: list[list[Cell]] = [[place, *pair] for place, pair in enumerate(manoeuvres.items(), start=1)]
     heads = [Column(title="no."), Column(title="trial"), Column(title="manoeuvre, as recognised")]
     benchmark = PageTable(caption="Benchmark data.", columns=heads, rows=trials)
@@ -190,13 +194,15 @@ def _comparison(found: Validation) -> PageSection:
         Column(title="verdict"),
     ]
     required = found.figures[0].required_percent
-    largest = max((100 * one.numerical / abs(one.measured) for one in found.figures if one.measured), default=0.0)
+    largest = max(
+        (100 * figure.numerical / abs(figure.measured) for figure in found.figures if figure.measured), default=0.0
+    )
     numerical = f"u_num is {format_number(largest, 2)} % of D at most."
     level = f"The level is U_val in per cent of D; required here: {required:g} %."
     text = f"{_METHOD} {level}\n\n{_SOURCES_OF_U} {numerical}\n\n{_CLOSED_LOOP}"
     table = PageTable(caption=f"{found.verdict[:1].upper()}{found.verdict[1:]}.", columns=columns, rows=rows)
     chart = Illustration(
-        chart=comparison_error_chart([one.as_json() for one in found.figures]), caption=COMPARISON_ERRORS
+        chart=comparison_error_chart([figure.as_json() for figure in found.figures]), caption=COMPARISON_ERRORS
     )
     return PageSection(heading="Validation", text=text, tables=[benchmark, table], charts=[chart])
 
@@ -214,11 +220,11 @@ def _named(name: str) -> str:
 def _replays(replays: Sequence[Passed]) -> PageSection:
     rows: list[list[Cell]] = []
     charts = []
-    for one in replays:
-        rows += [[one.name, *_replay_error(one, name)] for name in one.noise]
-        if {"motion.x", "motion.y"} <= set(one.noise):
-            charts.append(Illustration(chart=_replay_track(one)))
-        charts.append(Illustration(chart=_replay_history(one)))
+    for replay in replays:
+        rows += [[replay.name, *_replay_error(replay, name)] for name in replay.noise]
+        if {"motion.x", "motion.y"} <= set(replay.noise):
+            charts.append(Illustration(chart=_replay_track(replay)))
+        charts.append(Illustration(chart=_replay_history(replay)))
     columns = [
         Column(title="trial"),
         Column(title="signal"),
@@ -263,7 +269,8 @@ def _replay_history(one: Passed) -> alt.VConcatChart:
 
 def _standards(criteria: Sequence[ImoCriterion]) -> PageSection:
     rows: list[list[Cell]] = [
-        [one.name, one.found, one.allowed, one.unit, imo_verdict(one), one.remark] for one in criteria
+        [criterion.name, criterion.found, criterion.allowed, criterion.unit, imo_verdict(criterion), criterion.remark]
+        for criterion in criteria
     ]
     columns = [Column(title=title) for title in ("criterion", "found", "allowed", "unit", "verdict", "remark")]
     table = PageTable(caption="IMO MSC.137(76), the worse of starboard and port.", columns=columns, rows=rows)
@@ -278,13 +285,13 @@ def _limits(evidence: ValidationEvidence) -> PageSection:
         "Coefficients that no test of the source excites, or that are estimated (see the source and the comments).",
         "Scale effects between model and ship, in resistance, wake and rudder flow.",
         "Weather, current, depth and loading of the trials, as far as no effect of the card holds them.",
-        "Errors of the coefficients that go together, where no covariance stands beside the card.",
+        "Errors of the coefficients that go together, where no covariance is next to the card.",
     ]
     if card.propulsion is None:
         causes.append(
             "Engine and propeller: the card has none, so loss of revolutions in a turn is in the coefficients."
         )
-    rows: list[list[Cell]] = [[one] for one in causes]
+    rows: list[list[Cell]] = [[cause] for cause in causes]
     text = (
         "What can be behind an error E (7.5-02-06-03, potential causes of prediction error). The command influence "
         "tells how each figure depends on each coefficient (sensitivity), the command gap looks for the missing effect."

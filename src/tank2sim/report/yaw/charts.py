@@ -1,4 +1,4 @@
-"""Charts of the yaw rig: the record beside its programme, the energy balance, estimates by method, residuals."""
+"""Charts of the yaw rig: the record next to its programme, the energy balance, estimates by method, residuals."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SIGNALS = (
 
 
 def record_chart(name: str, columns: Mapping[str, Json]) -> alt.VConcatChart:
-    """Rate where it is evaluated beside the programme's, tracking error, and current, over the whole record; from
+    """Rate where it is evaluated next to the programme's, tracking error, and current, over the whole record; from
     ``histories`` of the JSON."""
     time = columns["t_s"]
     own = {"rate": "rate_radps", "error": "tracking_error_rad", "current": "current_A"}
@@ -69,7 +69,7 @@ def estimates_chart(methods: Mapping[str, Mapping[str, Json]], *, width_px: int 
     ``methods`` of the JSON."""
     rows: list[ChartRecord] = []
     names = []
-    kind = "total" if any(one["added_inertia_kgm2"] is None for one in methods.values()) else "added"
+    kind = "total" if any(method["added_inertia_kgm2"] is None for method in methods.values()) else "added"
     for method, estimate in methods.items():
         value, error = estimate[f"{kind}_inertia_kgm2"], estimate[f"{kind}_inertia_standard_error_kgm2"]
         spread = _NORMAL * (error or 0.0)
@@ -104,8 +104,13 @@ def energy_residual_chart(residuals: Sequence[Mapping[str, Json]], *, width_px: 
     """What the least squares leave of each subinterval's work, against the rate in its middle; from
     ``energy_residuals`` of the JSON."""
     rows: list[ChartRecord] = [
-        {"run": one["stage"], "hump": one["hump"], "w": plain(one["rate_degps"]), "v": plain(1e6 * one["left_J"])}
-        for one in residuals
+        {
+            "run": residual["stage"],
+            "hump": residual["hump"],
+            "w": plain(residual["rate_degps"]),
+            "v": plain(1e6 * residual["left_J"]),
+        }
+        for residual in residuals
     ]
     look = series_look(["accelerating", "braking"], as_points=["accelerating", "braking"])
     tooltip = [

@@ -31,7 +31,7 @@ _HOW = {
 
 
 def yaw_page(result: YawResult, theory: Sequence[TheoryValue] = ()) -> Page:
-    """The page of a result, and beside it what `theory` gives for the body's form."""
+    """The page of a result, and next to it what `theory` gives for the body's form."""
     names = ", ".join(record.path.name for record in result.records)
     estimates, balance, *more = yaw_drawn(plain_json(result.as_json()))
     return Page(

@@ -21,7 +21,7 @@ from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.audit import record_noise
 
 _LEAST_NOISE = 1e-3
-"""Noise of a signal that states none is taken as this share of its standard deviation at least (ours)."""
+"""Noise of a signal that states none is taken as this share of its standard deviation at least (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)

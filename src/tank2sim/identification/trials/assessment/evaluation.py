@@ -151,7 +151,7 @@ def predicted_figures(card: ManoeuvringCard, trials: Sequence[Trial]) -> tuple[F
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """One trial beside what a model makes of it.
+    """One trial next to what a model makes of it.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ _SHOWN = ("rudder", "motion.psi", "motion.r", "motion.speed", "motion.beta", "mo
 def comparison_windows(
     problem: Problem, card: ManoeuvringCard, trials: Sequence[Trial], noise: Mapping[str, float]
 ) -> tuple[Passage, ...]:
-    """Trials beside their simulations by a card's model: turns and zigzags in closed loop, others replayed.
+    """Trials next to their simulations by a card's model: turns and zigzags in closed loop, others replayed.
 
     Parameters
     ----------

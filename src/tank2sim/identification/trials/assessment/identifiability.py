@@ -23,13 +23,15 @@ from tank2sim.identification.trials.problem.measured_motion import MEASURED_STAT
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
 CLOSE_CORRELATION = 0.95
-"""Correlation from which two parameters are told as one: their difference has 39 times the variance of their sum."""
+"""Correlation from which two parameters are reported as one: their difference has 39 times the variance of their
+sum."""
 
 WEAK = 0.1
-"""A direction in which the trials tell less than this share of what the prior tells counts as not seen (ours)."""
+"""A direction in which the trials tell less than this share of what the prior tells counts as not seen (project
+choice)."""
 
 PART = 0.3
-"""Least component of a direction for its parameter to be named (ours)."""
+"""Least component of a direction for its parameter to be named (project choice)."""
 
 _ALONE = 1e-6
 """Information of the prior, of its own, that is left in what "the data alone" say: it keeps matrices regular."""
@@ -143,8 +145,8 @@ def refuse_unseen(problem: Problem) -> tuple[str, ...]:
     needed = [name for name in missing if _needed(parse_term(_short(name)))]
     if needed:
         runs = ", ".join(dict.fromkeys(run.origin for run in problem.runs))
-        told = ", ".join(_short(name) for name in needed)
-        raise InputError(runs, "", f"shows nothing of {told}", _remedy(needed))
+        text = ", ".join(_short(name) for name in needed)
+        raise InputError(runs, "", f"shows nothing of {text}", _remedy(needed))
     return tuple(missing)
 
 

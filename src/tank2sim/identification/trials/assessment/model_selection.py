@@ -24,7 +24,7 @@ from tank2sim.identification.trials.problem.picklable import Portable, map_tasks
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
 FARTHEST = 4
-"""One in this many runs, those of largest amplitude, is left out to see how a model extrapolates (ours)."""
+"""One in this many runs, those of largest amplitude, is left out to see how a model extrapolates (project choice)."""
 
 TrialEstimator = Callable[[Problem], Estimate]
 Score = Callable[[Problem, Estimate], float]
@@ -66,7 +66,7 @@ def criteria(problem: Problem, estimate: Estimate, samples: float | None = None)
     """
     form = WeakForm(problem)
     windows = form.at(estimate.values)
-    series = [one.residuals[piece] for one, run in zip(windows, form.runs, strict=True) for piece in run.pieces]
+    series = [window.residuals[piece] for window, run in zip(windows, form.runs, strict=True) for piece in run.pieces]
     prior = scaled_prior(problem, estimate.prior_scale)
     inverse = np.linalg.inv(estimate.information * np.outer(prior, prior) + np.eye(len(prior)))
     return criteria_of(series, float(len(prior) - np.trace(inverse)), samples)
@@ -203,7 +203,7 @@ def simplest(candidates: Mapping[str, CrossValidation]) -> str:
     """
     if not candidates:
         raise ValueError("there is nothing to choose from")
-    errors = {name: one.errors for name, one in candidates.items()}
+    errors = {name: candidate.errors for name, candidate in candidates.items()}
     best = min(errors, key=lambda name: float(np.mean(errors[name])))
 
     def as_good(name: str) -> bool:
@@ -218,7 +218,7 @@ def simplest(candidates: Mapping[str, CrossValidation]) -> str:
 def yaw_rate_error(problem: Problem, estimate: Estimate) -> float:
     """A score: error of the yaw rate over free-running windows, as a share of it (:mod:`.evaluation`)."""
     spreads = np.nanstd(np.concatenate([run.measured for run in problem.runs]), axis=0)
-    weights = {name: float(one) or 1.0 for name, one in zip(problem.seen, spreads, strict=True)}
+    weights = {name: float(spread) or 1.0 for name, spread in zip(problem.seen, spreads, strict=True)}
     return pooled(replay_error(problem, estimate.values, weights), "motion.r")
 
 

@@ -44,7 +44,7 @@ class PredictionSettings:
     Parameters
     ----------
     members : int
-        Simulations; 200 give the ends of a 95 % band to about a tenth of its width (ours).
+        Simulations; 200 give the ends of a 95 % band to about a tenth of its width (project choice).
     seed : int
     levels : tuple of float
         Quantiles to tell.
@@ -121,7 +121,7 @@ def bands(
     names = list(dict.fromkeys(name for one in reached for name in one))
     members = {name: np.array([np.nan if one is None else one.get(name, np.nan) for one in found]) for name in names}
     members = {name: column for name, column in members.items() if not np.isnan(column).all()}
-    quantiles = {name: tuple(map(float, np.nanquantile(one, settings.levels))) for name, one in members.items()}
+    quantiles = {name: tuple(map(float, np.nanquantile(member, settings.levels))) for name, member in members.items()}
     return Bands(settings.levels, quantiles, members, len(found) - len(reached))
 
 
@@ -135,9 +135,9 @@ def bootstrap(
 ) -> Array:
     """Parametric bootstrap: estimates (members, k) from runs that were simulated with the estimate (Efron 1979).
 
-    Each run is simulated anew under its own inputs, with random forces and white noise of the sensors' size; what was
-    known beforehand is drawn anew too, around the estimate. Members in which a run leaves all bounds are left out: on a
-    course-unstable ship over long runs there are some.
+    Each run is simulated again under its own inputs, with random forces and white noise of the sensors' size; what was
+    known beforehand is drawn again too, around the estimate. Members in which a run leaves all bounds are left out:
+    on a course-unstable ship over long runs there are some.
 
     Parameters
     ----------

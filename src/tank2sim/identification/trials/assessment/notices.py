@@ -1,4 +1,4 @@
-"""What a user should be told of an identification: where it is worse, what it rests on, where its card fails."""
+"""What a user should know of an identification: where it is worse, what it rests on, where its card fails."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ HARD_TURN = math.radians(35.0)
 """Rudder of the turn that a card is tried with (IMO MSC.137(76)), or the gear's largest angle if that is less."""
 
 STOPPED = 0.15
-"""A ship that keeps less than this share of her speed in a turn has stopped: full hulls keep a third (ours)."""
+"""A ship that keeps less than this share of its speed in a turn has stopped: full hulls keep a third (project
+choice)."""
 
 WORSE = 1.05
-"""An error that grew by less than this factor is the same (ours)."""
+"""An error that grew by less than this factor is the same (project choice)."""
 
 
 def remarks(result: Identification) -> tuple[str, ...]:
@@ -36,8 +37,8 @@ def remarks(result: Identification) -> tuple[str, ...]:
 
 
 def _recognised(result: Identification) -> list[str]:
-    told = "; ".join(f"{name}: {words}" for name, words in result.manoeuvres.items())
-    return [f"recognised, to starboard positive: {told}"] if told else []
+    text = "; ".join(f"{name}: {words}" for name, words in result.manoeuvres.items())
+    return [f"recognised, to starboard positive: {text}"] if text else []
 
 
 def _chosen(result: Identification) -> list[str]:
@@ -61,26 +62,26 @@ def _widened(scale: Mapping[str, float]) -> list[str]:
 
 
 def _worse(result: Identification) -> list[str]:
-    told = []
+    messages = []
     pairs = [("the trials fitted", result.before, result.fit)]
     if result.holdout and result.before_holdout:
         pairs.append(("the trials held out", result.before_holdout, result.holdout))
     for words, before, now in pairs:
         old, new = pooled(before.following, "motion.r"), pooled(now.following, "motion.r")
         if new > WORSE * old:
-            told.append(
+            messages.append(
                 f"WORSE than the card before on {words}: yaw-rate error {100 * old:.3g} % before, {100 * new:.3g} %"
             )
-    return told
+    return messages
 
 
 def _outside(result: Identification) -> list[str]:
     if result.holdout is None:
         return []
     missed = [
-        f"{one.trial} {one.name}"
-        for one in result.holdout.figures
-        if one.interval and not one.interval[0] <= one.measured <= one.interval[1]
+        f"{figure.trial} {figure.name}"
+        for figure in result.holdout.figures
+        if figure.interval and not figure.interval[0] <= figure.measured <= figure.interval[1]
     ]
     return [f"measured outside the 95 % interval: {', '.join(missed)}"] if missed else []
 
@@ -89,16 +90,16 @@ def _stops(card: ManoeuvringCard) -> list[str]:
     """Trials seldom hold a full turn: the card is tried in one, either way."""
     gear = card.steering_gear
     largest = HARD_TURN if gear is None or gear.max_angle_rad is None else min(HARD_TURN, gear.max_angle_rad)
-    told = []
+    messages = []
     for side, word in ((1, "starboard"), (-1, "port")):
         words = f"in a {math.degrees(largest):.0f} deg turn to {word} the model found"
         try:
             speed = simulate(build(card), Turn(side * largest)).trajectory["motion.speed"]
         except InputError:
-            told.append(f"{words} leaves all bounds: it holds only near the trials")
+            messages.append(f"{words} leaves all bounds: it holds only near the trials")
             continue
         if speed[-1] < STOPPED * speed[0]:
-            told.append(
+            messages.append(
                 f"{words} loses {100 * (1 - speed[-1] / speed[0]):.0f} % of its speed: it holds only near the trials"
             )
-    return told
+    return messages

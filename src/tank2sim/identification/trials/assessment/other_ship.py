@@ -42,14 +42,14 @@ def other_ship(problem: Problem) -> tuple[str, ...]:
         return ()
     rudder = problem.model.input_names.index("rudder.command")
     trials: dict[str, list[SampledRun]] = {}
-    for run in problem.runs:  # parts of one trial are told by their times
+    for run in problem.runs:  # parts of one trial are reported by their times
         if run.inputs[:, rudder].std() > _LEAST_RUDDER:
             trials.setdefault(run.name.partition(" at ")[0], []).append(run)
     found = {name: ratio for name, runs in trials.items() if (ratio := _ratio(problem, runs)) is not None}
-    told = [_told(name, ratio) for name, ratio in found.items() if _beyond(*ratio, FACTOR_ALONE)]
+    messages = [_told(name, ratio) for name, ratio in found.items() if _beyond(*ratio, FACTOR_ALONE)]
     if found and _beyond(*(whole := _mean(list(found.values()))), _FACTOR):
-        told.insert(0, _told("the mean of all trials", whole))
-    return tuple(told)
+        messages.insert(0, _told("the mean of all trials", whole))
+    return tuple(messages)
 
 
 def _told(name: str, ratio: tuple[float, float]) -> str:

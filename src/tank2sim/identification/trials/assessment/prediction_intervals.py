@@ -1,4 +1,4 @@
-"""What an answer foretells: intervals of the figures of trials held out, scatter of the estimates, criteria."""
+"""What an answer predicts: intervals of the figures of trials held out, scatter of the estimates, criteria."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def held_out(answer: FittedProblem, held: Measured, members: int, executor: Exec
             continue
         for name, (lowest, *_, highest) in found.items():
             intervals[trial.name, IN_BANDS.get(name, name)] = (lowest, highest)
-    figures = tuple(replace(one, interval=intervals.get((one.trial, one.name))) for one in plain.figures)
+    figures = tuple(replace(figure, interval=intervals.get((figure.trial, figure.name))) for figure in plain.figures)
     return replace(plain, figures=figures)
 
 
@@ -76,7 +76,7 @@ def bootstrapped(
     members: int,
     executor: Executor | None,
 ) -> Array | None:
-    """Estimates from trials simulated anew; None where they were not asked for, or the residual forces are unknown."""
+    """Estimates from trials simulated again; None where they were not asked for, or the residual forces are unknown."""
     if not members:
         return None
     left = _disturbances(answer)

@@ -1,4 +1,4 @@
-"""Trials beside what the card that was given and the card that was found make of them."""
+"""Trials next to what the card that was given and the card that was found make of them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SAMPLES = 240
 
 
 def replays(card: ManoeuvringCard, result: Identification, trials: Measured) -> tuple[tuple[Passage, Passage], ...]:
-    """Each trial beside `card`, the one that was given, and beside the card found."""
+    """Each trial next to `card`, the one that was given, and next to the card found."""
     both = []
     whole = card.model.valid_speed_mps is None  # the card found states the speeds of the trials fitted alone
     for one in (card, result.card):

@@ -22,7 +22,7 @@ from tank2sim.identification.trials.methods.weak_form import WeakForm, WeakWindo
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 
 HARMONICS = 16
-"""Harmonics of a force (ours): one in each sixteenth of its power, from slow drift to shaking."""
+"""Harmonics of a force (project choice): one in each sixteenth of its power, from slow drift to shaking."""
 
 LAGS = 12
 """Residuals up to this many half windows apart tell the correlation time (ours: 4 L/u0)."""
@@ -151,7 +151,7 @@ def draw_disturbances(disturbances: Disturbances, fastest: float, rng: np.random
 
 
 def fastest_rate(model: Model) -> float:
-    """Highest frequency that a model's step resolves, rad/s: ten steps in a period (ours)."""
+    """Highest frequency that a model's step resolves, rad/s: ten steps in a period (project choice)."""
     return 2 * np.pi / (10 * model.step_s)
 
 
@@ -161,7 +161,7 @@ def _parameter(name: str, unit: str) -> Parameter:
 
 def _lagged(form: WeakForm, windows: list[WeakWindows]) -> Array:
     """Covariances (lags, 3, 3) of residuals so many half windows apart."""
-    pieces = [one.residuals[part] for one, run in zip(windows, form.runs, strict=True) for part in run.pieces]
+    pieces = [window.residuals[part] for window, run in zip(windows, form.runs, strict=True) for part in run.pieces]
     lags = min(LAGS + 1, max(len(piece) for piece in pieces))
     sums, counts = np.zeros((lags, 3, 3)), np.zeros(lags)
     for piece in pieces:

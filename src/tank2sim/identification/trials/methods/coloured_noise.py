@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from tank2sim.arrays import Array
 
 LARGEST_PHI = 0.995
-"""Above it a residual would count as drift, and only its steps from sample to sample would weigh (ours)."""
+"""Above it a residual would count as drift, and only its steps from sample to sample would weigh (project choice)."""
 
 
 @dataclass(frozen=True)

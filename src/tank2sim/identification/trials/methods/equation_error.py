@@ -3,8 +3,8 @@
 Generalised least squares: the covariance of the three equations and the colour of their residuals are estimated from
 them, the prior is a ridge. Linear in derivatives, so that one step solves for them; no start is too bad, and nothing is
 simulated but what no sensor saw. Noise in the regressors pulls the estimates towards zero: they are smoothed first, and
-the user is told how much is left. Gusts move the ship in step with themselves, which pulls the damping towards zero by
-the share of the motion that they cause (as in any regression on the motion itself): a start for output error.
+the user is reported how much is left. Gusts move the ship in step with themselves, which pulls the damping towards
+zero by the share of the motion that they cause (as in any regression on the motion itself): a start for output error.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from tank2sim.identification.trials.methods.weak_form import WEAK_EQUATIONS, WID
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 
 TOLD_NOISE = 0.01
-"""Share of noise in a regressor's variance from which the user is told: so much too small its coefficients may be."""
+"""Share of noise in a regressor's variance from which the user is reported: so much too small its coefficients may
+be."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ class EquationErrorSettings:
     scale_prior : bool
         The prior's standard errors are multiplied, by groups, by the factor of largest evidence, at least 1.
     rounds : int
-        Times that noise (and prior) are estimated anew.
+        Times that noise (and prior) are estimated again.
     """
 
     width: float = WIDTH
@@ -98,7 +99,7 @@ def equation_error(
         Where the search begins; by default the prior's mean.
     settings : EquationErrorSettings, optional
     progress : callable
-        Told of each better estimate; what it raises passes through.
+        Called with each better estimate; what it raises passes through.
 
     Raises
     ------
@@ -121,7 +122,7 @@ def equation_error(
             weights = weights_of(form, windows)
             if settings.scale_prior:
                 scale = evidence_scale(problem, normal.information, values, scale)
-    deviations = np.sqrt(np.mean(np.concatenate([one.residuals for one in windows]) ** 2, axis=0))
+    deviations = np.sqrt(np.mean(np.concatenate([window.residuals for window in windows]) ** 2, axis=0))
     return Estimate(
         method="equation_error",
         free=problem.free,
@@ -152,13 +153,15 @@ def first_weights(form: WeakForm) -> WhiteningWeights:
 
 def weights_of(form: WeakForm, windows: list[WeakWindows]) -> WhiteningWeights:
     """Covariance and colour of the residuals as they are."""
-    every = np.concatenate([one.residuals for one in windows])
+    every = np.concatenate([window.residuals for window in windows])
     covariance = every.T @ every / len(every)
     smallest = 1e-12 * np.mean(np.concatenate([run.change for run in form.runs]) ** 2, axis=0)
     covariance += np.diag(np.where(smallest > 0, smallest, 1.0))  # an equation without residual would be singular
     inverse = np.linalg.inv(np.linalg.cholesky(covariance))
     pieces = [
-        inverse @ one.residuals[piece].T for one, run in zip(windows, form.runs, strict=True) for piece in run.pieces
+        inverse @ window.residuals[piece].T
+        for window, run in zip(windows, form.runs, strict=True)
+        for piece in run.pieces
     ]
     return WhiteningWeights(
         inverse, tuple(estimate_coloured_noise([piece[place] for piece in pieces], 1e-6) for place in range(3))
@@ -170,11 +173,11 @@ def normal_equations(form: WeakForm, windows: list[WeakWindows], weights: Whiten
     k = len(form.problem.free)
     information, gradient, cost, scores = np.zeros((k, k)), np.zeros(k), 0.0, []
     per_block = max(1, round(BLOCK * form.problem.ship_time / form.half))
-    for one, run in zip(windows, form.runs, strict=True):
-        if not len(one.residuals):
+    for window, run in zip(windows, form.runs, strict=True):
+        if not len(window.residuals):
             continue
-        r = weights.whitened(one.residuals, run.pieces)
-        J = -weights.whitened(one.jacobian, run.pieces)
+        r = weights.whitened(window.residuals, run.pieces)
+        J = -weights.whitened(window.jacobian, run.pieces)
         cost += float(np.sum(r**2))
         information += np.einsum("wik,wil->kl", J, J, optimize=True)
         pull = np.einsum("wik,wi->wk", J, r)
@@ -227,14 +230,16 @@ def _minimise(
 
 def _told(form: WeakForm) -> list[str]:
     """Regressors in which noise is left, and parameters that no acceleration depends on."""
-    told = []
+    messages = []
     spread = np.concatenate([run.motion.smooth[:, :3] for run in form.runs]).std(axis=0)
     left = np.sqrt(np.mean([run.motion.left**2 for run in form.runs], axis=0))
     for name, own, noise in zip("uvr", spread, left, strict=True):
         share = (noise / own) ** 2 if own > 0 else 0.0
         if share > TOLD_NOISE:
-            told.append(f"{100 * share:.0f} % of the variance of {name} is noise: its coefficients come out too small")
+            messages.append(
+                f"{100 * share:.0f} % of the variance of {name} is noise: its coefficients come out too small"
+            )
     blind = [name for name, seen in zip(form.problem.free, form.seen, strict=True) if not seen]
     if blind:
-        told.append(f"equation error does not see {', '.join(blind)}: no acceleration depends on them")
-    return told
+        messages.append(f"equation error does not see {', '.join(blind)}: no acceleration depends on them")
+    return messages

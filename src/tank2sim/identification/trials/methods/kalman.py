@@ -29,7 +29,7 @@ _ROUNDS = 3
 """Widths of the prior that are tried, at most."""
 
 SAME_SCALE = 0.05
-"""A change of the prior's width by less than this share is none (ours)."""
+"""A change of the prior's width by less than this share is none (project choice)."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class KalmanSettings:
     Parameters
     ----------
     white : bool
-        Random accelerations are drawn anew in each step, else they have a time constant that is estimated.
+        Random accelerations are drawn again in each step, else they have a time constant that is estimated.
     drifting : bool
-        Each sensor has a drift beside its white noise, also first-order Gauss-Markov (three to six times as slow).
+        Each sensor has a drift next to its white noise, also first-order Gauss-Markov (three to six times as slow).
     scale_prior : bool
         The prior's standard errors are multiplied, by groups, by the factor of largest evidence, at least 1.
     iterations : int
@@ -136,7 +136,7 @@ def kalman(
         Where the search begins; by default the prior's mean.
     settings : KalmanSettings, optional
     progress : callable
-        Told of each better estimate; what it raises passes through.
+        Called with each better estimate; what it raises passes through.
     """
     settings = settings or KalmanSettings()
     task = task_of(problem, white=settings.white, drifting=settings.drifting)

@@ -135,7 +135,7 @@ class FilterPass:
         Stacked (runs, n, ...), along the trajectory at which the gains were taken.
     gains : Gains
     cost : float
-        -2 log likelihood but for a constant; inf where the motion leaves all bounds.
+        -2 log likelihood except for a constant; inf where the motion leaves all bounds.
     """
 
     before: Array
@@ -169,7 +169,7 @@ def filter_pass(disturbed: Disturbed, batch: Batch, p: Array, levels: Levels, al
     )
     found = gains(tangents.A, tangents.C, levels.variances(batch, disturbed.nominal))
     runs = zip(batch.starts, batch.inputs, batch.measured, found.K, cases, strict=True)
-    before = np.stack([disturbed.predicted(*one) for one in runs])
+    before = np.stack([disturbed.predicted(*run) for run in runs])
     if not np.isfinite(before).all() or np.abs(before).max() > 1e9:
         return FilterPass(before, before, np.zeros_like(batch.measured), tangents, found, np.inf)
     seen = np.stack([disturbed.seen(states, inputs, p) for states, inputs in zip(before, batch.inputs, strict=True)])

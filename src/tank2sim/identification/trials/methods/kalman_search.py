@@ -26,7 +26,7 @@ USUAL_TIME = 0.5
 :data:`TIME_FACTOR` (ours: what a model leaves out of the flow passes with the ship's own length)."""
 
 TIME_FACTOR = 3.0
-"""Standard error of that, as a factor (ours)."""
+"""Standard error of that, as a factor (project choice)."""
 
 USUAL_PUSH = 0.2
 """Random acceleration at which the search begins, in nominal values of the state a ship time (ours: rather much, for
@@ -46,7 +46,7 @@ ENOUGH = 0.05
 """A search ends when an iteration gains less in -2 log likelihood: no estimate moves by a quarter of its error."""
 
 LONGEST_STEP = 1.5
-"""Largest change of the logarithm of a noise level in an iteration (ours)."""
+"""Largest change of the logarithm of a noise level in an iteration (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class SearchTask:
 
     @property
     def time_precision(self) -> Array:
-        """Inverse variance of the levels' logarithms before the trials; 0 but for time constants."""
+        """Inverse variance of the levels' logarithms before the trials; 0 except for time constants."""
         m, ny, count = len(self.first.process), len(self.first.measurement), len(self.first.vector)
         precision = np.zeros(count)
         precision[m : count - ny] = 1 / np.log(TIME_FACTOR) ** 2
@@ -206,13 +206,13 @@ def _level_normal(task: SearchTask, stand: Stand) -> tuple[Array, Array]:
     levels, made = stand.levels, stand.made
     logs = levels.vector
     variants = [levels, *(levels.at(logs + VARIATION * row) for row in np.eye(len(logs)))]
-    each = [one.variances(task.batch, task.disturbed.nominal) for one in variants]
+    each = [variant.variances(task.batch, task.disturbed.nominal) for variant in variants]
     variances = Variances(
         np.stack([one.process for one in each]),
         np.stack([one.measurement for one in each]),
         np.stack([one.start for one in each]),
     )
-    factors = np.stack([one.factors(task.batch.steps) for one in variants])
+    factors = np.stack([variant.factors(task.batch.steps) for variant in variants])
     cost, information = varied(made.tangents, variances, made.innovations, made.after, factors)
     prior = task.time_precision
     slope = 0.5 * (cost[1:] - cost[0]) / VARIATION + prior * (logs - task.first.vector)

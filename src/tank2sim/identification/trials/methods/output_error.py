@@ -38,7 +38,7 @@ class OutputErrorSettings:
     scale_prior : bool
         The prior's standard errors are multiplied by the factor of largest evidence, at least 1.
     rounds : int
-        Times that noise (and prior) are estimated anew.
+        Times that noise (and prior) are estimated again.
     """
 
     piece_s: float | None = None
@@ -74,7 +74,7 @@ def output_error(
         Where the search begins; by default the prior's mean.
     settings : OutputErrorSettings, optional
     progress : callable
-        Told of each better estimate; what it raises passes through.
+        Called with each better estimate; what it raises passes through.
     """
     settings = settings or OutputErrorSettings()
     shooting = Shooting(problem)

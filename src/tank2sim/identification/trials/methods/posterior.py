@@ -16,7 +16,7 @@ flow and of a slow model error are of that order)."""
 
 MOST_FITTED = 2 / 3
 """Share of the residuals' variance that parameters are believed to have fitted away at most: beyond it there are hardly
-more blocks than parameters, and the correction of their scatter would itself be scatter (ours)."""
+more blocks than parameters, and the correction of their scatter would itself be scatter (project choice)."""
 
 
 def scaled_prior(problem: Problem, scale: Mapping[str, float]) -> Array:

@@ -31,13 +31,15 @@ from tank2sim.identification.trials.methods.posterior import BLOCK, sandwich
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 
 _SETTLED = 2.0
-"""A coefficient has settled when it stays within this many of its last standard errors of its last value (ours)."""
+"""A coefficient has settled when it stays within this many of its last standard errors of its last value (project
+choice)."""
 
 LEARNED = 0.5
-"""... and its standard error has come below this share of the prior's (ours)."""
+"""... and its standard error has come below this share of the prior's (project choice)."""
 
 LATEST = 0.75
-"""What comes to rest later than in this share of the time has not settled: at the end everything rests (ours)."""
+"""What comes to rest later than in this share of the time has not settled: at the end everything rests (project
+choice)."""
 
 LEVEL_ITERATIONS = 15
 """Steps of the noise levels before each pass, at most."""
@@ -63,7 +65,7 @@ class RecursiveSettings:
     white : bool
         Random accelerations are white, else they have a time constant.
     drifting : bool
-        Each sensor has a drift beside its white noise.
+        Each sensor has a drift next to its white noise.
     """
 
     block: float = 1.0
@@ -152,7 +154,7 @@ def recursive(
         Where the model is linearised at first; by default the prior's mean.
     settings : RecursiveSettings, optional
     progress : callable
-        Told of the estimate after each run; what it raises passes through.
+        Called with the estimate after each run; what it raises passes through.
 
     Raises
     ------
@@ -172,7 +174,7 @@ def recursive(
         for step in _pass(task, stand, settings, hold=number > 0):
             steps.append(step)
             if steps[-1].run != steps[max(len(steps) - 2, 0)].run:
-                progress("recursive", step.values, sum(one.cost for one in steps))
+                progress("recursive", step.values, sum(step.cost for step in steps))
         at = steps[-1].values
         costs.append(sum(step.cost for step in steps))
         progress("recursive", at, costs[-1])
@@ -247,7 +249,7 @@ def _estimate(
         times_s=np.cumsum([step.length_s for step in steps]),
         runs=tuple(problem.runs[step.run].name for step in steps),
         path=np.stack([step.values for step in steps]),
-        path_errors=np.sqrt(np.stack([np.diag(one) for one in covariances])),
+        path_errors=np.sqrt(np.stack([np.diag(covariance) for covariance in covariances])),
         prior_error=problem.prior_error,
     )
 

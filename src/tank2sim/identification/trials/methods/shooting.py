@@ -20,7 +20,7 @@ from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.simulation.sensitivity import Sensitivity
 
 START_WINDOW = 5
-"""First guess of an initial state: a straight line through this many instants on either side (ours)."""
+"""First guess of an initial state: a straight line through this many instants on either side (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,8 @@ from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.sensitivity import Sensitivity
 
 WIDTH = 0.7
-"""Width of a window in L/u0 (ours): short against a manoeuvre, long against noise and the smoothing of regressors."""
+"""Width of a window in L/u0 (project choice): short against a manoeuvre, long against noise and the smoothing of
+regressors."""
 
 WEAK_EQUATIONS = ("motion.udot", "motion.vdot", "motion.rdot")
 
@@ -119,7 +120,7 @@ class WeakForm:
         )
 
     def _hidden_states(self, run: _Prepared, inputs: Array, p: Array) -> tuple[Array, Array | None]:
-        """States that were not measured, simulated beside the measured ones: in the middle of steps (n, nz), and by
+        """States that were not measured, simulated next to the measured ones: in the middle of steps (n, nz), and by
         the free parameters (n, nz, k)."""
         if self._sensitivity is None:
             return np.zeros((len(inputs), 0)), None

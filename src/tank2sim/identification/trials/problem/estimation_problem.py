@@ -12,7 +12,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
 LITTLE_KNOWN = 0.25
-"""A standard error of this share of the value or more is taken as it is (ours)."""
+"""A standard error of this share of the value or more is taken as it is (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ class Estimate:
     prior_scale : mapping
         Factor on the prior's standard errors by group (:attr:`Problem.groups`) that was chosen.
     notices : tuple of str
-        What a user should be told.
+        What a user should know.
     """
 
     method: str

@@ -1,4 +1,4 @@
-"""Problems that can be sent to another process: a model holds symbols that cannot, and is built anew from its card."""
+"""Problems that can be sent to another process: a model holds symbols that cannot, and is built again from its card."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Trials as they are taken for identification: audited, mended, and brought to the size of the card's ship."""
+"""Trials as they are taken for identification: audited, repaired, and brought to the size of the card's ship."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Measured:
     driven_by : str
         ``angle`` if the rudder's angle was measured in all of them, ``order`` if only its order is known.
     notices : tuple of str
-        What was mended and scaled.
+        What was repaired and scaled.
     """
 
     trials: tuple[Trial, ...]
@@ -46,7 +46,7 @@ class Measured:
 
 
 def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
-    """Read trials, mend what the audit is sure of, and scale them to the card's ship.
+    """Read trials, correct what the audit is sure of, and scale them to the card's ship.
 
     Raises
     ------
@@ -58,10 +58,10 @@ def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
     trials, notices = [], []
     for path in paths:
         trial, findings = audit_and_repair(read_trial(path))
-        for one in findings:
-            _refuse_open(one)
-            done = "taken so" if one.safe and one.mend is not None else "left as it is"
-            notices.append(f"{path.name}: {one.column}: {one.what}; {done}: {one.likely_truth}")
+        for finding in findings:
+            _refuse_open(finding)
+            done = "taken so" if finding.safe and finding.repair is not None else "left as it is"
+            notices.append(f"{path.name}: {finding.column}: {finding.what}; {done}: {finding.likely_truth}")
         if not set(RUDDERS) & set(trial.signals):
             raise InputError(path, "column of the rudder", "has no usable reading", "give the rudder in more rows")
         notices += _unused(trial, card)
@@ -92,16 +92,20 @@ def _refuse_open(finding: Finding) -> None:
 
 def _unused(trial: Trial, card: ManoeuvringCard) -> list[str]:
     """What of a trial does not enter, in words."""
-    told = []
+    messages = []
     for name, effect in EFFECTS.items():
         signals = set(effect.measured_as.values())
         if signals and signals <= set(trial.signals) and all(entry.name != name for entry in card.effects):
-            told.append(f"{trial.path.name}: {name} was measured, and the card has no effect {name!r}: it is not used")
+            messages.append(
+                f"{trial.path.name}: {name} was measured, and the card has no effect {name!r}: it is not used"
+            )
     rudder = trial.signals.get("delta_rad", trial.signals.get("delta_order_rad"))
     empty = 0 if rudder is None else int(np.isnan(rudder).sum())
     if empty:
-        told.append(f"{trial.path.name}: the rudder is empty in {empty} rows: taken as straight between its readings")
-    return told
+        messages.append(
+            f"{trial.path.name}: the rudder is empty in {empty} rows: taken as straight between its readings"
+        )
+    return messages
 
 
 def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:

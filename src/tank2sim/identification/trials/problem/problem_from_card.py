@@ -22,17 +22,18 @@ from tank2sim.records.trials import Trial
 from tank2sim.units import from_si
 
 LEAST_PART = 2.0
-"""Parts of a run inside the card's range of speeds are used if they last this many L/u0 (ours)."""
+"""Parts of a run inside the card's range of speeds are used if they last this many L/u0 (project choice)."""
 
 REVOLUTIONS = "propulsion.Xnn"
 REVOLUTIONS_ERROR = 0.2
-"""Standard error before the trials of the effect of revolutions, as a share of it: a card states none (ours)."""
+"""Standard error before the trials of the effect of revolutions, as a share of it: a card states none (project
+choice)."""
 
 REVOLUTIONS_VARY = 0.01
 """Revolutions that vary by less than this share of their nominal number tell nothing of their effect."""
 
 ASSUMED_EFFECT_ERROR = 0.25
-"""Standard error of an effect's parameter without one, as a share of its bounds' distance (ours)."""
+"""Standard error of an effect's parameter without one, as a share of its bounds' distance (project choice)."""
 
 
 def driven_model(card: ManoeuvringCard, driven_by: str) -> Model:
@@ -44,8 +45,8 @@ def driven_model(card: ManoeuvringCard, driven_by: str) -> Model:
 def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str, tuple[float, float]]:
     """Name in the model of each free parameter, to its value and standard error before the trials.
 
-    Every derivative that the card has (with a value or an uncertainty) but for accelerations, unless `inertia` asks for
-    them: motion alone cannot tell a mass from a force. Every parameter of the card's effects that is no input.
+    Every derivative that the card has (with a value or an uncertainty) except for accelerations, unless `inertia`
+    asks for them: motion alone cannot tell a mass from a force. Every parameter of the card's effects that is no input.
     """
     free = {}
     for name in {**card.derivatives, **card.uncertainty}:
@@ -56,14 +57,22 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
             free[f"derivatives.{name}"] = card.derivatives.get(name, 0.0), error
     for entry in card.effects:
         effect = EFFECTS[entry.name]
-        for one in effect.parameters:
-            unsaid = one.default is not None and one.absent is not None and one.name not in entry.parameters
-            if one.input_name or unsaid:  # an input, or a part of the effect that the card does not say to be there
+        for parameter in effect.parameters:
+            unsaid = (
+                parameter.default is not None
+                and parameter.absent is not None
+                and parameter.name not in entry.parameters
+            )
+            if (
+                parameter.input_name or unsaid
+            ):  # an input, or a part of the effect that the card does not say to be there
                 continue
-            error = entry.uncertainty.get(one.name, ASSUMED_EFFECT_ERROR * (one.maximum - one.lowest(card)))
+            error = entry.uncertainty.get(
+                parameter.name, ASSUMED_EFFECT_ERROR * (parameter.maximum - parameter.lowest(card))
+            )
             if error <= 0:  # stated as certain
                 continue
-            free[f"{effect.name}.{one.stem}"] = one.value(entry.parameters, card), error
+            free[f"{effect.name}.{parameter.stem}"] = parameter.value(entry.parameters, card), error
     return free
 
 
@@ -76,7 +85,7 @@ def problem_from_card(
     hold: Sequence[str] = (),
     whole: bool = False,
 ) -> Problem:
-    """The problem of fitting a card's free parameters to trials, but for those in `hold`.
+    """The problem of fitting a card's free parameters to trials, except for those in `hold`.
 
     Parts of runs at speeds outside the range that the card states are left out, unless runs are to stay `whole`.
 
@@ -92,8 +101,8 @@ def problem_from_card(
     for name in hold:
         known = name if name in free else f"derivatives.{name}"
         if known not in free:
-            told = " ".join(one.removeprefix("derivatives.") for one in free)
-            raise InputError("--hold", "", f"{name} is not estimated anyway", f"estimated are {told}")
+            text = " ".join(one.removeprefix("derivatives.") for one in free)
+            raise InputError("--hold", "", f"{name} is not estimated anyway", f"estimated are {text}")
         del free[known]
     if not free:
         raise InputError(card.source, "derivatives", "there is nothing to estimate", "give derivatives with a value")
@@ -133,11 +142,11 @@ def answered(card: ManoeuvringCard, estimate: Estimate) -> ManoeuvringCard:
     changes: dict[str, object] = {}
     for number, entry in enumerate(card.effects):
         effect = EFFECTS[entry.name]
-        for one in effect.parameters:
-            if (name := f"{effect.name}.{one.stem}") in found:
+        for parameter in effect.parameters:
+            if (name := f"{effect.name}.{parameter.stem}") in found:
                 value, error = found[name]
                 for section, figure in (("parameters", rounded(value, error)), ("uncertainty", float(f"{error:.3g}"))):
-                    key, shown = card.in_file(f"effects.{number}.{section}.{one.name}", figure)
+                    key, shown = card.in_file(f"effects.{number}.{section}.{parameter.name}", figure)
                     changes[key] = shown
     if REVOLUTIONS in found:
         scale = float(card.scales.force) if card.model.scaling == "dimensional" else 1.0

@@ -27,7 +27,7 @@ MOST_INSTANTS_A_ROW = 100
 """Instants of an even time a row of the file: beyond, 99 % of the record is missing, and one bad time (an epoch among
 seconds) would ask for gigabytes. Project choice: records of what a ship does have gaps of a few per cent."""
 LONGEST_GAP = 3
-"""Gaps of up to this many samples are bridged; in longer ones nothing counts as measured (a choice of ours)."""
+"""Gaps of up to this many samples are bridged; in longer ones nothing counts as measured (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)

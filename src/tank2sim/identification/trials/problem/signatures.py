@@ -25,7 +25,7 @@ def with_fitted_trials(text: str, source: str, trials: Sequence[Trial]) -> str:
             new.append(FittedTrial(name=trial.name, t_s=time, signals=signals))
     if not new:
         return text
-    return changed_text(text, source, {"fitted_trials": [one.model_dump() for one in (*card.fitted_trials, *new)]})
+    return changed_text(text, source, {"fitted_trials": [trial.model_dump() for trial in (*card.fitted_trials, *new)]})
 
 
 def fitted_as(card: ManoeuvringCard, trial: Trial) -> str | None:

@@ -27,12 +27,13 @@ SHARE_OF_LINEAR = 0.3
 """Standard error before the trials of a term that a card has not: this share of the linear force in a hard turn."""
 
 SHARE_BESIDE_DRAG = 0.1
-"""The same for cubic terms of the yaw moment beside cross-flow drag, which takes one coefficient for bow and stern. A
+"""The same for cubic terms of the yaw moment next to cross-flow drag, which takes one coefficient for bow and stern. A
 tenth is ours; of 0, 0.1 and 0.3 it was the one that followed KVLCC2's 35 deg turn at MARIN (tactical diameter -12, -3
 and +8 %) after fits of HSVA's zigzags, which themselves cannot tell the three apart."""
 
 SHARE_OF_ASYMMETRY = 0.02
-"""The same for terms of asymmetry (Y0, N0, Y0u, N0u): the lateral force of a single screw is a few percent (ours)."""
+"""The same for terms of asymmetry (Y0, N0, Y0u, N0u): the lateral force of a single screw is a few percent (project
+choice)."""
 
 CUBIC_HULL = {force: tuple(f"{force}{powers}" for powers in ("vvv", "vvr", "vrr", "rrr")) for force in "YN"}
 ASYMMETRY = ("Y0", "N0", "Y0u", "N0u")
