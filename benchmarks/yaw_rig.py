@@ -25,7 +25,7 @@ from tank2sim.dynamics.yaw_energy import dissipation_from_work, inertia_from_wor
 from tank2sim.dynamics.yaw_programme import PAPER_PROGRAMME, Similarity, YawProgramme, full_turns
 from tank2sim.dynamics.yaw_rig import ELLIPSOID_AIR, ELLIPSOID_T1, SHIP_AIR, SHIP_T1, SHIP_T2
 from tank2sim.identification.yaw.energy import energy_balance, fit_energy
-from tank2sim.identification.yaw.identify import GRAVITY, WATER_TERMS, YawOptions, YawResult, identify_yaw
+from tank2sim.identification.yaw.identify import GRAVITY, WATER_TERMS, YawIdentification, YawOptions, identify_yaw
 from tank2sim.identification.yaw.intervals import Speeds, intervals
 from tank2sim.records.yaw import Medium, YawRecord, read_yaw_record, yaw_record_text
 from tank2sim.simulation.yaw_record import simulated_record, yaw_record
@@ -163,7 +163,7 @@ def identified(
     measuring: Measuring,
     programme: YawProgramme = PAPER_PROGRAMME,
     known: YawRig | None = None,
-) -> tuple[YawRun, YawResult]:
+) -> tuple[YawRun, YawIdentification]:
     run = run_yaw_rig(rig, programme, controller, measuring, allow_saturation=True)
     options = YawOptions(inertia_kgm2=rig.inertia_kgm2, known=known, mirror_limit=10.0)
     return run, identify_yaw([recorded(run, rig)], options)
@@ -193,7 +193,7 @@ def print_methods() -> None:
                 print_estimates(result, true)
 
 
-def print_estimates(result: YawResult, true: float) -> None:
+def print_estimates(result: YawIdentification, true: float) -> None:
     for method, estimate in result.estimates.items():
         value, error = result.added_inertia(method) or (math.nan, None)
         spread = "" if error is None else f" ± {1e4 * error:.2g}"

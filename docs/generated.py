@@ -216,15 +216,16 @@ def _variable(one: FmuVariable) -> str:
 
 
 def modules(package: str) -> list[str]:
-    """Public modules of a package of tank2sim: those that the commands import, and those that the theory names."""
+    """Public modules of a package: those that commands and Python API import, and those that the theory names."""
     path = importlib.import_module(f"tank2sim.{package}").__path__
     there = [f"tank2sim.{package}", *(one.name for one in pkgutil.walk_packages(path, f"tank2sim.{package}."))]
-    return sorted(name for name in there if name in _imported_by_commands() or name in _named_by_theory())
+    return sorted(name for name in there if name in _imported_by_interfaces() or name in _named_by_theory())
 
 
 @cache
-def _imported_by_commands() -> frozenset[str]:
-    files = Path(tank2sim.__file__).parent.glob("cli/*.py")
+def _imported_by_interfaces() -> frozenset[str]:
+    package = Path(tank2sim.__file__).parent
+    files = [*package.glob("cli/*.py"), *package.glob("api/*.py")]
     return frozenset(
         name for file in files for name in re.findall(r"from (tank2sim[\w.]+) import", file.read_text("utf-8"))
     )

@@ -1,4 +1,4 @@
-"""``tank2sim signals``: table, JSON, page, and filtered trials that never stand where the measured ones were."""
+"""``tank2sim signals``: table, JSON, page, and filtered trials that never replace the measured ones."""
 
 import json
 import re
@@ -113,13 +113,13 @@ def test_the_measured_trial_is_never_overwritten(path, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "words"),
     [(["--out", "x.csv"], "needs a filter"), (["--filter", "lowpass:0.3"], "named by --column"),
      (["--column", "r", "--filter", "lowpass:77"], "not between"), (["--column", "r", "--filter", "x"], "is no filter"),
      (["--column", "r", "--filter", "decimate:2"], "leave --column out"), (["--segment", "900"], "no length")],
 )  # fmt: skip
-def test_what_does_not_fit_is_refused_in_one_line(path, options, told):
-    with pytest.raises(InputError, match=told):
+def test_what_does_not_fit_is_refused_in_one_line(path, options, words):
+    with pytest.raises(InputError, match=words):
         run(path, *options)
 
 
@@ -140,7 +140,7 @@ def test_charts_and_a_page_that_fetches_nothing(path, tmp_path):
     pictures = {picture.name for picture in plots.glob("*.png")}
     assert pictures == {"steps_r_density.png", "steps_r_correlation.png", "steps_r_spectrum.png"}
     assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in plots.glob("*.png"))
-    page = (plots / "signals.html").read_text()
+    page = (plots / "report.html").read_text()
     assert "Measured signals" in page
     assert "yaw rate" in page
     assert not re.search(r"""(src|href)=["']?(https?:)?//""", page)

@@ -85,7 +85,7 @@ def test_a_record_can_be_simulated_from_a_card_and_gives_its_inertia(folder):
     found = json.loads((folder / "s.json").read_text())
     assert found["body_inertia_standard_error_kgm2"] == pytest.approx(9.2e-4)  # the card's
     assert found["added_inertia_kgm2"]["energy_least_squares"] == pytest.approx(302.0e-4, rel=0.01)
-    assert found["added_inertia_kgm2"]["two_intervals_reference"] < 275e-4  # biased, and told
+    assert found["added_inertia_kgm2"]["two_intervals_reference"] < 275e-4  # biased, and reported
     assert any("two-interval" in note for note in found["notes"])
     refused(tank2sim("yaw", "rig.csv", "--simulate", "alyshev", cwd=folder), "rig.csv", "already")
     refused(tank2sim("yaw", "a.csv", "b.csv", "--simulate", "alyshev", cwd=folder), "--simulate", "2 records")
@@ -146,7 +146,7 @@ def test_bad_input_is_one_line(folder):
     refused(tank2sim("yaw", "water.csv", "--reference", "air.csv", cwd=folder), "--reference-inertia-kgm2")
     refused(tank2sim("yaw", "water.csv", "--rig", "mariner", cwd=folder), "model.kind")
     asked = ("--inertia-kgm2", "0.0204", "-o", "x.toml", "--card", "wilinski-zellman")
-    refused(tank2sim("yaw", "water.csv", *asked, cwd=folder), "N_rdot")
+    refused(tank2sim("yaw", "water.csv", *asked, cwd=folder), "model.kind")
     refused(tank2sim("yaw", "water.csv", "--inertia-kgm2", "0.9", "-o", "x.toml", "--card", "mariner", cwd=folder),
             "negative")  # fmt: skip
     assert not (folder / "x.toml").exists()

@@ -1,6 +1,6 @@
 """Every argument of a public function is documented: by its docstring, its type, its unit, or the manual's list.
 
-Public is what the reference shows: modules that ``tank2sim.cli`` imports from its packages, and those that the theory
+Public is what the reference shows: modules that ``tank2sim.cli`` and ``tank2sim.api`` import, and those that the theory
 names.
 """
 
@@ -48,16 +48,17 @@ def everywhere() -> frozenset[str]:
 
 @cache
 def public_modules() -> tuple[Path, ...]:
-    """The files of the modules that the commands import or the theory names."""
-    imported = (one for path in (SOURCES / "cli").glob("*.py") for one in ast.walk(tree(path)))
+    """The files of the modules that the commands or the Python API import or the theory names."""
+    files = [path for room in ("cli", "api") for path in (SOURCES / room).glob("*.py")]
+    imported = (one for path in files for one in ast.walk(tree(path)))
     names = {one.module for one in imported if isinstance(one, ast.ImportFrom) and one.module}
     theory = "".join(page.read_text(encoding="utf-8") for page in (MANUAL / "theory").glob("*.md"))
     for name in re.findall(r"`(\w+(?:\.\w+)+)`", theory):
         names |= {f"tank2sim.{name}", f"tank2sim.{name.rpartition('.')[0]}"}
     paths = {SOURCES.parent / name.replace(".", "/") for name in names if name.startswith("tank2sim.")}
     packages = {page.stem for page in (MANUAL / "reference").glob("*.md")}
-    files = {path / "__init__.py" if path.is_dir() else path.with_suffix(".py") for path in paths}
-    return tuple(sorted(path for path in files if path.is_file() and path.relative_to(SOURCES).parts[0] in packages))
+    modules = {path / "__init__.py" if path.is_dir() else path.with_suffix(".py") for path in paths}
+    return tuple(sorted(path for path in modules if path.is_file() and path.relative_to(SOURCES).parts[0] in packages))
 
 
 def functions(module: ast.Module) -> Iterator[tuple[str, Function, str]]:

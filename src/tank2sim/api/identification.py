@@ -211,8 +211,8 @@ def identify(
     ----------
     card : Ship, Card, str or path
         What is known of the ship beforehand; its standard errors say how well.
-    trials, holdout : path or sequence of paths
-        Trials to fit, and trials only to compare with; a folder stands for the trials in it.
+    trials, holdout : path, TrialRecord, or sequence of them
+        Trials to fit, and trials only to compare with; a folder means the trials in it.
     method : str
         ``output_error``, ``equation_error``, ``kalman`` or ``recursive``.
     structure : str

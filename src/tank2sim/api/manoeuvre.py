@@ -133,7 +133,7 @@ class ManoeuvreResult(Result):
 def simulate_manoeuvre(
     ship: Ship, manoeuvre: Manoeuvre, words: str, duration_s: float | None, ensemble: EnsembleOptions
 ) -> ManoeuvreResult:
-    """Simulate a manoeuvre of a ship, with an ensemble if it has members.
+    """Simulate a manoeuvre of a ship, called by its `words`, with an ensemble if it has members.
 
     Raises
     ------

@@ -5,8 +5,9 @@ from __future__ import annotations
 import base64
 import html
 import json
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -17,6 +18,8 @@ from tank2sim.marks import marked
 if TYPE_CHECKING:
     import altair as alt
     import pandas as pd
+
+    from tank2sim.report.kit.page import PageSection
 
 SCHEMA_VERSION = 1
 """Version of the JSON of all results: it grows when a key is removed or changes its meaning. Project choice."""
@@ -197,3 +200,14 @@ class Result(ABC):
             f"<p>{html.escape(table.title)}</p>{table.df.to_html(index=False, na_rep='')}" for table in self.tables
         ]
         return "\n".join(parts)
+
+
+def section_charts(sections: Iterable[PageSection]) -> dict[str, alt.TopLevelMixin]:
+    """Charts of sections of a page by the words of their heading, numbered from the second on: ``speeds_2``."""
+    charts: dict[str, alt.TopLevelMixin] = {}
+    for section in sections:
+        stem = re.sub(r"\W+", "_", section.heading.lower()).strip("_")
+        for illustration in section.charts:
+            number = sum(re.fullmatch(rf"{stem}(_\d+)?", name) is not None for name in charts) + 1
+            charts[stem if number == 1 else f"{stem}_{number}"] = illustration.chart
+    return charts

@@ -17,7 +17,7 @@ from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.replay import replay
 from tank2sim.identification.tow.card import tow_card_text
-from tank2sim.identification.tow.identify import TowResult, identify_tow
+from tank2sim.identification.tow.identify import TowIdentification, identify_tow
 from tank2sim.records.tows import Tows, read_tows
 from tank2sim.report.kit.charts import Tow, chart_png, tow_chart
 from tank2sim.report.kit.page import Column, Illustration, KeyFigure, PageSection, PageTable, Verdict
@@ -79,7 +79,9 @@ def _chart(tows: Tows, times: Array, speed: Array) -> alt.LayerChart:
     )
 
 
-def _section(paper: TowResult, chosen: TowResult, misses: list[dict[str, float]], chart: alt.LayerChart) -> PageSection:
+def _section(
+    paper: TowIdentification, chosen: TowIdentification, misses: list[dict[str, float]], chart: alt.LayerChart
+) -> PageSection:
     return PageSection(
         heading="A towed vehicle: from five tows to an FMU",
         text=(
@@ -102,7 +104,7 @@ def _section(paper: TowResult, chosen: TowResult, misses: list[dict[str, float]]
     )
 
 
-def _figures(chosen: TowResult, misses: list[dict[str, float]], reports: list[CheckReport]) -> list[KeyFigure]:
+def _figures(chosen: TowIdentification, misses: list[dict[str, float]], reports: list[CheckReport]) -> list[KeyFigure]:
     fit = chosen.fits["output_error"]
     return [
         KeyFigure(
@@ -154,7 +156,7 @@ def _miss_table(misses: list[dict[str, float]]) -> PageTable:
     )
 
 
-def _estimates(result: TowResult, caption: str) -> PageTable:
+def _estimates(result: TowIdentification, caption: str) -> PageTable:
     units = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m"}
     unknowns = next(iter(result.fits.values())).unknowns
     rows = []

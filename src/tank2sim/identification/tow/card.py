@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from tank2sim.cards.writing import SurgeResult, surge_card_text
 from tank2sim.identification.tow.fit import TowFit
-from tank2sim.identification.tow.identify import TowResult
+from tank2sim.identification.tow.identify import TowIdentification
 
 
-def tow_card_text(result: TowResult, fit: TowFit, *, name: str, source: str, length_m: float | None = None) -> str:
+def tow_card_text(
+    result: TowIdentification, fit: TowFit, *, name: str, source: str, length_m: float | None = None
+) -> str:
     """TOML text of the card with the numbers of one method; the notes are what the tows warn of.
 
     Parameters

@@ -35,8 +35,8 @@ TOW_METHODS = ("paper", "qr", "output_error")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class TowResult:
-    """What tows tell of a body.
+class TowIdentification:
+    """Estimates of a towed body.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class TowResult:
     fits : dict
         Method to its estimates.
     options : TowOptions
-        What was assumed next to (1.5).
+        What was assumed in addition to (1.5).
     warnings : tuple of str
         What the user should know before using them, in whole sentences.
     """
@@ -73,7 +73,7 @@ class TowResult:
         return mean_force(self.force, self.tows.time_s)
 
     def as_json(self) -> dict[str, Any]:
-        """The result as plain data; the unit of a number stands in its key, J is in N s^(1/2)."""
+        """The result as plain data; the unit of a number is in its key, J is in N s^(1/2)."""
         return {
             "tows": str(self.tows.path),
             "force_N": self.force_N,
@@ -96,7 +96,7 @@ def parse_terms(text: str) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        A term is unknown or stands twice.
+        A term is unknown or repeated.
     """
     return () if text.strip().lower() == "none" else _checked_terms([word.strip() for word in text.split(",")])
 
@@ -109,7 +109,7 @@ def identify_tow(
     terms: Iterable[str] = tuple(DRAG_POWERS),
     speed_degree: int = 2,
     options: TowOptions = AT_ONCE,
-) -> TowResult:
+) -> TowIdentification:
     """Estimate the surge mass and drag of (1.5) from tows by a known force from rest.
 
     Parameters
@@ -119,7 +119,7 @@ def identify_tow(
     mass_kg : float, optional
         Mass m with the water in the body; by default that in the file of the tows.
     terms : iterable of str
-        Drag terms to estimate next to M, any of B1, B2, B3; the others are zero.
+        Drag terms to estimate in addition to M, any of B1, B2, B3; the others are zero.
     speed_degree : int
         Degree of the speed polynomial of the first two methods, at least 2; the paper has 2.
     options : TowOptions
@@ -128,7 +128,7 @@ def identify_tow(
     Raises
     ------
     InputError
-        Force or mass is missing or not positive, a term is unknown or stands twice, nothing is left to estimate, or
+        Force or mass is missing or not positive, a term is unknown or repeated, nothing is left to estimate, or
         the tows do not determine the unknowns at all (too few readings, no motion, no acceleration).
     """
     pull = _force(tows, force)
@@ -141,7 +141,7 @@ def identify_tow(
     solutions = _solutions(tows, speed, problem, pull, options)
     fits = {name: _fit(name, solution, (tows, mass, pull), problem) for name, solution in solutions.items()}
     notes = _notes(tows, force, mass, set(TOW_METHODS) - set(fits))
-    return TowResult(
+    return TowIdentification(
         tows=tows,
         force=pull,
         mass_kg=mass,
@@ -226,7 +226,7 @@ def _positive(tows: Tows, name: str, given: float | None, written: float | None)
     option = "--" + name.replace("_", "-")
     value = given if given is not None else written
     if value is None:
-        raise InputError(tows.path, "", f"does not tell {name}", f"give {option}, or add a line '# {name}: VALUE'")
+        raise InputError(tows.path, "", f"does not state {name}", f"give {option}, or add a line '# {name}: VALUE'")
     if not np.isfinite(value) or value <= 0:
         raise InputError(option, "", f"is {value:g}", "a positive number was expected")
     return float(value)
@@ -236,9 +236,9 @@ def _checked_terms(terms: Iterable[str]) -> tuple[str, ...]:
     terms = tuple(terms)
     for term in terms:
         if term not in DRAG_POWERS:
-            raise InputError("--terms", "", f"there is no drag term {term!r}", "take any of B3,B2,B1, or none")
+            raise InputError("--terms", "", f"{term!r} is not a drag term", "take any of B3,B2,B1, or none")
         if terms.count(term) > 1:
-            raise InputError("--terms", "", f"{term} stands twice", "give each term once")
+            raise InputError("--terms", "", f"{term} is repeated", "give each term once")
     return tuple(term for term in DRAG_POWERS if term in terms)
 
 
@@ -257,7 +257,7 @@ def _check_solvable(tows: Tows, problem: equation_error.EquationError) -> None:
     # A steady tow leaves rounding noise as acceleration, which scaling would blow up to a column like any other.
     gain = np.abs(problem.basis[:, 0]).max() * (tows.time_s[-1] - tows.time_s[0])
     if problem.mass_kg is None and gain < 1e-6 * tows.top_speed_mps:
-        silent = "the speed does not change, so that the tows tell nothing of the mass"
+        silent = "the speed does not change, so that the tows do not determine the mass"
         raise InputError(tows.path, "", silent, "give tows that accelerate from rest")
     if scaled_condition(problem.free_design) > SINGULAR_CONDITION:
         unknowns = ", ".join(("M", *problem.terms)[len(problem.known) :])

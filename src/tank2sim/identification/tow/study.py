@@ -1,4 +1,4 @@
-"""All that tows tell of a body: the estimates asked for, and what other models make of the same readings."""
+"""Study of a towed body: the estimates asked for, and those of other models from the same readings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tank2sim.dynamics.surge_theory import (
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import COLLINEAR
 from tank2sim.identification.tow.equation_error import discretise, fit_mean_speed, solve_by_qr
-from tank2sim.identification.tow.identify import TowResult
+from tank2sim.identification.tow.identify import TowIdentification
 from tank2sim.identification.tow.model_selection import (
     SIMPLE,
     SIMPLE_LATE,
@@ -63,11 +63,11 @@ class Ellipse(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TowStudy:
-    """What tows tell, and what they cannot.
+    """What tows determine, and what they do not.
 
     Parameters
     ----------
-    result : TowResult
+    result : TowIdentification
         The estimates asked for.
     polynomials : tuple of SpeedPolynomial
         Degrees 0 to 3 through the mean speeds, as far as the readings test them.
@@ -83,7 +83,7 @@ class TowStudy:
         (2.5); empty where the size is not known.
     """
 
-    result: TowResult
+    result: TowIdentification
     polynomials: tuple[SpeedPolynomial, ...]
     models: tuple[FittedModel, ...]
     by_tow: tuple[TowByTow, ...]
@@ -135,7 +135,7 @@ class TowStudy:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user should know before using the estimates: the warnings, and what the models tell together."""
+        """What the user should know before using the estimates: the warnings, and what the models show together."""
         return (*self.result.warnings, *_notes(self), *_continued(self))
 
     def as_json(self) -> dict[str, Any]:
@@ -159,7 +159,7 @@ class TowStudy:
         return {**self.result.as_json(), **more, "warnings": list(self.notes)}
 
 
-def study_tows(result: TowResult, body: TowedBody | None = None) -> TowStudy:
+def study_tows(result: TowIdentification, body: TowedBody | None = None) -> TowStudy:
     """The study that goes with a result; with the size of the body also its drag coefficients and the theory."""
     tows, force = result.tows, result.force
     fits = result.fits.items()
@@ -263,12 +263,8 @@ def _notes(study: TowStudy) -> Iterator[str]:
     if best is not None and not (best.plausible and best.determined):
         yield (
             f"The lowest AIC has the model {best.model.label}, with "
-            + (
-                "a drag that is negative at some speeds"
-                if not best.plausible
-                else "unknowns that cannot be distinguished"
-            )
-            + "; a better fit is no better model."
+            + ("a drag that is negative at some speeds" if not best.plausible else "unknowns that cannot be separated")
+            + "; a better fit is not a better model."
         )
     late = {model.model: model.fit.aic for model in study.models}
     if not result.options.start_delay and late.get(SIMPLE_LATE, 0.0) < late.get(SIMPLE, 0.0) - 4:

@@ -16,13 +16,15 @@ from tank2sim.dynamics.yaw_rig import UNKNOWN_RIG
 from tank2sim.errors import InputError
 from tank2sim.files import BYTE_ORDER_MARK
 from tank2sim.identification.yaw.estimate import YawEstimate
-from tank2sim.identification.yaw.identify import YAW_METHODS, YawResult
+from tank2sim.identification.yaw.identify import YAW_METHODS, YawIdentification
 
 TANK_WATER_KGPM3 = 1000.0
-"""Density of the tank's water where no record tells it; fresh water, as the paper calculates with."""
+"""Density of the tank's water where no record states it; fresh water, as the paper calculates with."""
 
 
-def nrdot_prime(result: YawResult, method: str, length_m: float, density_kgpm3: float) -> tuple[float, float | None]:
+def nrdot_prime(
+    result: YawIdentification, method: str, length_m: float, density_kgpm3: float
+) -> tuple[float, float | None]:
     """N_rdot' = -lambda661 / (1/2 rho L^5) of the body in the tank, and its standard error.
 
     At equal Froude number the ship's is the same: an added inertia has no viscosity in it. Raises as
@@ -33,7 +35,7 @@ def nrdot_prime(result: YawResult, method: str, length_m: float, density_kgpm3: 
     return -value / scale, None if error is None else error / scale
 
 
-def known_added_inertia(result: YawResult, method: str) -> tuple[float, float | None]:
+def known_added_inertia(result: YawIdentification, method: str) -> tuple[float, float | None]:
     """lambda661 and its standard error, kg m2.
 
     Raises
@@ -45,35 +47,35 @@ def known_added_inertia(result: YawResult, method: str) -> tuple[float, float | 
     found = result.added_inertia(method)
     if found is None:
         remedy = "give records in water, and in air or --inertia-kgm2"
-        raise InputError(source, "", "does not tell the added inertia apart from the body's own", remedy)
+        raise InputError(source, "", "does not separate the added inertia from the body's own", remedy)
     if found[0] <= 0:
         raise InputError(source, "", "gives a negative added inertia, which no body has", "check J_zz and k_t")
     return found
 
 
-def body_length(result: YawResult, given_m: float | None) -> float:
+def body_length(result: YawIdentification, given_m: float | None) -> float:
     """The body's length by which N_rdot is made non-dimensional.
 
     Raises
     ------
     InputError
-        Neither the option nor a record tells it.
+        Neither the option nor a record states it.
     """
     for value in (given_m, *(record.constants.get("length_m") for record in result.records)):
         if value is not None:
             return value
     remedy = "give --length-m, the model's length between perpendiculars, or a line '# length_m: 0.67'"
-    raise InputError(result.records[0].path, "", "does not tell the length of the model", remedy)
+    raise InputError(result.records[0].path, "", "does not state the length of the model", remedy)
 
 
-def tank_density(result: YawResult) -> float:
+def tank_density(result: YawIdentification) -> float:
     """Density of the tank's water, kg/m3."""
-    messages = [record.constants.get("water_density_kgpm3") for record in result.records]
-    return next((value for value in messages if value is not None), TANK_WATER_KGPM3)
+    stated = [record.constants.get("water_density_kgpm3") for record in result.records]
+    return next((value for value in stated if value is not None), TANK_WATER_KGPM3)
 
 
-def with_nrdot(card: ManoeuvringCard, result: YawResult, method: str, length_m: float) -> ManoeuvringCard:
-    """The ship's card with N_rdot of the model on the rig; the old values stand in comments.
+def with_nrdot(card: ManoeuvringCard, result: YawIdentification, method: str, length_m: float) -> ManoeuvringCard:
+    """The ship's card with N_rdot of the model on the rig; the old values are in comments.
 
     Raises
     ------
@@ -105,18 +107,18 @@ def _replaced(text: str, source: str, key: str, value: float, origin: str) -> st
     return changed_text(text, source, {key: float(f"{value:.6g}")}, comment=f"{origin}; {was}")
 
 
-def rig_card_text(result: YawResult, method: str, *, name: str, source: str, known: YawRig | None) -> str:
+def rig_card_text(result: YawIdentification, method: str, *, name: str, source: str, known: YawRig | None) -> str:
     """TOML text of a rig card with the numbers of one method; the notes are those of the result.
 
     Raises
     ------
     InputError
-        The method tells no friction, or as :func:`known_added_inertia`.
+        The method gives no friction, or as :func:`known_added_inertia`.
     """
     estimate = result.estimates[method]
     if not estimate.friction:
         remedy = "take --method energy_least_squares, as_many_equations or output_error"
-        raise InputError("--method", "", f"{method} tells no friction, and a rig card needs it", remedy)
+        raise InputError("--method", "", f"{method} gives no friction, and a rig card needs it", remedy)
     added = known_added_inertia(result, method) if result.medium == "water" else None
     base = known or UNKNOWN_RIG
     kept = ("current_lag_s", "max_current_A", "inertia_accelerating_kgm2", "inertia_braking_kgm2", "gravity_Nm",
@@ -136,7 +138,7 @@ def rig_card_text(result: YawResult, method: str, *, name: str, source: str, kno
     values |= _gravity(estimate, base)
     values["torque_constant_NmpA"] = result.torque_constant_NmpA
     programme = result.records[0].programme
-    told = {"kind": programme.kind, "max_rate_degps": float(f"{math.degrees(programme.max_rate_radps):.9g}")}
+    motion = {"kind": programme.kind, "max_rate_degps": float(f"{math.degrees(programme.max_rate_radps):.9g}")}
     return yaw_rig_card_text(
         YawRigResult(
             name=name,
@@ -144,7 +146,7 @@ def rig_card_text(result: YawResult, method: str, *, name: str, source: str, kno
             notes=" ".join(result.notes),
             values=values,
             standard_errors=errors,
-            programme={**told, "rise_s": programme.rise_s, "settle_s": programme.settle_s, "humps": programme.humps},
+            programme={**motion, "rise_s": programme.rise_s, "settle_s": programme.settle_s, "humps": programme.humps},
             water_density_kgpm3=tank_density(result) if result.medium == "water" else None,
             length_m=next(
                 (record.constants["length_m"] for record in result.records if "length_m" in record.constants), None

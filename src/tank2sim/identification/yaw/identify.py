@@ -97,8 +97,8 @@ class BodyInertia:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class YawResult:
-    """What records of the rig tell of a body.
+class YawIdentification:
+    """Estimates of a body on the rig.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class YawResult:
     torque_constant_NmpA, torque_constant_error : float
         k_t and its relative standard error.
     body : BodyInertia or None
-        J_zz; None in air, where it is what is estimated, and where nothing tells it.
+        J_zz; None in air, where it is what is estimated, and where nothing states it.
     estimates : dict
         Method to estimate.
     fit : EnergyFit
@@ -135,7 +135,7 @@ class YawResult:
     angle: AngleFit | None
     mirror: tuple[float, ...]
     notes: tuple[str, ...]
-    air: YawResult | None = field(default=None)
+    air: YawIdentification | None = field(default=None)
 
     def added_inertia(self, method: str) -> tuple[float, float | None] | None:
         """lambda661 by a method and its standard error, kg m2; None where J_zz is not known.
@@ -184,16 +184,16 @@ class YawResult:
         }
 
 
-def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None) -> YawResult:
+def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None) -> YawIdentification:
     """Estimate the added yaw inertia and the dissipation of one body.
 
-    Records in air give J_zz, if there are any next to those in water; alone, they are themselves what is looked at.
+    Records in air give J_zz, if there are any in addition to those in water; alone, they are evaluated themselves.
 
     Raises
     ------
     InputError
         The intervals of a record are no mirror images, the motor saturates in one, the encoder steps too rarely, or
-        the records do not tell the terms apart.
+        the records do not separate the terms.
     """
     options = options or YawOptions()
     wet = tuple(record for record in records if record.medium == "water")
@@ -206,7 +206,7 @@ def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None
     return _result(wet, "water", options, air)
 
 
-def torque_constant(reference: YawResult, known_inertia_kgm2: float) -> tuple[float, float]:
+def torque_constant(reference: YawIdentification, known_inertia_kgm2: float) -> tuple[float, float]:
     """k_t (N m/A) and its relative standard error, from records in air of a body whose inertia is known.
 
     All terms of (3) are proportional to k_t: the records give J/k_t, whatever k_t they were evaluated with.
@@ -230,17 +230,21 @@ def parse_yaw_terms(text: str) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        A term is unknown or stands twice.
+        A term is unknown or repeated.
     """
     words = [word.strip() for word in text.split(",") if word.strip() not in ("", "inertia")]
     for word in words:
         if word not in ENERGY_TERMS or words.count(word) > 1:
             known = ", ".join(term for term in ENERGY_TERMS if term != "inertia")
-            raise InputError("--terms", "", f"{word!r} is no term, or stands twice", f"take any of {known}, once each")
+            raise InputError(
+                "--terms", "", f"{word!r} is not a term, or is repeated", f"take any of {known}, once each"
+            )
     return ("inertia", *(term for term in ENERGY_TERMS if term in words))
 
 
-def _result(records: tuple[YawRecord, ...], medium: Medium, options: YawOptions, air: YawResult | None) -> YawResult:
+def _result(
+    records: tuple[YawRecord, ...], medium: Medium, options: YawOptions, air: YawIdentification | None
+) -> YawIdentification:
     constant, notes = _torque_constant(records, options)
     notes += check_current(records)
     for record in records:
@@ -274,8 +278,8 @@ def _result(records: tuple[YawRecord, ...], medium: Medium, options: YawOptions,
     notes += [*left_out, *check_explained(records, angle.estimate.misfit if angle else None)]
     if angle:
         estimates["output_error"] = angle.estimate
-    body, told = _body(records, medium, options, air)
-    result = YawResult(
+    body, remarks = _body(records, medium, options, air)
+    result = YawIdentification(
         records=records,
         medium=medium,
         torque_constant_NmpA=constant,
@@ -286,7 +290,7 @@ def _result(records: tuple[YawRecord, ...], medium: Medium, options: YawOptions,
         ideal=ideal,
         angle=angle,
         mirror=mirror,
-        notes=(*notes, *told, *judged(fit, estimates)),
+        notes=(*notes, *remarks, *judged(fit, estimates)),
         air=air,
     )
     return result
@@ -303,7 +307,7 @@ def _with_gravity(fit: EnergyFit, fitted: Callable[[tuple[str, ...]], Fits]) -> 
     """
     try:
         more, reference = fitted((*fit.balance.terms, *GRAVITY))
-    except InputError:  # the angles do not tell it apart
+    except InputError:  # the angles do not separate it
         return None
     freedom = len(more.residuals_J) - len(more.coefficients)
     rest, before = float(more.residuals_J @ more.residuals_J), float(fit.residuals_J @ fit.residuals_J)
@@ -338,22 +342,22 @@ def _rig(constant: float, known: YawRig | None) -> YawRig:
 
 
 def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tuple[float, list[str]]:
-    told = {record.constants.get("torque_constant_NmpA") for record in records}
+    constants = {record.constants.get("torque_constant_NmpA") for record in records}
     if options.torque_constant_NmpA is not None:
         return options.torque_constant_NmpA, []
-    if len(told) > 1:
+    if len(constants) > 1:
         raise InputError(
             records[0].path, "comment torque_constant_NmpA", "is not the same in all records", "give --torque-constant"
         )
-    (stated,) = told
+    (stated,) = constants
     if stated is not None:
         return stated, []
-    note = f"No record tells the torque constant: that of the paper's motor, {TORQUE_CONSTANT_NMPA:g} N m/A, is taken."
+    note = f"No record states the torque constant: that of the paper's motor, {TORQUE_CONSTANT_NMPA:g} N m/A, is taken."
     return TORQUE_CONSTANT_NMPA, [note]
 
 
 def _body(
-    records: tuple[YawRecord, ...], medium: Medium, options: YawOptions, air: YawResult | None
+    records: tuple[YawRecord, ...], medium: Medium, options: YawOptions, air: YawIdentification | None
 ) -> tuple[BodyInertia | None, list[str]]:
     if medium == "air":
         return None, []
@@ -372,11 +376,11 @@ def _body(
     for record in records:
         if (stated := record.constants.get("inertia_kgm2")) is not None:
             error = record.constants.get("inertia_error_kgm2")
-            told = BodyInertia(value_kgm2=stated, error_kgm2=error, source=f"comment of {record.path.name}")
-            return told, _lacking(told)
+            inertia = BodyInertia(value_kgm2=stated, error_kgm2=error, source=f"comment of {record.path.name}")
+            return inertia, _lacking(inertia)
     return None, [
-        "J_zz is not known, so that the added inertia cannot be told from the total: give a record in air as well, or "
-        "--inertia-kgm2."
+        "J_zz is not known, so that the added inertia cannot be separated from the total: give a record in air as "
+        "well, or --inertia-kgm2."
     ]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.records.trials import Trial
 from tank2sim.units import from_si, to_si
@@ -12,7 +13,7 @@ HELD_COLUMNS = frozenset({"delta_order_rad", "n_radps"})
 """Signals that hold until their next value: orders."""
 
 DIRECTION_COLUMNS = frozenset({"psi_rad", "cog_rad", "wind_direction_rad", "wind_rel_direction_rad"})
-"""Signals that go round the compass: a step through north is no jump."""
+"""Signals that go round the compass: a step through north is not a jump."""
 
 _WORDS = {
     "delta": "rudder angle",
@@ -70,13 +71,19 @@ class SignalName:
 
     @property
     def words(self) -> str:
-        """What it is: ``yaw rate``."""
+        """The quantity in words: ``yaw rate``."""
         return _WORDS.get(self.stem, self.stem.replace("_", " "))
 
     @property
     def factor(self) -> float:
-        """What a value in SI is multiplied by to stand in that column."""
+        """Value in that column over the value in SI."""
         return from_si(self.file, 1.0)
+
+
+def file_columns(trial: Trial) -> dict[str, Array]:
+    """Columns (n,) of a trial by their names and in the units of a trial file, ``t_s`` first."""
+    names = {SignalName(name): values for name, values in trial.signals.items()}
+    return {"t_s": trial.time_s, **{name.file: name.factor * values for name, values in names.items()}}
 
 
 def find_signal(asked: str, trial: Trial) -> str:
@@ -85,7 +92,7 @@ def find_signal(asked: str, trial: Trial) -> str:
     Raises
     ------
     InputError
-        The trial has no such signal.
+        The signal is not in the trial.
     """
     name = to_si(asked, 1.0)[0]
     for signal in trial.signals:

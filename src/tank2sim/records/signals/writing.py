@@ -11,7 +11,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.signals.columns import HELD_COLUMNS, SignalName
+from tank2sim.records.signals.columns import HELD_COLUMNS, SignalName, file_columns
 from tank2sim.records.signals.effect import Filtered
 from tank2sim.records.signals.sampling import Series, even_series
 from tank2sim.records.trials import Trial, with_signals
@@ -19,10 +19,11 @@ from tank2sim.records.trials import Trial, with_signals
 _CIRCLE = frozenset({"cog_rad", "wind_direction_rad", "wind_rel_direction_rad"})
 
 
-def with_filtered(trial: Trial, filtered: Filtered, told: str) -> Trial:
+def with_filtered(trial: Trial, filtered: Filtered, notice: str) -> Trial:
     """The trial with one signal filtered, at its own times; nan where the filtered signal does not reach.
 
-    The noise stated of that signal is left out: it is no longer true.
+    `notice` is added to those of the trial.
+    The noise stated of that signal is left out: it does not hold any more.
     """
     series = filtered.series
     name = series.name
@@ -32,11 +33,13 @@ def with_filtered(trial: Trial, filtered: Filtered, told: str) -> Trial:
     outside = (trial.time_s < known[0] - series.step_s / 2) | (trial.time_s > known[-1] + series.step_s / 2)
     values[outside] = np.nan
     noise = {key: value for key, value in trial.noise.items() if key != name}
-    return replace(with_signals(trial, {name: _on_circle(name, values)}, told), noise=noise)
+    return replace(with_signals(trial, {name: _on_circle(name, values)}, notice), noise=noise)
 
 
-def thinned(trial: Trial, filtered: Sequence[Filtered], told: str) -> Trial:
-    """The trial at the fewer times of thinned signals, all of them; orders are taken as they stood at these times.
+def thinned(trial: Trial, filtered: Sequence[Filtered], notice: str) -> Trial:
+    """The trial at the fewer times of thinned signals, all of them; orders have their values at these times.
+
+    `notice` is added to those of the trial.
 
     Raises
     ------
@@ -45,22 +48,21 @@ def thinned(trial: Trial, filtered: Sequence[Filtered], told: str) -> Trial:
     """
     time = filtered[0].series.time_s
     signals: dict[str, Array] = {}
-    for one in filtered:
-        series = one.series
+    for result in filtered:
+        series = result.series
         if len(series.values) != len(time) or abs(series.start_s - time[0]) > series.step_s / 10:
-            names = " and ".join(SignalName(other.series.name).file for other in (filtered[0], one))
+            names = " and ".join(SignalName(other.series.name).file for other in (filtered[0], result))
             remedy = "cut the record to where all columns are known"
             raise InputError(trial.path, f"columns {names}", "are not known over the same times", remedy)
         signals[series.name] = _on_circle(series.name, series.values)
     for name in trial.signals:
         if name in HELD_COLUMNS:
             signals[name] = _held(even_series(trial, name), time)
-    return replace(trial, time_s=time, signals=signals, noise={}, notices=(*trial.notices, told))
+    return replace(trial, time_s=time, signals=signals, noise={}, notices=(*trial.notices, notice))
 
 
 def trial_text(trial: Trial, remarks: Sequence[str]) -> str:
     """Text of a trial CSV, rudder positive to starboard; `remarks` are its first comment lines."""
-    names = list(trial.signals)
     text = io.StringIO()
     for remark in remarks:
         text.write(f"# {' '.join(remark.split())}\n")
@@ -68,9 +70,9 @@ def trial_text(trial: Trial, remarks: Sequence[str]) -> str:
         text.write(f"# scale: {trial.scale:.10g}\n")
     if stated := [f"{SignalName(name).file} {SignalName(name).factor * trial.noise[name]:.6g}" for name in trial.noise]:
         text.write(f"# noise: {', '.join(stated)}\n")
-    text.write(",".join(["t_s", *(SignalName(name).file for name in names)]) + "\n")
-    columns = [SignalName(name).factor * trial.signals[name] for name in names]
-    for time, *values in zip(trial.time_s.tolist(), *(column.tolist() for column in columns), strict=True):
+    columns = file_columns(trial)
+    text.write(",".join(columns) + "\n")
+    for time, *values in zip(*(column.tolist() for column in columns.values()), strict=True):
         cells = (f"{value + 0.0:.10g}" if math.isfinite(value) else "" for value in values)
         text.write(",".join([f"{time:.10g}", *cells]) + "\n")
     return text.getvalue()

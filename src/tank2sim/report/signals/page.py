@@ -46,9 +46,9 @@ def trial_labels(analyses: Sequence[TrialAnalysis]) -> list[str]:
     ]
 
 
-def picture_name(key: ChartKey) -> str:
-    """File name of a chart's picture."""
-    return f"{key[0] or 'filter'}_{key[1]}.png"
+def chart_name(key: ChartKey) -> str:
+    """Stem of the file of a chart's picture."""
+    return f"{key[0] or 'filter'}_{key[1]}"
 
 
 def signals_charts(
@@ -89,9 +89,9 @@ def signals_charts(
 
 
 def signals_page(
-    analyses: Sequence[TrialAnalysis], charts: Mapping[ChartKey, alt.TopLevelMixin], filter_told: str
+    analyses: Sequence[TrialAnalysis], charts: Mapping[ChartKey, alt.TopLevelMixin], filter_text: str
 ) -> Page:
-    """The page; `charts` as :func:`signals_charts` gives them, `filter_told` what the filter does, in words."""
+    """The page; `charts` as :func:`signals_charts` gives them, `filter_text` what the filter does, in words."""
     columns = [column for analysis in analyses for column in analysis.columns]
     steady = [c for c in columns if c.randomness and c.randomness.stationarity.verdict is Stationary.YES]
     figures = [
@@ -103,19 +103,19 @@ def signals_page(
     for label, analysis in zip(trial_labels(analyses), analyses, strict=True):
         steering = analysis.steering
         notes = [*analysis.notices, *(steering.notices if steering else ())]
-        own = {kind: chart for (trial, kind), chart in charts.items() if trial == label}
+        of_trial = {kind: chart for (trial, kind), chart in charts.items() if trial == label}
         sections.append(
             PageSection(
                 heading=label,
                 text="" if sections else _HOW,
                 tables=[_signals(analysis), _tests(analysis)],
-                charts=[Illustration(chart=chart, caption=_caption(kind)) for kind, chart in own.items()],
+                charts=[Illustration(chart=chart, caption=_caption(kind)) for kind, chart in of_trial.items()],
                 notes=notes,
             )
         )
-    if filter_told:
+    if filter_text:
         illustrations = [Illustration(chart=chart) for (trial, _), chart in charts.items() if trial == _FILTER]
-        sections.append(PageSection(heading="Filter", text=filter_told, charts=illustrations))
+        sections.append(PageSection(heading="Filter", text=filter_text, charts=illustrations))
     title = analyses[0].trial.name if len(analyses) == 1 else f"{len(analyses)} trials"
     return Page(title=title, subtitle="Measured signals", figures=figures, sections=sections)
 
@@ -149,7 +149,7 @@ def _caption(kind: str) -> str:
         "transfer": "Gain and phase where the coherence is above chance, with 95 % intervals. In a zigzag the rudder "
         "follows the heading, and only what is highly coherent is the ship's own response.",
     }
-    return next((told for end, told in captions.items() if kind.endswith(end)), "")
+    return next((caption for end, caption in captions.items() if kind.endswith(end)), "")
 
 
 def _signals(analysis: TrialAnalysis) -> PageTable:
@@ -197,7 +197,7 @@ def _tests(analysis: TrialAnalysis) -> PageTable:
             continue
         steady, normal = found.stationarity, found.normality
         least = min(normal.p_values.values()) if normal.p_values else None
-        told: list[Cell] = [steady.verdict.value, steady.level.dickey_fuller, steady.level.kpss]
+        tests: list[Cell] = [steady.verdict.value, steady.level.dickey_fuller, steady.level.kpss]
         shape: list[Cell] = [normal.verdict, least, normal.skewness, normal.excess_kurtosis]
-        rows.append([SignalName(column.series.name).words, *told, *shape])
+        rows.append([SignalName(column.series.name).words, *tests, *shape])
     return PageTable(caption="Tests", columns=heads, rows=rows)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from tank2sim.dynamics.yaw_theory import TheoryValue
 from tank2sim.files import plain_json
-from tank2sim.identification.yaw.identify import YAW_METHODS, YawResult
+from tank2sim.identification.yaw.identify import YAW_METHODS, YawIdentification
 from tank2sim.identification.yaw.intervals import ENERGY_TERMS
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.numbers import format_number
@@ -30,8 +30,8 @@ _HOW = {
 }
 
 
-def yaw_page(result: YawResult, theory: Sequence[TheoryValue] = ()) -> Page:
-    """The page of a result, and next to it what `theory` gives for the body's form."""
+def yaw_page(result: YawIdentification, theory: Sequence[TheoryValue] = ()) -> Page:
+    """The page of a result, and what `theory` gives for the body's form."""
     names = ", ".join(record.path.name for record in result.records)
     estimates, balance, *more = yaw_drawn(plain_json(result.as_json()))
     return Page(
@@ -103,7 +103,7 @@ def _theory(values: Sequence[TheoryValue]) -> list[PageSection]:
     ]
 
 
-def _figures(result: YawResult) -> list[KeyFigure]:
+def _figures(result: YawIdentification) -> list[KeyFigure]:
     best = result.estimates[YAW_METHODS[0]]
     added = result.added_inertia(YAW_METHODS[0])
     value, error = added or (best.total_inertia_kgm2, best.inertia_error_kgm2)
@@ -139,7 +139,7 @@ def _figures(result: YawResult) -> list[KeyFigure]:
     ]
 
 
-def _estimates(result: YawResult) -> PageTable:
+def _estimates(result: YawIdentification) -> PageTable:
     rows: list[list[Cell]] = []
     for method, estimate in result.estimates.items():
         added, error = result.added_inertia(method) or (None, None)
@@ -163,8 +163,8 @@ def _estimates(result: YawResult) -> PageTable:
     return PageTable(caption="Estimates with standard errors", columns=columns, rows=rows)
 
 
-def _friction(result: YawResult) -> PageTable:
-    """A row for each term, a column for each method that tells it."""
+def _friction(result: YawIdentification) -> PageTable:
+    """A row for each term, a column for each method that gives it."""
     methods = [method for method, estimate in result.estimates.items() if estimate.friction]
     rows: list[list[Cell]] = []
     for term in result.fit.balance.terms[1:]:

@@ -45,8 +45,15 @@ class Measured:
     notices: tuple[str, ...]
 
 
-def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
-    """Read trials, correct what the audit is sure of, and scale them to the card's ship.
+def measured(given: Iterable[Path | Trial], card: ManoeuvringCard) -> Measured:
+    """Read trials, repair what the audit is sure of, and scale them to the card's ship.
+
+    Parameters
+    ----------
+    given : iterable
+        Files, or trials as they were read.
+    card : ManoeuvringCard
+        Of the ship.
 
     Raises
     ------
@@ -56,8 +63,9 @@ def measured(paths: Iterable[Path], card: ManoeuvringCard) -> Measured:
         order in others.
     """
     trials, notices = [], []
-    for path in paths:
-        trial, findings = audit_and_repair(read_trial(path))
+    for item in given:
+        trial, findings = audit_and_repair(item if isinstance(item, Trial) else read_trial(item))
+        path = trial.path
         for finding in findings:
             _refuse_open(finding)
             done = "taken so" if finding.safe and finding.repair is not None else "left as it is"
@@ -92,20 +100,20 @@ def _refuse_open(finding: Finding) -> None:
 
 def _unused(trial: Trial, card: ManoeuvringCard) -> list[str]:
     """What of a trial does not enter, in words."""
-    messages = []
+    notices = []
     for name, effect in EFFECTS.items():
         signals = set(effect.measured_as.values())
         if signals and signals <= set(trial.signals) and all(entry.name != name for entry in card.effects):
-            messages.append(
+            notices.append(
                 f"{trial.path.name}: {name} was measured, and the card has no effect {name!r}: it is not used"
             )
     rudder = trial.signals.get("delta_rad", trial.signals.get("delta_order_rad"))
     empty = 0 if rudder is None else int(np.isnan(rudder).sum())
     if empty:
-        messages.append(
+        notices.append(
             f"{trial.path.name}: the rudder is empty in {empty} rows: taken as straight between its readings"
         )
-    return messages
+    return notices
 
 
 def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:

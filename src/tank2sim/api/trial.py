@@ -1,0 +1,176 @@
+"""A measured trial in degrees, m/s and rpm, as a data frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tank2sim.errors import InputError
+from tank2sim.files import write_together
+from tank2sim.records.reading import READERS, looks_like_a_trial
+from tank2sim.records.reading import read_trial as read_record
+from tank2sim.records.signals.columns import SignalName, file_columns
+from tank2sim.records.signals.writing import trial_text
+from tank2sim.records.trials import Trial
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from tank2sim.api.audit import AuditResult
+    from tank2sim.api.signals import SignalsResult
+
+
+class TrialRecord:
+    """A free-running trial as it was measured; :func:`read_trial` gives one.
+
+    Angles are in degrees, speeds in m/s, revolutions in rpm, times in s; rudder and turns are positive to starboard.
+
+    Parameters
+    ----------
+    trial : Trial
+        SI and radians.
+    """
+
+    def __init__(self, trial: Trial) -> None:
+        self.trial = trial
+
+    @property
+    def name(self) -> str:
+        """File name without its ending."""
+        return self.trial.name
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.trial.path
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What was done to the data on reading."""
+        return self.trial.notices
+
+    @cached_property
+    def df(self) -> pd.DataFrame:
+        """The record, one row a sample: ``t_s``, ``delta_deg``, ``u_mps``, ``r_degps``, ``psi_deg``, ..."""
+        import pandas as pd
+
+        return pd.DataFrame(file_columns(self.trial))
+
+    @property
+    def noise(self) -> dict[str, float]:
+        """Standard deviation of the measurement by column of :attr:`df`, where the file states it."""
+        return {SignalName(name).file: SignalName(name).factor * sigma for name, sigma in self.trial.noise.items()}
+
+    def to_csv(self, path: str | Path | None = None) -> str:
+        """The record as text of a trial CSV with its notices as comments, also written to `path`.
+
+        Raises
+        ------
+        InputError
+            The file cannot be written, or is the one that was measured.
+        """
+        text = trial_text(self.trial, [f"tank2sim, from {self.path.name}", *self.notices])
+        if path is not None:
+            write_together({Path(path): text}, inputs=[self.path])
+        return text
+
+    def audit(self) -> AuditResult:
+        """What is wrong with the data, as :func:`tank2sim.audit` finds it."""
+        from tank2sim.api.audit import audit
+
+        return audit(self)
+
+    def signals(
+        self,
+        columns: Sequence[str] = (),
+        *,
+        max_gap_s: float | None = None,
+        segment_s: float | None = None,
+        filter: str | None = None,
+    ) -> SignalsResult:
+        """Statistics and spectra of the columns, and a `filter`; parameters are those of :func:`tank2sim.signals`."""
+        from tank2sim.api.signals import signals
+
+        return signals(self, columns, max_gap_s=max_gap_s, segment_s=segment_s, filter=filter)
+
+    def __repr__(self) -> str:
+        columns = file_columns(self.trial)
+        time = columns.pop("t_s")
+        return f"{self.name}: {len(time)} rows, {time[0]:.5g} to {time[-1]:.5g} s; columns {', '.join(columns)}"
+
+    def _repr_html_(self) -> str:
+        text: str = self.df._repr_html_()
+        return text
+
+
+TrialPaths = Sequence[TrialRecord | str | Path] | TrialRecord | str | Path
+"""Trials by their files, folders or records."""
+
+
+def read_trial(path: str | Path) -> TrialRecord:
+    """Read a trial: the project's CSV, a SIMMAN ``.dat`` or an Esso Osaka CSV, by its first line.
+
+    Parameters
+    ----------
+    path : path
+
+    Raises
+    ------
+    InputError
+        The file is missing or of no known format, its content is faulty, or its time does not rise.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import tank2sim as t2s
+    >>> file = tempfile.mkdtemp() + "/turn.csv"
+    >>> text = t2s.load("mariner").turn(35, duration_s=60).to_csv(file)
+    >>> trial = t2s.read_trial(file)
+    >>> float(trial.df["delta_deg"].max())
+    35.0
+    """
+    return TrialRecord(read_record(path))
+
+
+def trial_files(given: TrialPaths) -> list[Path]:
+    """The files that are meant: a folder means the trials in it, and a record the file that was measured.
+
+    Raises
+    ------
+    InputError
+        A folder holds no trial.
+    """
+    return [item.path if isinstance(item, TrialRecord) else item for item in _files_and_records(given)]
+
+
+def trials_of(given: TrialPaths, *, rising: bool = True) -> list[Trial]:
+    """The trials that are meant: records as they are, files read, and of a folder the trials in it.
+
+    Without `rising`, times that do not rise are let through.
+
+    Raises
+    ------
+    InputError
+        As :func:`tank2sim.records.reading.read_trial`; or a folder holds no trial.
+    """
+    return [
+        item.trial if isinstance(item, TrialRecord) else read_record(item, rising=rising)
+        for item in _files_and_records(given)
+    ]
+
+
+def _files_and_records(given: TrialPaths) -> list[TrialRecord | Path]:
+    found: list[TrialRecord | Path] = []
+    for item in [given] if isinstance(given, TrialRecord | str | Path) else given:
+        if isinstance(item, TrialRecord):
+            found.append(item)
+            continue
+        path = Path(item)
+        files = sorted(file for file in path.glob("*") if looks_like_a_trial(file)) if path.is_dir() else [path]
+        if not files:
+            endings = ", ".join(dict.fromkeys(ending for reader in READERS.values() for ending in reader.suffixes))
+            raise InputError(path, "", "holds no trial", f"a folder with trials ({endings}) was expected")
+        found += files
+    return found

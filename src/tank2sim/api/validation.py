@@ -1,0 +1,231 @@
+"""A card validated against trials in the manner of ITTC 7.5-02-06-03, as a result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
+from tank2sim.analysis.validation.standard_trials import MEMBERS, TrialShip, ship_of
+from tank2sim.analysis.validation.study import REQUIRED, Validated, Validation, Verified, verify
+from tank2sim.analysis.validation.study import validate as validate_figures
+from tank2sim.api.result import Result, ResultTable, section_charts
+from tank2sim.api.ship import Ship, as_ship
+from tank2sim.api.trial import TrialPaths, trials_of
+from tank2sim.arrays import Array
+from tank2sim.cards import Card, ManoeuvringCard
+from tank2sim.errors import InputError
+from tank2sim.gap.outcome.export import signal_display_name
+from tank2sim.gap.proof.card_replay import replay_by_card
+from tank2sim.gap.result import Passed
+from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
+from tank2sim.records.thinning import drawn_columns
+from tank2sim.simulation.integrator import NO_COMPILER
+from tank2sim.units import in_words
+
+if TYPE_CHECKING:
+    import altair as alt
+    import pandas as pd
+
+    from tank2sim.report.validation.page import ValidationEvidence
+
+REPLAY_SAMPLES = 240
+"""Samples of each trial in the JSON, for charts. Project choice: a chart is a few hundred pixels wide, and the record
+itself is the file."""
+
+
+@dataclass(frozen=True, eq=False)
+class Replays:
+    """Trials replayed, and why others could not be."""
+
+    replayed: tuple[Passed, ...]
+    notices: tuple[str, ...]
+
+
+class ValidationResult(Result):
+    """Figures of a ship's trials next to those simulated, with the validation uncertainty.
+
+    Parameters
+    ----------
+    ready : TrialShip
+        Card and model.
+    trials : Measured
+        At the size of the card's ship.
+    validation : Validation
+    members : int
+        Size of the ensemble of the verification.
+    """
+
+    command = "validate"
+
+    def __init__(self, ready: TrialShip, trials: Measured, validation: Validation, members: int) -> None:
+        self.ready, self.trials, self.validation = ready, trials, validation
+        self.verified, troubles = verify(ready, members)
+        self.criteria: tuple[ImoCriterion, ...] = tuple(imo_criteria(ready.model))
+        replays = _replay(ready.card, trials)
+        self.replays = replays.replayed
+        compiler = () if ready.integrator.compiled else (NO_COMPILER,)
+        findings = (*validation.notices, *troubles, *replays.notices)
+        self.notices = (*ready.model.notices, *trials.notices, *findings, *compiler)
+
+    @property
+    def ship(self) -> Ship:
+        """The ship."""
+        return Ship(self.ready.card)
+
+    @property
+    def verdict(self) -> str:
+        """How many figures are validated, too uncertain, only fitted, not validated or open."""
+        return self.validation.verdict
+
+    @property
+    def figures(self) -> pd.DataFrame:
+        """Compared figures, a row each, in the unit of the name: measured D, simulated S, E = S - D, U_val, outcome."""
+        import pandas as pd
+
+        rows = [
+            (row.trial, row.manoeuvre, row.name, *_numbers(row), str(row.outcome)) for row in self.validation.figures
+        ]
+        columns = ["trial", "manoeuvre", "figure", "measured", "simulated", "error", "uncertainty", "outcome"]
+        return pd.DataFrame(rows, columns=columns)
+
+    @property
+    def verification(self) -> pd.DataFrame:
+        """Figures of standard trials, a row each: value, numerical uncertainty U_num, deviation by the inputs."""
+        import pandas as pd
+
+        rows = [(row.trial, row.name, row.value, row.numerical, row.deviation) for row in self.verified]
+        return pd.DataFrame(rows, columns=["trial", "figure", "value", "numerical", "deviation"])
+
+    def content(self) -> Mapping[str, object]:
+        """As :meth:`.Result.content`."""
+        card = self.ready.card
+        return {
+            "kind": "validate",
+            "ship": card.ship.name,
+            "source": card.ship.source,
+            **self.validation.as_json(),
+            "verification": [{**vars(row), "U_num": row.numerical} for row in self.verified],
+            "imo": [criterion.as_json() for criterion in self.criteria],
+            "replays": [_replay_as_json(replay) for replay in self.replays],
+            "notices": self.notices,
+        }
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """The verdict, and the largest numerical uncertainty."""
+        verdict = f"{self.ready.card.ship.name}: {self.verdict}"
+        shares = _numerical_percent(self.verified)
+        if not shares:
+            return (verdict,)
+        return (
+            verdict,
+            f"Numerical uncertainty of {len(shares)} figures of standard trials: {max(shares):.2g} % at most",
+        )
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """Figure by figure; none without a turning circle or a zigzag among the trials."""
+        rows: list[list[object]] = [
+            [
+                row.trial,
+                " ".join(part for part in in_words(row.name) if part),
+                *_numbers(row),
+                str(row.outcome),
+            ]
+            for row in self.validation.figures
+        ]
+        if not rows:
+            return ()
+        columns = ("trial", "figure", "measured", "simulated", "E", "U_val", "verdict")
+        return (ResultTable("E = simulated less measured, and the validation uncertainty", columns, rows),)
+
+    def charts(self) -> dict[str, alt.TopLevelMixin]:
+        """Comparison errors, and track and histories of each replay."""
+        from tank2sim.report.validation.page import validation_page
+
+        return section_charts(validation_page(self._evidence()).sections)
+
+    def page(self) -> str:
+        """As :meth:`.Result.page`."""
+        from tank2sim.report.kit.page import render_page
+        from tank2sim.report.validation.page import validation_page
+
+        return render_page(validation_page(self._evidence()))
+
+    def _evidence(self) -> ValidationEvidence:
+        from tank2sim.report.validation.page import ValidationEvidence
+
+        card, model = self.ready.card, self.ready.model
+        return ValidationEvidence(
+            card, model, self.validation, self.verified, self.criteria, self.replays, self.notices
+        )
+
+
+def validate(
+    card: Ship | Card | str | Path,
+    trials: TrialPaths = (),
+    *,
+    members: int = MEMBERS,
+    required_percent: float = REQUIRED,
+) -> ValidationResult:
+    """Validate a ship in the manner of ITTC 7.5-02-06-03 by trials that did not make its card, figure by figure.
+
+    A trial that the card was identified from can only refute it.
+
+    Parameters
+    ----------
+    card : Ship, Card, str or path
+    trials : path, TrialRecord, or sequence of them
+        Turning circles and zigzags; a folder means the trials in it. Without any, the model is documented and
+        verified.
+    members : int
+        Ships drawn within the errors of the card for u_input; 0 for none: no figure can then be judged.
+    required_percent : float
+        U_reqd in per cent of each measured figure.
+
+    Raises
+    ------
+    InputError
+        The card is not one of a ship that manoeuvres, or a file is at fault.
+    """
+    ship = as_ship(card).manoeuvring()
+    records = trials_of(trials)
+    given = measured(records, ship) if records else Measured((), "angle", ())
+    found = validate_figures(ship, given.trials, members, required_percent)
+    return ValidationResult(ship_of(ship), given, found, members)
+
+
+def _replay(card: ManoeuvringCard, given: Measured) -> Replays:
+    """Replay each trial by itself, so that a trial that cannot be replayed spoils no other."""
+    found: list[Passed] = []
+    notices: list[str] = []
+    for trial in given.trials:
+        try:
+            found += replay_by_card(card, Measured((trial,), given.driven_by, ()))
+        except InputError as error:
+            notices.append(f"{trial.name}: not replayed: {error.problem}")
+    return Replays(tuple(found), tuple(notices))
+
+
+def _replay_as_json(replay: Passed) -> dict[str, object]:
+    """A trial as measured and as simulated, thinned to draw; columns as in a trial file."""
+    names = {name: signal_display_name(name) for name in replay.measured if name in replay.before}
+
+    def columns(values: Mapping[str, Array]) -> dict[str, list[float]]:
+        in_file = {column.file: column.factor * values[name] for name, column in names.items()}
+        return drawn_columns({"t_s": replay.time_s, **in_file}, REPLAY_SAMPLES)
+
+    return {"trial": replay.name, "measured": columns(replay.measured), "simulated": columns(replay.before)}
+
+
+def _numbers(row: Validated) -> tuple[float | None, ...]:
+    """D, S, E and U_val."""
+    return row.measured, row.simulated, row.error, row.uncertainty
+
+
+def _numerical_percent(verified: Sequence[Verified]) -> list[float]:
+    """U_num of each figure in per cent of its value."""
+    return [100 * abs(row.numerical / row.value) for row in verified if row.numerical is not None and row.value]

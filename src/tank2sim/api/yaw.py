@@ -1,0 +1,387 @@
+"""Added yaw inertia and dissipation of a body that a motor turns in a tank, as a result with its cards."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tank2sim.api.result import Result, ResultTable, section_charts
+from tank2sim.api.ship import Ship, as_ship
+from tank2sim.cards import Card, YawRigCard, parse_card
+from tank2sim.dynamics.yaw_programme import Similarity, YawProgramme, programme_of
+from tank2sim.dynamics.yaw_theory import FloatingBody, TheoryValue, theory_values
+from tank2sim.errors import InputError
+from tank2sim.files import write_together
+from tank2sim.identification.yaw.card import (
+    BEST,
+    body_length,
+    known_added_inertia,
+    nrdot_prime,
+    rig_card_text,
+    tank_density,
+    with_nrdot,
+)
+from tank2sim.identification.yaw.identify import (
+    YAW_METHODS,
+    YawIdentification,
+    YawOptions,
+    identify_yaw,
+    parse_yaw_terms,
+    torque_constant,
+)
+from tank2sim.records.yaw import Medium, read_yaw_record, yaw_record_text
+from tank2sim.simulation.yaw_rig_control import AdaptiveController, Controller
+
+if TYPE_CHECKING:
+    import altair as alt
+    import pandas as pd
+
+CONTROLLERS: dict[str, Controller | None] = {"tuned": None, "adaptive": AdaptiveController()}
+"""Names of the controllers (4), from the right inertia, and (6)."""
+
+
+class YawResult(Result):
+    """Added yaw inertia and dissipation of a body on the yaw rig, SI.
+
+    Parameters
+    ----------
+    identification : YawIdentification
+    method : str
+        Method whose numbers a card gets.
+    rig : YawRigCard, optional
+        What is known of the rig.
+    theory : sequence of TheoryValue
+        Added inertia from the form of the body.
+    """
+
+    command = "yaw"
+
+    def __init__(
+        self,
+        identification: YawIdentification,
+        method: str = BEST,
+        rig: YawRigCard | None = None,
+        theory: Sequence[TheoryValue] = (),
+    ) -> None:
+        self.identification, self.method, self.rig, self.theory = identification, method, rig, tuple(theory)
+        self.notices = identification.notes
+
+    @property
+    def estimates(self) -> pd.DataFrame:
+        """Estimates by method (index) with their standard errors: inertias in kg m2, dissipation B + D in J.
+
+        ``added_inertia_kgm2`` is missing where J_zz is not known; ``total_inertia_kgm2`` is J_zz + lambda661.
+        """
+        import pandas as pd
+
+        rows = []
+        for method, estimate in self.identification.estimates.items():
+            added, error = self.identification.added_inertia(method) or (None, None)
+            total = estimate.total_inertia_kgm2, estimate.inertia_error_kgm2
+            rows.append((method, added, error, *total, estimate.dissipation_J, estimate.dissipation_error_J))
+        names = ("added_inertia", "total_inertia", "dissipation")
+        units = ("kgm2", "kgm2", "J")
+        columns = [
+            f"{name}{error}_{unit}"
+            for name, unit in zip(names, units, strict=True)
+            for error in ("", "_standard_error")
+        ]
+        return pd.DataFrame(rows, columns=["method", *columns]).set_index("method")
+
+    @property
+    def added_inertia_kgm2(self) -> float | None:
+        """lambda661 by :attr:`method`; None where J_zz is not known."""
+        found = self.identification.added_inertia(self._known_method())
+        return found[0] if found else None
+
+    def nrdot(self, length_m: float | None = None) -> tuple[float, float | None]:
+        """N_rdot' (prime) of the body and its standard error.
+
+        Parameters
+        ----------
+        length_m : float, optional
+            Length of the body; by default as the records state.
+
+        Raises
+        ------
+        InputError
+            The added inertia or the length is not known, or the added inertia is negative.
+        """
+        found, method = self.identification, self._known_method()
+        known_added_inertia(found, method)  # before the length: without it no length helps
+        return nrdot_prime(found, method, body_length(found, length_m), tank_density(found))
+
+    def with_nrdot(self, card: Ship | Card | str | Path, length_m: float | None = None) -> Ship:
+        """A ship with N_rdot of the body on the rig on its card, the value before in a comment.
+
+        Parameters
+        ----------
+        card : Ship, Card, str or path
+        length_m : float, optional
+            As in :meth:`nrdot`.
+
+        Raises
+        ------
+        InputError
+            As :meth:`nrdot`, or the card is not one of a ship that manoeuvres.
+        """
+        ship = as_ship(card).manoeuvring()
+        self.nrdot(length_m)
+        length = body_length(self.identification, length_m)
+        return Ship(with_nrdot(ship, self.identification, self._known_method(), length))
+
+    def rig_card(self, name: str = "yaw rig") -> Card:
+        """The card of the rig with its body, called `name`.
+
+        Raises
+        ------
+        InputError
+            The method gives no friction, or the added inertia is not known or negative.
+        """
+        found, method = self.identification, self._known_method()
+        source = f"tank2sim yaw {' '.join(record.path.name for record in found.records)}, method {method}"
+        known = self.rig.yaw_rig if self.rig else None
+        return parse_card(rig_card_text(found, method, name=name, source=source, known=known), "the card found")
+
+    def content(self) -> Mapping[str, object]:
+        """As :meth:`.Result.content`."""
+        return {**self.identification.as_json(), "theory": [asdict(value) for value in self.theory]}
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """None: the tables say it."""
+        return ()
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """Estimates by method, friction and water, and the theory if it was asked for."""
+        found = self.identification
+        rows = [
+            [
+                method.replace("_", " "),
+                _with_error(*(found.added_inertia(method) or (None, None))),
+                _with_error(estimate.total_inertia_kgm2, estimate.inertia_error_kgm2),
+                _with_error(estimate.dissipation_J, estimate.dissipation_error_J),
+            ]
+            for method, estimate in found.estimates.items()
+        ]
+        names = ", ".join(record.path.name for record in found.records)
+        body = f"; J_zz = {1e4 * found.body.value_kgm2:.5g}e-4 kg m2 ({found.body.source})" if found.body else ""
+        title = f"{names}: in {found.medium}, k_t = {found.torque_constant_NmpA:.4g} N m/A{body}"
+        columns = ("", "added inertia, 1e-4 kg m2", "total, 1e-4 kg m2", "B + D, 1e-4 J")
+        friction = next(iter(found.estimates.values())).friction
+        terms = [[term.replace("_", " "), _with_error(*value)] for term, value in friction.items()]
+        tables = [
+            ResultTable(title, columns, rows),
+            ResultTable("Friction and water, by energy least squares", ("", "1e-4 SI"), terms),
+        ]
+        if self.theory:
+            values: list[list[object]] = [
+                [each.formula, 1e4 * each.value_kgm2, each.printed_kgm2 and 1e4 * each.printed_kgm2, each.remark]
+                for each in self.theory
+            ]
+            columns = ("", "added inertia, 1e-4 kg m2", "paper's Table 1", "remark")
+            tables.append(ResultTable("From the form, by (7), (8) and (9) of Alyshev (2019)", columns, values))
+        return tuple(tables)
+
+    def charts(self) -> dict[str, alt.TopLevelMixin]:
+        """Charts of the page: estimates, energy balance, records, residuals."""
+        from tank2sim.report.yaw.page import yaw_page
+
+        return section_charts(yaw_page(self.identification, self.theory).sections)
+
+    def page(self) -> str:
+        """As :meth:`.Result.page`."""
+        from tank2sim.report.kit.page import render_page
+        from tank2sim.report.yaw.page import yaw_page
+
+        return render_page(yaw_page(self.identification, self.theory))
+
+    def _known_method(self) -> str:
+        known = self.identification.estimates
+        if self.method not in known:
+            problem = f"{self.method} gave no estimate from these records"
+            raise InputError("--method", "", problem, f"take one of {', '.join(known)}")
+        return self.method
+
+
+def yaw(
+    records: Sequence[str | Path] | str | Path,
+    *,
+    inertia_kgm2: float | None = None,
+    inertia_error_kgm2: float | None = None,
+    torque_constant_NmpA: float | None = None,
+    reference: str | Path | None = None,
+    reference_inertia_kgm2: float | None = None,
+    rig: Ship | Card | str | Path | None = None,
+    terms: str | Sequence[str] | None = None,
+    mirror_percent: float = 25.0,
+    method: str = BEST,
+    theory: str | None = None,
+) -> YawResult:
+    """Estimate added yaw inertia and dissipation from records of the yaw rig (Alyshev 2019).
+
+    Parameters
+    ----------
+    records : path or sequence of paths
+        CSV files with ``t_s,phi_rad,current_A``; those of a body in air (``# medium: air``) give J_zz.
+    inertia_kgm2, inertia_error_kgm2 : float, optional
+        J_zz of body and rotor and its standard error; by default from records in air, or as the file says.
+    torque_constant_NmpA : float, optional
+        k_t, N m/A; by default as the records say.
+    reference, reference_inertia_kgm2 : path and float, optional
+        A record in air of a body of this known inertia, from which k_t is taken.
+    rig : Ship, Card, str or path, optional
+        Card of the rig: its walls, gravity, accelerating and braking count.
+    terms : str or sequence of str, optional
+        Terms in addition to the inertia (``"coulomb,viscous,quadratic"``); by default those of (3) for the medium.
+    mirror_percent : float
+        Largest difference of mirror images that is accepted, % of the largest rate.
+    method : str
+        Method whose numbers a card gets.
+    theory : str, optional
+        Also (7) to (9) for ``"L,B,T,H"`` or ``"L,B,T,H,CB"``: length, beam, draught and depth of water in m, block
+        coefficient; or for a card with these.
+
+    Raises
+    ------
+    InputError
+        A file is at fault, is not a record of such a rig, or does not determine the terms.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import tank2sim as t2s
+    >>> file = t2s.simulate_yaw("alyshev", tempfile.mkdtemp() + "/rig.csv")
+    >>> found = t2s.yaw(file)
+    >>> round(found.added_inertia_kgm2, 3)
+    0.03
+    """
+    if method not in YAW_METHODS:
+        raise InputError("--method", "", f"{method!r} is not known", f"there are: {', '.join(YAW_METHODS)}")
+    if (reference is None) != (reference_inertia_kgm2 is None):
+        raise InputError("--reference", "", "goes with --reference-inertia-kgm2", "give both, or neither")
+    error = 0.0
+    if reference is not None and reference_inertia_kgm2 is not None:
+        in_air = identify_yaw([read_yaw_record(reference)])
+        torque_constant_NmpA, error = torque_constant(in_air, reference_inertia_kgm2)
+    known = None if rig is None else _rig_card(rig, "--rig")
+    options = YawOptions(
+        inertia_kgm2=inertia_kgm2,
+        inertia_error_kgm2=inertia_error_kgm2,
+        torque_constant_NmpA=torque_constant_NmpA,
+        torque_constant_error=error,
+        known=known.yaw_rig if known else None,
+        terms=parse_yaw_terms(terms if isinstance(terms, str) else ",".join(terms)) if terms else None,
+        mirror_limit=mirror_percent / 100,
+    )
+    body = _floating_body(theory) if theory else None
+    paths = [records] if isinstance(records, str | Path) else records
+    found = identify_yaw([read_yaw_record(path) for path in paths], options)
+    values = theory_values(body, found.records[0].programme.max_rate_radps) if body else ()
+    return YawResult(found, method, known, values)
+
+
+def simulate_yaw(
+    card: Ship | Card | str | Path,
+    path: str | Path,
+    *,
+    medium: Medium = "water",
+    controller: str = "tuned",
+    similar_to: str | None = None,
+    noise_A: float = 0.0,
+) -> Path:
+    """Write the record that the yaw rig of a card would give, and return its file.
+
+    Parameters
+    ----------
+    card : Ship, Card, str or path
+        Card of the rig with its body (``"alyshev"``).
+    path : path
+        The new file.
+    medium : str
+        ``water`` or ``air``; in air with the card's friction f_c, f_1.
+    controller : str
+        ``tuned`` (4) or ``adaptive`` (6).
+    similar_to : str, optional
+        A ship's motion ``"L,B,R,T"`` to run at the size of the body: length and beam in m, yaw rate in deg/min, time
+        in s; by default the programme of the card.
+    noise_A : float
+        Standard deviation of the noise of the recorded current, A.
+
+    Raises
+    ------
+    InputError
+        The file exists, the card is not one of a yaw rig, or the motor saturates.
+    """
+    from tank2sim.simulation.yaw_record import simulated_record
+
+    path = Path(path)
+    if path.exists():
+        raise InputError(path, "", "is there already, and may be a measurement", "give --simulate a new name")
+    if controller not in CONTROLLERS:
+        raise InputError("--controller", "", f"{controller!r} is not known", f"there are: {', '.join(CONTROLLERS)}")
+    rig = _rig_card(card, "--simulate")
+    programme = _similar(rig, similar_to) if similar_to else None
+    record = simulated_record(
+        rig, path, noise_A, medium=medium, controller=CONTROLLERS[controller], programme=programme
+    )
+    write_together({path: yaw_record_text(record)}, inputs=[Path(rig.source)])
+    return path
+
+
+def _rig_card(given: Ship | Card | str | Path, option: str) -> YawRigCard:
+    card = as_ship(given).card
+    if not isinstance(card, YawRigCard):
+        raise card.fault("model.kind", f"is {card.model.kind!r}", f"give {option} a card of the yaw rig")
+    return card
+
+
+def _similar(card: YawRigCard, text: str) -> YawProgramme:
+    """The programme that is a ship's motion ``L,B,R,T`` at the size of the card's body."""
+    try:
+        length, beam, rate_degpmin, time_s = (float(word) for word in text.split(","))
+    except ValueError:
+        length = beam = rate_degpmin = time_s = 0.0
+    if not all(0 < value < math.inf for value in (length, beam, abs(rate_degpmin), time_s)):
+        remedy = "write length and beam in m, yaw rate in deg/min and time in s: 38,8,100,120"
+        raise InputError("--similar-to", "", f"{text!r} is not a motion of a ship", remedy)
+    body = card.ship
+    if body.length_m is None or body.beam_m is None:
+        raise card.fault("ship", "has no length_m or no beam_m", "add them, on the waterline")
+    ratio = Similarity(ship_length_m=length, ship_beam_m=beam, length_m=body.length_m, beam_m=body.beam_m)
+    try:
+        return ratio.programme(math.radians(rate_degpmin / 60), time_s, programme_of(card))
+    except ValueError as error:
+        raise InputError("--similar-to", "", str(error), "give another motion of the ship") from None
+
+
+def _floating_body(text: str) -> FloatingBody:
+    """From ``L,B,T,H`` or ``L,B,T,H,CB``, or from a card that states these."""
+    if "," not in text:
+        ship = as_ship(text).card.ship
+        sizes = [ship.length_m, ship.beam_m, ship.draught_m, ship.water_depth_m, ship.block_coefficient]
+    else:
+        try:
+            sizes = [float(word) for word in text.split(",")]
+        except ValueError:
+            sizes = []
+    missing = len(sizes) not in (4, 5) or any(size is None or not size > 0 for size in sizes[:4])
+    if missing or (sizes[4:] and sizes[4] is not None and not 0 < sizes[4] <= 1):
+        problem = f"{text!r} does not state length, beam, draught and depth of water"
+        remedy = "write for example 0.67,0.20,0.08,0.22,0.47, or name a card with them"
+        raise InputError("--theory", "", problem, remedy)
+    length, beam, draught, depth = (size or 0.0 for size in sizes[:4])
+    block = sizes[4] if len(sizes) > 4 else None
+    return FloatingBody(length_m=length, beam_m=beam, draught_m=draught, depth_m=depth, block_coefficient=block)
+
+
+def _with_error(value: float | None, error: float | None) -> str:
+    """A value and its standard error, in units of 1e-4."""
+    if value is None:
+        return "-"
+    spread = "" if error is None else f" ± {float(f'{1e4 * error:.2g}'):g}"
+    return f"{1e4 * value:.5g}{spread}"

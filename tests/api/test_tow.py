@@ -1,0 +1,92 @@
+"""Tows through the public API: mass and drag of a body whose equation of motion is known, and its card."""
+
+from __future__ import annotations
+
+import doctest
+
+import numpy as np
+import pytest
+
+import tank2sim as t2s
+from tank2sim.api import tow as module
+
+FORCE_N, MASS_KG, TOTAL_KG, B3 = 12.0, 2000.0, 2500.0, 90.0
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    """Three tows of a body with M dv/dt + B3 v^2 = T, v = sqrt(T/B3) tanh(sqrt(T B3) t/M), to 0.1 mm/s at random."""
+    random = np.random.default_rng(5)
+    time = np.linspace(0, 90, 10)
+    speed = np.sqrt(FORCE_N / B3) * np.tanh(np.sqrt(FORCE_N * B3) * time / TOTAL_KG)
+    columns = [time, *(speed + 1e-4 * random.standard_normal(10) * (time > 0) for _ in range(3))]
+    file = tmp_path_factory.mktemp("tow") / "body.csv"
+    comment = f"# force_N: {FORCE_N}\n# mass_kg: {MASS_KG}\n# length_m: 4.0\n"
+    rows = [",".join(f"{value:.8g}" for value in row) for row in zip(*columns, strict=True)]
+    file.write_text(comment + "\n".join(["t_s,speed_1_mps,speed_2_mps,speed_3_mps", *rows]) + "\n")
+    return file
+
+
+@pytest.fixture(scope="module")
+def found(path):
+    return t2s.tow(path, terms="B3")
+
+
+def test_mass_and_drag_are_those_of_the_analytic_motion(found):
+    assert found.method == "output_error"
+    assert found.total_mass_kg == pytest.approx(TOTAL_KG, rel=0.01)
+    assert found.added_mass_kg == pytest.approx(TOTAL_KG - MASS_KG, rel=0.05)
+    rows = found.estimates.set_index(["method", "name"])
+    drag = rows.loc[("output_error", "B3_kgpm")]
+    assert abs(drag["value"] - B3) < 3 * drag["standard_error"] < 0.05 * B3
+    low, high = found.mass_range_kg
+    assert low < TOTAL_KG < high
+
+
+def test_the_json_has_the_same_numbers(found):
+    content = found.to_dict()
+    assert content["schema"] == "tank2sim/tow/1"
+    assert content["methods"]["output_error"]["estimates"]["total_mass_kg"] == found.total_mass_kg
+    assert content["warnings"] == list(found.notices)
+
+
+def test_the_card_has_the_numbers_and_simulates(found, tmp_path):
+    found.card.save(tmp_path / "body.toml")
+    card = t2s.load(tmp_path / "body.toml").card
+    assert card.ship.name == "body" and card.ship.length_m == 4.0
+    assert card.surge.total_mass_kg == pytest.approx(found.total_mass_kg, rel=1e-4)
+    assert found.ship.model.state_names
+
+
+def test_a_force_is_a_number_or_a_polynomial(path):
+    constant = t2s.tow(path, force_N=2 * FORCE_N, terms=["B3"])
+    assert constant.total_mass_kg == pytest.approx(2 * TOTAL_KG, rel=0.01)  # (1.5) is linear in T, M and B
+    rising = t2s.tow(path, force_N=[FORCE_N, 0.0], terms=["B3"], total_mass_kg=TOTAL_KG)
+    assert rising.total_mass_kg == TOTAL_KG
+
+
+def test_it_fits_a_screen_and_shows_its_charts(found):
+    assert len(repr(found).splitlines()) <= 24
+    assert '<img alt="' in found._repr_html_()
+    assert {"speeds_and_residuals", "drag_coefficient"} <= set(found.charts())
+    assert found.page().startswith("<!doctype html>")
+
+
+@pytest.mark.parametrize(
+    ("options", "source"),
+    [
+        ({"method": "magic"}, "--method"),
+        ({"terms": ["B4"]}, "--terms"),
+        ({"length_m": -3.0}, "--length-m"),
+        ({"force_N": [1.0, -1.0]}, "--force-polynomial"),
+    ],
+)
+def test_bad_input_is_refused_with_place_and_remedy(path, options, source):
+    with pytest.raises(t2s.InputError) as refusal:
+        t2s.tow(path, **options)
+    assert refusal.value.source == source and refusal.value.problem and refusal.value.remedy
+
+
+def test_the_examples_run():
+    outcome = doctest.testmod(module)
+    assert outcome.attempted and not outcome.failed

@@ -1,0 +1,109 @@
+"""Records of the yaw rig through the public API: inertias of an independent simulation, cards, refusals."""
+
+from __future__ import annotations
+
+import doctest
+
+import pytest
+
+import tank2sim as t2s
+from tank2sim.api import yaw as module
+from tests.yaw_truth import Truth, record, written
+
+BODY_KGM2, ADDED_KGM2 = 0.0204, 0.03
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rig")
+    truth = Truth(total=BODY_KGM2 + ADDED_KGM2, humps=1)
+    written(folder / "water.csv", truth, record(truth), length_m=0.67, max_current_A=1.0)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(folder):
+    return t2s.yaw(folder / "water.csv", inertia_kgm2=BODY_KGM2, theory="0.685,0.2,0.1,0.24,0.49")
+
+
+def test_the_inertia_is_that_of_the_body_simulated_elsewhere(found):
+    assert found.added_inertia_kgm2 == pytest.approx(ADDED_KGM2, rel=0.01)
+    row = found.estimates.loc["energy_least_squares"]
+    assert row["total_inertia_kgm2"] == pytest.approx(BODY_KGM2 + ADDED_KGM2, rel=0.01)
+    assert 0 < row["total_inertia_standard_error_kgm2"] < 0.01 * row["total_inertia_kgm2"]
+
+
+def test_the_json_has_the_same_numbers_and_the_theory(found):
+    content = found.to_dict()
+    assert content["schema"] == "tank2sim/yaw/1"
+    assert content["added_inertia_kgm2"][found.method] == found.added_inertia_kgm2
+    assert content["dissipation_J"] == found.estimates["dissipation_J"].to_dict()
+    rows = {row["formula"]: row for row in content["theory"]}
+    assert rows["(9)"]["printed_kgm2"] == pytest.approx(797.6e-4)  # Alyshev (2019), Table 1
+
+
+def test_nrdot_of_the_body_goes_onto_a_ships_card(found):
+    value, _ = found.nrdot()
+    assert value == pytest.approx(-ADDED_KGM2 / (0.5 * 1000 * 0.67**5), rel=0.01)
+    ship = found.with_nrdot("mariner")
+    assert ship.derivatives.loc["Nrdot", "value"] == pytest.approx(value, rel=1e-5)
+    assert t2s.load("mariner").derivatives.loc["Nrdot", "value"] == pytest.approx(-43.8e-5)
+
+
+def test_the_rig_gets_a_card(found):
+    rig = found.rig_card("ellipsoid")
+    assert rig.ship.name == "ellipsoid"
+    assert rig.yaw_rig.added_inertia_kgm2 == pytest.approx(ADDED_KGM2, rel=0.01)
+
+
+def test_a_record_is_simulated_once(tmp_path):
+    path = tmp_path / "rig.csv"
+    assert t2s.simulate_yaw("alyshev", path, medium="air", noise_A=0.003) == path
+    found = t2s.yaw(path)
+    assert found.added_inertia_kgm2 is None
+    assert found.estimates.loc[found.method, "total_inertia_kgm2"] == pytest.approx(179.6e-4, rel=0.01)  # the card's
+    with pytest.raises(t2s.InputError) as refusal:
+        t2s.simulate_yaw("alyshev", path)
+    assert refusal.value.source == str(path) and refusal.value.remedy
+
+
+def test_it_fits_a_screen_and_shows_its_charts(found):
+    assert len(repr(found).splitlines()) <= 24
+    assert '<img alt="' in found._repr_html_()
+    assert {"estimates_by_method", "energy_balance", "energy_balance_2"} <= set(found.charts())
+
+
+@pytest.mark.parametrize(
+    ("options", "source"),
+    [
+        ({"method": "magic"}, "--method"),
+        ({"terms": ["stiction"]}, "--terms"),
+        ({"theory": "0.67,0.2"}, "--theory"),
+        ({"reference_inertia_kgm2": 0.02}, "--reference"),
+    ],
+)
+def test_bad_input_is_refused_with_place_and_remedy(folder, options, source):
+    with pytest.raises(t2s.InputError) as refusal:
+        t2s.yaw(folder / "water.csv", **options)
+    assert refusal.value.source == source and refusal.value.problem and refusal.value.remedy
+
+
+def test_a_card_of_another_kind_is_refused_with_its_key(found, folder):
+    for call in (lambda: t2s.yaw(folder / "water.csv", rig="mariner"), lambda: found.with_nrdot("wilinski-zellman")):
+        with pytest.raises(t2s.InputError) as refusal:
+            call()
+        assert refusal.value.place == "model.kind" and refusal.value.remedy
+
+
+def test_a_method_without_an_estimate_is_refused_before_a_card_is_made(folder):
+    terms = "coulomb,viscous,quadratic,braking_quadratic"
+    found = t2s.yaw(folder / "water.csv", inertia_kgm2=BODY_KGM2, terms=terms, method="output_error")
+    assert "output_error" not in found.estimates.index
+    with pytest.raises(t2s.InputError) as refusal:
+        found.rig_card()
+    assert refusal.value.source == "--method" and "energy_least_squares" in refusal.value.remedy
+
+
+def test_the_examples_run():
+    outcome = doctest.testmod(module)
+    assert outcome.attempted and not outcome.failed
