@@ -10,19 +10,29 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tank2sim.api.audit import AuditResult, audit
+    from tank2sim.api.autopilot import AutopilotResult
+    from tank2sim.api.bridge import PilotCardResult, PosterResult
+    from tank2sim.api.bundled_ships import ShipsResult
     from tank2sim.api.comparison import ComparisonResult, compare
+    from tank2sim.api.demo import DemoResult, run_demo
     from tank2sim.api.fmu import CheckResult, ExportResult, check_fmu
     from tank2sim.api.gap import GapResult, find_gap
+    from tank2sim.api.glide import GlideResult
     from tank2sim.api.identification import IdentificationResult, identify
+    from tank2sim.api.influence import InfluenceResult, TuningResult
     from tank2sim.api.manoeuvre import ManoeuvreResult
     from tank2sim.api.reduction import ReductionResult, reduce
+    from tank2sim.api.report import ReportResult, make_report
     from tank2sim.api.result import Result, ResultTable
     from tank2sim.api.schemas import json_schema
     from tank2sim.api.ship import Ship, load, ships
     from tank2sim.api.signals import SignalsResult, signals
     from tank2sim.api.stability import StabilityResult
+    from tank2sim.api.steering_models import SteeringModelsResult, steering_models
+    from tank2sim.api.steering_page import SteeringPageResult
     from tank2sim.api.tow import TowResult, tow
     from tank2sim.api.trial import TrialRecord, read_trial
+    from tank2sim.api.turn_tuning import TurnTuningResult
     from tank2sim.api.validation import ValidationResult, validate
     from tank2sim.api.yaw import YawResult, simulate_yaw, yaw
     from tank2sim.errors import InputError
@@ -31,21 +41,33 @@ __version__ = "0.1.0"
 
 _HOMES = {
     "AuditResult": "api.audit",
+    "AutopilotResult": "api.autopilot",
     "CheckResult": "api.fmu",
     "ComparisonResult": "api.comparison",
+    "DemoResult": "api.demo",
     "ExportResult": "api.fmu",
     "GapResult": "api.gap",
+    "GlideResult": "api.glide",
     "IdentificationResult": "api.identification",
+    "InfluenceResult": "api.influence",
     "InputError": "errors",
     "ManoeuvreResult": "api.manoeuvre",
+    "PilotCardResult": "api.bridge",
+    "PosterResult": "api.bridge",
     "ReductionResult": "api.reduction",
+    "ReportResult": "api.report",
     "Result": "api.result",
     "ResultTable": "api.result",
     "Ship": "api.ship",
+    "ShipsResult": "api.bundled_ships",
     "SignalsResult": "api.signals",
     "StabilityResult": "api.stability",
+    "SteeringModelsResult": "api.steering_models",
+    "SteeringPageResult": "api.steering_page",
     "TowResult": "api.tow",
     "TrialRecord": "api.trial",
+    "TuningResult": "api.influence",
+    "TurnTuningResult": "api.turn_tuning",
     "ValidationResult": "api.validation",
     "YawResult": "api.yaw",
     "audit": "api.audit",
@@ -55,11 +77,14 @@ _HOMES = {
     "identify": "api.identification",
     "json_schema": "api.schemas",
     "load": "api.ship",
+    "make_report": "api.report",
     "read_trial": "api.trial",
     "reduce": "api.reduction",
+    "run_demo": "api.demo",
     "ships": "api.ship",
     "signals": "api.signals",
     "simulate_yaw": "api.yaw",
+    "steering_models": "api.steering_models",
     "tow": "api.tow",
     "validate": "api.validation",
     "yaw": "api.yaw",
@@ -67,21 +92,33 @@ _HOMES = {
 
 __all__ = [
     "AuditResult",
+    "AutopilotResult",
     "CheckResult",
     "ComparisonResult",
+    "DemoResult",
     "ExportResult",
     "GapResult",
+    "GlideResult",
     "IdentificationResult",
+    "InfluenceResult",
     "InputError",
     "ManoeuvreResult",
+    "PilotCardResult",
+    "PosterResult",
     "ReductionResult",
+    "ReportResult",
     "Result",
     "ResultTable",
     "Ship",
+    "ShipsResult",
     "SignalsResult",
     "StabilityResult",
+    "SteeringModelsResult",
+    "SteeringPageResult",
     "TowResult",
     "TrialRecord",
+    "TuningResult",
+    "TurnTuningResult",
     "ValidationResult",
     "YawResult",
     "audit",
@@ -91,11 +128,14 @@ __all__ = [
     "identify",
     "json_schema",
     "load",
+    "make_report",
     "read_trial",
     "reduce",
+    "run_demo",
     "ships",
     "signals",
     "simulate_yaw",
+    "steering_models",
     "tow",
     "validate",
     "yaw",

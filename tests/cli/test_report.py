@@ -37,7 +37,8 @@ def test_histories_in_the_json_are_thinned_samples_of_the_run(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    ("text", "said"), [('{"name": 1}', "no result"), ("{", "no JSON"), ("\xff", "no JSON"), (None, "cannot be read")]
+    ("text", "said"),
+    [('{"name": 1}', "is not a result"), ("{", "is not JSON"), ("\xff", "is not JSON"), (None, "cannot be read")],
 )
 def test_what_is_no_result_is_refused_in_one_line(tmp_path: Path, text: str | None, said: str) -> None:
     if text is not None:

@@ -46,6 +46,18 @@ def test_a_ship_card_is_scaled_to_turn_through_two_points(tmp_path: Path) -> Non
     assert isinstance(card, ManoeuvringCard) and "turn through 35@35 1400m@3" in card.ship.source
 
 
+def test_two_points_have_a_page_and_a_steering_card_a_picture(tmp_path: Path) -> None:
+    points = ("influence", "mariner", "--through", "35@35", "1400m@3")
+    result = tank2sim(*points, "--page", "page.html", "--json", "out.json", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    found = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
+    assert found["schema"] == "tank2sim/influence/1" and found["after"][1]["radius_m"] == pytest.approx(1400)
+    assert "Tuning to two turns" in (tmp_path / "page.html").read_text(encoding="utf-8")
+    refused(tank2sim(*points, "--plot", "p.png", cwd=tmp_path), "--plot", "does not go with --through")
+    assert tank2sim("influence", "poznyakov-yudin", "--plot", "p.png", cwd=tmp_path).returncode == 0
+    assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_a_yaw_rate_is_to_the_side_of_the_rudder(tmp_path: Path) -> None:
     result = tank2sim("influence", "kvlcc2", "--through", "30@-35", "31.5@-10", "--json", "out.json", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
@@ -57,9 +69,9 @@ def test_a_yaw_rate_is_to_the_side_of_the_rudder(tmp_path: Path) -> None:
     ("points", "words"),
     [
         (("35@35",), "has 1 point"),
-        (("35@35", "much@3"), "is no point"),
-        (("35@35", "0m@3"), "is no point"),
-        (("35@35", "20@95"), "is no point"),
+        (("35@35", "much@3"), "is not a point"),
+        (("35@35", "0m@3"), "is not a point"),
+        (("35@35", "20@95"), "is not a point"),
         (("35@35", "20@35"), "one rudder angle"),
         (("60@35", "1@3"), "no hull factor and rudder factor"),
     ],

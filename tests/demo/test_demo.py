@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from tank2sim.cli.console import json_text
-from tank2sim.demo.run import DEMO_STEPS, PAGE, run_demo
+import tank2sim as t2s
+from tank2sim.api.demo import DemoResult
+from tank2sim.demo import DEMO_STEPS, PAGE
+from tank2sim.demo.run import write_demo
 
 pytestmark = pytest.mark.slow  # the whole way, which the README's first command goes too
 
@@ -18,8 +20,8 @@ pytestmark = pytest.mark.slow  # the whole way, which the README's first command
 def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, list[str]]:
     folder = tmp_path_factory.mktemp("demo")
     told: list[str] = []
-    result = run_demo(folder, told.append)
-    return folder, result, told
+    found = t2s.run_demo(folder, report=told.append)
+    return folder, found.to_dict(), told
 
 
 def test_it_tells_each_of_its_steps(demo) -> None:
@@ -56,15 +58,22 @@ def test_the_fmu_follows_the_measured_tows(demo) -> None:
 
 def test_the_result_is_json_and_the_page_is_there(demo) -> None:
     folder, result, _ = demo
-    assert json.loads(json_text(result))["mariner"]["stability"]["third order"]["stability_criterion"]["stable"]
+    assert json.loads(json.dumps(result))["mariner"]["stability"]["third order"]["stability_criterion"]["stable"]
     page = (folder / PAGE).read_text(encoding="utf-8")
     assert "zigzag:20/20" in page and page.rstrip().endswith("</html>")
+
+
+def test_the_result_has_the_page_and_fits_a_screen(demo) -> None:
+    folder, values, _ = demo
+    found = DemoResult(folder, values)
+    assert found.page() == (folder / PAGE).read_text(encoding="utf-8") and len(repr(found).splitlines()) <= 24
+    assert values["schema"] == "tank2sim/demo/1" and found.path == folder / PAGE
 
 
 @pytest.mark.long
 def test_a_second_run_gives_the_same_files_to_the_bit(demo, tmp_path) -> None:
     folder, result, _ = demo
-    run_demo(tmp_path, lambda _: None)
+    write_demo(tmp_path, lambda _: None)
     for name in result["files"]:
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes(), name
 
@@ -77,7 +86,7 @@ def test_stopped_half_way_it_leaves_no_half_written_file(demo, tmp_path) -> None
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_demo(tmp_path, stop)
+        write_demo(tmp_path, stop)
     left = list(tmp_path.iterdir())
     assert left
     for path in left:

@@ -6,9 +6,10 @@ from tank2sim.analysis.influence.card_influence import influence
 from tank2sim.analysis.influence.figures import parse_figure
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.result import Means
-from tank2sim.analysis.tuning.targets import parse_wish
+from tank2sim.analysis.tuning.targets import parse_target
 from tank2sim.analysis.tuning.tune import tune
 from tank2sim.cards import read_card
+from tank2sim.files import plain_json
 from tank2sim.report.influence.charts import InfluenceData, influence_charts, most_influential
 from tank2sim.report.influence.page import influence_page
 from tank2sim.report.kit.page import render_page
@@ -17,11 +18,12 @@ TEXTS = ("criterion_C", "steady_radius_m@20", "steady_rate_degpmin@20", "K_per_s
 
 
 def test_the_page_has_every_parameter_both_coefficients_and_the_tuning() -> None:
-    wish = parse_wish("steady_radius_m@20=640")
+    target = parse_target("steady_radius_m@20=640")
     study = Study(read_card("mariner"), [parse_figure(text) for text in TEXTS])
     result = influence(study, {"Yv": 1.0, "Nr": 2.0})
-    tuned = tune(study, [wish], Means())
-    page = influence_page(result, tuned, study.figures_at(tuned.values))
+    tuned = tune(study, [target], Means())
+    after = dict(zip(TEXTS, study.figures_at(tuned.values).tolist(), strict=True))
+    page = influence_page(plain_json(result.as_json() | {"tuned": tuned.as_json(after)}))
     html = render_page(page)
     assert html == render_page(page)
     text = re.sub(r"<script.*?</script>", "", html, flags=re.DOTALL)

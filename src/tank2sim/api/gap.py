@@ -16,7 +16,8 @@ from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trials import TrialPaths, fitted_and_held
 from tank2sim.cards import Card, parse_card
-from tank2sim.cards.covariance import not_referring, with_carried_covariance
+from tank2sim.cards.covariance import not_referring
+from tank2sim.cards.derived import derived_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
@@ -248,7 +249,8 @@ def improved_files(card: Card, text: str, path: Path) -> tuple[GapFiles, list[st
     A covariance that cannot be read is left out with a message: an hour's search is not lost for it.
     """
     try:
-        return with_carried_covariance(card, text, path)
+        found, messages = derived_card(card, text, path.name)
+        return found.files(path), list(messages)
     except InputError as error:
         return {path: not_referring(text)}, [f"{path.name} has no covariance: {error}"]
 

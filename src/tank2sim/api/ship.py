@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, Unpack
+from typing import TYPE_CHECKING, TypedDict, TypeVar, Unpack
 
 import numpy as np
 
 from tank2sim.api.ensemble import EnsembleOptions
 from tank2sim.arrays import Array
-from tank2sim.bundled import bundled_cards
 from tank2sim.cards import Card, ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.reading import changed_text
+from tank2sim.cards.steering_card import find_steering_card
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES
 from tank2sim.files import write_together
@@ -23,11 +24,22 @@ if TYPE_CHECKING:
     import control
     import pandas as pd
 
+    from tank2sim.api.autopilot import AutopilotResult
+    from tank2sim.api.bridge import PilotCardResult, PosterResult
     from tank2sim.api.fmu import ExportResult
+    from tank2sim.api.glide import GlideResult
+    from tank2sim.api.influence import InfluenceResult, TuningResult
     from tank2sim.api.manoeuvre import ManoeuvreResult
+    from tank2sim.api.result import Result
     from tank2sim.api.stability import StabilityResult
+    from tank2sim.api.steering_page import SteeringPageResult
+    from tank2sim.api.turn_tuning import TurnTuningResult
     from tank2sim.dynamics.model import Model
+    from tank2sim.simulation.glide_programme import GlideProgramme
     from tank2sim.simulation.manoeuvres import Manoeuvre
+
+
+AnyResult = TypeVar("AnyResult", bound="Result")
 
 
 class SimulationOptions(TypedDict, total=False):
@@ -289,6 +301,285 @@ class Ship:
         names = [None if given is None else list(given) for given in (states, inputs, outputs)]
         return state_space(self.model, point, states=names[0], inputs=names[1], outputs=names[2])
 
+    def influence(
+        self,
+        figures: str | Sequence[str] = (),
+        *,
+        joint_variation: Mapping[str, float] | None = None,
+        members: int = 0,
+        seed: int = 0,
+        executor: str = PROCESSES,
+    ) -> InfluenceResult:
+        """Influence coefficients: by how many per cent a figure changes for 10 % more of each number on the card.
+
+        Parameters
+        ----------
+        figures : str or sequence of str
+            ``criterion_C``, ``steady_radius_m@20``, ``overshoot1_deg@20/20``, angles in degrees: names are those of
+            :data:`tank2sim.analysis.influence.figures.FIGURE_KINDS`. By default one of each kind.
+        joint_variation : mapping, optional
+            Changes in % of numbers that change together (Kc), by name: ``{"Yv": 0.62, "Nv": 1.7}``.
+        members, seed, executor
+            As in :meth:`simulate`.
+
+        Raises
+        ------
+        InputError
+            A figure or a name is unknown, or the ship does not show a figure.
+        """
+        from tank2sim.api.influence import influence_of_ship
+
+        names = [figures] if isinstance(figures, str) else list(figures)
+        return influence_of_ship(self, names, joint_variation or {}, EnsembleOptions(members, seed, executor))
+
+    def tune(
+        self,
+        targets: str | Sequence[str],
+        *,
+        figures: str | Sequence[str] = (),
+        by: str = "uncertain",
+        within: float = 3.0,
+        hold: Sequence[str] = (),
+        bounds: Mapping[str, tuple[float, float]] | None = None,
+        joint_variation: Mapping[str, float] | None = None,
+        members: int = 0,
+        seed: int = 0,
+        executor: str = PROCESSES,
+    ) -> TuningResult:
+        """Change the card until figures have the values that a trial or a standard gives.
+
+        Parameters
+        ----------
+        targets : str or sequence of str
+            ``steady_radius_m@20=424``, ``overshoot1_deg@20/20<=25``, ``>=``: figures as in :meth:`influence`.
+        figures : str or sequence of str
+            Further figures to compute.
+        by : str
+            ``uncertain``: the least sum of squared moves in standard errors; ``fewest``: the fewest parameters.
+        within : float
+            Bounds of each move, standard errors of the card.
+        hold : sequence of str
+            Parameters that stay (``Nr``).
+        bounds : mapping, optional
+            Lowest and highest value by name, in the conventions of the card's file, in place of `within`.
+        joint_variation : mapping, optional
+            Parameters that move together only, as in :meth:`influence`.
+        members, seed, executor
+            As in :meth:`simulate`; of the ship before.
+
+        Raises
+        ------
+        InputError
+            A target cannot be read, a name is unknown, or nothing is left to change. Targets that contradict each
+            other are a result, whose card is refused.
+        """
+        from tank2sim.analysis.tuning.result import Means
+        from tank2sim.api.influence import tune_ship
+
+        wanted, further = ([given] if isinstance(given, str) else list(given) for given in (targets, figures))
+        means = Means(by=by, within=within, hold=hold, bounds=bounds or {}, agreed=joint_variation or {})
+        return tune_ship(self, wanted, further, means, EnsembleOptions(members, seed, executor))
+
+    def tune_through(self, first: str, second: str) -> TurnTuningResult:
+        """Scale the hull's moments and the rudder until the steady turns meet two points of the steering diagram.
+
+        Parameters
+        ----------
+        first, second : str
+            Points ``RATE@RUDDER``, deg/min to the side of the rudder at deg of rudder, + to starboard (``61@35``,
+            ``20@0`` of an unstable ship), or a radius, ``424m@20``.
+
+        Raises
+        ------
+        InputError
+            A point cannot be read, or no factors between 1/5 and 5 meet both.
+        """
+        from tank2sim.api.turn_tuning import tune_ship_through
+
+        return tune_ship_through(self, first, second)
+
+    def autopilot(
+        self,
+        design: str = "pid",
+        *,
+        speed_mps: float | None = None,
+        heading_weight_deg: float = 5.0,
+        rudder_weight_deg: float = 5.0,
+        wave_filter_radps: float | None = None,
+        course_change_deg: float = 20.0,
+        current_mps: float | None = None,
+        wind_mps: float | None = None,
+        wave_yaw_deg: float | None = None,
+        seed: int | None = None,
+        track: pd.DataFrame | Sequence[Sequence[float]] | Array | str | Path | None = None,
+    ) -> AutopilotResult:
+        """Design a heading controller, judge its loop and try it.
+
+        Parameters
+        ----------
+        design : str
+            ``pd``, ``pid``, ``lqr`` or ``robust``.
+        speed_mps : float, optional
+            Of the design; by default the speed of the card.
+        heading_weight_deg, rudder_weight_deg : float
+            Heading error and rudder that are equally bad for the LQR.
+        wave_filter_radps : float, optional
+            Frequency at which the rudder of the PID rests.
+        course_change_deg : float
+            To try, up to 170 either way, + to starboard.
+        current_mps, wind_mps, wave_yaw_deg : float, optional
+            Current towards east, wind from north-east, standard deviation of the yaw by waves; the ship steers north.
+            By default those of a fresh breeze, by Froude's law.
+        seed : int, optional
+            Of the waves.
+        track : DataFrame, array (n, 2) or path, optional
+            Waypoints ``x_m`` (north) and ``y_m`` (east) of a track to keep, too.
+
+        Raises
+        ------
+        InputError
+            The ship has no rudder, a value is out of bounds, or no controller holds the ship.
+        """
+        from tank2sim.analysis.heading.designs import LqrWeights
+        from tank2sim.analysis.heading.study import StudySettings
+        from tank2sim.api.autopilot import pilot_ship
+
+        settings = StudySettings(
+            kind=design,
+            speed_mps=speed_mps,
+            weights=LqrWeights(
+                heading_rad=math.radians(heading_weight_deg), rudder_rad=math.radians(rudder_weight_deg)
+            ),
+            wave_filter_radps=wave_filter_radps,
+            course_change_rad=math.radians(course_change_deg),
+            weather={
+                "current_mps": current_mps,
+                "wind_mps": wind_mps,
+                "wave_yaw_rad": None if wave_yaw_deg is None else math.radians(wave_yaw_deg),
+                "seed": seed,
+            },
+        )
+        return pilot_ship(self, settings, track)
+
+    def glide(
+        self,
+        angles_deg: float | Sequence[float] = (),
+        *,
+        roll_deg: float = 0.0,
+        buoyancy_kg: float | None = None,
+        programme: GlideProgramme | str | Path | None = None,
+        as_printed: bool = False,
+        budget_kg: float | None = None,
+        depth_m: float | None = None,
+        views: bool = False,
+    ) -> GlideResult:
+        """Steady glides of an underwater glider, the path of a programme, and what is best.
+
+        Parameters
+        ----------
+        angles_deg : float or sequence of float
+            Paths of steady glides, + to climb, - to dive.
+        roll_deg : float
+            Of these glides, + starboard side down.
+        buoyancy_kg : float, optional
+            Size of their net buoyancy; by default that of the card.
+        programme : path or GlideProgramme, optional
+            To be flown, by the steady glides and by the transient model: a CSV of steps ``duration_s``,
+            ``path_angle_deg`` or ``pitch_deg``, ``roll_deg``, ``buoyancy_kg``.
+        as_printed : bool
+            Also what the equations of Kulikovsky & Velikanov give as they are printed.
+        budget_kg, depth_m : float, optional
+            Ballast that can be pushed out, and the depth from which, for the range. Both or neither.
+        views : bool
+            Also how wrong steady glides are for programmes of different speed.
+
+        Raises
+        ------
+        InputError
+            The card is not one of a glider, an angle or a step cannot be flown, or the programme is at fault.
+        """
+        from tank2sim.analysis.glide.study import GlideQuestion
+        from tank2sim.api.glide import glide_with
+        from tank2sim.simulation.glide_programme import read_programme
+
+        angles = np.atleast_1d(np.asarray(angles_deg, dtype=float))
+        question = GlideQuestion(
+            angles_rad=tuple(np.radians(angles).tolist()),
+            roll_rad=math.radians(roll_deg),
+            buoyancy_kg=buoyancy_kg,
+            programme=read_programme(programme) if isinstance(programme, str | Path) else programme,
+            as_printed=as_printed,
+            budget_kg=budget_kg,
+            depth_m=depth_m,
+            views=views,
+        )
+        return glide_with(self, question)
+
+    def poster(
+        self,
+        path: str | Path | None = None,
+        *,
+        ballast: Ship | Card | str | Path | None = None,
+        orders: Mapping[str, float] | None = None,
+    ) -> PosterResult:
+        """The wheelhouse poster (IMO A.601(15), A3); what the card does not state stays blank.
+
+        Parameters
+        ----------
+        path : path, optional
+            HTML file to write, which prints on one page.
+        ballast : Ship, Card, str or path, optional
+            The ship in ballast; this is then the loaded condition.
+        orders : mapping, optional
+            Orders of the engine telegraph ahead, with their revolutions in rpm: ``{"Half ahead": 56}``.
+
+        Raises
+        ------
+        InputError
+            The ship does not manoeuvre, an order cannot be shown, the ballast card is of another ship, or the file
+            cannot be written.
+        """
+        from tank2sim.api.bridge import PosterResult, bridges_of
+
+        return self._written(PosterResult(*bridges_of(self, ballast, orders or {})), path)
+
+    def pilot_card(
+        self,
+        path: str | Path | None = None,
+        *,
+        ballast: Ship | Card | str | Path | None = None,
+        orders: Mapping[str, float] | None = None,
+    ) -> PilotCardResult:
+        """The pilot card (IMO A.601(15), A4). Parameters and errors are those of :meth:`poster`."""
+        from tank2sim.api.bridge import PilotCardResult, bridges_of
+
+        return self._written(PilotCardResult(*bridges_of(self, ballast, orders or {})), path)
+
+    def steering_page(self, path: str | Path | None = None, *, ghost: str | Path | None = None) -> SteeringPageResult:
+        """A page in which the ship is steered in a browser; it needs no network.
+
+        Parameters
+        ----------
+        path : path, optional
+            HTML file to write.
+        ghost : path, optional
+            A measured trial that moves next to the ship.
+
+        Raises
+        ------
+        InputError
+            The ship has no rudder, the trial is at fault or has no positions, or the file cannot be written.
+        """
+        from tank2sim.api.steering_page import make_steering_page
+
+        return self._written(make_steering_page(self, ghost), path, *([ghost] if ghost else []))
+
+    def _written(self, result: AnyResult, path: str | Path | None, *inputs: str | Path) -> AnyResult:
+        """The result, after its page was written to a path, if there is one, that is no input."""
+        if path is not None:
+            write_together({Path(path): result.page()}, inputs=[Path(self.card.source), *map(Path, inputs)])
+        return result
+
     def to_fmu(self, path: str | Path, *, fmi: int = 3, platforms: str = "host") -> ExportResult:
         """Write the FMU (Model Exchange and Co-Simulation).
 
@@ -343,7 +634,14 @@ def load(card: str | Path, values: Mapping[str, object] | None = None) -> Ship:
     >>> t2s.load("mariner").name
     'Mariner class'
     """
-    return Ship(read_card(card, dict(values or {})))
+    try:
+        return Ship(read_card(card, dict(values or {})))
+    except InputError:
+        if find_steering_card(str(card)) is None:
+            raise
+        problem = "is a steering card (equations of drift and turning), not a ship card"
+        remedy = "give a ship card (kind linear or abkowitz); tank2sim influence shows a steering card"
+        raise InputError(card, "", problem, remedy) from None
 
 
 def as_ship(card: Ship | Card | str | Path) -> Ship:
@@ -362,10 +660,6 @@ def ships() -> pd.DataFrame:
     >>> "mariner" in t2s.ships().index
     True
     """
-    import pandas as pd
+    from tank2sim.api.bundled_ships import list_ships
 
-    rows = []
-    for name, path in bundled_cards().items():
-        card = read_card(path)
-        rows.append((name, card.ship.name, card.model.kind, card.ship.length_m, card.ship.source))
-    return pd.DataFrame(rows, columns=["name", "ship", "model", "length_m", "source"]).set_index("name")
+    return list_ships().df

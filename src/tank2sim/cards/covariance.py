@@ -13,7 +13,7 @@ import math
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -140,41 +140,6 @@ def read_covariance(card: Card) -> Covariance | None:
     _check_names(card, path, names)
     _check_errors(card, path, names, matrix)
     return Covariance(tuple(names), matrix)
-
-
-def with_carried_covariance(card: Card, text: str, output: Path) -> tuple[dict[Path, str | bytes], list[str]]:
-    """Files of a card made from another one, with what of the covariance of that still holds; and messages about it.
-
-    Parameters
-    ----------
-    card : Card
-        The other one.
-    text : str
-        Of the new card.
-    output : Path
-        Where the new card is to be.
-
-    Raises
-    ------
-    InputError
-        The covariance to which `card` refers is at fault.
-    """
-    known = read_covariance(card)
-    if known is None:
-        return {output: text}, []
-    kept = carried(card, text)
-    if kept is None:
-        message = f"{output.name} has no covariance: all numbers of {card.source}'s changed"
-        return {output: not_referring(text)}, [message]
-    files = replace(card, text=text, covariance=kept).files(output)
-    if len(files) == 1 or len(kept.names) == len(known.names):
-        return files, []
-    changed = ", ".join(name.removeprefix("derivatives.") for name in known.names if name not in kept.names)
-    message = (
-        f"the covariance next to {output.name} is that of {len(kept.names)} numbers, moved by {HOLDS:g} standard error "
-        f"at most; errors of the others are independent now: {changed}"
-    )
-    return files, [message]
 
 
 def _form(path: Path) -> tuple[list[str], object]:

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
 
 import click
 
-from tank2sim.analysis.validation.bridge_data import Bridge
-from tank2sim.cli.bridge import bridge_options, write_bridge
+from tank2sim.api.ship import load
+from tank2sim.cli.bridge import bridge_options, show_sheet
 
 
 @click.command("poster")
 @bridge_options
-def command(card: str, **options: Any) -> None:
-    """Draw the wheelhouse poster (IMO A.601(15), A3) of CARD; what the card does not tell stays blank."""
-    write_bridge(_draw, card, options)
-
-
-def _draw(bridge: Bridge, ballast: Bridge | None) -> str:
-    # Drawing is asked for seldom, and its library is slow to load.
-    from tank2sim.report.bridge.pages import poster_page
-
-    return poster_page(bridge, ballast)
+def command(
+    card: str,
+    ballast: str | None,
+    orders: dict[str, float],
+    values: dict[str, object],
+    page: Path,
+    plot: Path | None,
+    json_file: Path | None,
+) -> None:
+    """Draw the wheelhouse poster (IMO A.601(15), A3) of CARD; what the card does not state stays blank."""
+    show_sheet(load(card, values).poster(ballast=ballast, orders=orders), page, plot, json_file)

@@ -34,12 +34,12 @@ class Workshop:
     ----------
     folder : Path
         An existing folder.
-    tell : callable
+    begin : callable
         Called with a few words at the beginning of each step.
     """
 
     folder: Path
-    tell: Callable[[str], None]
+    begin: Callable[[str], None]
     files: list[str] = field(default_factory=list)
 
     def write(self, name: str, content: str | bytes) -> Path:
@@ -58,10 +58,10 @@ class Workshop:
             The FMU differs from the model, or is not valid: the demo would show something untrue.
         """
         path = self.folder / f"{name}-fmi{fmi}.fmu"
-        self.tell(f"{path.name}: exporting")
+        self.begin(f"{path.name}: exporting")
         write_fmu(model, path, fmi=fmi, documents=documents_of(card))
         self.files.append(path.name)
-        self.tell(f"{path.name}: checking")
+        self.begin(f"{path.name}: checking")
         report = compare_with_model(path, model=model)
         if not report.passed:
             what = "; ".join((*report.validation, *report.differences)) or f"errors {report.max_error}"

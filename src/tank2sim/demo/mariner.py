@@ -48,7 +48,7 @@ def mariner(workshop: Workshop) -> DemoOutcome:
     path, reports = checked[0][0], [report for _, report in checked]
     runs, sections = {}, []
     for name, text in MANOEUVRES.items():
-        workshop.tell(f"Mariner: {text}, on the desk and in the FMU")
+        workshop.begin(f"Mariner: {text}, on the desk and in the FMU")
         run = {kind: simulate(model, parse_manoeuvre(text)) for kind, model in models.items()}
         runs[name] = run
         fmu = _in_fmu(models[THIRD], path, run[THIRD])
@@ -56,7 +56,7 @@ def mariner(workshop: Workshop) -> DemoOutcome:
             f"mariner-{name}.csv", trial_csv(run[THIRD].trajectory, f"tank2sim simulation of the Mariner: {text}")
         )
         sections.append(_manoeuvre_section(workshop, name, text, run, fmu))
-    workshop.tell("Mariner: stability")
+    workshop.begin("Mariner: stability")
     judged = {kind: stability(model) for kind, model in models.items()}
     criteria = imo_criteria(models[THIRD])
     sections = [_fmu_section(reports), *sections, _stability_section(models, judged, criteria)]

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from tank2sim.demo import PAGE
 from tank2sim.demo.fmu_helpers import Workshop
 from tank2sim.demo.mariner import mariner
 from tank2sim.demo.towed import towed_vehicle
 from tank2sim.report.kit.page import Page, render_page
 
-PAGE = "report.html"
 
-DEMO_STEPS = 18
-"""How often the demo says what it is doing."""
+def write_demo(folder: Path, begin: Callable[[str], None]) -> dict[str, object]:
+    """Run the demo into an existing folder, and return its figures.
 
-
-def run_demo(folder: Path, tell: Callable[[str], None]) -> dict[str, object]:
-    """Run the demo into an existing folder; `tell` is called at each of :data:`DEMO_STEPS`. Returns the steps' figures.
+    `begin` is called at each of :data:`tank2sim.demo.DEMO_STEPS`.
 
     A demo that is stopped half-way leaves whole files of what it had finished, and a second one replaces them.
 
@@ -26,9 +24,9 @@ def run_demo(folder: Path, tell: Callable[[str], None]) -> dict[str, object]:
     InputError
         There is no C compiler, or a file cannot be written.
     """
-    workshop = Workshop(folder, tell)
+    workshop = Workshop(folder, begin)
     towed, ship = towed_vehicle(workshop), mariner(workshop)
-    tell("writing the page")
+    begin("writing the page")
     page = Page(
         title="From tank to simulator",
         subtitle="Five tows of a vehicle and the Mariner: measured, identified, simulated, exported, checked",

@@ -23,7 +23,7 @@ from tank2sim.report.kit.charts import Tow, chart_png, tow_chart
 from tank2sim.report.kit.page import Column, Illustration, KeyFigure, PageSection, PageTable, Verdict
 
 WELL_POSED = ("B3",)
-"""Drag terms that these tows can tell (with M); the paper's B1 and B2 next to them cannot be identified."""
+"""Drag terms that these tows determine (with M); the B1 and B2 of the paper in addition cannot be identified."""
 
 
 NAME = "Wilinski-Zellman underwater vehicle"
@@ -34,14 +34,14 @@ LENGTH_M = 3.8
 
 def towed_vehicle(workshop: Workshop) -> DemoOutcome:
     """Identify, write the card, export and check the FMU, and tow it through fmpy next to the measured tows."""
-    workshop.tell("five tows of an underwater vehicle: identifying mass and drag")
+    workshop.begin("five tows of an underwater vehicle: identifying mass and drag")
     tows = read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
     paper, chosen = identify_tow(tows), identify_tow(tows, terms=WELL_POSED)
     text = tow_card_text(chosen, chosen.fits["output_error"], name=NAME, source=SOURCE, length_m=LENGTH_M)
     card = parse_card(text, workshop.write("towed-vehicle.toml", text).name)
     model = build(card)
     checked = [workshop.checked_fmu(card, model, "towed-vehicle", fmi) for fmi in (2, 3)]
-    workshop.tell("towed vehicle: co-simulating the five tows")
+    workshop.begin("towed vehicle: co-simulating the five tows")
     times, speed = _towed_again(model, checked[0][0], tows, chosen.force_N)
     rows = "\n".join(f"{t:.10g},{v:.10g}" for t, v in zip(times, speed, strict=True))
     workshop.write("towed-vehicle.csv", f"t_s,speed_mps\n{rows}\n")
@@ -87,8 +87,8 @@ def _section(
         text=(
             "An underwater vehicle was towed from rest by a known force (Wilinski and Zellman 1984, Table 1). Its mass "
             "with added mass M and its drag follow from M dv/dt + B1 v⁴ + B2 v³ + B3 v² = T.\n\n"
-            "The published method asks for four unknowns. The condition numbers say that these tows cannot tell them "
-            "apart; M and B3 alone they can. The card, and the FMU made from it, have those two, by output error."
+            "The published method asks for four unknowns. The condition numbers say that these tows cannot separate "
+            "them; M and B3 alone they can. The card, and the FMU made from it, have those two, by output error."
         ),
         tables=[
             _estimates(paper, "Four unknowns, as published"),

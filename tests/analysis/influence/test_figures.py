@@ -5,7 +5,7 @@ import math
 import pytest
 
 from tank2sim.analysis.influence.figures import FIGURE_KINDS, forms, parse_figure
-from tank2sim.analysis.tuning.targets import parse_wish
+from tank2sim.analysis.tuning.targets import parse_target
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 
@@ -43,17 +43,17 @@ def test_the_help_names_every_figure() -> None:
     assert all(name in forms() for name in FIGURE_KINDS)
 
 
-def test_both_ways_to_write_a_wish_mean_the_same() -> None:
-    one, other = parse_wish("steady_radius_m=424@20"), parse_wish("steady_radius_m@20=424")
+def test_both_ways_to_write_a_target_mean_the_same() -> None:
+    one, other = parse_target("steady_radius_m=424@20"), parse_target("steady_radius_m@20=424")
     assert (one.figure.kind, one.figure.angles, one.value) == (other.figure.kind, other.figure.angles, other.value)
     assert one.text == "steady_radius_m@20=424"
-    limit = parse_wish("overshoot1_deg@20/20<=25")
+    limit = parse_target("overshoot1_deg@20/20<=25")
     assert (limit.relation, limit.value, limit.figure.text) == ("<=", 25.0, "overshoot1_deg@20/20")
 
 
 @pytest.mark.parametrize(
     "text", ["steady_radius_m@20", "steady_radius_m@20=424@20", "T_s=fast", "T_s=nan", "=3", "T_s<3"]
 )
-def test_what_is_no_wish_is_refused(text) -> None:
+def test_what_is_no_target_is_refused(text) -> None:
     with pytest.raises(InputError):
-        parse_wish(text)
+        parse_target(text)

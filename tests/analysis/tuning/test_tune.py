@@ -8,7 +8,7 @@ import pytest
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.card import tuned_text
 from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, Means, Tuned
-from tank2sim.analysis.tuning.targets import Wish, parse_wish
+from tank2sim.analysis.tuning.targets import Target, parse_target
 from tank2sim.analysis.tuning.tune import tune
 from tank2sim.cards import linear_card, parse_card, read_card
 from tank2sim.errors import InputError
@@ -17,14 +17,14 @@ from tests.analysis.symmetric_ship import SYMMETRIC
 FIGURES = ("steady_radius_m@20", "steady_drift_deg@20", "criterion_C")
 
 
-def studied(card, *wishes: Wish) -> Study:
-    return Study(card, list(dict.fromkeys(wish.figure for wish in wishes)))
+def studied(card, *targets: Target) -> Study:
+    return Study(card, list(dict.fromkeys(target.figure for target in targets)))
 
 
 def tuned_to(card, texts: list[str], **means: object) -> tuple[Study, Tuned]:
-    wishes = [parse_wish(text) for text in texts]
-    study = studied(card, *wishes)
-    return study, tune(study, wishes, Means(**means))
+    targets = [parse_target(text) for text in texts]
+    study = studied(card, *targets)
+    return study, tune(study, targets, Means(**means))
 
 
 @pytest.fixture(scope="module")
@@ -38,15 +38,15 @@ def wanted(card) -> list[str]:
     d = card.derivatives
     changes = {"derivatives.Nd": -1.03 * d["Nd"], "derivatives.Nr": 0.98 * d["Nr"]}  # the file's rudder is to port
     copy = read_card("mariner", SYMMETRIC | changes)
-    wishes = [parse_wish(f"{figure}=1") for figure in FIGURES]
-    return [f"{name}={value!r}" for name, value in zip(FIGURES, studied(copy, *wishes).base.tolist(), strict=True)]
+    targets = [parse_target(f"{figure}=1") for figure in FIGURES]
+    return [f"{name}={value!r}" for name, value in zip(FIGURES, studied(copy, *targets).base.tolist(), strict=True)]
 
 
 @pytest.mark.parametrize("by", [FEWEST, UNCERTAIN])
 def test_the_figures_of_a_perturbed_copy_are_reached_with_no_more_than_was_perturbed(card, wanted, by) -> None:
     study, found = tuned_to(card, wanted, by=by)
     assert found.reached
-    assert found.after == pytest.approx([wish.value for wish in found.wishes], rel=1e-5)
+    assert found.after == pytest.approx([target.value for target in found.targets], rel=1e-5)
     assert study.figures_at(found.values) == pytest.approx(found.after)
     moved = [move.in_standard_errors for move in found.moves]
     perturbed = 1.5**2 + 1.0**2  # in standard errors of 2 %
@@ -57,7 +57,7 @@ def test_the_figures_of_a_perturbed_copy_are_reached_with_no_more_than_was_pertu
 
 
 def test_the_most_uncertain_parameters_move_along_the_gradient(card) -> None:
-    """Least sum of squares with one wish: moves in proportion to the slopes by standard errors (Lagrange)."""
+    """Least sum of squares with one target: moves in proportion to the slopes by standard errors (Lagrange)."""
     study, found = tuned_to(card, ["steady_radius_m@20=640"], by=UNCERTAIN)
     _, slopes = study.slopes_at(found.values)
     errors = np.array([one.standard_error for one in study.parameters])
@@ -67,7 +67,7 @@ def test_the_most_uncertain_parameters_move_along_the_gradient(card) -> None:
     assert cosine == pytest.approx(1.0, abs=1e-4)
 
 
-def test_one_wish_needs_one_parameter_and_that_of_the_largest_influence_by_error(card) -> None:
+def test_one_target_needs_one_parameter_and_that_of_the_largest_influence_by_error(card) -> None:
     _, found = tuned_to(card, ["steady_radius_m@20=630"], by=FEWEST)
     assert [move.parameter.short for move in found.moves] == ["Nd"]
     assert found.after == pytest.approx([630.0])
@@ -97,12 +97,12 @@ def test_an_agreed_variation_is_taken_as_a_whole(card) -> None:
     assert [change[name] for name in agreed] == pytest.approx([times * kc / 100 for kc in agreed.values()], rel=1e-9)
 
 
-def test_wishes_that_contradict_each_other_are_named_without_the_innocent_one(card) -> None:
-    """A diameter is twice the radius; what else is wished is not at fault."""
+def test_targets_that_contradict_each_other_are_named_without_the_innocent_one(card) -> None:
+    """A diameter is twice the radius; what else is a target is not at fault."""
     texts = ["criterion_C>=1e-6", "steady_radius_m@20=630", "steady_diameter_m@20=1200"]
     study, found = tuned_to(card, texts)
     assert not found.reached
-    assert [wish.text for wish in found.contradiction] == texts[1:]
+    assert [target.text for target in found.contradiction] == texts[1:]
     # The nearest in squares of relative misses lies between: a radius of 614.6 m.
     a, b = 1 / 630, 2 / 1200
     nearest = (a + b) / (a * a + b * b)
@@ -111,7 +111,7 @@ def test_wishes_that_contradict_each_other_are_named_without_the_innocent_one(ca
 
 @pytest.mark.parametrize("texts", [["600", "700"], ["640", "640"]], ids=["opposed", "one twice"])
 def test_what_has_no_influence_stays_and_the_rest_moves_as_little_as_it_can(card, texts) -> None:
-    """With one figure the least moves go along its slopes (Lagrange), whether the wishes are met or only approached."""
+    """With one figure the least moves go along its slopes (Lagrange), whether targets are met or only approached."""
     study, found = tuned_to(card, [f"steady_radius_m@20={text}" for text in texts])
     assert found.reached is (texts[0] == texts[1])
     assert not {"Xudot", "Yvdot", "Nrdot"} & {move.parameter.short for move in found.moves}
@@ -129,23 +129,23 @@ def test_what_has_no_influence_stays_and_the_rest_moves_as_little_as_it_can(card
         *("speed_loss_percent@20=120", "speed_loss_percent@20=-1", "overshoot1_deg@20/20=-2", "steady_drift_deg@20=95"),
     ],
 )
-def test_a_wish_that_no_ship_can_meet_is_refused(text) -> None:
+def test_a_target_that_no_ship_can_meet_is_refused(text) -> None:
     with pytest.raises(InputError, match="no ship has"):
-        parse_wish(text)
+        parse_target(text)
 
 
-def test_a_wish_beyond_the_bounds_is_told_alone_and_wider_bounds_reach_it(card) -> None:
+def test_a_target_beyond_the_bounds_is_told_alone_and_wider_bounds_reach_it(card) -> None:
     _, found = tuned_to(card, ["steady_radius_m@20=900"])
-    assert [wish.figure.text for wish in found.contradiction] == ["steady_radius_m@20"]
+    assert [target.figure.text for target in found.contradiction] == ["steady_radius_m@20"]
     assert 640 < found.after[0] < 900
     assert tuned_to(card, ["steady_radius_m@20=900"], within=10.0)[1].reached
 
 
-def test_the_tuned_card_reaches_its_wishes_and_bears_the_old_values(card) -> None:
+def test_the_tuned_card_reaches_its_targets_and_bears_the_old_values(card) -> None:
     _, found = tuned_to(card, ["steady_radius_m@20=640"], by=FEWEST)
     text = tuned_text(card, found)
     new = parse_card(text, "tuned.toml")
-    assert studied(new, *found.wishes).base == pytest.approx([640.0], rel=1e-6)
+    assert studied(new, *found.targets).base == pytest.approx([640.0], rel=1e-6)
     (line,) = [line for line in text.splitlines() if line.startswith("Nd = ")]
     assert "was -139e-5" in line and "standard errors" in line
     assert "tuned by tank2sim influence to steady_radius_m@20=640" in new.ship.source
@@ -168,8 +168,8 @@ def test_means_that_cannot_be_are_refused(card, means, words) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("by", [FEWEST, UNCERTAIN])
 def test_figures_of_manoeuvres_are_reached_too(by) -> None:
-    wishes = ["steady_radius_m=640@20", "overshoot1_deg@20/20<=7.5", "advance_m@35=580"]
-    _, found = tuned_to(read_card("mariner"), wishes, by=by)
+    targets = ["steady_radius_m=640@20", "overshoot1_deg@20/20<=7.5", "advance_m@35=580"]
+    _, found = tuned_to(read_card("mariner"), targets, by=by)
     assert found.reached
     assert found.after[[0, 2]] == pytest.approx([640.0, 580.0], rel=1e-5)
     assert found.after[1] <= 7.5 * (1 + 1e-5)

@@ -100,7 +100,7 @@ def test_the_standard_error_of_a_figure_is_of_the_whole_covariance(joint: Manoeu
     one, other, third = found.shares[:, places].T
     np.testing.assert_allclose(one, (slopes[:, places] @ FALLS) ** 2 / truth, rtol=1e-9)
     np.testing.assert_allclose([other, third], [one, one], rtol=1e-9)
-    assert "covariance beside the card (3 numbers, others as if independent)" in found.of_errors
+    assert "covariance next to the card (3 numbers, others as if independent)" in found.of_errors
 
 
 def test_influence_and_ensemble_of_a_card_with_a_covariance_say_the_same(joint: ManoeuvringCard) -> None:

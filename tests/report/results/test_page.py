@@ -136,7 +136,7 @@ def test_named_values_with_standard_errors_are_compared():
 
 @pytest.mark.parametrize("result", [{}, [], 3, None, {"name": "package", "version": "1"}])
 def test_what_no_command_wrote_is_refused(result):
-    with pytest.raises(InputError, match="is no result of a tank2sim command"):
+    with pytest.raises(InputError, match="is not a result of a tank2sim command"):
         result_page(result, "x.json")
 
 

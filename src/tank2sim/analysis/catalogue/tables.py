@@ -71,10 +71,10 @@ def model_of(card: SteeringCard, name: str) -> Model:
     known = [coefficient.name for coefficient in form.coefficients]
     for key in given:
         if key not in known:
-            raise InputError(card.source, f"{place}.{key}", f"is no coefficient of {form.name}", ", ".join(known))
+            raise InputError(card.source, f"{place}.{key}", f"is not a coefficient of {form.name}", ", ".join(known))
     if missing := not_given(card, name):
-        text = f"{form.title}: {', '.join(missing)} not given"
-        raise InputError(card.source, place, text, "; ".join(form.missing) or "add them")
+        problem = f"{form.title}: {', '.join(missing)} not given"
+        raise InputError(card.source, place, problem, "; ".join(form.missing) or "add them")
     model = steering_model(card.ship.name, form, given, card.ship.length_m, card.ship.speed_mps)
     return replace(model, source=card.source)
 
@@ -200,17 +200,17 @@ def combined_prediction(card: SteeringCard, other: str) -> CombinedPrediction:
     swapped = {name: K[printed.misread_as.get(name, name)] for name in K}
     percents = [combined_percent(one, agreed) for one in (K, swapped, table.K_percent)]
     radii = (printed.radius_m, printed.radius_m, table.radius_m)
-    foretold = [radius * (1 + percent / 100) for radius, percent in zip(radii, percents, strict=True)]
+    predicted = [radius * (1 + percent / 100) for radius, percent in zip(radii, percents, strict=True)]
     direct = turns_of(card, other, [rudder]).turns[0].radius_m
     return CombinedPrediction(
         agreed_percent=agreed,
         radius_m=table.radius_m,
         percent=percents[0],
-        predicted_m=foretold[0],
+        predicted_m=predicted[0],
         misread_percent=percents[1],
-        misread_m=foretold[1],
+        misread_m=predicted[1],
         own_percent=percents[2],
-        own_m=foretold[2],
+        own_m=predicted[2],
         direct_m=direct,
         direct_misread_m=_direct_misread(card, printed, other, agreed),
     )

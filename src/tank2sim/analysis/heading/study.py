@@ -42,15 +42,24 @@ INTEGRAL_SHARE = 0.25
 """Of the integral line of sight: critically damped (:class:`tank2sim.analysis.heading.track_keeping.Guidance`)."""
 
 _CHANGE_TIMES = 60
-"""Length of a course change in 1/w, w = sqrt(K/T): six times the slowest mode that is placed (choice of ours)."""
+"""Length of a course change in 1/w, w = sqrt(K/T): six times the slowest mode that is placed.
+
+Project choice: the change has settled then.
+"""
 _KEEPING_TIMES = 120
 """Length of course keeping in 1/w; figures are those of its later half."""
 
-_WAVES_TOLD = 40
-"""Of course keeping, in the histories (project choice)."""
+LARGEST_CHANGE_DEG = 170.0
+"""Of a change of course. Project choice: well below 180 deg, where port and starboard are the same way."""
+
+_WAVES_SHOWN = 40
+"""Of course keeping, in the histories. Project choice: single waves are seen."""
 
 _BUSY_PERCENT = 10.0
-"""Share of the time at full rate from which a gear is said to be overworked by waves (project choice)."""
+"""Share of the time at full rate from which a gear is said to be overworked by waves.
+
+Project choice: well above what a calm sea needs.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,8 +184,32 @@ class AutopilotStudy:
 
     def _histories(self) -> dict[str, dict[str, list[float]]]:
         """Of the runs by name; of course keeping the last waves, for more are a smear."""
-        last = self.runs["keeping"].t[-1] - _WAVES_TOLD * 2 * math.pi / self.weather.wave_radps
+        last = self.runs["keeping"].t[-1] - _WAVES_SHOWN * 2 * math.pi / self.weather.wave_radps
         return {name: histories(run, last if name == "keeping" else 0.0) for name, run in self.runs.items()}
+
+
+def check_settings(settings: StudySettings) -> None:
+    """Refuse values that are out of bounds.
+
+    Raises
+    ------
+    InputError
+        One is.
+    """
+    change = math.degrees(settings.course_change_rad)
+    if not 0 < abs(change) <= LARGEST_CHANGE_DEG * (1 + 1e-12):
+        remedy = f"give the angle to turn by, up to {LARGEST_CHANGE_DEG:g} deg either way"
+        raise InputError("--course-change", "", f"is {change:g}", remedy)
+    positive = {
+        "--speed": settings.speed_mps,
+        "--heading-weight": settings.weights.heading_rad,
+        "--rudder-weight": settings.weights.rudder_rad,
+        "--wave-filter": settings.wave_filter_radps,
+    }
+    weather = {"--current": "current_mps", "--wind": "wind_mps", "--wave-yaw": "wave_yaw_rad", "--seed": "seed"}
+    for option, value in (positive | {option: settings.weather.get(name) for option, name in weather.items()}).items():
+        if value is not None and not (0 <= value < math.inf and (value or option in weather)):
+            raise InputError(option, "", f"is {value:g}", "a positive number was expected")
 
 
 def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings) -> AutopilotStudy:
@@ -196,7 +229,7 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     only = card.model.kind == "linear"
     _refuse_other_speed(card, settings.speed_mps if only else None)
     design = _design(ship, settings)
-    margins, told = _margins(ship, design, settings.speed_mps, only_own=only)
+    margins, notices = _margins(ship, design, settings.speed_mps, only_own=only)
     if not margins[0].stable:
         raise _not_stable(ship, design, settings.speed_mps)
     values = {parameter.name: parameter.start for parameter in ship.parameters}
@@ -226,7 +259,7 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
         waypoints=settings.waypoints,
         notices=(
             *outside.notices,
-            *told,
+            *notices,
             *_begun_at(settings.speed_mps),
             *_notices(margins, runs, changes, tracks),
             *_of_the_gear(ship, design, kept, weather),
@@ -270,23 +303,23 @@ def _design(ship: Model, settings: StudySettings) -> HeadingDesign:
 def _margins(
     ship: Model, design: HeadingDesign, speed: float | None, *, only_own: bool
 ) -> tuple[tuple[LoopMargins, ...], list[str]]:
-    """At the speed of the design and at five across the card's range; and what is to be reported of those without.
+    """At the speed of the design and at five across the card's range; and notices of those without.
 
     The forces of a linear card are those at its own speed by definition: others would repeat its margins.
     """
     values = {parameter.name: parameter.start for parameter in ship.parameters}
     own = values["ship.speed"] if speed is None else speed
-    found, told = [loop_margins(ship, design.autopilot, own)], []
+    found, notices = [loop_margins(ship, design.autopilot, own)], []
     if only_own:
-        return tuple(found), [f"margins at {own:.4g} m/s alone: a linear card tells nothing of other speeds"]
+        return tuple(found), [f"margins at {own:.4g} m/s alone: a linear card does not hold at other speeds"]
     for other in np.linspace(values["ship.slowest"], values["ship.fastest"], 5).tolist():
         if abs(other / own - 1) < 1e-6:
             continue
         try:
             found.append(loop_margins(ship, design.autopilot, other))
         except InputError as error:  # the polynomial of a card may lose its rudder at an end of its range
-            told.append(f"no margins at {other:.4g} m/s: {error.problem}")
-    return tuple(found), told
+            notices.append(f"no margins at {other:.4g} m/s: {error.problem}")
+    return tuple(found), notices
 
 
 def _responses(ship: Model, design: HeadingDesign, margins: tuple[LoopMargins, ...]) -> tuple[LoopResponse, ...]:
@@ -320,34 +353,34 @@ def _notices(
     changes: Mapping[str, CourseChange],
     tracks: Mapping[str, TrackRun],
 ) -> list[str]:
-    messages = [f"the loop is not stable at {margin.speed_mps:.4g} m/s" for margin in margins if not margin.stable]
-    messages += [
+    notices = [f"the loop is not stable at {margin.speed_mps:.4g} m/s" for margin in margins if not margin.stable]
+    notices += [
         f"the course change {name!r} is not settled after {runs[name].t[-1]:.0f} s"
         for name, change in changes.items()
         if change.settling_time_s is None
     ]
-    return messages + [
+    return notices + [
         f"the track is not finished, {name}" for name, track in tracks.items() if not track.figures.finished
     ]
 
 
 def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weather: Weather) -> list[str]:
     """What is asked of the gear in waves, and where the autopilot stops short of it."""
-    messages = []
+    notices = []
     if kept.rate_limited_percent > _BUSY_PERCENT:
         remedy = f"--wave-filter {weather.wave_radps:.3g}" if design.kind == "pid" else "--design pid --wave-filter"
         filtered = "wave_filter_radps" in design.gains
-        messages.append(
+        notices.append(
             f"keeping a course in waves the rudder is at full rate {kept.rate_limited_percent:.0f} % of the time: "
             + ("the waves are more than this gear can follow" if filtered else f"{remedy} lets it rest")
         )
     limit = {parameter.name: parameter.start for parameter in ship.parameters}.get("steering.max_angle", 0.0)
     if limit > LARGEST_RUDDER_RAD * (1 + 1e-9):
-        messages.append(
+        notices.append(
             f"the autopilot orders no more than {math.degrees(LARGEST_RUDDER_RAD):.0f} deg of rudder, the angle that "
             f"SOLAS II-1, regulation 29, asks a gear for; this gear goes to {math.degrees(limit):.3g} deg"
         )
-    return messages
+    return notices
 
 
 def _begun_at(speed: float | None) -> list[str]:
@@ -355,8 +388,8 @@ def _begun_at(speed: float | None) -> list[str]:
 
 
 def _in_degrees(values: Mapping[str, float]) -> dict[str, float]:
-    told: dict[str, float] = {}
+    converted: dict[str, float] = {}
     for name, value in values.items():
         stem, _, unit = name.rpartition("_")
-        told |= {f"{stem}_deg": math.degrees(value)} if unit == "rad" else {name: value}
-    return told
+        converted |= {f"{stem}_deg": math.degrees(value)} if unit == "rad" else {name: value}
+    return converted

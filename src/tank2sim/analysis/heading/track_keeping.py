@@ -11,7 +11,7 @@ which a current leaves no error. A leg ends within the circle of acceptance abou
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,7 +35,7 @@ class Guidance:
     Parameters
     ----------
     lookahead_lengths : float
-        D: project choice; shorter ones come to the track sooner, and swing across it.
+        D. Project choice: shorter ones come to the track sooner, and swing across it.
     acceptance_lengths : float
         Radius about a waypoint in which the next leg begins; 2 by Fossen (2011), 10.3.2.
     integral_share : float
@@ -104,7 +104,7 @@ def read_waypoints(path: Path | str) -> Array:
     Raises
     ------
     InputError
-        The file is no such table, a cell is empty, there are fewer than two, two that follow are one place, or the
+        The file is not such a table, a cell is empty, there are fewer than two, two that follow are one place, or the
         track is longer than :data:`LONGEST_TRACK_M`.
     """
     table = read_table(path)
@@ -113,17 +113,33 @@ def read_waypoints(path: Path | str) -> Array:
     if empty.size:
         row, column = (int(place) for place in empty[0])
         raise InputError(path, table.place(row, ("x_m", "y_m")[column]), "is empty", "give each waypoint both numbers")
+    check_waypoints(points, path, lambda row: f"line {table.lines[row]}")
+    return np.asarray(points)
+
+
+def check_waypoints(points: Array, source: Path | str, place: Callable[[int], str]) -> None:
+    """Refuse waypoints (n, 2) that make no track; `place` says where one of a number, from 0, is.
+
+    Raises
+    ------
+    InputError
+        One is not finite, there are fewer than two, two that follow are one place, or the track is longer than
+        :data:`LONGEST_TRACK_M`.
+    """
     if len(points) < 2:
-        raise InputError(path, "", "has one waypoint", "give two or more: a track begins at the first")
-    length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+        raise InputError(source, "", "has one waypoint", "give two or more: a track begins at the first")
+    lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if lost.size:
+        raise InputError(source, place(int(lost[0])), "is not finite", "give each waypoint both numbers")
+    lengths = np.hypot(*np.diff(points, axis=0).T)
+    length = float(lengths.sum())
     if length > LONGEST_TRACK_M:
         problem = f"its track is {length / 1e3:.6g} km long, and at most {LONGEST_TRACK_M / 1e3:g} km can be sailed"
-        raise InputError(path, "", problem, "give x_m and y_m in m, and a shorter track")
-    same = np.flatnonzero(np.hypot(*np.diff(points, axis=0).T) < 1e-6)
+        raise InputError(source, "", problem, "give x_m and y_m in m, and a shorter track")
+    same = np.flatnonzero(lengths < 1e-6)
     if same.size:
-        row = int(same[0]) + 1
-        raise InputError(path, f"line {table.lines[row]}", "is the same place as the row before", "delete one of them")
-    return np.asarray(points)
+        problem = "is the same place as the waypoint before"
+        raise InputError(source, place(int(same[0]) + 1), problem, "delete one of them")
 
 
 def line_of_sight(error: float, integral: float, lookahead: float, gain: float = 0.0) -> tuple[float, float]:

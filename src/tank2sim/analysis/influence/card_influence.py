@@ -2,7 +2,7 @@
 
 By exact slopes, K = 10 c/F dF/dc, and by the 10 % difference of the paper
 (:mod:`tank2sim.analysis.influence.percent`), side by side; and what the standard errors of the card, and
-their covariance where one is next to it, make of each figure.
+their covariance where there is one next to it, make of each figure.
 """
 
 from __future__ import annotations
@@ -22,11 +22,10 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 
 CURVED = 1.5
-"""A slope and a 10 % difference that differ by this factor are reported: the figure bends or jumps there (project
-choice)."""
+"""Factor between slope and 10 % difference that is reported. Project choice: the figure bends or jumps there."""
 
-TOLD_FROM = 0.5
-"""... where either is at least so many per cent of the figure."""
+REPORTED_FROM = 0.5
+"""... where either is at least this percentage of the figure. Project choice: smaller ones move no decision."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +34,8 @@ class Agreed:
     and by 10 % differences, and what computing it directly gives; per cent of the figure."""
 
     percent: Mapping[str, float]
-    foretold: tuple[float, ...]
-    foretold_by_difference: tuple[float, ...]
+    predicted: tuple[float, ...]
+    predicted_by_difference: tuple[float, ...]
     direct: tuple[float, ...]
 
 
@@ -156,7 +155,7 @@ class CardInfluence:
         return {**result, "notices": list(self.notices)}
 
     def _agreed_as_json(self, agreed: Agreed) -> dict[str, object]:
-        columns = zip(self.figures, agreed.foretold, agreed.foretold_by_difference, agreed.direct, strict=True)
+        columns = zip(self.figures, agreed.predicted, agreed.predicted_by_difference, agreed.direct, strict=True)
         keys = {parameter.name: parameter.key for parameter in self.parameters}
         return {
             "percent": {keys[name]: percent for name, percent in agreed.percent.items()},
@@ -188,8 +187,8 @@ def influence(study: Study, agreed: Mapping[str, float] | None = None) -> CardIn
     together = None
     if agreed:
         together = _agreed(study, whole, agreed_by_name(agreed, study.parameters))
-    messages = [*study.notices, *errors.in_words, *_not_smooth(whole), *_differing(study, values)]
-    return replace(whole, agreed=together, notices=tuple(messages))
+    notices = [*study.notices, *errors.in_words, *_not_smooth(whole), *_differing(study, values)]
+    return replace(whole, agreed=together, notices=tuple(notices))
 
 
 def _differences(study: Study) -> Array:
@@ -218,10 +217,10 @@ def _agreed(study: Study, found: CardInfluence, percent: Mapping[str, float]) ->
     changed = changed_together(values, percent)
     direct = _change(study, np.array([changed[name] for name in names]))
 
-    def foretold(K: Array) -> tuple[float, ...]:
+    def predicted(K: Array) -> tuple[float, ...]:
         return tuple(combined_percent(dict(zip(names, row.tolist(), strict=True)), percent) for row in K)
 
-    return Agreed(percent, foretold(found.exact), foretold(found.difference), tuple(direct))
+    return Agreed(percent, predicted(found.exact), predicted(found.difference), tuple(direct))
 
 
 def _differing(study: Study, sloped: Array) -> Iterable[str]:
@@ -232,22 +231,22 @@ def _differing(study: Study, sloped: Array) -> Iterable[str]:
 
 
 def _not_smooth(found: CardInfluence) -> list[str]:
-    messages = []
+    notices = []
     exact = found.exact
     for row, figure in enumerate(found.figures):
         gone, bent = [], []
         for place, parameter in enumerate(found.parameters):
             slope, step = exact[row, place], found.difference[row, place]
-            if parameter.value == 0 or max(abs(slope), abs(step) if math.isfinite(step) else math.inf) < TOLD_FROM:
+            if parameter.value == 0 or max(abs(slope), abs(step) if math.isfinite(step) else math.inf) < REPORTED_FROM:
                 continue
             if not math.isfinite(step):
                 gone.append(parameter.short)
             elif slope * step <= 0 or not 1 / CURVED < abs(step / slope) < CURVED:
                 bent.append(parameter.short)
         if gone:
-            messages.append(f"{figure.text}: 10 % more of {', '.join(gone)} and the ship does not show it any more")
+            notices.append(f"{figure.text}: 10 % more of {', '.join(gone)} and the ship does not show it any more")
         if bent:
-            messages.append(
+            notices.append(
                 f"{figure.text} is not smooth or strongly curved in {', '.join(bent)}: slope and 10 % disagree"
             )
-    return messages
+    return notices

@@ -1,4 +1,4 @@
-"""A ship with figures asked of it: their values and exact slopes at any values of its parameters."""
+"""Figures of a ship: their values and exact slopes at any values of its parameters."""
 
 from __future__ import annotations
 
@@ -27,8 +27,10 @@ from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import Run, simulate
 
 NO_TURN = 1e-4
-"""A ship whose steady yaw rate is less than this share of u0/L goes straight: a circle of 10 000 lengths (project
-choice)."""
+"""A ship whose steady yaw rate is less than this share of u0/L goes straight.
+
+Project choice: a circle of 10 000 lengths.
+"""
 
 PLACE_FELT = 1e-20
 """Squared slopes of the scaled accelerations by place and heading from which no turn is steady: rounding is below."""
@@ -66,7 +68,7 @@ class Study:
         self._rest_near: dict[float, Array] = {}
         self._long_enough: dict[Turn | Zigzag, float] = {}
         self._told: dict[str, None] = dict.fromkeys(self.model.notices)
-        self._known = False  # whether the figures of the card itself have been found: others tell nothing of it
+        self._known = False  # whether the figures of the card itself have been found: others say nothing of it
         self.base: Array = self.figures_at(self.values)
         self._known = True
         for figure, value in zip(self.figures, self.base, strict=True):
@@ -90,7 +92,7 @@ class Study:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What a user should know of the ship of the card and of its manoeuvres."""
+        """What limits the ship of the card and its manoeuvres."""
         return tuple(self._told)
 
     def figures_at(self, values: Array) -> Array:

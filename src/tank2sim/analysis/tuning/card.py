@@ -16,9 +16,9 @@ _DIGITS = 10
 
 
 def tuned_text(card: ManoeuvringCard, tuned: Tuned) -> str:
-    """Text of a card with the moves made: each key that changed bears its old value as a comment."""
-    wishes = ", ".join(wish.text for wish in tuned.wishes)
-    how = f"tuned by tank2sim influence to {wishes}"
+    """Text of a card with the moves made: each key that changed has its old value as a comment."""
+    targets = ", ".join(target.text for target in tuned.targets)
+    how = f"tuned by tank2sim influence to {targets}"
     text = card.text
     for move in tuned.moves:
         comment = _comment(card, move) if _takes_comment(card, move.parameter.key) else None
@@ -27,7 +27,7 @@ def tuned_text(card: ManoeuvringCard, tuned: Tuned) -> str:
     text = changed_text(text, card.source, {"ship.source": f"{card.ship.source}; {how}"})
     parse_card(text, card.source)
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
-    head = f"# {how[0].upper()}{how[1:]} ({tuned.means.by}).\n# Keys that changed bear their old values in comments.\n"
+    head = f"# {how[0].upper()}{how[1:]} ({tuned.means.by}).\n# Keys that changed have their old values in comments.\n"
     return mark + head + text.removeprefix(mark)
 
 

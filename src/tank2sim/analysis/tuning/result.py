@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from tank2sim.analysis.influence.parameters import CardParameter
-from tank2sim.analysis.tuning.targets import Wish
+from tank2sim.analysis.tuning.targets import Target
 from tank2sim.arrays import Array
+from tank2sim.errors import InputError
 
 FEWEST, UNCERTAIN = "fewest", "uncertain"
 
@@ -32,6 +33,11 @@ class Means:
         Name to lowest and highest value as they stand in the card's file; they take the place of `within`.
     agreed : mapping
         Kc % by name of parameters that move together only.
+
+    Raises
+    ------
+    InputError
+        `by` is unknown, or `within` is not positive.
     """
 
     by: str = UNCERTAIN
@@ -39,6 +45,12 @@ class Means:
     hold: Sequence[str] = ()
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     agreed: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.by not in (FEWEST, UNCERTAIN):
+            raise InputError("--by", "", f"is {self.by!r}", f"give {FEWEST} or {UNCERTAIN}")
+        if not 0 < self.within < math.inf:
+            raise InputError("--within", "", f"is {self.within:g}", "a positive number of standard errors was expected")
 
 
 @dataclass(frozen=True)
@@ -58,55 +70,60 @@ class Move:
 
 @dataclass(frozen=True)
 class Tuned:
-    """A card tuned to wishes, or how near it came.
+    """A card tuned to targets, or how near it came.
 
     Parameters
     ----------
-    wishes : tuple of Wish
+    targets : tuple of Target
     means : Means
     values : array (k,)
         Of all parameters of the study, tuned.
     before, after : array
-        The figures of the wishes.
+        The figures of the targets.
     moves : tuple of Move
         Parameters that changed, the largest move first.
     agreed_times : float or None
         How many times the agreed variation was taken.
-    contradiction : tuple of Wish
-        Wishes that contradict each other within the bounds (one alone cannot be reached); empty if all are reached.
+    contradiction : tuple of Target
+        Targets that contradict each other within the bounds (one alone cannot be reached); empty if all are reached.
     """
 
-    wishes: tuple[Wish, ...]
+    targets: tuple[Target, ...]
     means: Means
     values: Array
     before: Array
     after: Array
     moves: tuple[Move, ...]
     agreed_times: float | None
-    contradiction: tuple[Wish, ...] = ()
+    contradiction: tuple[Target, ...] = ()
 
     @property
     def reached(self) -> bool:
-        """True if all wishes are met."""
+        """True if all targets are met."""
         return not self.contradiction
 
     def as_json(self, figures: Mapping[str, float] | None = None) -> dict[str, object]:
-        """``tuned`` of the command: wishes before and after, moves, and the contradiction if there is one.
+        """``tuned`` of the command: targets before and after, moves, and the contradiction if there is one.
 
         Parameters
         ----------
         figures : mapping, optional
             All figures that were asked for, of the tuned card.
         """
-        pairs = zip(self.wishes, self.before, self.after, strict=True)
+        pairs = zip(self.targets, self.before, self.after, strict=True)
         return {
             "reached": self.reached,
             "by": self.means.by,
             "within_standard_errors": self.means.within,
             "wishes": {
-                wish.text: {"figure": wish.figure.text, "wanted": wish.value, "before": float(a), "after": float(b)}
-                | {"relation": wish.relation}
-                for wish, a, b in pairs
+                target.text: {
+                    "figure": target.figure.text,
+                    "wanted": target.value,
+                    "before": float(a),
+                    "after": float(b),
+                }
+                | {"relation": target.relation}
+                for target, a, b in pairs
             },
             "parameters": {
                 move.parameter.key: {
@@ -117,6 +134,6 @@ class Tuned:
                 for move in self.moves
             },
             "agreed_times": self.agreed_times,
-            "contradiction": [wish.text for wish in self.contradiction],
+            "contradiction": [target.text for target in self.contradiction],
             "figures": dict(figures or {}),
         }

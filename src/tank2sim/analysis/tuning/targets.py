@@ -17,7 +17,7 @@ _WISH = re.compile(r"(?P<name>[^@<>=]+)(?P<at>@[^<>=]+)?(?P<relation><=|>=|=)(?P
 
 
 @dataclass(frozen=True)
-class Wish:
+class Target:
     """A figure and the value that it shall have, at most or at least; in the unit in the figure's name."""
 
     figure: InfluenceFigure
@@ -30,36 +30,36 @@ class Wish:
         return f"{self.figure.text}{self.relation}{self.value:g}"
 
 
-def parse_wish(text: str) -> Wish:
-    """The wish that a command line means: ``steady_radius_m@20=424`` or ``steady_radius_m=424@20``, ``<=``, ``>=``.
+def parse_target(text: str) -> Target:
+    """The target that a command line means: ``steady_radius_m@20=424`` or ``steady_radius_m=424@20``, ``<=``, ``>=``.
 
     Raises
     ------
     InputError
-        It is none, its figure does not exist, or its value is no finite number or one that no ship can have.
+        It is not a target, its figure does not exist, or its value is not finite or not possible of a ship.
     """
     found = _WISH.fullmatch(text.strip())
     if found is None or (found["at"] and found["behind"]):
         remedy = "give FIGURE@ARGUMENT=VALUE, <= or >=, as steady_radius_m@20=424 or 'overshoot1_deg@20/20<=25'"
-        raise InputError(TARGET_OPTION, text, "is no wish", remedy)
+        raise InputError(TARGET_OPTION, text, "is not a target", remedy)
     try:
         value = float(found["value"])
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
         raise InputError(
-            TARGET_OPTION, text, f"{found['value'].strip()} is no number", "give a value in the figure's unit"
+            TARGET_OPTION, text, f"{found['value'].strip()} is not a number", "give a value in the figure's unit"
         )
     figure = parse_figure(found["name"].strip() + (found["at"] or found["behind"] or "").strip(), TARGET_OPTION)
     if not _possible(figure.kind, value):
         problem = f"no ship has {figure.kind.description} of {value:g}"
         raise InputError(TARGET_OPTION, text, problem, "give a value that a ship can have")
-    return Wish(figure, found["relation"], value)
+    return Target(figure, found["relation"], value)
 
 
 def _possible(kind: FigureKind, value: float) -> bool:
     """Whether a ship can have a figure: sizes, times and rates of a manoeuvre are positive; a ship that loses all of
-    its speed turns no more."""
+    its speed does not turn."""
     if kind.family == STRAIGHT or kind.name == "transfer_m":
         return True
     if kind.name == "steady_drift_deg":

@@ -3,11 +3,11 @@
 Unknowns are the moves z of the card's parameters in standard errors, and as one more unknown the multiple of an agreed
 variation (Kc). Figures F are nonlinear in them with exact slopes (:mod:`tank2sim.analysis.influence.study`).
 
-- ``uncertain``: min sum z^2 with F(z) as wished and |z| within bounds (sequential quadratic programming, SLSQP).
-- ``fewest``: the smallest set of unknowns that reaches the wishes to first order, by mixed-integer programming (HiGHS),
-  with least sum |z| among equals; then the nonlinear problem in that set, again from there if it fails.
+- ``uncertain``: min sum z^2 with F(z) on target and |z| within bounds (sequential quadratic programming, SLSQP).
+- ``fewest``: the smallest set of unknowns that reaches the targets to first order, by mixed-integer programming
+  (HiGHS), with least sum |z| among equals; then the nonlinear problem in that set, again from there if it fails.
 
-Wishes that cannot all be reached: the smallest set of them that contradicts itself, found by leaving out one after the
+Targets that cannot all be reached: the smallest set of them that contradicts itself, found by leaving out one after the
 other (deletion filter, Chinneck and Dravnieks 1991), and the nearest that can be reached, in least squares; of all
 moves that come so near, the least.
 """
@@ -25,40 +25,40 @@ from scipy.optimize import Bounds, LinearConstraint, least_squares, milp, minimi
 from tank2sim.analysis.influence.parameters import CardParameter, agreed_by_name, find_parameter
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.result import FEWEST, Means, Move, Tuned
-from tank2sim.analysis.tuning.targets import AT_LEAST, AT_MOST, EQUAL, Wish
+from tank2sim.analysis.tuning.targets import AT_LEAST, AT_MOST, EQUAL, Target
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 
 Slice = NDArray[np.int64]
 
 _REACHED = 1e-5
-"""A wish is reached to this share of its value: far below what a trial tells."""
+"""A target is reached to this share of its value: far below what a trial shows."""
 
 _MOVED = 1e-6  # standard errors below which a parameter has not moved
-_NOT_SHOWN = 10.0  # what is missing, in shares of the wish, where the ship does not show the figure any more
+_NOT_SHOWN = 10.0  # what is missing, in shares of the target, where the ship does not show the figure any more
 _ROUNDING = 1e-9  # of the largest slope
 _DEPENDENT = 1e-6  # of the largest slope: what is left of a row after the others, and is none of its own
 _ROUNDS = 8  # sets of parameters that are tried
 _LONGEST_SEARCH_S = 20.0  # of one set; the best so far is taken then
 
 
-def tune(study: Study, wishes: Sequence[Wish], means: Means) -> Tuned:
-    """Change a card until its figures are as wished.
+def tune(study: Study, targets: Sequence[Target], means: Means) -> Tuned:
+    """Change a card until its figures are as targeted.
 
     Parameters
     ----------
     study : Study
-        Of the figures of the wishes, at least.
-    wishes : sequence of Wish
+        Of the figures of the targets, at least.
+    targets : sequence of Target
     means : Means
 
     Raises
     ------
     InputError
-        `means` names what is no parameter, or leaves nothing to change.
+        `means` names what is not a parameter, or leaves nothing to change.
     """
-    problem = _Problem(study, wishes, means)
-    z, contradiction = problem.start(), tuple[Wish, ...]()
+    problem = _Problem(study, targets, means)
+    z, contradiction = problem.start(), tuple[Target, ...]()
     if problem.largest(z) > _REACHED:
         free = problem.influential(z)
         nearest = problem.nearest(z, free)
@@ -70,18 +70,18 @@ def tune(study: Study, wishes: Sequence[Wish], means: Means) -> Tuned:
 
 
 class _Problem:
-    """The wishes as functions of the moves z (m,)."""
+    """The targets as functions of the moves z (m,)."""
 
-    def __init__(self, study: Study, wishes: Sequence[Wish], means: Means):
-        self.study, self.wishes, self.means = study, tuple(wishes), means
-        self._rows = [study.figures.index(wish.figure) for wish in wishes]
-        self._targets = np.array([wish.value for wish in wishes])
+    def __init__(self, study: Study, targets: Sequence[Target], means: Means):
+        self.study, self.targets, self.means = study, tuple(targets), means
+        self._rows = [study.figures.index(target.figure) for target in targets]
+        self._wanted = np.array([target.value for target in targets])
         base = study.base[self._rows]
-        # A wish of zero is measured by the value before.
-        self._scale = np.where(self._targets != 0, np.abs(self._targets), np.maximum(np.abs(base), 1e-12))
+        # A target of zero is measured by the value before.
+        self._scale = np.where(self._wanted != 0, np.abs(self._wanted), np.maximum(np.abs(base), 1e-12))
         self._agreed = agreed_by_name(means.agreed, study.parameters)
         self._matrix, self._lowest, self._highest = self._unknowns()
-        # Searches ask for the same moves again: by wish, by constraint.
+        # Searches ask for the same moves again: by target, by constraint.
         self._figures = lru_cache(maxsize=16)(self._computed_figures)
         self._slopes_known = lru_cache(maxsize=16)(self._computed_slopes)
 
@@ -123,7 +123,7 @@ class _Problem:
         return np.clip(np.zeros(len(self._lowest)), self._lowest, self._highest)
 
     def influential(self, z: Array) -> Slice:
-        """Unknowns that move a figure of the wishes; all of them where one is not shown at `z`."""
+        """Unknowns that move a figure of the targets; all of them where one is not shown at `z`."""
         if not np.all(np.isfinite(self.figures(z))):
             return np.arange(len(z))
         return np.flatnonzero(np.any(self._slopes(z) != 0, axis=0))
@@ -133,7 +133,7 @@ class _Problem:
         return self.study.values + self._matrix @ z
 
     def figures(self, z: Array) -> Array:
-        """Figures (n,) of the wishes after moves z; nan for those that the ship does not show then."""
+        """Figures (n,) of the targets after moves z; nan for those that the ship does not show then."""
         return self._figures(z.tobytes())
 
     def _computed_figures(self, z: bytes) -> Array:
@@ -143,8 +143,8 @@ class _Problem:
             return np.full(len(self._rows), np.nan)
 
     def _off(self, z: Array) -> Array:
-        """Figures less their wishes (n,), in shares of these."""
-        off = (self.figures(z) - self._targets) / self._scale
+        """Figures less their targets (n,), in shares of these."""
+        off = (self.figures(z) - self._wanted) / self._scale
         return np.where(np.isfinite(off), off, _NOT_SHOWN)
 
     def _slopes(self, z: Array) -> Array:
@@ -161,19 +161,19 @@ class _Problem:
         return np.where(np.abs(found) > _ROUNDING * np.max(np.abs(found), axis=1, keepdims=True), found, 0.0)
 
     def missing(self, z: Array) -> Array:
-        """What is missing (n,) to each wish, in shares of it."""
+        """What is missing (n,) to each target, in shares of it."""
         off = self._off(z)
-        least = [0.0 if wish.relation == AT_MOST else -np.inf for wish in self.wishes]
-        most = [0.0 if wish.relation == AT_LEAST else np.inf for wish in self.wishes]
+        least = [0.0 if target.relation == AT_MOST else -np.inf for target in self.targets]
+        most = [0.0 if target.relation == AT_LEAST else np.inf for target in self.targets]
         return np.clip(off, least, most)
 
     def largest(self, z: Array) -> float:
-        """The largest share of a wish that is missing."""
+        """The largest share of a target that is missing."""
         return float(np.max(np.abs(self.missing(z))))
 
     def nearest(self, z: Array, free: Slice, rows: Sequence[int] | None = None) -> Array:
-        """Moves that miss the wishes (of `rows`) least, in least squares; only those of `free` change."""
-        kept = list(range(len(self.wishes))) if rows is None else list(rows)
+        """Moves that miss the targets (of `rows`) least, in least squares; only those of `free` change."""
+        kept = list(range(len(self.targets))) if rows is None else list(rows)
 
         def slopes(part: Array) -> Array:
             own = _with(z, free, part)
@@ -196,10 +196,10 @@ class _Problem:
         return _with(z, free, solved.x)
 
     def least(self, z: Array, free: Slice) -> Array:
-        """The smallest moves (sum of squares) of `free` that reach the wishes, from moves `z` that do."""
+        """The smallest moves (sum of squares) of `free` that reach the targets, from moves `z` that do."""
         constraints = []
-        for row, wish in enumerate(self.wishes):
-            sign = -1.0 if wish.relation == AT_MOST else 1.0
+        for row, target in enumerate(self.targets):
+            sign = -1.0 if target.relation == AT_MOST else 1.0
 
             def value(part: Array, row: int = row, sign: float = sign) -> float:
                 return sign * float(self._off(_with(z, free, part))[row])
@@ -207,7 +207,7 @@ class _Problem:
             def slope(part: Array, row: int = row, sign: float = sign) -> Array:
                 return np.asarray(sign * self._slopes(_with(z, free, part))[row, free])
 
-            kind = "eq" if wish.relation == EQUAL else "ineq"
+            kind = "eq" if target.relation == EQUAL else "ineq"
             constraints.append({"type": kind, "fun": value, "jac": slope})
         solved = minimize(
             lambda part: 0.5 * float(part @ part),
@@ -223,29 +223,29 @@ class _Problem:
         return found if self.largest(found) <= _REACHED else self._refined(found, z, free)
 
     def least_as_near(self, z: Array, free: Slice) -> Array:
-        """The smallest moves of `free` that come as near to the wishes as moves `z` do.
+        """The smallest moves of `free` that come as near to the targets as moves `z` do.
 
-        What is not reached is held at what is; of figures that hang together (a radius and its diameter, a wish that
+        What is not reached is held at what is; of figures that hang together (a radius and its diameter, a target that
         is given twice) one is enough, and more would leave the search without a solution.
         """
         figures, missed = self.figures(z), np.abs(self.missing(z)) > _REACHED
         if not np.all(np.isfinite(figures)):
             return z
-        loose = [row for row, wish in enumerate(self.wishes) if wish.relation != EQUAL and not missed[row]]
-        tight = [row for row in range(len(self.wishes)) if row not in loose]
+        loose = [row for row, target in enumerate(self.targets) if target.relation != EQUAL and not missed[row]]
+        tight = [row for row in range(len(self.targets)) if row not in loose]
         kept = [tight[one] for one in _independent(self._slopes(z)[tight][:, free])] if tight else []
         held = [
-            Wish(self.wishes[row].figure, EQUAL, float(figures[row] if missed[row] else self._targets[row]))
+            Target(self.targets[row].figure, EQUAL, float(figures[row] if missed[row] else self._wanted[row]))
             for row in kept
         ]
-        return _Problem(self.study, [*held, *(self.wishes[row] for row in loose)], self.means).least(z, free)
+        return _Problem(self.study, [*held, *(self.targets[row] for row in loose)], self.means).least(z, free)
 
     def _refined(self, found: Array, fallback: Array, free: Slice) -> Array:
         refined = self.nearest(found, free)
         return refined if self.largest(refined) <= _REACHED else fallback
 
     def fewest(self, whole: Array) -> Array:
-        """Moves of as few unknowns as possible that reach the wishes; `whole`, with all of them, if no set does."""
+        """Moves of as few unknowns as possible that reach the targets; `whole`, with all of them, if no set does."""
         at, tried = self.start(), list[Slice]()
         for _ in range(_ROUNDS):
             free = self._smallest_set(at, tried)
@@ -258,13 +258,13 @@ class _Problem:
         return whole
 
     def _smallest_set(self, at: Array, tried: Sequence[Slice]) -> Slice | None:
-        """The fewest unknowns, but not those `tried`, with which the wishes are reached to first order about `at`."""
+        """The fewest unknowns, but not those `tried`, with which the targets are reached to first order about `at`."""
         off, slopes = self._off(at), self._slopes(at)
         m = len(at)
         aim = slopes @ at - off
         lower, upper = aim - _REACHED, aim + _REACHED
-        lower[[wish.relation == AT_MOST for wish in self.wishes]] = -np.inf
-        upper[[wish.relation == AT_LEAST for wish in self.wishes]] = np.inf
+        lower[[target.relation == AT_MOST for target in self.targets]] = -np.inf
+        upper[[target.relation == AT_LEAST for target in self.targets]] = np.inf
         one, none = np.eye(m), np.zeros((m, m))
         # unknowns: moves z, whether each is used b, and its size t >= |z|
         constraints = [
@@ -292,9 +292,9 @@ class _Problem:
         )
         return None if solved.x is None else np.flatnonzero(solved.x[m : 2 * m] > 0.5)
 
-    def contradiction(self) -> tuple[Wish, ...]:
-        """Wishes that cannot be reached together, none of which can be left out of that."""
-        kept = list(range(len(self.wishes)))
+    def contradiction(self) -> tuple[Target, ...]:
+        """Targets that cannot be reached together, none of which can be left out of that."""
+        kept = list(range(len(self.targets)))
         everything = np.arange(len(self._lowest))
         for row in list(kept):
             rest = [one for one in kept if one != row]
@@ -303,9 +303,9 @@ class _Problem:
             z = self.nearest(self.start(), everything, rest)
             if np.max(np.abs(self.missing(z)[rest])) > _REACHED:
                 kept = rest
-        return tuple(self.wishes[row] for row in kept)
+        return tuple(self.targets[row] for row in kept)
 
-    def result(self, z: Array, contradiction: tuple[Wish, ...]) -> Tuned:
+    def result(self, z: Array, contradiction: tuple[Target, ...]) -> Tuned:
         """What came of moves `z`."""
         z = np.where(np.abs(z) < _MOVED, 0.0, z)
         values = self.values(z)
@@ -316,7 +316,7 @@ class _Problem:
         ]
         moves.sort(key=lambda move: -abs(move.in_standard_errors or np.inf))
         return Tuned(
-            wishes=self.wishes,
+            targets=self.targets,
             means=self.means,
             values=values,
             before=self.study.base[self._rows],

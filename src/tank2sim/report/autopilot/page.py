@@ -1,4 +1,4 @@
-"""The page of an autopilot: what it is, how much its loop bears, what it does in calm, in weather and on a track."""
+"""The page of an autopilot: what it is, the margins of its loop, what it does in calm, in weather and on a track."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
-from tank2sim.analysis.heading.study import AutopilotStudy
 from tank2sim.arrays import Array
-from tank2sim.files import plain_json
 from tank2sim.report.autopilot.charts import (
     CrossTrack,
     cross_track_chart,
@@ -33,13 +31,8 @@ _SIGNALS = (
 )
 
 
-def autopilot_page(study: AutopilotStudy) -> Page:
-    """The page."""
-    return piloted_page(plain_json(study.as_json()))
-
-
-def piloted_page(found: Json) -> Page:
-    """The page, from what JSON has of an :class:`AutopilotStudy`."""
+def autopilot_page(found: Json) -> Page:
+    """The page, from the JSON of an :class:`.AutopilotStudy`."""
     sections = [_controller(found), _loop(found), _calm(found), _weather(found)]
     if found["track"]:
         sections.append(_track(found))

@@ -6,10 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tank2sim.analysis.influence.card_influence import CardInfluence
-from tank2sim.analysis.tuning.result import Tuned
 from tank2sim.arrays import Array
-from tank2sim.files import plain_json
 from tank2sim.report.ensemble.sections import figures_section
 from tank2sim.report.influence.charts import (
     PANELS,
@@ -37,17 +34,8 @@ _ERRORS = (
 )
 
 
-def influence_page(result: CardInfluence, tuned: Tuned | None = None, after: Array | None = None) -> Page:
-    """The page of a result; with the tuning if there was one, and all figures `after` it."""
-    told = result.as_json()
-    if tuned is not None:
-        values = [] if after is None else after.tolist()
-        told["tuned"] = tuned.as_json(dict(zip((figure.text for figure in result.figures), values, strict=False)))
-    return influenced_page(plain_json(told))
-
-
-def influenced_page(found: Json) -> Page:
-    """The page, from what JSON has of a result: that of :class:`CardInfluence`, ``tuned`` and ``ensemble``."""
+def influence_page(found: Json) -> Page:
+    """The page, from the JSON of a result: that of :class:`.CardInfluence`, ``tuned`` and ``ensemble``."""
     coefficients = InfluenceData.of(found)
     sections = []
     tuned = found.get("tuned")
@@ -72,11 +60,11 @@ def influenced_page(found: Json) -> Page:
     )
 
 
-def _wished(tuned: Mapping[str, Json]) -> dict[str, tuple[Mapping[str, Json], Verdict]]:
-    """Figure to its wish, and whether that is met."""
+def _targets_of(tuned: Mapping[str, Json]) -> dict[str, tuple[Mapping[str, Json], Verdict]]:
+    """Figure to its target, and whether that is met."""
     return {
-        wish["figure"]: (wish, Verdict.FAILED if text in tuned["contradiction"] else Verdict.PASSED)
-        for text, wish in tuned.get("wishes", {}).items()
+        target["figure"]: (target, Verdict.FAILED if text in tuned["contradiction"] else Verdict.PASSED)
+        for text, target in tuned.get("wishes", {}).items()
     }
 
 
@@ -84,13 +72,13 @@ def _key_figure(text: str, one: Mapping[str, Json], tuned: Mapping[str, Json]) -
     kind, _, argument = text.partition("@")
     words, unit = in_words(kind)
     label = f"{words}, {argument} deg" if argument else words
-    after, (wish, verdict) = tuned.get("figures", {}).get(text), _wished(tuned).get(text, ({}, Verdict.NONE))
+    after, (target, verdict) = tuned.get("figures", {}).get(text), _targets_of(tuned).get(text, ({}, Verdict.NONE))
     if after is None:
         note = f"standard error {one['standard_error']:.2g}"
         return KeyFigure(label=label, value=one["value"], unit=unit, note=note)
     note = f"was {one['value']:.5g} before tuning"
-    if wish:
-        note = f"was {one['value']:.5g}, wished {wish['relation']} {wish['wanted']:g}"
+    if target:
+        note = f"was {one['value']:.5g}, target {target['relation']} {target['wanted']:g}"
     return KeyFigure(label=label, value=after, unit=unit, verdict=verdict, note=note)
 
 
@@ -164,13 +152,13 @@ def _together(agreed: Mapping[str, Json]) -> PageSection:
 
 
 def _tuning(found: Json, tuned: Mapping[str, Json]) -> PageSection:
-    wished = _wished(tuned)
+    targets = _targets_of(tuned)
     figures: list[Sequence[Cell]] = []
     for text, one in found["figures"].items():
-        wish, verdict = wished.get(text, ({}, None))
-        wanted = f"{wish['relation']} {wish['wanted']:g}" if wish else ""
+        target, verdict = targets.get(text, ({}, None))
+        wanted = f"{target['relation']} {target['wanted']:g}" if target else ""
         figures.append([text, wanted, one["value"], tuned["figures"].get(text), verdict])
-    heads = ("figure", "wished", "before", "after", "")
+    heads = ("figure", "target", "before", "after", "")
     notes = []
     if contradiction := tuned["contradiction"]:
         several = len(contradiction) > 1

@@ -103,6 +103,13 @@ class Illustration:
     chart: alt.TopLevelMixin
     caption: str = ""
 
+    @property
+    def title(self) -> str:
+        """Title of the chart; empty if it has none."""
+        title = getattr(self.chart, "title", "")
+        text = getattr(title, "text", title)
+        return text if isinstance(text, str) else ""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PageSection:

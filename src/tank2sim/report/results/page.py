@@ -32,7 +32,7 @@ from tank2sim.report.results.motions import is_columns, motions
 from tank2sim.report.results.renderers import misshapen, render_charts, whole_page
 from tank2sim.report.results.result_types import ResultType, kind_of
 
-_TOLD = ("notices", "warnings", "notes")
+_NOTES = ("notices", "warnings", "notes")
 _DEEPEST = 5
 _MOST_PARTS = 12
 _BODE = {"omega_radps", "magnitude_dB", "phase_deg"}
@@ -64,7 +64,7 @@ def result_page(result: Json, source: str) -> Page:
     Raises
     ------
     InputError
-        It is no result of a command of tank2sim, or a value in it has not the form of one.
+        It is not a result of a command of tank2sim, or a value in it has another form.
     """
     kind = kind_of(result, source)
     if key := misshapen(kind.title, result):
@@ -75,18 +75,18 @@ def result_page(result: Json, source: str) -> Page:
 def _page(result: Mapping[str, Json], kind: ResultType, source: str) -> Page:
     if whole := whole_page(kind.title, result):
         return whole
-    messages = [str(note) for key in _TOLD for note in result.get(key) or []]
+    notices = [str(note) for key in _NOTES for note in result.get(key) or []]
     name = next((result[key] for key in ("ship", "campaign", "glider", "path") if isinstance(result.get(key), str)), "")
     checked = charts.errors("Errors of the outputs", result.get("errors"), result.get("limits"))
     own, rest = render_charts(kind.title, result)
     if checked:  # all but the largest errors, which the table of all of them has again
         rest = {key: value for key, value in rest.items() if key != "max_error"}
-    sections = [_section(key, value) for key, value in rest.items() if key not in _TOLD and not is_scalar(value)]
-    overview = {key: value for key, value in scalars(result).items() if key not in (*_TOLD, "kind", "schema")}
+    sections = [_section(key, value) for key, value in rest.items() if key not in _NOTES and not is_scalar(value)]
+    overview = {key: value for key, value in scalars(result).items() if key not in (*_NOTES, "kind", "schema")}
     table = [quantities("The result", overview)] if overview else []
     first = [
         PageSection(
-            heading="Overview", text=kind.beside, tables=table, charts=[checked] if checked else [], notes=messages
+            heading="Overview", text=kind.note, tables=table, charts=[checked] if checked else [], notes=notices
         )
     ]
     return Page(
@@ -94,7 +94,7 @@ def _page(result: Mapping[str, Json], kind: ResultType, source: str) -> Page:
         subtitle=f"From {source}",
         figures=headlines(result, kind),
         sections=[
-            *(first if overview or messages or kind.beside else []),
+            *(first if overview or notices or kind.note else []),
             *own,
             *(section for section in sections if section.tables or section.charts),
         ],
@@ -112,7 +112,7 @@ def _section(key: str, value: Json) -> PageSection:
 
 
 def _fill(parts: _Parts, caption: str, key: str, value: Json, depth: int) -> None:
-    """Add a value that is no scalar, and all under it, to the parts of a section."""
+    """Add a value that is not a scalar, and all under it, to the parts of a section."""
     if depth > _DEEPEST:
         parts.left_out += 1
     elif isinstance(value, Mapping):

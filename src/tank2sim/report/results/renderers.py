@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from tank2sim.report.autopilot.page import piloted_page
+from tank2sim.report.autopilot.page import autopilot_page
 from tank2sim.report.comparison.page import compared_page
 from tank2sim.report.glide.page import glides_drawn
-from tank2sim.report.influence.page import influenced_page
+from tank2sim.report.influence.page import influence_page
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Page, PageSection
 from tank2sim.report.results.fleet import told_fleet_page
@@ -113,10 +113,12 @@ _PAGES: Mapping[str, _Page] = {
     "Cards compared": _Page(
         compared_page, {"summary": list, "cards": list, "coefficients": list, "trials": list, "notices": list}
     ),
-    "Heading control": _Page(piloted_page, {"ship_alone": dict, "responses": list, "histories": dict, "notices": list}),
+    "Heading control": _Page(
+        autopilot_page, {"ship_alone": dict, "responses": list, "histories": dict, "notices": list}
+    ),
     "Fleet": _Page(told_fleet_page, {"fleet": str, "ships": list}),
     "Influence coefficients": _Page(
-        influenced_page, {"figures": dict, "parameters": dict, "influence_percent": dict, "notices": list}
+        influence_page, {"figures": dict, "parameters": dict, "influence_percent": dict, "notices": list}
     ),
 }
 """Commands whose own page is made of their JSON."""

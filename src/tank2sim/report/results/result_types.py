@@ -1,9 +1,9 @@
-"""Which command wrote a result: by its schema, and for files of versions without one by its keys."""
+"""Which command wrote a result: by its schema; of files without, which older versions wrote, by its keys."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,67 +16,66 @@ class ResultType:
 
     Parameters
     ----------
-    command : str
-        Which wrote it; ``poster`` stands for ``pilotcard``, too.
     title : str
         What it is, for the head of the page.
+    commands : str
+        Commands that write it, as their schemas name them, with spaces between.
     keys : tuple of str
         What the JSON of this command has at its top, and that of no other has all of.
     headlines : tuple of str
         Paths of the values that the reader looks for first, with dots between keys; for those that are
         worked out see :mod:`tank2sim.report.results.headlines`.
-    next to : str
+    note : str
         What the JSON has not, and where it is.
     """
 
-    command: str
     title: str
+    commands: str
     keys: tuple[str, ...]
     headlines: tuple[str, ...] = ()
-    beside: str = ""
+    note: str = ""
 
 
-_BESIDE_GAP = (
+_SCHEMA = re.compile(r"tank2sim/([a-z]+)/1")
+_GAP_NOTE = (
     "Tracks and time histories are not in gap.json: they are in report.html, which tank2sim gap wrote next to it."
 )
 
 RESULT_TYPES = (
-    ResultType("gap", "The missing effect", ("verdict", "could_hide"), beside=_BESIDE_GAP),
-    ResultType("simulate", "Simulated manoeuvre", ("ship", "manoeuvre", "figures"), ("manoeuvre",)),
+    ResultType("The missing effect", "gap", ("verdict", "could_hide"), note=_GAP_NOTE),
+    ResultType("Simulated manoeuvre", "simulate", ("ship", "manoeuvre", "figures"), ("manoeuvre",)),
     ResultType(
-        "stability",
         "Stability",
+        "stability",
         ("stability_criterion", "nomoto"),
         ("stability_criterion.stable", "stability_criterion.C_prime"),
     ),
     ResultType(
-        "autopilot", "Heading control", ("ship", "design", "gains"), ("design", "margins.at_design.phase_margin_deg")
+        "Heading control", "autopilot", ("ship", "design", "gains"), ("design", "margins.at_design.phase_margin_deg")
     ),
-    ResultType("influence", "Influence coefficients", ("influence_percent",), ()),
-    ResultType("reduce", "Captive tests", ("campaign", "derivatives"), ("test.speed_mps",)),
-    ResultType("identify", "Coefficients from trials", ("method", "derivatives", "misfit"), ("method",)),
-    ResultType("tow", "Towed vehicle", ("tows", "methods", "mass_kg"), ("readings",)),
-    ResultType("yaw", "Yaw rig", ("records", "added_inertia_kgm2"), ()),
-    ResultType("audit", "Audit of trials", ("findings", "trials"), ()),
-    ResultType("export", "FMU: export", ("platforms", "size_bytes"), ("fmi", "size_bytes")),
-    ResultType("check", "FMU: check", ("validation", "max_error"), ("passed",)),
-    ResultType("glide", "Underwater glider", ("glider", "states"), ()),
-    ResultType("influence", "Steering catalogue", ("ship", "steady_turns", "manoeuvres"), ()),
-    ResultType("influence", "Tuning to two turns", ("hull_factor", "rudder_factor"), ("hull_factor", "rudder_factor")),
-    ResultType("gap", "Fleet", ("fleet", "ships"), ()),
-    ResultType("ships", "Bundled ships", ("ships",), ()),
-    ResultType("demo", "From tests to a checked simulator", ("towed_vehicle", "mariner"), ()),
-    ResultType("compare", "Cards compared", ("cards", "coefficients", "trials"), ("summary",)),
-    ResultType("validate", "Validation", ("verification", "counts", "figures"), ("verdict",)),
-    ResultType("poster", "Bridge", ("turning_circles_deep", "telegraph"), ("rudder_deg",)),
-    ResultType("signals", "Signals", ("trials", "spectra"), ()),
-    ResultType("signals", "Signals", ("trials", "filter"), ()),
-    ResultType("signals", "Signals", ("trials",), ()),
+    ResultType("Influence coefficients", "influence", ("influence_percent",), ()),
+    ResultType("Captive tests", "reduce", ("campaign", "derivatives"), ("test.speed_mps",)),
+    ResultType("Coefficients from trials", "identify", ("method", "derivatives", "misfit"), ("method",)),
+    ResultType("Towed vehicle", "tow", ("tows", "methods", "mass_kg"), ("readings",)),
+    ResultType("Yaw rig", "yaw", ("records", "added_inertia_kgm2"), ()),
+    ResultType("Audit of trials", "audit", ("findings", "trials"), ()),
+    ResultType("FMU: export", "export", ("platforms", "size_bytes"), ("fmi", "size_bytes")),
+    ResultType("FMU: check", "check", ("validation", "max_error"), ("passed",)),
+    ResultType("Underwater glider", "glide", ("glider", "states"), ()),
+    ResultType("Steering catalogue", "influence", ("ship", "steady_turns", "manoeuvres"), ()),
+    ResultType("Tuning to two turns", "influence", ("hull_factor", "rudder_factor"), ("hull_factor", "rudder_factor")),
+    ResultType("Fleet", "gap", ("fleet", "ships"), ()),
+    ResultType("Bundled ships", "ships", ("ships",), ()),
+    ResultType("From tests to a checked simulator", "demo", ("towed_vehicle", "mariner"), ()),
+    ResultType("Cards compared", "compare", ("cards", "coefficients", "trials"), ("summary",)),
+    ResultType("Validation", "validate", ("verification", "counts", "figures"), ("verdict",)),
+    ResultType("Bridge", "poster pilotcard", ("turning_circles_deep", "telegraph"), ("rudder_deg",)),
+    ResultType("Ship to steer", "steer", ("ship", "steerable"), ("steerable",)),
+    ResultType("Signals", "signals", ("trials", "spectra"), ()),
+    ResultType("Signals", "signals", ("trials", "filter"), ()),
+    ResultType("Signals", "signals", ("trials",), ()),
 )
 """The results that are known, those with more particular keys first."""
-
-
-_SCHEMA = re.compile(r"tank2sim/([a-z]+)/\d+")
 
 
 def kind_of(result: Any, source: str) -> ResultType:
@@ -85,16 +84,23 @@ def kind_of(result: Any, source: str) -> ResultType:
     Raises
     ------
     InputError
-        It is no result of any.
+        It is not a result of any.
     """
-    if isinstance(result, Mapping):
-        named = _SCHEMA.fullmatch(str(result.get("schema", "")))
-        command = "poster" if named and named[1] == "pilotcard" else named and named[1]
-        for kind in RESULT_TYPES:
-            if command in (None, kind.command) and all(key in result for key in kind.keys):
-                return kind
-        if named:
-            problem = f"says that it is a result of tank2sim {named[1]}, and lacks what such a result has"
-            raise InputError(source, "schema", problem, "give the file as the command wrote it")
     remedy = "give what a command wrote with --json (or the gap.json of tank2sim gap)"
-    raise InputError(source, "", "is no result of a tank2sim command", remedy)
+    if isinstance(result, Mapping):
+        for kind in _types_of(result.get("schema"), source):
+            if all(key in result for key in kind.keys):
+                return kind
+    raise InputError(source, "", "is not a result of a tank2sim command", remedy)
+
+
+def _types_of(schema: object, source: str) -> Sequence[ResultType]:
+    """The types that a schema may mean; without one all of them."""
+    if schema is None:
+        return RESULT_TYPES
+    found = _SCHEMA.fullmatch(str(schema))
+    types = [kind for kind in RESULT_TYPES if found and found[1] in kind.commands.split()]
+    if not types:
+        remedy = "give what this version of tank2sim wrote with --json"
+        raise InputError(source, "schema", f"is {str(schema)[:60]!r}, which is not known", remedy)
+    return types

@@ -1,0 +1,131 @@
+"""The page of a result that was written as JSON, in this session or before."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tank2sim.api.paged import PagedResult
+from tank2sim.api.result import Result, ResultTable
+from tank2sim.errors import InputError
+from tank2sim.files import plain_json, write_together
+from tank2sim.marks import marked
+
+if TYPE_CHECKING:
+    from tank2sim.report.kit.page import Page
+
+_REMEDY = "give what a command wrote with --json"
+
+
+class ReportResult(PagedResult):
+    """The page of a result.
+
+    Parameters
+    ----------
+    values : mapping
+        The result as JSON values.
+    source : str
+        What messages and the head of the page call it.
+
+    Raises
+    ------
+    InputError
+        It is not a result of tank2sim, or a value in it is not as a command writes it.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> t2s.make_report(t2s.load("mariner").turn(35)).title
+    'Simulated manoeuvre: Mariner class'
+    """
+
+    command = "report"
+
+    def __init__(self, values: Mapping[str, Any], source: str) -> None:
+        from tank2sim.report.results.page import result_page
+
+        self._values, self.source = values, source
+        self._layout = result_page(values, source)
+        self.notices = tuple(marked(values.get("notices") or ()))
+
+    @property
+    def schema(self) -> str:
+        """Schema of the result; empty if the version that wrote it had none."""
+        return str(self._values.get("schema", ""))
+
+    @property
+    def title(self) -> str:
+        """Title of the page: what it is, and of which ship."""
+        return self._layout.title
+
+    def content(self) -> Mapping[str, object]:
+        """The result that is shown."""
+        return self._values
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Title of the page, and how many charts and tables it has."""
+        sections = self._layout.sections
+        charts, tables = (sum(len(getattr(each, kind)) for each in sections) for kind in ("charts", "tables"))
+        return (f"{self.title}: {charts} charts and {tables} tables",)
+
+    @property
+    def tables(self) -> tuple[ResultTable, ...]:
+        """None: the page has them."""
+        return ()
+
+    def layout(self) -> Page:
+        """As :meth:`.PagedResult.layout`."""
+        return self._layout
+
+
+def make_report(result: Result | Mapping[str, object] | str | Path, path: str | Path | None = None) -> ReportResult:
+    """Make the page of a result.
+
+    Parameters
+    ----------
+    result : Result, mapping or path
+        A result, its ``to_dict()``, or the JSON file that a command wrote with ``--json``.
+    path : path, optional
+        HTML file to write.
+
+    Raises
+    ------
+    InputError
+        It is not a result of tank2sim, or a file cannot be read or written.
+    """
+    if isinstance(result, Result):
+        found = ReportResult(result.to_dict(), f"tank2sim {result.command}")
+    elif isinstance(result, Mapping):
+        found = ReportResult(plain_json(result), "the result")
+    else:
+        found = ReportResult(read_result(Path(result)), str(result))
+    if path is not None:
+        inputs = [Path(result)] if isinstance(result, str | Path) else []
+        write_together({Path(path): found.page()}, inputs=inputs)
+    return found
+
+
+def read_result(path: Path) -> Any:
+    """The JSON of a file.
+
+    Raises
+    ------
+    InputError
+        The file cannot be read, or is not JSON that a page can show.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
+        json.dumps(content, ensure_ascii=False).encode()  # a text may hold half a character, which no page can
+        return content
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read ({error.strerror})", _REMEDY) from None
+    except json.JSONDecodeError as error:
+        raise InputError(path, f"line {error.lineno}", f"is not JSON ({error.msg})", _REMEDY) from None
+    except UnicodeEncodeError:
+        problem = "holds half of a character (a lone surrogate, \\ud800 to \\udfff)"
+        raise InputError(path, "", problem, _REMEDY) from None
+    except (ValueError, RecursionError):  # a ValueError also where an integer has thousands of digits
+        raise InputError(path, "", "is not JSON", _REMEDY) from None

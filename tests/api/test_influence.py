@@ -1,0 +1,129 @@
+"""Influence, tuning and steering models as a user of the API has them: against the simulated ship."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tank2sim as t2s
+from tank2sim.cards.covariance import Covariance, covariance_file, read_covariance, referring
+
+
+@pytest.fixture(scope="module")
+def mariner() -> t2s.Ship:
+    return t2s.load("mariner")
+
+
+@pytest.fixture(scope="module")
+def found(mariner: t2s.Ship) -> t2s.InfluenceResult:
+    return mariner.influence(["advance_m@35", "overshoot1_deg@20/20"], joint_variation={"Nd": 0.1, "Nr": -0.1})
+
+
+def test_a_coefficient_is_the_change_of_the_simulated_figure(mariner: t2s.Ship, found: t2s.InfluenceResult) -> None:
+    value = float(found.parameters.loc["derivatives.Nd", "value"])
+    more, less = (mariner.replace({"derivatives.Nd": share * value}) for share in (1.005, 0.995))
+    pairs = {
+        "advance_m@35": [ship.turn(35).figures["advance_m"] for ship in (less, more)],
+        "overshoot1_deg@20/20": [ship.zigzag(20, 20).figures["overshoot_1_deg"] for ship in (less, more)],
+    }
+    for figure, (low, high) in pairs.items():
+        change = 10 * 100 * (high - low) / found.figures.loc[figure, "value"]
+        assert found.coefficients.loc["derivatives.Nd", figure] == pytest.approx(change, rel=0.01)
+
+
+def test_figures_of_the_api_are_those_of_a_simulation(mariner: t2s.Ship, found: t2s.InfluenceResult) -> None:
+    assert found.figures.loc["advance_m@35", "value"] == pytest.approx(mariner.turn(35).figures["advance_m"], rel=1e-4)
+    first = mariner.zigzag(20, 20).figures["overshoot_1_deg"]
+    assert found.figures.loc["overshoot1_deg@20/20", "value"] == pytest.approx(first, rel=1e-3)
+
+
+def test_shares_of_independent_errors_make_up_the_variance(found: t2s.InfluenceResult) -> None:
+    np.testing.assert_allclose(found.variance_shares.sum(), 1.0, rtol=1e-9)
+
+
+def test_a_result_fits_a_screen_and_has_a_picture(found: t2s.InfluenceResult) -> None:
+    assert len(repr(found).splitlines()) <= 24
+    assert "data:image/png;base64," in found._repr_html_()
+    assert json.loads(found.to_json())["schema"] == "tank2sim/influence/1"
+    assert all(len(line) <= 80 for table in found.tables for line in ["".join(table.columns).replace("\n", "")])
+
+
+def test_the_tuned_ship_makes_the_turn_that_was_the_target(mariner: t2s.Ship) -> None:
+    tuning = mariner.tune("tactical_diameter_m@35=1000", by="fewest")
+    assert tuning.reached and len(tuning.moves) == 1
+    assert tuning.tuned_ship.turn(35).figures["tactical_diameter_m"] == pytest.approx(1000, rel=1e-4)
+    (name,) = tuning.moves.index
+    assert tuning.tuned_ship.derivatives.loc[name.removeprefix("derivatives."), "value"] != pytest.approx(
+        mariner.derivatives.loc[name.removeprefix("derivatives."), "value"], rel=1e-3
+    )
+
+
+def test_targets_that_contradict_each_other_are_named_and_their_card_is_refused(mariner: t2s.Ship) -> None:
+    tuning = mariner.tune(["steady_radius_m@20=640", "steady_diameter_m@20=1200"])
+    assert not tuning.reached and tuning.to_dict()["tuned"]["contradiction"] == list(tuning.targets.index)  # type: ignore[index]
+    with pytest.raises(t2s.InputError) as refused:
+        _ = tuning.card
+    assert refused.value.source == "--tune" and "--within" in refused.value.remedy
+
+
+def test_a_tuned_card_carries_the_covariance_of_what_hardly_moved(tmp_path: Path) -> None:
+    path = tmp_path / "ship.toml"
+    text = t2s.load("mariner").card.text + "\n[uncertainty]\nNd = 4e-5\nYv = 2e-4\nNv = 1e-4\n"
+    path.write_text(referring(text, path))
+    names = ("derivatives.Nd", "derivatives.Yv", "derivatives.Nv")
+    matrix = np.array([[1.6e-9, 2e-9, 0.0], [2e-9, 4e-8, 1e-8], [0.0, 1e-8, 1e-8]])
+    covariance_file(path).write_text(Covariance(names, matrix).as_text())
+    tuning = t2s.load(path).tune("steady_radius_m@20=640", by="fewest")
+    kept = read_covariance(tuning.card)
+    assert kept is not None and kept.names == names[1:]
+    assert any(notice.endswith("independent now: Nd") for notice in tuning.notices)
+
+
+def test_the_scaled_ship_turns_through_both_points(mariner: t2s.Ship) -> None:
+    tuning = mariner.tune_through("35@35", "1400m@3")
+    assert tuning.turns["rate_after_degpmin"].iloc[0] == pytest.approx(35)
+    run = tuning.tuned_ship.turn(35)
+    assert 60 * run.figures["steady_rate_degps"] == pytest.approx(35, rel=2e-3)
+    shallow = tuning.tuned_ship.turn(3, duration_s=3000)
+    u, v, r = (shallow.df[name].iloc[-1] for name in ("u_mps", "v_mps", "r_degps"))
+    assert math.hypot(u, v) / abs(math.radians(r)) == pytest.approx(1400, rel=2e-3)
+    assert len(repr(tuning).splitlines()) <= 24
+
+
+def test_models_of_a_steering_card_turn_as_the_paper_prints() -> None:
+    """Poznyakov & Yudin (2007), radius at 20 deg of rudder of the Japanese model, and K of C_m^omega."""
+    models = t2s.steering_models("poznyakov-yudin")
+    turns = models.turns.set_index(["model", "rudder_deg"])
+    assert turns.loc[("inoue-hirano", 20.0), "radius_m"] == pytest.approx(399.6, abs=0.25)
+    assert models.coefficients.loc["C_m_w", "inoue-hirano"] == pytest.approx(7.1, abs=0.05)
+    assert len(repr(models).splitlines()) <= 24 and len(models.charts()) == 3
+
+
+@pytest.mark.parametrize(
+    ("call", "source", "place"),
+    [
+        (lambda ship: ship.influence("steady_radius"), "--figure", "steady_radius"),
+        (lambda ship: ship.influence("criterion_C", joint_variation={"Yq": 1.0}), "--agreed", "Yq"),
+        (lambda ship: ship.influence("criterion_C", members=1), "--ensemble", ""),
+        (lambda ship: ship.tune("steady_radius_m@20"), "--tune", "steady_radius_m@20"),
+        (lambda ship: ship.tune([]), "--tune", ""),
+        (lambda ship: ship.tune("criterion_C=5e-6", by="luck"), "--by", ""),
+        (lambda ship: ship.tune("criterion_C=5e-6", within=0.0), "--within", ""),
+        (lambda ship: ship.tune_through("35@35", "much@3"), "--through", "much@3"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused_at_its_place(mariner: t2s.Ship, call, source: str, place: str) -> None:
+    with pytest.raises(t2s.InputError) as refused:
+        call(mariner)
+    assert (str(refused.value.source), refused.value.place) == (source, place)
+    assert refused.value.remedy
+
+
+def test_a_ship_card_is_not_a_steering_card() -> None:
+    with pytest.raises(t2s.InputError) as refused:
+        t2s.steering_models("mariner")
+    assert refused.value.remedy

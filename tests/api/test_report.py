@@ -1,0 +1,64 @@
+"""The page of a result: of a result in hand, of its values, and of the file that a command wrote."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import tank2sim as t2s
+from tank2sim.report.results.result_types import RESULT_TYPES, kind_of
+from tests.cli.command_line import refused, tank2sim
+
+
+@pytest.fixture(scope="module")
+def turn() -> t2s.ManoeuvreResult:
+    return t2s.load("mariner").turn(35)
+
+
+def test_a_result_its_values_and_its_file_give_one_page(turn: t2s.ManoeuvreResult, tmp_path: Path) -> None:
+    turn.to_json(tmp_path / "turn.json")
+    reports = [t2s.make_report(given) for given in (turn, turn.to_dict(), tmp_path / "turn.json")]
+    assert {found.title for found in reports} == {"Simulated manoeuvre: Mariner class"}
+    assert {tuple(found.charts()) for found in reports} == {("Track: turn:35", "Histories: turn:35")}
+    assert all(found.to_dict() == turn.to_dict() for found in reports)
+    t2s.make_report(tmp_path / "turn.json", tmp_path / "turn.html")
+    assert (tmp_path / "turn.html").read_text(encoding="utf-8").startswith("<!doctype html>")
+
+
+def test_the_name_of_the_schema_is_not_a_figure_of_the_page(turn: t2s.ManoeuvreResult) -> None:
+    assert "tank2sim/simulate/1" not in t2s.make_report(turn).page().partition("<script")[0]
+
+
+def test_a_report_fits_a_screen_and_has_a_picture(turn: t2s.ManoeuvreResult) -> None:
+    found = t2s.make_report(turn)
+    assert len(repr(found).splitlines()) <= 24
+    assert "data:image/png;base64," in found._repr_html_()
+
+
+def test_a_schema_decides_where_keys_would_say_something_else(turn: t2s.ManoeuvreResult) -> None:
+    keys = dict.fromkeys(("ship", "manoeuvre", "figures", "verdict", "could_hide"))
+    assert kind_of(keys, "x.json").commands == "gap"
+    assert kind_of({**keys, "schema": "tank2sim/simulate/1"}, "x.json").commands == "simulate"
+
+
+@pytest.mark.parametrize("schema", ["tank2sim/simulate/2", "tank2sim/dance/1", "simulate", 3])
+def test_a_schema_that_is_not_known_is_refused(turn: t2s.ManoeuvreResult, schema: object) -> None:
+    with pytest.raises(t2s.InputError) as refusal:
+        t2s.make_report({**turn.to_dict(), "schema": schema})
+    assert refusal.value.place == "schema" and refusal.value.remedy
+
+
+def test_every_command_of_a_type_exists() -> None:
+    from tank2sim.cli import COMMANDS
+
+    assert {command for kind in RESULT_TYPES for command in kind.commands.split()} == set(COMMANDS) - {"report"}
+
+
+def test_a_page_never_takes_the_place_of_its_json(turn: t2s.ManoeuvreResult, tmp_path: Path) -> None:
+    turn.to_json(tmp_path / "turn.json")
+    with pytest.raises(t2s.InputError):
+        t2s.make_report(tmp_path / "turn.json", tmp_path / "turn.json")
+    assert json.loads((tmp_path / "turn.json").read_text())["ship"] == "Mariner class"
+    refused(tank2sim("report", "turn.json", "-o", "turn.json", cwd=tmp_path), "turn.json")
