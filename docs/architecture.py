@@ -73,9 +73,8 @@ def package_table() -> str:
     for row in layers(package_imports())[::-1]:
         for name in row:
             text = ast.get_docstring(ast.parse((SOURCES / name / "__init__.py").read_text(encoding="utf-8"))) or ""
-            imported = ", ".join(f"`{other}`" for other in sorted(package_imports()[name])) or "none"
-            rows.append(f"| `{name}` | {_plain(text)} | {imported} |")
-    return "\n".join(["| package | what it is for | imports |", "|---|---|---|", *rows])
+            rows.append(f"| `{name}` | {_plain(text)} |")
+    return "\n".join(["| package | what it is for |", "|---|---|", *rows])
 
 
 def _plain(docstring: str) -> str:

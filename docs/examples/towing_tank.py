@@ -12,7 +12,7 @@ import tank2sim as t2s
 
 MODELS = Path(__file__).parents[2] / "models"
 
-# Mass and drag of an underwater vehicle: four parameters that these tows cannot tell apart, then two that they can.
+# Mass and drag of an underwater vehicle: four parameters that these tows cannot separate, then two that they can.
 tows = MODELS / "wilinski-zellman" / "tows.csv"
 tank2sim("tow", tows, "--force-N", "11.63", "--mass-kg", "2243")
 tank2sim("tow", tows, "--terms", "B3", "-o", "vehicle.toml")
