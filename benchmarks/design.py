@@ -1,6 +1,6 @@
 """Design studies of two bundled ships: stability and steady turning of each, and autopilots with their margins.
 
-Prints the figures that the README tells of ``tank2sim stability`` and ``tank2sim autopilot``, and the seconds that the
+Prints the figures of the manual for ``tank2sim stability`` and ``tank2sim autopilot``, and the seconds that the
 steering diagram takes, continuation through the unstable branch included, beside those of one simulated turn.
 """
 

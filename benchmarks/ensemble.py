@@ -98,7 +98,7 @@ def on_all(question: OfManoeuvre, draws: Draws, members: int) -> tuple[Ensemble,
 
 
 def bands_of_readme(card: ManoeuvringCard) -> None:
-    """The bands that the README tells of ``tank2sim simulate mariner --manoeuvre turn:35 --ensemble 100 --seed 3``."""
+    """The bands of the manual for ``tank2sim simulate mariner --manoeuvre turn:35 --ensemble 100 --seed 3``."""
     turn, asked = Turn(float(RUDDER)), EnsembleRequest(100, 3)
     run = simulate(build(card), turn)
     bands = manoeuvre_bands(card, turn, (None, float(run.trajectory.t[-1])), asked).figures

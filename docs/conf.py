@@ -25,6 +25,7 @@ extensions = [
     "plain_docstrings",
     "generated",
     "pictures",
+    "architecture",
 ]
 myst_enable_extensions = ["attrs_block", "dollarmath"]
 myst_heading_anchors = 3
