@@ -10,6 +10,7 @@ import multiprocessing
 import os
 import re
 import signal
+import sys
 import threading
 import warnings
 from collections.abc import Iterator
@@ -73,10 +74,30 @@ def processes_to_begin(workers: int | None = None) -> int:
     return workers or os.cpu_count() or 1
 
 
+class _Process(multiprocessing.context.SpawnProcess):
+    """A process that does not run the user's script again: all that it computes is in packages that it can import."""
+
+    def start(self) -> None:
+        """Start it while the main module has no name and no file by which the new process would run it."""
+        main = sys.modules["__main__"]
+        kept = {name: getattr(main, name) for name in ("__spec__", "__file__") if hasattr(main, name)}
+        for name in kept:
+            setattr(main, name, None)
+        try:
+            super().start()
+        finally:
+            for name, value in kept.items():
+                setattr(main, name, value)
+
+
+class _Context(multiprocessing.context.SpawnContext):
+    Process = _Process
+
+
 @contextmanager
 def _processes(workers: int | None) -> Iterator[Executor]:
-    """Processes that begin again, as threads may be at work in this one."""
-    context = multiprocessing.get_context("spawn")
+    """Processes that are started from nothing, as threads may be at work in this one."""
+    context = _Context()
     before = set(multiprocessing.active_children())
     with ProcessPoolExecutor(workers or os.cpu_count(), context, _prepare) as pool:
         try:
