@@ -208,16 +208,211 @@ class GapKeys(_Keys):
     files: NotRequired[list[str]]
 
 
-KEYS: dict[str, type] = {
+class _OpenKeys(TypedDict):
+    """Base of results to which options add keys: those declared are always there."""
+
+    __pydantic_config__ = ConfigDict(extra="allow")  # type: ignore[misc]
+    schema: str
+
+
+class AuditKeys(_Keys):
+    """What is wrong with the data of trials."""
+
+    findings: list[dict[str, Any]]
+    trials: list[dict[str, Any]]
+
+
+class AutopilotKeys(_OpenKeys):
+    """A heading controller, its margins and its runs."""
+
+    ship: str
+    design: str
+    source: str
+    gains: dict[str, Number]
+    limits: dict[str, Number]
+    margins: dict[str, Any]
+    closed_loop: dict[str, Any]
+    track: dict[str, Any] | None
+    responses: list[dict[str, Any]]
+    histories: dict[str, Any]
+    notices: list[str]
+
+
+class CompareKeys(_Keys):
+    """Cards of one ship side by side."""
+
+    kind: str
+    cards: list[dict[str, Any]]
+    summary: list[dict[str, Any]]
+    coefficients: list[dict[str, Any]]
+    effects: list[dict[str, Any]]
+    trials: list[dict[str, Any]]
+    members: int
+    notices: list[str]
+
+
+class DemoKeys(_Keys):
+    """The demonstration: figures of its two halves, and the files that it wrote."""
+
+    towed_vehicle: dict[str, Any]
+    mariner: dict[str, Any]
+    files: list[str]
+
+
+class GlideKeys(_OpenKeys):
+    """Steady glides, the polar, and the path of a programme where one was given."""
+
+    glider: str
+    states: list[dict[str, Any]]
+    design: dict[str, Any]
+    polar: dict[str, Any]
+    notices: list[str]
+    as_printed: NotRequired[list[dict[str, Any]]]
+    path: NotRequired[list[dict[str, Any]]]
+    length_m: NotRequired[Number]
+    path_histories: NotRequired[dict[str, Any]]
+    transient: NotRequired[dict[str, Any] | None]
+
+
+class InfluenceKeys(_OpenKeys):
+    """Sensitivity of figures to the numbers of a card, in per cent for 10 %; a tuning where one was asked for."""
+
+    ship: str
+    standard_errors: str
+    figures: dict[str, Any]
+    parameters: dict[str, Any]
+    influence_percent: dict[str, Any]
+    notices: list[str]
+    tuned: NotRequired[dict[str, Any]]
+
+
+class SteeringModelsKeys(_OpenKeys):
+    """The models of a steering card side by side."""
+
+    ship: str
+    main_model: str
+    rudder_deg: Number
+    steady_turns: dict[str, Any]
+    manoeuvres: dict[str, Any]
+
+
+class TwoPointKeys(_OpenKeys):
+    """A card tuned through two steady turns."""
+
+    hull_factor: Number
+    rudder_factor: Number
+
+
+class BridgeKeys(_Keys):
+    """Data of a wheelhouse poster or a pilot card."""
+
+    ship: str
+    source: str
+    rudder_deg: Number
+    turning_circles_deep: list[dict[str, Any]]
+    turning_circles_shallow: list[dict[str, Any]]
+    stops: list[dict[str, Any]]
+    zigzags: dict[str, Any]
+    telegraph: list[Any]
+    full_astern_from: list[Any]
+    hard_over_to_hard_over_s: Number
+    rudder_neutral_deg: Number
+    notices: list[str]
+    ballast: dict[str, Any] | None
+
+
+class ShipsKeys(_Keys):
+    """The bundled ships."""
+
+    ships: list[dict[str, str | float | None]]
+
+
+class SignalsKeys(_Keys):
+    """Statistics, spectra and filters of records."""
+
+    trials: list[dict[str, Any]]
+
+
+class SteerKeys(_Keys):
+    """A page on which the ship is steered."""
+
+    ship: str
+    ghost: str | None
+    steerable: bool
+    page_kB: Number
+    notices: list[str]
+
+
+class TowKeys(_OpenKeys):
+    """Surge mass and drag from accelerating tows."""
+
+    tows: str
+    force_N: Number
+    mass_kg: Number
+    terms: list[str]
+    readings: int
+    methods: dict[str, Any]
+    warnings: list[str]
+    models: list[dict[str, Any]]
+    mass_range_kg: list[Number] | None
+    speeds: dict[str, Any]
+    drag_coefficients: dict[str, Any] | None
+
+
+class ValidateKeys(_Keys):
+    """A validation report after ITTC 7.5-02-06-03."""
+
+    kind: str
+    ship: str
+    source: str
+    verdict: str
+    counts: dict[str, int]
+    figures: list[dict[str, Any]]
+    members: int
+    verification: list[dict[str, Any]]
+    imo: list[dict[str, Any]]
+    replays: list[dict[str, Any]]
+    notices: list[str]
+
+
+class YawKeys(_OpenKeys):
+    """Added yaw inertia and dissipation from records of a yaw rig, by method."""
+
+    records: list[str]
+    medium: str
+    torque_constant_NmpA: Number
+    body_inertia_kgm2: Number
+    added_inertia_kgm2: dict[str, Number] | None
+    dissipation_J: dict[str, Number]
+    methods: dict[str, Any]
+    histories: dict[str, Any]
+    notes: list[str]
+
+
+KEYS: dict[str, Any] = {
+    "audit": AuditKeys,
+    "autopilot": AutopilotKeys,
     "check": CheckKeys,
+    "compare": CompareKeys,
+    "demo": DemoKeys,
     "export": ExportKeys,
     "gap": GapKeys,
+    "glide": GlideKeys,
     "identify": IdentifyKeys,
+    "influence": InfluenceKeys | SteeringModelsKeys | TwoPointKeys,
+    "pilotcard": BridgeKeys,
+    "poster": BridgeKeys,
     "reduce": ReduceKeys,
+    "ships": ShipsKeys,
+    "signals": SignalsKeys,
     "simulate": SimulateKeys,
     "stability": StabilityKeys,
+    "steer": SteerKeys,
+    "tow": TowKeys,
+    "validate": ValidateKeys,
+    "yaw": YawKeys,
 }
-"""Command to the keys of its JSON."""
+"""Command to the keys of its JSON; ``report`` and the fleet of ``gap`` have none."""
 
 
 def schema_name(command: str) -> str:
@@ -245,5 +440,7 @@ def json_schema(command: str) -> dict[str, Any]:
     {'const': 'tank2sim/simulate/1'}
     """
     schema = TypeAdapter(KEYS[command]).json_schema()
-    schema["properties"]["schema"] = {"const": schema_name(command)}
+    for part in (schema, *schema.get("$defs", {}).values()):
+        if "schema" in part.get("properties", {}):
+            part["properties"]["schema"] = {"const": schema_name(command)}
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": schema_name(command), **schema}
