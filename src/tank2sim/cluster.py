@@ -230,7 +230,7 @@ def _client(text: str) -> Client:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of other versions; those that matter are reported below
-            # What listens there and is no scheduler may keep Dask waiting longer than it was reported to.
+            # What listens there and is no scheduler may keep Dask waiting longer than it was asked to.
             return _within(
                 2 * ANSWERS_WITHIN_S, lambda: Client(address, timeout=ANSWERS_WITHIN_S, set_as_default=False)
             )

@@ -75,6 +75,6 @@ def test_reduce_writes_the_covariance_and_simulate_draws_from_it(data, tmp_path)
     for name, error in zip(known.names, errors, strict=True):
         assert math.isclose(error, card.uncertainty[name.partition(".")[2]], rel_tol=6e-3)
     result = tank2sim("simulate", "ship.toml", "--manoeuvre", "turn:10", "--ensemble", "4", cwd=tmp_path)
-    assert result.returncode == 0 and "as the covariance beside the card says" in " ".join(result.stdout.split())
+    assert result.returncode == 0 and "as the covariance next to the card says" in " ".join(result.stdout.split())
     (tmp_path / "ship.covariance.json").unlink()
     refused(tank2sim("simulate", "ship.toml", "--manoeuvre", "turn:10", "--ensemble", "4", cwd=tmp_path), "is missing")

@@ -79,7 +79,7 @@ def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
             gap = replace(made_up.missing(), card=card, improved=improved, effects=(CURRENT,), passed=passed)
             return replace(gap, missing_force=None, agreement={}, figures_before=())
 
-        monkeypatch.setattr("tank2sim.gap.fleet.search.find_gap", find_gap)
+        monkeypatch.setattr("tank2sim.gap.fleet.search.run_gap_workflow", find_gap)
         monkeypatch.setattr("tank2sim.api.gap.run_workflow", find_gap)
         return calls
 

@@ -44,10 +44,10 @@ def stands_in_the_code(name: str) -> bool:
     return True
 
 
-def stands_in_the_tests(name: str) -> bool:
-    """Whether ``folder/test_module.py::test_name`` is there."""
+def is_in_the_checkout(name: str) -> bool:
+    """Whether ``folder/test_module.py::test_name`` is there, or a script of ``benchmarks/`` or ``docs/``."""
     file, _, test = name.partition("::")
-    path = ROOT / "tests" / file.removeprefix("tests/")
+    path = ROOT / file if file.startswith(("benchmarks/", "docs/")) else ROOT / "tests" / file.removeprefix("tests/")
     if not path.is_file():
         return False
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -65,14 +65,14 @@ def test_every_equation_says_where_it_is_from_where_it_stands_and_what_holds_it(
         assert where is not None, f"{page.name}: nothing after {found[1]}"
         assert named(where["code"]) and named(where["test"]), f"{page.name}: no name after {found[1]}"
         lost = [name for name in named(where["code"]) if not stands_in_the_code(name)]
-        lost += [name for name in named(where["test"]) if not stands_in_the_tests(name)]
+        lost += [name for name in named(where["test"]) if not is_in_the_checkout(name)]
         assert not lost, f"{page.name}: not there: {lost}"
 
 
 @pytest.mark.parametrize("page", sorted(MANUAL.rglob("*.md")), ids=lambda page: page.relative_to(MANUAL).as_posix())
 def test_tests_named_in_the_text_are_there(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    assert [name for name in re.findall(r"`([\w/]+\.py(?:::\w+)?)`", text) if not stands_in_the_tests(name)] == []
+    assert [name for name in re.findall(r"`([\w/]+\.py(?:::\w+)?)`", text) if not is_in_the_checkout(name)] == []
 
 
 def sections(text: str) -> dict[str, str]:
@@ -98,4 +98,4 @@ def test_every_effect_has_its_equation_with_its_code_and_a_test_that_tries_it() 
 
 def test_what_is_not_there_is_seen() -> None:
     assert not stands_in_the_code("dynamics.hull.no_such_function") and not stands_in_the_code("no_module.thing")
-    assert not stands_in_the_tests("dynamics/test_ship.py::test_none") and not stands_in_the_tests("no/test_file.py")
+    assert not is_in_the_checkout("dynamics/test_ship.py::test_none") and not is_in_the_checkout("no/test_file.py")

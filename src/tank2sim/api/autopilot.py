@@ -139,7 +139,12 @@ class AutopilotResult(PagedResult):
         return AutopilotResult(self.ship, self.study, AutopilotFmu(Path(path), made, difference))
 
     def to_fmu(self, path: str | Path, *, fmi: int = 3, verify: bool = False) -> AutopilotResult:
-        """Write the FMU of the controller, and return the result with it. Parameters are those of :meth:`make_fmu`.
+        """Write the FMU of the controller, and return the result with it.
+
+        Parameters
+        ----------
+        path, fmi, verify
+            As of :meth:`make_fmu`.
 
         Raises
         ------
@@ -244,7 +249,17 @@ def pilot_ship(
     settings: StudySettings,
     track: pd.DataFrame | Sequence[Sequence[float]] | Array | str | Path | None,
 ) -> AutopilotResult:
-    """Design a heading controller and try it. Raises as :meth:`.Ship.autopilot`."""
+    """Design a heading controller and simulate it. Raises as :meth:`.Ship.autopilot`.
+
+    Parameters
+    ----------
+    ship : Ship
+        It is steered.
+    settings : StudySettings
+        Of the design and its runs.
+    track : DataFrame, array, path or None
+        Waypoints, as of :meth:`.Ship.autopilot`.
+    """
     card = ship.card
     if not isinstance(card, ManoeuvringCard):
         raise InputError(card.source, "model.kind", "has no rudder", "an autopilot needs a linear or abkowitz card")

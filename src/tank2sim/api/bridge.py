@@ -136,7 +136,13 @@ class PilotCardResult(BridgeResult):
 def bridges_of(
     ship: Ship, ballast: Ship | Card | str | Path | None, orders: Mapping[str, float]
 ) -> tuple[Bridge, Bridge | None, tuple[str, ...]]:
-    """What a sheet is made of: both conditions, and notices about their cards. Raises as :meth:`.Ship.poster`."""
+    """Data of a sheet in both conditions, and notices about their cards. Raises as :meth:`.Ship.poster`.
+
+    Parameters
+    ----------
+    ship, ballast, orders
+        As of :meth:`.Ship.poster`.
+    """
     check_orders(orders)
     loaded = ship.manoeuvring()
     if ballast is None:

@@ -123,7 +123,9 @@ class GapResult(Result):
         gap = self.gap
         lines = [f"{gap.card.ship.name}: {verdict_in_words(gap)}", *probabilities_in_words(gap)]
         if gap.alternatives:
-            lines.append(f"these data cannot tell it from: {'; '.join(joined(names) for names in gap.alternatives)}")
+            lines.append(
+                f"these data cannot distinguish it from: {'; '.join(joined(names) for names in gap.alternatives)}"
+            )
         for place in gap.where[:1]:
             signal = signal_display_name(place.signal).file
             lines.append(
@@ -326,7 +328,13 @@ def find_gap(
 def gap_options(
     effects: Sequence[str] = (), without: Sequence[str] = (), max_effects: int = 2, workers: int | None = None
 ) -> GapOptions:
-    """Options of the search. Raises InputError for an effect that is not known."""
+    """Options of the search. Raises InputError for an effect that is not known.
+
+    Parameters
+    ----------
+    effects, without, max_effects, workers
+        As of :func:`find_gap`.
+    """
     for option, names in (("--effects", effects), ("--without", without)):
         for name in names:
             if EFFECTS.get(name) is None:

@@ -43,7 +43,17 @@ def folder_made(path: Path) -> Iterator[None]:
 
 
 def refuse_early(folder: Path, json_file: Path | None, inputs: Sequence[Path]) -> None:
-    """What would fail when files are written fails before the long work."""
+    """Refuse before the long work what would fail when files are written.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the results.
+    json_file : Path or None
+        Where the JSON goes, too.
+    inputs : sequence of Path
+        Files that must not be overwritten.
+    """
     for name in ALWAYS:
         for path in inputs:
             if (folder / name).exists() and (folder / name).samefile(path):
@@ -54,7 +64,17 @@ def refuse_early(folder: Path, json_file: Path | None, inputs: Sequence[Path]) -
 
 
 def put(files: Mapping[Path, str | bytes], folder: Path, inputs: Sequence[Path]) -> list[str]:
-    """Write all files or none; tells what became of those of an earlier run that have no successor."""
+    """Write all files or none; report what became of those of an earlier run that have no successor.
+
+    Parameters
+    ----------
+    files : mapping
+        Path to content.
+    folder : Path
+        Of the results.
+    inputs : sequence of Path
+        Files that must not be overwritten.
+    """
     earlier = _of_earlier_run(folder)
     some_corrected = any(path.parent == folder / CORRECTED for path in files)
     with folder_made(folder / CORRECTED) if some_corrected else contextlib.nullcontext():

@@ -281,7 +281,15 @@ class TuningResult(InfluenceResult):
 def influence_of_ship(
     ship: Ship, figures: Sequence[str], joint_variation: Mapping[str, float], ensemble: EnsembleOptions
 ) -> InfluenceResult:
-    """Influence coefficients of a ship. Raises as :meth:`.Ship.influence`."""
+    """Influence coefficients of a ship. Raises as :meth:`.Ship.influence`.
+
+    Parameters
+    ----------
+    ship, figures, joint_variation
+        As of :meth:`.Ship.influence`.
+    ensemble : EnsembleOptions
+        Of its bands.
+    """
     study = Study(ship.manoeuvring(), [parse_figure(text) for text in dict.fromkeys(figures or DEFAULT_FIGURES)])
     return InfluenceResult(ship, influence(study, joint_variation), _bands(ship, study, ensemble))
 
@@ -289,7 +297,17 @@ def influence_of_ship(
 def tune_ship(
     ship: Ship, targets: Sequence[str], figures: Sequence[str], means: Means, ensemble: EnsembleOptions
 ) -> TuningResult:
-    """Tune a ship's card to targets. Raises as :meth:`.Ship.tune`."""
+    """Tune a ship's card to targets. Raises as :meth:`.Ship.tune`.
+
+    Parameters
+    ----------
+    ship, targets, figures
+        As of :meth:`.Ship.tune`.
+    means : Means
+        How the card may be changed.
+    ensemble : EnsembleOptions
+        Of the bands of its figures.
+    """
     if not targets:
         raise InputError(TARGET_OPTION, "", "has no target", "give FIGURE=VALUE, as steady_radius_m@20=424")
     parsed: list[Target] = [parse_target(text) for text in targets]

@@ -550,7 +550,13 @@ class Ship:
         ballast: Ship | Card | str | Path | None = None,
         orders: Mapping[str, float] | None = None,
     ) -> PilotCardResult:
-        """The pilot card (IMO A.601(15), A4). Parameters and errors are those of :meth:`poster`."""
+        """The pilot card (IMO A.601(15), A4). Raises as :meth:`poster`.
+
+        Parameters
+        ----------
+        path, ballast, orders
+            As of :meth:`poster`.
+        """
         from tank2sim.api.bridge import PilotCardResult, bridges_of
 
         return self._written(PilotCardResult(*bridges_of(self, ballast, orders or {})), path)

@@ -112,7 +112,13 @@ class TurnTuningResult(Result):
 
 
 def tune_ship_through(ship: Ship, first: str, second: str) -> TurnTuningResult:
-    """Scale hull and rudder. Raises as :meth:`.Ship.tune_through`."""
+    """Scale hull and rudder. Raises as :meth:`.Ship.tune_through`.
+
+    Parameters
+    ----------
+    ship, first, second
+        As of :meth:`.Ship.tune_through`.
+    """
     levers = levers_of_ship(ship.manoeuvring(), ship.model)
     return TurnTuningResult(
         ship, (first, second), tune_to_two_points(ship.model, levers, parse_point(first), parse_point(second))

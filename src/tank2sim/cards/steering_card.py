@@ -138,7 +138,7 @@ class SteeringCard:
 def find_steering_card(name: str) -> Path | None:
     """Path of a steering card, a file or the name of a bundled one; None if it is not one.
 
-    A file counts as one by its ``format``, so that a command can tell it from a ship card.
+    A file counts as one by its ``format``, so that a command can distinguish it from a ship card.
     """
     path = Path(name)
     if not path.is_file():

@@ -59,7 +59,7 @@ Forces = tuple[Any, Any, Any]
 
 LEAST_BOUND, LARGEST_BOUND = 0.05, 0.9
 """Bounds of u_b over u0: a card that holds down to rest still divides by U there, and the thrust of a card without
-propulsion is reported from how X falls between u_b and u0. Choices of ours."""
+propulsion is found from how X falls between u_b and u0. Project choices."""
 
 BLEND = 0.5
 """The polynomial's share falls from 1 at u_b to 0 at this share of u_b^2 (0.71 u_b): project choice, narrow because a

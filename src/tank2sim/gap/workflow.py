@@ -44,10 +44,10 @@ from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.trials import Trial
 
 RIVALS = 12
-"""Explanations that are reported of."""
+"""Explanations that are reported."""
 
 DOUBT = 1e-3
-"""Probability below which trials that disagree about a parameter are reported of."""
+"""Probability below which trials that disagree about a parameter are reported."""
 
 
 @dataclass(frozen=True)

@@ -124,7 +124,7 @@ def _begins_rows(cells: list[str]) -> bool:
 
 
 def _uniform_time(path: Path, rows: NumberRows) -> tuple[Array, str]:
-    """Times of equal step that agree with every time printed, and what is reported of them.
+    """Times of equal step that agree with every time printed, and messages about them.
 
     A time printed as 1.23E+02 lies within half a unit of its last digit, evenly: the step is the least-squares one
     with these halves as weights. A sample lost or doubled would shift the rest by a step, so that every time printed

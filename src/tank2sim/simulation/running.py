@@ -15,7 +15,7 @@ from tank2sim.simulation.straight_course import straight_course
 from tank2sim.simulation.trajectory import Trajectory
 
 RUNAWAY = "the motion leaves all bounds"
-"""What is reported of a motion that is not finite."""
+"""The message about a motion that is not finite."""
 
 _CHUNK = 256  # steps taken between looks for an event: long enough for machine code to pay, short against a manoeuvre
 _TRIM_STEPS = 50

@@ -293,4 +293,4 @@ def test_no_criterion_is_passed_by_a_card_that_was_never_measured_in_yaw() -> No
 def test_a_rudder_that_turns_the_wrong_way_is_the_reason_of_what_is_not_shown() -> None:
     changed = {"derivatives.Yd": -278e-5, "derivatives.Nd": 139e-5}
     criteria = imo_criteria(build(read_card("mariner", changed)))
-    assert all(one.found is None and "against her rudder" in one.remark for one in criteria[:-1])
+    assert all(one.found is None and "against its rudder" in one.remark for one in criteria[:-1])

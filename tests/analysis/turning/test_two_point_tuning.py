@@ -119,5 +119,5 @@ def test_points_that_no_factors_meet_are_refused_in_one_line() -> None:
         tune_to_two_points(model, levers, WantedTurn(HARD_OVER, -0.01), WantedTurn(SMALL, 0.001))
     with pytest.raises(InputError, match="one rudder angle"):
         tune_to_two_points(model, levers, WantedTurn(SMALL, 0.002), WantedTurn(SMALL, 0.001))
-    with pytest.raises(InputError, match="other side of her straight course"):
+    with pytest.raises(InputError, match="other side of its straight course"):
         tune_to_two_points(model, levers, WantedTurn(HARD_OVER, 0.01), WantedTurn(-1e-9, 0.001))

@@ -65,7 +65,7 @@ def test_members_have_all_numbers_of_the_joint_draw_and_none_that_is_an_input(jo
         moved.append(member["propeller_side_force.Y"] - 4e-5)
         np.testing.assert_allclose(moved / FALLS, moved[0] / FALLS[0], rtol=1e-6)
         assert "current.speed" not in member
-    assert told == ("errors of 3 numbers go together, as the covariance beside the card says",)
+    assert told == ("errors of 3 numbers go together, as the covariance next to the card says",)
 
 
 def test_only_numbers_without_a_standard_error_are_told_to_have_none(joint: ManoeuvringCard) -> None:

@@ -30,8 +30,6 @@ OTHER_MEANINGS = {
     '"trim",': "the same caution",
     'name="current"': "current of a motor",
     '"current": "current_A"': "the same",
-    'more["current"]': "option --current of autopilot",
-    'more["wind"]': "option --wind of autopilot",
 }
 """Lines, by a part of them, in which the name of an effect is another word, and what it is there."""
 

@@ -83,7 +83,7 @@ def test_warnings_on_table_1_with_four_unknowns(four_unknowns):
 def test_three_unknowns_are_still_too_many(table_1):
     text = "\n".join(identify_tow(table_1, terms=("B3", "B2")).warnings)
     assert "M, B2, B3 cannot all be identified" in text
-    assert "output_error: not to be told from zero at 95 %: B2" in text
+    assert "output_error: not distinguishable from zero at 95 %: B2" in text
 
 
 def test_two_unknowns_only_show_the_late_start(two_unknowns):

@@ -15,7 +15,7 @@ from tank2sim.simulation.ensemble import Draws
 
 
 def draws_of(card: ManoeuvringCard, seed: int) -> tuple[Draws, list[str]]:
-    """The draws of a card, and what is to be reported of them.
+    """The draws of a card, and messages about them.
 
     Numbers in the card's covariance vary together as it says; all others are independent, with their standard errors.
 

@@ -238,7 +238,7 @@ def named_bands(
 
 
 def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
-    """Bands of figures by name, except for those of :data:`POLES` that go through infinity, and what is reported of
+    """Bands of figures by name, except for those of :data:`POLES` that go through infinity, and messages about
     these."""
     bands = figure_bands(found)
     own = [name for name in POLES if name in bands]

@@ -162,7 +162,7 @@ def _about_weather(model: Model) -> list[str]:
 
 
 def _spirals(model: Model, turning: SteadyTurning) -> tuple[SpiralPoints | None, SpiralPoints | None, list[str]]:
-    """The two spirals, and what is to be reported of them."""
+    """The two spirals, and messages about them."""
     messages: list[str] = []
     direct = reverse = None
     try:

@@ -320,7 +320,7 @@ def _with_folds(
 
 
 def _judged(model: Model, found: SteadyTurning) -> SteadyTurning:
-    """With its loop and what is to be reported of it."""
+    """With its loop and messages about it."""
     before = [fold for fold in found.folds if fold.place <= found.straight]
     after = [fold for fold in found.folds if fold.place > found.straight]
     loop = None

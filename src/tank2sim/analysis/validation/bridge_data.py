@@ -233,7 +233,7 @@ def _depths(ship: TrialShip) -> dict[str, dict[str, float]]:
 def _circles(
     ship: TrialShip, rudder: float, depths: Mapping[str, Mapping[str, float]]
 ) -> tuple[dict[str, list[ShipTrack]], list[str]]:
-    """Circles by depth, to starboard and port, and what is to be reported of them."""
+    """Circles by depth, to starboard and port, and messages about them."""
     found: dict[str, list[ShipTrack]] = {}
     messages = []
     if rudder > TRIAL_RUDDER * (1 + 1e-9):

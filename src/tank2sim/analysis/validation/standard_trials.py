@@ -126,7 +126,7 @@ def figure_numbers(figures: Figures) -> Numbers:
 def members(
     card: ManoeuvringCard, model: Model, count: int, seed: int = SEED
 ) -> tuple[tuple[dict[str, float], ...], tuple[str, ...]]:
-    """Parameters of `count` ships such as the card may mean, drawn within its errors; and what is to be reported of
+    """Parameters of `count` ships such as the card may mean, drawn within its errors; and messages about
     them.
 
     Errors of all numbers are normal, and go together as the covariance next to the card says; without one they are

@@ -2,10 +2,10 @@
 
     E = S - D,   u_val^2 = u_num^2 + u_input^2 + u_D^2,   U_val = 2 u_val
 
-with the figure S of the simulation and D of the trial. If |E| <= U_val, the error of the model cannot be told from the
-uncertainties, and the figure is validated at the level U_val; if not, the model errs by about E. A large U_val is no
-merit, for what is not known well cannot be refuted: beyond a level that is required, U_reqd, the figure counts as too
-uncertain. ASME V&V 20-2009 (where E is S - D); ITTC 7.5-03-01-01 (E = D - S, and
+with the figure S of the simulation and D of the trial. If |E| <= U_val, the error of the model cannot be
+distinguished from the uncertainties, and the figure is validated at the level U_val; if not, the model errs by about
+E. A large U_val is no merit, for what is not known well cannot be refuted: beyond a level that is required, U_reqd,
+the figure counts as too uncertain. ASME V&V 20-2009 (where E is S - D); ITTC 7.5-03-01-01 (E = D - S, and
 likewise U_V); Stern, Wilson, Coleman and Paterson (2001), J. Fluids Engineering 123. The factor of 2 is for 95 %.
 
 - u_num: the simulation is repeated with half the step. U_num = 3 |S(h) - S(h/2)|, the grid convergence index of two

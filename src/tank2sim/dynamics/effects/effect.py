@@ -39,7 +39,7 @@ class EffectParameter:
     maximum : float
         Physical upper bound, SI.
     default : float or callable, optional
-        Value where a card gives none, or what tells it from the card; without one the parameter is required.
+        Value where a card gives none, or what takes it from the card; without one the parameter is required.
     input_name : str, optional
         The parameter is an input of the model under this name (``current.speed``), which starts at the card's value.
         All others become tunable parameters of the model.

@@ -163,7 +163,7 @@ def _found(
 
 
 def fault_of_program(error: Exception) -> Fault:
-    """What is reported of an `error` that no check of the input foresaw."""
+    """The message about an `error` that no check of the input foresaw."""
     words = " ".join(str(error).split())[:200]
     remedy = "run 'tank2sim gap' with its card and trials alone, and report what it says"
     return Fault(f"a fault of the program, not of yours: {type(error).__name__}: {words}; {remedy}")

@@ -106,7 +106,7 @@ def next_test(
     duration_s: float | None = None,
     correlation_s: float = 0.0,
 ) -> NextTest | None:
-    """The manoeuvre by which the first explanation is reported apart best from all the others.
+    """The manoeuvre by which the first explanation is distinguished best from all the others.
 
     A manoeuvre's score is the loss of the wrong explanation that is to be expected, the mean over which of the two is
     true, against the rival that it distinguishes worst: ``d' (I - J (J'J + P^-1)^-1 J') d``, d the difference of what

@@ -225,7 +225,7 @@ def _passages(likelihood: Likelihood, e: Array) -> list[Strange]:
     """The strangest passage of each trial: sums of squares over windows, against chi squared.
 
     Noise of another colour than the filter's (waves) makes these sums vary more than they should, everywhere alike; by
-    how much is reported by the middle of their spread, and their degrees of freedom are fewer by as much
+    how much is given by the middle of their spread, and their degrees of freedom are fewer by as much
     (Satterthwaite).
     """
     motion = likelihood.motion

@@ -177,7 +177,7 @@ def _told_apart(full: CampaignEquations, choices: dict[str, Choice]) -> list[str
         alone = column - others @ np.linalg.lstsq(others, column, rcond=None)[0]
         inflation = float(column @ column / max(float(alone @ alone), 1e-300))
         text = (
-            f"the runs cannot tell it from simpler terms: variance inflation {inflation:.3g}, scaled condition number "
+            f"the runs cannot distinguish it from simpler terms: variance inflation {inflation:.3g}, condition number "
             f"{condition:.3g} with it, and {COLLINEAR:g} can be borne"
         )
         choices[name] = Choice(name, False, "collinear", text, inflation)

@@ -86,7 +86,7 @@ def _slope(name: str) -> str:
 
 
 def _trend(full: CampaignEquations, names: Sequence[str], name: str, selection: Selection) -> Trend | None:
-    """The trend of one term next to the named terms; None if the runs cannot tell it from them."""
+    """The trend of one term next to the named terms; None if the runs cannot distinguish it from them."""
     part = full.of_terms([*names, _slope(name)])
     solution = solve(part, selection.spread)
     if solution.condition > COLLINEAR:

@@ -96,7 +96,7 @@ def _identifiability(fits: Sequence[TowFit]) -> Iterator[str]:
             if _TWO_SIDED_95 * error > abs(value)
         ]
         if uncertain:
-            yield f"{fit.method}: not to be reported from zero at 95 %: {', '.join(uncertain)}."
+            yield f"{fit.method}: not distinguishable from zero at 95 %: {', '.join(uncertain)}."
 
 
 def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[str]:

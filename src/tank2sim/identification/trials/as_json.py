@@ -24,7 +24,7 @@ FIGURES_ARE = "simulated in closed loop with the card found, from each trial's m
 def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -> dict[str, object]:
     """Everything a script may want: ``derivatives``, ``effects``, ``misfit``, ``figures``, ``identifiability``, ...
 
-    `told` is what the user was reported next to the notices of the result.
+    `told` are messages in addition to the notices of the result.
     """
     estimate, known = result.estimate, result.identifiability
     parameters = _parameters(result)

@@ -35,7 +35,8 @@ class _Move:
 
 
 def rudder_clock_findings(trial: Trial) -> list[Finding]:
-    """A rudder angle that is late. An early one, or an order, cannot be told from a slow ship or steering gear.
+    """A rudder angle that is late. An early one, or an order, cannot be distinguished from a slow ship or steering
+    gear.
 
     Shortly after a rudder moves, r = a + b t + c I + d J, with I the integral over time of the change of the rudder
     and J that of I: the first terms of the answer of any linear ship, none of which comes before its cause. The shift

@@ -218,7 +218,7 @@ def _lesser(trial: Trial, track: AuditedTrack, pair: tuple[str, str], given: Com
     clock = fit(ground, [*base, windows.rate(velocity)])
     findings = []
     best = plain
-    # what half a step of the clock would do cannot be told from the stamping of the times
+    # what half a step of the clock would do cannot be distinguished from the stamping of the times
     least = track.speed * windows.step_s / 2
     if lever is not None and (lever.differs(4) or lever.differs(5)) and np.hypot(*lever.values[4:6]) > least:
         best = lever

@@ -59,7 +59,7 @@ class Peak:
     distinct : bool
         True if it rises above what surrounds it by more than scatter can (see :func:`spectrum`).
     lowest : bool
-        True if it is at the lowest frequency, where it cannot be told from a slow drift.
+        True if it is at the lowest frequency, where it cannot be distinguished from a slow drift.
     """
 
     frequency_hz: float

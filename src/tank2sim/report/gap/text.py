@@ -102,7 +102,7 @@ def beside_verdict(gap: Gap) -> list[str]:
     messages = [f"{one[0].upper()}{one[1:]}." for one in probabilities_in_words(gap)]
     if gap.alternatives and gap.verdict != AMBIGUOUS:
         names = "; ".join(" with ".join(map(effect_in_words, alternative)) for alternative in gap.alternatives)
-        messages.append(f"What else it could be: {names}. These data cannot tell them apart.")
+        messages.append(f"What else it could be: {names}. These data cannot distinguish them.")
     elif gap.effects and gap.verdict == MISSING:
         messages.append("What else it could be: none of the explanations without it comes near.")
     if gap.verdict != NO_EFFECT_MISSING and gap.equation:

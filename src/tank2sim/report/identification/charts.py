@@ -357,7 +357,7 @@ def _thinned(label: str, columns: Sequence[Array]) -> Indices:
 
 
 def _marks(position: Position, tooltip: Sequence[alt.Tooltip]) -> list[alt.Chart]:
-    # The data stand once for all panels of a trial: what is a line and what a point is reported by the series.
+    # The data stand once for all panels of a trial: the series determines what is a line and what a point.
     # Encodings are handed over as dictionaries: Altair copies its own objects, with all they leave open, at every
     # level.
     place = {name: channel.to_dict() for name, channel in position.items()}

@@ -56,7 +56,7 @@ def drawn_from(result: Json, source: str, draw: Callable[[Json], _T]) -> _T:
     Raises
     ------
     InputError
-        It fails on the shape of a value, which is then no longer as the command wrote it; determined by its key.
+        It fails on the shape of a value, which is then no longer as the command wrote it; named by its key.
     """
     place = _Place()
     try:

@@ -1,4 +1,4 @@
-"""The validation report of a simulation model, with what ITTC 7.5-02-06-03 wants to be reported of it."""
+"""The validation report of a simulation model, with what ITTC 7.5-02-06-03 wants to be stated of it."""
 
 from __future__ import annotations
 
