@@ -32,7 +32,7 @@ from tank2sim.identification.trials.problem.problem_from_card import driven_mode
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, prepare
 from tank2sim.identification.trials.problem.structures import STRUCTURES
 from tank2sim.records.audit import repair_trial
-from tank2sim.records.reading import read_trial
+from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import Trial, unwrapped, window, with_signals
 
 AIMS = {"turn": 0.10, "zigzag": 0.18}
@@ -201,7 +201,7 @@ def read(data: Path) -> dict[str, Trial]:
     """The runs, mended by the audit, the wind's direction continuous."""
     found = {}
     for path in sorted(data.glob("*/*.csv")):
-        trial, _ = repair_trial(read_trial(path))
+        trial, _ = repair_trial(read_trial_file(path))
         direction = unwrapped(trial.signals["wind_direction_rad"])
         found[trial.name] = with_signals(trial, {"wind_direction_rad": direction}, "wind direction made continuous")
     return found

@@ -248,8 +248,8 @@ def test_a_log_is_read_by_the_package_and_fitted_in_its_structure(site: Path, wo
     (work / "logs" / "notes.log").write_text("nothing of a trial\n")
     code = """
 import json
-from tank2sim.records.reading import read_trial
-trial = read_trial("logs/zz.log")
+from tank2sim.records.reading import read_trial_file
+trial = read_trial_file("logs/zz.log")
 print(json.dumps({"t_s": trial.time_s.tolist(), **{name: column.tolist() for name, column in trial.signals.items()}}))
 """
     read = json.loads(done(python(site, code, cwd=work)))
@@ -476,7 +476,7 @@ def test_a_reader_that_fails_names_its_package_and_does_not_stop_others(
     monkeypatch.setattr(reading, "READERS", registry)
     (tmp_path / "a.xyz").write_text("XYZ\n")
     with pytest.raises(InputError) as refusal:
-        reading.read_trial(tmp_path / "a.xyz")
+        reading.read_trial_file(tmp_path / "a.xyz")
     assert (refusal.value.source, refusal.value.place) == (
         "readers 1",
         "entry point tank2sim.trial_readers: misreading",

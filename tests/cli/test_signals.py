@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from tank2sim.cli.signals import command
 from tank2sim.errors import InputError
-from tank2sim.records.reading import read_trial
+from tank2sim.records.reading import read_trial_file
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_table_and_json_have_each_column_in_the_units_of_the_file(path, tmp_path
     for word in ("delta_deg", "r_degps", "psi_deg", "constant", "stationary", "corr."):
         assert word in shown.output
     (trial,) = json.loads((tmp_path / "found.json").read_text())["trials"]
-    values = read_trial(path).signals
+    values = read_trial_file(path).signals
     column = trial["columns"]["r_degps"]
     assert column["unit"] == "deg/s"
     assert column["standard_deviation"] == pytest.approx(np.rad2deg(np.std(values["r_radps"])))
@@ -75,7 +75,7 @@ def test_a_filtered_column_takes_the_place_of_the_measured_one(path, tmp_path):
     out = tmp_path / "filtered.csv"
     shown = run(path, "--column", "r", "--filter", "lowpass:0.3,causal", "--out", out)
     assert "delays 0.15 Hz by" in shown.output
-    before, after = read_trial(path), read_trial(out)
+    before, after = read_trial_file(path), read_trial_file(out)
     assert "r_degps filtered by lowpass:0.3,causal: delays 0.15 Hz" in out.read_text().splitlines()[1]
     assert np.std(np.diff(after.signals["r_radps"])) < 0.4 * np.std(np.diff(before.signals["r_radps"]))
     for name in ("delta_rad", "n_radps", "psi_rad"):
@@ -88,13 +88,13 @@ def test_a_filtered_column_takes_the_place_of_the_measured_one(path, tmp_path):
 def test_detrending_and_smoothing_write_trials_too(path, tmp_path):
     for text in ("detrend:1", "savgol:11,3", "spline:0.5", "bandpass:0.01,0.5"):
         assert "no phase shift" in run(path, "--column", "r", "--filter", text, "--out", tmp_path / "o.csv").output
-        assert read_trial(tmp_path / "o.csv").signals["r_radps"].shape == (3000,)
+        assert read_trial_file(tmp_path / "o.csv").signals["r_radps"].shape == (3000,)
 
 
 def test_decimation_thins_the_whole_trial(path, tmp_path):
     out = tmp_path / "thin.csv"
     run(path, "--filter", "decimate:5", "--out", out)
-    before, after = read_trial(path), read_trial(out)
+    before, after = read_trial_file(path), read_trial_file(out)
     assert np.allclose(after.time_s, before.time_s[::5])
     # What is left of the noise, 0.05 deg/s times the root of 0.8/5, makes up this difference.
     error = np.rad2deg(np.std((after.signals["psi_rad"] - before.signals["psi_rad"][::5])[20:-20]))

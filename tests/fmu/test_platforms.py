@@ -25,7 +25,7 @@ from tank2sim.fmu.export import make_fmu
 from tank2sim.fmu.platforms import PLATFORMS, named_platforms
 from tank2sim.native import cross
 from tank2sim.native.compiler import require_compiler
-from tank2sim.native.cross import Target
+from tank2sim.native.cross import CompileTarget
 from tank2sim.native.universal import universal
 from tests.cli.command_line import refused, tank2sim
 
@@ -87,7 +87,7 @@ def test_a_universal_library_holds_each_on_a_page_of_its_own() -> None:
 
 
 def test_macs_share_a_folder_in_fmi_2_and_patience_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    def compiled(_: object, target: Target) -> bytes:
+    def compiled(_: object, target: CompileTarget) -> bytes:
         return struct.pack("<III", 0xFEEDFACF, 12 if "aarch64" in target.triple else 7, 0) + target.triple.encode()
 
     monkeypatch.setattr(fmu_libraries, "has_compiled", lambda target: "windows" not in target.triple)

@@ -10,7 +10,7 @@ import pytest
 
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults, corrected_text
 from tank2sim.records.audit import repair_trial
-from tank2sim.records.reading import read_trial
+from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import Trial, froude_scaled
 
 TIME = np.arange(0.0, 200.0, 0.5)
@@ -41,7 +41,7 @@ def sheet(
 def written(folder: Path, text: str, name: str = "turn.csv") -> Trial:
     path = folder / name
     path.write_bytes(text.encode())
-    return read_trial(path)
+    return read_trial_file(path)
 
 
 def degrees(trial: Trial, name: str) -> np.ndarray:
@@ -155,12 +155,12 @@ def test_a_trial_without_what_the_sensor_shows_needs_no_file(tmp_path: Path) -> 
 
 def test_a_published_record_becomes_a_trial_csv(data: Path, tmp_path: Path) -> None:
     path = next(iter(sorted((data / "data" / "kvlcc2_hsva").glob("*.dat"))))
-    trial, _ = repair_trial(read_trial(path))
+    trial, _ = repair_trial(read_trial_file(path))
     again = reread(tmp_path, corrected_text(path, trial, [("log_scale", {"factor": 0.05}, {})]))
     assert again.scale == trial.scale
     np.testing.assert_allclose(again.signals["u_mps"], trial.signals["u_mps"] / 1.05, rtol=1e-9)
     np.testing.assert_allclose(again.signals["delta_rad"], trial.signals["delta_rad"], atol=1e-9)
-    assert np.corrcoef(again.signals["delta_rad"], read_trial(path).signals["delta_rad"])[0, 1] == pytest.approx(1)
+    assert np.corrcoef(again.signals["delta_rad"], read_trial_file(path).signals["delta_rad"])[0, 1] == pytest.approx(1)
 
 
 def test_a_quoted_header_is_written_in_the_trial_format(tmp_path: Path) -> None:

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.records.audit import audit, audit_and_repair, record_noise, repair_trial
+from tank2sim.records.audit import audit_and_repair, audit_trial, record_noise, repair_trial
 from tank2sim.records.audit.rudder import rudder_response
-from tank2sim.records.reading import read_trial
+from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import select_rows
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
@@ -83,7 +83,7 @@ def faulty(kind, change, shrunk=None, **options):
 def test_a_wrong_column_is_named_and_mended(kind, name):
     change, column, truth = FAULTS[name]
     record = faulty(kind, change, SHRUNK.get(name))
-    (finding,) = audit(record)
+    (finding,) = audit_trial(record)
     assert (finding.column, finding.kind) == (column, "fault")
     assert truth in finding.likely_truth
     right, applied = repair_trial(record)
@@ -94,7 +94,7 @@ def test_a_wrong_column_is_named_and_mended(kind, name):
         spread = 6 * max(NOISE.get(signal, 0.0) * (2 if "knots" in name else 1), 0.02 if "mps" in signal else 0)
         # turning by psi and back adds u times the noise of psi to v
         assert np.max(np.abs(right.signals[signal] - expected)) < spread + 1e-9
-    assert not audit(right)
+    assert not audit_trial(right)
 
 
 def test_several_faults_at_once_are_told_apart():
@@ -103,15 +103,15 @@ def test_several_faults_at_once_are_told_apart():
         rest = {"delta_rad": -m["delta_rad"], "r_radps": m["r_radps"] * DEG}
         return {"u_mps": earth.real, "v_mps": earth.imag, **rest}
 
-    findings = audit(faulty("zigzag", change, "r_radps"))
+    findings = audit_trial(faulty("zigzag", change, "r_radps"))
     assert [one.column for one in findings] == ["r_degps", "u_mps, v_mps", "delta_deg"]
 
 
 @pytest.mark.parametrize("kind", MOTIONS)
 def test_a_clean_record_raises_no_alarm(kind):
     for seed in range(4):
-        assert audit(trial(MOTIONS[kind], seed=seed)) == ()
-    assert audit(trial(MOTIONS[kind], noise=NONE)) == ()
+        assert audit_trial(trial(MOTIONS[kind], seed=seed)) == ()
+    assert audit_trial(trial(MOTIONS[kind], noise=NONE)) == ()
 
 
 LESSER = {
@@ -134,7 +134,7 @@ LESSER = {
 def test_lesser_faults_are_noted_with_their_size_and_left_as_they_are(name):
     change, expected, truth = LESSER[name]
     record = faulty("zigzag", change)
-    (finding,) = audit(record)
+    (finding,) = audit_trial(record)
     assert (finding.kind, finding.safe) == ("note", False)
     assert truth in finding.likely_truth
     error = max(value for key, value in finding.evidence.items() if key.startswith("standard_error"))
@@ -145,7 +145,7 @@ def test_lesser_faults_are_noted_with_their_size_and_left_as_they_are(name):
     assert not applied
     assert right is record
     if finding.repair is not None and name in ("log", "compass", "gyro"):
-        assert not audit(finding.repair(record))
+        assert not audit_trial(finding.repair(record))
 
 
 def rows(*slices):
@@ -194,7 +194,7 @@ SENSORS = {
 @pytest.mark.parametrize("name", SENSORS)
 def test_faults_of_time_and_sensors_are_found(name):
     change, column, kind, truth = SENSORS[name]
-    findings = audit(change(trial(MOTIONS["zigzag"])))
+    findings = audit_trial(change(trial(MOTIONS["zigzag"])))
     assert (findings[0].column, findings[0].kind) == (column, kind)
     assert truth in findings[0].likely_truth
     assert len(findings) == 1
@@ -218,26 +218,26 @@ def test_failed_readings_are_left_out_and_nothing_else():
 def test_a_coarse_sensor_and_slow_positions_are_no_fault():
     record = trial(MOTIONS["zigzag"])
     coarse = {"psi_rad": np.round(record.signals["psi_rad"] / DEG) * DEG, "x_m": np.round(record.signals["x_m"])}
-    assert audit(replace(record, signals={**record.signals, **coarse})) == ()
+    assert audit_trial(replace(record, signals={**record.signals, **coarse})) == ()
 
 
 @pytest.mark.parametrize("count", [2, 5, 8, 30, 200])
 def test_a_short_record_is_left_alone(count):
-    assert audit(select_rows(trial(MOTIONS["turn"]), np.arange(count))) == ()
+    assert audit_trial(select_rows(trial(MOTIONS["turn"]), np.arange(count))) == ()
 
 
 @pytest.mark.parametrize("gone", ["psi_rad", "r_radps", "x_m", "v_mps", "delta_rad"])
 def test_a_record_without_a_signal_is_judged_by_the_rest(gone):
     record = faulty("zigzag", lambda m: {"delta_rad": -m["delta_rad"]})
     signals = {name: values for name, values in record.signals.items() if name != gone}
-    findings = audit(replace(record, signals=signals))
+    findings = audit_trial(replace(record, signals=signals))
     assert [one.column for one in findings] == ([] if gone == "delta_rad" else ["delta_deg"])
 
 
 def test_a_rudder_that_stops_before_its_order_is_noted():
     record = trial(MOTIONS["zigzag"])
     order = {"delta_order_rad": 1.5 * record.signals["delta_rad"]}
-    (finding,) = audit(replace(record, signals={**record.signals, **order}))
+    (finding,) = audit_trial(replace(record, signals={**record.signals, **order}))
     assert "stands at 20 deg" in finding.what
 
 
@@ -246,7 +246,7 @@ def test_velocities_over_ground_that_are_through_the_water_are_found():
     record = trial({**m, **moved(m, (0.3 - 0.4j) * m["t_s"])})
     names = {"u_mps": "u_ground_mps", "v_mps": "v_ground_mps"}
     signals = {names.get(name, name): values for name, values in record.signals.items()}
-    (finding,) = audit(replace(record, signals=signals))
+    (finding,) = audit_trial(replace(record, signals=signals))
     assert finding.column == "u_ground_mps, v_ground_mps"
     assert "through the water, in a current of 0.5" in finding.likely_truth
 
@@ -254,7 +254,7 @@ def test_velocities_over_ground_that_are_through_the_water_are_found():
 def test_speed_over_ground_in_knots_is_found():
     record = trial(MOTIONS["turn"])
     sog = np.hypot(record.signals["u_mps"], record.signals["v_mps"]) * 3600 / 1852
-    (finding,) = audit(replace(record, signals={**record.signals, "sog_mps": sog}))
+    (finding,) = audit_trial(replace(record, signals={**record.signals, "sog_mps": sog}))
     assert (finding.column, finding.likely_truth) == ("sog_mps", "it is in knots")
 
 
@@ -270,7 +270,7 @@ def test_white_noise_is_estimated_to_a_few_per_cent_in_spite_of_spikes(seed):
 
 def test_a_finding_becomes_one_entry_a_column():
     change, _, _ = FAULTS["earth-fixed"]
-    (finding,) = audit(faulty("turn", change))
+    (finding,) = audit_trial(faulty("turn", change))
     entries = json.loads(json.dumps(finding.as_json()))
     assert [entry["column"] for entry in entries] == ["u_mps", "v_mps"]
     assert {"file", "column", "what", "likely_truth"} <= set(entries[0])
@@ -281,8 +281,8 @@ def test_kvlcc2_velocities_are_found_to_be_earth_fixed(data):
     files = sorted(data.glob("data/kvlcc2_*/*.dat"))
     assert files, "the folder holds no record"
     for file in files:
-        record = read_trial(file)
-        (finding,) = [one for one in audit(record) if one.kind == "fault"]
+        record = read_trial_file(file)
+        (finding,) = [one for one in audit_trial(record) if one.kind == "fault"]
         assert finding.column == "u_mps, v_mps", file
         assert "earth-fixed" in finding.likely_truth
         right, _ = repair_trial(record)
@@ -297,14 +297,14 @@ def test_the_esso_osaka_is_right_as_it_is(data):
     files = sorted(data.glob("data/esso_osaka/*/*.csv"))
     assert files, "the folder holds no record"
     for file in files:
-        assert [one for one in audit(read_trial(file)) if one.kind == "fault"] == [], file
+        assert [one for one in audit_trial(read_trial_file(file)) if one.kind == "fault"] == [], file
 
 
 def test_hidden_effects_of_the_gap_cases_are_measured_and_a_clean_one_is_clean(data):
     expected = {1: ("speed_mps", 0.5288), 5: ("bias_degps", 0.02792), 8: ("speed_mps", 0.4699)}
     for case in range(1, 9):
         for name in ("zigzag20_20", "turn35_stbd", "accel"):
-            findings = audit(read_trial(data / f"data/gap_cases/case_{case}/{name}.csv"))
+            findings = audit_trial(read_trial_file(data / f"data/gap_cases/case_{case}/{name}.csv"))
             if case not in expected:
                 assert findings == (), (case, name)
                 continue
@@ -320,7 +320,7 @@ def test_hidden_effects_of_the_gap_cases_are_measured_and_a_clean_one_is_clean(d
 def test_time_in_another_unit_is_told_from_a_rate_in_another_unit(unit, name, kind):
     right = trial(motion(kind))
     wrong = replace(right, time_s=right.time_s / unit)
-    (finding,) = [one for one in audit(wrong) if one.kind == "fault"]
+    (finding,) = [one for one in audit_trial(wrong) if one.kind == "fault"]
     assert finding.columns == ("t_s",) and name in finding.likely_truth
     np.testing.assert_allclose(repair_trial(wrong)[0].time_s, right.time_s)
 
@@ -328,7 +328,7 @@ def test_time_in_another_unit_is_told_from_a_rate_in_another_unit(unit, name, ki
 def test_velocities_of_the_opposite_sign_are_a_fault():
     right = trial(motion("zigzag"))
     signals = {**right.signals, "u_mps": -right.signals["u_mps"], "v_mps": -right.signals["v_mps"]}
-    found = [one for one in audit(replace(right, signals=signals)) if one.kind == "fault"]
+    found = [one for one in audit_trial(replace(right, signals=signals)) if one.kind == "fault"]
     assert [one.likely_truth for one in found] == ["both are of the opposite sign"]
 
 
@@ -375,12 +375,12 @@ def test_faults_that_depend_on_each_other_are_repaired_one_after_the_other(kind,
     shrink = {of: abs(np.median(changed[of][true[of] != 0] / true[of][true[of] != 0])) for of in changed}
     noise = {of: value * shrink.get(of, 1.0) for of, value in NOISE.items()}
     record = trial({**true, **changed}, noise=noise)
-    assert [one.column for one in audit(record)] == columns
+    assert [one.column for one in audit_trial(record)] == columns
     right, _ = repair_trial(record)
     for signal in ("delta_rad", "r_radps", "psi_rad", "u_mps", "v_mps", "x_m", "y_m"):
         # half a knot's third digit of the speed, six times the noise of the rest
         np.testing.assert_allclose(right.signals[signal], true[signal], atol=6 * NOISE.get(signal, 0.0) + 1e-9)
-    assert not audit(right)
+    assert not audit_trial(right)
 
 
 UNKNOWN = {
@@ -398,7 +398,7 @@ UNKNOWN = {
 def test_a_factor_of_no_unit_is_a_fault_and_left_alone(kind, name):
     change, column = UNKNOWN[name]
     record = trial({**MOTIONS[kind], **change(MOTIONS[kind])})
-    (finding,) = audit(record)
+    (finding,) = audit_trial(record)
     assert (finding.column, finding.kind, finding.open) == (column, "fault", True)
     right, applied = repair_trial(record)
     assert not applied and right is record
@@ -407,14 +407,14 @@ def test_a_factor_of_no_unit_is_a_fault_and_left_alone(kind, name):
 def test_without_a_rate_of_turn_half_the_speed_is_not_knots():
     m = MOTIONS["zigzag"]
     record = trial({name: values for name, values in {**m, "t_s": 2.0 * m["t_s"]}.items() if name != "r_radps"})
-    (finding,) = audit(record)
+    (finding,) = audit_trial(record)
     assert finding.open and "knots" in finding.likely_truth
 
 
 def test_a_sign_that_no_other_column_tells_is_not_chosen():
     m = MOTIONS["zigzag"]
     record = trial({"t_s": m["t_s"], "delta_rad": 0.0 * m["t_s"], "r_radps": -m["r_radps"], "psi_rad": m["psi_rad"]})
-    (finding,) = audit(record)
+    (finding,) = audit_trial(record)
     assert (finding.column, finding.open) == ("r_degps, psi_deg", True)
 
 
@@ -422,7 +422,7 @@ def test_a_heading_to_port_without_rate_and_velocities_does_not_turn_the_rudder(
     m = MOTIONS["zigzag"]
     kept = {name: m[name] for name in ("t_s", "delta_rad", "x_m", "y_m")}
     record = trial({**kept, "psi_rad": -m["psi_rad"]})
-    assert audit(record)[0].column == "psi_deg, x_m, y_m"
+    assert audit_trial(record)[0].column == "psi_deg, x_m, y_m"
     np.testing.assert_array_equal(repair_trial(record)[0].signals["delta_rad"], m["delta_rad"])
 
 
@@ -433,7 +433,7 @@ def test_many_spikes_are_left_out_though_some_lie_close_together(name, count):
     rng = np.random.default_rng(3)
     struck = np.sort(rng.choice(np.arange(5, 3995, 4), count, replace=False))
     record.signals[name][struck] += np.deg2rad(40) * rng.choice([-1, 1], count)
-    (finding,) = audit(record)
+    (finding,) = audit_trial(record)
     assert finding.evidence["spikes"] == count
     assert np.flatnonzero(np.isnan(repair_trial(record)[0].signals[name])).tolist() == struck.tolist()
 
@@ -443,7 +443,7 @@ def test_a_stray_time_is_named_and_its_row_left_out(row, value):
     record = trial(MOTIONS["zigzag"])
     times = record.time_s.copy()
     times[row] = value
-    findings = audit(replace(record, time_s=times))
+    findings = audit_trial(replace(record, time_s=times))
     assert findings[0].columns == ("t_s",) and findings[0].evidence["first_row"] == row + 1
     right, _ = repair_trial(replace(record, time_s=times))
     np.testing.assert_array_equal(right.time_s, np.delete(record.time_s, row))
@@ -452,7 +452,7 @@ def test_a_stray_time_is_named_and_its_row_left_out(row, value):
 def test_two_recordings_in_one_file_are_not_chosen_between():
     record = trial(MOTIONS["zigzag"])
     times = np.where(np.arange(4001) < 3790, record.time_s, record.time_s + 1e6)
-    (finding,) = audit(replace(record, time_s=times))
+    (finding,) = audit_trial(replace(record, time_s=times))
     assert finding.columns == ("t_s",) and finding.open
 
 
@@ -464,7 +464,7 @@ def test_columns_recorded_less_often_are_judged_as_others(every, name):
     slow = np.arange(4001) % every > 0
     for signal in ("psi_rad", "u_mps", "v_mps", "x_m", "y_m"):
         record.signals[signal][slow] = np.nan
-    faults = [one for one in audit(record) if one.kind == "fault"]
+    faults = [one for one in audit_trial(record) if one.kind == "fault"]
     assert [one.column for one in faults] == [column]
     assert truth in faults[0].likely_truth
 
@@ -490,7 +490,7 @@ def smooth_rudder(m, late_s):
 @pytest.mark.parametrize("late_s", [3.0, 4.0, 5.0])
 def test_a_rudder_that_is_late_is_noted_and_left_as_it_is(late_s):
     record = smooth_rudder(MOTIONS["zigzag"], late_s)
-    (finding,) = audit(record)
+    (finding,) = audit_trial(record)
     assert (finding.column, finding.kind, finding.safe) == ("delta_deg", "note", False)
     assert finding.evidence["delay_s"] == pytest.approx(late_s, abs=1.5)
     assert repair_trial(record)[0] is record
@@ -498,13 +498,13 @@ def test_a_rudder_that_is_late_is_noted_and_left_as_it_is(late_s):
 
 @pytest.mark.parametrize("late_s", [0.0, -1.0, -3.0])
 def test_a_rudder_that_is_not_late_is_not_noted(late_s):
-    assert audit(smooth_rudder(MOTIONS["zigzag"], late_s)) == ()
+    assert audit_trial(smooth_rudder(MOTIONS["zigzag"], late_s)) == ()
 
 
 def test_velocities_through_the_water_named_over_ground_are_not_to_be_used():
     m = MOTIONS["zigzag"]
     named = {{"u_mps": "u_ground_mps", "v_mps": "v_ground_mps"}.get(name, name): values for name, values in m.items()}
-    (finding,) = audit(trial({**named, **moved(m, (0.3 - 0.4j) * m["t_s"])}))
+    (finding,) = audit_trial(trial({**named, **moved(m, (0.3 - 0.4j) * m["t_s"])}))
     assert finding.open and finding.columns == ("u_ground_mps", "v_ground_mps")
 
 
@@ -547,7 +547,7 @@ def test_the_sign_of_a_rudder_in_radians_is_judged_on_its_degrees(manoeuvre, mar
     signals = {name: np.asarray(run[of])[::5] for name, of in names.items()}
     noise = {"r_radps": np.radians(0.01), "psi_rad": np.radians(0.1)}
     record = trial({"t_s": run.t[::5], **signals, "delta_rad": DEG * signals["delta_rad"]}, noise=noise)
-    assert [(one.column, one.likely_truth.split()[-1]) for one in audit(record)] == [("delta_deg", "degrees")]
+    assert [(one.column, one.likely_truth.split()[-1]) for one in audit_trial(record)] == [("delta_deg", "degrees")]
     np.testing.assert_allclose(repair_trial(record)[0].signals["delta_rad"], signals["delta_rad"])
 
 
@@ -572,7 +572,7 @@ def test_a_heading_printed_with_three_digits_is_the_motion_of_its_rate(heading, 
     for amplitude in (1.0, 2.0, 4.0):
         t, psi, rate, _ = gentle(heading, amplitude, step)
         signals = {"psi_rad": three_digits(psi) * DEG, "r_radps": rate * DEG, "delta_rad": 0.1 * np.sign(rate)}
-        found = audit(trial({"t_s": t, **signals}, noise={"r_radps": 0.005 * DEG}))
+        found = audit_trial(trial({"t_s": t, **signals}, noise={"r_radps": 0.005 * DEG}))
         assert not [one for one in found if "same motion" in one.what], (amplitude, found)
 
 
@@ -580,5 +580,5 @@ def test_a_heading_printed_with_three_digits_is_the_motion_of_its_rate(heading, 
 def test_another_motion_is_found_behind_a_rounded_heading(heading):
     t, psi, _, other = gentle(heading, 8.0, 1.0)
     signals = {"psi_rad": three_digits(psi) * DEG, "r_radps": other * DEG, "delta_rad": 0.1 * np.sign(other)}
-    found = audit(trial({"t_s": t, **signals}, noise={"r_radps": 0.005 * DEG}))
+    found = audit_trial(trial({"t_s": t, **signals}, noise={"r_radps": 0.005 * DEG}))
     assert [one for one in found if "same motion" in one.what and one.kind == "fault"]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tank2sim.errors import InputError
-from tank2sim.records.reading import looks_like_a_trial, read_trial
+from tank2sim.records.reading import looks_like_a_trial, read_trial_file
 from tank2sim.records.same_record import refuse_copies, same_record, signature
 from tests.records.motions import motion, trial
 
@@ -100,7 +100,7 @@ def test_measured_records_are_no_copies_of_each_other(data: Path) -> None:
     folders = [data / "data" / name for name in ("kvlcc2_hsva", "kvlcc2_marin", "gap_cases/case_1", "gap_cases/case_5")]
     folders += [path for path in (data / "data/esso_osaka").glob("*") if path.is_dir()]
     for folder in folders:
-        trials = [read_trial(path) for path in sorted(folder.glob("*.*")) if looks_like_a_trial(path)]
+        trials = [read_trial_file(path) for path in sorted(folder.glob("*.*")) if looks_like_a_trial(path)]
         assert len(trials) > 1
         refuse_copies(trials)
         for one in trials:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tank2sim.errors import InputError
-from tank2sim.records.reading import looks_like_a_trial, read_trial
+from tank2sim.records.reading import looks_like_a_trial, read_trial_file
 from tank2sim.records.trials import froude_scaled, sampling_step, window, with_signals
 from tests.records.motions import motion, trial
 
@@ -24,7 +24,7 @@ def write(tmp_path):
 
 
 def test_a_csv_is_read_in_si_with_a_continuous_heading(write):
-    read = read_trial(write("# scale: 45.714\n# noise: u_mps 0.03, psi_deg 0.1\n" + GOOD))
+    read = read_trial_file(write("# scale: 45.714\n# noise: u_mps 0.03, psi_deg 0.1\n" + GOOD))
     np.testing.assert_allclose(read.signals["delta_rad"], np.deg2rad([0, 10, -10]))
     np.testing.assert_allclose(read.signals["psi_rad"], np.deg2rad([350, 359, 368]))
     np.testing.assert_allclose(read.signals["r_radps"], np.deg2rad([0, 1, -1]))
@@ -36,14 +36,14 @@ def test_a_csv_is_read_in_si_with_a_continuous_heading(write):
 
 
 def test_a_rudder_positive_to_port_is_turned_once(write):
-    read = read_trial(write("# rudder_sign: port\n" + GOOD.replace("delta_deg", "delta_order_deg")))
+    read = read_trial_file(write("# rudder_sign: port\n" + GOOD.replace("delta_deg", "delta_order_deg")))
     np.testing.assert_allclose(read.signals["delta_order_rad"], np.deg2rad([0, -10, 10]))
     np.testing.assert_allclose(read.signals["r_radps"], np.deg2rad([0, 1, -1]))
     assert any("positive to port" in notice for notice in read.notices)
 
 
 def test_a_foreign_column_is_left_out_and_named(write):
-    read = read_trial(write(GOOD.replace("u_mps", "thrust_N")))
+    read = read_trial_file(write(GOOD.replace("u_mps", "thrust_N")))
     assert "thrust_N" not in read.signals
     assert "thrust_N" in read.notices[0]
 
@@ -68,11 +68,11 @@ def test_faulty_csvs_are_refused_with_their_place(write, old, new, said):
     assert old in GOOD
     path = write(GOOD.replace(old, new, 1))
     with pytest.raises(InputError, match=re.escape(f"{path}: {said}")):
-        read_trial(path)
+        read_trial_file(path)
 
 
 def test_a_time_that_falls_is_let_through_to_the_audit(write):
-    read = read_trial(write(GOOD.replace("1,10,2", "0,10,2")), rising=False)
+    read = read_trial_file(write(GOOD.replace("1,10,2", "0,10,2")), rising=False)
     np.testing.assert_array_equal(read.time_s, [0, 0, 2])
 
 
@@ -86,7 +86,7 @@ MARIN = "MARIN(Maritime Research Institute Netherlands)\nZig-zag for KVLCC2 : 10
 
 
 def test_a_record_of_hsva_is_read_at_model_scale(write):
-    read = read_trial(write(HSVA, "Z.dat"))
+    read = read_trial_file(write(HSVA, "Z.dat"))
     assert read.scale == 45.714
     np.testing.assert_allclose(read.time_s, [0, 0.05, 0.10, 0.15])
     expected = {"x_m": 0.5, "y_m": 0.2, "psi_rad": np.deg2rad(3), "u_mps": 1.1, "v_mps": 0.05, "r_radps": np.deg2rad(2)}
@@ -95,7 +95,7 @@ def test_a_record_of_hsva_is_read_at_model_scale(write):
 
 
 def test_repeating_times_of_marin_become_a_uniform_base_and_this_is_said(write):
-    read = read_trial(write(MARIN, "Z.dat"))
+    read = read_trial_file(write(MARIN, "Z.dat"))
     assert read.scale == 45.714
     np.testing.assert_allclose(read.time_s, 0.135 * np.arange(2000), rtol=1e-3)
     assert np.ptp(np.diff(read.time_s)) < 1e-9
@@ -108,7 +108,7 @@ def test_a_sample_lost_from_a_record_of_marin_is_not_papered_over(write):
     lines = MARIN.split("\n")
     path = write("\n".join(lines[:300] + lines[340:]), "Z.dat")
     with pytest.raises(InputError, match=r"line \d+, column t_s: the times do not rise"):
-        read_trial(path)
+        read_trial_file(path)
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_a_sample_lost_from_a_record_of_marin_is_not_papered_over(write):
 def test_faulty_dat_files_are_refused_with_their_place(write, text, said):
     path = write(text, "Z.dat")
     with pytest.raises(InputError, match=re.escape(said)):
-        read_trial(path)
+        read_trial_file(path)
 
 
 def test_a_record_of_the_esso_osaka_may_hold_nan(write):
@@ -131,16 +131,16 @@ def test_a_record_of_the_esso_osaka_may_hold_nan(write):
     header += "n_prop [rps],delta_rudder [rad],wind_velo_relative_mid [m/s],wind_dir_relative_mid [rad],"
     header += "wind_velo_true [m/s],wind_dir_true [rad]\n"
     rows = ["0,1,2,3,4,6.2,.1,10,.2,1,2,3,4", "0.1,1,NaN,3,4,0.1,.1,-10,.2,1,2,3,4", "0.2,1,,3,4,0.2,.1,10,.2,1,2,3,4"]
-    read = read_trial(write(header + "\n".join(rows)))
+    read = read_trial_file(write(header + "\n".join(rows)))
     np.testing.assert_array_equal(np.isnan(read.signals["u_mps"]), [False, True, True])
     np.testing.assert_allclose(read.signals["psi_rad"], [6.2, 0.1 + 2 * np.pi, 0.2 + 2 * np.pi])
     np.testing.assert_allclose(read.signals["n_radps"], 2 * np.pi * np.array([10, -10, 10]))
     assert read.signals["delta_rad"][0] == 0.2
     assert read.signals["wind_direction_rad"][0] == 4
     with pytest.raises(InputError, match=re.escape("line 3, column delta_rudder [rad]: 'x' is no number")):
-        read_trial(write(header + "\n".join(rows).replace("-10,.2", "-10,x")))
+        read_trial_file(write(header + "\n".join(rows).replace("-10,.2", "-10,x")))
     with pytest.raises(InputError, match=re.escape("there is not one column vm_velo [m/s]")):
-        read_trial(write((header + "\n".join(rows)).replace("vm_velo", "v")))
+        read_trial_file(write((header + "\n".join(rows)).replace("vm_velo", "v")))
 
 
 @pytest.mark.parametrize("blank", [",,,,,,,,,,,,", "nan" + 12 * ",nan", " , ,,,,,,,,,,,"])
@@ -149,17 +149,17 @@ def test_blank_rows_at_the_end_of_an_esso_osaka_record_are_no_rows(tmp_path, dat
     lines = whole.read_text(encoding="latin-1").splitlines()[:50]
     for end, rows in (("blank", [*lines, blank, "", blank]), ("whole", lines)):
         (tmp_path / f"{end}.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
-    blank_end, known = (read_trial(tmp_path / f"{end}.csv") for end in ("blank", "whole"))
+    blank_end, known = (read_trial_file(tmp_path / f"{end}.csv") for end in ("blank", "whole"))
     np.testing.assert_array_equal(blank_end.time_s, known.time_s)
     np.testing.assert_array_equal(blank_end.signals["r_radps"], known.signals["r_radps"])
     (tmp_path / "inside.csv").write_text("\n".join([*lines[:20], blank, *lines[20:]]) + "\n", encoding="utf-8")
     with pytest.raises(InputError, match="row 20 has no time"):
-        read_trial(tmp_path / "inside.csv")
+        read_trial_file(tmp_path / "inside.csv")
 
 
 def test_wind_of_the_esso_osaka_is_where_it_comes_from(data):
     """The true wind, less the ship's own, is the relative one: both directions are where the wind comes from."""
-    read = read_trial(data / "data/esso_osaka/turning/turn_14-Sep-2020_13_39_32.csv")
+    read = read_trial_file(data / "data/esso_osaka/turning/turn_14-Sep-2020_13_39_32.csv")
     s = read.signals
     air = -s["wind_speed_mps"] * np.exp(1j * s["wind_direction_rad"])
     relative = -(air * np.exp(-1j * s["psi_rad"]) - (s["u_mps"] + 1j * s["v_mps"]))
@@ -173,7 +173,7 @@ def test_every_real_record_is_read(data):
     files = [*data.glob("data/kvlcc2_*/*.dat"), *data.glob("data/esso_osaka/*/*.csv")]
     assert files, "the folders hold no record"
     for file in files:
-        read = read_trial(file)
+        read = read_trial_file(file)
         assert np.all(np.diff(read.time_s) > 0)
         assert {"u_mps", "v_mps", "r_radps", "psi_rad", "x_m", "y_m", "delta_rad", "n_radps"} <= set(read.signals)
 
@@ -193,7 +193,7 @@ def test_froude_scaling_keeps_every_number_without_dimension():
 
 
 def test_stated_noise_is_scaled_as_its_signal(write):
-    read = froude_scaled(read_trial(write("# noise: u_mps 0.03, r_degps 0.1\n" + GOOD)), 4.0)
+    read = froude_scaled(read_trial_file(write("# noise: u_mps 0.03, r_degps 0.1\n" + GOOD)), 4.0)
     assert read.noise == pytest.approx({"u_mps": 0.06, "r_radps": np.deg2rad(0.05)})
 
 
@@ -206,7 +206,7 @@ def test_a_window_holds_both_its_ends():
 
 
 def test_changed_signals_leave_the_others_and_say_so(write):
-    before = read_trial(write("# noise: u_mps 0.03\n" + GOOD))
+    before = read_trial_file(write("# noise: u_mps 0.03\n" + GOOD))
     after = with_signals(before, {"u_mps": None, "r_radps": 2 * before.signals["r_radps"]}, "changed")
     assert "u_mps" not in after.signals
     assert after.noise == {}
@@ -233,7 +233,7 @@ def test_a_comment_that_resembles_a_key_is_refused_with_its_spelling(tmp_path, c
     path = tmp_path / "run.csv"
     path.write_text(f"{comment}\nt_s,delta_deg,u_mps\n0,0,5\n1,0,5\n")
     with pytest.raises(InputError, match=f"'# {right}: ...'"):
-        read_trial(path)
+        read_trial_file(path)
 
 
 @pytest.mark.parametrize(
@@ -246,14 +246,14 @@ def test_a_comment_that_resembles_a_key_is_refused_with_its_spelling(tmp_path, c
 def test_free_text_stays_allowed(tmp_path, comment):
     path = tmp_path / "run.csv"
     path.write_text(f"{comment}\nt_s,delta_deg,u_mps\n0,5,5\n1,5,5\n")
-    assert read_trial(path).scale is None
+    assert read_trial_file(path).scale is None
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.dat", "RUN.CSV"])
 @pytest.mark.parametrize("mark", ["", "\xef\xbb\xbf", "# a comment\n"])
 def test_what_a_folder_takes_for_a_trial_is_read_as_one(write, name, mark):
     path = write(mark + GOOD, name)
-    assert looks_like_a_trial(path) and len(read_trial(path).time_s) == 3
+    assert looks_like_a_trial(path) and len(read_trial_file(path).time_s) == 3
 
 
 def test_what_no_format_recognises_is_refused_by_the_format_of_its_ending(write):
@@ -264,5 +264,5 @@ def test_what_no_format_recognises_is_refused_by_the_format_of_its_ending(write)
         path = write(text, name)
         assert not looks_like_a_trial(path)
         with pytest.raises(InputError) as refusal:
-            read_trial(path)
+            read_trial_file(path)
         assert refusal.value.source == str(path) and problem in refusal.value.problem

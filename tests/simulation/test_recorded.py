@@ -10,7 +10,7 @@ import pytest
 from tank2sim.cards import parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.identification.trials.problem.prepare_trials import measured
-from tank2sim.records.reading import read_trial
+from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
@@ -257,7 +257,7 @@ def test_each_measured_turn_and_zigzag_is_recognised_from_its_execute(data: Path
     runs["zigzag/zigzag_31-Jul-2020_13_22_52"] = (Zigzag, 36.1, 14.9)
     runs["zigzag/zigzag_31-Jul-2020_13_57_45"] = (Zigzag, 26.5, 19.8)
     for name, (form, execute, rudder) in runs.items():
-        what = recorded(read_trial(data / "data/esso_osaka" / f"{name}.csv"), ship)
+        what = recorded(read_trial_file(data / "data/esso_osaka" / f"{name}.csv"), ship)
         assert what is not None and isinstance(what.manoeuvre, form), name
         assert what.begin_s == pytest.approx(execute, abs=0.3)
         assert math.degrees(what.manoeuvre.rudder) == pytest.approx(rudder, abs=0.2)
@@ -288,7 +288,7 @@ def test_the_course_of_a_zigzag_is_that_before_the_ship_drifted_off_it(data: Pat
     folder = data / "data/gap_cases/case_6"
     ship = build(read_card(str(folder / "ship.toml")))
     for name, heading, overshoots in (("zigzag20_20", 20.0, (7.9, 6.4)), ("zigzag10_10", 10.0, (4.9, 4.5))):
-        what = recorded(read_trial(folder / f"{name}.csv"), ship)
+        what = recorded(read_trial_file(folder / f"{name}.csv"), ship)
         assert what is not None and isinstance(what.manoeuvre, Zigzag)
         assert math.degrees(what.manoeuvre.heading) == pytest.approx(heading)
         assert what.manoeuvre.lag_s < 1.0

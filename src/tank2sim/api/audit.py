@@ -36,7 +36,7 @@ class AuditResult(Result):
 
     def __init__(self, trials: Sequence[Trial]) -> None:
         self.trials = tuple(TrialRecord(trial) for trial in trials)
-        self.found = tuple(tuple(records_audit.audit(trial)) for trial in trials)
+        self.found = tuple(tuple(records_audit.audit_trial(trial)) for trial in trials)
         self._noise = tuple(record_noise(trial) for trial in trials)
         self.notices = tuple(f"{trial.name}: {notice}" for trial in trials for notice in trial.notices)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.records.reading import READERS, looks_like_a_trial
-from tank2sim.records.reading import read_trial as read_record
+from tank2sim.records.reading import read_trial_file as read_record
 from tank2sim.records.signals.columns import SignalName, file_columns
 from tank2sim.records.signals.writing import trial_text
 from tank2sim.records.trials import Trial
@@ -153,7 +153,7 @@ def trials_of(given: TrialPaths, *, rising: bool = True) -> list[Trial]:
     Raises
     ------
     InputError
-        As :func:`tank2sim.records.reading.read_trial`; or a folder holds no trial.
+        As :func:`tank2sim.records.reading.read_trial_file`; or a folder holds no trial.
     """
     return [
         item.trial if isinstance(item, TrialRecord) else read_record(item, rising=rising)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
 from tank2sim.analysis.validation.standard_trials import MEMBERS, TrialShip, ship_of
 from tank2sim.analysis.validation.study import REQUIRED, Validated, Validation, Verified, verify
-from tank2sim.analysis.validation.study import validate as validate_figures
+from tank2sim.analysis.validation.study import validate_card as validate_figures
 from tank2sim.api.result import Result, ResultTable, section_charts
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, trials_of

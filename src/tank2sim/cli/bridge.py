@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 
 from tank2sim.api.bridge import ORDER_OPTION, BridgeResult
 from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.cli.console import json_option, show_result, write_result
-from tank2sim.cli.options import plot_option, set_option
+from tank2sim.cli.options import Command, plot_option, set_option
 from tank2sim.errors import InputError
-
-Command = Callable[..., Any]
 
 
 def bridge_options(command: Command) -> Command:

@@ -7,7 +7,7 @@ import sys
 from dataclasses import dataclass
 
 from tank2sim.errors import InputError
-from tank2sim.native.cross import Target
+from tank2sim.native.cross import CompileTarget
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Platform:
 
     fmi2: str
     fmi3: str
-    target: Target
+    target: CompileTarget
 
     def folder(self, fmi: int) -> str:
         """Name of the folder in an FMU of this version of FMI."""
@@ -29,11 +29,11 @@ class Platform:
 # The oldest systems: glibc 2.17 is that of RHEL 7 and of Python's manylinux2014; macOS 11 is the first on ARM, and
 # 10.13 the oldest that Apple's tools still build for when macOS 11 came.
 PLATFORMS = (
-    Platform("linux64", "x86_64-linux", Target("x86_64-linux-gnu.2.17", ".so")),
-    Platform("aarch64-linux", "aarch64-linux", Target("aarch64-linux-gnu.2.17", ".so")),
-    Platform("win64", "x86_64-windows", Target("x86_64-windows-gnu", ".dll")),
-    Platform("darwin64", "x86_64-darwin", Target("x86_64-macos.10.13", ".dylib")),
-    Platform("darwin64", "aarch64-darwin", Target("aarch64-macos.11.0", ".dylib")),
+    Platform("linux64", "x86_64-linux", CompileTarget("x86_64-linux-gnu.2.17", ".so")),
+    Platform("aarch64-linux", "aarch64-linux", CompileTarget("aarch64-linux-gnu.2.17", ".so")),
+    Platform("win64", "x86_64-windows", CompileTarget("x86_64-windows-gnu", ".dll")),
+    Platform("darwin64", "x86_64-darwin", CompileTarget("x86_64-macos.10.13", ".dylib")),
+    Platform("darwin64", "aarch64-darwin", CompileTarget("aarch64-macos.11.0", ".dylib")),
 )
 """Every platform, by which ``--platforms all`` is meant."""
 

@@ -21,7 +21,7 @@ _LINK_FLAGS_OF = {".so": ("-lm",), ".dylib": ("-Wl,-install_name,@rpath/model.dy
 
 
 @dataclass(frozen=True)
-class Target:
+class CompileTarget:
     """What to compile for: processor, system and the oldest version of it, and how the name of a library ends.
 
     `exports` names the functions of a WebAssembly module that the page calls; other libraries export what their
@@ -55,12 +55,12 @@ def require_cross_compiler() -> None:
     _compiler()
 
 
-def has_compiled(target: Target) -> bool:
+def has_compiled(target: CompileTarget) -> bool:
     """Whether something was compiled for this target before: the first time takes longer, for Windows minutes."""
     return _mark(target).exists()
 
 
-def cross_compiled(sources: Mapping[str, str], target: Target) -> bytes:
+def cross_compiled(sources: Mapping[str, str], target: CompileTarget) -> bytes:
     """The shared library of C sources for a target; kept, and compiled only if it is not kept yet.
 
     Parameters
@@ -86,7 +86,7 @@ def cross_compiled(sources: Mapping[str, str], target: Target) -> bytes:
     return kept(sources, [_version(), *target.flags], target.suffix, make).read_bytes()
 
 
-def _compile(compiler: Path, target: Target, library: Path) -> None:
+def _compile(compiler: Path, target: CompileTarget, library: Path) -> None:
     """Compile the C files in the folder of the library, in which the compiler runs, so that it sees no path of ours."""
     names = sorted(path.name for path in library.parent.glob("*.c"))
     # What it makes of our sources goes with the folder: it is never used again.
@@ -139,5 +139,5 @@ def _zig_cache() -> Path:
     return folder
 
 
-def _mark(target: Target) -> Path:
+def _mark(target: CompileTarget) -> Path:
     return _zig_cache() / f"tank2sim-{_version()}-{target.triple}"

@@ -50,7 +50,7 @@ def _recognises(reader: TrialReader, text: str) -> bool:
         return False
 
 
-def read_trial(path: Path | str, *, rising: bool = True) -> Trial:
+def read_trial_file(path: Path | str, *, rising: bool = True) -> Trial:
     """Read a trial of any format of :data:`READERS`; its beginning shows which.
 
     Parameters

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.validation.standard_trials import ship_of
-from tank2sim.analysis.validation.study import ComparisonOutcome, Validated, made_card, validate, verify
+from tank2sim.analysis.validation.study import ComparisonOutcome, Validated, made_card, validate_card, verify
 from tank2sim.cards import revised
 from tank2sim.dynamics import build
 from tank2sim.records.trials import Trial
@@ -44,7 +44,7 @@ def trials(mariner_card):
 
 
 def test_a_trial_of_the_ship_herself_is_validated(mariner_card, trials) -> None:
-    found = validate(mariner_card, trials, 12)
+    found = validate_card(mariner_card, trials, 12)
     assert len(found.figures) == 9
     # 2 % of each coefficient is assumed: that is what u_input is of
     assert all(one.outcome is ComparisonOutcome.VALIDATED for one in found.figures if one.name != "overshoot_2_deg"), [
@@ -58,14 +58,14 @@ def test_a_trial_of_the_ship_herself_is_validated(mariner_card, trials) -> None:
 
 def test_a_trial_of_a_ship_with_another_rudder_is_refuted(mariner_card, trials) -> None:
     rudder = 0.6 * mariner_card.derivatives["Nd"]
-    found = validate(revised(mariner_card, {"Nd": (rudder, 0.02 * rudder)}), trials[:1], 8)
+    found = validate_card(revised(mariner_card, {"Nd": (rudder, 0.02 * rudder)}), trials[:1], 8)
     rows = {one.name: one for one in found.figures}
     assert rows["advance_m"].outcome is ComparisonOutcome.REFUTED and rows["advance_m"].error > 0
     assert "not validated" in found.verdict
 
 
 def test_without_members_nothing_is_known_of_the_inputs_and_no_figure_is_judged(mariner_card, trials) -> None:
-    found = validate(mariner_card, trials[1:], 0)
+    found = validate_card(mariner_card, trials[1:], 0)
     assert found.figures and all(
         one.outcome is ComparisonOutcome.OPEN and one.uncertainty is None for one in found.figures
     )
@@ -73,7 +73,7 @@ def test_without_members_nothing_is_known_of_the_inputs_and_no_figure_is_judged(
 
 def test_repeats_enter_the_uncertainty_of_the_data(mariner_card, trials) -> None:
     again = trial_of(mariner_card, "again", Turn(math.radians(20.3)), seed=1)
-    alone, both = (validate(mariner_card, those, 0).figures[0] for those in (trials[:1], [trials[0], again]))
+    alone, both = (validate_card(mariner_card, those, 0).figures[0] for those in (trials[:1], [trials[0], again]))
     assert alone.name == both.name == "advance_m"
     assert both.data > 2 * alone.data and both.inputs is None
 
@@ -101,7 +101,7 @@ def test_the_step_hardly_matters_and_a_coarse_one_does(mariner_card) -> None:
 
 
 def test_without_a_trial_nothing_is_validated(mariner_card) -> None:
-    assert validate(mariner_card, []).verdict.startswith("not validated")
+    assert validate_card(mariner_card, []).verdict.startswith("not validated")
 
 
 def test_trials_that_made_a_card_are_known_by_its_source(mariner_card, trials) -> None:
@@ -109,7 +109,7 @@ def test_trials_that_made_a_card_are_known_by_its_source(mariner_card, trials) -
     own = replace(mariner_card, ship=mariner_card.ship.model_copy(update={"source": how}))
     assert made_card(own, "zigzag") and made_card(own, "Z_35_05")
     assert not any(made_card(own, name) for name in ("turn", "zig", "Z_35", "35_05", "Z_35_05_b"))
-    found = validate(own, trials, 0)
+    found = validate_card(own, trials, 0)
     assert ComparisonOutcome.VALIDATED not in {one.outcome for one in found.figures if one.trial == "zigzag"}
     assert all(not one.made_card for one in found.figures if one.trial == "turn")
     assert any("zigzag: the card was identified from this trial" in notice for notice in found.notices)

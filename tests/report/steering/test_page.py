@@ -13,7 +13,7 @@ from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.records.reading import read_trial
+from tank2sim.records.reading import read_trial_file
 from tank2sim.report.steering.ghost import ghost_of
 from tank2sim.report.steering.page import steering_page
 from tank2sim.report.steering.ship import WEB, controls, has_compiler, ship_following_angle, ship_in_page
@@ -99,7 +99,7 @@ def pond(tmp_path_factory):
 def ghost(mariner, tmp_path):
     file = tmp_path / "trial.csv"
     file.write_text(TRIAL, encoding="utf-8")
-    return ghost_of(read_trial(file), mariner)
+    return ghost_of(read_trial_file(file), mariner)
 
 
 def sailed(html, folder, steps):
@@ -170,18 +170,18 @@ def test_a_ghost_without_positions_is_refused(mariner, tmp_path):
     file = tmp_path / "trial.csv"
     file.write_text("t_s,delta_deg,u_mps\n0,0,7\n1,0,7\n2,0,7\n", encoding="utf-8")
     with pytest.raises(InputError, match="hold no track"):
-        ghost_of(read_trial(file), mariner)
+        ghost_of(read_trial_file(file), mariner)
 
 
 def test_a_ghost_without_speed_through_the_water_starts_at_what_was_measured(mariner, tmp_path):
     file = tmp_path / "trial.csv"
     file.write_text("t_s,delta_deg,sog_mps,x_m,y_m\n0,0,5,0,0\n1,0,5,0,6\n2,0,5,0,12\n", encoding="utf-8")
-    ghost = ghost_of(read_trial(file), mariner)
+    ghost = ghost_of(read_trial_file(file), mariner)
     assert ghost.start["initial.u"] == 5
     assert ghost.start["initial.psi"] == pytest.approx(np.pi / 2)
     assert any("over the ground, 9.72 knots" in one for one in ghost.notices)
     file.write_text("t_s,delta_deg,x_m,y_m\n0,0,0,0\n1,0,0,6\n2,0,0,12\n", encoding="utf-8")
-    ghost = ghost_of(read_trial(file), mariner)
+    ghost = ghost_of(read_trial_file(file), mariner)
     assert ghost.start["initial.u"] == pytest.approx(6)
     assert any("first positions, 11.66 knots" in one for one in ghost.notices)
 
@@ -190,13 +190,13 @@ def test_the_mean_wind_of_a_trial_is_that_at_the_start(mariner, pond, tmp_path):
     file = tmp_path / "trial.csv"
     rows = "t_s,delta_deg,u_mps,x_m,y_m,wind_speed_mps,wind_direction_deg\n0,0,.3,0,0,3,90\n1,0,.3,.3,0,4,0\n"
     file.write_text(rows, encoding="utf-8")
-    ghost = ghost_of(read_trial(file), pond)
+    ghost = ghost_of(read_trial_file(file), pond)
     mean = {"wind.speed": 2.5, "wind.direction": np.arctan2(3, 4)}
     assert ghost.held == pytest.approx(mean)
     assert any("2.5 m/s from 37 deg" in one for one in ghost.notices)
     data = data_of(steering_page(pond, "AA==", ghost))
     assert {one["name"]: one["start"] for one in data["controls"] if one["name"] in mean} == pytest.approx(mean)
-    assert ghost_of(read_trial(file), mariner).held == {}
+    assert ghost_of(read_trial_file(file), mariner).held == {}
 
 
 def test_what_surrounds_the_ship_has_the_bounds_of_a_card(pond):
@@ -356,7 +356,7 @@ class TestInABrowser:
         file = tmp_path / "trial.csv"
         rows = np.column_stack(list(columns.values()))
         np.savetxt(file, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.12g")
-        ghost = ghost_of(read_trial(file), mariner)
+        ghost = ghost_of(read_trial_file(file), mariner)
         model = ship_following_angle(mariner)
         steps = "click('follow'); click('finish'); click('save'); click('zigzag'); click('finish'); click('save');"
         _, (voyage, zigzag) = sailed(steering_page(model, ship_in_page(model), ghost), tmp_path, steps)
@@ -371,7 +371,7 @@ class TestInABrowser:
     def test_orders_of_a_trial_are_followed_through_the_gear(self, mariner, tmp_path):
         file = tmp_path / "trial.csv"
         file.write_text(TRIAL.replace("delta_deg", "delta_order_deg"), encoding="utf-8")
-        html = steering_page(mariner, ship_in_page(mariner), ghost_of(read_trial(file), mariner))
+        html = steering_page(mariner, ship_in_page(mariner), ghost_of(read_trial_file(file), mariner))
         _, (voyage,) = sailed(html, tmp_path, "click('follow'); click('finish'); click('save');")
         assert voyage["x_m"][0] == 100
         assert voyage["t_s"][-1] == pytest.approx(4)

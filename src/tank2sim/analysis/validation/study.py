@@ -201,7 +201,7 @@ class Validation:
         }
 
 
-def validate(
+def validate_card(
     card: ManoeuvringCard, trials: Sequence[Trial], count: int = MEMBERS, required_percent: float = REQUIRED
 ) -> Validation:
     """Simulate the turns and zigzags among trials in closed loop from their measured starts, and compare figures.

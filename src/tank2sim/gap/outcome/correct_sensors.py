@@ -17,7 +17,7 @@ from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
 from tank2sim.gap.outcome.improve_card import Found, in_short
 from tank2sim.records.audit import repair_trial
 from tank2sim.records.csv_table import read_table
-from tank2sim.records.reading import read_trial, reader_of
+from tank2sim.records.reading import read_trial_file, reader_of
 from tank2sim.records.signals.writing import trial_text
 from tank2sim.records.trial_csv import TRIAL_CSV
 from tank2sim.records.trials import RUDDERS, Trial
@@ -79,7 +79,7 @@ def corrected_text(path: Path, trial: Trial, found: Sequence[Found]) -> str | No
     InputError
         The file cannot be read any more.
     """
-    raw = read_trial(path, rising=False)
+    raw = read_trial_file(path, rising=False)
     own, _ = repair_trial(raw)
     sized = _at_size_of(own, trial, found)
     fixed = correct_sensor_faults(own, sized)

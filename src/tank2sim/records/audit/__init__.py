@@ -2,6 +2,6 @@
 
 from tank2sim.records.audit.finding import Finding
 from tank2sim.records.audit.noise import record_noise
-from tank2sim.records.audit.run import audit, audit_and_repair, repair_trial
+from tank2sim.records.audit.run import audit_and_repair, audit_trial, repair_trial
 
-__all__ = ["Finding", "audit", "audit_and_repair", "record_noise", "repair_trial"]
+__all__ = ["Finding", "audit_and_repair", "audit_trial", "record_noise", "repair_trial"]

@@ -35,7 +35,7 @@ CHECKS: tuple[Callable[[Trial], list[Finding]], ...] = (
 is repaired, the rudder on a rate of turn whose sign is."""
 
 
-def audit(trial: Trial) -> tuple[Finding, ...]:
+def audit_trial(trial: Trial) -> tuple[Finding, ...]:
     """What is wrong with a trial, by its consistency alone, and what its columns look like instead.
 
     Checked are the time base; each sensor by itself (missing, stuck, spikes); r against dpsi/dt; velocities against
@@ -57,7 +57,7 @@ def repair_trial(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
 
 
 def audit_and_repair(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
-    """The trial as :func:`repair_trial` gives it, and all that is wrong with it, as :func:`audit` does.
+    """The trial as :func:`repair_trial` gives it, and all that is wrong with it, as :func:`audit_trial` does.
 
     After a fault that is not repaired (:attr:`.Finding.open`) nothing more is: what follows may depend on it, and is
     reported only where it is about other columns. After one of the time nothing else can be judged.

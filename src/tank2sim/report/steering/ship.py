@@ -11,7 +11,7 @@ from tank2sim.dynamics.model import Input, Model, Variable
 from tank2sim.errors import InputError
 from tank2sim.fmu.interface import Interface, interface
 from tank2sim.fmu.sources import c_sources
-from tank2sim.native.cross import Target, cross_compiled, require_cross_compiler
+from tank2sim.native.cross import CompileTarget, cross_compiled, require_cross_compiler
 from tank2sim.units import UNITS
 
 TOKEN = "page"
@@ -31,7 +31,7 @@ FUNCTIONS = (
 )
 """What the page calls."""
 
-WEB = Target("wasm32-wasi", ".wasm", (*FUNCTIONS, "malloc"))
+WEB = CompileTarget("wasm32-wasi", ".wasm", (*FUNCTIONS, "malloc"))
 """WebAssembly with the C library of WASI, of which nothing is left but mathematics and memory: it imports nothing."""
 
 NO_WASM_COMPILER = (

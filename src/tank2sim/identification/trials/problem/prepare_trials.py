@@ -13,7 +13,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.records.audit import Finding, audit_and_repair
-from tank2sim.records.reading import read_trial
+from tank2sim.records.reading import read_trial_file
 from tank2sim.records.same_record import refuse_copies
 from tank2sim.records.trials import RUDDERS, Trial, froude_scaled
 
@@ -64,7 +64,7 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard) -> Measured:
     """
     trials, notices = [], []
     for item in given:
-        trial, findings = audit_and_repair(item if isinstance(item, Trial) else read_trial(item))
+        trial, findings = audit_and_repair(item if isinstance(item, Trial) else read_trial_file(item))
         path = trial.path
         for finding in findings:
             _refuse_open(finding)
