@@ -12,7 +12,8 @@ from pathlib import Path
 
 from tank2sim.cards import linear_card, read_card
 from tank2sim.dynamics import build
-from tank2sim.fmu import compare_with_model, write_fmu
+from tank2sim.fmu.check import compare_with_model
+from tank2sim.fmu.export import write_fmu
 
 
 def main() -> None:

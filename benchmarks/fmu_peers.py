@@ -31,7 +31,7 @@ from fmu_step import AGREEMENT, AIM, library_of, measure, ship_numbers
 
 from tank2sim.cards import read_card
 from tank2sim.dynamics import Model, build
-from tank2sim.fmu import ExportedFmu, write_fmu
+from tank2sim.fmu.export import ExportedFmu, write_fmu
 from tank2sim.fmu.running import RunningFmu, running
 from tank2sim.fmu.unpacking import unpack
 from tank2sim.native.compiler import FLAGS, require_compiler

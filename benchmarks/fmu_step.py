@@ -22,7 +22,7 @@ import fmpy
 
 from tank2sim.cards import read_card
 from tank2sim.dynamics import Model, build
-from tank2sim.fmu import ExportedFmu, write_fmu
+from tank2sim.fmu.export import ExportedFmu, write_fmu
 from tank2sim.native.compiler import FLAGS, require_compiler
 
 HERE = Path(__file__).parent / "fmu_step"

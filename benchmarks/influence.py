@@ -14,7 +14,7 @@ from tank2sim.analysis.influence.card_influence import CardInfluence, influence
 from tank2sim.analysis.influence.figures import parse_figure
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, Means
-from tank2sim.analysis.tuning.targets import parse_wish
+from tank2sim.analysis.tuning.targets import parse_target
 from tank2sim.analysis.tuning.tune import tune
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 
@@ -81,7 +81,7 @@ def main() -> None:
         print(f"{len(result.parameters)} parameters on {len(FIGURES)} figures, slopes and 10 % differences (aim: 5 s)")
         print(f"nothing compiled before: {first:5.2f} s")
         print(f"again:                   {again:5.2f} s")
-        wishes = [parse_wish(text) for text in WISHES]
+        wishes = [parse_target(text) for text in WISHES]
         for by in (FEWEST, UNCERTAIN):
             begin = time.perf_counter()
             found = tune(Study(read_card_of_the_mariner(), [wish.figure for wish in wishes]), wishes, Means(by=by))

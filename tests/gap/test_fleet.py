@@ -195,7 +195,7 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> None:
             raise ZeroDivisionError("by zero")
         return f"gap of {card.source}"
 
-    monkeypatch.setattr("tank2sim.gap.fleet.search.find_gap", find_gap)
+    monkeypatch.setattr("tank2sim.gap.fleet.search.run_gap_workflow", find_gap)
 
 
 def test_a_bad_ship_does_not_stop_the_others(mariner_card: ManoeuvringCard, failing) -> None:
