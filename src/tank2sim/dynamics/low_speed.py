@@ -64,7 +64,7 @@ propulsion is found from how X falls between u_b and u0. Project choices."""
 BLEND = 0.5
 """The polynomial's share falls from 1 at u_b to 0 at this share of u_b^2 (0.71 u_b): project choice, narrow because a
 polynomial soon departs from the truth beyond its range, and as wide as the KVLCC2 needs to turn steadily within it. In
-the hull's surge force it is the cube of that: the Mariner's polynomial would drive its on with a stopped engine."""
+the hull's surge force it is the cube of that: the Mariner's polynomial would drive it on with a stopped engine."""
 
 STILL_SPEED = 1e-7
 """Speed over u0 at which the ship counts as at rest: project choice. Above 0.1 u0 it changes U by less than 1e-12 of

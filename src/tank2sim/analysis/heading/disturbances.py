@@ -1,4 +1,4 @@
-"""What a ship is steered in: current, wind, and waves that turn its to and fro at their own frequency."""
+"""What a ship is steered in: current, wind, and waves that turn it to and fro at their own frequency."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ _RESPONSE = (
 _TURNING = (
     "All steady turns that are joined to the straight course, at constant revolutions in calm water, followed by "
     "continuation through the folds. Solid: stable with the rudder held (all eigenvalues decay). Dashed: the ship "
-    "leaves the turn by itself, and only a rudder at work holds its there."
+    "leaves the turn by itself, and only a rudder at work holds it there."
 )
 _SPIRALS = (
     "The spiral holds each rudder until the turn is steady, so its points lie on the stable branches and jump at the "
