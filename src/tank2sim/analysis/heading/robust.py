@@ -86,6 +86,8 @@ def robust_design(plant: SteeringPlant, name: str, origin: str) -> HeadingDesign
 def _synthesis(plant: SteeringPlant, origin: str) -> tuple[control.StateSpace, float]:
     """Controller without its integral (time in 1/w), and the gain reached."""
     w = plant.frequency_radps
+    if not (np.isfinite(plant.A).all() and np.isfinite(plant.B).all()):  # LAPACK may search for ever
+        raise InputError(origin, "", "no robust controller was found (the linear ship is not finite)", "check the card")
     ship = control.ss(plant.A / w, plant.B / w, [[0, 0, 1, 0]], [[0]])
     integral = control.ss([[0]], [[1]], [[INTEGRAL]], [[1]])
     together = control.series(integral, ship)
