@@ -58,15 +58,18 @@ def installed() -> dict[str, str]:
     for name in sorted(sources):
         if not name.startswith(_NOT_SENT):
             digest.update(name.encode() + sources[name].read_bytes().replace(b"\r\n", b"\n"))
-    own = {"Python": "{}.{}".format(*sys.version_info), "tank2sim": f"{__version__} (source {digest.hexdigest()[:8]})"}
-    return own | {name: version(name) for name in _COMPUTING}
+    versions = {
+        "Python": "{}.{}".format(*sys.version_info),
+        "tank2sim": f"{__version__} (source {digest.hexdigest()[:8]})",
+    }
+    return versions | {name: version(name) for name in _COMPUTING}
 
 
 @contextmanager
 def connected(text: str) -> Iterator[Executor]:
     """The cluster whose scheduler is at ``dask://host:port``, for the time of a ``with``.
 
-    When it is left, nothing of ours waits at the scheduler any more.
+    When it is left, nothing of versions waits at the scheduler any more.
 
     Raises
     ------
@@ -103,7 +106,7 @@ class Cluster(Executor):
     def __init__(self, client: Client, text: str):
         self._client, self._text, self.wanted = client, text, installed()
         self._waiting: dict[Future[Any], Remote] = {}
-        self._one, self._ended = Lock(), Event()
+        self._lock, self._ended = Lock(), Event()
         Thread(target=self._watch, daemon=True).start()
 
     def refuse_others(self) -> None:
@@ -112,10 +115,10 @@ class Cluster(Executor):
             problem = f"the scheduler at {self._text} has no workers"
             raise InputError(EXECUTOR_OPTION, "", problem, "start some with `dask worker host:port`")
         try:
-            told = _within(PATIENCE_S, lambda: self._client.run(installed, on_error="return"))
+            replies = _within(PATIENCE_S, lambda: self._client.run(installed, on_error="return"))
         except (OSError, TimeoutError):  # one does not answer now; each is asked again before it works
             return
-        for address, found in told.items():
+        for address, found in replies.items():
             if not isinstance(found, OSError):  # such a one has just gone, and another may come
                 _refuse_other(found if isinstance(found, dict) else {}, self.wanted, address)
 
@@ -127,17 +130,17 @@ class Cluster(Executor):
         task = pickle.dumps((fn, args, kwargs))
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Sending large graph")
-            remote = self._client.submit(_done_there, self.wanted, task, pure=False)
-        with self._one:
+            remote = self._client.submit(_run_on_worker, self.wanted, task, pure=False)
+        with self._lock:
             self._waiting[promised] = remote
-        promised.add_done_callback(self._left)
+        promised.add_done_callback(self._forget)
         remote.add_done_callback(partial(self._arrived, promised))
         return promised
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Takes back what is not done, whatever is asked: at the end of a ``with`` nobody waits for it any more."""
         self._ended.set()
-        with self._one:
+        with self._lock:
             remotes = list(self._waiting.values())
             self._waiting.clear()
         with suppress(Exception):  # it may be gone
@@ -150,20 +153,20 @@ class Cluster(Executor):
         try:
             result = pickle.loads(remote.result())
         except BaseException as error:
-            told = self._told(error, lost=remote.cancelled() or self._client.status != "running")
-            self._settle(promised, lambda: promised.set_exception(told))
+            failure = self._explained(error, lost=remote.cancelled() or self._client.status != "running")
+            self._settle(promised, lambda: promised.set_exception(failure))
         else:
             self._settle(promised, lambda: promised.set_result(result))
 
     def _settle(self, promised: Future[Any], settle: Callable[[], None]) -> None:
         """Once: by its result, or by the watch."""
-        with self._one:
+        with self._lock:
             known = self._waiting.pop(promised, None) is not None
         if known and promised.set_running_or_notify_cancel():
             settle()
 
-    def _left(self, promised: Future[Any]) -> None:
-        with self._one:
+    def _forget(self, promised: Future[Any]) -> None:
+        with self._lock:
             remote = self._waiting.pop(promised, None)
         if remote is not None and not self._ended.is_set():
             remote.cancel()
@@ -176,7 +179,7 @@ class Cluster(Executor):
             if not trouble:
                 well = time.monotonic()
             elif time.monotonic() - well > PATIENCE_S:
-                with self._one:
+                with self._lock:
                     waiting = list(self._waiting)
                 for promised in waiting:
                     error = InputError(EXECUTOR_OPTION, "", trouble, "correct the cluster, or leave the option out")
@@ -190,7 +193,7 @@ class Cluster(Executor):
             return f"the scheduler at {self._text} has not answered for {PATIENCE_S:g} s"
         return "" if workers else f"all workers of {self._text} are lost, and none has come for {PATIENCE_S:g} s"
 
-    def _told(self, error: BaseException, *, lost: bool) -> BaseException:
+    def _explained(self, error: BaseException, *, lost: bool) -> BaseException:
         from distributed.scheduler import KilledWorker
 
         if isinstance(error, KilledWorker):
@@ -205,20 +208,20 @@ class Cluster(Executor):
         return InputError(EXECUTOR_OPTION, "", problem, "start it and its workers again, or leave the option out")
 
 
-_ONE_AT_A_TIME = Lock()
+_SINGLE_TASK = Lock()
 """In a worker, whose threads share what is kept from task to task, and the symbols of CasADi."""
 
 
 def working_for_another() -> bool:
     """Whether this process is a worker that is at work for some client."""
-    return _ONE_AT_A_TIME.locked()
+    return _SINGLE_TASK.locked()
 
 
-def _done_there(wanted: Mapping[str, str], task: bytes) -> bytes:
+def _run_on_worker(wanted: Mapping[str, str], task: bytes) -> bytes:
     from distributed import get_worker
 
     _refuse_other(installed(), wanted, get_worker().address)
-    with _ONE_AT_A_TIME:
+    with _SINGLE_TASK:
         fn, args, kwargs = pickle.loads(task)
         return pickle.dumps(fn(*args, **kwargs))
 
@@ -239,10 +242,10 @@ def _client(text: str) -> Client:
         raise InputError(EXECUTOR_OPTION, "", problem, f"{remedy}, or leave the option out") from None
 
 
-def _refuse_other(there: Mapping[str, str], here: Mapping[str, str], address: str) -> None:
-    for name, wanted in here.items():
-        if there.get(name) != wanted:
-            problem = f"has {name} {there[name]}, but here it is {wanted}" if name in there else f"lacks this {name}"
+def _refuse_other(theirs: Mapping[str, str], versions: Mapping[str, str], address: str) -> None:
+    for name, wanted in versions.items():
+        if theirs.get(name) != wanted:
+            problem = f"has {name} {theirs[name]}, but here it is {wanted}" if name in theirs else f"lacks this {name}"
             raise InputError(
                 EXECUTOR_OPTION, f"worker {address}", problem, "install the same on both, and start the worker again"
             )

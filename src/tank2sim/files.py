@@ -72,14 +72,14 @@ def write_together(
             else:
                 direct.append((data, target))
         for data, target in direct:
-            with _told(target.given):
+            with _as_input_error(target.given):
                 if target.given is STANDARD_OUTPUT:
                     sys.stdout.write(data.decode("utf-8"))
                     continue
                 with target.path.open("wb") as stream:
                     stream.write(data)
         for temporary, target in ready:
-            with _told(target.given):
+            with _as_input_error(target.given):
                 temporary.replace(target.path)
     finally:
         for temporary, _ in ready:
@@ -100,7 +100,7 @@ def _target(given: Path) -> _Target:
         return _Target(given, given, False)
     if given.name == "-" and given.parent == Path():
         raise InputError(given, "", "is no name of a file", "only --json writes to standard output")
-    with _told(given):
+    with _as_input_error(given):
         try:
             mode = given.stat().st_mode
         except FileNotFoundError:
@@ -132,15 +132,15 @@ def _refuse_inputs(targets: Sequence[_Target], inputs: Sequence[Path]) -> None:
                 raise InputError(target.given, "", f"is an input ({path}), which would be overwritten", remedy)
 
 
-def _same(one: Path, other: Path) -> bool:
+def _same(first: Path, second: Path) -> bool:
     try:
-        return os.path.samefile(one, other)
+        return os.path.samefile(first, second)
     except OSError:
         return False  # one of them does not exist
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _as_input_error(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
@@ -150,7 +150,7 @@ def _told(path: Path) -> Iterator[None]:
 
 def _temporary(target: _Target, data: bytes) -> Path:
     temporary = None
-    with _told(target.given):
+    with _as_input_error(target.given):
         try:
             # Not named after the target: its name may already be as long as the file system allows.
             handle, name = tempfile.mkstemp(prefix=".tank2sim-", dir=target.path.parent)

@@ -152,7 +152,7 @@ def test_every_platform_is_there_and_nothing_is_compiled_twice(
     assert sorted(path.name for path in (folder / "binaries").iterdir()) == sorted(FOLDERS[fmi])
     monkeypatch.setattr(cross, "_compile", lambda *_: pytest.fail("compiled again"))
     told: list[str] = []
-    again = make_fmu(hull, fmi=fmi, platforms=PLATFORMS, told=told.append)
+    again = make_fmu(hull, fmi=fmi, platforms=PLATFORMS, report=told.append)
     assert again.platforms == tuple(FOLDERS[fmi])
     assert told[0].startswith("0 of 5") and told[-1].startswith("5 of 5")
 

@@ -131,7 +131,7 @@ class AutopilotResult(PagedResult):
         """
         from tank2sim.fmu.autopilot import make_autopilot_fmu, verify_together  # takes most of a second to import
 
-        made = make_autopilot_fmu(self.study.design, fmi=fmi, told=report)
+        made = make_autopilot_fmu(self.study.design, fmi=fmi, report=report)
         difference = None
         if verify:
             report("co-simulating ship and autopilot")

@@ -152,12 +152,12 @@ def make_fmu_file(
         Called with the stage that begins.
     """
     chosen = named_platforms(platforms)
-    made = make_fmu(ship.model, fmi=fmi, documents=documents_of(ship.card), platforms=chosen, told=report)
+    made = make_fmu(ship.model, fmi=fmi, documents=documents_of(ship.card), platforms=chosen, report=report)
     files: dict[Path, str | bytes] = {path: made.content}
     if ssp:
         from tank2sim.fmu.ssp import ship_with_autopilot
 
-        files[ssp] = ship_with_autopilot(ship.model, made, platforms=chosen, told=report)
+        files[ssp] = ship_with_autopilot(ship.model, made, platforms=chosen, report=report)
     return ExportResult(ship, path, made, ssp, files)
 
 

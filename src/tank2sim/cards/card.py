@@ -139,8 +139,8 @@ class ManoeuvringCard(Card):
 
     def in_file(self, place: str, value: float) -> tuple[str, float]:
         """Place and value as the file has them, from those in SI: for messages about an angle."""
-        own = self.spelt.get(place, place)
-        return own, from_si(own, value)
+        spelling = self.spelt.get(place, place)
+        return spelling, from_si(spelling, value)
 
     def standard_error(self, name: str) -> float:
         """Standard error of a derivative (prime): as stated, or the default share of its value."""

@@ -100,7 +100,7 @@ def carried(card: Card, text: str) -> Covariance | None:
     known = read_covariance(card)
     if known is None:
         return None
-    old, new = (tomllib.loads(one.removeprefix(BYTE_ORDER_MARK)) for one in (card.text, text))
+    old, new = (tomllib.loads(card_text.removeprefix(BYTE_ORDER_MARK)) for card_text in (card.text, text))
 
     def holds(name: str, error: float) -> bool:
         effect = ".".join([*name.split(".")[:2], "name"]) if name.startswith("effects.") else name
@@ -112,7 +112,7 @@ def carried(card: Card, text: str) -> Covariance | None:
         return alike and abs(after - before) <= HOLDS * error
 
     errors = np.sqrt(np.maximum(np.diag(known.matrix), 0.0)).tolist()
-    rows = [place for place, one in enumerate(zip(known.names, errors, strict=True)) if holds(*one)]
+    rows = [place for place, error in enumerate(zip(known.names, errors, strict=True)) if holds(*error)]
     kept = tuple(known.names[row] for row in rows)
     return Covariance(kept, known.matrix[np.ix_(rows, rows)]) if kept else None
 

@@ -161,7 +161,7 @@ def read_steering_card(name: str | Path) -> SteeringCard:
     """
     path = find_steering_card(str(name))
     if path is None and not Path(name).is_file():
-        known = sorted(one.parent.name for one in bundled("models").glob(f"*/{_FILE}"))
+        known = sorted(folder.parent.name for folder in bundled("models").glob(f"*/{_FILE}"))
         raise InputError(name, "", "is no file and no bundled steering card", f"bundled are: {', '.join(known)}")
     return parse_steering_card(read_text(path or Path(name)), str(path or name))
 
@@ -213,7 +213,7 @@ def _check_influence(form: _Form, models: Mapping[str, SteeringEntry], source: s
 def _to_radians(content: dict[str, Any], spelt: dict[str, str]) -> None:
     """Convert the angles and rates of ``[[points]]`` and ``[influence]`` in place; `spelt` learns their own keys."""
     points = content.get("points")
-    sections = [(f"points.{n}", one) for n, one in enumerate(points if isinstance(points, list) else [])]
+    sections = [(f"points.{n}", point) for n, point in enumerate(points if isinstance(points, list) else [])]
     for place, section in [*sections, ("influence", content.get("influence"))]:
         if not isinstance(section, dict):
             continue  # the form will refuse it, or there is none

@@ -142,9 +142,9 @@ def _run() -> int:
             return _unwritable(error)
         with tempfile.NamedTemporaryFile("w", prefix="tank2sim-", suffix=".log", delete=False) as log:
             traceback.print_exc(file=log)
-        told = " ".join(str(error).split())[:200]
+        message = " ".join(str(error).split())[:200]
         return _refuse(
-            f"a fault of the program, not of yours: {type(error).__name__}: {told}; please report {Path(log.name)}"
+            f"a fault of the program, not of yours: {type(error).__name__}: {message}; please report {Path(log.name)}"
         )
     return result if isinstance(result, int) else 0
 

@@ -63,18 +63,18 @@ def command(
     run that was stopped continues where it was. A finding is not a failure: whatever is found, the command ends with 0,
     or with 2 if a ship of the fleet could not be judged.
     """
-    folder, one_ship = Path(card), None
+    folder, single_ship = Path(card), None
     if folder.is_dir() and not trials:
         if holdout:
             remedy = f"put the trials to be held out into a sub-folder {HOLDOUT} of each ship's folder"
             raise InputError("--holdout", "", "cannot be given with a folder of ships", remedy)
-        one_ship = ship_alone(folder)
-        if one_ship is None:
+        single_ship = ship_alone(folder)
+        if single_ship is None:
             from tank2sim.cli.gap_fleet import FleetRequest, run_fleet  # its page is slow to import
 
             options = gap_options(effects, without, max_effects, workers)
             return run_fleet(FleetRequest(folder, output, options, executor, again, json_file))
-        card, trials, holdout = str(one_ship.card), one_ship.trials, one_ship.holdout
+        card, trials, holdout = str(single_ship.card), single_ship.trials, single_ship.holdout
     elif not trials:
         raise click.UsageError("Missing argument 'TRIALS...'", click.get_current_context())
     elif folder.is_dir() and card.lower() not in bundled_cards():
@@ -103,6 +103,6 @@ def command(
     inside = [path.relative_to(output) for path in files if path.is_relative_to(output)]
     names = {path.parts[0] if len(path.parts) == 1 else f"{path.parts[0]}/" for path in inside}
     screen.print(f"{output}: {', '.join(sorted(names))}", soft_wrap=True, markup=False)
-    if one_ship:
+    if single_ship:
         show_notices([f"{folder} holds a card itself, and was taken for one ship"])
     return 0

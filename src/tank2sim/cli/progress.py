@@ -12,21 +12,21 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from tank2sim.arrays import Array
 
 if TYPE_CHECKING:  # the identification takes long to import, and most commands do without
-    from tank2sim.identification.trials.problem.estimation_problem import SearchReport as Told
+    from tank2sim.identification.trials.problem.estimation_problem import SearchReport
 
 
 @contextmanager
-def showing_progress(what: str) -> Iterator[Told]:
+def showing_progress(what: str) -> Iterator[SearchReport]:
     """A line that says how far a search is, on the error stream and only where that is a terminal."""
     with showing_stages(what) as show:
         steps = 0
 
-        def told(stage: str, values: Array, cost: float) -> None:
+        def report(stage: str, values: Array, cost: float) -> None:
             nonlocal steps
             steps += 1
             show(f"{stage}: step {steps}, cost {cost:.6g} (Ctrl-C keeps the best so far)")
 
-        yield told
+        yield report
 
 
 @contextmanager
@@ -37,7 +37,7 @@ def showing_stages(what: str) -> Iterator[Callable[[str], None]]:
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(what, total=None)
 
-        def told(stage: str) -> None:
+        def report(stage: str) -> None:
             bar.update(task, description=stage)
 
-        yield told
+        yield report

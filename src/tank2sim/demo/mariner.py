@@ -62,8 +62,8 @@ def mariner(workshop: Workshop) -> DemoOutcome:
     sections = [_fmu_section(reports), *sections, _stability_section(models, judged, criteria)]
     figures = _figures(reports, runs["turn-35"][THIRD], runs["zigzag-20-20"][THIRD], judged[THIRD])
     result: dict[str, object] = {
-        "figures": {name: {kind: one.figures for kind, one in run.items()} for name, run in runs.items()},
-        "stability": {kind: one.as_json() for kind, one in judged.items()},
+        "figures": {name: {kind: entry.figures for kind, entry in run.items()} for name, run in runs.items()},
+        "stability": {kind: entry.as_json() for kind, entry in judged.items()},
         "imo": [criterion.as_json() for criterion in criteria],
         "checks": [report.as_json() for report in reports],
     }
@@ -111,7 +111,7 @@ def _manoeuvre_section(
             ),
             Illustration(chart=histories, caption="Rudder and yaw rate are positive to starboard."),
         ],
-        notes=[f"{kind}: {notice}." for kind, one in run.items() for notice in one.notices],
+        notes=[f"{kind}: {notice}." for kind, result in run.items() for notice in result.notices],
     )
 
 
@@ -119,7 +119,7 @@ def _figure_table(run: dict[str, Run]) -> PageTable:
     rows: list[list[Cell]] = []
     for name, value in run[THIRD].figures.items():
         words, unit = in_words(name)
-        both = [one.figures[name] for one in run.values()]
+        both = [result.figures[name] for result in run.values()]
         if isinstance(value, list):
             lists = [each if isinstance(each, list) else [] for each in both]
             for k in range(max(len(each) for each in lists)):
@@ -207,7 +207,7 @@ def _verdict(judged: Stability) -> str:
 def _nomoto_table(judged: dict[str, Stability]) -> PageTable:
     times = [Column(title=name, unit="s") for name in ("T", "T1", "T2", "T3")]
     columns = [Column(title="model"), Column(title="K", unit="1/s"), *times]
-    rows = [[kind, *vars(one.nomoto).values()] for kind, one in judged.items()]
+    rows = [[kind, *vars(result.nomoto).values()] for kind, result in judged.items()]
     return PageTable(caption="Nomoto's coefficients at the speed of expansion", columns=columns, rows=rows)
 
 

@@ -72,11 +72,11 @@ def autopilot_model(name: str, gains: HeadingGains, step_s: float) -> Model:
     held = IntegralState(gains.anti_windup_time_s, gains.largest_rudder_rad)
     demand = Kp.symbol * error.symbol - Kd.symbol * r.symbol
     if gains.integral == 0:
-        own, described = held.without_integral(demand), "Heading autopilot: PD with limits"
-        return steered_by(name, described, (*inputs, Kp, Kd, error), own, step_s)
-    own = held.variables(demand, Ki.symbol * within(error.symbol, band.symbol))
+        state_variables, described = held.without_integral(demand), "Heading autopilot: PD with limits"
+        return steered_by(name, described, (*inputs, Kp, Kd, error), state_variables, step_s)
+    state_variables = held.variables(demand, Ki.symbol * within(error.symbol, band.symbol))
     described = "Heading autopilot: PID with limits and anti-windup"
-    return steered_by(name, described, (*inputs, *parameters, error), own, step_s)
+    return steered_by(name, described, (*inputs, *parameters, error), state_variables, step_s)
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,7 @@ def linear_autopilot_model(name: str, description: str, law: LinearLaw, step_s: 
     held = IntegralState(law.anti_windup_time_s, law.largest_rudder_rad).variables(
         _row(law.demand, seen), within(_row(law.growth, seen), most.symbol)
     )
-    order = next(one for one in held if one.name == "rudder.command")
+    order = next(variable for variable in held if variable.name == "rudder.command")
     rates = [_rate(place, _row(row, ca.vertcat(seen, order.symbol))) for place, row in enumerate(law.rates, start=1)]
     given: tuple[Variable, ...] = (*inputs, most, *states, *rates, error)
     return steered_by(name, description, given, held, step_s)

@@ -22,14 +22,14 @@ def closed_loop_model(ship: Model, autopilot: Model) -> Model:
     joints: list[Quantity] = []
     for receiver, sender in ((ship, autopilot), (autopilot, ship)):
         sent = {state.name: state for state in (*sender.states, *sender.quantities)}
-        joints += [_joint(one, sent[one.name]) for one in receiver.inputs if one.name in sent]
+        joints += [_joint(variable, sent[variable.name]) for variable in receiver.inputs if variable.name in sent]
     joined = {joint.name.removeprefix("joint.") for joint in joints}
     return Model(
         name=f"{ship.name} with {autopilot.name}",
         source=ship.source,
         description=f"{ship.description}; {autopilot.description}",
         states=(*ship.states, *autopilot.states),
-        inputs=tuple(one for one in (*ship.inputs, *autopilot.inputs) if one.name not in joined),
+        inputs=tuple(variable for variable in (*ship.inputs, *autopilot.inputs) if variable.name not in joined),
         parameters=(*ship.parameters, *autopilot.parameters),
         quantities=(*ship.quantities, *autopilot.quantities, *joints),
         outputs=(*ship.outputs, *autopilot.outputs),

@@ -76,9 +76,11 @@ def lamb_coefficients(a_m: float, b_m: float, c_m: float) -> LambCoefficients:
     )
 
 
-def _turning(one_m: float, other_m: float, own: float, others: float) -> float:
+def _turning(semi_axis_m: float, other_axis_m: float, own_factor: float, other_factor: float) -> float:
     """Added inertia about the third axis over that of the displaced fluid, 1/5 M (a^2 + b^2)."""
-    if abs(one_m / other_m - 1) < _ROUND:
+    if abs(semi_axis_m / other_axis_m - 1) < _ROUND:
         return 0.0
-    p = (one_m / other_m) ** 2
-    return (p - 1) ** 2 * (others - own) / ((p + 1) * (2 * (p - 1) + (p + 1) * (own - others)))
+    p = (semi_axis_m / other_axis_m) ** 2
+    return (
+        (p - 1) ** 2 * (other_factor - own_factor) / ((p + 1) * (2 * (p - 1) + (p + 1) * (own_factor - other_factor)))
+    )

@@ -88,9 +88,9 @@ def _position(north: ca.SX, east: ca.SX, origin: ca.SX) -> tuple[ca.SX, ca.SX]:
     phi0 = ca.fmax(-HIGHEST_LATITUDE, ca.fmin(HIGHEST_LATITUDE, origin))
     sine, cosine = ca.sin(phi0), ca.cos(phi0)
     eccentricity = FLATTENING * (2 - FLATTENING)  # e^2
-    rest = 1 - eccentricity * sine**2
-    prime_vertical = EQUATORIAL_RADIUS_M / ca.sqrt(rest)
-    meridian = prime_vertical * (1 - eccentricity) / rest
+    squared = 1 - eccentricity * sine**2
+    prime_vertical = EQUATORIAL_RADIUS_M / ca.sqrt(squared)
+    meridian = prime_vertical * (1 - eccentricity) / squared
     x, y, tangent = north / meridian, east / prime_vertical, sine / cosine
-    bent = y**2 * tangent * prime_vertical / meridian / 2 + 1.5 * eccentricity * sine * cosine * x**2 / rest
+    bent = y**2 * tangent * prime_vertical / meridian / 2 + 1.5 * eccentricity * sine * cosine * x**2 / squared
     return phi0 + x - bent, y * (1 + x * meridian / prime_vertical * tangent) / cosine

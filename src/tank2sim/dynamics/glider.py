@@ -45,19 +45,19 @@ def glider_warnings(card: GliderCard) -> tuple[str, ...]:
 
     Both are so in the paper's own data.
     """
-    own, density = card.glider, card.environment.water_density_kgpm3
+    glider, density = card.glider, card.environment.water_density_kgpm3
     messages = []
-    light = density * own.volume_m3 - own.mass_kg
-    if abs(light) > 0.02 * own.mass_kg:
+    light = density * glider.volume_m3 - glider.mass_kg
+    if abs(light) > 0.02 * glider.mass_kg:
         messages.append(
-            f"the card contradicts itself: {own.volume_m3:g} m3 displace {density * own.volume_m3:.4g} kg and the mass "
-            f"is {own.mass_kg:g} kg, a net buoyancy of {light:+.3g} kg where the glider has {own.buoyancy_kg:g} kg "
-            f"({own.mass_kg:g} kg displace {own.mass_kg / density:.4g} m3); mass and net buoyancy are used as they "
+            f"the card contradicts itself: {glider.volume_m3:g} m3 displace {density * glider.volume_m3:.4g} kg and the mass "
+            f"is {glider.mass_kg:g} kg, a net buoyancy of {light:+.3g} kg where the glider has {glider.buoyancy_kg:g} kg "
+            f"({glider.mass_kg:g} kg displace {glider.mass_kg / density:.4g} m3); mass and net buoyancy are used as they "
             "are, the volume in the ballast (1) alone"
         )
-    if math.isclose(own.reference_area_m2, own.volume_m3 ** (2 / 3), rel_tol=1e-3):
+    if math.isclose(glider.reference_area_m2, glider.volume_m3 ** (2 / 3), rel_tol=1e-3):
         messages.append(
-            f"the coefficients are referred to V^(2/3) = {own.reference_area_m2:.4g} m2; those of gliders are by "
+            f"the coefficients are referred to V^(2/3) = {glider.reference_area_m2:.4g} m2; those of gliders are by "
             "custom referred to the frontal area, with which speeds are higher by the root of the ratio: state the "
             "area that belongs to them in glider.reference_area_m2"
         )
@@ -73,7 +73,9 @@ def glider_model(card: GliderCard) -> Model:
     it turns to port.
     """
     inputs, parameters = _inputs(card), _parameters(card)
-    states = _states(card, {one.name: one for one in inputs}, {parameter.name: parameter for parameter in parameters})
+    states = _states(
+        card, {variable.name: variable for variable in inputs}, {parameter.name: parameter for parameter in parameters}
+    )
     symbols = {state.name: state.symbol for state in (*states, *inputs, *parameters)}
     quantities = (*_rates_of_orders(symbols), *_dynamics(symbols, card))
     return Model(
@@ -130,7 +132,7 @@ def _inputs(card: GliderCard) -> tuple[Input, ...]:
 
 
 def _parameters(card: GliderCard) -> tuple[Parameter, ...]:
-    own = card.glider
+    glider = card.glider
 
     def constant(name: str, unit: str, description: str, start: float, least: float = 0.0) -> Parameter:
         return Parameter(
@@ -142,26 +144,31 @@ def _parameters(card: GliderCard) -> tuple[Parameter, ...]:
 
     seconds = "Time in which {} comes within 37 % of its order"
     return (
-        constant("glider.mass", "kg", "Mass with the ballast", own.mass_kg),
-        constant("glider.added_mass_axial", "kg", "Added mass along the hull", own.added_mass_axial_kg),
-        constant("glider.added_mass_normal", "kg", "Added mass across the hull, up and down", own.added_mass_normal_kg),
-        constant("glider.reference_area", "m2", "Area to which the coefficients refer", own.reference_area_m2),
-        constant("glider.lift_slope", "1", "C_L by incidence, 1/rad", own.lift_slope),
-        constant("glider.lift_quadratic", "1", "C_L by incidence times its size, 1/rad^2", own.lift_quadratic),
-        constant("glider.drag_zero", "1", "C_D without incidence", own.drag_zero),
-        constant("glider.drag_quadratic", "1", "C_D by incidence squared, 1/rad^2", own.drag_quadratic),
+        constant("glider.mass", "kg", "Mass with the ballast", glider.mass_kg),
+        constant("glider.added_mass_axial", "kg", "Added mass along the hull", glider.added_mass_axial_kg),
+        constant(
+            "glider.added_mass_normal",
+            "kg",
+            "Added mass across the hull, up and down",
+            glider.added_mass_normal_kg,
+        ),
+        constant("glider.reference_area", "m2", "Area to which the coefficients refer", glider.reference_area_m2),
+        constant("glider.lift_slope", "1", "C_L by incidence, 1/rad", glider.lift_slope),
+        constant("glider.lift_quadratic", "1", "C_L by incidence times its size, 1/rad^2", glider.lift_quadratic),
+        constant("glider.drag_zero", "1", "C_D without incidence", glider.drag_zero),
+        constant("glider.drag_quadratic", "1", "C_D by incidence squared, 1/rad^2", glider.drag_quadratic),
         constant("glider.water_density", "kg/m3", "Density of the water", card.environment.water_density_kgpm3),
         constant("glider.gravity", "m/s2", "Acceleration of gravity", card.environment.gravity_mps2),
-        constant("buoyancy.time_constant", "s", seconds.format("the buoyancy"), own.buoyancy_time_constant_s, 1e-3),
-        constant("pitch.time_constant", "s", seconds.format("the pitch"), own.pitch_time_constant_s, 1e-3),
-        constant("roll.time_constant", "s", seconds.format("the roll"), own.roll_time_constant_s, 1e-3),
+        constant("buoyancy.time_constant", "s", seconds.format("the buoyancy"), glider.buoyancy_time_constant_s, 1e-3),
+        constant("pitch.time_constant", "s", seconds.format("the pitch"), glider.pitch_time_constant_s, 1e-3),
+        constant("roll.time_constant", "s", seconds.format("the roll"), glider.roll_time_constant_s, 1e-3),
         initial("x", "m", "North of the origin at the start"),
         initial("y", "m", "East of the origin at the start"),
         initial("z", "m", "Below the origin at the start"),
         initial("psi", "rad", "Course at the start, clockwise from north"),
         initial("u", "m/s", "Velocity along the hull at the start, + forward", _usual_speed(card)),
         initial("w", "m/s", "Velocity across the hull at the start, + down"),
-        initial("buoyancy", "kg", "Net buoyancy at the start, + light", -own.buoyancy_kg),
+        initial("buoyancy", "kg", "Net buoyancy at the start, + light", -glider.buoyancy_kg),
         initial("pitch", "rad", "Pitch at the start, + nose up", -_PITCH),
         initial("roll", "rad", "Roll at the start, + starboard side down"),
         Parameter(
@@ -177,9 +184,9 @@ def _parameters(card: GliderCard) -> tuple[Parameter, ...]:
 
 def _usual_speed(card: GliderCard) -> float:
     """About the speed of the dive in which the model starts, m/s: |m0| g sin(pitch) = drag without incidence."""
-    own = card.glider
-    pull = own.buoyancy_kg * card.environment.gravity_mps2 * math.sin(_PITCH)
-    return math.sqrt(2 * pull / (card.environment.water_density_kgpm3 * own.reference_area_m2 * own.drag_zero))
+    glider = card.glider
+    pull = glider.buoyancy_kg * card.environment.gravity_mps2 * math.sin(_PITCH)
+    return math.sqrt(2 * pull / (card.environment.water_density_kgpm3 * glider.reference_area_m2 * glider.drag_zero))
 
 
 def _step(card: GliderCard) -> float:
@@ -187,10 +194,16 @@ def _step(card: GliderCard) -> float:
 
     The fastest motion is that of the incidence, rho S v C_L' / (2 (m + A33)), 2.5 1/s for the probe, or a control.
     """
-    own = card.glider
-    grip = 0.5 * card.environment.water_density_kgpm3 * own.reference_area_m2 * _usual_speed(card) * own.lift_slope
-    incidence = (own.mass_kg + own.added_mass_normal_kg) / grip
-    controls = (own.buoyancy_time_constant_s, own.pitch_time_constant_s, own.roll_time_constant_s)
+    glider = card.glider
+    grip = (
+        0.5 * card.environment.water_density_kgpm3 * glider.reference_area_m2 * _usual_speed(card) * glider.lift_slope
+    )
+    incidence = (glider.mass_kg + glider.added_mass_normal_kg) / grip
+    controls = (
+        glider.buoyancy_time_constant_s,
+        glider.pitch_time_constant_s,
+        glider.roll_time_constant_s,
+    )
     longest = _STEP_SHARE * min(incidence, *controls)
     power = 10.0 ** math.floor(math.log10(longest))
     return max(factor * power for factor in (1, 2, 5) if factor * power <= longest)
@@ -273,22 +286,24 @@ def _dynamics(symbols: dict[str, ca.SX], card: GliderCard) -> list[Quantity]:
     worth = (LARGEST_INCIDENCE - abs(incidence)) / (LARGEST_INCIDENCE - SMALL_INCIDENCE)
     course = symbols["motion.psi"]
 
-    def told(name: str, unit: str, description: str, value: ca.SX, nominal: float = 1.0) -> Quantity:
+    def quantity(name: str, unit: str, description: str, value: ca.SX, nominal: float = 1.0) -> Quantity:
         shown = {"rad": "deg", "rad/s": "deg/s"}.get(unit)
         return Quantity(name=name, unit=unit, description=description, value=value, nominal=nominal, display_unit=shown)
 
     return [
-        told("motion.xdot", "m/s", "Velocity north", at.horizontal * ca.cos(course)),
-        told("motion.ydot", "m/s", "Velocity east", at.horizontal * ca.sin(course)),
-        told("motion.zdot", "m/s", "Velocity down", -at.climb),
-        told("motion.psidot", "rad/s", "Rate of the course, + to starboard", turn, 0.01),
-        told("motion.udot", "m/s2", "Acceleration along the hull", udot, 0.01),
-        told("motion.wdot", "m/s2", "Acceleration across the hull", wdot, 0.01),
-        told("motion.speed", "m/s", "Speed through the water", at.speed, _usual_speed(card)),
-        told("motion.incidence", "rad", "Incidence, + when the flow comes from below", incidence, 0.1),
-        told("motion.path_angle", "rad", "Angle of the path, + up", ca.atan2(at.climb, at.horizontal), 0.5),
-        told("force.lift", "N", "Lift, + when it acts towards the back of the glider", lift_area * at.speed**2, weight),
-        told("force.drag", "N", "Drag, + when it acts against the motion", drag_area * at.speed**2, 0.5 * weight),
+        quantity("motion.xdot", "m/s", "Velocity north", at.horizontal * ca.cos(course)),
+        quantity("motion.ydot", "m/s", "Velocity east", at.horizontal * ca.sin(course)),
+        quantity("motion.zdot", "m/s", "Velocity down", -at.climb),
+        quantity("motion.psidot", "rad/s", "Rate of the course, + to starboard", turn, 0.01),
+        quantity("motion.udot", "m/s2", "Acceleration along the hull", udot, 0.01),
+        quantity("motion.wdot", "m/s2", "Acceleration across the hull", wdot, 0.01),
+        quantity("motion.speed", "m/s", "Speed through the water", at.speed, _usual_speed(card)),
+        quantity("motion.incidence", "rad", "Incidence, + when the flow comes from below", incidence, 0.1),
+        quantity("motion.path_angle", "rad", "Angle of the path, + up", ca.atan2(at.climb, at.horizontal), 0.5),
+        quantity(
+            "force.lift", "N", "Lift, + when it acts towards the back of the glider", lift_area * at.speed**2, weight
+        ),
+        quantity("force.drag", "N", "Drag, + when it acts against the motion", drag_area * at.speed**2, 0.5 * weight),
         Quantity(
             name="validity",
             unit="1",

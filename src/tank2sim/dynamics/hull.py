@@ -179,9 +179,9 @@ def _rudder_quantities(hull: Hull) -> tuple[Quantity, Quantity, Quantity]:
 
 def _hydrodynamic_linear(hull: Hull) -> dict[str, ca.SX]:
     """Yv, Yr, Nv, Nr without the inertia that "total" cards put into them; SI at a speed of 1 m/s."""
-    at_one = hull.scales(ca.SX(1))
+    unit_scales = hull.scales(ca.SX(1))
     names = ("Yv", "Yr", "Nv", "Nr")
-    found = {name: at_one.derivative(known_term(name)) * hull.coefficient(name) for name in names}
+    found = {name: unit_scales.derivative(known_term(name)) * hull.coefficient(name) for name in names}
     if not hull.inertial_terms:
         found["Yr"] += hull["ship.mass"]
         found["Nr"] += hull["ship.mass"] * hull["ship.x_G"]

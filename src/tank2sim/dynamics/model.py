@@ -298,15 +298,15 @@ class Model:
     def extend(self, *variables: Variable, outputs: Iterable[str] = (), notices: Iterable[str] = ()) -> Model:
         """A model with more variables (each put with its own kind), outputs and notices."""
 
-        def those(kind: type[Kind]) -> tuple[Kind, ...]:
+        def of_kind(kind: type[Kind]) -> tuple[Kind, ...]:
             return tuple(variable for variable in variables if isinstance(variable, kind))
 
         return replace(
             self,
-            states=(*self.states, *those(State)),
-            inputs=(*self.inputs, *those(Input)),
-            parameters=(*self.parameters, *those(Parameter)),
-            quantities=(*self.quantities, *those(Quantity)),
+            states=(*self.states, *of_kind(State)),
+            inputs=(*self.inputs, *of_kind(Input)),
+            parameters=(*self.parameters, *of_kind(Parameter)),
+            quantities=(*self.quantities, *of_kind(Quantity)),
             outputs=(*self.outputs, *outputs),
             notices=(*self.notices, *notices),
         )
@@ -314,25 +314,25 @@ class Model:
     def with_constant_inputs(self, names: Iterable[str]) -> Model:
         """A model in which the inputs of these names are parameters, constant at what they start at."""
         given = set(names)
-        held = [one for one in self.inputs if one.name in given]
+        held = [variable for variable in self.inputs if variable.name in given]
         constants = tuple(
             _same_symbol(
-                one,
+                variable,
                 Parameter(
-                    name=one.name,
-                    unit=one.unit,
-                    description=one.description,
-                    nominal=one.nominal,
-                    minimum=one.minimum,
-                    maximum=one.maximum,
-                    display_unit=one.display_unit,
-                    start=one.start,
+                    name=variable.name,
+                    unit=variable.unit,
+                    description=variable.description,
+                    nominal=variable.nominal,
+                    minimum=variable.minimum,
+                    maximum=variable.maximum,
+                    display_unit=variable.display_unit,
+                    start=variable.start,
                 ),
             )
-            for one in held
+            for variable in held
         )
-        left = tuple(one for one in self.inputs if one.name not in given)
-        return replace(self, inputs=left, parameters=(*self.parameters, *constants))
+        remaining = tuple(variable for variable in self.inputs if variable.name not in given)
+        return replace(self, inputs=remaining, parameters=(*self.parameters, *constants))
 
     # -- what is derived ---------------------------------------------------------------------------------------------
 

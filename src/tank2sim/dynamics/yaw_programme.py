@@ -112,9 +112,9 @@ class YawProgramme:
 
     def at(self, time_s: Array) -> Reference:
         """The programmed motion at times (n,); at rest before the start and after the end."""
-        own = np.clip(np.asarray(time_s, dtype=float), self.start_s, self.end_s) - self.start_s
-        hump = np.minimum(np.floor(own / self.period_s), self.humps - 1)
-        phase = own - hump * self.period_s
+        programme_time = np.clip(np.asarray(time_s, dtype=float), self.start_s, self.end_s) - self.start_s
+        hump = np.minimum(np.floor(programme_time / self.period_s), self.humps - 1)
+        phase = programme_time - hump * self.period_s
         sign = 1.0 - 2.0 * (hump % 2) if self.kind == "reversing" else np.ones_like(hump)
         before = hump % 2 if self.kind == "reversing" else hump
         rate, angle = self._hump, self._hump_angle
@@ -166,20 +166,20 @@ def programme_of(card: YawRigCard) -> YawProgramme:
     InputError
         It is none that can be run.
     """
-    own = card.programme
-    if own is None:
+    stated = card.programme
+    if stated is None:
         return PAPER_PROGRAMME
     try:
         programme = YawProgramme(
-            max_rate_radps=own.max_rate_radps,
-            rise_s=own.rise_s,
-            settle_s=own.settle_s,
-            kind="reversing" if own.kind == "reversing" else "unidirectional",
-            humps=own.humps,
+            max_rate_radps=stated.max_rate_radps,
+            rise_s=stated.rise_s,
+            settle_s=stated.settle_s,
+            kind="reversing" if stated.kind == "reversing" else "unidirectional",
+            humps=stated.humps,
         )
     except ValueError as error:
         raise card.fault("programme", str(error), "correct its keys") from None
-    return full_turns(programme) if own.kind == "full_turn" else programme
+    return full_turns(programme) if stated.kind == "full_turn" else programme
 
 
 def full_turns(programme: YawProgramme) -> YawProgramme:

@@ -87,11 +87,11 @@ def wall_terms(
     heading: ca.SX, walls: TankWalls, coefficients: Mapping[str, ca.SX] | None = None
 ) -> tuple[ca.SX, ca.SX]:
     """lambda_66l (kg m2) and f_66l (N m s) at a heading; coefficients by name (``wall.bow_inertia``), or the walls'."""
-    own: Mapping[str, Any] = coefficients or {name: start for name, _, start, _ in _wall_rows(walls)}
+    values: Mapping[str, Any] = coefficients or {name: start for name, _, start, _ in _wall_rows(walls)}
     bow, stern = wall_nearness(heading, walls)
     return (
-        own["wall.bow_inertia"] * bow + own["wall.stern_inertia"] * stern,
-        own["wall.bow_damping"] * bow + own["wall.stern_damping"] * stern,
+        values["wall.bow_inertia"] * bow + values["wall.stern_inertia"] * stern,
+        values["wall.bow_damping"] * bow + values["wall.stern_damping"] * stern,
     )
 
 
@@ -267,7 +267,7 @@ def _parameters(rig: YawRig) -> tuple[Parameter, ...]:
             )
             for name, unit, start, description in rows
         ),
-        *(Parameter(name=n, unit=unit, start=0.0, tunable=False, description=told) for n, unit, told in starts),
+        *(Parameter(name=n, unit=unit, start=0.0, tunable=False, description=text) for n, unit, text in starts),
     )
 
 

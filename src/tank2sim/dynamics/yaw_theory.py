@@ -124,11 +124,11 @@ def added_inertia_by_8(body: FloatingBody, rate_radps: float, stage: Stage, *, b
     length, beam, draught, block = body.length_m, body.beam_m, body.draught_m, body.block
     finite = 1 - (beam / length - 0.0502) * (0.965 + 0.86 * 2 * draught / beam)
     size = finite * math.pi / 2 * body.density_kgpm3 * draught**2 * length**3
-    at_rest = (0.60 * block - 0.258) * (0.962 + 0.0127 * beam / (2 * draught))
+    still_water = (0.60 * block - 0.258) * (0.962 + 0.0127 * beam / (2 * draught))
     fineness = a * (0.066 - 0.08 * (1 - block) ** 0.8)
     shallow = b * (draught / body.depth_m) ** 2 * (0.066 - bracket * (1 - block) ** 0.81)
     waves = rotational_froude_number(body, rate_radps) ** 1.5 * (beam / draught) ** 0.73 * (fineness + shallow)
-    return float(size * (at_rest + waves))
+    return float(size * (still_water + waves))
 
 
 def sensitivity_of_8(body: FloatingBody, rate_radps: float, stage: Stage, change: float = 0.01) -> float:
@@ -174,11 +174,11 @@ def theory_values(body: FloatingBody, rate_radps: float) -> tuple[TheoryValue, .
     printed = _PRINTED.get(body, {})
 
     def row(formula: str, value: float, remark: str) -> TheoryValue:
-        own = printed.get(formula)
-        if own is not None:
-            same = "reproduces" if abs(value / own - 1) < _SAME else "does not reproduce"
+        printed_value = printed.get(formula)
+        if printed_value is not None:
+            same = "reproduces" if abs(value / printed_value - 1) < _SAME else "does not reproduce"
             remark = f"the paper's number {same}; {remark}"
-        return TheoryValue(formula=formula, value_kgm2=value, printed_kgm2=own, remark=remark)
+        return TheoryValue(formula=formula, value_kgm2=value, printed_kgm2=printed_value, remark=remark)
 
     try:
         values = [row("(7)", added_inertia_by_7(body), "half ellipsoid, corrected, times the factor of depth")]

@@ -98,6 +98,6 @@ def _shown(figure: object) -> str:
         case float():
             return f"{figure:.4g}"
         case list() | tuple():
-            return ", ".join(_shown(one) for one in figure)
+            return ", ".join(_shown(value) for value in figure)
         case _:
             return str(figure)

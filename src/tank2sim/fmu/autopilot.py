@@ -18,7 +18,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.export import ExportedFmu, make_fmu
-from tank2sim.fmu.libraries import Told
+from tank2sim.fmu.libraries import ProgressReport
 from tank2sim.fmu.platforms import Platform
 from tank2sim.fmu.provenance import ValueOrigin
 from tank2sim.fmu.running import RunningFmu, running
@@ -41,16 +41,16 @@ def make_autopilot_fmu(
     *,
     fmi: int = 2,
     platforms: Sequence[Platform] | None = None,
-    told: Told = lambda _: None,
+    report: ProgressReport = lambda _: None,
 ) -> ExportedFmu:
     """The FMU of a controller, which says how it was found.
 
     Inputs ``motion.psi``, ``motion.r`` (as the ship's FMU has them among its outputs) and ``heading.command``, output
     ``rudder.command``. Parameters and errors are those of :func:`tank2sim.fmu.export.make_fmu`.
     """
-    own = (parameter.name for parameter in design.autopilot.parameters if parameter.name.startswith("autopilot."))
-    documents = Documents(source=design.source, origins={name: ValueOrigin(design.source) for name in own})
-    return make_fmu(design.autopilot, fmi=fmi, documents=documents, platforms=platforms, told=told)
+    tuned = (parameter.name for parameter in design.autopilot.parameters if parameter.name.startswith("autopilot."))
+    documents = Documents(source=design.source, origins={name: ValueOrigin(design.source) for name in tuned})
+    return make_fmu(design.autopilot, fmi=fmi, documents=documents, platforms=platforms, report=report)
 
 
 def co_simulate_heading(
@@ -81,15 +81,15 @@ def co_simulate_heading(
         hull, pilot = (_opened(stack, path, names) for path, names in ((ship, _HULL), (autopilot, _PILOT)))
         hull.initialise({})
         pilot.initialise({"heading.command": heading_rad})
-        for place, now in enumerate(time):
+        for place, instant in enumerate(time):
             seen = hull.read(_SEEN)
             pilot.write(dict(zip(_SEEN, seen, strict=True)))
             heading[place], order[place] = seen[0], pilot.read(["rudder.command"])[0]
             if place == count:
                 break
-            pilot.instance.doStep(currentCommunicationPoint=now, communicationStepSize=step_s)
+            pilot.instance.doStep(currentCommunicationPoint=instant, communicationStepSize=step_s)
             hull.write({"rudder.command": order[place]})
-            hull.instance.doStep(currentCommunicationPoint=now, communicationStepSize=step_s)
+            hull.instance.doStep(currentCommunicationPoint=instant, communicationStepSize=step_s)
     return SteeredRun(time, heading, order)
 
 

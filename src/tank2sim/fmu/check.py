@@ -173,11 +173,11 @@ def _repeat_reference(unpacked: UnpackedFmu) -> tuple[list[str], float | None]:
 
 def _name_differences(unpacked: UnpackedFmu, model: Model) -> list[str]:
     described = interface(model)
-    there = {variable.name: variable for variable in unpacked.description.modelVariables}
+    variables = {variable.name: variable for variable in unpacked.description.modelVariables}
     differences = []
     for causality in ("input", "output", "parameter"):
         wanted = [variable.name for variable in described.with_causality(causality)]
-        found = [name for name, variable in there.items() if variable.causality == causality]
+        found = [name for name, variable in variables.items() if variable.causality == causality]
         differences += [f"{causality} {name} of the model is not in the FMU" for name in wanted if name not in found]
         differences += [f"{causality} {name} of the FMU is not in the model" for name in found if name not in wanted]
     return differences

@@ -150,6 +150,6 @@ def _pattern(results: ca.SX, variables: ca.SX) -> Pattern:
     return pattern
 
 
-def _product(left: Pattern, right: Pattern) -> Pattern:
-    product: Pattern = (left.astype(int) @ right.astype(int)) > 0
+def _product(first: Pattern, second: Pattern) -> Pattern:
+    product: Pattern = (first.astype(int) @ second.astype(int)) > 0
     return product

@@ -22,7 +22,7 @@ from tank2sim.files import write_whole
 from tank2sim.fmu.dependencies import fmu_structure
 from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.interface import Interface, interface
-from tank2sim.fmu.libraries import Told, libraries, require_compilers
+from tank2sim.fmu.libraries import ProgressReport, libraries, require_compilers
 from tank2sim.fmu.osp import osp_groups
 from tank2sim.fmu.platforms import Platform
 from tank2sim.fmu.sources import c_sources, headers_notice
@@ -80,7 +80,7 @@ def make_fmu(
     fmi: int = 2,
     documents: Documents | None = None,
     platforms: Sequence[Platform] | None = None,
-    told: Told = lambda _: None,
+    report: ProgressReport = lambda _: None,
 ) -> ExportedFmu:
     """One FMU with Model Exchange and Co-Simulation for this machine's platform, or for others.
 
@@ -93,7 +93,7 @@ def make_fmu(
         Version of FMI, 2 (2.0) or 3 (3.0).
     platforms : sequence of Platform, optional
         None: this machine's, compiled by its own compiler; others need the extra ``platforms``.
-    told : callable, optional
+    report : callable, optional
         Hears which libraries are being compiled.
 
     Raises
@@ -112,7 +112,7 @@ def make_fmu(
     sources = {name.removeprefix("sources/"): text for name, text in files.items() if name.startswith("sources/")}
     with ThreadPoolExecutor(1) as pool:  # the reference is calculated while the compiler works
         promised = pool.submit(_gathered, model)
-        made = libraries(sources, platforms, fmi, told)
+        made = libraries(sources, platforms, fmi, report)
         evidence = promised.result()
     contents = _encoded(files | evidence.reference_files()) | _icons(fmi)
     contents |= {f"binaries/{folder}/{identifier}{suffix}": library for (folder, suffix), library in made.items()}
@@ -165,7 +165,7 @@ def _encoded(files: dict[str, str]) -> dict[str, bytes]:
 def _icons(fmi: int) -> dict[str, bytes]:
     """The pictures by which a tool shows the FMU (FMI 2.0, 2.3; FMI 3.0, 2.5.1)."""
     names = {"icon.png": "model.png"} if fmi == 2 else {name: f"terminalsAndIcons/{name}" for name in _ICON_FILES}
-    return {name: bundled("fmu_templates", own).read_bytes() for own, name in names.items()}
+    return {name: bundled("fmu_templates", file).read_bytes() for file, name in names.items()}
 
 
 def _values(model: Model, described: Interface, fmi: int, documents: Documents) -> dict[str, Any]:

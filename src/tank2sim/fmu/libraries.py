@@ -13,7 +13,7 @@ from tank2sim.native.cross import cross_compiled, has_compiled, require_cross_co
 from tank2sim.native.library import cached_library
 from tank2sim.native.universal import universal
 
-Told = Callable[[str], None]
+ProgressReport = Callable[[str], None]
 """Hears, in a few words, what is being done."""
 
 # Project choice: the compiler uses the processors itself too, so more at a time bring nothing.
@@ -43,7 +43,7 @@ def require_compilers(platforms: Sequence[Platform] | None) -> None:
 
 
 def libraries(
-    sources: Mapping[str, str], platforms: Sequence[Platform] | None, fmi: int, told: Told = lambda _: None
+    sources: Mapping[str, str], platforms: Sequence[Platform] | None, fmi: int, report: ProgressReport = lambda _: None
 ) -> dict[tuple[str, str], bytes]:
     """The libraries of C sources: folder of the platform and ending of the name, to the library.
 
@@ -62,33 +62,35 @@ def libraries(
         As :func:`require_compilers`.
     """
     if platforms is None:
-        own = cached_library(sources, flags=_LINK_FLAGS.get(sys.platform, ()), seldom=SELDOM)
-        return {(host_platform().folder(fmi), SHARED_SUFFIX): own.read_bytes()}
-    made = _compiled(sources, platforms, told)
+        library = cached_library(sources, flags=_LINK_FLAGS.get(sys.platform, ()), seldom=SELDOM)
+        return {(host_platform().folder(fmi), SHARED_SUFFIX): library.read_bytes()}
+    made = _compiled(sources, platforms, report)
     shared: dict[tuple[str, str], list[bytes]] = {}
     for platform in platforms:
         shared.setdefault((platform.folder(fmi), platform.target.suffix), []).append(made[platform])
     return {place: parts[0] if len(parts) == 1 else universal(parts) for place, parts in shared.items()}
 
 
-def _compiled(sources: Mapping[str, str], platforms: Sequence[Platform], told: Told) -> dict[Platform, bytes]:
+def _compiled(
+    sources: Mapping[str, str], platforms: Sequence[Platform], report: ProgressReport
+) -> dict[Platform, bytes]:
     waiting = {platform: "" if has_compiled(platform.target) else _patience(platform) for platform in platforms}
     made: dict[Platform, bytes] = {}
 
-    def tell() -> None:
-        left = ", ".join(f"{platform.fmi3}{note}" for platform, note in waiting.items())
-        told(f"{len(made)} of {len(platforms)} libraries compiled; left: {left or 'none'}")
+    def report_state() -> None:
+        remaining = ", ".join(f"{platform.fmi3}{note}" for platform, note in waiting.items())
+        report(f"{len(made)} of {len(platforms)} libraries compiled; left: {remaining or 'none'}")
 
     with ThreadPoolExecutor(_AT_A_TIME) as pool:
         # What takes longest first, so that no processor is idle next to it.
         first = sorted(platforms, key=lambda platform: not waiting[platform])
         jobs = {pool.submit(cross_compiled, sources, platform.target): platform for platform in first}
-        tell()
+        report_state()
         try:
             for job in as_completed(jobs):
                 made[jobs[job]] = job.result()
                 del waiting[jobs[job]]
-                tell()
+                report_state()
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise

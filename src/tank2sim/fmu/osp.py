@@ -69,7 +69,10 @@ def osp_groups(interface: Interface) -> tuple[Group, ...]:
     A part that lacks one of its variables is left out. What has no kind (``wind.speed``) stands in a Generic group
     with the others of its first name and causality (``wind`` for inputs, ``position_output`` for outputs).
     """
-    found = {one.name: one for one in (*interface.with_causality("input"), *interface.with_causality("output"))}
+    found = {
+        fmu_variable.name: fmu_variable
+        for fmu_variable in (*interface.with_causality("input"), *interface.with_causality("output"))
+    }
     groups = []
     for name, parts in _MOTION.items():
         within = tuple(
@@ -80,12 +83,20 @@ def osp_groups(interface: Interface) -> tuple[Group, ...]:
         if within:
             groups.append(Group("Generic", name, groups=within))
     grouped = {variable.name for group in groups for variable in _variables(group)}
-    rest: dict[str, list[FmuVariable]] = {}
-    for one in found.values():
-        if one.name not in grouped:
-            first = one.name.partition(".")[0]
-            rest.setdefault(first if one.causality == "input" else f"{first}_output", []).append(one)
-    return (*groups, *(Group("Generic", name, tuple((one, "") for one in those)) for name, those in rest.items()))
+    ungrouped: dict[str, list[FmuVariable]] = {}
+    for fmu_variable in found.values():
+        if fmu_variable.name not in grouped:
+            first = fmu_variable.name.partition(".")[0]
+            ungrouped.setdefault(first if fmu_variable.causality == "input" else f"{first}_output", []).append(
+                fmu_variable
+            )
+    return (
+        *groups,
+        *(
+            Group("Generic", name, tuple((fmu_variable, "") for fmu_variable in members))
+            for name, members in ungrouped.items()
+        ),
+    )
 
 
 def _variables(group: Group) -> Iterator[FmuVariable]:

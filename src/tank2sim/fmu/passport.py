@@ -86,7 +86,7 @@ class Passport:
 def passport(model: Model, documents: Documents, manoeuvres: Mapping[str, Run], replay: Replay) -> Passport:
     """The passport of a model, from the origins that its documents state."""
     variables: list[Parameter | Input] = [*model.parameters]
-    variables += [one for one in model.inputs if one.name in documents.origins]
+    variables += [input_ for input_ in model.inputs if input_.name in documents.origins]
     return Passport(
         model=model.name,
         description=model.description,

@@ -21,7 +21,7 @@ from tank2sim.fmu.running import co_simulate, exchange, running
 from tank2sim.fmu.unpacking import FmuType, UnpackedFmu
 
 _LONGEST_S = 900.0
-_ENTRY = "import sys; from tank2sim.fmu.process import drive_here; drive_here(*sys.argv[1:])"
+_ENTRY = "import sys; from tank2sim.fmu.process import drive_in_process; drive_in_process(*sys.argv[1:])"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,9 +84,9 @@ def _run_alone(command: list[str], environment: dict[str, str]) -> int:
         It took longer than allowed.
     """
     nothing = subprocess.DEVNULL  # a pipe would be held open by a process that the library has started
-    own_group = os.name == "posix"
+    new_session = os.name == "posix"
     with subprocess.Popen(
-        command, env=environment, stdin=nothing, stdout=nothing, stderr=nothing, start_new_session=own_group
+        command, env=environment, stdin=nothing, stdout=nothing, stderr=nothing, start_new_session=new_session
     ) as process:
         try:
             return process.wait(_LONGEST_S)
@@ -104,7 +104,7 @@ def _end_group(process: subprocess.Popen[bytes]) -> None:
         subprocess.run(kill, capture_output=True, check=False)
 
 
-def drive_here(folder: str, kind: FmuType, task: str, answer: str) -> None:
+def drive_in_process(folder: str, kind: FmuType, task: str, answer: str) -> None:
     """Drive the FMU in `folder` as the file `task` says and write what came of it to the file `answer`."""
     drive = {"ModelExchange": exchange, "CoSimulation": co_simulate}[kind]
     found: dict[str, Any] = {}

@@ -89,17 +89,17 @@ def origins(card: Card) -> dict[str, ValueOrigin]:
     particulars = {f"ship.{_stem(key)}": ("ship", key) for key in document["ship"] if _stem(key) != "length"}
     found = {}
     for variable, (section, key) in (_PLACES | particulars).items():
-        said = _beside(document.get(section), key)
-        if said is not None:
+        comment = _line_comment(document.get(section), key)
+        if comment is not None:
             error, whence = _surge_error(card, key)
-            found[variable] = ValueOrigin(card.ship.source, said, error, whence)
+            found[variable] = ValueOrigin(card.ship.source, comment, error, whence)
     if not isinstance(card, ManoeuvringCard):
         return found
     found = _of_low_speed() | found
     for name in card.derivatives:
-        said = _beside(document.get("derivatives"), card.places.get(name, name))
+        comment = _line_comment(document.get("derivatives"), card.places.get(name, name))
         whence = STATED_ERROR if name in card.uncertainty else ASSUMED_ERROR
-        found[f"derivatives.{name}"] = ValueOrigin(card.ship.source, said or "", card.standard_error(name), whence)
+        found[f"derivatives.{name}"] = ValueOrigin(card.ship.source, comment or "", card.standard_error(name), whence)
     return found | dict(_of_effects(card, document))
 
 
@@ -125,22 +125,22 @@ def _of_effects(card: ManoeuvringCard, document: Mapping[str, Any]) -> Iterator[
     for entry, table in zip(card.effects, document.get("effects", ()), strict=True):
         effect = EFFECTS[entry.name]
         for name, variable in effect.model_names().items():
-            said = _beside(table.get("parameters"), name)
+            comment = _line_comment(table.get("parameters"), name)
             error = entry.uncertainty.get(name)
-            value = "default of the effect" if said is None else card.ship.source
+            value = "default of the effect" if comment is None else card.ship.source
             whence = NOT_STATED if error is None else STATED_ERROR
             package = f" ({origin.distribution})" if (origin := EFFECTS.origin(entry.name)) else ""
             source = f"equation of the effect {entry.name}{package}: {effect.source}; value: {value}"
-            yield variable, ValueOrigin(source, said or "", error, whence)
+            yield variable, ValueOrigin(source, comment or "", error, whence)
 
 
-def _beside(section: Any, key: str) -> str | None:
+def _line_comment(section: Any, key: str) -> str | None:
     """The comment next to a key, which the file may spell in another unit; None if it has no such key."""
     if section is None:
         return None
-    for own in section:
-        if key in (own, to_si(own, 1.0)[0]):
+    for name in section:
+        if key in (name, to_si(name, 1.0)[0]):
             # What is an inline table bears no comments on its keys.
-            trivia = getattr(section.item(own) if hasattr(section, "item") else None, "trivia", None)
+            trivia = getattr(section.item(name) if hasattr(section, "item") else None, "trivia", None)
             return str(trivia.comment).lstrip("# ").strip() if trivia is not None else ""
     return None

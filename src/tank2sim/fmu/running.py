@@ -139,14 +139,14 @@ def exchange(fmu: RunningFmu, run: InputSequence, inputs: Sequence[str], outputs
 
 def _solve(fmu: RunningFmu, solver: Any, begin: float, end: float) -> None:
     """From `begin` to `end`, again from each place where an event indicator changes sign."""
-    now = begin
-    while now < end:
-        event, _, now = solver.step(now, end)
-        fmu.instance.setTime(now)
+    time_s = begin
+    while time_s < end:
+        event, _, time_s = solver.step(time_s, end)
+        fmu.instance.setTime(time_s)
         if event:
             fmu.instance.enterEventMode()
             fmu.update()
-            solver.reset(now)
+            solver.reset(time_s)
 
 
 class _NoInputs:

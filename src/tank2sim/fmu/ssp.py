@@ -12,7 +12,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.fmu.documents import Documents
 from tank2sim.fmu.export import ExportedFmu, make_fmu, zipped
 from tank2sim.fmu.interface import FmuVariable, interface
-from tank2sim.fmu.libraries import Told
+from tank2sim.fmu.libraries import ProgressReport
 from tank2sim.fmu.platforms import Platform
 from tank2sim.fmu.provenance import ValueOrigin
 from tank2sim.fmu.templates import render
@@ -41,14 +41,18 @@ class Joint:
 
 
 def ship_with_autopilot(
-    ship: Model, made: ExportedFmu, *, platforms: Sequence[Platform] | None = None, told: Told = lambda _: None
+    ship: Model,
+    made: ExportedFmu,
+    *,
+    platforms: Sequence[Platform] | None = None,
+    report: ProgressReport = lambda _: None,
 ) -> bytes:
     """The package: the ship's FMU as it was made, an autopilot for it for the same version of FMI, and their joints.
 
     Inputs are joined to outputs of the same name. The others (``heading.command`` of the autopilot, the revolutions)
     are no connectors: the system would have to hand them in, which the engines of OSP and ecos do not know; but all
     engines set variables of a component, and where nothing is set the start values hold.
-    Platforms and `told` are those of :func:`tank2sim.fmu.export.make_fmu`.
+    Platforms and `report` are those of :func:`tank2sim.fmu.export.make_fmu`.
 
     Raises
     ------
@@ -57,7 +61,9 @@ def ship_with_autopilot(
         :func:`tank2sim.analysis.heading.control.heading_autopilot` and :func:`tank2sim.fmu.export.make_fmu`.
     """
     autopilot = heading_autopilot(ship)
-    steered = make_fmu(autopilot, fmi=made.fmi, documents=_documents(ship, autopilot), platforms=platforms, told=told)
+    steered = make_fmu(
+        autopilot, fmi=made.fmi, documents=_documents(ship, autopilot), platforms=platforms, report=report
+    )
     parts, joints = _joined({"ship": ship, "autopilot": autopilot})
     lengths = {parameter.name: parameter.start for parameter in ship.parameters}
     values = {
@@ -101,5 +107,5 @@ def _documents(ship: Model, autopilot: Model) -> Documents:
         f"Pole placement (relative damping {DAMPING:g}, integral {SLOWNESS:g} of the natural frequency) on Nomoto's "
         f"model of {ship.name} at {found.speed_mps:.4g} m/s: K = {nomoto.K_per_s:.5g} 1/s, T = {nomoto.T_s:.5g} s"
     )
-    own = (parameter.name for parameter in autopilot.parameters if parameter.name.startswith("autopilot."))
-    return Documents(source=source, origins={name: ValueOrigin(source) for name in own})
+    tuned = (parameter.name for parameter in autopilot.parameters if parameter.name.startswith("autopilot."))
+    return Documents(source=source, origins={name: ValueOrigin(source) for name in tuned})

@@ -48,11 +48,11 @@ def terminals(interface: Interface) -> tuple[Terminal, ...]:
     """
     grouped: dict[str, dict[str, FmuVariable]] = {}
     for variable in (*interface.with_causality("output"), *interface.with_causality("input")):
-        first, _, rest = variable.name.partition(".")
-        if not rest:
+        first, _, member = variable.name.partition(".")
+        if not member:
             continue
         members = grouped.setdefault(_TERMINAL_OF.get(first, first), {})
-        members[variable.name if rest in members else rest] = variable
+        members[variable.name if member in members else member] = variable
     descriptions = _DESCRIPTIONS | _of_effects()
     return tuple(
         Terminal(name, descriptions.get(name, f"Signals {name}.*"), tuple(members.items()))

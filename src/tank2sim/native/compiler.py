@@ -22,7 +22,7 @@ from tank2sim.errors import InputError
 FLAGS = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", "-fvisibility=hidden")
 
 # Of the levels below -O2 the one at which code that CasADi generates compiles in less than half the time.
-_LESS = "-Og"
+_QUICK = "-Og"
 
 SHARED_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
@@ -120,9 +120,9 @@ def _refusal(
         # The longest first, so that no processor is idle next to it at the end.
         sources = sorted(sources, key=lambda source: (-source.stat().st_size, source.name))
         objects = [Path(name, f"{place}.o") for place in range(len(sources))]
-        less = {source: [_LESS] if source.name in seldom else [] for source in sources}
+        optimisation = {source: [_QUICK] if source.name in seldom else [] for source in sources}
         compiling = (
-            [*command, *less[source], "-c", os.path.relpath(source, folder), "-o", str(compiled)]
+            [*command, *optimisation[source], "-c", os.path.relpath(source, folder), "-o", str(compiled)]
             for source, compiled in zip(sources, objects, strict=True)
         )
         linking = [

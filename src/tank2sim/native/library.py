@@ -133,10 +133,10 @@ def _remove(path: Path) -> None:
 def _sweep(folder: Path) -> None:
     """Remove the folders that killed runs have left in the cache."""
     oldest = time.time() - _DAYS_KEPT * 86400
-    for left in folder.glob(f"{_MAKING}*"):
+    for unfinished in folder.glob(f"{_MAKING}*"):
         with contextlib.suppress(OSError):
-            if left.stat().st_mtime < oldest:
-                _remove(left)
+            if unfinished.stat().st_mtime < oldest:
+                _remove(unfinished)
 
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT)

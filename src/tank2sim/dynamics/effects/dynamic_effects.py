@@ -36,9 +36,9 @@ def _remembering(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> M
         description="Rate of change of the sway velocity that the flow remembers",
         value=late / given["time_constant"],
     )
-    here = scales(model, speed_of_scaling(model, card))
+    scaling = scales(model, speed_of_scaling(model, card))
     Y, N = (
-        -given["share"] * late * here.derivative(known_term(name)) * model.symbol(f"derivatives.{name}")
+        -given["share"] * late * scaling.derivative(known_term(name)) * model.symbol(f"derivatives.{name}")
         for name in ("Yv", "Nv")
     )
     return with_steps_for(with_forces(model.extend(z, rate), Y=Y, N=N), "flow_memory.time_constant")
@@ -126,11 +126,11 @@ def _rolling(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model
         nominal=1e-3,
         value=-(pulse**2) * (phi.symbol + given["heel_ratio"] * driving) - 2 * given["damping"] * pulse * p.symbol,
     )
-    here = scales(model, speed_of_scaling(model, card))
+    scaling = scales(model, speed_of_scaling(model, card))
     rolling = with_forces(
         model.extend(phi, p, phidot, pdot, outputs=["motion.phi"]),
-        Y=here.force * given["Yphi"] * phi.symbol,
-        N=here.force * here.length * given["Nphi"] * phi.symbol,
+        Y=scaling.force * given["Yphi"] * phi.symbol,
+        N=scaling.force * scaling.length * given["Nphi"] * phi.symbol,
     )
     return with_steps_for(rolling, "roll_coupling.roll_period", share=1 / (2 * math.pi))
 

@@ -135,8 +135,8 @@ def _turning_unlike(model: Model, given: EffectSymbols, card: ManoeuvringCard) -
     Even terms in Y and N are those that a symmetric ship has not: Abkowitz (1964); SIMMAN 2008 tactical diameters.
     """
     r = model.symbol("motion.r")
-    here = scales(model, model.symbol("ship.length") * r)
-    return with_forces(model, Y=here.force * given["Yrr"], N=here.force * here.length * given["Nrr"])
+    scaling = scales(model, model.symbol("ship.length") * r)
+    return with_forces(model, Y=scaling.force * given["Yrr"], N=scaling.force * scaling.length * given["Nrr"])
 
 
 ASYMMETRIC_TURNING = Effect(

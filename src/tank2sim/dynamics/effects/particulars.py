@@ -92,8 +92,8 @@ def with_particulars(model: Model, card: ManoeuvringCard, *keys: str) -> tuple[M
         name, unit, *_ = _ESTIMATES[key]
         if getattr(card.ship, key) is not None:
             continue
-        told = f"the card states no {key}: the {name} is taken as {model_particular(card, key):.3g} {unit}".rstrip()
-        notice = f"{told} ({estimated_from(key)})"
+        missing = f"the card states no {key}: the {name} is taken as {model_particular(card, key):.3g} {unit}".rstrip()
+        notice = f"{missing} ({estimated_from(key)})"
         if notice not in model.notices:
             model = model.extend(notices=[notice])
     return model, tuple(model_particular(card, key) for key in keys)

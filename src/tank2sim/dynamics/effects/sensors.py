@@ -267,8 +267,8 @@ def _measured(signals: _Columns, effect: Effect, values: Mapping[str, float]) ->
         return {}
     x, shown = ca.vcat([motion[name] for name in names]), ca.SX.sym("shown", len(names))
     expression = ca.vcat([readings[name] for name in names])
-    rest = ca.substitute(expression, x, ca.SX.zeros(len(names)))
-    solution = ca.solve(ca.jacobian(expression, x), shown - rest)
+    constant_part = ca.substitute(expression, x, ca.SX.zeros(len(names)))
+    solution = ca.solve(ca.jacobian(expression, x), shown - constant_part)
     others = [name for name in MEASURED_BEFOREHAND if name not in names and ca.depends_on(solution, motion[name])]
     for name in others:
         if _SIGNALS[name] not in signals:

@@ -246,8 +246,8 @@ def _with_bank_suction(model: Model, given: EffectSymbols, card: ManoeuvringCard
     Norrbin (1974), Bank effects on a ship moving through a short dredged channel: force and moment are proportional to
     the square of the speed. A bank to starboard draws the ship (Y' > 0) and turns its bow away (N' < 0).
     """
-    here = scales(model, model.symbol("motion.u"))
-    return with_forces(model, Y=here.force * given["Y"], N=here.force * here.length * given["N"])
+    scaling = scales(model, model.symbol("motion.u"))
+    return with_forces(model, Y=scaling.force * given["Y"], N=scaling.force * scaling.length * given["N"])
 
 
 BANK_SUCTION = Effect(

@@ -50,8 +50,8 @@ def steering_model(
     if wrong:
         raise ValueError(f"{form.name}: missing or unknown: {', '.join(wrong)}")
     states, starts = zip(_drift(), yaw_rate(nominal_radps=0.01), strict=True)
-    own = _coefficients(form, {k: float(v or 0.0) for k, v in values.items()})
-    constants = (*_ship(length_m, speed_mps), *starts, *own)
+    own_coefficients = _coefficients(form, {k: float(v or 0.0) for k, v in values.items()})
+    constants = (*_ship(length_m, speed_mps), *starts, *own_coefficients)
     gear, notices = steering_gear(None, length_m / speed_mps)
     given = (*states, *constants, *gear)
     motion = (*states, *_quantities(form, {variable.name: variable.symbol for variable in given}))
@@ -122,8 +122,10 @@ def _quantities(form: SteeringForm, symbols: Mapping[str, ca.SX]) -> tuple[Quant
     beta, r = symbols["motion.beta"], symbols["motion.r"]
     speed = symbols["ship.speed"]
     per_second = speed / symbols["ship.length"]
-    own = {coefficient.name: symbols[f"coefficients.{coefficient.name}"] for coefficient in form.coefficients}
-    sway, yaw = form.rates(own, beta, r / per_second, symbols["rudder.effective"])
+    own_coefficients = {
+        coefficient.name: symbols[f"coefficients.{coefficient.name}"] for coefficient in form.coefficients
+    }
+    sway, yaw = form.rates(own_coefficients, beta, r / per_second, symbols["rudder.effective"])
 
     def quantity(name: str, unit: str, description: str, value: ca.SX) -> Quantity:
         return Quantity(name=name, unit=unit, description=description, value=value)
