@@ -26,10 +26,10 @@ static Status refuse(const Instance *self, unsigned reference, const char *why) 
 static Status check_roles(const Instance *self, const unsigned unknowns[], size_t unknown_count,
                           const unsigned knowns[], size_t known_count) {
     for (size_t i = 0; i < unknown_count; ++i) {
-        if (!is_unknown(unknowns[i])) return refuse(self, unknowns[i], "is no state, derivative or output");
+        if (!is_unknown(unknowns[i])) return refuse(self, unknowns[i], "is not a state, derivative or output");
     }
     for (size_t i = 0; i < known_count; ++i) {
-        if (!is_known(self, knowns[i])) return refuse(self, knowns[i], "is no real variable to derive by now");
+        if (!is_known(self, knowns[i])) return refuse(self, knowns[i], "is not a real variable to derive by now");
     }
     return OK;
 }
@@ -136,7 +136,7 @@ Status output_derivatives(Instance *self, const unsigned references[], size_t co
                           double values[]) {
     double tangent[VARIABLE_COUNT] = {0};
     for (size_t i = 0; i < count; ++i) {
-        if (!is_unknown(references[i])) return refuse(self, references[i], "is no state, derivative or output");
+        if (!is_unknown(references[i])) return refuse(self, references[i], "is not a state, derivative or output");
         if (orders[i] != 1) return refuse(self, references[i], "has a derivative of order 1 and of no other");
     }
     refresh(self, STALE_RATES);

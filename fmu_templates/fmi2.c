@@ -288,14 +288,14 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
     if (REFUSED(c, ANY_MODE, CO_SIMULATION) || MISSING(c, value, 1)) return fmi2Error;
-    if (s != fmi2DoStepStatus) return (fmi2Status)report(c, DISCARD, "%s: no such status", __func__);
+    if (s != fmi2DoStepStatus) return (fmi2Status)report(c, DISCARD, "%s: unknown status", __func__);
     *value = (fmi2Status)((Instance *)c)->last_step;
     return fmi2OK;
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value) {
     if (REFUSED(c, ANY_MODE, CO_SIMULATION) || MISSING(c, value, 1)) return fmi2Error;
-    if (s != fmi2LastSuccessfulTime) return (fmi2Status)report(c, DISCARD, "%s: no such status", __func__);
+    if (s != fmi2LastSuccessfulTime) return (fmi2Status)report(c, DISCARD, "%s: unknown status", __func__);
     *value = ((Instance *)c)->value[TIME];
     return fmi2OK;
 }
@@ -303,12 +303,12 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value) {
     (void)s;
     if (REFUSED(c, ANY_MODE, CO_SIMULATION) || MISSING(c, value, 1)) return fmi2Error;
-    return (fmi2Status)report(c, DISCARD, "%s: no such status", __func__);
+    return (fmi2Status)report(c, DISCARD, "%s: unknown status", __func__);
 }
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
     if (REFUSED(c, ANY_MODE, CO_SIMULATION) || MISSING(c, value, 1)) return fmi2Error;
-    if (s != fmi2Terminated) return (fmi2Status)report(c, DISCARD, "%s: no such status", __func__);
+    if (s != fmi2Terminated) return (fmi2Status)report(c, DISCARD, "%s: unknown status", __func__);
     /* The same step would fail again: a simulator that only asks whether to go on would ask for ever. */
     *value = ((Instance *)c)->last_step == DISCARD;
     return fmi2OK;
@@ -317,5 +317,5 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value) {
     (void)s;
     if (REFUSED(c, ANY_MODE, CO_SIMULATION) || MISSING(c, value, 1)) return fmi2Error;
-    return (fmi2Status)report(c, DISCARD, "%s: no such status", __func__);
+    return (fmi2Status)report(c, DISCARD, "%s: unknown status", __func__);
 }

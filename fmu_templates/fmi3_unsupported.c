@@ -17,7 +17,7 @@ fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance) { return none(instan
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance, fmi3ValueReference valueReference,
                                                size_t *nDependencies) {
     (void)valueReference, (void)nDependencies;
-    return none(instance, __func__, "dependencies stand in modelDescription.xml (all variables are scalars)");
+    return none(instance, __func__, "dependencies are in modelDescription.xml (all variables are scalars)");
 }
 
 fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference dependent,
@@ -26,7 +26,7 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference
                                        size_t nDependencies) {
     (void)dependent, (void)elementIndicesOfDependent, (void)independents, (void)elementIndicesOfIndependents;
     (void)dependencyKinds, (void)nDependencies;
-    return none(instance, __func__, "dependencies stand in modelDescription.xml (all variables are scalars)");
+    return none(instance, __func__, "dependencies are in modelDescription.xml (all variables are scalars)");
 }
 
 fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],

@@ -27,7 +27,7 @@ static void send(const Instance *self, Status status, unsigned category, const c
     }
 }
 
-/* Tell the simulator why a call did not end with OK; returns `status`. */
+/* Report to the simulator why a call did not end with OK; returns `status`. */
 Status report(const Instance *self, Status status, const char *format, ...) {
     static const unsigned category[] = {LOG_EVENTS, LOG_WARNING, LOG_DISCARD, LOG_ERROR};
     va_list arguments;

@@ -4,7 +4,7 @@
  * outlives a call belongs to an instance, so any number of them may live in one process, each in its own thread; what
  * does not outlive it is on the stack, so that an instance is small and a fleet of them fits into a cache.
  *
- * The variables stand in one array in the order of their value references, in blocks (see model.h): time, states,
+ * The variables are in one array in the order of their value references, in blocks (see model.h): time, states,
  * inputs, parameters, the largest internal step, derivatives of the states, outputs with the event indicators last.
  * The generated equations read and write the blocks in place.
  */

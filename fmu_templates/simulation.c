@@ -11,10 +11,10 @@ enum { TRIM_ITERATIONS = 50 };
 /* H = 1 s with steps of 0.1 s shall be ten steps, although H / 0.1 may come out as 10.000000000000002. */
 static const double STEP_COUNT_ROUNDING = 1e-9;
 
-/* More internal steps in one communication step are a mistake, in which a simulator would seem to hang (ours). */
+/* More internal steps in one communication step are a mistake, in which a simulator would seem to hang (project choice). */
 static const double MOST_STEPS = 1e7;
 
-/* States that are not finite stay so: a long step need not go to its end to find it (so often is a choice of ours). */
+/* States that are not finite stay so: a long step need not go to its end to find it (so often is a project choice). */
 enum { STEPS_BETWEEN_CHECKS = 256 };
 
 static const size_t STATE_BYTES = (STATES_END - STATES_BEGIN) * sizeof(double);

@@ -19,7 +19,7 @@ typedef struct {
     double value[SAVED_COUNT];
 } Snapshot;
 
-/* FNV-1a with 64 bits (Fowler, Noll and Vo, RFC 9923): finds damage, and is no protection against forgery. */
+/* FNV-1a with 64 bits (Fowler, Noll and Vo, RFC 9923): finds damage, and is not a protection against forgery. */
 static uint64_t checksum_of(const Snapshot *snapshot) {
     const unsigned char *bytes = (const unsigned char *)snapshot;
     uint64_t sum = UINT64_C(14695981039346656037);
@@ -34,9 +34,9 @@ static bool possible_mode(int kind, int mode) {
     return (mode & modes) != 0 && (mode & (mode - 1)) == 0;
 }
 
-/* What is wrong with the beginning of a state, where its length stands; NULL if nothing. */
+/* What is wrong with the beginning of a state, where its length is; NULL if nothing. */
 static const char *fault_of_head(const Snapshot *snapshot) {
-    if (memcmp(snapshot->format, FORMAT_NAME, sizeof FORMAT_NAME) != 0) return "is no state of such an FMU";
+    if (memcmp(snapshot->format, FORMAT_NAME, sizeof FORMAT_NAME) != 0) return "is not a state of such an FMU";
     if (snapshot->version != FORMAT_VERSION) return "has another version of the format";
     if (snapshot->length != (int32_t)sizeof *snapshot) return "has another length";
     return NULL;

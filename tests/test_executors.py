@@ -18,7 +18,7 @@ needs_dask = pytest.mark.skipif(importlib.util.find_spec("distributed") is None,
 
 @pytest.mark.parametrize("text", ["threads", "dask://", "dask://host", "dask://host:x", "tcp://host:8786", ""])
 def test_what_is_no_executor_is_refused(text: str) -> None:
-    with pytest.raises(InputError, match="is no executor"):
+    with pytest.raises(InputError, match="is not an executor"):
         check_executor(text)
 
 

@@ -1,4 +1,4 @@
-"""Aliases of array types: the shape stands in the docstring of what takes or returns them."""
+"""Aliases of array types: the docstring of what takes or returns them states the shape."""
 
 from __future__ import annotations
 

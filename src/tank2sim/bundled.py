@@ -1,6 +1,6 @@
 """The one locator of what comes with the program: ``models/`` and ``fmu_templates/``.
 
-In a checkout and an editable install both stand at the root of the project; in a wheel they stand inside the package.
+In a checkout and an editable install both are at the root of the project; in a wheel they are inside the package.
 """
 
 from __future__ import annotations

@@ -233,7 +233,7 @@ def _client(text: str) -> Client:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of other versions; those that matter are reported below
-            # What listens there and is no scheduler may keep Dask waiting longer than it was asked to.
+            # A listener that is not a scheduler may keep Dask waiting longer than it was asked to.
             return _within(
                 2 * ANSWERS_WITHIN_S, lambda: Client(address, timeout=ANSWERS_WITHIN_S, set_as_default=False)
             )
@@ -267,7 +267,7 @@ def _within(seconds: float, make: Callable[[], _Result]) -> _Result:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Dask tells of each connection that breaks, on the error stream; what the user is to know of it, we tell."""
+    """Dask reports each broken connection on the error stream; tank2sim reports what the user needs to know of it."""
     import distributed  # noqa: F401 - it sets up its loggers when it is imported
 
     trees = ("distributed", "tornado", "asyncio")

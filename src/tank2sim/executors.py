@@ -36,7 +36,7 @@ def check_executor(text: str) -> str:
     if text == PROCESSES:
         return text
     if not re.fullmatch(r"dask://[^/\s:]+:\d{1,5}|dask://\[[0-9a-fA-F:]+\]:\d{1,5}", text):
-        raise InputError(EXECUTOR_OPTION, "", f"{text!r} is no executor", f"give {EXECUTOR_FORMS}")
+        raise InputError(EXECUTOR_OPTION, "", f"{text!r} is not an executor", f"give {EXECUTOR_FORMS}")
     if importlib.util.find_spec("distributed") is None:
         problem = "Dask, which a cluster needs, is not installed"
         raise InputError(EXECUTOR_OPTION, "", problem, "pip install 'tank2sim[dask]', or leave the option out")
@@ -113,7 +113,7 @@ def _processes(workers: int | None) -> Iterator[Executor]:
 def _prepare() -> None:
     """Prepare a process for work.
 
-    An interrupt is for the one that began it alone: workers that were told of it, too, would each say so. A worker that
+    An interrupt is for the one that began it alone: workers that received it, too, would each report it. A worker that
     is busy for minutes does not outlive, unseen, the one that began it and was killed.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)

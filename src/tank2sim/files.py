@@ -40,13 +40,13 @@ def write_together(
 ) -> None:
     """Write several files, all or none: first all as temporary files next to their targets, then all are renamed.
 
-    A link keeps pointing where it does, and its target is replaced; what is no regular file (a device, a pipe) cannot
-    be replaced and is written to.
+    A link keeps pointing where it does, and its target is replaced; what is not a regular file (a device, a pipe)
+    cannot be replaced and is written to.
 
     Parameters
     ----------
     contents : mapping
-        Path to what is to stand there.
+        Path to the file that is to be there.
     inputs : paths, optional
         Files that were read, which must not be overwritten; those that do not exist are passed over.
     outputs : paths, optional
@@ -99,7 +99,7 @@ def _target(given: Path) -> _Target:
     if given is STANDARD_OUTPUT:
         return _Target(given, given, False)
     if given.name == "-" and given.parent == Path():
-        raise InputError(given, "", "is no name of a file", "only --json writes to standard output")
+        raise InputError(given, "", "is not the name of a file", "only --json writes to standard output")
     with _as_input_error(given):
         try:
             mode = given.stat().st_mode
@@ -107,7 +107,7 @@ def _target(given: Path) -> _Target:
             return _Target(given, _without_links(given), True)
         if stat.S_ISDIR(mode):
             raise InputError(given, "", "is a folder, and a file is to be written there", "give the name of a file")
-        # The links of /dev/stdout lead to no path when it is a pipe: what is no regular file keeps its name.
+        # The links of /dev/stdout lead to no path when it is a pipe: what is not a regular file keeps its name.
         regular = stat.S_ISREG(mode)
         return _Target(given, _without_links(given) if regular else given, regular)
 
@@ -177,11 +177,11 @@ def read_text(path: Path) -> str:
 
 
 def read_exact_text(path: Path) -> str:
-    """Text of a UTF-8 file as it stands, which encodes to the same bytes again. Raises as :func:`read_text`."""
+    """Text of a UTF-8 file unchanged, which encodes to the same bytes again. Raises as :func:`read_text`."""
     try:
         return Path(path).read_bytes().decode("utf-8")
     except FileNotFoundError:
-        raise InputError(path, "", "there is no such file", "check the name") from None
+        raise InputError(path, "", "the file does not exist", "check the name") from None
     except UnicodeDecodeError as error:
         raise InputError(path, f"byte {error.start}", "is not UTF-8 text", "save it as UTF-8") from None
     except OSError as error:
@@ -203,7 +203,7 @@ def writable_folder(path: Path) -> Path:
             pass
     except OSError as error:
         raise InputError(
-            path, "", f"is no folder that can be written ({error.strerror})", "choose another with -o"
+            path, "", f"is not a folder that can be written ({error.strerror})", "choose another with -o"
         ) from None
     return path
 

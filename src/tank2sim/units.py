@@ -1,6 +1,6 @@
-"""Units: those that stand in the names of keys and columns, and those that an FMU declares.
+"""Units in the names of keys and columns, and units that an FMU declares.
 
-A number's unit stands at the end of its name (``length_m``, ``psi_deg``). Inside the program everything is SI and
+A number's unit is at the end of its name (``length_m``, ``psi_deg``). Inside the program everything is SI and
 radians; :func:`to_si` converts a named number once, at the door.
 """
 
@@ -27,7 +27,7 @@ _SUFFIXES: dict[str, tuple[str, float]] = {
 def to_si(name: str, value: float) -> tuple[str, float]:
     """Name and value in SI: ``("max_angle_deg", 40.0)`` becomes ``("max_angle_rad", 0.698...)``.
 
-    Names whose unit is SI already, or that bear none, come back unchanged.
+    Names whose unit is SI already, or that have none, come back unchanged.
     """
     stem, _, suffix = name.rpartition("_")
     if stem and suffix in _SUFFIXES:
@@ -37,7 +37,7 @@ def to_si(name: str, value: float) -> tuple[str, float]:
 
 
 def from_si(name: str, value: float) -> float:
-    """The inverse of :func:`to_si` for one value: what stands under `name` in a file, from its SI value."""
+    """The inverse of :func:`to_si` for one value: the number under `name` in a file, from its SI value."""
     _, factor = to_si(name, 1.0)
     return value / factor
 

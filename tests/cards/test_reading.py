@@ -97,12 +97,12 @@ def test_uncertainty_left_out_is_two_percent() -> None:
         ('kind = "abkowitz"', 'kind = "mmg"', "model.kind", "abkowitz"),
         ('rudder_sign = "port"', "", "model.rudder_sign", "is missing"),
         ('yaw_rate_terms = "hydrodynamic"', 'yaw_rate_terms = "both"', "model.yaw_rate_terms", "total"),
-        ("Yv = -6e5", "Yv = -6e5\nYbeta = 1.0", "derivatives.Ybeta", "no name of a derivative"),
-        ("Yv = -6e5", "Yv = -6e5\nYvvvv = 1.0", "derivatives.Yvvvv", "no term of (3.8)"),
+        ("Yv = -6e5", "Yv = -6e5\nYbeta = 1.0", "derivatives.Ybeta", "not a name of a derivative"),
+        ("Yv = -6e5", "Yv = -6e5\nYvvvv = 1.0", "derivatives.Yvvvv", "not a term of (3.8)"),
         ("Xdd = -5e5", "Xudd = 1.0\nXddu = 1.0", "derivatives.Xddu", "same term as Xudd"),
         ("mass = 5e6", "mass = 5e12", "rigid_body.mass", "prime"),
         ("x_G = 1.0", "x_G = 80.0", "rigid_body.x_G", "midships"),
-        ("[derivatives]", "[wings]\na = 1\n[derivatives]", "wings", "no key of a card"),
+        ("[derivatives]", "[wings]\na = 1\n[derivatives]", "wings", "not a key of a card"),
         ("[derivatives]", "[derivatives", "line", "TOML"),
     ],
 )
@@ -140,7 +140,7 @@ def test_an_angle_out_of_bounds_is_told_in_the_units_of_the_file() -> None:
     [
         ('name = "curent"', "did you mean current?"),
         ('name = "current"', "speed_mps: is missing"),
-        ('name = "current"\nparameters = {speed_mps = 0.5, direction_deg = 30.0, depth_m = 1.0}', "no parameter"),
+        ('name = "current"\nparameters = {speed_mps = 0.5, direction_deg = 30.0, depth_m = 1.0}', "not a parameter"),
         ('name = "current"\nparameters = {speed_mps = -0.5, direction_deg = 30.0}', "was expected"),
         ('name = "current"\nparameters = {speed_mps = 0.5, direction_deg = 400}', "direction_deg: is 400; -360 to 360"),
     ],
@@ -151,7 +151,7 @@ def test_a_faulty_effect_is_refused(effect: str, expected: str) -> None:
 
 def test_an_effect_given_twice_is_refused() -> None:
     effect = '[[effects]]\nname = "current"\nparameters = {speed_mps = 0.5, direction_deg = 30.0}\n'
-    assert "stands twice" in refusal(f"{SI_CARD}\n{effect}{effect}")
+    assert "is given twice" in refusal(f"{SI_CARD}\n{effect}{effect}")
 
 
 def test_a_bundled_name_is_found_in_any_case_and_an_unknown_one_lists_them() -> None:

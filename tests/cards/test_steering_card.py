@@ -36,17 +36,17 @@ def test_ship_cards_are_no_steering_cards(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("length_m = 148.13", "length_ft = 486", "ship.length_ft: is no key"),
+        ("length_m = 148.13", "length_ft = 486", "ship.length_ft: is not a key"),
         ("length_m = 148.13", "length_m = -1", "ship.length_m"),
         ("rudder_deg = 15\n", 'rudder_deg = "much"\n', "rudder_deg: is 'much'"),
         ("yaw_rate_degpmin = 47", "drift_deg = 10", "points.0: has not one of yaw rate and radius"),
-        ('name = "curve-3"', 'name = "base"', "models: two bear one name"),
-        ('title = "model of Sobolev"', 'title = "base model"', "models: two bear one title"),
-        ('model = "inoue-hirano"\n', 'model = "nobody"\n', "influence.model: 'nobody' is no model"),
+        ('name = "curve-3"', 'name = "base"', "models: two have the same name"),
+        ('title = "model of Sobolev"', 'title = "base model"', "models: two have the same title"),
+        ('model = "inoue-hirano"\n', 'model = "nobody"\n', "influence.model: 'nobody' is not a model"),
         ("[6.0, 7.5, 9.0]", "[6.0, 6.0, 9.0]", "influence.draughts_m: has one draught twice"),
         ("[-1.60, -0.22, 1.85]", "[-1.60]", "influence.K_percent.C_y_b: has 1 values"),
         ('C_y_bw = "C_y_bb"', 'C_y_bw = "C_q"', "influence.misread_as: C_q has no K"),
-        ("[ship]", "[ship", "is no TOML"),
+        ("[ship]", "[ship", "is not TOML"),
     ],
 )
 def test_a_fault_is_told_by_its_key(old: str, new: str, told: str) -> None:

@@ -57,7 +57,7 @@ def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(tmp_path: Path
         ("wilinski-zellman",): "has no rudder",
         ("mariner", "--speed", "30"): "outside the range",
         ("mariner", "--track", "track.csv"): "same place",
-        ("mariner", "--track", "none.csv"): "no such file",
+        ("mariner", "--track", "none.csv"): "does not exist",
         ("mariner", "--track", "short.csv"): "short.csv: leg 1: is 2 m",
         ("mariner", "--course-change", "0"): "is 0",
         ("mariner", "--verify"): "needs an FMU",

@@ -224,7 +224,7 @@ def _with_trials(folder: Path, new: Path) -> Path:
         (["mariner", "turn20.csv", "turn20.csv"], ["turn20.csv", "has the name of another trial"]),
         (["mariner", "turn20.csv", "--holdout", "turn20.csv"], ["turn20.csv", "both fitted and held out"]),
         (["mariner", "turn20.csv", "--holdout", "sub/turn20.csv"], ["turn20.csv", "both fitted and held out"]),
-        (["mariner", "no.csv"], ["no.csv", "no such file"]),
+        (["mariner", "no.csv"], ["no.csv", "does not exist"]),
         (["mariner", "turn20.csv", "--holdout", "no.csv"], ["no.csv"]),
         (["titanic", "turn20.csv"], ["titanic"]),
         (["linear.toml", "turn20.csv"], ["linear.toml", "model.kind", "linear"]),
@@ -253,7 +253,7 @@ def test_bad_input_is_one_line_and_no_folder_is_made(
 def test_a_folder_that_cannot_be_written_is_told_before_the_work(folder: Path, tmp_path: Path, finding) -> None:
     calls = finding((CURRENT,))
     (tmp_path / "file").write_text("no folder")
-    refused(tank2sim("gap", "mariner", "turn20.csv", "-o", str(tmp_path / "file"), cwd=folder), "file", "no folder")
+    refused(tank2sim("gap", "mariner", "turn20.csv", "-o", str(tmp_path / "file"), cwd=folder), "file", "not a folder")
     if os.geteuid() != 0:
         (tmp_path / "locked").mkdir(mode=0o555)
         refused(tank2sim("gap", "mariner", "turn20.csv", "-o", str(tmp_path / "locked"), cwd=folder), "locked")

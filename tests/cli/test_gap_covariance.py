@@ -1,4 +1,4 @@
-"""The improved card of ``gap`` bears what of the covariance of the first one still holds, in its own folder."""
+"""The improved card of ``gap`` has what of the covariance of the first one still holds, in its own folder."""
 
 from __future__ import annotations
 

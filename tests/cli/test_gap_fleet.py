@@ -226,9 +226,9 @@ def test_a_folder_that_holds_a_card_is_one_ship(ships: Path, tmp_path: Path, fin
         (["ships", "-o", "ships/beta"], ["ships/beta", "of its own"]),
         (["ships/alpha/holdout", "-o", "out"], ["holds no ship"]),
         (["ships", "-o", "out", "--effects", "curent"], ["did you mean current"]),
-        (["ships", "-o", "out", "--executor", "threads"], ["is no executor"]),
+        (["ships", "-o", "out", "--executor", "threads"], ["is not an executor"]),
         (["ships", "-o", "out", "--json", "no/f.json"], ["no/f.json", "no such folder"]),
-        (["ships", "-o", "file"], ["file", "no folder"]),
+        (["ships", "-o", "file"], ["file", "not a folder"]),
     ],
 )
 def test_what_a_fleet_cannot_be_asked_is_one_line_and_nothing_is_written(

@@ -54,7 +54,7 @@ def test_the_reference_area_is_an_option(tmp_path) -> None:
         (["--angle-deg", "24", "--roll-deg", "30"], ["26.534 deg"]),
         (["--angle-deg", "thirty"], ["--angle-deg", "thirty"]),
         (["--angle-deg", "95"], ["95 deg"]),
-        (["kulikovsky-velikanov"], ["stands alone", "--card"]),
+        (["kulikovsky-velikanov"], ["is given alone", "--card"]),
         (["--card", "mariner"], ["model.kind", "glider"]),
         (["--programme", "none.csv"], ["none.csv"]),
         (["--budget-kg", "10"], ["--depth-m", "missing"]),

@@ -53,7 +53,7 @@ def test_card_json_and_plots_are_written_and_agree(path, tmp_path):
 def test_a_missing_run_is_refused_and_nothing_is_written(tmp_path):
     faulty = write(Campaign(seed=6, size="linear", rate_hz=5.0, faults={"drift_+04": "missing"}), tmp_path / "c").path
     card = tmp_path / "card.toml"
-    with pytest.raises(InputError, match=r"drift_\+04\.csv.*no such file"):
+    with pytest.raises(InputError, match=r"drift_\+04\.csv.*does not exist"):
         run(faulty, "-o", card)
     assert not card.exists()
     assert run(faulty, "-o", card, "--keep-going").exit_code == 0

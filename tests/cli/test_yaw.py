@@ -138,7 +138,7 @@ def test_theory_stands_beside_the_record(folder):
 
 
 def test_bad_input_is_one_line(folder):
-    refused(tank2sim("yaw", "none.csv", cwd=folder), "none.csv", "no such file")
+    refused(tank2sim("yaw", "none.csv", cwd=folder), "none.csv", "does not exist")
     refused(tank2sim("yaw", "water.csv", "--card", "mariner", cwd=folder), "--card", "-o")
     refused(tank2sim("yaw", "water.csv", "--mirror-percent", "0.1", cwd=folder), "no mirror images", "%")
     refused(tank2sim("yaw", "water.csv", "-o", "x.toml", "--card", "mariner", cwd=folder), "--inertia-kgm2")

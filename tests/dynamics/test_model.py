@@ -47,9 +47,9 @@ def test_faults_in_a_model_are_refused() -> None:
         decay(Parameter(name="decay.v", unit="1", description="", start=0.0))
     with pytest.raises(ValueError, match="unknown unit"):
         decay(Parameter(name="decay.w", unit="furlong", description="", start=0.0))
-    with pytest.raises(ValueError, match="no state or quantity"):
+    with pytest.raises(ValueError, match="not a state or quantity"):
         decay(outputs=("decay.speed",))
-    with pytest.raises(ValueError, match="no variables of the model"):
+    with pytest.raises(ValueError, match="not variables of the model"):
         decay(Quantity(name="decay.q", unit="1", description="", value=ca.SX.sym("stranger")))
     one = Quantity(name="decay.one", unit="1", description="", value=ca.SX(0))
     two = Quantity(name="decay.two", unit="1", description="", value=one.symbol)

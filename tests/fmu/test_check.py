@@ -266,7 +266,7 @@ def test_the_report_is_plain_data_and_nothing_is_printed(
     assert capfd.readouterr() == ("", "")
 
 
-# ---- files that are no FMU ----
+# ---- files that are not FMU ----
 
 
 def test_files_that_are_no_fmu_are_told_in_one_line(
@@ -278,13 +278,13 @@ def test_files_that_are_no_fmu_are_told_in_one_line(
     cases = {"text.fmu": b"no zip", "empty.fmu": b"", "short.fmu": whole[:-100], "damaged.fmu": bytes(damaged)}
     for name, content in cases.items():
         (tmp_path / name).write_bytes(content)
-        with pytest.raises(InputError, match=rf"{name}.*no FMU"):
+        with pytest.raises(InputError, match=rf"{name}.*not an FMU"):
             compare_with_model(tmp_path / name, model=hull)
     with zipfile.ZipFile(tmp_path / "bare.fmu", "w") as archive:
         archive.writestr("readme.txt", "nothing here")
     with pytest.raises(InputError, match=r"no modelDescription\.xml"):
         compare_with_model(tmp_path / "bare.fmu", model=hull)
-    for path, problem in ((tmp_path / "none.fmu", "no such file"), (tmp_path, "cannot be read")):
+    for path, problem in ((tmp_path / "none.fmu", "does not exist"), (tmp_path, "cannot be read")):
         with pytest.raises(InputError, match=problem):
             compare_with_model(path, model=hull)
         with pytest.raises(InputError, match=problem):

@@ -219,10 +219,10 @@ def test_a_check_repeats_the_reference_result(mariner_fmu: Fmu, tmp_path: Path) 
     ("name", "change", "words"),
     [
         (OUTPUTS_FILE, with_another_position, "from the reference result"),
-        (OUTPUTS_FILE, lambda text: text.replace("motion.u", "motion.w"), "motion.w, which is no variable"),
-        (OUTPUTS_FILE, lambda text: text[: len(text) // 2 - 3], "no table of"),
-        (INPUTS_FILE, lambda text: text + "x\n", "no table of numbers"),
-        (INPUTS_FILE, lambda text: "", "no table of"),
+        (OUTPUTS_FILE, lambda text: text.replace("motion.u", "motion.w"), "motion.w, which is not a variable"),
+        (OUTPUTS_FILE, lambda text: text[: len(text) // 2 - 3], "not a table of"),
+        (INPUTS_FILE, lambda text: text + "x\n", "not a table of numbers"),
+        (INPUTS_FILE, lambda text: "", "not a table of"),
     ],
 )
 def test_a_reference_result_that_is_wrong_or_damaged_fails_the_check(

@@ -57,10 +57,10 @@ def test_platforms_go_by_the_names_of_both_versions() -> None:
 
 @pytest.mark.parametrize("names", ["", "amiga", "linux64,", "all,linux64", "host,win64", "LINUX64"])
 def test_what_is_no_platform_is_told(names: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="is no platform") as caught:
+    with pytest.raises(InputError, match="is not a platform") as caught:
         named_platforms(names)
     assert "x86_64-windows" in caught.value.remedy
-    refused(tank2sim("export", "mariner", "-o", "x.fmu", "--platforms", names, cwd=tmp_path), "is no platform")
+    refused(tank2sim("export", "mariner", "-o", "x.fmu", "--platforms", names, cwd=tmp_path), "is not a platform")
     assert list(tmp_path.iterdir()) == []
 
 

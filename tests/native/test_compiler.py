@@ -1,4 +1,4 @@
-"""A compiler that is there and of no use is told in one line, and is no compiler to those who can do without."""
+"""A compiler that is there and of no use is told in one line, and is not a compiler to those who can do without."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ def covariance_file(card: Path) -> Path:
 def referring(text: str, card: Path) -> str:
     """A card's text with the line that refers to the file next to `card`, in place of any that it had.
 
-    It stands after the comment with which the card begins.
+    It follows the comment with which the card begins.
     """
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
     kept = _WHOLE_LINE.sub("", text.removeprefix(mark))
@@ -146,12 +146,12 @@ def _form(path: Path) -> tuple[list[str], object]:
     try:
         content = json.loads(read_text(path))
     except (ValueError, RecursionError) as error:
-        raise InputError(path, "", f"is no JSON ({error})", "write it again with reduce or identify") from None
+        raise InputError(path, "", f"is not JSON ({error})", "write it again with reduce or identify") from None
     if not isinstance(content, dict) or content.get("format") != _FORMAT:
         raise InputError(path, "format", f"is not {_FORMAT!r}", "give a file that reduce or identify wrote")
     names = content.get("names")
     if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
-        raise InputError(path, "names", "is no list of keys of the card", 'give names such as "derivatives.Yv"')
+        raise InputError(path, "names", "is not a list of keys of the card", 'give names such as "derivatives.Yv"')
     if len(set(names)) < len(names):
         raise InputError(path, "names", "has a name twice", "give each number once")
     return names, content.get("covariance")
@@ -163,7 +163,7 @@ def _matrix(path: Path, names: Sequence[str], rows: object) -> Array:
     except (TypeError, ValueError):
         matrix = np.zeros(0)
     if matrix.shape != (len(names), len(names)) or not np.isfinite(matrix).all():
-        problem = f"is no matrix of {len(names)} rows of {len(names)} finite numbers"
+        problem = f"is not a matrix of {len(names)} rows of {len(names)} finite numbers"
         raise InputError(path, "covariance", problem, "give a row for each of the names")
     errors = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     size = np.outer(errors, errors)
@@ -184,7 +184,9 @@ def _check_names(card: Card, path: Path, names: Sequence[str]) -> None:
     for name in names:
         value = _at(content, name)
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise InputError(path, f"names: {name}", f"is no number of {card.source}", "give dotted keys of the card")
+            raise InputError(
+                path, f"names: {name}", f"is not a number of {card.source}", "give dotted keys of the card"
+            )
 
 
 def _check_errors(card: Card, path: Path, names: Sequence[str], matrix: Array) -> None:
@@ -206,7 +208,7 @@ def _uncertainty_of(name: str) -> str:
 
 
 def _at(content: Any, key: str) -> object:
-    """What stands at a dotted key of a TOML document; None if nothing does."""
+    """Value at a dotted key of a TOML document; None if there is none."""
     for part in key.split("."):
         if isinstance(content, list) and part.isdigit() and int(part) < len(content):
             content = content[int(part)]

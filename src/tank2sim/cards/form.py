@@ -36,7 +36,7 @@ def _rising_pair(value: object) -> object:
     Raises
     ------
     ValueError
-        It is no list of two plausible speeds, the lower first.
+        It is not a list of two plausible speeds, the lower first.
     """
     if not isinstance(value, list):
         return value

@@ -49,13 +49,13 @@ def form_fault(
 
 
 def short(value: object) -> str:
-    """A value as it would stand in Python, cut to 80 characters."""
+    """A value as Python would write it, cut to 80 characters."""
     text = repr(value)
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def suggestion(key: str, known: list[str]) -> str:
-    """What to do about an unknown key where the `known` ones may stand."""
+    """What to do about an unknown key where the `known` ones may be given."""
     close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
     same_stem = [name for name in known if name.partition("_")[0] == key.partition("_")[0]]
     best = close or same_stem
@@ -80,7 +80,7 @@ def _problem_and_remedy(fault: Any, key: str, form: type[BaseModel], what: str) 
         case "extra_forbidden":
             inside = _in_a_section(key, form) if len(fault["loc"]) == 1 else []
             remedy = f"did you mean {inside[0]}?" if inside else suggestion(key, _siblings(fault["loc"], form))
-            return f"is no key of {what}", remedy
+            return f"is not a key of {what}", remedy
         case "finite_number":
             return f"is {short(given)}", "a finite number was expected"
         case "float_type" | "int_type":
@@ -109,7 +109,7 @@ def _shown(key: str, value: float) -> str:
 
 
 def _siblings(place: tuple[int | str, ...], form: Any) -> list[str]:
-    """Keys that may stand where an unknown one was found."""
+    """Keys that may be given where an unknown one was found."""
     for part in place[:-1]:
         if isinstance(part, int):
             continue

@@ -79,7 +79,7 @@ def read_card(name: str | Path, changes: Mapping[str, object] | None = None) -> 
     Raises
     ------
     InputError
-        There is no such card, or something in it is wrong; the message names file, key and what was expected.
+        The card does not exist, or something in it is wrong; the message names file, key and what was expected.
     """
     path = find_card(str(name))
     text = read_exact_text(path)
@@ -108,12 +108,12 @@ def parse_card(text: str, source: str) -> Card:
 def changed_text(text: str, source: str, changes: Mapping[str, object], *, comment: str | None = None) -> str:
     """A card's text with values at dotted keys replaced or added; everything else stays as it is, comments included.
 
-    With a `comment` the changed keys bear that instead of their own, which told of the value that is gone.
+    With a `comment` it replaces the comments of the changed keys, which described the old values.
 
     Raises
     ------
     InputError
-        A key leads through something that is no section.
+        A key leads through something that is not a section.
     """
     document = _document(text, source)
     for key, value in changes.items():
@@ -127,7 +127,7 @@ def changed_text(text: str, source: str, changes: Mapping[str, object], *, comme
                 table[section] = tomlkit.table()
             table = table[section]
             if not isinstance(table, dict | list):
-                raise InputError(source, key, f"cannot be set: {section} is no section", "give section.key=value")
+                raise InputError(source, key, f"cannot be set: {section} is not a section", "give section.key=value")
         table[last] = value
         if comment is not None and not isinstance(table, tomlkit.items.InlineTable):  # {...} cannot hold comments
             table[last].comment(comment)
@@ -152,7 +152,7 @@ def revised(
     for name, (value, error) in derivatives.items():
         term = parse_term(name)
         if term is None:
-            raise ValueError(f"{name} is no derivative")
+            raise ValueError(f"{name} is not a derivative")
         factor = file_factor(term, scales, rudder_to_port=card.model.rudder_sign == "port")
         key = card.places.get(name, name)
         changes[f"derivatives.{key}"] = value * factor
@@ -176,7 +176,7 @@ def _content(text: str, source: str) -> dict[str, Any]:
 
 
 def _document(text: str, source: str) -> tomlkit.TOMLDocument:
-    _content(text, source)  # unlike tomlkit, tomllib tells the place of every fault, a doubled key's too
+    _content(text, source)  # unlike tomlkit, tomllib reports the place of every fault, a doubled key's too
     with faults_of_toml(source):
         document = tomlkit.parse(text.removeprefix(BYTE_ORDER_MARK))
     return document
@@ -271,7 +271,9 @@ def _si_card(form: SurgeCard | GliderForm | YawRigForm, section: str, text: str,
     known = list(type(fields[section]).model_fields)
     for key in fields.get("uncertainty", {}):
         if key not in known:
-            raise InputError(source, f"uncertainty.{key}", f"is no coefficient of [{section}]", suggestion(key, known))
+            raise InputError(
+                source, f"uncertainty.{key}", f"is not a coefficient of [{section}]", suggestion(key, known)
+            )
     return _SI_CARDS[section](source=source, text=text, **fields)
 
 
@@ -303,7 +305,7 @@ def _canonical_names(values: Mapping[str, float], section: str, source: str) -> 
         term = parse_term(key)
         if term is None:
             remedy = "a name is X, Y or N and then v, r, d, u as often as they occur (Yvvr), 0 or udot, vdot, rdot"
-            raise InputError(source, f"{section}.{key}", "is no name of a derivative", remedy)
+            raise InputError(source, f"{section}.{key}", "is not a name of a derivative", remedy)
         if term.name in places:
             problem = f"is the same term as {places[term.name]}"
             raise InputError(source, f"{section}.{key}", problem, f"give it once, as {term.name}")
@@ -315,4 +317,4 @@ def _refuse_doubled_effects(effects: list[EffectEntry], source: str) -> None:
     names = [entry.name for entry in effects]
     for number, name in enumerate(names):
         if name in names[:number]:
-            raise InputError(source, f"effects.{number}.name", f"{name} stands twice", "give each effect once")
+            raise InputError(source, f"effects.{number}.name", f"{name} is given twice", "give each effect once")

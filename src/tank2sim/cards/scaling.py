@@ -53,7 +53,7 @@ class Scales:
 
 
 def file_factor(term: Term, scales: Scales | None, *, rudder_to_port: bool) -> float:
-    """What a derivative inside (prime, starboard) is multiplied by to stand in a file.
+    """What a derivative inside (prime, starboard) is multiplied by before it is written to a file.
 
     Parameters
     ----------

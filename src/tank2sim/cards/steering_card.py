@@ -1,7 +1,7 @@
 """Steering cards: one ship in several steering models, with the points of its steering diagram that are known.
 
 The format is ``tank2sim-steering/1``: ``[ship]``, ``[[models]]`` with their coefficients, ``[[points]]``, and printed
-influence coefficients in ``[influence]``. Which coefficients a model has is said where its equations stand
+influence coefficients in ``[influence]``. Which coefficients a model has is defined next to its equations
 (:mod:`tank2sim.dynamics.steering_models`).
 """
 
@@ -131,7 +131,7 @@ class SteeringCard:
     influence: PrintedInfluence | None
 
     def place(self, model: str) -> str:
-        """Where a model stands in the file, for messages."""
+        """The place of a model in the file, for messages."""
         return f"models.{list(self.models).index(model)}"
 
 
@@ -147,7 +147,7 @@ def find_steering_card(name: str) -> Path | None:
     try:
         content = tomllib.loads(read_text(path))
     except (InputError, ValueError, RecursionError):
-        return None  # the reader of ship cards tells the fault
+        return None  # the reader of ship cards reports the fault
     return path if str(content.get("format", "")).startswith(_FORMAT.partition("/")[0] + "/") else None
 
 
@@ -157,12 +157,12 @@ def read_steering_card(name: str | Path) -> SteeringCard:
     Raises
     ------
     InputError
-        There is no such card, or something in it is wrong; the message names file, key and what was expected.
+        The card does not exist, or something in it is wrong; the message names file, key and what was expected.
     """
     path = find_steering_card(str(name))
     if path is None and not Path(name).is_file():
         known = sorted(folder.parent.name for folder in bundled("models").glob(f"*/{_FILE}"))
-        raise InputError(name, "", "is no file and no bundled steering card", f"bundled are: {', '.join(known)}")
+        raise InputError(name, "", "is neither a file nor a bundled steering card", f"bundled are: {', '.join(known)}")
     return parse_steering_card(read_text(path or Path(name)), str(path or name))
 
 
@@ -171,7 +171,7 @@ def parse_steering_card(text: str, source: str) -> SteeringCard:
     try:
         content = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise InputError(source, "", f"is no TOML: {error}", "correct the TOML there") from None
+        raise InputError(source, "", f"is not TOML: {error}", "correct the TOML there") from None
     spelt: dict[str, str] = {}
     _to_radians(content, spelt)
     try:
@@ -180,9 +180,9 @@ def parse_steering_card(text: str, source: str) -> SteeringCard:
         raise form_fault(error, source, spelt, form=_Form, what="a steering card") from None
     models = {entry.name: entry for entry in form.models}
     if len(models) < len(form.models):
-        raise InputError(source, "models", "two bear one name", "give each model a name of its own")
+        raise InputError(source, "models", "two have the same name", "give each model a name of its own")
     if len({entry.title for entry in form.models}) < len(form.models):
-        raise InputError(source, "models", "two bear one title", "give each model a title of its own")
+        raise InputError(source, "models", "two have the same title", "give each model a title of its own")
     for number, point in enumerate(form.points):
         if (point.yaw_rate_radps is None) == (point.radius_m is None):
             remedy = "give yaw_rate_degpmin or radius_m"
@@ -197,7 +197,7 @@ def _check_influence(form: _Form, models: Mapping[str, SteeringEntry], source: s
         return
     if influence.model not in models:
         remedy = f"the models are {', '.join(models)}"
-        raise InputError(source, "influence.model", f"{influence.model!r} is no model of the card", remedy)
+        raise InputError(source, "influence.model", f"{influence.model!r} is not a model of the card", remedy)
     if len(set(influence.draughts_m)) < len(influence.draughts_m):
         raise InputError(source, "influence.draughts_m", "has one draught twice", "give each draught once")
     for name, values in influence.K_percent.items():

@@ -1,7 +1,7 @@
-"""Names of hydrodynamic derivatives: how a name is spelt, and which powers of v, r, rudder and speed it stands for.
+"""Names of hydrodynamic derivatives: how a name is spelt, and which powers of v, r, rudder and speed it denotes.
 
-Which names a model has is said where its equation stands (:mod:`tank2sim.dynamics.abkowitz`); this is only the grammar:
-``Yvvr`` is the coefficient of v^2 r in Y, ``X0`` a constant, ``Y0u`` the coefficient of Du in Y, ``Nrdot`` an
+The names that a model has are listed next to its equation (:mod:`tank2sim.dynamics.abkowitz`); this is the grammar
+alone: ``Yvvr`` is the coefficient of v^2 r in Y, ``X0`` a constant, ``Y0u`` the coefficient of Du in Y, ``Nrdot`` an
 acceleration derivative.
 """
 
@@ -46,7 +46,7 @@ class Term:
 
 
 def parse_term(name: str) -> Term | None:
-    """The term a name stands for, whatever the order of its letters (``Xudd`` is ``Xddu``); None if it is no name."""
+    """The term a name denotes, whatever the order of its letters (``Xudd`` is ``Xddu``); None if it is not a name."""
     acceleration = _ACCELERATION_TERM.fullmatch(name)
     if acceleration:
         return Term(acceleration[1], acceleration=acceleration[2])
@@ -62,5 +62,5 @@ def known_term(name: str) -> Term:
     """The term of a name that a list of the program has; raises ValueError if it is none."""
     term = parse_term(name)
     if term is None:
-        raise ValueError(f"{name} is no derivative")
+        raise ValueError(f"{name} is not a derivative")
     return term

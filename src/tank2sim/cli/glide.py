@@ -55,7 +55,7 @@ def command(
     """
     if further and not angles:
         remedy = "a card goes after --card, an angle after --angle-deg"
-        raise InputError(further[0], "", "stands alone", remedy)
+        raise InputError(further[0], "", "is given alone", remedy)
     ship = load(card, values if area is None else {**values, "glider.reference_area_m2": area})
     result = ship.glide(
         _parse_angles((*angles, *further)),

@@ -45,7 +45,9 @@ def parse_bounds(given: Iterable[str]) -> dict[str, tuple[float, float]]:
         name, _, ends = text.partition("=")
         low, dots, high = ends.partition("..")
         if not dots or not name.strip():
-            raise InputError(BOUND, text, "is no NAME=LOW..HIGH", "give, for example, --bound Yv=-0.013..-0.010")
+            raise InputError(
+                BOUND, text, "is not of the form NAME=LOW..HIGH", "give, for example, --bound Yv=-0.013..-0.010"
+            )
         pair = (_number(BOUND, text, low), _number(BOUND, text, high))
         if not pair[0] < pair[1]:
             raise InputError(BOUND, text, "leaves no room", "give LOW..HIGH with LOW below HIGH")
@@ -59,13 +61,13 @@ def _number(option: str, text: str, number: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(option, text, f"{number.strip() or 'nothing'} is no number", "give NAME and a number")
+        raise InputError(option, text, f"{number.strip() or 'nothing'} is not a number", "give NAME and a number")
     return value
 
 
 def _from_file(path: Path) -> dict[str, float]:
     if not path.is_file():
-        raise InputError(AGREED, str(path), "is no NAME=PERCENT and no file", "give, for example, --agreed Yv=0.62")
+        raise InputError(AGREED, str(path), "is neither NAME=PERCENT nor a file", "give, for example, --agreed Yv=0.62")
     try:
         content = tomllib.loads(read_exact_text(path))
     except ValueError as error:

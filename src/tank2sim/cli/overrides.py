@@ -24,7 +24,7 @@ def parse_changes(settings: Iterable[str]) -> dict[str, object]:
         key, text = key.strip(), text.strip()
         if not sign or not all(key.split(".")) or not text:
             remedy = "give section.key=value, for example --set derivatives.Yv=-0.012"
-            raise InputError("--set", setting, "is no KEY=VALUE", remedy)
+            raise InputError("--set", setting, "is not of the form KEY=VALUE", remedy)
         try:
             changes[key] = tomlkit.parse(f"value = {text}").unwrap()["value"]
         except TOMLKitError:

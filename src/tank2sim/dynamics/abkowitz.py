@@ -1,6 +1,6 @@
 """The hydrodynamic polynomials of paper 2: third order (3.8), Abkowitz, and linear (3.5).
 
-The lists of terms stand here and nowhere else; a name tells its powers (:mod:`tank2sim.cards.terms`), so that list and
+The lists of terms are defined here alone; a name states its powers (:mod:`tank2sim.cards.terms`), so that list and
 equation are one. Taylor factors (1/2, 1/6) are absorbed in the coefficients.
 """
 

@@ -5,8 +5,8 @@
     rudder = order, within the limit
     dz/dt  = Ki (e, within the band) + (rudder - order, within -z and 0)/Tt
 
-The integral takes no more of a heading error than its band, so that a change of course, which is no disturbance, does
-not fill it. The term in Tt empties the integral z while the rudder is at its limit (back-calculation): Astrom &
+The integral takes no more of a heading error than its band, so that a change of course, which is not a disturbance,
+does not fill it. The term in Tt empties the integral z while the rudder is at its limit (back-calculation): Astrom &
 Hagglund (2006), Advanced PID Control, 3.5. It empties z and no more: a large change of course alone orders far more
 than the limit, and would fill z the other way, so that the ship crept to its new course.
 

@@ -9,7 +9,7 @@ YAW_DISTURBANCE = "waves.yaw_acceleration"
 
 
 def closed_loop_model(ship: Model, autopilot: Model) -> Model:
-    """One model of both: each input of the one that bears the name of the other's state or quantity is joined to it.
+    """One model of both: each input of the one that has the name of the other's state or quantity is joined to it.
 
     ``heading.command`` stays an input; outputs are those of both. The equations are those of the two models as they
     are: an input that is joined becomes a quantity ``joint.<name>`` whose value is the signal itself.
@@ -17,7 +17,7 @@ def closed_loop_model(ship: Model, autopilot: Model) -> Model:
     Raises
     ------
     ValueError
-        The two have a variable of one name that is no joint.
+        Both have a variable of the same name that is not joined.
     """
     joints: list[Quantity] = []
     for receiver, sender in ((ship, autopilot), (autopilot, ship)):

@@ -58,7 +58,7 @@ def _with_effect(model: Model, card: ManoeuvringCard, entry: EffectEntry, place:
         for name in given:
             if name not in known:
                 remedy = f"{entry.name} has {', '.join(known)} (angles also in deg)"
-                raise card.fault(f"{place}.{section}.{name}", f"is no parameter of {entry.name}", remedy)
+                raise card.fault(f"{place}.{section}.{name}", f"is not a parameter of {entry.name}", remedy)
     for name, parameter in known.items():
         if name not in entry.parameters:
             if parameter.default is not None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from scipy.special import elliprd
 
 # Two axes closer than this make a body of revolution: (b/c - 1)^2, to which the added inertia is proportional, is then
-# below what a float can tell from 1.
+# below what a float can distinguish from 1.
 _ROUND = 1e-8
 
 

@@ -19,7 +19,7 @@ EVENT_SHIFT = 1e-9
 rounds and far below what a ship or a solver notices. Many kinks are approached for ever or never left (a rudder at its
 order, an order at the largest angle), where the difference itself would change sign with each rounding."""
 
-# |a| is left out: it stands as a |a| in these equations, whose derivative is continuous.
+# |a| is left out: it appears as a |a| in these equations, whose derivative is continuous.
 _KINKED = (ca.OP_FMIN, ca.OP_FMAX, ca.OP_LT, ca.OP_LE)
 
 
@@ -29,7 +29,7 @@ def kinks(model: Model) -> tuple[Quantity, ...]:
 
     For each minimum, maximum or comparison of a and b in a quantity on which a derivative of a state depends, a - b
     less :data:`EVENT_SHIFT`; those that hold neither a state nor an input are left out. Their values are expanded,
-    and they are no part of the model.
+    and they are not part of the model.
     """
     variables = ca.vertcat(model.x, model.u)
     found: list[Quantity] = []

@@ -41,7 +41,7 @@ _PITCH = 0.5
 
 
 def glider_warnings(card: GliderCard) -> tuple[str, ...]:
-    """What to tell of a card: a displaced volume that does not carry its mass, and an area that is V^(2/3).
+    """Messages about a card: a displaced volume that does not carry its mass, and an area that is V^(2/3).
 
     Both are so in the paper's own data.
     """
@@ -50,10 +50,10 @@ def glider_warnings(card: GliderCard) -> tuple[str, ...]:
     light = density * glider.volume_m3 - glider.mass_kg
     if abs(light) > 0.02 * glider.mass_kg:
         messages.append(
-            f"the card contradicts itself: {glider.volume_m3:g} m3 displace {density * glider.volume_m3:.4g} kg and the mass "
-            f"is {glider.mass_kg:g} kg, a net buoyancy of {light:+.3g} kg where the glider has {glider.buoyancy_kg:g} kg "
-            f"({glider.mass_kg:g} kg displace {glider.mass_kg / density:.4g} m3); mass and net buoyancy are used as they "
-            "are, the volume in the ballast (1) alone"
+            f"the card contradicts itself: {glider.volume_m3:g} m3 displace {density * glider.volume_m3:.4g} kg and "
+            f"the mass is {glider.mass_kg:g} kg, a net buoyancy of {light:+.3g} kg where the glider has "
+            f"{glider.buoyancy_kg:g} kg ({glider.mass_kg:g} kg displace {glider.mass_kg / density:.4g} m3); mass and "
+            "net buoyancy are used as they are, the volume in the ballast (1) alone"
         )
     if math.isclose(glider.reference_area_m2, glider.volume_m3 ** (2 / 3), rel_tol=1e-3):
         messages.append(

@@ -3,7 +3,7 @@
 The path makes an angle epsilon with the horizontal (+ up), the hull the pitch theta = epsilon + alpha (2), and the
 plane of symmetry, in which the motion stays, is rolled by gamma about the path (+ starboard side down). These are the
 paper's angles; at the incidences of a glide they differ from Euler's pitch and roll by alpha (1 - cos gamma), 0.01 deg
-with 5 deg of roll. Vectors stand in axes that turn with the course: along it and horizontal, to starboard, up.
+with 5 deg of roll. Vectors are in axes that turn with the course: along it and horizontal, to starboard, up.
 
 Everything here takes numbers as well as CasADi expressions.
 """
@@ -91,8 +91,8 @@ def glider_accelerations(at: Attitude, momentum: ca.SX, force: ca.SX, others: ca
     others : (3, 1)
         Rate of the momentum by the rates of pitch and roll alone.
     """
-    # A path that is almost vertical has no course, and none of these equations tells how it would turn: beyond 84 deg
-    # (a horizontal share of 0.1, project choice) its course turns no faster than at that angle.
+    # A path that is almost vertical has no course, and these equations do not determine how it would turn: beyond 84
+    # deg (a horizontal share of 0.1, project choice) its course turns no faster than at that angle.
     turned = ca.fmax(momentum[0], 0.1 * ca.norm_2(momentum) + _SLOWEST_MPS)
     by_velocity = ca.jacobian(momentum, ca.vertcat(at.u, at.w))
     matrix = ca.horzcat(by_velocity, ca.vertcat(-momentum[1], turned, 0))

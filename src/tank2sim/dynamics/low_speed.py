@@ -18,7 +18,7 @@ make of it), and the resistance R_b is that of the card at u_b: F_p less the car
 without propulsion keeps its revolutions, whatever the speed, unless its X at u_b is a resistance already (a bare hull:
 F_p = 0, and it comes to rest).
 
-The rudder stands in the race of the propeller, with the card's own terms in delta alone, as they are at u0:
+The rudder is in the race of the propeller, with the card's own terms in delta alone, as they are at u0:
 
     F = F_delta(u0) (A u|u| + B n^2/n0^2) + F_d(u0) gamma B/sqrt(J) n/n0 (v - r L/2)
     A u_b^2 + B = k,    B/A = J, but B abs(Y_d(u0)) <= F_p/(1 - t),    J = 2 F_p/(c rho pi D^2/4)
@@ -77,7 +77,7 @@ it brings the ship to rest. Project choice."""
 LEAST_SHARE, LEAST_RESISTANCE = 0.7, 1e-4
 """R_b is not taken to be less than this share of (u_b/u0)^2 times the resistance at u0, of which waves, that fall away,
 make up three tenths at most on ships that push no hump; nor than this much of 1/2 rho L^2 u_b^2, a sixth of a usual
-resistance. Both are choices of ours, for cards whose thrust and polynomial disagree."""
+resistance. Both are project choices, for cards whose thrust and polynomial disagree."""
 
 DRAG_COEFFICIENT = 1.0
 """C_D: the largest of 0.6 to 1 for whole hulls (Faltinsen 1990, 6.4), for a turn on the spot works on the ends, which

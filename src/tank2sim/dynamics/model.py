@@ -59,7 +59,7 @@ class Variable:
 
     @cached_property
     def symbol(self) -> ca.SX:
-        """The scalar CasADi symbol that stands for this variable in expressions."""
+        """The scalar CasADi symbol that denotes this variable in expressions."""
         return ca.SX.sym(self.name)
 
 
@@ -148,8 +148,8 @@ class Model:
     Raises
     ------
     ValueError
-        Two variables have one name, a name or unit is unknown, an expression uses a symbol that is no variable of the
-        model, or quantities define each other in a circle.
+        Two variables have one name, a name or unit is unknown, an expression uses a symbol that is not a variable of
+        the model, or quantities define each other in a circle.
     """
 
     name: str
@@ -174,7 +174,7 @@ class Model:
         known = {quantity.name for quantity in self.quantities}
         for name in (*self.outputs, *(state.derivative for state in self.states)):
             if name not in known and name not in {state.name for state in self.states}:
-                raise ValueError(f"{name} is no state or quantity")
+                raise ValueError(f"{name} is not a state or quantity")
         _ = self._sorted_quantities
 
     # -- looking things up -------------------------------------------------------------------------------------------
@@ -263,7 +263,7 @@ class Model:
     def redefine(self, name: str, value: Callable[[ca.SX], ca.SX]) -> Model:
         """A model in which the quantity `name` has the value ``value(old expression)``."""
         if name not in {quantity.name for quantity in self.quantities}:
-            raise ValueError(f"{name} is no quantity of {self.name}")
+            raise ValueError(f"{name} is not a quantity of {self.name}")
         changed = tuple(
             _same_symbol(quantity, replace(quantity, value=ca.SX(value(quantity.value))))
             if quantity.name == name
@@ -273,7 +273,7 @@ class Model:
         return replace(self, quantities=changed)
 
     def substitute(self, name: str, value: ca.SX) -> Model:
-        """A model in which `value` stands wherever the variable `name` stood: in quantities, starts and trims.
+        """A model in which `value` replaces the variable `name`: in quantities, starts and trims.
 
         `value` may hold the old symbol. A parameter that it does not hold acts on nothing any more, and is dropped.
         """
@@ -415,9 +415,9 @@ class Model:
         uses: dict[str, set[str]] = {}
         for quantity in self.quantities:
             symbols = {symbol.element_hash(): symbol for symbol in ca.symvar(quantity.value)}
-            strangers = [symbols[key].name() for key in symbols if key not in known and key not in by_symbol]
-            if strangers:
-                raise ValueError(f"{quantity.name} uses {strangers}, which are no variables of the model")
+            unknown = [symbols[key].name() for key in symbols if key not in known and key not in by_symbol]
+            if unknown:
+                raise ValueError(f"{quantity.name} uses {unknown}, which are not variables of the model")
             uses[quantity.name] = {by_symbol[key].name for key in symbols if key in by_symbol}
         try:
             order = graphlib.TopologicalSorter(uses).static_order()
@@ -430,7 +430,7 @@ class Model:
 def _values(variables: tuple[Parameter, ...] | tuple[Input, ...], changed: Mapping[str, float]) -> Array:
     unknown = set(changed) - {variable.name for variable in variables}
     if unknown:
-        raise KeyError(f"no such variable: {', '.join(sorted(unknown))}")
+        raise KeyError(f"unknown variable: {', '.join(sorted(unknown))}")
     return np.array([changed.get(variable.name, variable.start) for variable in variables], dtype=float)
 
 

@@ -57,8 +57,8 @@ def propulsion(section: Propulsion) -> tuple[Variable, ...]:
 def propeller_force(n: ca.SX, nominal: ca.SX, Xnn: ca.SX) -> ca.SX:
     """X' of the propeller at the speed of expansion: Xnn (n|n|/n0^2 - 1); zero at nominal revolutions n0 (rad/s).
 
-    A card tells the thrust ahead, by the revolutions about u0. In all four quadrants the same is assumed here: it goes
+    A card states the thrust ahead, by the revolutions about u0. In all four quadrants the same is assumed here: it goes
     with n|n|, whichever way the ship moves; its slope at n = 0 is zero from both sides. A real propeller pushes less
-    astern than ahead at the same revolutions, and one that stands still drags.
+    astern than ahead at the same revolutions, and one that does not move drags.
     """
     return Xnn * (n * ca.fabs(n) / nominal**2 - 1)

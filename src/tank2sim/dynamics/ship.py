@@ -95,7 +95,7 @@ def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[str]]:
                 close = difflib.get_close_matches(name, ALL_TERMS, n=1)
                 hint = f"did you mean {close[0]}? " if close else ""
                 remedy = f"{hint}the third-order model has {' '.join(ALL_TERMS)}"
-                raise card.fault(f"{section}.{key}", "is no term of (3.8)", remedy)
+                raise card.fault(f"{section}.{key}", "is not a term of (3.8)", remedy)
     if card.model.kind == "abkowitz":
         return list(ALL_TERMS), []
     names = [*LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS]

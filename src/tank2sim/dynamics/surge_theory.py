@@ -1,6 +1,6 @@
 """What the surge coefficients of (1.5) say of a body: drag coefficients (1.3), and the mass by theory (2.5) of paper 1.
 
-Both need the size of the body and its water, which the tows alone do not tell.
+Both need the size of the body and its water, which the tows alone do not determine.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ SHIP_AIR = YawRig(
     inertia_kgm2=179.6e-4, coulomb_Nm=10.3e-4, viscous_Nms=10.7e-4, torque_constant_NmpA=_TORQUE_CONSTANT_NMPA
 )
 UNKNOWN_RIG = YawRig(inertia_kgm2=1.0, torque_constant_NmpA=1.0)
-"""A rig of which nothing is known: the first two numbers stand for those that are to be found."""
+"""A rig of which nothing is known: the first two numbers are placeholders for those that are to be found."""
 
 
 def friction(rate: ca.SX, coulomb: ca.SX, viscous: ca.SX, quadratic: ca.SX) -> ca.SX:

@@ -72,7 +72,7 @@ def co_simulate_heading(
     Raises
     ------
     InputError
-        A file is no FMU that runs here, offers no Co-Simulation, or lacks a signal of the two.
+        A file is not an FMU that runs here, offers no Co-Simulation, or lacks a signal of the two.
     """
     count = round(duration_s / step_s)
     time = np.asarray(step_s * np.arange(count + 1), dtype=np.float64)

@@ -153,9 +153,9 @@ def _repeat_reference(unpacked: UnpackedFmu) -> tuple[list[str], float | None]:
     if reference is None or "CoSimulation" not in unpacked.kinds:
         return [], None
     variables = {variable.name: variable for variable in unpacked.description.modelVariables}
-    strangers = [name for name in (*reference.input_names, *reference.output_names) if name not in variables]
-    if strangers:
-        return [f"the reference result has {strangers[0]}, which is no variable of the FMU"], None
+    unknown = [name for name in (*reference.input_names, *reference.output_names) if name not in variables]
+    if unknown:
+        return [f"the reference result has {unknown[0]}, which is not a variable of the FMU"], None
     names: dict[str, tuple[str, ...]] = {"inputs": reference.input_names, "outputs": reference.output_names}
     answer = drive_apart(unpacked, Drive(kind="CoSimulation", run=reference.run, parameters=(), **names))
     if answer.outputs is None:

@@ -16,7 +16,7 @@ _SECTIONS = ("UnitDefinitions", "DefaultExperiment", "ModelVariables", "ModelStr
 _IDENTIFIERS = ("name", "valueReference", "index")
 
 Elements = dict[str, dict[str, str]]
-"""Where an element stands, in words, to its attributes."""
+"""Place of each element, in words, to its attributes."""
 
 
 def description_differences(path: Path, text: bytes, model: Model, fmi: int) -> list[str]:
@@ -34,7 +34,7 @@ def description_differences(path: Path, text: bytes, model: Model, fmi: int) -> 
     Raises
     ------
     InputError
-        The text is no XML.
+        The text is not XML.
     """
     try:
         found = _elements(ElementTree.fromstring(text))
@@ -46,7 +46,7 @@ def description_differences(path: Path, text: bytes, model: Model, fmi: int) -> 
     for place in expected:
         differences += _attribute_differences(place, found.get(place, expected[place]), expected[place])
     if not differences and list(found) != list(expected):
-        differences.append("the elements of the description stand in another order than the model's")
+        differences.append("the elements of the description are in another order than the model's")
     return differences
 
 

@@ -99,7 +99,7 @@ def make_fmu(
     Raises
     ------
     InputError
-        There is no compiler, this machine's platform has no name in FMI, SOURCE_DATE_EPOCH is no time, or `fmi` is
+        There is no compiler, this machine's platform has no name in FMI, SOURCE_DATE_EPOCH is not a time, or `fmi` is
         neither 2 nor 3.
     """
     if fmi not in (2, 3):
@@ -169,7 +169,7 @@ def _icons(fmi: int) -> dict[str, bytes]:
 
 
 def _values(model: Model, described: Interface, fmi: int, documents: Documents) -> dict[str, Any]:
-    """What the templates of the description and the documentation tell, without the names of source files."""
+    """The data of the templates of the description and the documentation, without the names of source files."""
     return {
         "about": {
             "name": model.name,
@@ -220,7 +220,7 @@ def _epoch() -> int | None:
         time.gmtime(seconds)
     except (ValueError, OverflowError, OSError):
         remedy = "set it to seconds since 1970, or leave it out"
-        raise InputError("SOURCE_DATE_EPOCH", "", f"{given!r} is no time", remedy) from None
+        raise InputError("SOURCE_DATE_EPOCH", "", f"{given!r} is not a time", remedy) from None
     return seconds
 
 

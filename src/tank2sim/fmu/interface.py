@@ -17,7 +17,7 @@ TRIM_SWITCH = "initial.trim"
 
 MAX_STEP = "solver.max_step"
 
-# The structured names of FMI 2.0 (2.2.9), except for quoted parts, which C and file names would not bear.
+# The structured names of FMI 2.0 (2.2.9), except for quoted parts, which C and file names do not allow.
 _STRUCTURED_NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
 
 
@@ -81,7 +81,7 @@ class Interface:
     """All variables of an FMU, in blocks: time, states, inputs, parameters, largest step, rates, other outputs.
 
     The event indicators (:func:`tank2sim.dynamics.event_indicators.kinks`) are the last of the other outputs.
-    A state or its rate that is an output of the model stands in its own block, with causality output. Boolean inputs
+    A state or its rate that is an output of the model is in its own block, with causality output. Boolean inputs
     and parameters are Boolean variables; a Boolean state or quantity is a real one with value 0 or 1, because in
     Model Exchange FMI lets discrete variables change at events only.
     """
@@ -122,7 +122,7 @@ def interface(model: Model) -> Interface:
     Raises
     ------
     ValueError
-        A name is no structured name of FMI or is one that the FMU gives itself, or a start value is not finite.
+        A name is not a structured name of FMI or is one that the FMU gives itself, or a start value is not finite.
     """
     rate_names = _rate_names(model)
     others = [name for name in dict.fromkeys(model.outputs) if name not in model.state_names and name not in rate_names]
@@ -261,7 +261,7 @@ def _refuse(variables: tuple[FmuVariable, ...]) -> None:
     for variable in variables:
         plain = variable.name.removeprefix("der(").removesuffix(")")
         if not _STRUCTURED_NAME.fullmatch(plain):
-            raise ValueError(f"{variable.name} is no structured name of FMI")
+            raise ValueError(f"{variable.name} is not a structured name of FMI")
         if variable.name in seen:
             raise ValueError(f"{variable.name} is a name that the FMU gives itself")
         seen.add(variable.name)

@@ -19,7 +19,7 @@ ProgressReport = Callable[[str], None]
 # Project choice: the compiler uses the processors itself too, so more at a time bring nothing.
 _AT_A_TIME = 2
 
-# A library bears neither the name of its file nor the time of its making, so that it is the same each time.
+# A library has neither the name of its file nor the time of its making, so that it is the same each time.
 _LINK_FLAGS = {
     "linux": ("-Wl,--strip-all",),
     "darwin": ("-Wl,-install_name,@rpath/model.dylib",),

@@ -1,7 +1,7 @@
 """Variable groups after the interface specification of the Open Simulation Platform, OSP-IS 1.0.1.
 
 Groups of one kind in two FMUs are joined as one connection. The kind (``LinearVelocity``) says what the variables are;
-they stand in the order of the axes, forward and starboard in body axes, north and east in earth axes.
+they are in the order of the axes, forward and starboard in body axes, north and east in earth axes.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Group:
 Parts = tuple[tuple[str, str, dict[str, str]], ...]
 
 # Generic group -> its parts: kind, name, variables with their axes. Names of groups as in OSP's demonstration vessel
-# where that has them. Kinds stand in the order of the schema, which is a sequence.
+# where that has them. Kinds are in the order of the schema, which is a sequence.
 _MOTION: dict[str, Parts] = {
     "ned_position": (
         ("LinearDisplacement", "ned_position.linear", {"motion.x": "x", "motion.y": "y"}),
@@ -66,7 +66,7 @@ _MOTION: dict[str, Parts] = {
 def osp_groups(interface: Interface) -> tuple[Group, ...]:
     """Generic groups with all inputs and outputs that OSP-IS has kinds for, then one for each other kind of signal.
 
-    A part that lacks one of its variables is left out. What has no kind (``wind.speed``) stands in a Generic group
+    A part that lacks one of its variables is left out. What has no kind (``wind.speed``) is in a Generic group
     with the others of its first name and causality (``wind`` for inputs, ``position_output`` for outputs).
     """
     found = {

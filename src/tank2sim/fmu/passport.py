@@ -19,7 +19,7 @@ PASSPORT_FILE = f"{EXTRA}/passport.json"
 PASSPORT_PAGE = "documentation/passport.html"
 _FORMAT = "tank2sim-passport/1"
 
-# What a user sets is no coefficient of the ship.
+# What a user sets is not a coefficient of the ship.
 _NOT_OF_THE_SHIP = ("initial.", "origin.", "solver.")
 
 

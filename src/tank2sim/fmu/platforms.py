@@ -54,7 +54,7 @@ def host_platform() -> Platform:
     found = next((each for each in PLATFORMS if each.fmi3 == name), None)
     if found is None:
         remedy = "export on Linux, Windows or macOS with an x86-64 or ARM processor of 64 bits"
-        raise InputError("this machine", f"{sys.platform} on {processor}", "is no platform of the exporter", remedy)
+        raise InputError("this machine", f"{sys.platform} on {processor}", "is not a platform of the exporter", remedy)
     return found
 
 
@@ -69,7 +69,7 @@ def named_platforms(names: str) -> tuple[Platform, ...] | None:
     Raises
     ------
     InputError
-        One of them is no platform.
+        One of them is not a platform.
     """
     if names == "host":
         return None
@@ -79,5 +79,5 @@ def named_platforms(names: str) -> tuple[Platform, ...] | None:
     unknown = sorted(asked - {name for each in PLATFORMS for name in (each.fmi2, each.fmi3)})
     if unknown:
         remedy = f"choose all, host, or of {', '.join(each.fmi3 for each in PLATFORMS)} with commas between"
-        raise InputError("--platforms", unknown[0] or repr(names), "is no platform of the exporter", remedy)
+        raise InputError("--platforms", unknown[0] or repr(names), "is not a platform of the exporter", remedy)
     return tuple(each for each in PLATFORMS if asked & {each.fmi2, each.fmi3})

@@ -140,7 +140,7 @@ def _line_comment(section: Any, key: str) -> str | None:
         return None
     for name in section:
         if key in (name, to_si(name, 1.0)[0]):
-            # What is an inline table bears no comments on its keys.
+            # What is an inline table has no comments on its keys.
             trivia = getattr(section.item(name) if hasattr(section, "item") else None, "trivia", None)
             return str(trivia.comment).lstrip("# ").strip() if trivia is not None else ""
     return None

@@ -1,7 +1,7 @@
 """The reference result that an FMU carries: a manoeuvre, and what the CasADi model answered to it.
 
 A ship does a 20/20 zigzag, anything else the steps of every input with which an FMU is checked. Both lie in the FMU as
-CSV files in SI: the inputs, which jump where a time stands twice (so FMPy takes them), and the outputs at the
+CSV files in SI: the inputs, which jump where a time is given twice (so FMPy takes them), and the outputs at the
 communication points by the very steps of Co-Simulation.
 """
 
@@ -141,8 +141,8 @@ def _read(path: Path) -> tuple[tuple[str, ...], Array]:
         header, *rows = path.read_text(encoding="ascii").splitlines()
         names = tuple(header.split(",")[1:])
         table = np.array([[float(cell) for cell in row.split(",")] for row in rows]).reshape(len(rows), len(names) + 1)
-    except ValueError as error:  # also text that is no ASCII
-        raise InputError(path, "", f"is no table of numbers ({error})", "export the FMU again") from None
+    except ValueError as error:  # also text that is not ASCII
+        raise InputError(path, "", f"is not a table of numbers ({error})", "export the FMU again") from None
     if len(table) < 2 or not np.isfinite(table).all():
-        raise InputError(path, "", "is no table of finite numbers", "export the FMU again")
+        raise InputError(path, "", "is not a table of finite numbers", "export the FMU again")
     return names, table

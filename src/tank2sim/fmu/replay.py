@@ -20,7 +20,7 @@ def replay(path: Path, run: InputSequence, model: Model) -> dict[str, Array]:
     Raises
     ------
     InputError
-        The file is no FMU for this machine.
+        The file is not an FMU for this machine.
     """
     with contextlib.redirect_stdout(io.StringIO()), tempfile.TemporaryDirectory(prefix="tank2sim-") as folder:
         unpacked = unpack(Path(path), Path(folder))

@@ -65,11 +65,11 @@ def _file_of(function: str) -> str:
 
 
 def headers_notice(fmi: int) -> str:
-    """Copyright notice and licence of the FMI headers, as they stand in them."""
+    """Copyright notice and licence of the FMI headers, as written in them."""
     text = _header(_HEADERS[fmi][0])
     found = re.search(r"Copyright \(C\).*?POSSIBILITY OF SUCH DAMAGE\.", text, re.DOTALL)
     if found is None:
-        raise RuntimeError("the FMI headers of fmpy bear no licence: another version of fmpy is needed")
+        raise RuntimeError("the FMI headers of fmpy have no licence: another version of fmpy is needed")
     lines = [line.strip() for line in found.group().splitlines()]
     return f"{', '.join(_HEADERS[fmi])} in sources/:\n\n" + "\n".join(lines) + "\n"
 

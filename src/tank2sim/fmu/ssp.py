@@ -50,7 +50,7 @@ def ship_with_autopilot(
     """The package: the ship's FMU as it was made, an autopilot for it for the same version of FMI, and their joints.
 
     Inputs are joined to outputs of the same name. The others (``heading.command`` of the autopilot, the revolutions)
-    are no connectors: the system would have to hand them in, which the engines of OSP and ecos do not know; but all
+    are not connectors: the system would have to hand them in, which the engines of OSP and ecos do not know; but all
     engines set variables of a component, and where nothing is set the start values hold.
     Platforms and `report` are those of :func:`tank2sim.fmu.export.make_fmu`.
 
@@ -84,7 +84,7 @@ def ship_with_autopilot(
 
 
 def _joined(models: Mapping[str, Model]) -> tuple[list[Part], list[Joint]]:
-    """Components and connections: each input that bears the name of another's output is joined to it."""
+    """Components and connections: each input that has the name of another's output is joined to it."""
     described = {name: interface(model) for name, model in models.items()}
     parts, joints = [], []
     for name, model in models.items():

@@ -90,7 +90,7 @@ def unpack(path: Path, folder: Path) -> UnpackedFmu:
             raise zipfile.BadZipFile(damaged)
         if "modelDescription.xml" not in names:
             raise InputError(
-                path, "", "is no FMU: it has no modelDescription.xml", "give a file that tank2sim exported"
+                path, "", "is not an FMU: it has no modelDescription.xml", "give a file that tank2sim exported"
             )
         fmpy.extract(str(path), str(folder))
     except InputError:
@@ -135,7 +135,7 @@ def _require_bounded(path: Path, archive: zipfile.ZipFile) -> None:
     size = sum(entry.file_size for entry in entries)
     if size > LARGEST_BYTES or len(entries) > MOST_FILES:
         problem = f"would unpack to {size / 1e6:.0f} MB in {len(entries)} files"
-        remedy = f"at most {LARGEST_BYTES / 1e6:.0f} MB in {MOST_FILES} files are unpacked: it is no FMU of a ship"
+        remedy = f"at most {LARGEST_BYTES / 1e6:.0f} MB in {MOST_FILES} files are unpacked: it is not an FMU of a ship"
         raise InputError(path, "", problem, remedy)
 
 
@@ -159,7 +159,9 @@ def _require_library(path: Path, unpacked: UnpackedFmu) -> None:
 
 def _no_fmu(path: Path, error: Exception) -> InputError:
     if isinstance(error, FileNotFoundError):
-        return InputError(path, "", "there is no such file", "check the name")
+        return InputError(path, "", "the file does not exist", "check the name")
     if isinstance(error, OSError):
         return InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions")
-    return InputError(path, "", "is no FMU (it is no zip file, or a damaged one)", "give a file that tank2sim exported")
+    return InputError(
+        path, "", "is not an FMU (it is not a zip file, or a damaged one)", "give a file that tank2sim exported"
+    )

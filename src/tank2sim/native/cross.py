@@ -15,7 +15,7 @@ from tank2sim.errors import InputError
 from tank2sim.native.compiler import FLAGS
 from tank2sim.native.library import cache_folder, kept
 
-# A library bears neither names of its making nor debugging data, so that it is the same each time.
+# A library has neither names of its making nor debugging data, so that it is the same each time.
 _LINK_FLAGS = ("-s", "-shared")
 _LINK_FLAGS_OF = {".so": ("-lm",), ".dylib": ("-Wl,-install_name,@rpath/model.dylib",), ".dll": ()}
 
@@ -87,7 +87,7 @@ def cross_compiled(sources: Mapping[str, str], target: CompileTarget) -> bytes:
 
 
 def _compile(compiler: Path, target: CompileTarget, library: Path) -> None:
-    """Compile the C files in the folder of the library, in which the compiler runs, so that it sees no path of ours."""
+    """Compile the C files in the folder of the library, where the compiler runs: it sees no path of this machine."""
     names = sorted(path.name for path in library.parent.glob("*.c"))
     # What it makes of our sources goes with the folder: it is never used again.
     caches = {"ZIG_GLOBAL_CACHE_DIR": str(_zig_cache()), "ZIG_LOCAL_CACHE_DIR": str(library.parent / "cache")}

@@ -22,7 +22,7 @@ def universal(libraries: Sequence[bytes]) -> bytes:
     Raises
     ------
     ValueError
-        One of them is no such library, or two are for the same processor.
+        One of them is not such a library, or two are for the same processor.
     """
     page = 1 << _PAGE_BITS
     heads = [_BEGIN.unpack_from(library) for library in libraries]

@@ -104,7 +104,7 @@ def test_a_missing_or_unknown_parameter_is_refused(name: str) -> None:
         rest = {other: value for other, value in TYPICAL[name].items() if other != key}
         with pytest.raises(InputError, match=r"effects\.0\.parameters.*is missing"):
             ship({name: rest})
-    with pytest.raises(InputError, match="is no parameter of"):
+    with pytest.raises(InputError, match="is not a parameter of"):
         ship({name: {**TYPICAL[name], "strength": 1.0}})
 
 

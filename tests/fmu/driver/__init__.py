@@ -34,7 +34,7 @@ def runner(platform: str) -> Runner:
     """The runner of a platform, by its folder of FMI 3."""
     if platform == "x86_64-linux":
         here = sys.platform == "linux" and os.uname().machine == "x86_64"
-        return Runner("x86_64-linux-gnu.2.17", missing="" if here else "this is no x86-64 Linux")
+        return Runner("x86_64-linux-gnu.2.17", missing="" if here else "this is not a x86-64 Linux")
     if platform == "aarch64-linux":
         emulator = shutil.which("qemu-aarch64")
         there = emulator and _SYSROOT.is_dir()

@@ -113,7 +113,7 @@ void release_arrays(void) {
 /* ---- what must hold ---- */
 
 void line_logged(const char *category, const char *message) {
-    must(category && *category && message && *message && !strchr(message, '\n'), message, "is no line of a log");
+    must(category && *category && message && *message && !strchr(message, '\n'), message, "is not a line of a log");
     ++lines;
 }
 

@@ -26,7 +26,7 @@ def with_changes(model: Model, changes: Mapping[str, ca.SX], card: ManoeuvringCa
     Raises
     ------
     InputError
-        The card's model has no such derivative (the linear one has few).
+        The card's model has no derivative of that name (the linear one has few).
     """
     for name in changes:
         if f"derivatives.{name}" not in model:
@@ -63,7 +63,7 @@ def _magnified(names: Iterable[str]) -> EffectEquations:
 
 
 def _added(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
-    """Derivatives change by the parameters that bear their names."""
+    """Derivatives change by the parameters of the same names."""
     return with_changes(model, given, card)
 
 

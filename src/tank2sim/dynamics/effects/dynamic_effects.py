@@ -50,7 +50,8 @@ FLOW_MEMORY = Effect(
     description="The flow round the hull needs time to answer a change of drift.",
     source="Cummins (1962), Schiffstechnik 9, in its simplest form; linear sway damping",
     parameters=(
-        # Circulation settles within the time in which the flow passes the hull once or a part of it (sizes ours).
+        # Circulation settles within the time in which the flow passes the hull once or a part of it (sizes chosen
+        # here).
         EffectParameter(
             "share", "share of the linear sway damping that answers late", -1.0, 1.0, absent=0.0, typical=(0.3,)
         ),
@@ -63,8 +64,8 @@ FLOW_MEMORY = Effect(
 )
 
 TYPICAL_STABILITY = 0.05
-"""Metacentric height in beams where a card gives none: in the middle of 0.03 to 0.08 of loaded merchant ships; a choice
-of ours, as are the parameters' defaults."""
+"""Metacentric height in beams where a card gives none: in the middle of 0.03 to 0.08 of loaded merchant ships; a
+project choice, as are the parameters' defaults."""
 
 
 def _natural_period(card: ManoeuvringCard) -> float:

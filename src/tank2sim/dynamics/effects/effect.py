@@ -45,12 +45,12 @@ class EffectParameter:
         All others become tunable parameters of the model.
     absent : float, optional
         Value, SI, at which the effect vanishes; if several parameters have one, when all of them are at it. None for
-        what only shapes an effect (directions, times), and for what stands in place of something that the ship has
+        what only shapes an effect (directions, times), and for what replaces something that the ship has
         anyway (the gear).
     typical : tuple or callable, optional
-        Values, SI, from which a search begins, or what tells them from the card: one for an amplitude, of the size in
-        which the effect is common; a short grid over what is plausible for a shape, the likeliest first. An effect with
-        a required parameter without typical values is not tried on trials.
+        Values, SI, from which a search begins, or a function of the card that gives them: one for an amplitude, of the
+        size in which the effect is common; a short grid over what is plausible for a shape, the likeliest first. An
+        effect with a required parameter without typical values is not tried on trials.
     spread : float or callable, optional
         Standard deviation, SI, of what is known beforehand of a parameter with a default, if a search shall estimate
         it with the others; None: it stays at its default.
@@ -91,7 +91,7 @@ class EffectParameter:
         return self.spread(card) if callable(self.spread) else self.spread
 
     def variable(self, effect: str, value: float, card: ManoeuvringCard) -> Parameter | Input:
-        """The model's variable that holds it, ``<effect>.<name without its unit>`` if it is no input."""
+        """The model's variable that holds it, ``<effect>.<name without its unit>`` if it is not an input."""
         suffix = self.name.removeprefix(self.stem).lstrip("_")
         unit, description = _UNITS.get(suffix, "1"), self.description[0].upper() + self.description[1:]
         if self.input_name:
@@ -161,7 +161,7 @@ class Effect:
         of, so that a record can be corrected.
     delays : mapping
         Name of an input to the parameter (a time, s) by which the ship answers late to the record of that input: it
-        acts at t on what stands in the record at t - delay.
+        acts at t on the recorded value at t - delay.
     changes : tuple of str
         Derivatives, where the effect is nothing but other values of these: once found, it is written into
         ``[derivatives]`` of a card. Empty for all other effects.

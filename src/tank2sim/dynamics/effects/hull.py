@@ -98,7 +98,7 @@ HUMP_RESISTANCE = Effect(
     name="hump_resistance",
     acts_on="force",
     description="About one speed the ship's own waves add up and resist more than at speeds below and above.",
-    source="Faltinsen (2005), Hydrodynamics of High-Speed Marine Vehicles, 4.2; Gaussian hump of ours",
+    source="Faltinsen (2005), Hydrodynamics of High-Speed Marine Vehicles, 4.2; Gaussian hump chosen here",
     parameters=(
         EffectParameter(
             "X_prime",

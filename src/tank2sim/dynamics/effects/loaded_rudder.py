@@ -53,8 +53,8 @@ LOADED_RUDDER = Effect(
     description="The propeller's jet over the rudder grows as the ship slows, and meets it at the angle of the flow.",
     source="rudder of the MMG model: Yasukawa and Yoshimura (2015), J. Mar. Sci. Technol. 20, 37-52",
     parameters=(
-        # It stands in place of the polynomial's rudder, so it vanishes nowhere. The KVLCC2 of Yasukawa and Yoshimura
-        # (2015) has gamma_R = 0.40 and 0.64 and l_R' = -0.71; the loading is ours.
+        # It replaces the polynomial's rudder, so it vanishes nowhere. The KVLCC2 of Yasukawa and Yoshimura
+        # (2015) has gamma_R = 0.40 and 0.64 and l_R' = -0.71; the loading is a project choice.
         EffectParameter(
             "loading",
             "relative gain of inflow speed at the rudder by relative loss of the ship's speed",
@@ -64,7 +64,11 @@ LOADED_RUDDER = Effect(
         ),
         EffectParameter("straightening", "share of the cross flow that reaches the rudder", 0.0, 2.0, typical=(0.5,)),
         EffectParameter(
-            "lever", "place that tells the cross flow, in ship lengths forward of midships", -4.0, 0.0, typical=(-0.7,)
+            "lever",
+            "place where the cross flow is taken, in ship lengths forward of midships",
+            -4.0,
+            0.0,
+            typical=(-0.7,),
         ),
     ),
     equations=_in_loaded_slipstream,

@@ -1,4 +1,4 @@
-"""Particulars of the ship that effects need: those of the card, or estimates that the model's notices tell."""
+"""Particulars of the ship that effects need: those of the card, or estimates that the model's notices report."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from tank2sim.dynamics.model import Model
 
 BEAMS_IN_LENGTH = 7.0
 BEAMS_IN_DRAUGHT = 0.4
-"""L/B = 7 and B/T = 2.5 are in the middle of loaded merchant ships (6 to 8, 2 to 3.5): choices of ours."""
+"""L/B = 7 and B/T = 2.5 are in the middle of loaded merchant ships (6 to 8, 2 to 3.5): project choices."""
 
 FRONT_IN_BEAMS = 0.6
 SIDE_IN_LENGTHS = 0.055
 """Areas above the water over B^2 and L^2, between those of a loaded tanker (0.35 and 0.03) and of a container ship
-(0.95 and 0.1): choices of ours."""
+(0.95 and 0.1): project choices."""
 
 DIAMETER_IN_DRAUGHTS = 0.6
 """Diameter of the propeller over the draught, between that of full tankers (0.45) and of container ships (0.75): a
-choice of ours."""
+project choice."""
 
 AREA_ERROR = 0.4
 """Standard error of such an area, relative: the distance from the middle to those of tanker and container ship."""

@@ -94,8 +94,9 @@ PROPELLER_WALK = Effect(
 def _with_loading_side_force(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Y, N = 1/2 rho L^2 U^2 (Y', L N') eta, with the propeller loading eta = (n/n0) u0/U - 1.
 
-    An asymmetry that vanishes where the propeller holds the speed and grows as the ship slows: the form is ours, after
-    the KVLCC2 (SIMMAN 2008) whose tactical diameters differ by 8 % between the sides, but not by one constant.
+    An asymmetry that vanishes where the propeller holds the speed and grows as the ship slows: the form is a project
+    choice, after the KVLCC2 (SIMMAN 2008) whose tactical diameters differ by 8 % between the sides, but not by one
+    constant.
     """
     speed = model.symbol("motion.speed")
     # U^2 eta, without its division by U at rest
@@ -108,7 +109,7 @@ LOADING_SIDE_FORCE = Effect(
     name="loading_side_force",
     acts_on="force",
     description="The harder the propeller works for the ship's speed, the more it pushes the stern to one side.",
-    source="form of ours, after the asymmetry of the KVLCC2 in SIMMAN 2008",
+    source="form chosen here, after the asymmetry of the KVLCC2 in SIMMAN 2008",
     parameters=(
         # The Mariner's side force, at the loading of a ship that has lost a third of its speed (project choice).
         EffectParameter(
@@ -137,7 +138,7 @@ def _with_droop(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
 
     First order in the loss of speed of an engine at constant torque or power, whose propeller load rises in a turn: the
     propulsion strategies that ITTC 7.5-02-06-01, free running model tests, distinguishes. On a card without propulsion
-    the order is the nominal one, and :data:`RESISTANCE` stands for Xnn.
+    the order is the nominal one, and :data:`RESISTANCE` takes the place of Xnn.
     """
     loss = 1 - model.symbol("motion.u") / model.symbol("ship.speed")
     if "propeller.speed_actual" in model:

@@ -1,4 +1,4 @@
-"""Effects on the force of the rudder, and on the angle at which it stands."""
+"""Effects on the force of the rudder and on its angle."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def with_rudder_force(model: Model, multiplier: ca.SX) -> Model:
 
 
 def _biased(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
-    """The hull sees delta + d0: the rudder stands off its dial."""
+    """The hull sees delta + d0: the rudder angle differs from its indicator."""
     return model.redefine("rudder.effective", lambda angle: angle + given["angle"])
 
 
 RUDDER_BIAS = Effect(
     name="rudder_bias",
     acts_on="actuator",
-    description="The rudder stands a little to one side of what its indicator shows.",
+    description="The rudder angle has a small constant offset from what its indicator shows.",
     source="formats of the ship card; kinematics",
     parameters=(
         EffectParameter(
@@ -131,7 +131,7 @@ RUDDER_STALL = Effect(
             0.0,
             1.0,
             absent=0.0,
-            typical=(0.4,),  # ours
+            typical=(0.4,),  # project choice
         ),
     ),
     equations=_stalled,

@@ -139,7 +139,7 @@ LOG_SCALE = Effect(
             -0.9,
             2.0,
             absent=0.0,
-            typical=(0.05,),  # ours
+            typical=(0.05,),  # project choice
         ),
     ),
     readings=_scaled_log,
@@ -165,7 +165,7 @@ LOG_MISALIGNMENT = Effect(
             -math.pi / 4,
             math.pi / 4,
             absent=0.0,
-            typical=(math.radians(2.0),),  # ours
+            typical=(math.radians(2.0),),  # project choice
         ),
     ),
     readings=_turned_log,
@@ -191,7 +191,7 @@ LOG_LEVER_ARM = Effect(
             absent=0.0,
             typical=lengths(
                 0.3
-            ),  # logs stand in the forebody, out of the boundary layer and the bubbles (project choice)
+            ),  # logs are in the forebody, out of the boundary layer and the bubbles (project choice)
         ),
     ),
     readings=_log_forward,
@@ -281,7 +281,7 @@ def _measured(signals: _Columns, effect: Effect, values: Mapping[str, float]) ->
 
 def _held(time_s: NDArray[np.float64], column: NDArray[np.float64], asked: NDArray[np.float64]) -> NDArray[np.float64]:
     """The last sample at or before each time asked for."""
-    # Times are sums of rounded steps: a sample that stands a millionth of a step late still counts as at the time.
+    # Times are sums of rounded steps: a sample that is a millionth of a step late still counts as at the time.
     slack = 1e-6 * float(np.min(np.diff(time_s))) if len(time_s) > 1 else 0.0
     places = np.searchsorted(time_s, asked + slack, side="right") - 1
     return column[np.clip(places, 0, len(column) - 1)]

@@ -84,7 +84,7 @@ def _with_wind(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mod
     Fossen (2011), Handbook of Marine Craft Hydrodynamics and Motion Control, 8.1: c_X 0.5 to 0.9, c_Y 0.7 to 0.95,
     c_N 0.05 to 0.2 for ships with symmetric superstructures; the defaults are in the middle of the first two, and for
     c_N that of Blendermann (1994), J. Wind Eng. Ind. Aerodyn. 51, whose arm 0.18 (pi/2 - gamma) L gives
-    0.10 at 45 deg. x_A is the centroid of the side area; L between perpendiculars stands for the length over all.
+    0.10 at 45 deg. x_A is the centroid of the side area; L between perpendiculars is used for the length over all.
     The whole relative wind acts, so that a ship meets still air too. Where the card's X holds that resistance already
     it would count twice: a share 1 - a of the force in still air is taken off, a the parameter ``still_air``.
     """
@@ -133,7 +133,7 @@ WIND = Effect(
             input_name="wind.direction",
             typical=DIRECTION_SIGNS,
         ),
-        # Spreads: half the ranges of Fossen (2011) above; that of the centroid is ours.
+        # Spreads: half the ranges of Fossen (2011) above; that of the centroid is a project choice.
         EffectParameter(
             "surge_coefficient",
             "wind force coefficient in surge, on the frontal area",

@@ -48,7 +48,7 @@ class SteeringForm:
     name, title : str
         Key in the catalogue; words for a reader.
     source : str
-        Where the equations stand.
+        The source of the equations.
     coefficients : tuple of SteeringCoefficient
         In the order of the paper's tables, first those of Y.
     rates : callable

@@ -14,7 +14,7 @@ PAVLENKO = SteeringForm(
     missing=(
         "the paper prints neither coefficients nor results of it: they agree worse with the trials, it says",
         'it has "another set of terms in the right-hand sides" of (1); which ones is not printed, and (1) as printed '
-        "stands here in their place",
+        "is used here in their place",
     ),
 )
 """The model of Pavlenko."""
