@@ -59,7 +59,7 @@ suppress_warnings = ["ref.python"]
 
 
 def _tables_of_the_program(app: Sphinx, tree: nodes.document) -> None:
-    """Outputs with a table are told apart from others: on a narrow screen they are scrolled, their lines not broken."""
+    """Outputs with a table are marked: on a narrow screen they are scrolled, their lines not broken."""
     for block in tree.findall(nodes.literal_block):
         if "━" in block.astext():
             block["classes"].append("drawn")

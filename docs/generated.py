@@ -124,7 +124,7 @@ def commands() -> str:
             logger.warning("the command %s cannot be imported: %s", name, error)
             continue
         if command is None:
-            raise ValueError(f"no such command: {name}")
+            raise ValueError(f"unknown command: {name}")
         text += [f"## `tank2sim {name}`", "", *_command(name, command)]
     return "\n".join(text)
 
@@ -137,9 +137,9 @@ def _command(name: str, command: click.Command) -> list[str]:
         lines += [_text(" ".join(paragraph.split())), ""]
     lines += ["{.options}", "| option | meaning |", "|---|---|"]
     for parameter in command.get_params(context):
-        told = parameter.get_help_record(context)
-        if told is not None and told[1] and "--help" not in parameter.opts:
-            lines.append(f"| `{told[0].replace('|', chr(92) + '|')}` | {_text(' '.join(told[1].split()))} |")
+        help_record = parameter.get_help_record(context)
+        if help_record is not None and help_record[1] and "--help" not in parameter.opts:
+            lines.append(f"| `{help_record[0].replace('|', chr(92) + '|')}` | {_text(' '.join(help_record[1].split()))} |")
     return [*lines, ""]
 
 
@@ -175,7 +175,7 @@ def schemas() -> str:
 
 
 def keys(name: str) -> str:
-    """The keys of a section of a card or campaign, with what stands where the file gives none."""
+    """The keys of a section of a card or campaign, with the default where the file gives none."""
     section: type[BaseModel] = getattr(form, name, None) or getattr(campaign_form, name)
     lines = ["| key | where the file gives none |", "|---|---|"]
     for key, field in section.model_fields.items():
@@ -263,7 +263,7 @@ def _fill(app: Sphinx, page: str, source: list[str]) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Fill pages as they are read; they are read anew when the program changes."""
+    """Fill pages as they are read; they are read again when the program changes."""
     app.connect("source-read", _fill)
     app.connect("env-get-outdated", lambda app, env, added, changed, removed: _GENERATED & env.found_docs)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

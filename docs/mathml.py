@@ -1,6 +1,6 @@
 """Formulas as MathML, which browsers show by themselves; MathJax and KaTeX would need a network or 2 MB of script.
 
-The translation is that of Docutils; two of its habits are mended here. What it does not know is a warning with the
+The translation is that of Docutils; two of its habits are corrected here. What it does not know is a warning with the
 place of the formula, which ends a strict build.
 """
 
@@ -30,14 +30,14 @@ ElementTree.register_namespace("", _NAMESPACE)
 def mathml(formula: str, node: nodes.Node, block: bool) -> str:
     """The MathML of a formula; the formula itself as code, and a warning, where it is not understood."""
     try:
-        return mended(str(tex2mathml(formula, as_block=block)))
+        return corrected(str(tex2mathml(formula, as_block=block)))
     except MathError as error:
         logger.warning("formula not understood: %s: %s", error, formula, location=node)
         return f"<code>{nodes.unescape(formula)}</code>"
 
 
-def mended(text: str) -> str:
-    """The MathML of Docutils with subscripts beside an accented symbol, not under it, and with room about functions."""
+def corrected(text: str) -> str:
+    """The MathML of Docutils with subscripts next to an accented symbol, not under it, and with room about functions."""
     root = ElementTree.fromstring(text.replace("&ApplyFunction;", _APPLY))
     for element in list(root.iter()):
         if element.tag == _tag("mtable"):

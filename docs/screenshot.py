@@ -1,6 +1,6 @@
 """Makes the README's picture of the page on which a ship is steered, ``docs/static/steering_page.png``.
 
-The Mariner turns in a current to the east, beside the track of the same turn without. Needs Chromium and the extra
+The Mariner turns in a current to the east, next to the track of the same turn without. Needs Chromium and the extra
 `platforms`::
 
     python docs/screenshot.py
