@@ -1,4 +1,4 @@
-"""How many modules one trial, one campaign, one card enter on their way to a card or an FMU, and one gap on its way out.
+"""How many modules a trial, a campaign and a card enter on their way to a card or an FMU, and a gap on its way out.
 
 Each command runs in this process under a profile of calls; what is counted are the modules of tank2sim in which a
 function was called, without the command line and the pages, and the rooms (packages) in which they are.
@@ -52,7 +52,11 @@ def main() -> None:
             subprocess.run([sys.executable, ROOT / "docs" / "examples" / script, *arguments], check=True)
         for name, command in WALKS.items():
             sys.argv = ["tank2sim", *command.split()]
-            with entered(package) as modules, contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+            with (
+                entered(package) as modules,
+                contextlib.redirect_stdout(io.StringIO()),
+                contextlib.suppress(SystemExit),
+            ):
                 command_line()
             inside = sorted(module for module in modules if module.split("/")[0] not in OUTSIDE)
             rooms = sorted({module.rpartition("/")[0] or "(top)" for module in inside})

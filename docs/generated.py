@@ -13,6 +13,7 @@ import json
 import math
 import pkgutil
 import re
+from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -139,13 +140,24 @@ def _command(name: str, command: click.Command) -> list[str]:
     for parameter in command.get_params(context):
         help_record = parameter.get_help_record(context)
         if help_record is not None and help_record[1] and "--help" not in parameter.opts:
-            lines.append(f"| `{help_record[0].replace('|', chr(92) + '|')}` | {_text(' '.join(help_record[1].split()))} |")
+            lines.append(
+                f"| `{help_record[0].replace('|', chr(92) + '|')}` | {_text(' '.join(help_record[1].split()))} |"
+            )
     return [*lines, ""]
 
 
-def project_choices() -> str:
-    """Numbers that rest on no source: value, place and reason, from the constants' own docstrings."""
-    rows: dict[str, list[str]] = {}
+@dataclass(frozen=True)
+class ProjectConstant:
+    """A number that rests on no source: name below ``tank2sim``, value as the code has it, meaning and reason."""
+
+    name: str
+    value: str
+    reason: str
+
+
+def project_constants() -> list[ProjectConstant]:
+    """The constants whose docstrings call them a project choice, by module."""
+    found = []
     for path in sorted(SOURCES.rglob("*.py")):
         body = ast.parse(path.read_text(encoding="utf-8")).body
         for node, after in pairwise(body):
@@ -157,11 +169,21 @@ def project_choices() -> str:
                 continue
             place = path.relative_to(SOURCES).with_suffix("").as_posix().replace("/", ".")
             value = " ".join(ast.unparse(node.value).split()) if node.value else ""
-            cells = [f"`{place}.{ast.unparse(target)}`", f"`{value if len(value) < 60 else value[:57] + '...'}`"]
-            text = re.sub(r":\w+:`~?([^`]+)`", r"`\1`", " ".join(reason.split()))
-            line = " | ".join(cell.replace("|", "\\|") for cell in (*cells, text))
-            rows.setdefault(place.partition(".")[0], []).append(f"| {line} |")
-    heads = "| name | value | meaning and reason |\n|---|---|---|"
+            found.append(ProjectConstant(f"{place}.{ast.unparse(target)}", value, " ".join(reason.split())))
+    return found
+
+
+def project_choices() -> str:
+    """Numbers that rest on no source: value, place, reason, and what was measured at half and at twice the value."""
+    measured = json.loads((Path(__file__).parent / "static" / "project_choices.json").read_text(encoding="utf-8"))
+    rows: dict[str, list[str]] = {}
+    for constant in project_constants():
+        value = constant.value if len(constant.value) < 60 else constant.value[:57] + "..."
+        reason = re.sub(r":\w+:`~?([^`]+)`", r"`\1`", constant.reason)
+        cells = [f"`{constant.name}`", f"`{value}`", reason, *measured.get(constant.name, ("", ""))]
+        line = " | ".join(cell.replace("|", "\\|") for cell in cells)
+        rows.setdefault(constant.name.partition(".")[0], []).append(f"| {line} |")
+    heads = "| name | value | meaning and reason | at half | at twice |\n|---|---|---|---|---|"
     return "\n\n".join("\n".join([f"## {room}\n", heads, *lines]) for room, lines in rows.items())
 
 

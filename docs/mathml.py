@@ -37,7 +37,7 @@ def mathml(formula: str, node: nodes.Node, block: bool) -> str:
 
 
 def corrected(text: str) -> str:
-    """The MathML of Docutils with subscripts next to an accented symbol, not under it, and with room about functions."""
+    """MathML of Docutils with subscripts next to an accented symbol, not under it, and room about functions."""
     root = ElementTree.fromstring(text.replace("&ApplyFunction;", _APPLY))
     for element in list(root.iter()):
         if element.tag == _tag("mtable"):
