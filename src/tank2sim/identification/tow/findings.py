@@ -65,7 +65,7 @@ def identifiable_terms(fits: Sequence[TowFit]) -> tuple[str, ...]:
             columns = [
                 [place for place, name in enumerate(fit.free) if name in chosen or name not in terms] for fit in fits
             ]
-            if all(scaled_condition(fit.design[:, own]) <= COLLINEAR for fit, own in zip(fits, columns, strict=True)):
+            if all(scaled_condition(fit.design[:, chosen_columns]) <= COLLINEAR for fit, chosen_columns in zip(fits, columns, strict=True)):
                 return chosen
     return ()
 
@@ -159,12 +159,12 @@ def _worst_misfit(tows: Tows, speeds: Array, estimates: int) -> int | None:
 
 
 def _disagreement(fits: Sequence[TowFit]) -> Iterator[str]:
-    for one, other in combinations(fits, 2):
-        if one.covariance is None or other.covariance is None:
+    for first, second in combinations(fits, 2):
+        if first.covariance is None or second.covariance is None:
             continue
-        apart = abs(one.values[0] - other.values[0])
-        if apart > _TWO_SIDED_95 * np.sqrt(one.covariance[0, 0] + other.covariance[0, 0]):
+        difference = abs(first.values[0] - second.values[0])
+        if difference > _TWO_SIDED_95 * np.sqrt(first.covariance[0, 0] + second.covariance[0, 0]):
             yield (
-                f"{one.method} and {other.method} differ in M by {apart:.3g} kg, more than their standard errors "
+                f"{first.method} and {second.method} differ in M by {difference:.3g} kg, more than their standard errors "
                 f"explain; the mass is known no better than that."
             )

@@ -202,9 +202,9 @@ def _fit(
 def _notes(tows: Tows, force: float | Polynomial | None, mass_kg: float, failed: set[str]) -> list[str]:
     notes = []
     used = force if isinstance(force, float | int) else tows.force_N
-    for name, own, written in (("force_N", used, tows.force_N), ("mass_kg", mass_kg, tows.mass_kg)):
-        if written is not None and written != own:
-            notes.append(f"The file of the tows says {name} {written:g}, and {own:g} was given and used.")
+    for name, used_value, written in (("force_N", used, tows.force_N), ("mass_kg", mass_kg, tows.mass_kg)):
+        if written is not None and written != used_value:
+            notes.append(f"The file of the tows says {name} {written:g}, and {used_value:g} was given and used.")
     if isinstance(force, Polynomial) and tows.force_N is not None:
         notes.append(
             f"The file of the tows says force_N {tows.force_N:g}, and {force_words(force)} was given and used."

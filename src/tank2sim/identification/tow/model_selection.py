@@ -133,11 +133,11 @@ def mass_range(fitted: Sequence[FittedModel]) -> tuple[float, float] | None:
 
     Models that AIC leaves far behind the best of these are not asked.
     """
-    usable = [one for one in fitted if one.plausible and one.determined]
+    usable = [model for model in fitted if model.plausible and model.determined]
     if not usable:
         return None
-    best = min(one.fit.aic for one in usable)
-    intervals = [one.mass_interval_kg for one in usable if one.fit.aic <= best + _FAR_BEHIND]
+    best = min(model.fit.aic for model in usable)
+    intervals = [model.mass_interval_kg for model in usable if model.fit.aic <= best + _FAR_BEHIND]
     return min(low for low, _ in intervals), max(high for _, high in intervals)
 
 
@@ -226,8 +226,8 @@ def _each(tows: Tows, ways: Sequence[tuple[str, tuple[str, ...], TowEstimator]])
             return np.full(width, np.nan) if found is None else found
 
         alone = np.array([row(tows.only(number)) for number in numbers])
-        left_out = np.array([row(tows.without(number)) for number in numbers])
-        yield TowByTow(label, unknowns, row(tows), alone, left_out)
+        held_out = np.array([row(tows.without(number)) for number in numbers])
+        yield TowByTow(label, unknowns, row(tows), alone, held_out)
 
 
 def _by_paper(tows: Tows, force: Polynomial, terms: tuple[str, ...], degree: int) -> Array | None:

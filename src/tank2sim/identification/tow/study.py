@@ -113,7 +113,7 @@ class TowStudy:
             if name in result.fits:
                 fit = result.fits[name]
                 speeds = simulated_speeds(fit.coefficients, result.force, time, fit.start_delay_s)
-                if np.isfinite(speeds).all() and not any(np.allclose(speeds, other) for other in found.values()):
+                if np.isfinite(speeds).all() and not any(np.allclose(speeds, drawn) for drawn in found.values()):
                     found[f"{name.replace('_', ' ')}: {', '.join(fit.unknowns)}"] = speeds
         return time, found
 
@@ -140,7 +140,7 @@ class TowStudy:
 
     def as_json(self) -> dict[str, Any]:
         """The study as plain data: that of the result, and more."""
-        more: dict[str, Any] = {
+        studies: dict[str, Any] = {
             "speed_polynomials": [polynomial._asdict() for polynomial in self.polynomials],
             "models": [model.as_json() for model in self.models],
             "mass_range_kg": self.mass_range_kg,
@@ -151,12 +151,12 @@ class TowStudy:
         }
         if self.body is not None:
             factor = self.body.area_ratio
-            more["body"] = dict(vars(self.body))
-            more["drag_coefficients"] = {
+            studies["body"] = dict(vars(self.body))
+            studies["drag_coefficients"] = {
                 name: {"by_length_squared": drag.as_json(), "by_volume_two_thirds": drag.times(factor).as_json()}
                 for name, drag in self.drags.items()
             }
-        return {**self.result.as_json(), **more, "warnings": list(self.notes)}
+        return {**self.result.as_json(), **studies, "warnings": list(self.notes)}
 
 
 def study_tows(result: TowIdentification, body: TowedBody | None = None) -> TowStudy:
@@ -238,13 +238,13 @@ def _continued(study: TowStudy) -> Iterator[str]:
     if not study.by_tow:
         return
     for number, alone in enumerate(study.by_tow[0].alone):
-        own = tows.only(number)
-        if own.time_s[-1] >= tows.time_s[-1] or not np.isfinite(alone).all():
+        single = tows.only(number)
+        if single.time_s[-1] >= tows.time_s[-1] or not np.isfinite(alone).all():
             continue
-        speed = fit_mean_speed(own, len(result.speed_polynomial) - 1).polynomial
+        speed = fit_mean_speed(single, len(result.speed_polynomial) - 1).polynomial
         problem = discretise(speed, tows.time_s, result.terms, result.force)
         yield (
-            f"Tow {number + 1} ends at {own.time_s[-1]:g} s: over that time the paper's way gives M {alone[0]:.0f} kg; "
+            f"Tow {number + 1} ends at {single.time_s[-1]:g} s: over that time the paper's way gives M {alone[0]:.0f} kg; "
             f"with its polynomial continued to the {tows.time_s[-1]:g} s of the others, "
             f"{solve_by_qr(problem)[0]:.0f} kg."
         )

@@ -88,7 +88,7 @@ def with_nrdot(card: ManoeuvringCard, result: YawIdentification, method: str, le
     key = card.places.get("Nrdot", "Nrdot")
     text = _replaced(card.text, card.source, f"derivatives.{key}", value * factor, f"yaw rig, {method}")
     if error is not None:
-        spelt = next((own for own in _section(text, "uncertainty") if own.lower() == "nrdot"), key)
+        spelt = next((key_in_file for key_in_file in _section(text, "uncertainty") if key_in_file.lower() == "nrdot"), key)
         text = _replaced(text, card.source, f"uncertainty.{spelt}", error * abs(factor), f"yaw rig, {method}")
     new = parse_card(text, card.source)
     assert isinstance(new, ManoeuvringCard)
@@ -101,9 +101,9 @@ def _section(text: str, section: str) -> tomlkit.items.Table | dict[str, object]
 
 
 def _replaced(text: str, source: str, key: str, value: float, origin: str) -> str:
-    section, _, own = key.partition(".")
+    section, _, name = key.partition(".")
     old = _section(text, section)
-    was = f"was {old[own].as_string()}" if own in old else "not stated before"  # type: ignore[union-attr]
+    was = f"was {old[name].as_string()}" if name in old else "not stated before"  # type: ignore[union-attr]
     return changed_text(text, source, {key: float(f"{value:.6g}")}, comment=f"{origin}; {was}")
 
 

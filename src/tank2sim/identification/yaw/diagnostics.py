@@ -32,7 +32,7 @@ def check_current(records: tuple[YawRecord, ...]) -> list[str]:
     """What to say of the files and their currents; InputError where the motor is saturated in one or idle."""
     notes = []
     for record in records:
-        notes += [f"{record.path.name}: {told}" for told in record.notes]
+        notes += [f"{record.path.name}: {note}" for note in record.notes]
         largest = float(np.abs(record.current_A).max())
         if largest < _LEAST_A:
             problem, remedy = f"stays below {_LEAST_A:g} A: the motor did not turn the body", "give the current in A"
@@ -126,8 +126,8 @@ def check_explained(records: tuple[YawRecord, ...], misfit_rad: float | None) ->
             f"(3) leaves {misfit_rad:.2g} rad of the angle (rms), more than an encoder's pulse: gravity, walls or "
             "something else acts that is not among the terms, and no standard error contains what they do."
         )
-    (first, *others) = records
-    if not others and first.programme.humps == 1 and first.programme.turn_per_interval_rad < 2 * math.pi:
+    (first, *further) = records
+    if not further and first.programme.humps == 1 and first.programme.turn_per_interval_rad < 2 * math.pi:
         notes.append(
             "One hump of part of a turn does not tell a moment of gravity from inertia: give two humps or more, which "
             "begin at other angles."
@@ -160,20 +160,20 @@ def judged(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[str]:
     return [*notes, *_compared(best, estimates.get("output_error"))]
 
 
-def _compared(best: YawEstimate, other: YawEstimate | None) -> list[str]:
+def _compared(best: YawEstimate, nonlinear: YawEstimate | None) -> list[str]:
     """The energy least squares next to the nonlinear ones, where these say more, or something else."""
-    if other is None or not best.inertia_error_kgm2 or not other.inertia_error_kgm2:
+    if nonlinear is None or not best.inertia_error_kgm2 or not nonlinear.inertia_error_kgm2:
         return []
-    apart = abs(best.total_inertia_kgm2 - other.total_inertia_kgm2)
-    error = math.hypot(best.inertia_error_kgm2, other.inertia_error_kgm2)
-    if apart > _APART * error:
+    difference = abs(best.total_inertia_kgm2 - nonlinear.total_inertia_kgm2)
+    error = math.hypot(best.inertia_error_kgm2, nonlinear.inertia_error_kgm2)
+    if difference > _APART * error:
         return [
-            f"energy_least_squares and output_error differ by {1e4 * apart:.3g}e-4 kg m2, {apart / error:.2g} times "
+            f"energy_least_squares and output_error differ by {1e4 * difference:.3g}e-4 kg m2, {difference / error:.2g} times "
             "their errors: something in the record is in neither's equations, and neither error contains it."
         ]
-    if other.inertia_error_kgm2 < best.inertia_error_kgm2 / _SHARPER:
+    if nonlinear.inertia_error_kgm2 < best.inertia_error_kgm2 / _SHARPER:
         return [
-            f"output_error is sharper here, ± {1e4 * other.inertia_error_kgm2:.2g}e-4 against "
+            f"output_error is sharper here, ± {1e4 * nonlinear.inertia_error_kgm2:.2g}e-4 against "
             f"± {1e4 * best.inertia_error_kgm2:.2g}e-4 kg m2; --method output_error puts it into a card."
         ]
     return []

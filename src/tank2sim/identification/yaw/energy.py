@@ -82,9 +82,9 @@ def energy_balance(
     """The balance of every subinterval of mirror pairs; `rig` tells what is known beyond (3)."""
     rows, work = [], []
     for pair in pairs:
-        for own in pair:
-            rows += work_rows(own, terms, parts)
-            work += [motor_work(own.part(place, parts), torque_constant_NmpA, rig) for place in range(parts)]
+        for interval in pair:
+            rows += work_rows(interval, terms, parts)
+            work += [motor_work(interval.part(place, parts), torque_constant_NmpA, rig) for place in range(parts)]
     return Balance(terms=terms, rows=np.array(rows), work_J=np.array(work), pairs=tuple(pairs), parts=parts)
 
 
@@ -121,8 +121,8 @@ def fit_energy(balance: Balance, record: YawRecord, programmed: Balance | None =
 
 def _inverse(rows: Array, instruments: Array) -> Array:
     """(Z'X)^-1 Z'; with Z = X that of least squares."""
-    norms, other = column_norms(rows), column_norms(instruments)
-    scaled = (instruments / other).T
+    norms, instrument_norms = column_norms(rows), column_norms(instruments)
+    scaled = (instruments / instrument_norms).T
     inverse: Array = np.linalg.solve(scaled @ (rows / norms), scaled) / norms[:, None]
     return inverse
 
@@ -131,8 +131,8 @@ def _clustered(inverse: Array, residuals: Array, balance: Balance) -> Array:
     """Covariance from the scatter of whole intervals, each taken as one draw (Liang & Zeger 1986)."""
     count = 2 * len(balance.pairs)
     each = (inverse * residuals).reshape(len(balance.terms), count, balance.parts).sum(axis=2)
-    more = count / max(1, count - 1)
-    covariance: Array = more * each @ each.T
+    correction = count / max(1, count - 1)
+    covariance: Array = correction * each @ each.T
     return covariance
 
 
@@ -199,10 +199,10 @@ def two_intervals(method: str, balance: Balance, fit: EnergyFit) -> YawEstimate:
     """
     work = balance.whole(balance.work_J)
     inertia, lost = [], []
-    for pair, (one, other) in zip(balance.pairs, work, strict=True):
+    for pair, (accelerating, braking) in zip(balance.pairs, work, strict=True):
         w1, w2 = float(pair[0].rate_radps[0]), float(pair[0].rate_radps[-1])
-        inertia.append(inertia_from_work(float(one), float(other), w1, w2))
-        lost.append(dissipation_from_work(float(one), float(other)))
+        inertia.append(inertia_from_work(float(accelerating), float(braking), w1, w2))
+        lost.append(dissipation_from_work(float(accelerating), float(braking)))
     total = float(np.mean(inertia))
     return YawEstimate(
         method=method,

@@ -45,7 +45,7 @@ class YawEstimate:
 
     def as_json(self) -> dict[str, Any]:
         """As plain data; the unit of a number stands in its key."""
-        told: dict[str, Any] = {
+        result: dict[str, Any] = {
             "total_inertia_kgm2": self.total_inertia_kgm2,
             "total_inertia_standard_error_kgm2": self.inertia_error_kgm2,
             "dissipation_J": self.dissipation_J,
@@ -53,9 +53,9 @@ class YawEstimate:
         }
         for term, (value, error) in self.friction.items():
             unit = ENERGY_TERMS[term][1]
-            told[f"{term}_{unit}"], told[f"{term}_standard_error_{unit}"] = value, error
+            result[f"{term}_{unit}"], result[f"{term}_standard_error_{unit}"] = value, error
         if self.bias_kgm2 is not None:
-            told["bias_against_least_squares_kgm2"] = self.bias_kgm2
-            told["bias_from_kgm2"] = dict(self.bias_from)
-            told["total_inertia_by_hump_kgm2"] = list(self.by_hump_kgm2)
-        return told
+            result["bias_against_least_squares_kgm2"] = self.bias_kgm2
+            result["bias_from_kgm2"] = dict(self.bias_from)
+            result["total_inertia_by_hump_kgm2"] = list(self.by_hump_kgm2)
+        return result

@@ -145,12 +145,12 @@ class YawIdentification:
         """
         if self.body is None:
             return None
-        own = self.estimates[method]
-        added = own.total_inertia_kgm2 - self.body.value_kgm2
-        scaled = added if self.body.by_torque_constant else own.total_inertia_kgm2
-        parts = [own.inertia_error_kgm2, self.body.error_kgm2, self.torque_constant_error * scaled]
+        estimate = self.estimates[method]
+        added = estimate.total_inertia_kgm2 - self.body.value_kgm2
+        scaled = added if self.body.by_torque_constant else estimate.total_inertia_kgm2
+        parts = [estimate.inertia_error_kgm2, self.body.error_kgm2, self.torque_constant_error * scaled]
         known = [part for part in parts if part is not None]
-        return added, math.hypot(*known) if own.inertia_error_kgm2 is not None else None
+        return added, math.hypot(*known) if estimate.inertia_error_kgm2 is not None else None
 
     def as_json(self) -> dict[str, Any]:
         """The result as plain data; ``added_inertia_kgm2`` and ``dissipation_J`` by method, the rest in ``methods``;
@@ -158,10 +158,10 @@ class YawIdentification:
         added = {method: self.added_inertia(method) for method in self.estimates}
         methods = {}
         for method, estimate in self.estimates.items():
-            own = added[method]
+            value = added[method]
             methods[method] = {
-                "added_inertia_kgm2": own[0] if own else None,
-                "added_inertia_standard_error_kgm2": own[1] if own else None,
+                "added_inertia_kgm2": value[0] if value else None,
+                "added_inertia_standard_error_kgm2": value[1] if value else None,
                 **estimate.as_json(),
             }
         return {
@@ -171,8 +171,8 @@ class YawIdentification:
             "body_inertia_kgm2": self.body.value_kgm2 if self.body else None,
             "body_inertia_standard_error_kgm2": self.body.error_kgm2 if self.body else None,
             "body_inertia_source": self.body.source if self.body else None,
-            "added_inertia_kgm2": {method: own[0] if own else None for method, own in added.items()},
-            "dissipation_J": {method: own.dissipation_J for method, own in self.estimates.items()},
+            "added_inertia_kgm2": {method: value[0] if value else None for method, value in added.items()},
+            "dissipation_J": {method: value.dissipation_J for method, value in self.estimates.items()},
             "methods": methods,
             "mirror_difference": list(self.mirror),
             "histories": record_histories(self.records, self.fit),
@@ -263,8 +263,8 @@ def _result(
     terms = options.terms or (AIR_TERMS if medium == "air" else WATER_TERMS)
     fit, reference = fitted(terms)
     if options.terms is None and (found := _with_gravity(fit, fitted)):
-        (fit, reference), told_of_gravity = found
-        notes += told_of_gravity
+        (fit, reference), gravity_notes = found
+        notes += gravity_notes
     check_sign(records[0], fit)
     ideal = programmed[0][0]
     estimates = {
@@ -274,8 +274,8 @@ def _result(
         "energy_least_squares_reference": least_squares_estimate("energy_least_squares_reference", reference, ideal),
         "two_intervals_reference": two_intervals("two_intervals_reference", reference.balance, fit),
     }
-    angle, left_out = _angle(records, _rig(constant, rig), estimates["energy_least_squares"], ideal)
-    notes += [*left_out, *check_explained(records, angle.estimate.misfit if angle else None)]
+    angle, omissions = _angle(records, _rig(constant, rig), estimates["energy_least_squares"], ideal)
+    notes += [*omissions, *check_explained(records, angle.estimate.misfit if angle else None)]
     if angle:
         estimates["output_error"] = angle.estimate
     body, remarks = _body(records, medium, options, air)
@@ -306,21 +306,21 @@ def _with_gravity(fit: EnergyFit, fitted: Callable[[tuple[str, ...]], Fits]) -> 
     the test alone finds the roundings of a record without noise.
     """
     try:
-        more, reference = fitted((*fit.balance.terms, *GRAVITY))
+        extended, reference = fitted((*fit.balance.terms, *GRAVITY))
     except InputError:  # the angles do not separate it
         return None
-    freedom = len(more.residuals_J) - len(more.coefficients)
-    rest, before = float(more.residuals_J @ more.residuals_J), float(fit.residuals_J @ fit.residuals_J)
-    moment = float(np.hypot(*more.coefficients[-2:]))
-    turned = sum(abs(own.angle_rad[-1] - own.angle_rad[0]) for pair in more.balance.pairs for own in pair)
-    mean = float(np.abs(more.balance.work_J).sum()) / turned
-    if moment < _SLIGHT * mean or f_test.sf((before - rest) / 2 / (rest / freedom), 2, freedom) > _RARE:
+    freedom = len(extended.residuals_J) - len(extended.coefficients)
+    after, before = float(extended.residuals_J @ extended.residuals_J), float(fit.residuals_J @ fit.residuals_J)
+    moment = float(np.hypot(*extended.coefficients[-2:]))
+    turned = sum(abs(interval.angle_rad[-1] - interval.angle_rad[0]) for pair in extended.balance.pairs for interval in pair)
+    mean = float(np.abs(extended.balance.work_J).sum()) / turned
+    if moment < _SLIGHT * mean or f_test.sf((before - after) / 2 / (after / freedom), 2, freedom) > _RARE:
         return None
     note = (
         f"What (3) leaves goes with the angle: a moment of gravity of {moment:.3g} N m is among the terms "
         f"(--terms {','.join(fit.balance.terms[1:])} leaves it out). The two-interval formulas do not know it."
     )
-    return (more, reference), [note]
+    return (extended, reference), [note]
 
 
 def _angle(

@@ -89,8 +89,8 @@ class Interval:
 Work = Callable[[Interval], float]
 
 
-def _change_of_square(own: Interval) -> float:
-    return float(own.rate_radps[-1] ** 2 - own.rate_radps[0] ** 2) / 2
+def _change_of_square(interval: Interval) -> float:
+    return float(interval.rate_radps[-1] ** 2 - interval.rate_radps[0] ** 2) / 2
 
 
 def _swept(power: int) -> Work:
@@ -137,19 +137,19 @@ def _interval(record: YawRecord, ends: tuple[float, float], speeds: Speeds, *, b
     begin, end = ends
     time = record.time_s
     inside = (time > begin + 1e-9) & (time < end - 1e-9)
-    own = np.concatenate([[begin], time[inside], [end]])
+    times = np.concatenate([[begin], time[inside], [end]])
     if speeds == "reference":
-        angle, rate, acceleration = record.programme.at(own)
+        angle, rate, acceleration = record.programme.at(times)
         angle = angle + np.interp(record.programme.start_s, time, record.angle_rad)
     else:
         spline = smooth_angle(record, ends)
-        angle, rate, acceleration = (spline(own, nu) for nu in (0, 1, 2))
+        angle, rate, acceleration = (spline(times, nu) for nu in (0, 1, 2))
     return Interval(
-        time_s=own,
+        time_s=times,
         angle_rad=angle,
         rate_radps=rate,
         acceleration_radps2=acceleration,
-        current_A=np.interp(own, time, record.current_A),
+        current_A=np.interp(times, time, record.current_A),
         braking=braking,
         number=number,
     )
@@ -200,36 +200,36 @@ def _spline(time: Array, angle: Array, knot_s: float) -> BSpline | None:
 
 def _cross_validation(spline: BSpline, time: Array, angle: Array) -> float:
     """n RSS / (n - c m)^2, c the sum of the correlations of one error with all others (Altman 1990)."""
-    left = angle - spline(time)
+    residual = angle - spline(time)
     free = len(time) - _CORRELATION * len(spline.c)
-    return float(len(time) * (left @ left) / free**2) if free > 0 else math.inf
+    return float(len(time) * (residual @ residual) / free**2) if free > 0 else math.inf
 
 
-def known_work(own: Interval, rig: YawRig) -> float:
+def known_work(interval: Interval, rig: YawRig) -> float:
     """Work (J) against what is known beyond (3): walls, gravity, and what differs between accelerating and braking.
 
     Of the pair f_662a, f_662d the difference is counted, when braking; lambda_662 |w|^1.5 and the walls' added inertia
     take part with the acceleration.
     """
-    rate, acceleration = own.rate_radps, own.acceleration_radps2
+    rate, acceleration = interval.rate_radps, interval.acceleration_radps2
     inertia, damping = np.zeros_like(rate), np.zeros_like(rate)
     if rig.walls:
         heading = ca.SX.sym("psi")
         walls = ca.Function("walls", [heading], list(wall_terms(heading, rig.walls)))
-        inertia, damping = (np.asarray(value).ravel() for value in walls(own.angle_rad[None, :]))
-    more = rig.inertia_braking_kgm2 if own.braking else rig.inertia_accelerating_kgm2
-    inertia = inertia + more * np.abs(rate) ** 1.5
-    rougher = rig.quadratic_braking - rig.quadratic_Nms2 if own.braking else 0.0
-    gravity = rig.gravity_Nm * np.sin(own.angle_rad - rig.gravity_angle_rad)
-    return own.integral(
+        inertia, damping = (np.asarray(value).ravel() for value in walls(interval.angle_rad[None, :]))
+    extra = rig.inertia_braking_kgm2 if interval.braking else rig.inertia_accelerating_kgm2
+    inertia = inertia + extra * np.abs(rate) ** 1.5
+    rougher = rig.quadratic_braking - rig.quadratic_Nms2 if interval.braking else 0.0
+    gravity = rig.gravity_Nm * np.sin(interval.angle_rad - rig.gravity_angle_rad)
+    return interval.integral(
         inertia * rate * acceleration + damping * rate**2 + rougher * np.abs(rate) ** 3 + gravity * rate
     )
 
 
-def motor_work(own: Interval, torque_constant_NmpA: float, rig: YawRig | None = None) -> float:
+def motor_work(interval: Interval, torque_constant_NmpA: float, rig: YawRig | None = None) -> float:
     """k_t int w I dt less the work against what is known, J."""
-    work = torque_constant_NmpA * own.integral(own.rate_radps * own.current_A)
-    return work - known_work(own, rig) if rig else work
+    work = torque_constant_NmpA * interval.integral(interval.rate_radps * interval.current_A)
+    return work - known_work(interval, rig) if rig else work
 
 
 def mirror_difference(pair: tuple[Interval, Interval]) -> float:
@@ -237,15 +237,15 @@ def mirror_difference(pair: tuple[Interval, Interval]) -> float:
     speeding, braking = pair
     x = np.linspace(0, 1, 101)
 
-    def at(own: Interval, share: Array) -> Array:
-        time = own.time_s[0] + share * (own.time_s[-1] - own.time_s[0])
-        rate: Array = np.abs(np.interp(time, own.time_s, own.rate_radps))
+    def at(interval: Interval, share: Array) -> Array:
+        time = interval.time_s[0] + share * (interval.time_s[-1] - interval.time_s[0])
+        rate: Array = np.abs(np.interp(time, interval.time_s, interval.rate_radps))
         return rate
 
-    one, other = at(speeding, x), at(braking, 1 - x)
-    return float(np.max(np.abs(one - other)) / max(one.max(), other.max()))
+    speeding_rates, braking_rates = at(speeding, x), at(braking, 1 - x)
+    return float(np.max(np.abs(speeding_rates - braking_rates)) / max(speeding_rates.max(), braking_rates.max()))
 
 
-def work_rows(own: Interval, terms: Mapping[str, float] | tuple[str, ...], parts: int) -> list[list[float]]:
+def work_rows(interval: Interval, terms: Mapping[str, float] | tuple[str, ...], parts: int) -> list[list[float]]:
     """Work per unit of each term in each part of an interval."""
-    return [[ENERGY_TERMS[term][0](own.part(place, parts)) for term in terms] for place in range(parts)]
+    return [[ENERGY_TERMS[term][0](interval.part(place, parts)) for term in terms] for place in range(parts)]

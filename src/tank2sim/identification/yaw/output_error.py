@@ -92,15 +92,15 @@ def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, i
     begin = np.concatenate([values / scale, *(hump.start for hump in humps)])
 
     def evaluate(unknown: Array) -> tuple[Array, Array]:
-        left, slopes = [], []
+        residuals, slopes = [], []
         for place, hump in enumerate(humps):
             at = count + 2 * place
             angle, sensitivity = predict(unknown[:count] * scale, unknown[at : at + 2], hump)
-            left.append(angle - hump.angle_rad)
+            residuals.append(angle - hump.angle_rad)
             wide = np.zeros((len(angle), len(unknown)))
             wide[:, :count], wide[:, at : at + 2] = sensitivity[:, :count] * scale, sensitivity[:, count:]
             slopes.append(wide)
-        return np.concatenate(left), np.vstack(slopes)
+        return np.concatenate(residuals), np.vstack(slopes)
 
     last: list[tuple[Array, Array, Array]] = []
 

@@ -29,9 +29,9 @@ def record_histories(records: Sequence[YawRecord], fit: EnergyFit) -> dict[str, 
         reference = programme.at(time)
         rate = np.full(len(time), np.nan)
         for pair in fit.balance.pairs[before : before + programme.humps]:
-            for own in pair:
-                inside = (time >= own.time_s[0]) & (time <= own.time_s[-1])
-                rate[inside] = np.interp(time[inside], own.time_s, own.rate_radps)
+            for interval in pair:
+                inside = (time >= interval.time_s[0]) & (time <= interval.time_s[-1])
+                rate[inside] = np.interp(time[inside], interval.time_s, interval.rate_radps)
         before += programme.humps
         offset = record.angle_rad[0] - float(programme.at(time[:1]).angle_rad[0])
         columns = {
@@ -66,16 +66,16 @@ def balance_as_json(fit: EnergyFit) -> dict[str, Any]:
 
 def residuals_as_json(fit: EnergyFit) -> list[dict[str, Any]]:
     """What the least squares leave of each subinterval's work, J, with the mean rate in it, deg/s."""
-    balance, left = fit.balance, iter(fit.residuals_J.tolist())
+    balance, residuals = fit.balance, iter(fit.residuals_J.tolist())
     return [
         {
-            "stage": STAGES[own.braking],
-            "hump": own.number + 1,
-            "rate_degps": float(np.degrees(np.mean(own.part(part, balance.parts).rate_radps))),
-            "left_J": next(left),
+            "stage": STAGES[interval.braking],
+            "hump": interval.number + 1,
+            "rate_degps": float(np.degrees(np.mean(interval.part(part, balance.parts).rate_radps))),
+            "left_J": next(residuals),
         }
         for pair in balance.pairs
-        for own in pair
+        for interval in pair
         for part in range(balance.parts)
     ]
 
@@ -84,7 +84,7 @@ def angle_residual_as_json(angle: AngleFit | None) -> dict[str, list[float]] | N
     """What the integrated equation leaves of the angle, a gap (nan) where nothing is fitted."""
     if angle is None:
         return None
-    time, left = angle.time_s, angle.residual_rad
+    time, residual = angle.time_s, angle.residual_rad
     breaks = np.flatnonzero(np.abs(np.diff(time)) > 1.0) + 1
     time = np.insert(time, breaks, time[breaks - 1] + 0.01)
-    return drawn_columns({"t_s": time, "residual_rad": np.insert(left, breaks, np.nan)}, peaks=True)
+    return drawn_columns({"t_s": time, "residual_rad": np.insert(residual, breaks, np.nan)}, peaks=True)
