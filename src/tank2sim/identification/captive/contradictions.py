@@ -49,8 +49,8 @@ def contradicted(campaign: Campaign, runs: Sequence[ReducedRun]) -> dict[str, In
             remaining = [run for run in remaining if run.run.name != row.run]
             difference = "harmonics differ" if row.type in OSCILLATING else "mean differs"
             problem = (
-                f"contradicts the other runs: its {difference} from their prediction by {100 * share:.0f} % of the force, "
-                f"{times:.0f} times the usual difference"
+                f"contradicts the other runs: its {difference} from their prediction by {100 * share:.0f} % of the "
+                f"force, {times:.0f} times the usual difference"
             )
             remedy = "check for a dead gauge, or for a unit or sign that differs from the other runs"
             found.setdefault(row.run, InputError(row.run, f"gauge {force}", problem, remedy))

@@ -179,8 +179,8 @@ def _sheet(reduction: Reduction) -> Iterator[str]:
         for quantity, unit, stated, found in measured:
             if stated is not None and run.run.oscillates and abs(found / stated - 1) > _SHEET:
                 yield (
-                    f"{run.run.name}: its {quantity} is {found:.4g} {unit}, and {stated:.4g} by the sheet; the measured "
-                    "value is used."
+                    f"{run.run.name}: its {quantity} is {found:.4g} {unit}, and {stated:.4g} by the sheet; the "
+                    "measured value is used."
                 )
 
 

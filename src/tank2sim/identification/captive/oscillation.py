@@ -179,7 +179,7 @@ def cubic_findings(found: Sequence[CubicByTwoWays]) -> list[str]:
         (first, first_error), (second, second_error) = cubic.from_third_harmonic, cubic.from_amplitude
         messages.append(
             f"{cubic.name} is {first:.3g} ± {first_error:.2g} by the third harmonic and {second:.3g} ± "
-            f"{second_error:.2g} by the amplitude, {abs(cubic.ratio):.1f} standard errors apart: the force is not cubic in this range, or "
-            "it depends on the frequency."
+            f"{second_error:.2g} by the amplitude, {abs(cubic.ratio):.1f} standard errors apart: the force is not "
+            "cubic in this range, or it depends on the frequency."
         )
     return messages

@@ -243,8 +243,8 @@ def similarity(model: Mapping[str, float | None], ship: Mapping[str, float | Non
             amount = f"{100 * difference:.2g} %" + ("" if kind else " of the length")
             yield Caution(
                 "similarity",
-                f"{name} is {of_model:.4g} of the model and {of_ship:.4g} of the ship card, {amount} apart; derivatives "
-                "hold for the ship only if both are equal (paper 2).",
+                f"{name} is {of_model:.4g} of the model and {of_ship:.4g} of the ship card, {amount} apart; "
+                "derivatives hold for the ship only if both are equal (paper 2).",
             )
 
 

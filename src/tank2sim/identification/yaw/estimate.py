@@ -1,4 +1,4 @@
-"""What one method makes of records of the yaw rig: inertia, dissipation, friction, and how sure they are."""
+"""Estimates from records of the yaw rig by one method: inertia, dissipation and friction with their errors."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ class YawEstimate:
     ----------
     method : str
     total_inertia_kgm2, inertia_error_kgm2 : float
-        J_zz + lambda661 (in air J_zz) and its standard error; None where the data do not tell.
+        J_zz + lambda661 (in air J_zz) and its standard error; None where the data do not determine it.
     dissipation_J, dissipation_error_J : float
         B + D over one interval.
     friction : mapping
         Other terms of :data:`tank2sim.identification.yaw.intervals.ENERGY_TERMS` to (value, standard error), in SI.
     misfit : float or None
-        Root mean square of what is left: J for methods of energy, rad for those of the angle.
+        Root mean square of the residuals: J for methods of energy, rad for those of the angle.
     bias_kgm2 : float or None
-        How far a two-interval formula lies from the energy least squares of the same records.
+        Difference of a two-interval formula from the energy least squares of the same records.
     bias_from : mapping
-        Parts of that: ``dissipation`` (not the same in both intervals) and ``speeds`` (w1, w2 not those of w6, w5).
+        Parts of the bias: ``dissipation`` (different in both intervals) and ``speeds`` (w1, w2 differ from w6, w5).
     by_hump_kgm2 : tuple of float
         J_zz + lambda661 of each pair of intervals by a two-interval formula, of which the estimate is the mean.
     """
@@ -44,7 +44,7 @@ class YawEstimate:
     by_hump_kgm2: tuple[float, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
-        """As plain data; the unit of a number stands in its key."""
+        """As plain data; the unit of a number is in its key."""
         result: dict[str, Any] = {
             "total_inertia_kgm2": self.total_inertia_kgm2,
             "total_inertia_standard_error_kgm2": self.inertia_error_kgm2,
