@@ -19,7 +19,7 @@ import numpy as np
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.cards.reading import revised
 from tank2sim.identification.trials.assessment.evaluation import Following
-from tank2sim.identification.trials.identify import IdentificationOptions, estimated, identify_trials
+from tank2sim.identification.trials.identify import IdentificationOptions, estimate_parameters, identify_trials
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 
@@ -65,7 +65,7 @@ def _speed(card: ManoeuvringCard, files: list[Path]) -> None:
     names = tuple(problem.free[place] for place in places)
     fewer = replace(problem, free=names, prior_mean=problem.prior_mean[places], prior_error=problem.prior_error[places])
     begin = time.perf_counter()
-    found = estimated(fewer, IdentificationOptions())
+    found = estimate_parameters(fewer, IdentificationOptions())
     samples = sum(len(run.measured) for run in problem.runs)
     print(
         f"output error, {len(problem.runs)} runs, {samples} samples, {FREE} coefficients: "

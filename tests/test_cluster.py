@@ -21,7 +21,7 @@ from tank2sim.executors import executing, processes_to_begin
 from tank2sim.gap.inference.fit_all import Fitting, Known, Proposal
 from tank2sim.gap.inference.prior import likelihood_from_card
 from tank2sim.identification.trials.assessment.model_selection import cross_validate, yaw_rate_error
-from tank2sim.identification.trials.assessment.monte_carlo import PredictionSettings, bootstrap
+from tank2sim.identification.trials.assessment.prediction_intervals import PredictionSettings, bootstrap
 from tank2sim.identification.trials.assessment.residual_forces import disturbances_of
 from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.problem.picklable import portable

@@ -57,7 +57,7 @@ def test_a_missing_run_is_refused_and_nothing_is_written(tmp_path):
         run(faulty, "-o", card)
     assert not card.exists()
     assert run(faulty, "-o", card, "--keep-going").exit_code == 0
-    assert "left out, for it is at fault" in run(faulty, "--keep-going").output
+    assert "left out because of a fault" in run(faulty, "--keep-going").output
 
 
 def test_what_is_estimated_and_what_is_missing_is_said(path, tmp_path):

@@ -95,7 +95,7 @@ def test_a_record_can_be_simulated_from_a_card_and_gives_its_inertia(folder):
 def test_a_simulated_record_that_gives_no_result_is_not_left_behind_and_its_card_is_named(folder):
     text = bundled("models", "alyshev", "ship.toml").read_text()
     (folder / "rig.toml").write_text(re.sub(r"(?m)^settle_s *=.*$", "settle_s = 0.0", text))
-    refused(tank2sim("yaw", "made.csv", "--simulate", "rig.toml", cwd=folder), "rig.toml", "no mirror images")
+    refused(tank2sim("yaw", "made.csv", "--simulate", "rig.toml", cwd=folder), "rig.toml", "not mirror images")
     assert not (folder / "made.csv").exists()
 
 
@@ -140,7 +140,7 @@ def test_theory_stands_beside_the_record(folder):
 def test_bad_input_is_one_line(folder):
     refused(tank2sim("yaw", "none.csv", cwd=folder), "none.csv", "does not exist")
     refused(tank2sim("yaw", "water.csv", "--card", "mariner", cwd=folder), "--card", "-o")
-    refused(tank2sim("yaw", "water.csv", "--mirror-percent", "0.1", cwd=folder), "no mirror images", "%")
+    refused(tank2sim("yaw", "water.csv", "--mirror-percent", "0.1", cwd=folder), "not mirror images", "%")
     refused(tank2sim("yaw", "water.csv", "-o", "x.toml", "--card", "mariner", cwd=folder), "--inertia-kgm2")
     refused(tank2sim("yaw", "air.csv", "-o", "x.toml", "--card", "mariner", cwd=folder), "records in water")
     refused(tank2sim("yaw", "water.csv", "--reference", "air.csv", cwd=folder), "--reference-inertia-kgm2")

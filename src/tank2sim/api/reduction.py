@@ -14,9 +14,8 @@ from tank2sim.cards import Card, parse_card
 from tank2sim.cards.covariance import Covariance
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.as_json import reduction_as_json
-from tank2sim.identification.captive.covariance import reduction_covariance
 from tank2sim.identification.captive.findings import implausible, reduction_findings
-from tank2sim.identification.captive.reduction import Reduction, ReductionOptions, reduce_campaign
+from tank2sim.identification.captive.reduction import Reduction, ReductionOptions, reduce_campaign, reduction_covariance
 from tank2sim.identification.captive.result_card import (
     FILLS,
     Contents,
@@ -111,7 +110,7 @@ class ReductionResult(Result):
                 rows,
             )
         ]
-        if left_out := [[choice.name, choice.reason, choice.told] for choice in terms_left_out(self.reduction)]:
+        if left_out := [[choice.name, choice.reason, choice.explanation] for choice in terms_left_out(self.reduction)]:
             tables.append(ResultTable("Terms that the runs excite and that were left out", ("", "", "why"), left_out))
         errors_by_type = prediction_rows(self.reduction)
         tables.append(

@@ -1,4 +1,4 @@
-"""How well a linear least-squares problem determines its unknowns."""
+"""Conditioning of linear least-squares problems."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def column_norms(design: Array) -> Array:
 def scaled_condition(design: Array) -> float:
     """Condition number of a design matrix (rows, unknowns) whose columns are scaled to equal length.
 
-    Infinite with fewer rows than unknowns: the singular values then leave out the directions that no row determines.
+    Infinite with fewer rows than unknowns: the singular values then omit the undetermined directions.
     """
     if design.shape[0] < design.shape[1]:
         return np.inf

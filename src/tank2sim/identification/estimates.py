@@ -1,8 +1,8 @@
-"""Published estimates of derivatives from the main dimensions of a ship, for what was not measured.
+"""Published estimates of derivatives from the main dimensions of a ship, for derivatives without measurements.
 
 All in the prime system (forces 1/2 rho L^2 U^2, moments 1/2 rho L^3 U^2, accelerations by rho and L), about the origin
-midways between the perpendiculars, without inertia terms ("hydrodynamic"). An estimate is no measurement: each carries
-its source and a wide standard error.
+midways between the perpendiculars, without inertia terms ("hydrodynamic"). Each estimate has its
+source and a wide standard error.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ GYRATION = "radius of gyration 0.25 L"
 """The usual rule for merchant ships without a weight distribution."""
 
 RELATIVE_ERROR = 0.30
-"""Standard error of a Clarke estimate, relative: the regressions scatter by so much, and hold for merchant hulls."""
+"""Standard error of a Clarke estimate, relative: scatter of the regressions, which are for merchant hulls."""
 
 COUPLING_ERROR = 0.05
 """Standard error of Clarke's Y_rdot and N_vdot in units of pi (T/L)^2: small differences of large numbers, even of
@@ -37,9 +37,9 @@ GYRATION_ERROR = 0.06
 
 @dataclass(frozen=True, kw_only=True)
 class Particulars:
-    """Main dimensions, SI: length between perpendiculars, beam, draught; mass, its density of water, and x_G.
+    """Main dimensions, SI: length between perpendiculars, beam, draught; mass, density of the water, and x_G.
 
-    A missing mass follows from the block coefficient and the other way about.
+    A missing mass follows from the block coefficient and vice versa.
     """
 
     length_m: float
@@ -79,7 +79,7 @@ class Particulars:
 
 @dataclass(frozen=True)
 class NamedEstimate:
-    """An estimated number (prime), its standard error, and where the formula is from."""
+    """An estimated number (prime), its standard error, and the source of its formula."""
 
     value: float
     standard_error: float
@@ -87,15 +87,15 @@ class NamedEstimate:
 
 
 def estimate(particulars: Particulars, names: Iterable[str]) -> dict[str, NamedEstimate]:
-    """Estimates of derivatives by their names, as far as there is a published formula.
+    """Estimates of derivatives with a published formula.
 
     Parameters
     ----------
     particulars : Particulars
         Of the ship.
     names : iterable of str
-        Canonical names; ``yaw_inertia`` is J_z'. Those without a formula are left out of the result, not guessed: see
-        :data:`ESTIMATED`.
+        Canonical names; ``yaw_inertia`` is J_z'. Names without a formula (see :data:`ESTIMATED`) are not in
+        the result.
 
     Returns
     -------
@@ -149,4 +149,4 @@ ESTIMATED: Mapping[str, Callable[[Particulars], NamedEstimate]] = {
     "Xudot": _surge,
     "yaw_inertia": _yaw_inertia,
 }
-"""What can be estimated, by name. Rudder and third-order terms are not here: they hang on more than main dimensions."""
+"""Formulas by name. Rudder and third-order terms have none: they depend on more than main dimensions."""

@@ -11,8 +11,7 @@ from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
 from tank2sim.cards import parse_card, read_card
 from tank2sim.cards.covariance import Covariance
 from tank2sim.dynamics import build
-from tank2sim.identification.captive.covariance import reduction_covariance
-from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
+from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign, reduction_covariance
 from tank2sim.identification.captive.result_card import card_contents, reduced_card_text
 from tank2sim.records.campaigns import read_campaign
 from tank2sim.simulation.manoeuvres import parse_manoeuvre

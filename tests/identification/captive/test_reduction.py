@@ -116,7 +116,7 @@ def test_every_candidate_is_accounted_for_with_a_reason(noisy):
     assert choices["Nrrd"].reason == "not excited"
     assert choices["Nv"].reason == "linear"
     assert choices["Nvvr"].reason == "determined"
-    assert all(choice.told for choice in choices.values())
+    assert all(choice.explanation for choice in choices.values())
     assert choices["Nv"].inflation > 1
     shown = {name for name, choice in choices.items() if choice.kept}
     assert shown == {name for name in noisy.derivatives if name[0] == "N"}
@@ -125,7 +125,7 @@ def test_every_candidate_is_accounted_for_with_a_reason(noisy):
 def test_terms_that_cannot_be_told_apart_are_left_out_and_told(hmri):
     reasons = {choice.name: choice for choice in hmri.forces["Y"].selection.choices}
     assert reasons["Yvdd"].reason == "collinear"  # rudder and drift keep one ratio in the combined tests
-    assert "condition number" in reasons["Yvdd"].told
+    assert "condition number" in reasons["Yvdd"].explanation
     assert reasons["Yvdd"].inflation > 30
 
 

@@ -14,11 +14,11 @@ from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import NOISE_SHARE, Campaign, write
 
 CASES = {
-    "saturated": ("sway_02", "gauge Y: stands still at its .* saturated"),
+    "saturated": ("sway_02", "gauge Y: is constant at its .* saturated"),
     "step": ("drift_+04", "gauge Y: its zero steps by"),
     "degrees": ("yaw_02", "column r_radps: reaches .* cannot be"),
     "short": ("sway_11", "has 0.7. of a period"),
-    "wrong type": ("yaw_12", "is said to be pure_sway"),
+    "wrong type": ("yaw_12", "has type pure_sway"),
     "missing": ("rudder_+10", "there is no such file"),
 }
 
@@ -74,7 +74,7 @@ def test_the_rest_is_reduced_when_asked_to_go_on(tmp_path):
         ("drift_+08", lambda run: {"speed_mps": 100 * run.speed_mps}, "speed_mps: has a mean of"),
         ("drift_+08", lambda run: {"delta_rad": run.delta_rad + 2.0}, "column delta_rad: reaches 2, which cannot be"),
         ("rudder_+10", lambda run: {"delta_rad": -run.delta_rad}, "delta_rad: is -10 deg, and 10 deg by the sheet"),
-        ("rudder_+10", lambda run: {"r_radps": run.r_radps + 0.05}, "is said to be static_rudder, and the model moves"),
+        ("rudder_+10", lambda run: {"r_radps": run.r_radps + 0.05}, "has type static_rudder, but the model moves"),
         ("drift_+08", lambda run: {"time_s": run.time_s + 3 * (run.time_s > 5)}, "column t_s: has a gap of 3.1 s"),
     ],
 )

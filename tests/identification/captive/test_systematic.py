@@ -124,8 +124,7 @@ def test_kinds_of_run_that_no_other_can_check_are_named(tmp_path):
     found, _ = reduced(Campaign(seed=7, size="linear", rate_hz=5.0), tmp_path)
     assert {"static_rudder", "pure_yaw"} <= set(found.forces["Y"].unchecked)
     assert any(
-        sentence.startswith("Not known is whether the gauges") and "static_rudder" in sentence
-        for sentence in reduction_findings(found)
+        "whether the gauges" in sentence and "static_rudder" in sentence for sentence in reduction_findings(found)
     )
 
 

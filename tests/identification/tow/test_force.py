@@ -135,7 +135,7 @@ def test_force_from_text():
 
 @pytest.mark.parametrize("text", ["", "fast", "1,,2", "inf"])
 def test_what_is_no_polynomial_is_refused(text):
-    with pytest.raises(InputError, match=r"--force-polynomial: .* is no polynomial; give numbers"):
+    with pytest.raises(InputError, match=r"--force-polynomial: .* is not a polynomial; give numbers"):
         parse_force(text)
 
 

@@ -72,7 +72,7 @@ def test_warnings_on_table_1_with_four_unknowns(four_unknowns):
         r"qr: almost fully correlated are B1 and B2",
         r"qr: the drag terms have opposite signs \(B2 negative\)",
         r"output_error: the drag is negative over \d+ % of the speeds up to 0.176 m/s",
-        r"qr: 4 unknowns are drawn from the 3 coefficients of a speed polynomial of degree 2",
+        r"qr: 4 unknowns are estimated from the 3 coefficients of a speed polynomial of degree 2",
         r"qr and output_error differ in M by 1.19e\+03 kg",
     ]
     for sentence in expected:
@@ -122,7 +122,7 @@ def test_what_is_given_comes_before_the_file_and_is_told(table_1):
     reference = identify_tow(table_1, terms=("B3",))
     for name, fit in result.fits.items():
         np.testing.assert_allclose(fit.values, 2 * reference.fits[name].values, rtol=1e-6)
-    assert "The file of the tows says force_N 11.63, and 23.26 was given and used." in result.warnings
+    assert "The file of the tows states force_N 11.63; 23.26 was given and used." in result.warnings
 
 
 def test_largest_speed_error_is_that_of_the_integrated_model(two_unknowns, table_1):

@@ -67,7 +67,7 @@ def test_derivatives_of_the_innovations_are_those_of_finite_differences(pushed):
     seen = (*SEEN, "motion.vdot")
     problem = problem.with_runs((replace(run, seen=seen, measured=np.hstack([run.measured, accelerometer])),))
     task = task_of(problem, drifting=True)
-    made = task.begin(problem.prior_mean).made
+    made = task.first_point(problem.prior_mean).filtered
     disturbed, batch = task.disturbed, task.batch
     case = (np.exp(-batch.steps[0] / np.exp(task.first.time)), batch.steps[:1])
 
@@ -166,9 +166,9 @@ def test_a_run_says_the_same_beside_a_longer_one(pushed):
     problem = pushed[0][0]
     long, short = problem.runs[0], problem.runs[1].part(0, 60)
     task = task_of(problem.with_runs((long, short)))
-    together = task.begin(problem.prior_mean).made
+    together = task.first_point(problem.prior_mean).filtered
     alone = [task_of(problem.with_runs((run,))) for run in (long, short)]
-    apart = [replace(one, first=task.first).begin(problem.prior_mean).made for one in alone]
+    apart = [replace(one, first=task.first).first_point(problem.prior_mean).filtered for one in alone]
     assert together.cost == pytest.approx(sum(one.cost for one in apart), rel=1e-9)
 
 

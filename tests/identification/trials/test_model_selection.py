@@ -83,8 +83,8 @@ def test_each_run_is_left_out_once_and_the_largest_last(asked):
 
     result = cross_validate(asked, ESTIMATOR, score)
     assert seen == [("small",), ("middle",), ("large",), ("large",)]
-    assert [fold.left_out for fold in result.single] == seen[:3]
-    assert result.extrapolation.left_out == ("large",)
+    assert [fold.held_out for fold in result.single] == seen[:3]
+    assert result.extrapolation.held_out == ("large",)
 
 
 def test_largest_amplitude_is_that_of_the_yaw_rate(asked):

@@ -10,7 +10,7 @@ import pytest
 
 from tank2sim.cards import parse_card
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.assessment.monte_carlo import PredictionSettings, bands, bootstrap, flat
+from tank2sim.identification.trials.assessment.prediction_intervals import PredictionSettings, bands, bootstrap, flat
 from tank2sim.identification.trials.assessment.residual_forces import (
     HARMONICS,
     Disturbances,

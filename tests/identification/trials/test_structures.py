@@ -8,7 +8,7 @@ import pytest
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
-from tank2sim.identification.trials.problem.problem_from_card import answered, free_parameters, rounded
+from tank2sim.identification.trials.problem.problem_from_card import card_with_estimate, free_parameters, rounded
 from tank2sim.identification.trials.problem.structures import STRUCTURES, prior_of_absent
 
 
@@ -70,7 +70,7 @@ def test_an_answer_goes_into_the_card_in_its_own_signs_and_scaling(name: str) ->
     assert isinstance(card, ManoeuvringCard)
     started = STRUCTURES["cross_flow"].start(card)
     free = free_parameters(started)
-    new = answered(started, _estimate(free, 1.25))
+    new = card_with_estimate(started, _estimate(free, 1.25))
     again = parse_card(new.text, "again")
     assert isinstance(again, ManoeuvringCard)
     found = free_parameters(again)

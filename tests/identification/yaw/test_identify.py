@@ -250,7 +250,7 @@ def test_what_is_no_record_is_refused(tmp_path, columns):
         with pytest.raises(InputError, match=pattern):
             identify_yaw([read_yaw_record(path)])
 
-    tell(r"no mirror images: their rates differ by up to \d+\.\d % of the largest, and 25 %", start_s=1.0, humps=1)
+    tell(r"not mirror images: their rates differ by up to \d+\.\d % of the largest, and 25 %", start_s=1.0, humps=1)
     tell("does not come after", changed=broken(columns, t=np.r_[columns["t"][:-1], 0.0]))
     coarse = np.floor(columns["psi"] / 0.05) * 0.05
     tell(r"steps of the encoder from .* and \d+ are needed", changed=broken(columns, psi=coarse))

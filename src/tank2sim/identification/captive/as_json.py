@@ -1,4 +1,4 @@
-"""The whole of a reduction as plain data, for JSON."""
+"""A complete reduction as plain data, for JSON."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
 from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.result_card import Contents
+from tank2sim.identification.captive.selection import Choice
 from tank2sim.identification.captive.tables import by_the_papers_order, prediction_errors
 from tank2sim.records.campaigns import Campaign
 
 
 def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str, ...]) -> dict[str, Any]:
-    """Everything of a reduction; ``derivatives`` and ``rigid_body`` are those of the card."""
+    """A complete reduction; ``derivatives`` and ``rigid_body`` are those of the card."""
     campaign = reduction.campaign
     found: dict[str, Any] = {
         "campaign": str(campaign.path),
@@ -36,7 +37,8 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
         "warnings": warnings,
         "methods": {force: _methods(result) for force, result in reduction.forces.items()},
         "selection": {
-            force: [asdict(choice) for choice in result.selection.choices] for force, result in reduction.forces.items()
+            force: [_choice(choice) for choice in result.selection.choices]
+            for force, result in reduction.forces.items()
         },
         "spread": {force: _spread(result) for force, result in reduction.forces.items()},
         "systematic_errors": [{**asdict(error), "message": error.message} for error in reduction.systematic],
@@ -53,12 +55,17 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
         "not_used": reduction.not_used,
         "faults": [str(fault) for fault in reduction.faults],
     }
-    again = repeats(campaign, reduction.runs)
-    found["repeats"] = asdict(again) if again else None
+    repeated = repeats(campaign, reduction.runs)
+    found["repeats"] = asdict(repeated) if repeated else None
     if is_resistance(campaign) and "X0" in reduction.derivatives:
         resistance = reduction.derivatives["X0"]
         found["resistance"] = {"X0": {"value": resistance.value, "standard_error": resistance.standard_error}}
     return found
+
+
+def _choice(choice: Choice) -> dict[str, Any]:
+    found = asdict(choice)
+    return {"told" if key == "explanation" else key: value for key, value in found.items()}
 
 
 def _derivative(reduction: Reduction, card: Contents, name: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Each run predicted from all the others: what a model is worth where it was not fitted, and which runs pull it."""
+"""Leave-one-out cross-validation: prediction errors outside the fit, and the influence of each run."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ _UNLIKELY = 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class LeftOut:
-    """One run left out.
+    """Prediction of a run from all other runs.
 
     Parameters
     ----------
     run, type : str
         Its name and type.
     measured, predicted : float
-        The water's force, by 1/2 rho L^2 u0^2 (N: L^3): its mean in a steady run, its part in phase with the velocity
-        in an oscillating one; predicted from the derivatives of all other runs.
+        The water's force, by 1/2 rho L^2 u0^2 (N: L^3): mean in a steady run, part in phase with the velocity in an
+        oscillating run; predicted with the derivatives of all other runs.
     standard_error : float
-        Of the difference of the two.
+        Of predicted less measured.
     chance : float
-        Probability of a misfit of all its coefficients as large as this or larger.
+        Probability of at least this misfit of all coefficients.
     misfit : float
-        Root mean square misfit of all its coefficients, in standard errors.
+        Root mean square misfit of all coefficients, in standard errors.
     gap, size : float
         Norm of that misfit, and the larger norm of the coefficients measured and predicted; units as `measured`.
     influence : float
-        The most that leaving it out moves a derivative, in standard errors.
+        Largest change of a derivative without the run, in standard errors.
     moved : str
-        Which derivative that is.
+        Name of that derivative.
     """
 
     run: str
@@ -65,15 +65,15 @@ class LeftOut:
 
     @property
     def unlikely(self) -> bool:
-        """It does not belong with the others, but by a chance of one in ten thousand."""
+        """True if the probability of the misfit is below one in ten thousand."""
         return self.chance < _UNLIKELY
 
 
 def leave_one_out(equations: CampaignEquations, spread: Spread) -> tuple[LeftOut, ...]:
-    """Every run left out in turn, with the spread of the whole campaign.
+    """Leave out each run in turn, with the spread of the whole campaign.
 
-    One solve serves all: leaving a run out takes its share from the normal equations. A run without which a term
-    cannot be found is not told.
+    A single solution serves all runs: its share is subtracted from the normal equations. A run without which a term is
+    not determined has no row.
     """
     if not equations.names:
         return ()
@@ -90,33 +90,33 @@ def leave_one_out(equations: CampaignEquations, spread: Spread) -> tuple[LeftOut
     found = []
     ends = [*equations.first_rows[1:], len(equations.values)]
     for place, (start, end) in enumerate(zip(equations.first_rows, ends, strict=True)):
-        own, target = design[start:end], values[start:end]
-        rest = normal - own.T @ own
-        if np.linalg.cond(rest) > 1e10:
+        block, target = design[start:end], values[start:end]
+        remaining = normal - block.T @ block
+        if np.linalg.cond(remaining) > 1e10:
             continue
-        inverse = np.linalg.inv(rest)
-        without = inverse @ (right - own.T @ target)
+        inverse = np.linalg.inv(remaining)
+        without = inverse @ (right - block.T @ target)
         shift = np.abs(without - estimate) / np.maximum(errors, 1e-300)
-        most = int(np.argmax(shift))
-        by_others = own @ inverse @ (together - scatter[place]) @ inverse @ own.T
-        misfit_covariance = run_covariance(equations, spread, place) + by_others
+        largest = int(np.argmax(shift))
+        prediction_covariance = block @ inverse @ (together - scatter[place]) @ inverse @ block.T
+        misfit_covariance = run_covariance(equations, spread, place) + prediction_covariance
         root = weights.run_root(equations, place)
-        which = 1 if equations.runs[place].run.oscillates else 0
-        shown, expected = root @ target, root @ (own @ without)
-        squares = _squares(target - own @ without, misfit_covariance)
+        row = 1 if equations.runs[place].run.oscillates else 0
+        shown, expected = root @ target, root @ (block @ without)
+        squares = _squares(target - block @ without, misfit_covariance)
         found.append(
             LeftOut(
                 run=equations.runs[place].run.name,
                 type=equations.runs[place].run.type,
-                measured=float(shown[which]),
-                predicted=float(expected[which]),
-                standard_error=float(np.sqrt((root @ misfit_covariance @ root.T)[which, which])),
+                measured=float(shown[row]),
+                predicted=float(expected[row]),
+                standard_error=float(np.sqrt((root @ misfit_covariance @ root.T)[row, row])),
                 chance=float(chdtrc(end - start, squares)),
                 misfit=float(np.sqrt(squares / (end - start))),
                 gap=float(np.linalg.norm(shown - expected)),
                 size=float(max(np.linalg.norm(shown), np.linalg.norm(expected))),
-                influence=float(shift[most]),
-                moved=equations.names[most],
+                influence=float(shift[largest]),
+                moved=equations.names[largest],
             )
         )
     return tuple(found)

@@ -1,7 +1,7 @@
-"""The linear equations of a campaign: what each term of (3.8) gives to each harmonic of each run.
+"""The linear equations of a campaign: the contribution of each term of (3.8) to each harmonic of each run.
 
 A run's reduction to harmonics is linear, so that the same reduction of the regressors v, v^3, v r^2, dv/dt, ... gives
-the equations exactly, whatever the motion; no small-amplitude expansion is made.
+the exact equations for any motion, without a small-amplitude expansion.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from tank2sim.records.campaigns import Campaign
 
 SPEED_RANGE = 0.03
 """Relative change of the speed between runs from which terms in Du are candidates, and within which a run counts as
-one at the test speed. Project choice: 3 % of speed is 6 % of force, and carriages hold 0.1 %."""
+at the test speed. Project choice: 3 % of speed is 6 % of force, and carriages hold 0.1 %."""
 _ACTIVE = 1e-3
 """A term is excited if its product of motions reaches this share of the product of the campaign's largest motions."""
 
@@ -49,14 +49,14 @@ class CampaignEquations:
     design : array, (rows, columns)
         Each run's block is multiplied by the inverse root of its within-run covariance.
     values : array, (rows,)
-        The water's force so weighted.
+        The water's force, weighted in the same way.
     zero : array, (rows,)
-        What a zero error of 1 common to a run adds, so weighted.
+        Effect of a zero error of 1 common to a run, weighted.
     gauge : array, (rows,)
-        The force as the gauge showed it, the reaction of the body's inertia in it, so weighted: what a gain error of 1
-        common to a run adds.
+        The gauge's force, with the reaction of the body's inertia, weighted: the effect of a gain error of 1 common to
+        a run.
     run_of_row : array of int, (rows,)
-        Place of each row's run in `runs`.
+        Index of each row's run in `runs`.
     runs : tuple of ReducedRun
         The runs.
     unit : float
@@ -64,7 +64,7 @@ class CampaignEquations:
     roots : tuple of array
         Cholesky root of each run's within-run covariance, in `unit`.
     prior : mapping
-        Term to the standard deviation (prime) about zero within which it is held; others are free.
+        Term to the standard deviation (prime) of its prior about zero; other terms are free.
     """
 
     force: str
@@ -80,24 +80,24 @@ class CampaignEquations:
     prior: Mapping[str, float] = field(default_factory=dict)
 
     def held(self, prior: Mapping[str, float]) -> CampaignEquations:
-        """The same equations with some terms held loosely about zero."""
+        """The equations with a prior about zero on some terms."""
         return replace(self, prior=prior)
 
     @property
     def prior_rows(self) -> Array:
-        """The prior as weighted equations with zero on their right, (terms held, columns)."""
+        """The prior as weighted equations with right-hand side zero, (terms with a prior, columns)."""
         places = [place for place, name in enumerate(self.names) if name in self.prior]
         rows = np.zeros((len(places), len(self.names)))
         rows[np.arange(len(places)), places] = [1.0 / self.prior[self.names[place]] for place in places]
         return rows
 
     def of_terms(self, names: Sequence[str]) -> CampaignEquations:
-        """The same equations with some columns only."""
+        """The equations with the columns `names` only."""
         places = [self.names.index(name) for name in names]
         return replace(self, names=tuple(names), design=self.design[:, places])
 
     def of_runs(self, places: Sequence[int]) -> CampaignEquations:
-        """The equations of some runs only."""
+        """The equations of the runs `places` only."""
         rows = np.flatnonzero(np.isin(self.run_of_row, places))
         renumbered = {place: number for number, place in enumerate(places)}
         return replace(
@@ -136,15 +136,15 @@ def campaign_equations(
     Raises
     ------
     InputError
-        A yaw run's inertia is to be taken out and the campaign does not give it.
+        The inertia of a yaw run must be removed and the campaign does not give it.
     """
     scales = campaign.scales
     unit = scales.force * (scales.length if force == "N" else 1.0)
     blocks, values, zeros, gauges, roots, places = [], [], [], [], [], []
     for place, run in enumerate(runs):
         histories = np.column_stack([*(_history(campaign, run.motion, name) for name in names)]) / unit
-        own = rigid_body_force(campaign, run.motion)[force] / unit
-        projected = run.projected(np.column_stack([histories, own]))
+        inertial = rigid_body_force(campaign, run.motion)[force] / unit
+        projected = run.projected(np.column_stack([histories, inertial]))
         fit, count = run.fits[force], run.regressed
         covariance = fit.covariance[:count, :count] / unit**2
         root = np.linalg.cholesky(covariance)
@@ -178,9 +178,9 @@ def axial_speed(motion: CaptiveMotion) -> Array:
 
 
 def rigid_body_force(campaign: Campaign, motion: CaptiveMotion) -> Mapping[str, Array]:
-    """What is added to a measured force (hydrodynamic sense) to leave the water's, N and N m: (3.1) of paper 2.
+    """Correction of a measured force (hydrodynamic sense) to the water's force, N and N m: (3.1) of paper 2.
 
-    Zero if the campaign's forces have the inertia removed already.
+    Zero if the inertia is already removed from the campaign's forces.
     """
     if campaign.inertia_removed:
         return {force: np.zeros(len(motion.time_s)) for force in "XYN"}
@@ -220,7 +220,7 @@ def _history(campaign: Campaign, motion: CaptiveMotion, name: str) -> Array:
 
 
 def excited(campaign: Campaign, runs: Sequence[ReducedRun], term: Term) -> bool:
-    """Whether some run moves in a way that the term acts on."""
+    """True if the motion of a run excites the term."""
     u0, length = campaign.test.speed_mps, campaign.model.length_m
     if term.acceleration == "u":
         return False
@@ -234,19 +234,19 @@ def excited(campaign: Campaign, runs: Sequence[ReducedRun], term: Term) -> bool:
         return False
     powers = np.array([term.v, term.r, term.d, term.u])
     motions = np.array([_largest_motions(run.motion, u0, length) for run in runs])
-    # The largest motions of one run count as simultaneous: a coarse bound is enough to see that nothing moves.
+    # The largest motions of one run count as simultaneous: a coarse bound is enough to detect a missing motion.
     products, bound = np.prod(motions**powers, axis=1), np.prod(motions.max(axis=0) ** powers)
     return bool(np.any(products > _ACTIVE * bound))
 
 
 def _largest_motions(motion: CaptiveMotion, u0: float, length: float) -> list[float]:
-    """Of v', r', rudder, and of the change of speed U (that of u by the drift angle alone tells nothing of Du)."""
+    """Largest v', r', rudder angle and change of speed U (a change of u by drift alone does not determine Du)."""
     change = abs(motion.mean_speed_mps / u0 - 1)
     v, r, delta = motion.largest
     return [v / u0, r * length / u0, delta, change if change > SPEED_RANGE else 0.0]
 
 
 def speeds_differ(campaign: Campaign, runs: Sequence[ReducedRun]) -> bool:
-    """Whether the runs' speeds differ by more than :data:`SPEED_RANGE` of the test speed."""
+    """True if the runs' speeds differ by more than :data:`SPEED_RANGE` of the test speed."""
     speeds = [run.motion.mean_speed_mps for run in runs]
     return max(speeds) - min(speeds) > SPEED_RANGE * campaign.test.speed_mps

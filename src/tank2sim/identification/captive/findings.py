@@ -1,4 +1,4 @@
-"""What a user should know of a reduction before using it: each finding is one sentence or two."""
+"""Findings of a reduction for its user, each of a sentence or two."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _REPEATED_ENOUGH = 3
 
 
 def reduction_findings(reduction: Reduction) -> tuple[str, ...]:
-    """Everything to be reported of a reduction, the gravest first."""
+    """All findings of a reduction, the gravest first."""
     found = [
         *implausible(reduction),
-        *(f"left out, for it is at fault: {fault}" for fault in reduction.faults),
-        *_left_out(reduction),
+        *(f"left out because of a fault: {fault}" for fault in reduction.faults),
+        *_omitted_runs(reduction),
         *reduction.campaign.remarks,
         *_missing(reduction),
         *_physics(reduction),
@@ -40,7 +40,7 @@ def reduction_findings(reduction: Reduction) -> tuple[str, ...]:
 
 
 def implausible(reduction: Reduction) -> tuple[str, ...]:
-    """What makes the derivatives doubtful as a whole: systematic errors of the records, and values that no ship has."""
+    """Findings that question all derivatives: systematic errors of the records, and values that no ship has."""
     values = {name: derivative.value for name, derivative in reduction.derivatives.items()}
     errors = {name: derivative.standard_error for name, derivative in reduction.derivatives.items()}
     return (
@@ -49,17 +49,17 @@ def implausible(reduction: Reduction) -> tuple[str, ...]:
     )
 
 
-def _left_out(reduction: Reduction) -> Iterator[str]:
+def _omitted_runs(reduction: Reduction) -> Iterator[str]:
     reasons: dict[str, list[str]] = defaultdict(list)
     for name, reason in reduction.not_used.items():
         reasons[reason.partition(" is ")[0]].append(name)
-    for what, names in reasons.items():
+    for cause, names in reasons.items():
         first = reduction.not_used[names[0]]
         yield f"{len(names)} run{'s' * (len(names) > 1)} left out ({_listed(names)}): {first}."
-        if what == "its speed" and _constant_revolutions(reduction, names):
+        if cause == "its speed" and _constant_revolutions(reduction, names):
             yield (
                 "The runs away from the test speed keep its revolutions, so that speed and propeller load change "
-                "together: no term in Du of hull or rudder alone can be had from them. --off-speed uses them, and its "
+                "together: they give no term in Du of hull or rudder alone. --off-speed uses them, and its "
                 "terms in Du then hold at constant revolutions."
             )
     if reduction.options.off_speed:
@@ -113,15 +113,15 @@ def _conventions(reduction: Reduction) -> Iterator[str]:
 
 
 def _unchecked(reduction: Reduction) -> Iterator[str]:
-    """Which systematic errors this campaign could not show."""
+    """Systematic errors that this campaign could not show."""
     kinds = dict.fromkeys(kind for force in "YN" for kind in reduction.forces[force].unchecked)
     if kinds:
         yield (
-            f"Not known is whether the gauges read the same in runs of {', '.join(kinds)} as in the others: no other "
-            "kind of run gives the same derivatives."
+            f"It is not known whether the gauges read the same in runs of {', '.join(kinds)} as in other runs: "
+            "no other kind of run gives the same derivatives."
         )
     if any(run.run.oscillates for run in reduction.runs) and not can_show_delay(reduction.runs):
-        yield "Not known is whether the forces lag the motion: it takes oscillations at two frequencies or more."
+        yield "It is not known whether the forces lag the motion: that needs oscillations at two frequencies or more."
 
 
 def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator[str]:
@@ -139,7 +139,7 @@ def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator
             )
     collinear = [choice.name for choice in result.selection.choices if choice.reason == "collinear"]
     if collinear:
-        yield f"The campaign cannot tell {', '.join(collinear)} from other terms: they are left out."
+        yield f"The campaign cannot distinguish {', '.join(collinear)} from other terms: they are left out."
     odd = [row for row in result.left_out if row.unlikely]
     for row in odd:
         yield (
@@ -163,7 +163,7 @@ def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator
 
 
 def _sheet(reduction: Reduction) -> Iterator[str]:
-    """Frequencies and amplitudes of the sheet that are not those measured."""
+    """Frequencies and amplitudes of the sheet that differ from the measured ones."""
     for run in reduction.runs:
         sheet, motion = run.run.sheet, run.motion
         measured = (
@@ -176,9 +176,12 @@ def _sheet(reduction: Reduction) -> Iterator[str]:
             ),
             ("yaw rate amplitude", "rad/s", sheet.yaw_rate_amplitude_radps, motion.amplitude(motion.r_radps)),
         )
-        for what, unit, said, found in measured:
-            if said is not None and run.run.oscillates and abs(found / said - 1) > _SHEET:
-                yield f"{run.run.name}: its {what} is {found:.4g} {unit}, and {said:.4g} by the sheet; measured counts."
+        for quantity, unit, stated, found in measured:
+            if stated is not None and run.run.oscillates and abs(found / stated - 1) > _SHEET:
+                yield (
+                    f"{run.run.name}: its {quantity} is {found:.4g} {unit}, and {stated:.4g} by the sheet; the "
+                    "measured value is used."
+                )
 
 
 def _repeated(reduction: Reduction) -> Iterator[str]:
@@ -190,7 +193,7 @@ def _repeated(reduction: Reduction) -> Iterator[str]:
         if zero and not 1 / 3 < deviation / zero < 3:
             yield (
                 f"Repeated runs differ in {force}' by {deviation:.2g}, and runs altogether from the fit by {zero:.2g}: "
-                "the standard errors rest on the latter."
+                "the standard errors use the latter."
             )
 
 

@@ -1,8 +1,8 @@
-"""Every run reduced to a handful of numbers: mean, trend and harmonics of X, Y, N, with an honest covariance.
+"""Reduction of a run to mean, trend and harmonics of X, Y, N, with a covariance that includes coloured noise.
 
 Least squares over whole periods, with zero offset, linear drift of the zero and higher harmonics fitted, so that none
-of them leans on the first harmonic. A record sampled at 20 Hz is not 20 independent readings a second: the covariance
-takes the spectral density of the residuals near each harmonic's own frequency (for a harmonic regressor the
+of them biases the first harmonic. A record sampled at 20 Hz is not 20 independent readings a second: the covariance
+uses the spectral density of the residuals near each harmonic's frequency (for a harmonic regressor the
 autocorrelation enters by that density alone; Grenander & Rosenblatt 1957). The zero error that is common to a
 whole run cannot be seen inside it; :mod:`tank2sim.identification.captive.regression` finds it from run to run.
 """
@@ -27,7 +27,7 @@ REGRESSED_HARMONICS = 3
 _WINDOW = 10
 """Lines of the periodogram on each side of a frequency over which its density is averaged."""
 _FLOOR = 1e-6
-"""Least standard deviation of a record relative to its largest value: a computed record has no noise at all."""
+"""Least standard deviation of a record relative to its largest value: a computed record has no noise."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -39,7 +39,7 @@ class HarmonicFit:
     coefficients : array, (columns,)
         In the order of :attr:`ReducedRun.labels`, N or N m, hydrodynamic sense, as measured.
     covariance : array, (columns, columns)
-        Of noise within the run; the zero error of the run is not in it.
+        Of noise within the run, without the zero error of the run.
     residual : array, (rows,)
         Record less fit.
     density : array, (columns,)
@@ -57,18 +57,18 @@ class HarmonicFit:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ReducedRun:
-    """A run as a few numbers.
+    """A run reduced to harmonics.
 
     Parameters
     ----------
     run : CaptiveRun
         The record.
     motion : CaptiveMotion
-        Its smooth motion.
+        Smooth motion of the run.
     labels : tuple of str
         ``mean``, ``cos 1``, ``sin 1``, ..., and last ``trend`` (by the time over half the record's length).
     basis : array, (rows, columns)
-        What the force was fitted by.
+        Basis of the fit of the forces.
     fits : mapping
         ``X``, ``Y``, ``N`` to its fit.
     """
@@ -81,18 +81,18 @@ class ReducedRun:
 
     @property
     def regressed(self) -> int:
-        """How many coefficients, from the first, go into the derivatives."""
+        """Number of coefficients, from the first, that determine the derivatives."""
         return 1 + 2 * REGRESSED_HARMONICS if self.run.oscillates else 1
 
     def projected(self, histories: Array) -> Array:
-        """The coefficients that given histories (rows, n) would have: (regressed, n); exactly linear."""
+        """Coefficients (regressed, n) of the given histories (rows, n); exactly linear."""
         gram = self.basis.T @ self.basis
         coefficients = np.linalg.solve(gram, self.basis.T @ histories)[: self.regressed]
         return np.asarray(coefficients, dtype=np.float64)
 
 
 def reduced_run(run: CaptiveRun) -> ReducedRun:
-    """A run as mean, harmonics and trend of its forces.
+    """Reduce a run to mean, harmonics and trend of its forces.
 
     Raises
     ------
@@ -133,9 +133,9 @@ def _fit(values: Array, basis: Array, inverse: Array, motion: CaptiveMotion) -> 
 def moderated(runs: Sequence[ReducedRun]) -> tuple[ReducedRun, ...]:
     """The runs with densities moderated by those of all runs.
 
-    A density averaged over a few lines is itself uncertain by a quarter. Each is drawn towards the campaign's usual one
-    as far as the runs differ by no more than chance (Smyth 2004, Statistical Applications in Genetics and Molecular
-    Biology 3); where they truly differ, they stay as they are.
+    A density averaged over a few lines has an uncertainty of a quarter. Each is drawn towards the campaign's usual
+    density as far as the runs differ only by chance (Smyth 2004, Statistical Applications in Genetics and Molecular
+    Biology 3); densities that differ significantly do not change.
     """
     result = list(runs)
     records = [place for place, run in enumerate(runs) if not run.run.is_average]
@@ -189,7 +189,7 @@ def _densities(residual: Array, columns: int, periods: int) -> tuple[Array, Arra
         freedom = max(1, count - columns)
         return np.full(columns, float(residual @ residual) / freedom), np.full(columns, float(freedom))
     power = np.abs(np.fft.rfft(residual)) ** 2 / count
-    # The fit has emptied the lines of its own harmonics, which over whole periods are lines of the periodogram.
+    # The fit removes the power at its harmonics, which over whole periods are lines of the periodogram.
     fitted = np.zeros(len(power), dtype=bool)
     fitted[0] = True
     if periods:

@@ -1,7 +1,7 @@
-"""The motion of a captive run, from what was measured: its frequency, its whole periods, and smooth histories.
+"""The measured motion of a captive run: its frequency, its whole periods, and smooth histories.
 
 Frequencies and amplitudes come from the record, never from the test sheet. Histories are mean and harmonics by least
-squares, so that accelerations are exact derivatives of what the mechanism did and noise of the motion sensors does not
+squares, so that accelerations are exact derivatives of the mechanism's motion and noise of the motion sensors does not
 enter the products of (3.8).
 """
 
@@ -19,7 +19,7 @@ from tank2sim.errors import InputError
 from tank2sim.records.campaigns import CaptiveRun
 
 MOTION_HARMONICS = 3
-"""Harmonics of the mechanism's motion that are kept."""
+"""Number of harmonics of the mechanism's motion."""
 _WHOLE = 0.02
 """Share of a period by which a record may fall short of a whole number of them: rounding of its ends."""
 _FEWEST_PER_PERIOD = 16
@@ -71,7 +71,7 @@ class CaptiveMotion:
 
     @cached_property
     def accelerates(self) -> tuple[bool, bool]:
-        """Whether the sway velocity, and the yaw rate, change at all."""
+        """True for a sway velocity, and for a yaw rate, that changes."""
         return bool(np.any(self.vdot_mps2)), bool(np.any(self.rdot_radps2))
 
     def amplitude(self, values: Array) -> float:
@@ -80,7 +80,7 @@ class CaptiveMotion:
 
 
 def leading(run: CaptiveRun) -> Array:
-    """The velocity that a type of run is about: v in pure sway, r in yaw."""
+    """The leading velocity of a type of run: v in pure sway, r in yaw."""
     return run.v_mps if run.type == "pure_sway" else run.r_radps
 
 
@@ -90,7 +90,7 @@ def run_motion(run: CaptiveRun) -> CaptiveMotion:
     Raises
     ------
     InputError
-        It oscillates and has no oscillation, less than one whole period, or too few readings a period.
+        An oscillating run has no oscillation, less than one whole period, or too few readings a period.
     """
     return _oscillating(run) if run.oscillates else _steady(run)
 
@@ -117,7 +117,7 @@ def _steady(run: CaptiveRun) -> CaptiveMotion:
 
 def _oscillating(run: CaptiveRun) -> CaptiveMotion:
     if len(run.time_s) < _FEWEST_PER_PERIOD:
-        raise InputError(run.name, "", f"has {len(run.time_s)} readings only", "a whole period of them is needed")
+        raise InputError(run.name, "", f"has only {len(run.time_s)} readings", "a whole period is needed")
     if np.ptp(leading(run)) == 0.0:
         name = "v_mps" if run.type == "pure_sway" else "r_radps"
         raise InputError(run.name, f"column {name}", f"does not change, in a run of {run.type}", "correct its type")
@@ -133,7 +133,7 @@ def _oscillating(run: CaptiveRun) -> CaptiveMotion:
     v, r, speed, rudder = (
         _fitted(values[kept], basis) for values in (run.v_mps, run.r_radps, run.speed_mps, run.delta_rad)
     )
-    # What the forces of a row show is the motion a delay before.
+    # The forces of a row belong to the motion one delay earlier.
     time = time - run.force_delay_s
     basis = harmonic_basis(time, frequency, MOTION_HARMONICS)
     slope = _derivative_basis(basis, frequency)
@@ -168,7 +168,7 @@ def _derivative_basis(basis: Array, frequency: float) -> Array:
 
 
 def _fitted(values: Array, basis: Array) -> Array:
-    # Over whole periods the columns are nearly orthogonal: the normal equations lose nothing, and are fast.
+    # Over whole periods the columns are nearly orthogonal: the normal equations are accurate and fast.
     solution: Array = np.asarray(np.linalg.solve(basis.T @ basis, basis.T @ values), dtype=np.float64)
     return solution
 
@@ -194,9 +194,9 @@ def measured_frequency(run: CaptiveRun) -> float:
 
 def _oscillating_signals(run: CaptiveRun) -> list[Array]:
     signals = [leading(run)]
-    other = run.y_m if run.type == "pure_sway" else run.psi_rad
-    if other is not None and np.ptp(other) > 0:
-        signals.append(other)
+    position = run.y_m if run.type == "pure_sway" else run.psi_rad
+    if position is not None and np.ptp(position) > 0:
+        signals.append(position)
     return signals
 
 
@@ -205,15 +205,15 @@ def _spectral_line(time: Array, values: Array) -> float:
     count = len(values)
     padded = 4 * count
     spectrum = np.abs(np.fft.rfft((values - float(np.mean(values))) * np.hanning(count), padded))
-    # below half a cycle in the record there is no oscillation to find
+    # Less than half a cycle in the record is not an oscillation.
     spectrum[: max(2, padded // (2 * count))] = 0.0
     step = (time[-1] - time[0]) / (count - 1)
     line = 2 * math.pi * int(np.argmax(spectrum)) / (padded * step)
     bin_width = 2 * math.pi / (count * step)
     if line > _FEW_PERIODS * bin_width:
         return float(line)
-    # Of a period or two the lines of positive and negative frequency run together, and half the frequency may have the
-    # highest: the sinusoid that fits best does not mistake it.
+    # With a period or two the lines of positive and negative frequency overlap, and half the frequency may have the
+    # highest line; the best fit of a sinusoid finds the right one.
     trials = bin_width * np.arange(0.5, _FEW_PERIODS + 1.0, 0.1)
     return float(min(trials, key=lambda trial: _misfit(values, harmonic_basis(time, trial, 1))))
 

@@ -1,9 +1,9 @@
-"""Oscillation tests by themselves: what each run gives by (4.4), and what amplitude and frequency do to it.
+"""Evaluation of single oscillation tests: derivatives of each run by (4.4), and their dependence on amplitude.
 
 The in-phase and quadrature parts of the first harmonic over the velocity amplitude are the damping and the added mass
 of one run, the form in which a tank reports planar motion tests. With third-order terms the first harmonic depends on
-the amplitude (Y_v + 3/4 Y_vvv v_a^2) and there is a third harmonic (1/4 Y_vvv v_a^3): two ways to one number, and a
-check of each other (Fourier against amplitude; ITTC 7.5-02-06-02).
+the amplitude (Y_v + 3/4 Y_vvv v_a^2) and there is a third harmonic (1/4 Y_vvv v_a^3): two independent estimates of the
+same number (Fourier against amplitude; ITTC 7.5-02-06-02).
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.records.campaigns import Campaign
 
 _DIFFER = 3.0
-"""Standard errors by which the two ways to a third-order term may differ."""
+"""Standard errors by which the two estimates of a third-order term may differ."""
 _DISTINCT = 0.02
-"""Relative difference from which two frequencies or amplitudes count as two."""
+"""Relative difference from which two frequencies or amplitudes count as distinct."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class OscillationDerivatives:
     Parameters
     ----------
     run, type : str
-        Its name and type.
+        Name and type of the run.
     letter : str
         ``v`` in pure sway, else ``r``.
     frequency_radps, amplitude : float
@@ -59,7 +59,7 @@ class OscillationDerivatives:
 
 @dataclass(frozen=True, kw_only=True)
 class CubicByTwoWays:
-    """A third-order term found in two ways: (value, standard error), None if the runs do not allow it."""
+    """Two estimates of a third-order term: (value, standard error), None if the runs do not allow it."""
 
     name: str
     from_third_harmonic: tuple[float, float]
@@ -67,15 +67,15 @@ class CubicByTwoWays:
 
     @property
     def ratio(self) -> float:
-        """Difference of the two over its standard error; 0 if there is one only."""
+        """Difference of the estimates over its standard error; 0 for a single estimate."""
         if self.from_amplitude is None:
             return 0.0
-        (one, error), (other, its_error) = self.from_third_harmonic, self.from_amplitude
-        return (one - other) / float(np.hypot(error, its_error))
+        (first, first_error), (second, second_error) = self.from_third_harmonic, self.from_amplitude
+        return (first - second) / float(np.hypot(first_error, second_error))
 
 
 def oscillations(campaign: Campaign, runs: Sequence[ReducedRun]) -> tuple[OscillationDerivatives, ...]:
-    """Each oscillating run by itself."""
+    """Derivatives of each oscillating run."""
     return tuple(_oscillation(campaign, run) for run in runs if run.run.oscillates)
 
 
@@ -93,14 +93,14 @@ def _oscillation(campaign: Campaign, run: ReducedRun) -> OscillationDerivatives:
     history = motion.v_mps / speed if letter == "v" else motion.r_radps * length / speed
     amplitude = float(run.projected(history[:, None])[1, 0])
     reduced = frequency * length / speed
-    own = rigid_body_force(campaign, motion)
+    inertial = rigid_body_force(campaign, motion)
     values: dict[str, float] = {}
     errors: dict[str, float] = {}
     third: dict[str, tuple[float, float]] = {}
     for force in "YN":
         unit = 0.5 * campaign.test.water_density_kgpm3 * length**2 * speed**2 * (length if force == "N" else 1.0)
         fit = run.fits[force]
-        water = (fit.coefficients[: run.regressed] + run.projected(own[force][:, None])[:, 0]) / unit
+        water = (fit.coefficients[: run.regressed] + run.projected(inertial[force][:, None])[:, 0]) / unit
         error: Array = np.sqrt(np.diag(fit.covariance))[: run.regressed] / unit
         # velocity is a cos(wt), acceleration -a w sin(wt); in the prime system w L/U
         values[f"{force}{letter}"], errors[f"{force}{letter}"] = water[1] / amplitude, error[1] / amplitude
@@ -122,7 +122,7 @@ def _oscillation(campaign: Campaign, run: ReducedRun) -> OscillationDerivatives:
 
 
 def distinct(values: Sequence[float]) -> int:
-    """How many values differ by more than 2 %."""
+    """Number of values that differ by more than 2 %."""
     ordered = sorted(values)
     return sum(place == 0 or value > ordered[place - 1] * (1 + _DISTINCT) for place, value in enumerate(ordered))
 
@@ -176,10 +176,10 @@ def cubic_findings(found: Sequence[CubicByTwoWays]) -> list[str]:
     for cubic in found:
         if cubic.from_amplitude is None or abs(cubic.ratio) <= _DIFFER:
             continue
-        (one, error), (other, its_error) = cubic.from_third_harmonic, cubic.from_amplitude
+        (first, first_error), (second, second_error) = cubic.from_third_harmonic, cubic.from_amplitude
         messages.append(
-            f"{cubic.name} is {one:.3g} ± {error:.2g} by the third harmonic and {other:.3g} ± {its_error:.2g} by the "
-            f"amplitude, {abs(cubic.ratio):.1f} standard errors apart: the force is no cubic in this range, or it "
-            "depends on the frequency."
+            f"{cubic.name} is {first:.3g} ± {first_error:.2g} by the third harmonic and {second:.3g} ± "
+            f"{second_error:.2g} by the amplitude, {abs(cubic.ratio):.1f} standard errors apart: the force is not "
+            "cubic in this range, or it depends on the frequency."
         )
     return messages

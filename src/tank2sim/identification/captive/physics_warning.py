@@ -1,4 +1,4 @@
-"""One warning on captive tests."""
+"""A warning on captive tests."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Caution:
-    """One warning.
+    """A warning.
 
     Parameters
     ----------
     kind : str
-        What it is about, such as ``"frequency parameter"``.
+        Subject, such as ``"frequency parameter"``.
     message : str
         One sentence, with figures and source.
     runs : tuple of str
-        The runs concerned; empty if it is the campaign.
+        The runs concerned; empty for the whole campaign.
     missing : str
-        The key without which the warning cannot be given; empty if it is given.
+        The missing key that prevents the check; empty if the check was made.
     """
 
     kind: str
@@ -28,5 +28,5 @@ class Caution:
 
 
 def lacking(kind: str, what: str, key: str) -> Caution:
-    """A caution that cannot be given: what stays unknown, and the key it takes."""
-    return Caution(kind, f"Not known is {what}; it takes {key}.", missing=key)
+    """A caution on a check that lacks a key: the unknown, and the key."""
+    return Caution(kind, f"Not known: {what}; give {key}.", missing=key)

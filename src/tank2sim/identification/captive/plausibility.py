@@ -1,4 +1,4 @@
-"""Physics warnings on the derivatives that captive tests gave: values that no known ship has.
+"""Physics warnings on derivatives from captive tests: values that no known ship has.
 
 Prime system, rudder positive to starboard, without inertia terms.
 """
@@ -7,29 +7,53 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
-from tank2sim.identification.captive.expected_signs import EXPECTED_SIGNS, ExpectedSign
 from tank2sim.identification.captive.physics_warning import Caution
 
 ADDED_SHARE = (0.1, 3.0)
-"""Added mass and added yaw inertia of ships over their own lie between; about 0.9 and 0.7 are usual."""
+"""Range of added mass over mass, and of added yaw inertia over yaw inertia; about 0.9 and 0.7 are usual."""
 
 DEEP_ADDED_SHARES = {"Yvdot": (0.5, 1.6), "Nrdot": (0.25, 2.0)}
 """Added mass over mass, and added yaw inertia over yaw inertia, of ships in deep water: 0.76 and 0.60 (KVLCC2), 0.89
-(S175), 0.94 and 1.12 (Mariner); a project choice on either side. With half the mass, whose reaction the gauges then
-seem to show in the water, 0.94 becomes 2.9."""
+(S175), 0.94 and 1.12 (Mariner); both limits are a project choice. If half the mass is stated, the reaction of the other
+half seems to come from the water, and 0.94 becomes 2.9."""
 
 ADDED_MASSES = ("Yvdot", "Nrdot")
-"""Derivatives that tell a wrong convention of the forces; their sign is judged with it."""
+"""Derivatives that reveal a wrong convention of the forces; their sign is checked with it."""
 
 LEVERS = (
     ("Nv", "Yv", (-0.1, 0.6), "the force of a small drift angle"),
     ("Nd", "Yd", (-0.55, -0.35), "the force of the rudder"),
 )
-"""Moment and force, and the range of their ratio, lengths forward of midships. The rudder stands at -0.5, and the force
-it raises on the hull is forward of it; drift: 0.23 (Mariner) to 0.44 (KVLCC2)."""
+"""Moment and force, and the range of their ratio, lengths forward of midships. The rudder is at -0.5, and its force
+on the hull acts forward of it; drift: 0.23 (Mariner) to 0.44 (KVLCC2)."""
 
 _SIGNIFICANT = 2.0
+
+
+@dataclass(frozen=True)
+class ExpectedSign:
+    """The sign, +1 or -1, and its reason, written after a colon."""
+
+    sign: int
+    reason: str
+
+
+EXPECTED_SIGNS: dict[str, ExpectedSign] = {
+    "Yv": ExpectedSign(-1, "the water resists sideways motion"),
+    "Nv": ExpectedSign(-1, "the force of a drift angle acts forward of midships (Munk moment)"),
+    "Nr": ExpectedSign(-1, "the water damps yawing"),
+    "Yd": ExpectedSign(-1, "a rudder that turns to starboard pushes the stern to port"),
+    "Nd": ExpectedSign(+1, "a rudder that turns to starboard, at the stern, pushes the bow to starboard"),
+    "Yvdot": ExpectedSign(-1, "accelerating sideways takes water along (added mass)"),
+    "Nrdot": ExpectedSign(-1, "accelerating in yaw takes water along (added inertia)"),
+    "Xudot": ExpectedSign(-1, "accelerating ahead takes water along (added mass)"),
+    "Xdd": ExpectedSign(-1, "a rudder at an angle has more drag"),
+}
+"""Signs of derivatives that every known ship has. Compared with the Mariner (Chislett and Strom-Tejsen 1965) and the
+KVLCC2 (Yasukawa and Yoshimura 2015, converted); derivatives whose sign differs between ships, such as Y_r, Y_rdot and
+N_vdot, are not listed."""
 
 
 def force_convention(
@@ -40,12 +64,12 @@ def force_convention(
     Parameters
     ----------
     derivatives : mapping
-        Prime values; Yvdot and Nrdot are looked at.
+        Prime values; Yvdot and Nrdot are checked.
     mass_prime, inertia_prime : float
         m' and J_z'. With forces of the wrong sign Y_vdot comes out as 2 m' - Y_vdot and N_rdot as 2 J_z' - N_rdot,
-        by (4.4) of paper 2 and its like for yaw.
+        by (4.4) of paper 2 and its equivalent for yaw.
     convention : str
-        ``force_convention`` as the campaign has it.
+        ``force_convention`` of the campaign.
     """
     inertias = ((mass_prime, "mass"), (inertia_prime, "yaw inertia"))
     for name, (inertia, what) in zip(ADDED_MASSES, inertias, strict=True):
@@ -63,9 +87,9 @@ def added_masses(
     mass_prime: float,
     inertia_prime: float | None,
 ) -> Iterator[Caution]:
-    """Added mass or yaw inertia that no known ship has in deep water next to its own, by more than two standard errors.
+    """Added mass or yaw inertia that no known ship has in deep water, by more than two standard errors.
 
-    Of positive derivatives :func:`force_convention` speaks.
+    Positive derivatives are the subject of :func:`force_convention`.
     """
     inertias = ((mass_prime, "mass", "mass_kg"), (inertia_prime, "yaw inertia", "yaw_inertia_kgm2"))
     for name, (inertia, what, key) in zip(ADDED_MASSES, inertias, strict=True):
@@ -84,17 +108,17 @@ def added_masses(
 
 
 def _likely_cause(value: float, inertia: float, convention: str) -> str:
-    """What makes of a ship's acceleration derivative the positive value found."""
+    """Likely cause of a positive acceleration derivative."""
     least, most = ADDED_SHARE
-    other = {"on_model": "on_gauge", "on_gauge": "on_model"}.get(convention)
-    if other is None:
+    opposite = {"on_model": "on_gauge", "on_gauge": "on_model"}.get(convention)
+    if opposite is None:
         return f"check that the model's inertia is indeed removed from the forces ({convention})"
-    for mended, instead, cause in (
-        (2 * inertia - value, other, "the signs look reversed"),
+    for corrected, instead, cause in (
+        (2 * inertia - value, opposite, "the signs look reversed"),
         (value - inertia, "hydrodynamic", "the inertia of the model looks removed already"),
     ):
-        if -most * inertia <= mended <= -least * inertia:
-            return f'force_convention = "{instead}" would give {mended:.3g}, as of a ship: {cause}'
+        if -most * inertia <= corrected <= -least * inertia:
+            return f'force_convention = "{instead}" would give {corrected:.3g}, as of a ship: {cause}'
     if abs(value - inertia) < least * inertia:
         return "the forces hardly show the model's own inertia: check the unit of the gauges"
     return "check force_convention, the mass and the unit of the gauges"
@@ -111,7 +135,7 @@ def unusual_signs(derivatives: Mapping[str, float], standard_errors: Mapping[str
 
 
 def yaw_force(derivatives: Mapping[str, float], mass_prime: float) -> Iterator[Caution]:
-    """Y_r of m' or more: the water would then push a yawing ship inwards by more than the centrifugal force."""
+    """Y_r of m' or more: the water would push a yawing ship inwards by more than the centrifugal force."""
     value = derivatives.get("Yr")
     if value is not None and value >= mass_prime:
         yield Caution(
@@ -122,7 +146,7 @@ def yaw_force(derivatives: Mapping[str, float], mass_prime: float) -> Iterator[C
 
 
 def levers(derivatives: Mapping[str, float], standard_errors: Mapping[str, float]) -> Iterator[Caution]:
-    """Points of attack where no ship has them, by more than two standard errors: N_v/Y_v and N_delta/Y_delta."""
+    """Points of attack that no ship has, by more than two standard errors: N_v/Y_v and N_delta/Y_delta."""
     for moment, force, (low, high), what in LEVERS:
         if not derivatives.get(moment) or not derivatives.get(force):
             continue

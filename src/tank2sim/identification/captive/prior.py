@@ -1,11 +1,11 @@
-"""What ships in general say of third-order terms that a campaign leaves open.
+"""Prior of third-order terms, from the ratios of known ships, for campaigns that hardly determine them.
 
-Small angles do not show the third order. To drop a term because it does not differ from zero would be to claim that it
-is zero, and would make its linear term look better known than it is (post-selection inference; Leeb & Pötscher 2005,
-Econometric Theory 21). To leave it free would let noise at 10 degrees of rudder speak of 35. So every term that the
-campaign can distinguish stays in the regression, held loosely about zero: its ratio to the linear term of the same
-force has a standard deviation as wide as the ratios of known ships. Where the tests show a term this moves it by
-nothing; the values come from the tests alone, or are not in the card.
+Small angles do not show the third order. Dropping a term that does not differ from zero would state that it is zero,
+and would make its linear term look more accurate than it is (post-selection inference; Leeb & Pötscher 2005,
+Econometric Theory 21). A free term would extrapolate noise at 10 degrees of rudder to 35. Therefore every term that the
+campaign can distinguish stays in the regression with a wide prior about zero: its ratio to the linear term of the same
+force has the standard deviation of the ratios of known ships. The prior does not move terms that the tests determine;
+the card has no others.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ RATIOS: Mapping[str, tuple[str, float]] = {
     "rrd": ("d", 2.0),
     "vrd": ("d", 6.0),
 }
-"""Powers of a term of Y or N to the linear term it is compared with and the standard deviation of the ratio (prime).
+"""Powers of a term of Y or N to the linear term of the ratio, and the standard deviation of the ratio (prime).
 
 Round figures, above the largest of the Mariner (Chislett & Strom-Tejsen 1965: Yvvv/Yv 7.0, Yvvr/Yv 13, Nvvr/Nv 21,
-Nvvv/Nv 6.2, Nvvd/Nd 3.5, Yvvd/Yd 4.3, Yddd/Yd 0.32). Terms that are not here are free."""
+Nvvv/Nv 6.2, Nvvd/Nd 3.5, Yvvd/Yd 4.3, Yddd/Yd 0.32). Other terms are free."""
 
 
 def with_prior(equations: CampaignEquations, spread: Spread) -> CampaignEquations:
-    """The equations with third-order terms of Y and N held loosely about zero, by their linear terms as found."""
+    """The equations with the prior of third-order terms of Y and N, scaled by the estimated linear terms."""
     found = solve(equations, spread)
     held = {}
     for name in equations.names:

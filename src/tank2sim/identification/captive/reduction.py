@@ -1,7 +1,7 @@
-"""A captive campaign to hydrodynamic derivatives with uncertainty: the whole way.
+"""Reduction of a captive campaign to hydrodynamic derivatives with uncertainty.
 
-Every run is reduced to mean and harmonics; two ways lead on to the derivatives of (3.8): one weighted regression over
-the whole campaign, whose numbers are the result, and next to it the paper's order, from the simplest tests to the more
+Every run is reduced to mean and harmonics. Two methods then give the derivatives of (3.8): a weighted regression over
+the whole campaign, which is the result, and for comparison the paper's order, from the simplest tests to the more
 complex. The numbers are prime, instantaneous, "hydrodynamic", starboard-positive, expanded at the test speed.
 """
 
@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.contradictions import contradicted
 from tank2sim.identification.captive.cross_validation import LeftOut, leave_one_out
@@ -43,21 +44,21 @@ from tank2sim.identification.captive.warnings import body_of
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, together
 
 DISAGREEMENT_LIMIT = 3.5
-"""Standard errors by which the two ways may differ before it is reported."""
+"""Standard errors from which a difference between the methods is reported."""
 THRUST_LIMIT = 4.0
-"""Standard errors by which a resistance must be negative to be refused: chance does so once in 30 000 campaigns."""
+"""Standard errors by which a resistance must be negative to be refused: by chance once in 30 000 campaigns."""
 ESSENTIAL = ("Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot", "Yv", "Nv", "Yr", "Nr", "Yd", "Nd")
-"""Derivatives without which no manoeuvre can be simulated rightly."""
+"""Derivatives that every simulation of a manoeuvre needs."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReductionOptions:
-    """What the user asks for.
+    """Options of a reduction.
 
     Parameters
     ----------
     keep_going : bool
-        Leave out runs at fault instead of refusing the campaign.
+        Omit runs with faults instead of refusing the campaign.
     keep_fast : bool
         Use runs with omega U/g of 0.1 and more, too.
     off_speed : bool
@@ -65,7 +66,7 @@ class ReductionOptions:
     all_terms : bool
         Keep terms that the tests do not determine.
     test_symmetry : bool
-        Test terms of the other parity, which (3.8) leaves out.
+        Test terms of the opposite parity, which (3.8) lacks.
     """
 
     keep_going: bool = False
@@ -77,18 +78,18 @@ class ReductionOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class Derivative:
-    """One derivative found (prime).
+    """A derivative (prime).
 
     Parameters
     ----------
     value, standard_error : float
-        ``standard_error`` joins both types.
+        ``standard_error`` combines both types.
     type_a : float
         Standard error from the scatter of the campaign.
     type_b : mapping
-        Source to standard error from what was stated of the campaign, and from systematic errors that it shows.
+        Source to standard error, of stated uncertainties and of systematic errors that the campaign shows.
     found_in : tuple of str
-        Types of run on which it rests most, determined by the paper's order; empty if that does not give it.
+        Types of run that determine it in the paper's order; empty if that order does not give it.
     """
 
     value: float
@@ -100,28 +101,28 @@ class Derivative:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ForceResult:
-    """What a campaign tells of one force.
+    """Result of a campaign for one force.
 
     Parameters
     ----------
     selection : Selection
-        Chosen terms and equations; its ``choices`` tell every candidate's fate.
+        Chosen terms and equations; its ``choices`` state the decision on every candidate.
     solution : Solution
         The weighted regression over the whole campaign (Type A errors).
     stepwise : Stepwise
         The paper's order.
     disagreements : tuple
-        Where the two differ.
+        Terms on which the two differ.
     trends : tuple
         Trends with frequency, and values extrapolated to zero frequency.
     left_out : tuple
-        Each run predicted from all the others.
+        Each run predicted from all other runs.
     asymmetry : Asymmetry or None
-        The test of the other parity, if asked for.
+        The test of the opposite parity, on request.
     systematic : tuple
         Errors common to many runs that the campaign shows in this force.
     unchecked : tuple of str
-        Types of run of which no other gives the derivatives: an error of the gauge in them alone would not be seen.
+        Types of run whose derivatives no other type gives: an error of the gauge in them alone would not show.
     """
 
     selection: Selection
@@ -137,28 +138,28 @@ class ForceResult:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Reduction:
-    """A campaign reduced.
+    """Result of a reduction.
 
     Parameters
     ----------
     campaign : Campaign
         As read.
     options : ReductionOptions
-        As asked.
+        The options used.
     runs : tuple of ReducedRun
-        Those that were used.
+        The runs used.
     not_used : mapping
-        Name of a run to why it was left out.
+        Name of an omitted run to the reason.
     faults : tuple of InputError
-        Runs at fault, left out because that was asked for.
+        Faults of runs omitted with `keep_going`.
     forces : mapping
         ``X``, ``Y``, ``N`` to its result.
     derivatives : mapping
-        Name to number; the card's.
+        Derivatives by name.
     oscillations, cubics
-        Oscillation tests by themselves.
+        Evaluation of single oscillation tests.
     missing : tuple of str
-        Those of :data:`ESSENTIAL` that the campaign does not give.
+        Names in :data:`ESSENTIAL` that the campaign does not give.
     """
 
     campaign: Campaign
@@ -184,8 +185,8 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
     Raises
     ------
     InputError
-        Runs are at fault and `keep_going` is not asked for (all are reported); no run is left; or a key that the runs
-        need is missing; or a number of ``[model]``, or the sign of the resistance, cannot be.
+        Runs have faults without `keep_going` (all are reported), no run remains, a necessary key is missing, or a
+        number of ``[model]`` or the sign of the resistance is impossible.
     """
     options = options or ReductionOptions()
     _refuse_impossible_body(campaign)
@@ -226,13 +227,13 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
 
 def _refuse_impossible_body(campaign: Campaign) -> None:
     for key, problem in impossible_body(body_of(campaign)):
-        raise InputError(campaign.path, f"model.{key}", problem, "one of these numbers is in another unit")
+        raise InputError(campaign.path, f"model.{key}", problem, "correct the unit of one of these numbers")
 
 
 def _refuse_thrust(campaign: Campaign, derivatives: Mapping[str, Derivative]) -> None:
-    """A towed model that the water pushes ahead: the X gauge is reversed.
+    """Refuse a towed model that the water pushes ahead: its X gauge is reversed.
 
-    Where the added mass is negative the signs of all forces are in doubt, and a warning says so.
+    With a negative added mass the signs of all forces are in doubt, and a warning states it.
     """
     found = derivatives.get("X0")
     reversed_forces = "Yvdot" in derivatives and derivatives["Yvdot"].value > 0
@@ -300,8 +301,8 @@ def _force_result(
         selection=selection,
         solution=solution,
         stepwise=steps,
-        # With terms in Du the steps at the test speed, which lack them, are no second way to the same numbers: Du acts
-        # by u = U cos(beta) in their drift tests, too.
+        # With terms in Du the steps at the test speed, which lack them, do not estimate the same numbers: Du acts by
+        # u = U cos(beta) in their drift tests, too.
         disagreements=()
         if options.off_speed
         else disagreements(steps, together, selection.reported, DISAGREEMENT_LIMIT),
@@ -319,7 +320,7 @@ def _derivatives(campaign: Campaign, result: ForceResult) -> dict[str, Derivativ
     found = {}
     for name, value, error in zip(solution.names, solution.values, solution.standard_errors, strict=True):
         if name not in result.selection.reported or " " in name:
-            continue  # not shown, or a trend with frequency, which is no derivative
+            continue  # not reported, or a trend with frequency, which is not a derivative
         type_b = {source: abs(shifts.get(name, 0.0)) for source, shifts in sources.items()}
         found[name] = Derivative(
             value=float(value),
@@ -332,9 +333,9 @@ def _derivatives(campaign: Campaign, result: ForceResult) -> dict[str, Derivativ
 
 
 def common_shifts(campaign: Campaign, result: ForceResult) -> dict[str, dict[str, float]]:
-    """What each term of a force (prime) moves by, with its sign, for each error common to many runs: source to shifts.
+    """Change of each term of a force (prime), with its sign, by each error common to many runs: source to changes.
 
-    Stated errors (Type B) of one standard deviation, and the errors that the campaign itself shows, in full.
+    Stated errors (Type B) of one standard deviation, and the full errors that the campaign shows.
     """
     used, solution = result.selection.equations, result.solution
     shown = {error.source: error.shifts(used, solution) for error in result.systematic}
@@ -342,5 +343,30 @@ def common_shifts(campaign: Campaign, result: ForceResult) -> dict[str, dict[str
 
 
 def is_resistance(campaign: Campaign) -> bool:
-    """Whether X0 is the resistance of a model without a working propeller, which no card of a ship has."""
+    """True if X0 is the resistance of a model without a working propeller, which is not in the card of a ship."""
     return not any(run.propeller_radps for run in campaign.runs)
+
+
+def reduction_covariance(reduction: Reduction, names: Sequence[str]) -> Array:
+    """Covariance (k, k), prime, of the derivatives `names` of a campaign.
+
+    Type A is that of the regression of each force, whose errors are independent. An error common to many runs (Type B,
+    or shown by the campaign itself) moves the derivatives of all three forces together: the outer product of what they
+    move by.
+    """
+    places = {name: place for place, name in enumerate(names)}
+    covariance = np.zeros((len(names), len(names)))
+    shifts: dict[str, Array] = {}
+    for result in reduction.forces.values():
+        solution = result.solution
+        columns = [place for place, name in enumerate(solution.names) if name in places]
+        rows = [places[solution.names[place]] for place in columns]
+        covariance[np.ix_(rows, rows)] += solution.covariance[np.ix_(columns, columns)]
+        for source, moved in common_shifts(reduction.campaign, result).items():
+            shift = shifts.setdefault(source, np.zeros(len(names)))
+            for name, by in moved.items():
+                if name in places:
+                    shift[places[name]] = by
+    for shift in shifts.values():
+        covariance += np.outer(shift, shift)
+    return (covariance + covariance.T) / 2

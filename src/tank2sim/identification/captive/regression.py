@@ -1,4 +1,4 @@
-"""Generalised least squares over a campaign, with the zero error and the gain error that every run has of its own.
+"""Generalised least squares over a campaign, with a zero error and a gain error of each run.
 
 The covariance of a run's coefficients is ``noise`` times its within-run covariance, plus ``zero_variance`` for its
 mean, plus ``gain_variance`` times the outer product of the coefficients that its gauge showed: a gauge that reads 0.5 %
@@ -6,9 +6,9 @@ more in one run than in the next errs in all harmonics of that run together. The
 likelihood over the campaign (REML; Patterson & Thompson 1971), so that the scatter from run to run, not only that
 within a run, determines how well a derivative is known.
 
-The gain errors widen the standard errors and do not weight the runs: the weights are those that are likeliest without
-them. Weights by gain errors would let a misfit of (3.8) in one harmonic pass for the gain of the run, at the cost of
-the harmonics that fit.
+The gain errors widen the standard errors and do not weight the runs: the weights are the likeliest without them. With
+them a misfit of (3.8) in one harmonic could be attributed to the gain of the run, to the detriment of the harmonics
+that fit.
 """
 
 from __future__ import annotations
@@ -31,34 +31,34 @@ _NOISE_RANGE = (math.log(1e-3), math.log(1e4))
 _ZERO_RANGE = (-25.0, 25.0)
 """Natural logarithms of the factor on a zero variance at the start."""
 _LEAST_GAIN = 1e-8
-"""Variance of the gain, 0.01 %, at which the likelihood must be higher than without."""
+"""Variance of the gain, 0.01 %, at which the likelihood must exceed that without gain errors."""
 _GAIN = 1e-5
 """Variance of the gain from which the search begins: 0.3 %, between good gauges (0.1 %) and poor ones (1 %)."""
 _GAIN_RANGE = (-20.0, 4.5)
-"""Natural logarithms of the factor on it: from nothing to gains that differ by 3 % from run to run. Such gains cost the
-likelihood 1000 a run where a force is not explained at all; were 10 % allowed, 100 would be less than what noise costs
-in a campaign with a gross error, and all forces would pass for errors of gain about zero."""
+"""Natural logarithms of the factor on it: from none to gains that differ by 3 % from run to run. Such gains cost the
+likelihood 1000 a run where a force is not explained at all; with 10 % the cost of 100 would be below that of noise in a
+campaign with a gross error, and all forces would be attributed to errors of gain about zero."""
 _FEWEST_RUNS = 8
 _CLEARLY = 0.05
-"""Chance of so much higher a likelihood if all types of run scatter alike, below which each gets its own variance."""
+"""Probability of the gain in likelihood if all types of run scatter alike, below which each gets its own variance."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """How the runs of a campaign scatter.
+    """Scatter of the runs of a campaign.
 
     Parameters
     ----------
     noise : float
-        Factor on the within-run covariances; 1 if they are all there is.
+        Factor on the within-run covariances; 1 if they are complete.
     zero_variance : float
         Variance of the zero error from run to run, in ``Equations.unit`` squared.
     by_type : mapping
-        Type of run to its own such variance, where the types differ; what (3.8) does not follow is in it.
+        Type of run to its own variance, where the types differ; it includes the misfit of (3.8).
     gain_variance : float
         Variance of the gauge's relative gain from run to run.
     weights : Spread or None
-        By which the runs are weighted, if not by this.
+        Spread that weights the runs, if different.
     """
 
     noise: float
@@ -85,23 +85,23 @@ class Spread:
         start, size = int(equations.first_rows[place]), len(equations.roots[place])
         root: Array = math.sqrt(self.noise) * equations.roots[place]
         for direction, sizes, variances in self._common_errors(equations):
-            own, length = direction[start : start + size], float(sizes[place])
+            block, length = direction[start : start + size], float(sizes[place])
             along = math.sqrt(1.0 + float(variances[place]) * length / self.noise) - 1.0
-            root = root @ (np.eye(size) + np.outer(own, own) * along / length)
+            root = root @ (np.eye(size) + np.outer(block, block) * along / length)
         return root
 
     def log_determinant(self, equations: CampaignEquations) -> float:
-        """Of the covariance of the weighted equations."""
+        """Logarithm of the determinant of the covariance of the weighted equations."""
         total = len(equations.values) * math.log(self.noise)
         for _, sizes, variances in self._common_errors(equations):
             total += float(np.sum(np.log1p(variances * sizes / self.noise)))
         return total
 
     def _common_errors(self, equations: CampaignEquations) -> Iterator[tuple[Array, Array, Array]]:
-        """What errs together in a run: direction (rows,), its squared norm in each run, and its variance (runs,).
+        """Errors common to a run: direction (rows,), its squared norm in each run, and its variance (runs,).
 
         The covariance is noise R (I + g g' gain/noise) R', R R' = I + z z' zero/noise, g the inverse of R times the
-        gauge's coefficients: each error is taken out after the other.
+        gauge's coefficients: the errors are removed in sequence.
         """
         zeros, sizes = self.zeros(equations), equations.zero_sizes
         yield equations.zero, sizes, zeros
@@ -129,7 +129,7 @@ class Solution:
     condition : float
         Scaled condition number of the weighted design.
     inflation : array, (terms,)
-        Variance inflation factors: by how much the variance of a term is greater than if no other were there.
+        Variance inflation factors: variance of a term over its variance as the only term.
     """
 
     names: tuple[str, ...]
@@ -141,7 +141,7 @@ class Solution:
 
     @property
     def standard_errors(self) -> Array:
-        """(terms,)."""
+        """Standard errors of the values, (terms,)."""
         errors: Array = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
         return errors
 
@@ -152,7 +152,7 @@ class Solution:
         return ratios
 
     def value(self, name: str) -> float:
-        """Of one term; 0 if it is not among them."""
+        """Value of a term; 0 for an absent term."""
         return float(self.values[self.names.index(name)]) if name in self.names else 0.0
 
     def error(self, name: str) -> float:
@@ -161,7 +161,7 @@ class Solution:
 
 
 def solve(equations: CampaignEquations, spread: Spread) -> Solution:
-    """Weighted least squares by QR; the covariance is that of a known spread, whatever the weights."""
+    """Weighted least squares by QR; the covariance is that of `spread`, also with other weights."""
     weights = spread.weights
     solution = efficient_solution(equations, weights or spread)
     if weights is None or not equations.names:
@@ -171,13 +171,13 @@ def solve(equations: CampaignEquations, spread: Spread) -> Solution:
 
 
 def scatters(equations: CampaignEquations, spread: Spread) -> Array:
-    """Covariance of what each run adds to the right of the weighted normal equations, (runs, terms, terms)."""
+    """Covariance of each run's contribution to the weighted normal equations' right-hand side, (runs, terms, terms)."""
     design = (spread.weights or spread).weighted(equations, equations.design)
     ends = [*equations.first_rows[1:], len(equations.values)]
     found = np.empty((len(equations.runs), len(equations.names), len(equations.names)))
     for place, (start, end) in enumerate(zip(equations.first_rows, ends, strict=True)):
-        own = design[start:end]
-        found[place] = own.T @ run_covariance(equations, spread, place) @ own
+        block = design[start:end]
+        found[place] = block.T @ run_covariance(equations, spread, place) @ block
     return found
 
 
@@ -186,14 +186,14 @@ def run_covariance(equations: CampaignEquations, spread: Spread, place: int) -> 
     size = len(equations.roots[place])
     if spread.weights is None:
         return np.eye(size)
-    # Both are roots of covariances of the same coefficients, one by its weights and one as it is.
+    # Both are roots of covariances of the same coefficients, one of the weights and one of the spread.
     root = np.linalg.solve(spread.weights.run_root(equations, place), spread.run_root(equations, place))
     covariance: Array = np.asarray(root @ root.T, dtype=np.float64)
     return covariance
 
 
 def efficient_solution(equations: CampaignEquations, spread: Spread) -> Solution:
-    """Generalised least squares by QR: weighted by the whole of a known spread, gain errors, too."""
+    """Generalised least squares by QR: weighted by a known spread with its gain errors."""
     design, values = weighted_system(equations, spread)
     if not equations.names:
         return Solution((), np.zeros(0), np.zeros((0, 0)), spread, 1.0, np.zeros(0))
@@ -220,11 +220,11 @@ def weighted_system(equations: CampaignEquations, spread: Spread) -> tuple[Array
 
 
 def fitted_spread(equations: CampaignEquations, *, by_type: bool = True) -> Spread:
-    """The spread that restricted maximum likelihood finds for these terms.
+    """The spread of largest restricted likelihood for these terms.
 
-    One zero variance serves all types of run, unless the likelihood speaks clearly for one each: the tests at large
-    angles, say, do not follow (3.8). Where every run is a single reading (averages, steady runs alone) the two factors
-    cannot be distinguished, and the noise within a run is taken as it is.
+    All types of run share one zero variance, unless the likelihood is clearly higher with one each: tests at large
+    angles, for example, may not follow (3.8). Where every run is a single reading (averages, steady runs alone) the two
+    factors cannot be distinguished, and the factor on the noise within a run is 1.
     """
     single = len(equations.values) == len(equations.runs)
     common, least = _best(equations, {"": _starting_zero(equations)}, single)
@@ -232,14 +232,14 @@ def fitted_spread(equations: CampaignEquations, *, by_type: bool = True) -> Spre
     types = [kind for kind, count in counts.items() if count >= _FEWEST_RUNS]
     if not by_type or len(types) < 2:
         return _with_gain(equations, common, single)
-    # Each type by itself is the start: a common one is a likely spread, too, from which no way leads downhill.
-    alone = {
+    # The start is each type alone: a common spread is a local minimum.
+    starts = {
         kind: _starting_zero(equations.of_runs([n for n, run in enumerate(equations.runs) if run.run.type == kind]))
         for kind in types
     }
-    own, lower = _best(equations, alone, single)
+    separate, lower = _best(equations, starts, single)
     clearly = chdtrc(len(types) - 1, max(least - lower, 0.0)) < _CLEARLY
-    return _with_gain(equations, own if clearly else common, single)
+    return _with_gain(equations, separate if clearly else common, single)
 
 
 def _best(equations: CampaignEquations, start: Mapping[str, float], single: bool) -> tuple[Spread, float]:
@@ -255,7 +255,7 @@ def _best(equations: CampaignEquations, start: Mapping[str, float], single: bool
 
 
 def _with_gain(equations: CampaignEquations, base: Spread, single: bool) -> Spread:
-    """The likeliest spread with gain errors, weighted by one without; that itself if the likelihood knows of none."""
+    """The likeliest spread with gain errors, weighted by `base`; `base` if gain errors do not raise the likelihood."""
     if _criterion(equations, replace(base, gain_variance=_LEAST_GAIN)) >= _criterion(equations, base):
         return base
 
@@ -271,7 +271,7 @@ def _with_gain(equations: CampaignEquations, base: Spread, single: bool) -> Spre
 def _likeliest(
     equations: CampaignEquations, spread: Callable[[Array], Spread], bounds: list[tuple[float, float]]
 ) -> tuple[Spread, float]:
-    """The spread of greatest likelihood by its logarithms, from zero within their bounds, and -2 log of that."""
+    """The spread of largest likelihood over its logarithms, from zero within their bounds, and -2 log likelihood."""
     found = minimize(
         lambda logs: _criterion(equations, spread(logs)),
         np.zeros(len(bounds)),

@@ -1,4 +1,4 @@
-"""Repeated runs: what the same test gives again is the plainest measure of what one run is worth."""
+"""Repeated runs: the direct measure of the scatter of a run."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Repeats:
     Parameters
     ----------
     groups : tuple of tuple of str
-        Names of runs that are one test.
+        Names of the runs of the same test.
     deviation : mapping
-        Force to the standard deviation of one run's mean within the groups, prime.
+        Force to the standard deviation of a run's mean within the groups, prime.
     freedom : int
         Degrees of freedom of the deviations.
     """
@@ -35,7 +35,7 @@ class Repeats:
 
 
 def repeats(campaign: Campaign, runs: Sequence[ReducedRun]) -> Repeats | None:
-    """The repeats of a campaign; None if no test was made twice."""
+    """The repeats of a campaign; None without a repeated test."""
     together: dict[tuple[object, ...], list[ReducedRun]] = defaultdict(list)
     for run in runs:
         together[_test(campaign, run)].append(run)
@@ -57,7 +57,7 @@ def repeats(campaign: Campaign, runs: Sequence[ReducedRun]) -> Repeats | None:
 
 
 def _test(campaign: Campaign, run: ReducedRun) -> tuple[object, ...]:
-    """What makes two runs the same test: steady angles and speed, or frequency and amplitude, as measured."""
+    """Key of a test: measured steady angles and speed, or frequency and amplitude."""
     motion, length = run.motion, campaign.model.length_m
     speed = motion.mean_speed_mps
     drift = round(math.asin(max(-1.0, min(1.0, -float(motion.v_mps.mean()) / speed))) / _ANGLE_RAD)

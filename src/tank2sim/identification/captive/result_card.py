@@ -1,4 +1,4 @@
-"""The ship card of a reduction: what was measured, what was filled in from published estimates, at which scale."""
+"""The ship card of a reduction: measured values, published estimates of missing ones, and the scale."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ FILLS: Mapping[str, str] = {"clarke1983": CLARKE}
 
 @dataclass(frozen=True, kw_only=True)
 class Contents:
-    """What the card says.
+    """Contents of the card.
 
     Parameters
     ----------
     entries : mapping
-        Name to value, standard error (prime) and how it was found, in the canonical order.
+        Name to value, standard error (prime) and origin, in the canonical order.
     estimated : tuple of str
-        Those that are estimates.
+        Names of the estimates.
     missing : tuple of str
-        Essential ones that are neither measured nor estimated.
+        Names of essential derivatives that are neither measured nor estimated.
     mass, yaw_inertia, x_G : float
         Prime.
     inertia_source : str
-        Where the yaw inertia is from.
+        Source of the yaw inertia.
     """
 
     entries: Mapping[str, DerivativeEntry]
@@ -49,17 +49,17 @@ class Contents:
 
 
 def card_contents(reduction: Reduction, fill: str | None = None) -> Contents:
-    """What a card of a reduction has.
+    """Contents of the card of a reduction.
 
     Parameters
     ----------
     fill : str, optional
-        Key of :data:`FILLS`: the source of what the campaign cannot give.
+        Key of :data:`FILLS`: the source of derivatives that the campaign does not give.
 
     Raises
     ------
     InputError
-        The estimate needs beam and draught and the campaign does not give them.
+        The estimate needs beam and draught, and the campaign lacks them.
     """
     campaign = reduction.campaign
     model, scales = campaign.model, campaign.scales
@@ -90,12 +90,12 @@ def card_contents(reduction: Reduction, fill: str | None = None) -> Contents:
 
 
 def _in_card_figures(entry: DerivativeEntry) -> DerivativeEntry:
-    """Figures as the card has them, so that card and JSON agree to the last."""
+    """Figures rounded as in the card, so that card and JSON agree exactly."""
     return DerivativeEntry(float(f"{entry.value:.7g}"), float(f"{entry.standard_error:.3g}"), entry.how)
 
 
 def _how(reduction: Reduction, name: str) -> str:
-    """In a few words: from what a derivative was found, and what the paper's order gives."""
+    """Short origin of a derivative, with its value in the paper's order."""
     result = reduction.forces[name[0]]
     steps = result.stepwise
     if any(trend.name == name and trend.used for trend in result.trends):
@@ -107,7 +107,7 @@ def _how(reduction: Reduction, name: str) -> str:
 
 
 def _constant_thrust(reduction: Reduction, found: Mapping[str, DerivativeEntry]) -> dict[str, DerivativeEntry]:
-    """Xu and Xuu of a ship whose thrust stays what balances the measured resistance, while that goes as U^2.
+    """Xu and Xuu with constant thrust that balances the measured resistance, which varies as U^2.
 
     X = R0 (U/u0)^2 - R0 over 1/2 rho L^2 U^2 is X0' (1 - (u0/U)^2), X0' the measured resistance (negative), and with
     u0/U = 1 - Du' it is X0' (2 Du' - Du'^2). Thrust grows as a ship slows, so that this is a cautious estimate.
@@ -188,7 +188,7 @@ def reduced_card_text(reduction: Reduction, card: Contents, scale: float = 1.0) 
 
 
 def _tested(reduction: Reduction) -> TestedRange:
-    """How far the runs that were used went in drift, rudder and yaw rate."""
+    """Largest drift, rudder angle and yaw rate of the runs used."""
     drift, rudder, rate = [0.0], [0.0], [0.0]
     for run in reduction.runs:
         motion, speed = run.motion, run.motion.speed_mps

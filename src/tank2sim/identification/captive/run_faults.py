@@ -1,7 +1,7 @@
-"""Faults of single runs: records that cannot be what they are said to be.
+"""Faults of single runs: records that contradict their description.
 
-Every check is by run, names the run, and says what is wrong and what to do; a limit is generous, so that what it stops
-is a fault of the record and no unusual ship.
+Every check names the run, the problem and the remedy. The limits are generous, so that they find faults of the record
+and accept an unusual ship.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.motion import leading
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
 
-_OTHER_MOTION = 0.1
-"""Share that a motion foreign to the type of a run may have of its own motion."""
+_FOREIGN_MOTION = 0.1
+"""Largest amplitude of a motion foreign to the type of a run, as a share of the expected motion."""
 _DRIFT_TOLERANCE_RAD = math.radians(1.0)
 _SAME_RATE = 0.1
 """Relative difference by which v may differ from dy/dt, and r from dpsi/dt."""
-_STEP_RATIO, _STEP_BESIDE_DRIFT = 9.0, 5.5
-"""Standard errors that a step in the zero must reach, by itself and next to a linear drift of the zero; chance, which
-comes to 5 among the hundreds of records of a campaign, does not do both."""
+_STEP_RATIO, _STEP_WITH_DRIFT = 9.0, 5.5
+"""Standard errors that a step in the zero must reach, alone and next to a linear drift of the zero; chance, which
+reaches 5 among the hundreds of records of a campaign, does not reach both."""
 _LARGEST_PRIME = {"X": 0.5, "Y": 0.5, "N": 0.25}
-"""No hull's coefficients come near: a flat plate broadside has Y' of about T/L."""
+"""Far above the coefficients of any hull: a flat plate broadside has Y' of about T/L."""
 _GAP = 5.0
 _NO_SMALL_ANGLE = 0.05
 _FEWEST_LEVELS = 8
@@ -37,20 +37,20 @@ at its outermost level up to 1/(sqrt(2) - 1) = 2.4 times as long in all as at th
 
 
 def record_faults(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:
-    """What is wrong with a record, before anything is made of it: the first fault of each kind."""
+    """Faults of a record before its reduction: the first of each kind."""
     if not run.is_average:
         yield from _clock(run)
     yield from _impossible_values(campaign, run)
     if run.is_average:
         return
-    yield from _other_motion(campaign, run)
+    yield from _foreign_motion(campaign, run)
     for force in FORCE_COLUMNS:
         yield from _dead(campaign, run, force)
         yield from _clipped(run, force)
 
 
 def reduced_faults(run: ReducedRun) -> Iterator[InputError]:
-    """What shows in a reduced run alone: other angles, rates that do not belong to positions, a step in a zero."""
+    """Faults that only a reduced run shows: wrong angles, rates inconsistent with positions, a step in a zero."""
     if run.run.is_average:
         return
     yield from _angles(run)
@@ -103,30 +103,28 @@ def _impossible_values(campaign: Campaign, run: CaptiveRun) -> Iterator[InputErr
             yield InputError(run.name, f"column {column}", problem, f"give it in {'N m' if force == 'N' else 'N'}")
 
 
-def _other_motion(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:
-    """A motion that is not what the type of the run says."""
+def _foreign_motion(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:
+    """A motion that contradicts the type of the run."""
     speed, length = float(np.mean(run.speed_mps)), campaign.model.length_m
     if speed <= 0:
-        return  # a fault of the speed, which is reported by itself
+        return  # a fault of the speed, which has its own report
     sway, yaw = _swing(run.v_mps) / speed, _swing(run.r_radps) * length / speed
     turning = abs(float(np.mean(run.r_radps))) * length / speed
     remedy = "correct its type in the campaign, or the record"
-    own = {"pure_sway": sway, "pure_yaw": yaw, "yaw_with_drift": yaw}.get(run.type)
+    expected = {"pure_sway": sway, "pure_yaw": yaw, "yaw_with_drift": yaw}.get(run.type)
     foreign = {"pure_sway": ("yaw rate", yaw), "pure_yaw": ("sway", sway), "yaw_with_drift": ("sway", sway)}
-    if own is not None:
-        name, other = foreign[run.type]
-        if other > _OTHER_MOTION * own or own == 0.0:
-            problem = f"is said to be {run.type}, and its {name} swings by {other:.3g} next to {own:.3g} (prime)"
+    if expected is not None:
+        name, amplitude = foreign[run.type]
+        if amplitude > _FOREIGN_MOTION * expected or expected == 0.0:
+            problem = f"has type {run.type}, but its {name} swings by {amplitude:.3g} next to {expected:.3g} (prime)"
             yield InputError(run.name, "", problem, remedy)
     elif max(sway, yaw) > 0.02 or turning > 0.02:
-        problem = (
-            f"is said to be {run.type}, and the model moves: v' by {sway:.3g}, r' by {yaw:.3g} about {turning:.3g}"
-        )
+        problem = f"has type {run.type}, but the model moves: v' by {sway:.3g}, r' by {yaw:.3g} about {turning:.3g}"
         yield InputError(run.name, "", problem, remedy)
 
 
 def _angles(reduced: ReducedRun) -> Iterator[InputError]:
-    """Drift and rudder that are not those of the type or the sheet: means over whole periods."""
+    """Drift and rudder (means over whole periods) that differ from the type or the sheet."""
     run, motion = reduced.run, reduced.motion
     sine = -float(np.mean(motion.v_mps)) / motion.mean_speed_mps
     drift = math.asin(float(np.clip(sine, -1.0, 1.0)))
@@ -154,26 +152,31 @@ def _rates(reduced: ReducedRun) -> Iterator[InputError]:
     run, frequency = reduced.run, reduced.motion.frequency_radps
     if not run.oscillates:
         return
-    of, name, column = (run.y_m, "y_m", "v_mps") if run.type == "pure_sway" else (run.psi_rad, "psi_rad", "r_radps")
-    if of is None or np.ptp(of) == 0.0:
+    position_signal, name, column = (
+        (run.y_m, "y_m", "v_mps") if run.type == "pure_sway" else (run.psi_rad, "psi_rad", "r_radps")
+    )
+    if position_signal is None or np.ptp(position_signal) == 0.0:
         return
     wave = np.exp(-1j * frequency * run.time_s) * np.hanning(len(run.time_s))
-    position, rate = np.sum(wave * (of - of.mean())), np.sum(wave * (leading(run) - leading(run).mean()))
+    position, rate = (
+        np.sum(wave * (position_signal - position_signal.mean())),
+        np.sum(wave * (leading(run) - leading(run).mean())),
+    )
     factor = complex(rate / (1j * frequency * position))
     if abs(factor - 1.0) <= _SAME_RATE:
         return
-    what = "has the opposite sign of" if abs(factor + 1.0) <= _SAME_RATE else f"is {abs(factor):.3g} times"
+    relation = "has the opposite sign of" if abs(factor + 1.0) <= _SAME_RATE else f"is {abs(factor):.3g} times"
     if 0.9 < abs(factor) < 1.1 and abs(factor + 1.0) > _SAME_RATE:
-        what = f"is {math.degrees(np.angle(factor)):.3g} deg out of phase with"
-    problem = f"{what} the rate of change of {name}"
-    yield InputError(run.name, f"column {column}", problem, "one of them is in another unit, sign or clock")
+        relation = f"is {math.degrees(np.angle(factor)):.3g} deg out of phase with"
+    problem = f"{relation} the rate of change of {name}"
+    yield InputError(run.name, f"column {column}", problem, "correct the unit, sign or clock of one of them")
 
 
 def _dead(campaign: Campaign, run: CaptiveRun, force: str) -> Iterator[InputError]:
-    """A gauge that shows one value from end to end, where the model's motion or the gauge's usual noise forbids it."""
+    """A gauge with a constant reading, which the model's motion or the gauge's usual noise excludes."""
     values = run.force(force)
     if np.ptp(values) > 0.0 or np.min(run.speed_mps) <= 0:
-        return  # without speed there is no drift angle; that fault is reported by itself
+        return  # without speed the drift angle is undefined; that fault has its own report
     angles = (float(np.mean(run.v_mps / run.speed_mps)), float(np.mean(run.delta_rad)))
     # Drift and rudder together may cancel, and a coarse gauge reads nothing at a small angle.
     nothing = float(values[0]) == 0.0 and max(map(abs, angles)) > _NO_SMALL_ANGLE and 0.0 in angles
@@ -184,21 +187,20 @@ def _dead(campaign: Campaign, run: CaptiveRun, force: str) -> Iterator[InputErro
 
 
 def _usually_noisy(campaign: Campaign, force: str) -> bool:
-    """Whether steady runs usually show many levels: no computed campaign, and no coarse gauge."""
+    """True if steady runs usually have many levels: neither a computed campaign nor a coarse gauge."""
     records = [run for run in campaign.runs if not run.is_average]
     steady = [run for run in records if not run.oscillates] or records
     return float(np.median([len(np.unique(run.force(force))) for run in steady])) >= _FEWEST_LEVELS
 
 
 def _clipped(run: CaptiveRun, force: str) -> Iterator[InputError]:
-    """A plateau at the top or bottom of a record: many equal readings in a row, and nothing beyond.
+    """A plateau at the top or bottom of a record: many equal readings in a row, and none beyond.
 
-    A gauge that shows a few levels only is coarse next to what it measures, and its outermost may well be the usual
-    one.
+    A gauge with a few levels only is coarse, and its outermost level may be the usual one.
     """
     values = run.force(force)
-    stands, counts = np.unique(values, return_counts=True)
-    if len(stands) < _FEWEST_LEVELS:
+    unique_levels, counts = np.unique(values, return_counts=True)
+    if len(unique_levels) < _FEWEST_LEVELS:
         return
     inner = int(counts[1:-1].max())
     equal = np.flatnonzero(np.diff(values) != 0.0)
@@ -206,14 +208,14 @@ def _clipped(run: CaptiveRun, force: str) -> Iterator[InputError]:
     usual = float(np.median(lengths))
     for extreme, end in ((float(values.max()), "top"), (float(values.min()), "bottom")):
         levels = values[np.concatenate([equal, [len(values) - 1]])]
-        others = levels[levels != extreme]
-        next_level = others.max() if end == "top" else others.min()
-        # A coarse gauge stands still at every level, a saturated one at its last.
+        inner_levels = levels[levels != extreme]
+        next_level = inner_levels.max() if end == "top" else inner_levels.min()
+        # A coarse gauge is constant for a while at every level, a saturated gauge only at its last.
         natural = max(usual, float(lengths[levels == next_level].max()))
         longest, count = int(lengths[levels == extreme].max()), int(np.count_nonzero(values == extreme))
         plateau = longest >= _PLATEAU * natural and count >= _PLATEAU * inner
         if plateau and count >= max(6, 0.01 * len(values)):
-            problem = f"stands still at its {end}, {extreme:.4g}, for {longest} readings: the gauge is saturated"
+            problem = f"is constant at its {end}, {extreme:.4g}, for {longest} readings: the gauge is saturated"
             yield InputError(run.name, f"gauge {force}", problem, "repeat the run with a larger range")
             return
 
@@ -221,7 +223,7 @@ def _clipped(run: CaptiveRun, force: str) -> Iterator[InputError]:
 def _step(run: ReducedRun, force: str) -> tuple[float, float, float] | None:
     """Time, size and ratio to its standard error of a step in the mean of a residual; None if there is none.
 
-    A step must stand out whether or not a linear drift of the zero is fitted with it: slow noise seldom does both.
+    A step must be significant with and without a fitted linear drift of the zero: slow noise seldom is in both.
     """
     count = len(run.basis)
     if count < 40:
@@ -229,15 +231,15 @@ def _step(run: ReducedRun, force: str) -> tuple[float, float, float] | None:
     steady = [place for place, label in enumerate(run.labels) if label != "trend"]
     record = run.run.force(force)[run.motion.kept]
     place, size, ratio = _largest_step(record, run.basis)
-    if ratio < _STEP_BESIDE_DRIFT or _largest_step(record, run.basis[:, steady])[2] < _STEP_RATIO:
+    if ratio < _STEP_WITH_DRIFT or _largest_step(record, run.basis[:, steady])[2] < _STEP_RATIO:
         return None
     return float(run.run.time_s[run.motion.kept][place]), size, ratio
 
 
 def _largest_step(record: Array, basis: Array) -> tuple[int, float, float]:
-    """Row, size and ratio of the step that is likeliest next to the columns of a basis.
+    """Row, size and ratio of the likeliest step in addition to the columns of a basis.
 
-    It is fitted together with them, at the row where the sum of the residuals departs most.
+    It is fitted together with them, at the row of the largest cumulative sum of the residuals.
     """
     count = len(record)
     gram = basis.T @ basis
@@ -250,7 +252,7 @@ def _largest_step(record: Array, basis: Array) -> tuple[int, float, float]:
     length = float(column @ column)
     size = float(column @ residual) / length
     # Density of what remains at low frequencies, where a step has its power: of a few lines for slow noise, of many
-    # for a steady estimate.
+    # lines for a stable estimate.
     power = np.abs(np.fft.rfft(residual - size * column)) ** 2 / count
     least = 1e-20 * float(np.max(record**2)) + 1e-300
     density = max(*(float(np.mean(power[1:lines])) for lines in (3, 5, 13, 61)), least)

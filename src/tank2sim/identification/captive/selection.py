@@ -1,11 +1,11 @@
-"""Which terms of (3.8) a campaign can give: every term left out is reported, with the reason.
+"""Selection of the terms of (3.8) that a campaign determines, with the reason for every omitted term.
 
-Every term that the campaign excites and can tell from the others is in the regression, third-order terms held loosely
-about zero (:mod:`tank2sim.identification.captive.prior`). Whether a term is reported depends on the design of the tests
-and never on its value: to leave out a term because it does not differ from zero would claim that it is zero, with no
-error, and would move every manoeuvre that needs it. Reported are the linear terms, the acceleration derivatives, X0,
-and every other term on which the tests say more than the prior: at large angles with a small standard error, at small
-angles with a large one. A term that is not reported keeps its part in the standard errors of the others.
+Every term that the campaign excites and can distinguish is in the regression, third-order terms with a prior about zero
+(:mod:`tank2sim.identification.captive.prior`). The report of a term depends on the design of the tests and never on its
+value: omission of a term because it does not differ from zero would state that it is exactly zero, and would change
+every manoeuvre that needs it. Reported are the linear terms, the acceleration derivatives, X0, and every other term on
+which the tests have more information than the prior: at large angles with a small standard error, at small angles with
+a large one. A term that is not reported still contributes to the standard errors of the other terms.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from tank2sim.records.campaigns import Campaign
 
 DETERMINED = math.sqrt(0.5)
 """Largest standard error of a reported third-order term, in the standard deviations of its prior: the tests then weigh
-at least as much as what known ships have in common (1/s^2 - 1 >= 1), and the value is theirs."""
+at least as much as the prior of known ships (1/s^2 - 1 >= 1) and determine the value."""
 
 _NORMAL = 1.959964
 """Standard errors of a two-sided 95 % interval of the normal distribution."""
@@ -35,36 +35,36 @@ _NORMAL = 1.959964
 
 @dataclass(frozen=True)
 class Choice:
-    """What became of one candidate term.
+    """Decision on a candidate term.
 
     Parameters
     ----------
     name : str
         The term.
     kept : bool
-        It is reported.
+        True for a reported term.
     reason : str
         ``linear``, ``determined``, ``asked for``, ``not excited``, ``collinear``, ``not determined``, ``trend``.
-    told : str
+    explanation : str
         The reason in a sentence, with its figures.
     inflation, ratio : float or None
-        Variance inflation factor, and value over standard error, when it was decided.
+        Variance inflation factor, and value over standard error, at the decision.
     """
 
     name: str
     kept: bool
     reason: str
-    told: str
+    explanation: str
     inflation: float | None = None
     ratio: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """The regression over the whole campaign: equations of all terms that it can distinguish, and each candidate's
-    fate.
+    """The regression over the whole campaign: equations of all terms that it can distinguish, and the decision on each
+    candidate.
 
-    Of the terms in the regression those that the tests do not determine have ``kept`` false: they are not reported.
+    Terms of the regression that the tests do not determine have ``kept`` false: they are not reported.
     """
 
     equations: CampaignEquations
@@ -80,8 +80,8 @@ class Selection:
     def solution(self) -> Solution:
         """All terms of the regression, its errors widened by Student's t over the normal quantile.
 
-        So 1.96 standard errors are a 95 % interval, although the scatter was itself estimated, from as many degrees of
-        freedom as there are runs more than free terms.
+        Thus 1.96 standard errors are a 95 % interval, although the scatter is an estimate with runs less free terms as
+        degrees of freedom.
         """
         solution = solve(self.equations, self.spread)
         free = len(self.equations.names) - len(self.equations.prior)
@@ -103,7 +103,7 @@ def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_te
         As :func:`tank2sim.identification.captive.equations.campaign_equations`.
     """
     choices: dict[str, Choice] = {}
-    used = told_apart(campaign, runs, force, choices)
+    used = distinguishable_equations(campaign, runs, force, choices)
     spread = fitted_spread(used)
     used = with_prior(used, spread)
     selection = Selection(used, spread, ())
@@ -114,35 +114,36 @@ def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_te
     return replace(selection, choices=tuple(sorted(choices.values(), key=lambda choice: order.index(choice.name))))
 
 
-def told_apart(
+def distinguishable_equations(
     campaign: Campaign, runs: Sequence[ReducedRun], force: str, choices: dict[str, Choice]
 ) -> CampaignEquations:
-    """The equations of all terms that the runs excite and can distinguish; the fate of the others goes to `choices`."""
+    """The equations of all terms that the runs excite and can distinguish; the decisions on other terms are added to
+    `choices`."""
     active = []
     for term in candidate_terms(force):
         if excited(campaign, runs, term):
             active.append(term.name)
         else:
-            choices[term.name] = Choice(term.name, False, "not excited", f"no run moves so that {term.name} acts")
+            choices[term.name] = Choice(term.name, False, "not excited", f"no run excites {term.name}")
     full = campaign_equations(campaign, runs, force, active)
-    return full.of_terms(_told_apart(full, choices))
+    return full.of_terms(_keep_distinguishable(full, choices))
 
 
 def _judged(solution: Solution, place: int, held: float, *, all_terms: bool) -> Choice:
-    """Whether a term of the regression, held within a standard deviation `held` of zero, is reported."""
+    """Decision on a term of the regression with prior standard deviation `held`."""
     name, ratio = solution.names[place], float(solution.ratios[place])
     value, error = solution.values[place], solution.standard_errors[place]
     if _always(name):
-        reason, told = "linear", f"value / standard error {ratio:.3g}"
+        reason, explanation = "linear", f"value / standard error {ratio:.3g}"
     elif error <= DETERMINED * held:
-        reason, told = "determined", f"value / standard error {ratio:.3g}"
+        reason, explanation = "determined", f"value / standard error {ratio:.3g}"
     else:
         reason = "asked for" if all_terms else "not determined"
-        told = (
+        explanation = (
             f"the tests reach too small angles to show it: {value:.3g} ± {error:.2g}, and known ships scatter by "
             f"{held:.2g}; its uncertainty is in the errors of the others"
         )
-    return Choice(name, reason != "not determined", reason, told, float(solution.inflation[place]), ratio)
+    return Choice(name, reason != "not determined", reason, explanation, float(solution.inflation[place]), ratio)
 
 
 def _always(name: str) -> bool:
@@ -155,13 +156,13 @@ def _order(term: Term) -> int:
     return term.v + term.r + term.d + term.u
 
 
-def _told_apart(full: CampaignEquations, choices: dict[str, Choice]) -> list[str]:
-    """Terms that the campaign can distinguish, taken from the simplest to the most mixed: each that joins must leave
-    the condition number bearable."""
+def _keep_distinguishable(full: CampaignEquations, choices: dict[str, Choice]) -> list[str]:
+    """Terms that the campaign can distinguish, from the simplest to the most mixed: each must keep the condition number
+    within its limit."""
     kept: list[str] = []
     conditions = _conditions(full)
     for name in sorted(full.names, key=_simplicity):
-        # The zero of Y and N is an unknown, whether or not its term is in the result.
+        # The zero of Y and N is always unknown, also if its term is not in the result.
         spare = 0 if full.force == "X" or {"Y0", "N0"} & {name, *kept} else 1
         if len(kept) + spare >= conditions or (conditions < 2 and name != "X0"):
             text = f"{conditions} distinct condition{'s' * (conditions > 1)} cannot show it next to the zero"
@@ -173,19 +174,19 @@ def _told_apart(full: CampaignEquations, choices: dict[str, Choice]) -> list[str
         if condition <= COLLINEAR or _always(name):
             kept.append(name)
             continue
-        column, others = weighted[:, -1], weighted[:, :-1]
-        alone = column - others @ np.linalg.lstsq(others, column, rcond=None)[0]
-        inflation = float(column @ column / max(float(alone @ alone), 1e-300))
+        column, simpler = weighted[:, -1], weighted[:, :-1]
+        remainder = column - simpler @ np.linalg.lstsq(simpler, column, rcond=None)[0]
+        inflation = float(column @ column / max(float(remainder @ remainder), 1e-300))
         text = (
             f"the runs cannot distinguish it from simpler terms: variance inflation {inflation:.3g}, condition number "
-            f"{condition:.3g} with it, and {COLLINEAR:g} can be borne"
+            f"{condition:.3g} with it, above the limit of {COLLINEAR:g}"
         )
         choices[name] = Choice(name, False, "collinear", text, inflation)
     return [name for name in full.names if name in kept]
 
 
 def _conditions(full: CampaignEquations) -> int:
-    """How many distinct conditions there are: an oscillating run counts once for each of its coefficients."""
+    """Number of distinct conditions: an oscillating run counts once for each of its coefficients."""
     steady = {
         tuple(np.round([m.v_mps[0] / m.speed_mps[0], m.delta_rad[0], m.speed_mps[0]], 2).tolist())
         for m in (run.motion for run in full.runs if not run.run.oscillates)
@@ -194,7 +195,7 @@ def _conditions(full: CampaignEquations) -> int:
 
 
 def _simplicity(name: str) -> tuple[int, ...]:
-    """Linear terms come first, then by order, and at one order those in one motion before mixed ones."""
+    """Sort key: linear terms first, then by order, and within an order terms in one motion before mixed terms."""
     term = parse_term(name)
     assert term is not None
     mixed = sum(power > 0 for power in (term.v, term.r, term.d, term.u))
@@ -202,5 +203,5 @@ def _simplicity(name: str) -> tuple[int, ...]:
 
 
 def usual_zero(full: CampaignEquations) -> float:
-    """A zero error that makes every mean as good as the others: what can be distinguished hangs on the tests alone."""
+    """Zero error that gives all means similar weights, so that only the tests determine the distinguishable terms."""
     return float(np.median([root[0, 0] for root in full.roots])) ** 2

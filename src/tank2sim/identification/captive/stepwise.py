@@ -1,6 +1,6 @@
-"""The paper's order: linear terms from the simplest tests, then held fixed while more complex tests give the rest.
+"""The paper's order: linear terms from the simplest tests, held fixed while more complex tests give further terms.
 
-Paper 2, sections 4 and 5. What is held fixed is itself uncertain; its covariance goes on into what is found with it.
+Paper 2, sections 4 and 5. The covariance of the terms held fixed propagates to the further terms.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ _STEPS: tuple[tuple[RunType, str], ...] = (
 """Type of run, and the motions whose terms it gives, in the order of the steps."""
 
 _LEAST_SPREAD = 0.5
-"""Least standard error of a difference, in those of the regression: less than that is no disagreement worth a word."""
+"""Least standard error of a difference, relative to that of the regression: smaller differences do not matter."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stepwise:
-    """What the paper's order gives of one force.
+    """Result of the paper's order for one force.
 
     Parameters
     ----------
     names : tuple of str
-        Terms found, in the order in which they were.
+        Terms in the order of their estimation.
     values, standard_errors : array, (terms,)
         Prime.
     found_in : tuple of str
-        Type of run that gave each.
+        Type of run that gave each term.
     """
 
     names: tuple[str, ...]
@@ -53,7 +53,7 @@ class Stepwise:
 
 @dataclass(frozen=True)
 class Disagreement:
-    """A term on which two ways differ: ``ratio`` is the difference over its standard error."""
+    """A term on which the methods differ: ``ratio`` is the difference over its standard error."""
 
     name: str
     stepwise: float
@@ -64,7 +64,7 @@ class Disagreement:
 def stepwise(equations: CampaignEquations, spread: Spread, test_speed_mps: float) -> Stepwise:
     """The terms of a force in the paper's order, with the weights of the whole campaign.
 
-    The steps use the runs at the test speed; those at others give the terms in Du, last.
+    The steps use the runs at the test speed; runs at other speeds give the terms in Du, last.
     """
     names: list[str] = []
     found_in: list[str] = []
@@ -82,15 +82,15 @@ def stepwise(equations: CampaignEquations, spread: Spread, test_speed_mps: float
         if not new:
             continue
         held = part.of_terms(names).design
-        own = part.of_terms(new)
-        weighted = spread.weighted(part, np.column_stack([own.design, held, part.values]))
-        prior = own.prior_rows
+        chosen = part.of_terms(new)
+        weighted = spread.weighted(part, np.column_stack([chosen.design, held, part.values]))
+        prior = chosen.prior_rows
         weighted = np.vstack([weighted, np.hstack([prior, np.zeros((len(prior), len(names) + 1))])])
         design, fixed, target = weighted[:, : len(new)], weighted[:, len(new) : -1], weighted[:, -1]
         norms = column_norms(design)
         inverse = np.linalg.pinv(design / norms) / norms[:, None]
         values = np.concatenate([values, inverse @ (target - fixed @ values)])
-        covariance = _joined(covariance, inverse, inverse @ fixed)
+        covariance = _joint_covariance(covariance, inverse, inverse @ fixed)
         names += new
         found_in += [kind or "all"] * len(new)
     errors: Array = np.sqrt(np.diag(covariance))
@@ -98,9 +98,9 @@ def stepwise(equations: CampaignEquations, spread: Spread, test_speed_mps: float
 
 
 def scatter_within_tests(equations: CampaignEquations) -> Spread:
-    """The spread of the runs when each type of test may have linear terms of its own.
+    """The spread of the runs if each type of test has its own linear terms.
 
-    Tests that contradict each other then do not pass for scatter, behind which the contradiction would hide.
+    A contradiction between types of test then does not count as scatter.
     """
     columns, names = [equations.design], list(equations.names)
     kinds = np.array([run.run.type for run in equations.runs])[equations.run_of_row]
@@ -114,16 +114,16 @@ def scatter_within_tests(equations: CampaignEquations) -> Spread:
     return fitted_spread(replace(equations, names=tuple(names), design=np.hstack(columns)), by_type=False)
 
 
-def _joined(held: Array, inverse: Array, leaning: Array) -> Array:
-    """Covariance of the terms held and of the new ones, which lean on them by -`leaning`."""
+def _joint_covariance(held: Array, inverse: Array, leaning: Array) -> Array:
+    """Covariance of the held and the new terms, which depend on the held terms by -`leaning`."""
     across = -held @ leaning.T
-    own = inverse @ inverse.T + leaning @ held @ leaning.T
-    joined: Array = np.block([[held, across], [across.T, own]])
+    covariance = inverse @ inverse.T + leaning @ held @ leaning.T
+    joined: Array = np.block([[held, across], [across.T, covariance]])
     return joined
 
 
 def _new_terms(part: CampaignEquations, spread: Spread, found: set[str], motions: str) -> list[str]:
-    """Terms not found yet that act in these runs, in the step's motions alone, and can be distinguished there."""
+    """New terms that the step's motions excite in these runs, and that the runs can distinguish."""
     reach = np.abs(spread.weighted(part, part.design)).max(axis=0)
     new: list[str] = []
     for name, reached in zip(part.names, reach, strict=True):
@@ -139,7 +139,7 @@ def _new_terms(part: CampaignEquations, spread: Spread, found: set[str], motions
 
 
 def disagreements(steps: Stepwise, together: Solution, names: Sequence[str], limit: float) -> tuple[Disagreement, ...]:
-    """Those of the named terms on which the paper's order and the regression differ by more than `limit` errors.
+    """The terms in `names` on which the paper's order and the regression differ by more than `limit` standard errors.
 
     The regression is efficient, so that the variance of the difference is the difference of the variances (Hausman
     1978).

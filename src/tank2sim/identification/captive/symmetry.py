@@ -1,8 +1,8 @@
-"""The symmetry that (3.8) uses, tested: are there terms of the other parity?
+"""Test of the symmetry in (3.8): terms of the opposite parity.
 
 By the symmetry of a hull to port and starboard X has even terms and Y, N odd ones, except for Y0, N0 and their change
-with speed, which (3.8) has for a single screw. What the other parity would add has no place in a card; that it is
-small is worth knowing.
+with speed, which (3.8) has for a single screw. Terms of the opposite parity
+are not part of a card; the test shows that they are small.
 """
 
 from __future__ import annotations
@@ -19,7 +19,11 @@ from tank2sim.identification.captive.selection import Selection
 from tank2sim.identification.conditioning import COLLINEAR
 from tank2sim.records.campaigns import Campaign
 
-_OTHER_PARITY = {"X": "v r d vvv rrr ddd".split(), "Y": "vv rr dd vr vd rd".split(), "N": "vv rr dd vr vd rd".split()}
+_OPPOSITE_PARITY = {
+    "X": "v r d vvv rrr ddd".split(),
+    "Y": "vv rr dd vr vd rd".split(),
+    "N": "vv rr dd vr vd rd".split(),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,9 +33,9 @@ class Asymmetry:
     Parameters
     ----------
     names : tuple of str
-        Terms of the other parity that the campaign excites.
+        Terms of the opposite parity that the campaign excites.
     values, standard_errors : tuple of float
-        Prime, with them all next to the terms of the result.
+        Prime, with all of them in addition to the terms of the result.
     chance : float
         Probability of values as large as these together if the symmetry holds (Wald's test); 1 without terms.
     """
@@ -43,25 +47,25 @@ class Asymmetry:
 
 
 def asymmetry(campaign: Campaign, selection: Selection) -> Asymmetry:
-    """Terms of the other parity next to those of the result."""
+    """Terms of the opposite parity in addition to those of the result."""
     force, runs = selection.equations.force, selection.equations.runs
     kept, prior = selection.equations.names, selection.equations.prior
-    other: list[str] = []
-    for powers in _OTHER_PARITY[force]:
+    excited_terms: list[str] = []
+    for powers in _OPPOSITE_PARITY[force]:
         term = parse_term(force + powers)
         assert term is not None
         if not excited(campaign, runs, term):
             continue
-        trial = campaign_equations(campaign, runs, force, [*kept, *other, term.name]).held(prior)
+        trial = campaign_equations(campaign, runs, force, [*kept, *excited_terms, term.name]).held(prior)
         if solve(trial, selection.spread).condition <= COLLINEAR:
-            other.append(term.name)
-    if not other:
+            excited_terms.append(term.name)
+    if not excited_terms:
         return Asymmetry(names=(), values=(), standard_errors=(), chance=1.0)
-    solution = solve(campaign_equations(campaign, runs, force, [*kept, *other]).held(prior), selection.spread)
+    solution = solve(campaign_equations(campaign, runs, force, [*kept, *excited_terms]).held(prior), selection.spread)
     values, covariance = solution.values[len(kept) :], solution.covariance[len(kept) :, len(kept) :]
     return Asymmetry(
-        names=tuple(other),
+        names=tuple(excited_terms),
         values=tuple(float(value) for value in values),
         standard_errors=tuple(float(error) for error in np.sqrt(np.diag(covariance))),
-        chance=float(chdtrc(len(other), values @ np.linalg.solve(covariance, values))),
+        chance=float(chdtrc(len(excited_terms), values @ np.linalg.solve(covariance, values))),
     )

@@ -1,9 +1,9 @@
-"""Systematic errors that a campaign shows by itself: forces that lag the motion, a gauge that errs in one kind of run.
+"""Systematic errors that a campaign shows: forces that lag the motion, a gauge in error in one kind of run.
 
 Both are extra unknowns of the same regression. A delay tau turns every harmonic k of a force by k omega tau: with the
 known inertia of the body the damping then seems to change with omega^2, and the added mass by a constant. A gauge that
-reads more in one kind of run gives other derivatives there than all other kinds of run together. Nothing is corrected
-here: what is found is reported first, and what its correction would change is added to the standard errors.
+reads more in one kind of run gives derivatives that differ from those of all other kinds of run. Such errors are not
+corrected: they are reported first, and the effect of their correction is added to the standard errors.
 """
 
 from __future__ import annotations
@@ -23,24 +23,25 @@ from tank2sim.identification.captive.regression import Solution, Spread, fitted_
 from tank2sim.identification.conditioning import SINGULAR_CONDITION
 
 _SHOWN = 4.0
-"""Standard errors from which such an error is reported: of the some 20 that are looked for chance shows one in 800
+"""Standard errors from which such an error is reported: with some 20 possible errors, chance exceeds it in one of 800
 campaigns."""
 LEAST_PHASE_RAD = 0.003
-"""Phase by which a delay turns the fastest oscillation before it is reported. A project choice: 0.003 of the damping
+"""Least reported phase of a delay at the fastest oscillation. A project choice: 0.003 of the damping
 force is then in the added mass, a third of a percent."""
 _LEAST_GAIN = 0.02
-"""Relative error of a gauge in one kind of run before it is reported. A project choice: gauges are calibrated to 0.1 to
-1 %, and what (3.8) does not follow is of that size."""
+"""Least reported relative error of a gauge in one kind of run. A project choice: gauges are calibrated to 0.1 to 1 %,
+and the misfit of (3.8) is of that size."""
 VISIBLE_GAIN = 0.1
-"""Relative error of a gauge in one kind of run that must show, or it is said that none would. A project choice."""
+"""Relative error of a gauge that the runs of a kind must be able to show, or a finding states that they cannot. A
+project choice: poor gauges err by some percent."""
 _SUSPECT = 2.0
-"""Standard errors from which a gain is looked at more closely."""
+"""Standard errors from which a gain is estimated again with its own scatter."""
 _AS_WELL = 2.0
-"""Difference of two ratios to the standard error within which either kind of run may be the one that errs."""
+"""Difference of two ratios to the standard error within which either kind of run may be in error."""
 _ALIKE = 1e-3
-"""Chance of delays so different, if they are one, below which they are none: the flow then remembers earlier motion."""
+"""Probability of the scatter of delays below which they are not a common delay but memory of the flow."""
 _NEARLY = 0.2
-"""Share by which delays found in different runs may differ and still be one: (3.8) is no better than that."""
+"""Relative difference of delays in different runs that still count as a common delay: the accuracy of (3.8)."""
 _ITERATIONS = 4
 _MOTIONS = {"sway": ("pure_sway",), "yaw": ("pure_yaw", "yaw_with_drift")}
 
@@ -56,9 +57,9 @@ class SystematicError:
     force : str
         The gauges concerned: ``Y``, ``N``, or ``XYN``.
     runs : str
-        Type of the runs concerned; empty if it is all that oscillate.
+        Type of the runs concerned; empty for all oscillating runs.
     or_runs : tuple of str
-        Other types of run whose error would explain it nearly as well.
+        Other types of run whose error would explain the data nearly as well.
     size, standard_error : float
         Delay in s, positive if the forces lag the motion; relative gain, positive if the gauge reads too much.
     """
@@ -72,33 +73,35 @@ class SystematicError:
 
     @property
     def message(self) -> str:
-        """What was found, what it does, and what to do."""
+        """The error, its effect and its remedy, in a sentence."""
         if self.source == "force_delay":
             gauges = "The forces lag" if self.force == "XYN" else f"The {self.force} gauge lags"
             remedy = (
                 f"give [test] force_delay_s = {self.size:.4g} and [uncertainty] force_delay_s = "
-                f"{self.standard_error:.2g} to take it out"
+                f"{self.standard_error:.2g} to correct it"
                 if self.force == "XYN"
                 else "shift its column in time"
             )
             return (
                 f"{gauges} the motion by {self.size:.4g} ± {self.standard_error:.2g} s: added masses and inertias are "
                 f"wrong by the damping times that. Check filters and clocks, and {remedy}; until then the standard "
-                "errors hold what it changes."
+                "errors include its effect."
             )
-        more = "more" if self.size > 0 else "less"
-        instead = f" (or those of {', '.join(self.or_runs)} err)" if self.or_runs else ""
+        direction = "more" if self.size > 0 else "less"
+        alternatives = f" (or those of {', '.join(self.or_runs)} err)" if self.or_runs else ""
         return (
-            f"The {self.force} gauge reads {100 * abs(self.size):.2g} ± {100 * self.standard_error:.1g} % {more} in "
-            f"runs of {self.runs} than all other kinds of run imply{instead}: check its calibration there; until then "
-            "the standard errors hold what it changes."
+            f"The {self.force} gauge reads {100 * abs(self.size):.2g} ± {100 * self.standard_error:.1g} % {direction} "
+            f"in runs of {self.runs} than all other kinds of run imply{alternatives}: check its calibration there; "
+            "until then the standard errors include its effect."
         )
 
     def shifts(self, equations: CampaignEquations, solution: Solution) -> dict[str, float]:
-        """What each term of a force (prime) moves by if the error is corrected."""
+        """Change of each term of a force (prime) by a correction of the error."""
         if equations.force not in self.force:
             return {}
-        corrected = advanced(equations, self.size) if not self.runs else _regauged(equations, self.runs, self.size)
+        corrected = (
+            advance_forces(equations, self.size) if not self.runs else _correct_gain(equations, self.runs, self.size)
+        )
         moved = solve(corrected, solution.spread).values - solution.values
         return {name: float(shift) for name, shift in zip(equations.names, moved, strict=True)}
 
@@ -109,14 +112,14 @@ def force_delays(forces: Mapping[str, CampaignEquations]) -> tuple[SystematicErr
     Parameters
     ----------
     forces : mapping
-        ``Y`` and ``N`` to their equations, without trends with frequency (which would take it up).
+        ``Y`` and ``N`` to their equations, without trends with frequency, which would absorb the delay.
     """
     fastest = max((run.motion.frequency_radps for used in forces.values() for run in used.runs), default=0.0)
     found = {force: _delays(used) for force, used in forces.items() if force in "YN"}
-    shown = {force: _one_delay(delays, fastest) for force, delays in found.items()}
-    common = _one_delay([delay for delays in found.values() for delay in delays], fastest)
+    shown = {force: _common_delay(delays, fastest) for force, delays in found.items()}
+    common = _common_delay([delay for delays in found.values() for delay in delays], fastest)
     if common is None and (alone := [delay for delay in shown.values() if delay is not None])[1:]:
-        common = _one_delay(alone, fastest)
+        common = _common_delay(alone, fastest)
     if common is not None and all(found.values()):
         return (SystematicError(source="force_delay", force="XYN", runs="", size=common[0], standard_error=common[1]),)
     return tuple(
@@ -127,15 +130,15 @@ def force_delays(forces: Mapping[str, CampaignEquations]) -> tuple[SystematicErr
 
 
 def can_show_delay(runs: Sequence[ReducedRun]) -> bool:
-    """Whether some kind of oscillation was made at two frequencies."""
+    """True if a kind of oscillation was made at two frequencies."""
     return any(_several_frequencies(runs, kinds) for kinds in _MOTIONS.values())
 
 
 def gauge_gains(
     equations: CampaignEquations, spread: Spread, rival: float
 ) -> tuple[tuple[SystematicError, ...], tuple[str, ...]]:
-    """The kind of run in which a gauge departs most from what all other kinds imply, if it does; and the kinds of which
-    that cannot be said, since no other kind gives their derivatives.
+    """The kind of run in which a gauge departs most from the prediction of all other kinds, if any; and the kinds that
+    cannot be checked, because no other kind gives their derivatives.
 
     Parameters
     ----------
@@ -144,19 +147,19 @@ def gauge_gains(
     spread : Spread
         Of the runs within each kind.
     rival : float
-        Largest ratio of a trend with frequency to its standard error: what explains the runs better is not repeated.
+        Largest ratio of a trend with frequency to its standard error: a gain must explain the runs better.
     """
     predicted = _predicted(equations, spread)
     kinds = np.array([run.run.type for run in equations.runs])[equations.run_of_row]
     gains: dict[str, tuple[float, float]] = {}
     unknown = []
     for kind in dict.fromkeys(kinds.tolist()):
-        joined = _joined(equations, {"gain": np.where(kinds == kind, predicted, 0.0)})
+        joined = _with_unknowns(equations, {"gain": np.where(kinds == kind, predicted, 0.0)})
         solution = solve(joined, spread)
         if solution.condition < SINGULAR_CONDITION and abs(solution.value("gain")) > max(
             _LEAST_GAIN, _SUSPECT * solution.error("gain")
         ):
-            # Scatter within kinds still holds what a gauge in error does: that next to the error is what counts.
+            # The scatter within kinds still includes the effect of the gauge: estimate it together with the gain.
             solution = solve(joined, fitted_spread(joined, by_type=False))
         size, error = solution.value("gain"), solution.error("gain")
         if solution.condition > SINGULAR_CONDITION or _SHOWN * error > VISIBLE_GAIN:
@@ -178,24 +181,25 @@ def gauge_gains(
     return (found,), tuple(unknown)
 
 
-def advanced(equations: CampaignEquations, delay_s: float) -> CampaignEquations:
-    """The equations with the forces of the oscillating runs as they were a delay later: corrected for it."""
+def advance_forces(equations: CampaignEquations, delay_s: float) -> CampaignEquations:
+    """The equations with the forces of the oscillating runs corrected for a delay."""
     change = np.zeros_like(equations.gauge)
     for rows, run, root in _oscillating(equations):
-        turn = _turned(len(root), run.motion.frequency_radps * delay_s)
+        turn = _phase_shift(len(root), run.motion.frequency_radps * delay_s)
         change[rows] = np.linalg.solve(root, turn @ root @ equations.gauge[rows]) - equations.gauge[rows]
     return replace(equations, values=equations.values + change, gauge=equations.gauge + change)
 
 
-def _regauged(equations: CampaignEquations, kind: str, gain: float) -> CampaignEquations:
-    """The equations with what a gauge read too much in one kind of run taken off."""
-    here = np.array([run.run.type == kind for run in equations.runs])[equations.run_of_row]
-    change = np.where(here, -gain / (1.0 + gain) * equations.gauge, 0.0)
+def _correct_gain(equations: CampaignEquations, kind: str, gain: float) -> CampaignEquations:
+    """The equations with the gauge's gain corrected in one kind of run."""
+    affected = np.array([run.run.type == kind for run in equations.runs])[equations.run_of_row]
+    change = np.where(affected, -gain / (1.0 + gain) * equations.gauge, 0.0)
     return replace(equations, values=equations.values + change, gauge=equations.gauge + change)
 
 
-def _one_delay(delays: Sequence[tuple[float, float]], fastest_radps: float) -> tuple[float, float] | None:
-    """The common value of several delays (value, standard error) and its standard error, s; None if none is shown."""
+def _common_delay(delays: Sequence[tuple[float, float]], fastest_radps: float) -> tuple[float, float] | None:
+    """The common value of several delays (value, standard error) and its standard error, s; None without a significant
+    delay."""
     if not delays:
         return None
     values, weights = np.array([value for value, _ in delays]), np.array([error**-2.0 for _, error in delays])
@@ -210,11 +214,11 @@ def _one_delay(delays: Sequence[tuple[float, float]], fastest_radps: float) -> t
 
 
 def _delays(equations: CampaignEquations) -> list[tuple[float, float]]:
-    """The delay of one gauge in runs of sway and in runs of yaw by themselves, as far as they show it."""
+    """The delay of one gauge in runs of sway alone and in runs of yaw alone, where they determine it."""
     motions = {motion: kinds for motion, kinds in _MOTIONS.items() if _several_frequencies(equations.runs, kinds)}
     if not motions:
         return []
-    # The prior is by the linear terms, which a long delay leaves without any size.
+    # Without the prior: it scales with the linear terms, which a long delay reduces to zero.
     free = equations.held({})
     found, spread = dict.fromkeys(motions, 0.0), None
     for last in (False, True):
@@ -229,7 +233,7 @@ def _delays(equations: CampaignEquations) -> list[tuple[float, float]]:
         shown = any(abs(delay) > _SHOWN * solution.error(motion) for motion, delay in found.items())
         if last or not shown:
             break
-        spread = None  # that of the uncorrected forces has the delay in it
+        spread = None  # the spread of the uncorrected forces includes the delay
     return [(found[motion], solution.error(motion)) for motion in motions]
 
 
@@ -240,25 +244,25 @@ def _several_frequencies(runs: Sequence[ReducedRun], kinds: Sequence[str]) -> bo
 def _with_slopes(
     equations: CampaignEquations, motions: Mapping[str, Sequence[str]], delays: Mapping[str, float]
 ) -> CampaignEquations:
-    """The equations corrected for a delay of each motion, with a small further one of each as unknown."""
+    """The equations corrected for a delay of each motion, with a small further delay of each as unknown."""
     corrected = equations
     for motion, kinds in motions.items():
-        corrected = _some_advanced(corrected, kinds, delays[motion])
-    return _joined(corrected, {motion: _slope(corrected, kinds) for motion, kinds in motions.items()})
+        corrected = _advance_kinds(corrected, kinds, delays[motion])
+    return _with_unknowns(corrected, {motion: _slope(corrected, kinds) for motion, kinds in motions.items()})
 
 
-def _some_advanced(equations: CampaignEquations, kinds: Sequence[str], delay_s: float) -> CampaignEquations:
-    here = np.array([run.run.type in kinds for run in equations.runs])[equations.run_of_row]
-    whole = advanced(equations, delay_s)
+def _advance_kinds(equations: CampaignEquations, kinds: Sequence[str], delay_s: float) -> CampaignEquations:
+    affected = np.array([run.run.type in kinds for run in equations.runs])[equations.run_of_row]
+    whole = advance_forces(equations, delay_s)
     return replace(
         equations,
-        values=np.where(here, whole.values, equations.values),
-        gauge=np.where(here, whole.gauge, equations.gauge),
+        values=np.where(affected, whole.values, equations.values),
+        gauge=np.where(affected, whole.gauge, equations.gauge),
     )
 
 
 def _slope(equations: CampaignEquations, kinds: Sequence[str]) -> Array:
-    """What a delay of 1 s of the gauge in some kinds of run adds to the equations: less its rate of change, (rows,)."""
+    """Effect on the equations of a gauge delay of 1 s in some kinds of run: minus the rate of change, (rows,)."""
     column = np.zeros_like(equations.gauge)
     for rows, run, root in _oscillating(equations):
         if run.run.type in kinds:
@@ -276,7 +280,7 @@ def _oscillating(equations: CampaignEquations) -> Iterator[tuple[slice, ReducedR
 
 
 def _rate(count: int, frequency_radps: float) -> Array:
-    """Takes mean and harmonics (count,) of a force to those of its rate of change."""
+    """Matrix from mean and harmonics (count,) of a force to those of its rate of change."""
     matrix = np.zeros((count, count))
     for place in range(1, count, 2):
         order = (place + 1) // 2
@@ -284,8 +288,9 @@ def _rate(count: int, frequency_radps: float) -> Array:
     return matrix
 
 
-def _turned(count: int, phase_rad: float) -> Array:
-    """Takes mean and harmonics (count,) of a force to those of the force a phase later: harmonic k turns by k times."""
+def _phase_shift(count: int, phase_rad: float) -> Array:
+    """Matrix from mean and harmonics (count,) of a force to those a phase later: harmonic k turns by k times the
+    phase."""
     matrix = np.eye(count)
     for place in range(1, count, 2):
         angle = (place + 1) // 2 * phase_rad
@@ -294,8 +299,8 @@ def _turned(count: int, phase_rad: float) -> Array:
     return matrix
 
 
-def _joined(equations: CampaignEquations, columns: Mapping[str, Array]) -> CampaignEquations:
-    """The equations with more unknowns."""
+def _with_unknowns(equations: CampaignEquations, columns: Mapping[str, Array]) -> CampaignEquations:
+    """The equations with further unknowns."""
     return replace(
         equations,
         names=(*equations.names, *columns),
@@ -304,6 +309,6 @@ def _joined(equations: CampaignEquations, columns: Mapping[str, Array]) -> Campa
 
 
 def _predicted(equations: CampaignEquations, spread: Spread) -> Array:
-    """The gauge's coefficients as the derivatives predict them: no noise in them, (rows,)."""
+    """The gauge's coefficients as predicted by the derivatives, without noise, (rows,)."""
     residual: Array = equations.values - equations.design @ solve(equations, spread).values
     return equations.gauge - residual

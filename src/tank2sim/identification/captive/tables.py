@@ -1,4 +1,4 @@
-"""What a reduction tells its reader, row by row: for the screen and for the page."""
+"""Table rows of a reduction for screen and page."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from tank2sim.identification.captive.result_card import Contents
 from tank2sim.identification.captive.selection import Choice
 
 _FEWEST_RUNS = 3
-"""Runs of one type below which the error of their prediction has no range to be measured by."""
+"""Least number of runs of a type whose range gives a scale for the error of their prediction."""
 
 
 @dataclass(frozen=True)
 class Stepped:
-    """A derivative by the paper's order (prime): value, standard error, and the types of run that gave it."""
+    """A derivative by the paper's order (prime): value, standard error, and the types of run behind it."""
 
     value: float
     standard_error: float
@@ -48,7 +48,7 @@ def derivative_rows(reduction: Reduction, card: Contents) -> list[DerivativeRow]
 
 
 def by_the_papers_order(reduction: Reduction, name: str) -> Stepped | None:
-    """A derivative as the steps from the simplest to the more complex tests give it."""
+    """A derivative by the paper's order; None if it does not give it."""
     steps = reduction.forces[name[0]].stepwise
     if name not in steps.names:
         return None

@@ -1,7 +1,7 @@
-"""Physics warnings on how captive tests were made: what a correct reduction may still get wrong about the ship.
+"""Physics warnings on the conditions of captive tests, which a correct reduction does not remove.
 
-Each function looks at one thing and yields a :class:`Caution` if need be, one sentence; nothing is left out or changed
-here. A warning that cannot be given yields a caution that names the key it lacks. "Paper 2" is Krezelewski and Misiag,
+Each function checks one condition and yields a :class:`Caution` of one sentence where necessary; data are neither
+omitted nor changed. A check that lacks data yields a caution with the missing key. "Paper 2" is Krezelewski and Misiag,
 section 5; "ITTC" is the recommended procedure 7.5-02-06-02, Captive Model Tests.
 """
 
@@ -20,7 +20,7 @@ LARGEST_FREQUENCY_PARAMETER = 0.1
 """omega U/g. Paper 2: coefficients fall steeply above."""
 
 LARGEST_REDUCED_FREQUENCY = {"sway": 2.0, "yaw": 3.0}
-"""omega L/U above which the flow remembers. ITTC quotes limits of 1 to 2 in sway and 2 to 3 in yaw; the upper ones."""
+"""omega L/U above which the flow has memory. ITTC quotes limits of 1 to 2 in sway and 2 to 3 in yaw; the upper ones."""
 
 NEAR_RESONANCE = 0.1
 """A harmonic of the motion this near (relatively) to a standing wave of the tank excites it: project choice."""
@@ -41,8 +41,9 @@ BLOCK_COEFFICIENTS = (0.4, 0.9)
 """Mass over rho L B T of ships: 0.45 (destroyers) to 0.87 (tankers); a project choice on either side."""
 
 POSSIBLE_BLOCKS = (0.05, 1.05)
-"""Beyond these no floating body is meant. Above: a body displaces no more than its box; 5 % for a waterline longer than
-the length given. Below: catamarans with their overall beam have 0.1 and more, kg for t or cm for m 0.01 and less."""
+"""Possible block coefficients of floating bodies. Above: a body displaces no more than its box; 5 % for a waterline
+longer than the length given. Below: catamarans with their overall beam have 0.1 and more, kg for t or cm for m 0.01 and
+less."""
 
 POSSIBLE_MASSES = (5e-4, 0.1)
 """m' = m/(1/2 rho L^3) where beam or draught is not given: 2 C_B (B/L)(T/L), from a rowing eight's 0.3, 0.06, 0.015 to
@@ -53,16 +54,16 @@ RADII_OF_GYRATION = (0.18, 0.32)
 
 POSSIBLE_RADII = (0.1, 0.5)
 """Above: a body of length L has at most L/2, all its mass at its ends. Below: all mass within 0.17 L of midships; a
-project choice that takes t m2 or kg cm2 for what they are."""
+project choice that detects t m2 or kg cm2."""
 
 POSSIBLE_CENTRE = 0.5
-"""|x_G| in lengths from midships: beyond, the centre of gravity is off the ship."""
+"""|x_G| in lengths from midships at which the centre of gravity is at the end of the ship."""
 
 CENTRES_OF_GRAVITY = 0.1
 """|x_G| in lengths of ships that float on even keel: some 0.05 at most; a project choice beyond it."""
 
 SIMILARITY = {"m'": (0.02, "relative"), "J_z'": (0.05, "relative"), "x_G'": (0.005, ""), "z_G'": (0.005, "")}
-"""How far model and ship may be apart, relative or in lengths: project choice, paper 2 asks for equality."""
+"""Largest difference of model and ship, relative or in lengths: project choice, paper 2 requires equality."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class OscillationMotion:
 
 @dataclass(frozen=True)
 class Tank:
-    """Breadth and depth of the basin, m; None if not known."""
+    """Breadth and depth of the basin, m; None if unknown."""
 
     breadth_m: float | None = None
     depth_m: float | None = None
@@ -119,7 +120,7 @@ class FroudeScaling:
 
     @property
     def speed(self) -> float:
-        """And time: the root of the ratio of lengths."""
+        """Ratio of speeds and of times: the root of the ratio of lengths."""
         return math.sqrt(self.length)
 
     @property
@@ -129,7 +130,7 @@ class FroudeScaling:
 
     @property
     def force(self) -> float:
-        """Also that of masses."""
+        """Ratio of forces and of masses."""
         return self.density * self.length**3
 
     @property
@@ -180,7 +181,7 @@ def model_length(length_m: float) -> Iterator[Caution]:
 def frequency_parameters(
     runs: tuple[OscillationMotion, ...], speed_mps: float, gravity_mps2: float
 ) -> Iterator[Caution]:
-    """Runs with omega U/g of 0.1 or more; those are to be left out."""
+    """Runs with omega U/g of 0.1 or more, which should be omitted."""
     values = {run.run: brard_number(run.frequency_radps, speed_mps, gravity_mps2) for run in runs}
     high = tuple(name for name, value in values.items() if value >= LARGEST_FREQUENCY_PARAMETER)
     if high:
@@ -194,7 +195,7 @@ def frequency_parameters(
 
 
 def flow_memory(runs: tuple[OscillationMotion, ...], speed_mps: float, length_m: float) -> Iterator[Caution]:
-    """Runs so fast that the force depends on the motion before, one caution a kind of motion."""
+    """Runs so fast that the force depends on earlier motion, one caution for each kind of motion."""
     for motion, limit in LARGEST_REDUCED_FREQUENCY.items():
         values = {
             run.run: reduced_frequency(run.frequency_radps, speed_mps, length_m) for run in runs if run.motion == motion
@@ -204,8 +205,8 @@ def flow_memory(runs: tuple[OscillationMotion, ...], speed_mps: float, length_m:
             yield Caution(
                 "flow memory",
                 f"omega L/U of {motion} reaches {max(values.values()):.3g}, above the {limit:g} that ITTC quotes: the "
-                "flow remembers earlier motion, and derivatives may depend on frequency; the runs are kept, see the "
-                "trend with frequency.",
+                "flow has memory of earlier motion, and derivatives may depend on frequency; the runs are kept, see "
+                "the trend with frequency.",
                 high,
             )
 
@@ -223,32 +224,32 @@ def trim(trim_m: float | None, length_m: float) -> Iterator[Caution]:
 
 
 def similarity(model: Mapping[str, float | None], ship: Mapping[str, float | None]) -> Iterator[Caution]:
-    """Differences of m', J_z', x_G', z_G' between model and ship; a number one of them lacks is named.
+    """Differences of m', J_z', x_G', z_G' between model and ship; a missing number is reported.
 
     Parameters
     ----------
     model, ship : mapping
-        The numbers under the names of :data:`SIMILARITY`, prime system, x_G' and z_G' in lengths.
+        Numbers by the names of :data:`SIMILARITY`, prime system, x_G' and z_G' in lengths.
     """
     keys = {"m'": "mass_kg", "J_z'": "yaw_inertia_kgm2", "x_G'": "x_G_m", "z_G'": "z_G_m"}
     for name, (limit, kind) in SIMILARITY.items():
-        one, other = model.get(name), ship.get(name)
-        if one is None or other is None:
-            where = f"[model] {keys[name]}" if one is None else f"{name} of the ship card"
-            yield lacking("similarity", f"whether model and ship have the same {name}", where)
+        of_model, of_ship = model.get(name), ship.get(name)
+        if of_model is None or of_ship is None:
+            key = f"[model] {keys[name]}" if of_model is None else f"{name} of the ship card"
+            yield lacking("similarity", f"whether model and ship have the same {name}", key)
             continue
-        apart = abs(one - other) / (abs(other) if kind else 1.0)
-        if apart > limit:
-            amount = f"{100 * apart:.2g} %" + ("" if kind else " of the length")
+        difference = abs(of_model - of_ship) / (abs(of_ship) if kind else 1.0)
+        if difference > limit:
+            amount = f"{100 * difference:.2g} %" + ("" if kind else " of the length")
             yield Caution(
                 "similarity",
-                f"{name} is {one:.4g} of the model and {other:.4g} of the ship card, {amount} apart; derivatives hold "
-                "for the ship only if both are equal (paper 2).",
+                f"{name} is {of_model:.4g} of the model and {of_ship:.4g} of the ship card, {amount} apart; "
+                "derivatives hold for the ship only if both are equal (paper 2).",
             )
 
 
 def tank_resonance(runs: tuple[OscillationMotion, ...], tank: Tank, gravity_mps2: float) -> Iterator[Caution]:
-    """Runs of which the motion or its third harmonic is near a transverse standing wave of the tank.
+    """Runs whose motion or its third harmonic is near a transverse standing wave of the tank.
 
     A model on the centreline that sways or yaws excites the waves that are odd across the tank, modes 1, 3, 5.
     """
@@ -259,15 +260,19 @@ def tank_resonance(runs: tuple[OscillationMotion, ...], tank: Tank, gravity_mps2
         return
     depth = math.inf if tank.depth_m is None else tank.depth_m
     for mode in (1, 3, 5):
-        own = standing_wave_frequency(mode, tank.breadth_m, depth, gravity_mps2)
+        standing_wave = standing_wave_frequency(mode, tank.breadth_m, depth, gravity_mps2)
         for harmonic in (1, 3):
-            near = tuple(run.run for run in runs if abs(harmonic * run.frequency_radps - own) <= NEAR_RESONANCE * own)
+            near = tuple(
+                run.run
+                for run in runs
+                if abs(harmonic * run.frequency_radps - standing_wave) <= NEAR_RESONANCE * standing_wave
+            )
             if near:
                 what = "the motion" if harmonic == 1 else "the third harmonic of the motion"
                 yield Caution(
                     "tank resonance",
                     f"The frequency of {what} is within {100 * NEAR_RESONANCE:.0f} % of standing wave {mode} across "
-                    f"the tank ({own:.3g} rad/s, {tank.breadth_m:g} m wide): its waves add to the forces.",
+                    f"the tank ({standing_wave:.3g} rad/s, {tank.breadth_m:g} m wide): its waves add to the forces.",
                     near,
                 )
 
@@ -307,7 +312,7 @@ def depth_froude(speed_mps: float, depth_m: float | None, gravity_mps2: float) -
 
 
 def impossible_body(body: CarriedBody) -> Iterator[tuple[str, str]]:
-    """What no floating body has: the key under ``[model]``, and what is wrong. Most often a wrong unit."""
+    """Impossible numbers of a body: the key under ``[model]`` and the problem, usually a wrong unit."""
     if body.block is not None and not _within(body.block, POSSIBLE_BLOCKS):
         yield (
             "mass_kg",
@@ -357,7 +362,7 @@ def carried_mass(body: CarriedBody, block_coefficient: float | None = None) -> I
     if abs(body.x_G_m) > CENTRES_OF_GRAVITY * body.length_m:
         yield Caution(
             "mass",
-            f"The centre of gravity is {abs(body.x_G_m) / body.length_m:.2g} L from midships, and ships have some 0.05 "
+            f"The centre of gravity is {abs(body.x_G_m) / body.length_m:.2g} L from midships, and ships have 0.05 "
             "L at most: check [model] x_G_m.",
         )
 
@@ -367,15 +372,15 @@ def _within(value: float, limits: tuple[float, float]) -> bool:
 
 
 def scale_effect(scale: float | None, length_m: float, speed_mps: float, viscosity_m2ps: float | None) -> Caution:
-    """What Froude scaling to the ship does not keep: the Reynolds number (paper 2, section 5)."""
+    """Caution on the Reynolds number, which Froude scaling does not preserve (paper 2, section 5)."""
     if scale is None:
         return lacking("scale effect", "the Reynolds number of the ship", "[model] scale")
-    at = ""
+    model_number = ""
     if viscosity_m2ps is not None:
-        at = f" ({speed_mps * length_m / viscosity_m2ps:.2g} of the model)"
+        model_number = f" ({speed_mps * length_m / viscosity_m2ps:.2g} of the model)"
     ratio = FroudeScaling(scale).reynolds
     return Caution(
         "scale effect",
-        f"At equal Froude number the ship's Reynolds number is {ratio:.4g} times the model's{at}: its boundary "
-        "layer is thinner, its resistance coefficient and the wake at the rudder smaller.",
+        f"At equal Froude number the ship's Reynolds number is {ratio:.4g} times the model's{model_number}: its "
+        "boundary layer is thinner, its resistance coefficient and the wake at the rudder smaller.",
     )

@@ -1,8 +1,8 @@
-"""Trends with frequency: do damping and added mass depend on it, and what are they at zero frequency?
+"""Trends of damping and added mass with frequency, and their values at zero frequency.
 
-For slow motions both are even functions of the frequency: value at zero plus a slope times (omega L/U)^2. A term with a
-trend that is shown keeps it in the regression, so that its own value is that at zero frequency; static tests, which are
-at zero frequency, take part.
+For slow motions both are even functions of the frequency: value at zero plus a slope times (omega L/U)^2. A significant
+trend stays in the regression, so that the value of its term is that at zero frequency; static tests, which are at zero
+frequency, take part.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from tank2sim.identification.conditioning import COLLINEAR
 from tank2sim.records.campaigns import Campaign
 
 _SHOWN = 3.5
-"""Standard errors from which a slope counts as shown: with eight slopes in a campaign chance reaches it once in 250."""
+"""Standard errors of a significant slope: with eight slopes in a campaign chance reaches it once in 250."""
 _FEWEST_FREQUENCIES = 3
 
 
@@ -35,7 +35,7 @@ class Trend:
     at_zero, error_at_zero : float
         Its value extrapolated to zero frequency, with this slope in the regression.
     used : bool
-        The slope is shown, and the result's value is that at zero frequency.
+        True for a significant slope: the result's value is that at zero frequency.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Trend:
 
 
 def trends(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[Trend, ...]]:
-    """The selection, with the trends that are shown among its terms, and every trend that can be looked for."""
+    """The selection with the significant trends among its terms, and all trends that can be estimated."""
     used = selection.equations
     candidates = [
         name
@@ -77,7 +77,7 @@ def trends(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[T
     ]
     widened = full.of_terms(names)
     result = replace(selection, equations=widened, spread=fitted_spread(widened), choices=(*selection.choices, *chosen))
-    kept = [_trend(full, [other for other in names if other != _slope(name)], name, result) for name in shown]
+    kept = [_trend(full, [term for term in names if term != _slope(name)], name, result) for name in shown]
     return result, (*(replace(trend, used=True) for trend in kept if trend is not None), *messages)
 
 

@@ -1,7 +1,8 @@
-"""Type B uncertainty: errors common to the whole campaign, which no scatter of its runs shows (ITTC 7.5-02-06-04).
+"""Type B uncertainty: errors common to the whole campaign, which the scatter of its runs does not show (ITTC
+7.5-02-06-04).
 
-Each is carried through by making the error and solving again: what the derivatives then change by is their uncertainty
-from it. Different errors are independent and add in squares.
+Each error is propagated by applying it and solving again: the change of the derivatives is their uncertainty.
+Different errors are independent and add in squares.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from tank2sim.identification.captive.equations import CampaignEquations, campaig
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.motion import CaptiveMotion
 from tank2sim.identification.captive.regression import Solution, solve
-from tank2sim.identification.captive.systematic import advanced
+from tank2sim.identification.captive.systematic import advance_forces
 from tank2sim.records.campaigns import Campaign
 
 
 def type_b_shifts(campaign: Campaign, used: CampaignEquations, solution: Solution) -> dict[str, dict[str, float]]:
-    """What each term of a force (prime) moves by, with its sign, for each stated error of one standard deviation.
+    """Change of each term of a force (prime), with its sign, by each stated error of one standard deviation.
 
-    `solution` is that of the equations `used`.
+    `solution` is the solution of the equations `used`.
     """
     stated = campaign.uncertainty.model_dump()
     found = {}
@@ -36,17 +37,17 @@ def type_b_shifts(campaign: Campaign, used: CampaignEquations, solution: Solutio
 
 
 def _with_error(campaign: Campaign, used: CampaignEquations, source: str, size: float) -> CampaignEquations:
-    """The equations as they would be if the error were of one standard deviation."""
+    """The equations with an error of one standard deviation."""
     if source == "force_delay_s":
-        return advanced(used, size)
-    changed, altered = _altered(campaign, used.runs, source, size)
+        return advance_forces(used, size)
+    changed, altered = _with_altered_data(campaign, used.runs, source, size)
     return campaign_equations(changed, altered, used.force, used.names).held(used.prior)
 
 
-def _altered(
+def _with_altered_data(
     campaign: Campaign, runs: Sequence[ReducedRun], source: str, size: float
 ) -> tuple[Campaign, list[ReducedRun]]:
-    """Campaign and runs as they would be if the error were of one standard deviation."""
+    """Campaign and runs with an error of one standard deviation."""
     if source == "mass_relative":
         return _model(campaign, "mass_kg", 1 + size), list(runs)
     if source == "yaw_inertia_relative":

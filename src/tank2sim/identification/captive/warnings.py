@@ -1,4 +1,4 @@
-"""All physics warnings on a captive campaign: on how it was tested, and on the derivatives it gave."""
+"""All physics warnings on a captive campaign: on its test conditions, and on its derivatives."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ __all__ = ["Caution", "OscillationMotion", "body_of", "cautions_of_result", "cau
 def cautions_of_test(
     campaign: Campaign, runs: tuple[OscillationMotion, ...], ship: ManoeuvringCard | None = None
 ) -> tuple[Caution, ...]:
-    """Everything to be said of a campaign before its forces are looked at.
+    """Cautions on the test conditions of a campaign, without its forces.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def cautions_of_test(
     runs : tuple of OscillationMotion
         Its oscillating runs, with frequencies as measured.
     ship : ManoeuvringCard, optional
-        The ship that the model is to be similar to.
+        The ship of the model.
     """
     model, test = campaign.model, campaign.test
     gravity, speed, length = test.gravity_mps2, test.speed_mps, model.length_m
@@ -70,19 +70,19 @@ def cautions_of_test(
 def cautions_of_result(
     derivatives: Mapping[str, float], standard_errors: Mapping[str, float], campaign: Campaign
 ) -> tuple[Caution, ...]:
-    """Everything to be said of derivatives (prime, "hydrodynamic", starboard), standard errors by the same names."""
+    """Cautions on derivatives (prime, "hydrodynamic", starboard), with standard errors by the same names."""
     numbers = _numbers(campaign)
     mass, inertia = numbers["m'"], numbers["J_z'"]
     assert mass is not None
     body = body_of(campaign)
     deep = not (campaign.tank.depth_m and body.draught_m) or campaign.tank.depth_m >= LEAST_DEPTH_RATIO * body.draught_m
     # A positive added mass is reported once, with its likely cause.
-    others = {name: value for name, value in derivatives.items() if name not in ADDED_MASSES}
+    other_derivatives = {name: value for name, value in derivatives.items() if name not in ADDED_MASSES}
     return (
         *force_convention(derivatives, mass, inertia or 0.0, campaign.test.force_convention),
         *carried_mass(body, campaign.model.block_coefficient),
         *(added_masses(derivatives, standard_errors, mass, inertia) if deep else ()),
-        *unusual_signs(others, standard_errors),
+        *unusual_signs(other_derivatives, standard_errors),
         *yaw_force(derivatives, mass),
         *levers(derivatives, standard_errors),
     )

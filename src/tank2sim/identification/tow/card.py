@@ -1,4 +1,4 @@
-"""What tows gave, as the card of a body that only surges."""
+"""The card of a body with surge only, from its tows."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from tank2sim.identification.tow.identify import TowIdentification
 def tow_card_text(
     result: TowIdentification, fit: TowFit, *, name: str, source: str, length_m: float | None = None
 ) -> str:
-    """TOML text of the card with the numbers of one method; the notes are what the tows warn of.
+    """TOML text of the card with the numbers of one method; its notes are the warnings of the result.
 
     Parameters
     ----------
     fit : TowFit
         One of ``result.fits``.
     name, source : str
-        Of the body, and of the numbers.
+        Name of the body, and source of the numbers.
     length_m : float, optional
-        Of the body, if known.
+        Length of the body, if known.
     """
     values = {key: value for key, value in fit.estimates.items() if key not in ("added_mass_kg", "start_delay_s")}
     return surge_card_text(

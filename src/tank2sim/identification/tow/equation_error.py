@@ -64,7 +64,7 @@ class EquationError:
     force_N : array, (nodes,)
         T.
     mass_kg : float, optional
-        M, if it is known; the drag terms alone are then unknown. All estimates hold it in their first place still.
+        M, if known; then only the drag terms are unknown. It is the first of all estimates in either case.
     """
 
     time_s: Array
@@ -96,7 +96,7 @@ class EquationError:
 
     @property
     def free_design(self) -> Array:
-        """The columns of :attr:`design` of what is unknown."""
+        """The columns of :attr:`design` of the unknowns."""
         return self.design[:, len(self.known) :]
 
     @property
@@ -112,13 +112,13 @@ class EquationError:
 def fit_mean_speed(tows: Tows, degree: int = 2) -> SpeedFit:
     """Least-squares polynomial through the mean of the tows at each time, as in (2.1).
 
-    The scatter assumes that the readings after the release err independently and alike; the speed at t = 0 is zero
+    The scatter assumes independent readings of equal variance after the release; the speed at t = 0 is zero
     without error.
 
     Raises
     ------
     InputError
-        There are no more readings after the release than the polynomial has coefficients.
+        The readings after the release do not outnumber the coefficients of the polynomial.
     """
     span = float(tows.time_s[-1])
     powers = np.vander(tows.time_s / span, degree + 1, increasing=True)
@@ -139,8 +139,8 @@ def fit_mean_speed(tows: Tows, degree: int = 2) -> SpeedFit:
 def simpson_nodes(times_s: Array) -> tuple[Array, Array]:
     """Nodes and weights of Simpson's rule over the recorded time, in an even number of intervals.
 
-    The intervals are as long as the sampling step (the median), or slightly shorter to make them even in number; there
-    are ten at least, which for Table 1 is the paper's division.
+    The intervals are the median sampling step, or slightly shorter for an even number; at least ten, as in the paper
+    for Table 1.
     """
     begin, end = float(times_s[0]), float(times_s[-1])
     count = round((end - begin) / float(np.median(np.diff(times_s))))
@@ -172,7 +172,7 @@ def discretise(
     force : float or Polynomial
         T(t), N over s.
     mass_kg : float, optional
-        M, if it is known.
+        M, if known.
     """
     time, weights = simpson_nodes(times_s)
     v = speed(time)
@@ -202,11 +202,11 @@ def solve_by_qr(problem: EquationError) -> Array:
 def covariance(problem: EquationError, estimates: Array, speed: SpeedFit) -> Array:
     """Covariance (1 + terms, 1 + terms) of the least-squares estimates, from the scatter of the readings.
 
-    The scatter is carried to first order through the polynomial and the solution. It is assumed that (1.5) with these
-    terms is the truth, that the polynomial can follow it, and that the readings after the release err independently
-    and alike. A mass that is known has no variance. The usual s^2 (A'A)^-1 of the residuals of (1.5) is not used: these
-    residuals are the misfit of smooth curves, not noise, and on simulated tows it gave less than half of the true
-    standard error of M.
+    The scatter is propagated to first order through the polynomial and the solution, under the assumptions that (1.5)
+    with these terms is true, that the polynomial can follow it, and that the readings after the release have
+    independent errors of equal variance. A known mass has no variance. The usual s^2 (A'A)^-1 of the residuals of (1.5)
+    is not used: these residuals are the misfit of smooth curves, not noise, and on simulated tows it gave less than
+    half of the true standard error of M.
     """
     first = len(problem.known)
     norms = column_norms(problem.free_design)

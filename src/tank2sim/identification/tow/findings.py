@@ -1,4 +1,4 @@
-"""What a user should know before using what was identified from tows: each finding is one sentence."""
+"""Findings of an identification from tows for its user, each of a sentence."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SIGNIFICANCE = 0.05
 
 
 def tow_findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping[str, TowFit]) -> Iterator[str]:
-    """Sentences on terms that are not identifiable, values that cannot be, and misfits beyond the scatter.
+    """Sentences on terms that are not identifiable, impossible values, and misfits beyond the scatter.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def tow_findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping
     speed : Polynomial
         v*(t) of the equation error, m/s over s.
     fits : mapping
-        Method to its fit. The method of the paper is left out where QR, with the same estimates, is there.
+        Method to its fit. The method of the paper is omitted if QR, with the same estimates, is included.
     """
     messages = [fit for name, fit in fits.items() if name != "paper" or "qr" not in fits]
     yield from _identifiability(messages)
@@ -55,9 +55,9 @@ def tow_findings(tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping
 
 
 def identifiable_terms(fits: Sequence[TowFit]) -> tuple[str, ...]:
-    """The most drag terms that every one of the fits (of one model) can distinguish from M and each other.
+    """The largest set of drag terms that all fits (of one model) can distinguish from M and each other.
 
-    Where there is a choice, the lower powers of the speed are taken.
+    Of sets of equal size the one with the lower powers of the speed.
     """
     terms = fits[0].terms
     for count in range(len(terms), 0, -1):
@@ -65,7 +65,10 @@ def identifiable_terms(fits: Sequence[TowFit]) -> tuple[str, ...]:
             columns = [
                 [place for place, name in enumerate(fit.free) if name in chosen or name not in terms] for fit in fits
             ]
-            if all(scaled_condition(fit.design[:, own]) <= COLLINEAR for fit, own in zip(fits, columns, strict=True)):
+            if all(
+                scaled_condition(fit.design[:, chosen_columns]) <= COLLINEAR
+                for fit, chosen_columns in zip(fits, columns, strict=True)
+            ):
                 return chosen
     return ()
 
@@ -76,7 +79,7 @@ def _identifiability(fits: Sequence[TowFit]) -> Iterator[str]:
         numbers = " and ".join(f"{fit.condition_scaled:.2g} ({fit.method})" for fit in collinear)
         yield (
             f"{', '.join(collinear[-1].free)} cannot all be identified from these tows: the scaled condition number is "
-            f"{numbers}, and {COLLINEAR**2:g} can be borne; take fewer terms "
+            f"{numbers}, above the limit of {COLLINEAR**2:g}; take fewer terms "
             f"(--terms {','.join(identifiable_terms(fits)) or 'none'})."
         )
     for fit in fits:
@@ -114,7 +117,7 @@ def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[str]:
     if drags.min() < 0:
         yield (
             f"{fit.method}: the drag is negative over {100 * np.mean(drags < 0):.0f} % of the speeds up to "
-            f"{top_speed_mps:.3g} m/s that were reached, down to {drags.min():.2g} N at {speeds[drags.argmin()]:.2g} "
+            f"{top_speed_mps:.3g} m/s reached, down to {drags.min():.2g} N at {speeds[drags.argmin()]:.2g} "
             "m/s; no hull has that."
         )
     minus = ", ".join(term for term, value in fit.drag_terms.items() if value < 0)
@@ -125,9 +128,9 @@ def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[str]:
 def _polynomial_findings(tows: Tows, speed: Polynomial, fit: TowFit) -> Iterator[str]:
     if len(fit.free) > len(speed.coef):
         yield (
-            f"{fit.method}: {len(fit.free)} unknowns are drawn from the {len(speed.coef)} coefficients of a speed "
-            f"polynomial of degree {speed.degree()}; the standard errors are then those of the arithmetic, not of "
-            "the drag."
+            f"{fit.method}: {len(fit.free)} unknowns are estimated from the {len(speed.coef)} coefficients of a speed "
+            f"polynomial of degree {speed.degree()}; the standard errors then reflect the arithmetic, not the "
+            "drag."
         )
     speeds = speed(tows.time_s)
     row = _worst_misfit(tows, speeds, len(speed.coef))
@@ -140,10 +143,10 @@ def _polynomial_findings(tows: Tows, speed: Polynomial, fit: TowFit) -> Iterator
 
 
 def _worst_misfit(tows: Tows, speeds: Array, estimates: int) -> int | None:
-    """Row at which speeds (times,) leave the mean of the tows most, if they leave it more than scatter explains.
+    """Row of the largest departure of speeds (times,) from the mean of the tows, if it exceeds the scatter.
 
-    The test is the F test of lack of fit, the scatter of the tows about their mean being the pure error. None also
-    where there is too little repetition to say.
+    The test is the F test of lack of fit, with the scatter of the tows about their mean as pure error. None also with
+    too few repetitions for the test.
     """
     moving = tows.time_s > 0
     counts, mean = tows.counts[moving], tows.mean_speed_mps[moving]
@@ -159,12 +162,12 @@ def _worst_misfit(tows: Tows, speeds: Array, estimates: int) -> int | None:
 
 
 def _disagreement(fits: Sequence[TowFit]) -> Iterator[str]:
-    for one, other in combinations(fits, 2):
-        if one.covariance is None or other.covariance is None:
+    for first, second in combinations(fits, 2):
+        if first.covariance is None or second.covariance is None:
             continue
-        apart = abs(one.values[0] - other.values[0])
-        if apart > _TWO_SIDED_95 * np.sqrt(one.covariance[0, 0] + other.covariance[0, 0]):
+        difference = abs(first.values[0] - second.values[0])
+        if difference > _TWO_SIDED_95 * np.sqrt(first.covariance[0, 0] + second.covariance[0, 0]):
             yield (
-                f"{one.method} and {other.method} differ in M by {apart:.3g} kg, more than their standard errors "
-                f"explain; the mass is known no better than that."
+                f"{first.method} and {second.method} differ in M by {difference:.3g} kg, more than their standard "
+                "errors explain; this is the accuracy of the mass."
             )

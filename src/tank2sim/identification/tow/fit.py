@@ -1,4 +1,4 @@
-"""What one method makes of the tows: estimates, their uncertainty, and how well they are determined."""
+"""Estimates from tows by one method, with their uncertainty and conditioning."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TOW_PARAMETERS = {
 """Unknown of (1.5) to its name with unit, as in :class:`SurgeCoefficients`, the card and the JSON."""
 
 DELAY = "delay"
-"""Unknown next to those of (1.5): how much later than t = 0 the body starts, s."""
+"""Unknown in addition to those of (1.5): time from t = 0 to the start of the body, s."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -35,13 +35,13 @@ class TowFit:
     terms : tuple of str
         Drag terms, in the order of (1.5).
     values : array, (unknowns,)
-        M, the coefficients of the terms, and the start delay where it is asked for; SI.
+        M, the coefficients of the terms, and the start delay if it is estimated; SI.
     covariance : array, (unknowns, unknowns), or None
-        Of the values; None where the method gives none. A mass that was given has no variance.
+        Of the values; None where the method gives none. A given mass has no variance.
     mass_kg : float
         m, taken as exact.
     design : array, (rows, free unknowns)
-        What the method solves in the least-squares sense.
+        Design matrix of the method's least squares.
     J : float
         Of (1.6), N s^(1/2), with the polynomial speed of the tows.
     largest_speed_error_mps : float
@@ -64,7 +64,7 @@ class TowFit:
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Names of the values that were estimated: not M if it was given."""
+        """Names of the estimated values: without M if it was given."""
         return self.unknowns[len(self.unknowns) - self.design.shape[1] :]
 
     @property
@@ -76,7 +76,7 @@ class TowFit:
 
     @property
     def start_delay_s(self) -> float:
-        """How much later than t = 0 the body starts; 0 where it was not asked."""
+        """Time from t = 0 to the start of the body, s; 0 if it was not estimated."""
         return float(self.values[-1]) if DELAY in self.unknowns else 0.0
 
     @property

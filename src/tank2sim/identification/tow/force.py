@@ -20,14 +20,16 @@ def parse_force(text: str) -> Polynomial:
     Raises
     ------
     InputError
-        It is no list of finite numbers.
+        It is not a list of finite numbers.
     """
     try:
         coefficients = [float(word) for word in text.split(",")]
     except ValueError:
         coefficients = [np.nan]
     if not np.isfinite(coefficients).all():
-        raise InputError("--force-polynomial", "", f"{text!r} is no polynomial", "give numbers, as in 11.6,0.02,-1e-4")
+        raise InputError(
+            "--force-polynomial", "", f"{text!r} is not a polynomial", "give numbers, as in 11.6,0.02,-1e-4"
+        )
     return Polynomial(coefficients)
 
 
@@ -56,6 +58,6 @@ def mean_force(force: Polynomial, times_s: Array) -> float:
 
 
 def force_words(force: Polynomial) -> str:
-    """How a reader is reported the force: ``T = 11.63 N``, ``T = 11.6 + 0.02 t N``."""
+    """Text of the force: ``T = 11.63 N``, ``T = 11.6 + 0.02 t N``."""
     powers = [f"{value:+.6g}" + ("" if k == 0 else " t" if k == 1 else f" t^{k}") for k, value in enumerate(force.coef)]
     return "T = " + " ".join(powers).lstrip("+").replace(" +", " + ").replace(" -", " - ") + " N"

@@ -6,8 +6,8 @@ Three methods estimate M and the chosen drag terms of (1.5):
 - ``qr``: the same least squares by QR, with standard errors;
 - ``output_error``: (1.5) integrated from rest, fitted to all readings of all tows, with standard errors.
 
-The added mass is lambda11 = M - m. The last method can estimate a start delay as well, and all can hold M at a value
-that is known.
+The added mass is lambda11 = M - m. The last method can estimate a start delay as well, and all can hold M at a
+known value.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ class TowIdentification:
     fits : dict
         Method to its estimates.
     options : TowOptions
-        What was assumed in addition to (1.5).
+        Assumptions in addition to (1.5).
     warnings : tuple of str
-        What the user should know before using them, in whole sentences.
+        Messages for the user, in sentences.
     """
 
     tows: Tows
@@ -115,21 +115,21 @@ def identify_tow(
     Parameters
     ----------
     force : float or Polynomial, optional
-        Towing force, N: a constant, or T(t) over s as in (1.13); by default that in the file of the tows.
+        Towing force, N: a constant, or T(t) over s as in (1.13); by default from the file of the tows.
     mass_kg : float, optional
-        Mass m with the water in the body; by default that in the file of the tows.
+        Mass m with the water in the body; by default from the file of the tows.
     terms : iterable of str
-        Drag terms to estimate in addition to M, any of B1, B2, B3; the others are zero.
+        Drag terms to estimate in addition to M, any of B1, B2, B3; other terms are zero.
     speed_degree : int
         Degree of the speed polynomial of the first two methods, at least 2; the paper has 2.
     options : TowOptions
-        A start delay (of the output error; the other methods take the polynomial as it is), or a known M.
+        A start delay (of output error; the other methods use the polynomial without delay), or a known M.
 
     Raises
     ------
     InputError
-        Force or mass is missing or not positive, a term is unknown or repeated, nothing is left to estimate, or
-        the tows do not determine the unknowns at all (too few readings, no motion, no acceleration).
+        Force or mass is missing or not positive, a term is unknown or repeated, no unknown remains, or the tows do not
+        determine the unknowns (too few readings, no motion, no acceleration).
     """
     pull = _force(tows, force)
     mass = _positive(tows, "mass_kg", mass_kg, tows.mass_kg)
@@ -202,15 +202,13 @@ def _fit(
 def _notes(tows: Tows, force: float | Polynomial | None, mass_kg: float, failed: set[str]) -> list[str]:
     notes = []
     used = force if isinstance(force, float | int) else tows.force_N
-    for name, own, written in (("force_N", used, tows.force_N), ("mass_kg", mass_kg, tows.mass_kg)):
-        if written is not None and written != own:
-            notes.append(f"The file of the tows says {name} {written:g}, and {own:g} was given and used.")
+    for name, used_value, written in (("force_N", used, tows.force_N), ("mass_kg", mass_kg, tows.mass_kg)):
+        if written is not None and written != used_value:
+            notes.append(f"The file of the tows states {name} {written:g}; {used_value:g} was given and used.")
     if isinstance(force, Polynomial) and tows.force_N is not None:
-        notes.append(
-            f"The file of the tows says force_N {tows.force_N:g}, and {force_words(force)} was given and used."
-        )
+        notes.append(f"The file of the tows states force_N {tows.force_N:g}; {force_words(force)} was given and used.")
     if tows.time_s[0] == 0 and np.nanmax(np.abs(tows.speed_mps[0])) > 0:
-        notes.append("The speed at t_s = 0 is not zero in every tow, and a start from rest at that moment is assumed.")
+        notes.append("The speed at t_s = 0 is not zero in every tow; a start from rest at that time is assumed.")
     for method in failed:
         notes.append(f"{method}: the fit did not converge and is left out; take fewer terms (--terms B3).")
     return notes
@@ -254,11 +252,11 @@ def _check_assumptions(tows: Tows, terms: tuple[str, ...], speed_degree: int, op
 def _check_solvable(tows: Tows, problem: equation_error.EquationError) -> None:
     if tows.top_speed_mps <= 0:
         raise InputError(tows.path, "", "no tow has a speed above zero", "give tows in which the body moves forward")
-    # A steady tow leaves rounding noise as acceleration, which scaling would blow up to a column like any other.
+    # The acceleration of a steady tow is rounding noise, which scaling would make a column like any other.
     gain = np.abs(problem.basis[:, 0]).max() * (tows.time_s[-1] - tows.time_s[0])
     if problem.mass_kg is None and gain < 1e-6 * tows.top_speed_mps:
-        silent = "the speed does not change, so that the tows do not determine the mass"
-        raise InputError(tows.path, "", silent, "give tows that accelerate from rest")
+        problem_text = "the speed does not change, so that the tows do not determine the mass"
+        raise InputError(tows.path, "", problem_text, "give tows that accelerate from rest")
     if scaled_condition(problem.free_design) > SINGULAR_CONDITION:
         unknowns = ", ".join(("M", *problem.terms)[len(problem.known) :])
         raise InputError(tows.path, "", f"the equations for {unknowns} are singular", "take fewer terms (--terms B3)")

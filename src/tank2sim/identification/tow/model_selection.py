@@ -1,4 +1,4 @@
-"""What tows can tell and what not: models of different size by AIC, each tow by itself, one tow left out in turn."""
+"""Model selection for tows: models of different size by AIC, fits of single tows, and the jackknife over tows."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from tank2sim.records.tows import Tows
 
 _NO_DELAY_S = 1e-3
 _FAR_BEHIND = 20.0
-"""AIC above the best at which a model is out: project choice. The usual 10 (Burnham & Anderson 2002) is for readings
-that err independently, and those of one tow may err together."""
+"""AIC above the best from which a model is excluded: project choice. The usual 10 (Burnham & Anderson 2002) is for
+independent readings, and errors within a tow may be correlated."""
 
 
 class TowModel(NamedTuple):
-    """Drag terms next to M, in the order of (1.5), and whether the body starts late."""
+    """Drag terms in addition to M, in the order of (1.5), and True for a start delay."""
 
     terms: tuple[str, ...]
     start_delay: bool = False
 
     @property
     def unknowns(self) -> tuple[str, ...]:
-        """Names of what is estimated."""
+        """Names of the unknowns."""
         return ("M", *self.terms, *([DELAY] if self.start_delay else []))
 
     @property
@@ -49,7 +49,7 @@ MODELS = tuple(
 """From the mass alone to all of (1.5), each without and with a start delay."""
 
 SIMPLE, SIMPLE_LATE = TowModel(("B3",)), TowModel(("B3",), start_delay=True)
-"""The models that are also fitted to each tow: those that short tows can bear."""
+"""The models that are also fitted to each tow: short tows determine their unknowns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +59,11 @@ class FittedModel:
     Parameters
     ----------
     model : TowModel
-        What was estimated.
+        Unknowns of the fit.
     fit : OutputErrorFit
         Estimates in the order of ``model.unknowns``.
     lowest_drag_N : float
-        Of the speeds up to the highest reading; negative where the model is no hull's.
+        Lowest drag up to the highest measured speed; negative for an impossible model.
     """
 
     model: TowModel
@@ -72,13 +72,12 @@ class FittedModel:
 
     @property
     def plausible(self) -> bool:
-        """M is positive and the drag nowhere negative."""
+        """True if M is positive and the drag nowhere negative."""
         return bool(self.fit.estimates[0] > 0 and self.lowest_drag_N >= 0)
 
     @property
     def determined(self) -> bool:
-        """The estimates can be distinguished (scaled condition number at most 900), and a delay is not at its bound,
-        0."""
+        """True if the scaled condition number is at most 900 and a delay is not at its bound, 0."""
         late = not self.model.start_delay or self.fit.estimates[-1] > _NO_DELAY_S
         return late and self.fit.condition_scaled <= COLLINEAR**2
 
@@ -90,12 +89,12 @@ class FittedModel:
 
     @property
     def delay_s(self) -> float:
-        """How much later than t = 0 the body starts."""
+        """Time from t = 0 to the start of the body, s."""
         return float(self.fit.estimates[-1]) if self.model.start_delay else 0.0
 
     @property
     def mass_interval_kg(self) -> tuple[float, float]:
-        """95 % interval of M, for readings that err independently and alike."""
+        """95 % interval of M, for independent readings of equal variance."""
         middle, half = self.fit.estimates[0], self.fit.half_widths[0]
         return float(middle - half), float(middle + half)
 
@@ -115,10 +114,10 @@ class FittedModel:
 
 
 def compare_models(tows: Tows, force: Polynomial, models: Sequence[TowModel] = MODELS) -> tuple[FittedModel, ...]:
-    """The models fitted to all readings; those with too few readings, or that do not converge, are left out.
+    """The models fitted to all readings, without those that have too few readings or do not converge.
 
-    AIC compares them only as readings that err independently and alike. Readings of one tow do not quite: small
-    differences mean nothing.
+    AIC assumes independent readings of equal variance. Readings of a tow are not quite independent: small differences
+    are not significant.
     """
     fitted = []
     for model in models:
@@ -129,60 +128,60 @@ def compare_models(tows: Tows, force: Polynomial, models: Sequence[TowModel] = M
 
 
 def mass_range(fitted: Sequence[FittedModel]) -> tuple[float, float] | None:
-    """Lowest and highest M within the 95 % intervals of the models that a hull could have and the tows determine.
+    """Lowest and highest M within the 95 % intervals of the plausible models that the tows determine.
 
-    Models that AIC leaves far behind the best of these are not asked.
+    Models with an AIC far above the best of these are excluded.
     """
-    usable = [one for one in fitted if one.plausible and one.determined]
+    usable = [model for model in fitted if model.plausible and model.determined]
     if not usable:
         return None
-    best = min(one.fit.aic for one in usable)
-    intervals = [one.mass_interval_kg for one in usable if one.fit.aic <= best + _FAR_BEHIND]
+    best = min(model.fit.aic for model in usable)
+    intervals = [model.mass_interval_kg for model in usable if model.fit.aic <= best + _FAR_BEHIND]
     return min(low for low, _ in intervals), max(high for _, high in intervals)
 
 
 @dataclass(frozen=True, eq=False)
 class TowByTow:
-    """One way of estimating, tow by tow.
+    """Estimates of one method, tow by tow.
 
     Parameters
     ----------
     label : str
         Method and unknowns.
     unknowns : tuple of str
-        What is estimated.
+        Names of the unknowns.
     together : array, (unknowns,)
         From all tows, SI.
-    alone, left_out : arrays, (tows, unknowns)
-        From each tow by itself, and from all without it; nan where that is not possible.
+    alone, held_out : arrays, (tows, unknowns)
+        From each tow alone, and from all tows except it; nan where impossible.
     """
 
     label: str
     unknowns: tuple[str, ...]
     together: Array
     alone: Array
-    left_out: Array
+    held_out: Array
 
     @property
     def jackknife_errors(self) -> Array:
-        """Standard errors by leaving out one tow in turn, (unknowns,); nan if one of these fits failed.
+        """Jackknife standard errors over tows, (unknowns,); nan if one of the fits failed.
 
         sqrt((n - 1)/n sum (x_i - mean x)^2) (Efron 1982, The jackknife, the bootstrap and other resampling plans). They
-        hold also where the readings of one tow err together.
+        are valid also for correlated readings within a tow.
         """
-        count = len(self.left_out)
-        errors: Array = np.sqrt((count - 1) / count * np.sum((self.left_out - self.left_out.mean(axis=0)) ** 2, axis=0))
+        count = len(self.held_out)
+        errors: Array = np.sqrt((count - 1) / count * np.sum((self.held_out - self.held_out.mean(axis=0)) ** 2, axis=0))
         return errors
 
     @property
     def half_widths(self) -> Array:
-        """Half-widths of the 95 % intervals by leaving out one tow in turn, with Student's t of n - 1, (unknowns,)."""
-        half: Array = stats.t.ppf(0.975, len(self.left_out) - 1) * self.jackknife_errors
+        """Half-widths of the jackknife 95 % intervals, with Student's t of n - 1 degrees of freedom, (unknowns,)."""
+        half: Array = stats.t.ppf(0.975, len(self.held_out) - 1) * self.jackknife_errors
         return half
 
     @property
     def spread_errors(self) -> Array:
-        """Standard errors of the mean of the tows taken each by itself, (unknowns,): their spread by root n."""
+        """Standard errors of the mean of the single tows' estimates, (unknowns,): their spread over root n."""
         errors: Array = np.std(self.alone, axis=0, ddof=1) / math.sqrt(len(self.alone))
         return errors
 
@@ -192,7 +191,7 @@ class TowByTow:
             "unknowns": list(self.unknowns),
             "together": self.together.tolist(),
             "alone": self.alone.tolist(),
-            "left_out": self.left_out.tolist(),
+            "left_out": self.held_out.tolist(),
             "jackknife_standard_errors": self.jackknife_errors.tolist(),
             "jackknife_half_widths_95": self.half_widths.tolist(),
             "spread_standard_errors": self.spread_errors.tolist(),
@@ -203,14 +202,18 @@ TowEstimator = Callable[[Tows], Array | None]
 
 
 def tow_by_tow(tows: Tows, force: Polynomial, terms: tuple[str, ...], speed_degree: int = 2) -> tuple[TowByTow, ...]:
-    """Each tow by itself and one left out in turn: by the paper's algorithm with `terms`, and by the simple models.
+    """Single-tow and jackknife estimates by the paper's algorithm with `terms`, and by the simple models.
 
-    Empty for less than three tows, whose spread says nothing.
+    Empty for fewer than three tows, whose spread is not informative.
     """
     if len(tows.names) < 3:
         return ()
     ways: list[tuple[str, tuple[str, ...], TowEstimator]] = [
-        (f"paper: {', '.join(('M', *terms))}", ("M", *terms), lambda own: _by_paper(own, force, terms, speed_degree))
+        (
+            f"paper: {', '.join(('M', *terms))}",
+            ("M", *terms),
+            lambda single: _by_paper(single, force, terms, speed_degree),
+        )
     ]
     for model in (SIMPLE, SIMPLE_LATE):
         ways.append((f"output error: {model.label}", model.unknowns, _by_output_error(force, model)))
@@ -221,13 +224,13 @@ def _each(tows: Tows, ways: Sequence[tuple[str, tuple[str, ...], TowEstimator]])
     numbers = range(len(tows.names))
     for label, unknowns, estimate in ways:
 
-        def row(own: Tows, estimate: TowEstimator = estimate, width: int = len(unknowns)) -> Array:
-            found = estimate(own) if own.top_speed_mps > 0 else None
+        def row(tows: Tows, estimate: TowEstimator = estimate, width: int = len(unknowns)) -> Array:
+            found = estimate(tows) if tows.top_speed_mps > 0 else None
             return np.full(width, np.nan) if found is None else found
 
         alone = np.array([row(tows.only(number)) for number in numbers])
-        left_out = np.array([row(tows.without(number)) for number in numbers])
-        yield TowByTow(label, unknowns, row(tows), alone, left_out)
+        held_out = np.array([row(tows.without(number)) for number in numbers])
+        yield TowByTow(label, unknowns, row(tows), alone, held_out)
 
 
 def _by_paper(tows: Tows, force: Polynomial, terms: tuple[str, ...], degree: int) -> Array | None:

@@ -1,4 +1,4 @@
-"""Surge mass and drag from tows by the error of the output: the speeds of (1.5), integrated, against all readings."""
+"""Surge mass and drag from tows by output error: comparison of the integrated speeds of (1.5) with all readings."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ from tank2sim.simulation.scheme import runge_kutta_step
 Predictor = Callable[[Array], tuple[Array, Array]]
 
 MOST_STEPS = 5000
-"""Steps of the integration over a record: one that lasts longer than so many of the model's steps is of a body that is
-slow in proportion, and takes longer ones. Project choice: a thousandth of the rise of the speed is far below any error
-of reading, and a time in milliseconds under t_s would otherwise compute for hours."""
+"""Most steps of the integration over a record; a longer record has longer steps than the model's, because its body is
+slower in proportion. Project choice: a thousandth of the rise of the speed is far below any reading error, and a time
+in milliseconds under t_s would otherwise compute for hours."""
 _LATEST_START = 0.5
-"""Longest start delay that is looked for, in the time of the record: a later start leaves too little of it."""
+"""Upper bound of the start delay as a share of the record: a later start leaves too few readings."""
 
 
 @dataclass(frozen=True)
 class TowOptions:
-    """What is assumed of the tows next to (1.5).
+    """Assumptions on the tows in addition to (1.5).
 
     Parameters
     ----------
     start_delay : bool
-        The body starts later than t = 0 by a time that is estimated too, the same in all tows.
+        Estimate a delay of the start after t = 0, the same in all tows.
     total_mass_kg : float, optional
-        M, if it is known and not to be estimated.
+        M, if known: it is not estimated.
     """
 
     start_delay: bool = False
@@ -59,7 +59,7 @@ class OutputErrorFit:
     Parameters
     ----------
     estimates : array, (unknowns,)
-        M (unless it is known), the drag coefficients, the start delay (where it is asked for); SI.
+        M (unless known), the drag coefficients, the start delay (if estimated); SI.
     design : array, (readings, unknowns)
         Sensitivities of the speeds at the readings to the estimates.
     residuals_mps : array, (readings,)
@@ -82,7 +82,7 @@ class OutputErrorFit:
 
     @property
     def covariance(self) -> Array:
-        """Covariance of the estimates, for readings that err independently and alike and a model that is true."""
+        """Covariance of the estimates, for independent readings of equal variance and a true model."""
         norms = column_norms(self.design)
         inverse = np.linalg.pinv(self.design / norms) / norms[:, None]
         covariance: Array = self.scatter_mps**2 * inverse @ inverse.T
@@ -101,7 +101,7 @@ class OutputErrorFit:
 
     @property
     def aic(self) -> float:
-        """Akaike's n ln(SSE/n) + 2 k, with n readings and k estimates; lower is better, differences alone count."""
+        """Akaike's n ln(SSE/n) + 2 k, with n readings and k estimates; lower is better, only differences matter."""
         n = len(self.residuals_mps)
         mean_square = max(float(np.mean(self.residuals_mps**2)), np.finfo(float).tiny)
         return n * math.log(mean_square) + 2 * len(self.estimates)
@@ -112,14 +112,14 @@ def speed_predictor(
 ) -> Predictor:
     """Speeds of (1.5) from rest, and their sensitivities.
 
-    The body is at rest until t = 0, or until the start delay, and then moves under T(t) of the same clock. In each step
-    of the integration acts the mean of T over the step, so that no impulse is lost.
+    The body is at rest until t = 0, or until the start delay, and then moves under T(t) of the same clock. The
+    force of each integration step is the mean of T over the step, which preserves the impulse.
 
     Returns
     -------
     callable
         ``predict(estimates) -> (speeds (times,), sensitivities (times, unknowns))`` with estimates = (M, B..., delay),
-        SI; without M if it is known, without delay if there is none. A delay is >= 0.
+        SI; without M if it is known, without delay if it is not estimated. A delay is >= 0.
     """
     pull = as_force(force)
     model = _unit_model()
@@ -139,7 +139,7 @@ def speed_predictor(
             parameters[mass] = options.total_mass_kg
         parameters[chosen] = estimates[: len(chosen)]
         begin = float(estimates[-1]) if options.start_delay else 0.0
-        # The steps between two readings shorten when the start comes between them; before it they are nothing.
+        # The steps between two readings are shorter if the start is between them, and zero before the start.
         moving = np.diff(np.maximum(times_s, begin), prepend=begin)
         steps = np.repeat(moving / np.maximum(counts, 1), counts)
         at = begin + np.cumsum(steps) - steps
@@ -162,7 +162,7 @@ def _unit_model() -> Model:
 
 @functools.cache
 def _sensitive_step(names: tuple[str, ...], width: int) -> ca.Function:
-    """A step of the states and of their sensitivities to parameters ``surge.*``, and to what else moved their start."""
+    """A step of the states and of their sensitivities to parameters ``surge.*`` and to the start state."""
     model = _unit_model()
     chosen = [model.parameter_names.index(f"surge.{name}") for name in names]
     step = runge_kutta_step(model)
@@ -192,7 +192,7 @@ def fit_speeds(
     Raises
     ------
     InputError
-        There are no more readings after the release than estimates.
+        The readings after the release do not outnumber the estimates.
     """
     read = ~np.isnan(tows.speed_mps) & (tows.time_s > 0)[:, None]
     row_of_reading = np.nonzero(read)[0]
@@ -203,7 +203,7 @@ def fit_speeds(
         problem = f"{len(readings)} readings after the release do not test {len(scale)} estimates"
         raise InputError(tows.path, "", problem, "give more readings, or take fewer terms (--terms B3)")
 
-    @functools.lru_cache(maxsize=2)  # residuals and Jacobian are asked for at one point, one after the other
+    @functools.lru_cache(maxsize=2)  # residuals and Jacobian are evaluated at the same point
     def at(*scaled: float) -> tuple[Array, Array]:
         speeds, sensitivities = predict(np.array(scaled) * scale)
         return speeds[row_of_reading] - readings, sensitivities[row_of_reading] * scale
@@ -226,7 +226,8 @@ def fit_speeds(
 
 
 def _search(tows: Tows, force_N: float, terms: tuple[str, ...], options: TowOptions) -> tuple[Array, Array, Array]:
-    """Scale of each unknown, and start and upper bound in that scale; the lower bound is 0 where an upper one is."""
+    """Scale of each unknown, and start and upper bound in that scale; the lower bound is 0 where an upper bound
+    exists."""
     # The mass that gives the last mean speed without drag, and drag terms as large as the force at the top speed.
     mass = force_N * tows.time_s[-1] / max(tows.mean_speed_mps[-1], 1e-3 * tows.top_speed_mps)
     drags = [force_N / tows.top_speed_mps ** DRAG_POWERS[term] for term in terms]

@@ -1,4 +1,4 @@
-"""What paper 1 (Wilinski & Zellman 1984) prints, to be held next to what its data give."""
+"""Printed numbers of paper 1 (Wilinski & Zellman 1984), for comparison with its data."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ MASS_BY_THEORY_KG = 2489.0
 
 
 def are_of_the_paper(tows: Tows) -> bool:
-    """Whether these are the tows of Table 1."""
+    """True if these are the tows of Table 1."""
     same_times = len(tows.time_s) == len(TIMES_S) and np.allclose(tows.time_s, TIMES_S)
     # All means but the misprinted one, which Table 1 rounds to four digits.
     return bool(same_times and np.allclose(np.delete(tows.mean_speed_mps - MEANS_MPS, 1), 0, atol=6e-5))

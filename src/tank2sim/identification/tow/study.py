@@ -1,4 +1,4 @@
-"""Study of a towed body: the estimates asked for, and those of other models from the same readings."""
+"""Study of a towed body: its estimates, and those of other models from the same readings."""
 
 from __future__ import annotations
 
@@ -63,24 +63,24 @@ class Ellipse(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TowStudy:
-    """What tows determine, and what they do not.
+    """Estimates from tows, with alternative models and their spread.
 
     Parameters
     ----------
     result : TowIdentification
-        The estimates asked for.
+        The estimates.
     polynomials : tuple of SpeedPolynomial
         Degrees 0 to 3 through the mean speeds, as far as the readings test them.
     models : tuple of FittedModel
         Models of different size, by output error.
     by_tow : tuple of TowByTow
-        Each tow by itself, and one left out in turn; empty for less than three tows.
+        Single-tow and jackknife estimates; empty for fewer than three tows.
     body : TowedBody or None
-        Size of the body, where it is known.
+        Size of the body, if known.
     drags : dict
-        Method to C(v) referred to L^2; empty where the size is not known.
+        Method to C(v) referred to L^2; empty without the size.
     theory : tuple of MassByTheory
-        (2.5); empty where the size is not known.
+        (2.5); empty without the size.
     """
 
     result: TowIdentification
@@ -93,14 +93,14 @@ class TowStudy:
 
     @property
     def mass_range_kg(self) -> tuple[float, float] | None:
-        """What these tows fix of M; None if no model of those compared is of use."""
+        """Range of M from these tows; None without a usable model."""
         return mass_range(self.models)
 
     @property
     def best(self) -> FittedModel | None:
-        """The model of the lowest AIC among those that these tows determine and a hull can have."""
+        """The model of lowest AIC among the plausible ones that these tows determine."""
         usable = [model for model in self.models if model.plausible and model.determined]
-        return min(usable, key=lambda one: one.fit.aic, default=None)
+        return min(usable, key=lambda fitted: fitted.fit.aic, default=None)
 
     def simulated(self) -> tuple[Array, dict[str, Array]]:
         """Times (n,), s, and speeds (n,), m/s, of the best usable model and of the methods, each motion once."""
@@ -113,7 +113,7 @@ class TowStudy:
             if name in result.fits:
                 fit = result.fits[name]
                 speeds = simulated_speeds(fit.coefficients, result.force, time, fit.start_delay_s)
-                if np.isfinite(speeds).all() and not any(np.allclose(speeds, other) for other in found.values()):
+                if np.isfinite(speeds).all() and not any(np.allclose(speeds, drawn) for drawn in found.values()):
                     found[f"{name.replace('_', ' ')}: {', '.join(fit.unknowns)}"] = speeds
         return time, found
 
@@ -129,38 +129,38 @@ class TowStudy:
 
     @property
     def ellipses(self) -> tuple[Ellipse, ...]:
-        """Of M and B3, without and with a start delay."""
+        """Regions of M and B3, without and with a start delay."""
         found = [confidence_ellipse(model) for model in self.models if model.model in (SIMPLE, SIMPLE_LATE)]
         return tuple(found)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user should know before using the estimates: the warnings, and what the models show together."""
+        """Messages for the user: the warnings, and the findings of the model comparison."""
         return (*self.result.warnings, *_notes(self), *_continued(self))
 
     def as_json(self) -> dict[str, Any]:
-        """The study as plain data: that of the result, and more."""
-        more: dict[str, Any] = {
+        """The study as plain data, including that of the result."""
+        studies: dict[str, Any] = {
             "speed_polynomials": [polynomial._asdict() for polynomial in self.polynomials],
             "models": [model.as_json() for model in self.models],
             "mass_range_kg": self.mass_range_kg,
-            "tow_by_tow": {one.label: one.as_json() for one in self.by_tow},
+            "tow_by_tow": {method.label: method.as_json() for method in self.by_tow},
             "confidence_ellipses": [ellipse._asdict() for ellipse in self.ellipses],
-            "mass_by_theory": [one.as_json() for one in self.theory],
+            "mass_by_theory": [mass.as_json() for mass in self.theory],
             "speeds": self._speeds_as_json(),
         }
         if self.body is not None:
             factor = self.body.area_ratio
-            more["body"] = dict(vars(self.body))
-            more["drag_coefficients"] = {
+            studies["body"] = dict(vars(self.body))
+            studies["drag_coefficients"] = {
                 name: {"by_length_squared": drag.as_json(), "by_volume_two_thirds": drag.times(factor).as_json()}
                 for name, drag in self.drags.items()
             }
-        return {**self.result.as_json(), **more, "warnings": list(self.notes)}
+        return {**self.result.as_json(), **studies, "warnings": list(self.notes)}
 
 
 def study_tows(result: TowIdentification, body: TowedBody | None = None) -> TowStudy:
-    """The study that goes with a result; with the size of the body also its drag coefficients and the theory."""
+    """The study of a result; with the size of the body also its drag coefficients and the theory."""
     tows, force = result.tows, result.force
     fits = result.fits.items()
     return TowStudy(
@@ -175,21 +175,21 @@ def study_tows(result: TowIdentification, body: TowedBody | None = None) -> TowS
 
 
 def towed_body(tows: Tows, mass_kg: float, given: Mapping[str, float | None]) -> TowedBody | None:
-    """The body from what is given and, failing that, from the file of the tows; None if its length is not known.
+    """The body from the given values, else from the file of the tows; None if its length is unknown.
 
-    The volume is by default that of the water that the body with the water inside weighs: it floats in equilibrium.
+    The default volume is the mass of the body, with the water inside, over the density of water: it floats.
 
     Parameters
     ----------
     mass_kg : float
         m, with the water inside.
     given : mapping
-        Keys of :data:`tank2sim.records.tows.BODY_KEYS` to values, None for what is not given.
+        Keys of :data:`tank2sim.records.tows.BODY_KEYS` to values, None if not given.
 
     Raises
     ------
     InputError
-        A value that is given is not positive.
+        A given value is not positive.
     """
     for key, value in given.items():
         if value is not None and not (np.isfinite(value) and value > 0):
@@ -208,7 +208,7 @@ def towed_body(tows: Tows, mass_kg: float, given: Mapping[str, float | None]) ->
 
 
 def speed_polynomials(tows: Tows, degrees: Sequence[int] = _DEGREES) -> Iterator[SpeedPolynomial]:
-    """Rows of Table 2, as far as there are more readings than coefficients."""
+    """Rows of Table 2, while readings outnumber coefficients."""
     for degree in degrees:
         try:
             fitted = fit_mean_speed(tows, degree).polynomial
@@ -221,31 +221,32 @@ def speed_polynomials(tows: Tows, degrees: Sequence[int] = _DEGREES) -> Iterator
 
 
 def confidence_ellipse(fitted: FittedModel, points: int = 121) -> Ellipse:
-    """Joint 95 % region of M and B3 of a model that has them first, from the linearised covariance and Fisher's F."""
+    """Joint 95 % region of M and B3 of a model whose first unknowns they are, from the linearised covariance and
+    Fisher's F."""
     fit = fitted.fit
     radius = np.sqrt(2 * stats.f.ppf(_LEVEL, 2, fit.freedom))
     angle = np.linspace(0, 2 * np.pi, points)
     circle = radius * np.vstack([np.cos(angle), np.sin(angle)])
-    # By the eigenvectors, which also bear a region without width.
+    # By the eigenvectors, which also describe a region without width.
     squares, axes = np.linalg.eigh(fit.covariance[:2, :2])
     outline = axes * np.sqrt(np.maximum(squares, 0.0)) @ circle + fit.estimates[:2, None]
     return Ellipse(fitted.model.label, (float(fit.estimates[0]), float(fit.estimates[1])), outline[0], outline[1])
 
 
 def _continued(study: TowStudy) -> Iterator[str]:
-    """Of tows that end before the others: what the paper's way makes of their polynomial continued to the end."""
+    """Notes on tows that end early: the paper's estimate with their polynomial continued to the end."""
     tows, result = study.result.tows, study.result
     if not study.by_tow:
         return
     for number, alone in enumerate(study.by_tow[0].alone):
-        own = tows.only(number)
-        if own.time_s[-1] >= tows.time_s[-1] or not np.isfinite(alone).all():
+        single = tows.only(number)
+        if single.time_s[-1] >= tows.time_s[-1] or not np.isfinite(alone).all():
             continue
-        speed = fit_mean_speed(own, len(result.speed_polynomial) - 1).polynomial
+        speed = fit_mean_speed(single, len(result.speed_polynomial) - 1).polynomial
         problem = discretise(speed, tows.time_s, result.terms, result.force)
         yield (
-            f"Tow {number + 1} ends at {own.time_s[-1]:g} s: over that time the paper's way gives M {alone[0]:.0f} kg; "
-            f"with its polynomial continued to the {tows.time_s[-1]:g} s of the others, "
+            f"Tow {number + 1} ends at {single.time_s[-1]:g} s: over that time the paper's method gives M "
+            f"{alone[0]:.0f} kg; with its polynomial continued to the {tows.time_s[-1]:g} s of the other tows, "
             f"{solve_by_qr(problem)[0]:.0f} kg."
         )
 
@@ -256,13 +257,13 @@ def _notes(study: TowStudy) -> Iterator[str]:
     if span is not None:
         low, high = span
         yield (
-            f"These tows fix M no better than {low:.0f} to {high:.0f} kg (added mass {low - result.mass_kg:.0f} to "
-            f"{high - result.mass_kg:.0f} kg): 95 % intervals of models that they determine and a hull can have."
+            f"These tows determine M only to {low:.0f} to {high:.0f} kg (added mass {low - result.mass_kg:.0f} to "
+            f"{high - result.mass_kg:.0f} kg): 95 % intervals of the plausible models that they determine."
         )
-    best = min(study.models, key=lambda one: one.fit.aic, default=None)
+    best = min(study.models, key=lambda fitted: fitted.fit.aic, default=None)
     if best is not None and not (best.plausible and best.determined):
         yield (
-            f"The lowest AIC has the model {best.model.label}, with "
+            f"The model of lowest AIC is {best.model.label}, with "
             + ("a drag that is negative at some speeds" if not best.plausible else "unknowns that cannot be separated")
             + "; a better fit is not a better model."
         )
@@ -281,4 +282,4 @@ def _notes(study: TowStudy) -> Iterator[str]:
             "force over time (input tow.force)."
         )
     if result.options.start_delay:
-        yield "A card holds no start delay: a simulation of these tows begins that much later."
+        yield "A card has no start delay: a simulation of these tows begins later by it."

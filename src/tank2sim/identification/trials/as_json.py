@@ -1,4 +1,4 @@
-"""The result of an identification as JSON, and its rows for screen and page."""
+"""The result of an identification as JSON, and its table rows for screen and page."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from tank2sim.identification.trials.identify import Identification
 from tank2sim.marks import FORCED
 
 NO_YAW = 3.0
-"""A run whose yaw rate stays below this many times its noise goes straight."""
-
+"""A run whose yaw rate stays below this many times its noise is straight."""
 
 FIGURES_ARE = "simulated in closed loop with the card found, from each trial's measured start, rudder rate and lag"
-"""Of what the figures are: ``simulate`` takes the card's approach speed and steering gear instead."""
+"""Origin of the figures: ``simulate`` uses the card's approach speed and steering gear instead."""
 
 
-def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -> dict[str, object]:
-    """Everything a script may want: ``derivatives``, ``effects``, ``misfit``, ``figures``, ``identifiability``, ...
+def identification_as_json(result: Identification, messages: tuple[str, ...] = ()) -> dict[str, object]:
+    """The complete result: ``derivatives``, ``effects``, ``misfit``, ``figures``, ``identifiability``, ...
 
-    `told` are messages in addition to the notices of the result.
+    `messages` are warnings in addition to the notices of the result.
     """
     estimate, known = result.estimate, result.identifiability
     parameters = _parameters(result)
@@ -50,7 +49,7 @@ def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -
         "structures": {
             name: {
                 "errors": structure.errors,
-                "left_out": [list(fold.left_out) for fold in (*structure.single, structure.extrapolation)],
+                "left_out": [list(fold.held_out) for fold in (*structure.single, structure.extrapolation)],
             }
             for name, structure in result.structures.items()
         },
@@ -62,10 +61,10 @@ def identification_as_json(result: Identification, told: tuple[str, ...] = ()) -
         "identifiability": {
             "condition": known.condition,
             "singular_values": known.singular_values,
-            "correlated_pairs": [[one, other, value] for one, other, value in known.pairs],
+            "correlated_pairs": [[first, second, value] for first, second, value in known.pairs],
             "unseen": [list(direction) for direction in known.unseen],
         },
-        "warnings": [*result.notices, *known.notices, *told],
+        "warnings": [*result.notices, *known.notices, *messages],
     }
 
 
@@ -111,32 +110,29 @@ def _bootstrap(result: Identification) -> dict[str, object] | None:
 
 
 def estimate_rows(result: Identification) -> list[list[object]]:
-    """Name, estimate, before, share of the information that the trials gave: a row for each free parameter."""
+    """Name, estimate, before, share of the information from the trials: a row for each free parameter."""
     rows: list[list[object]] = []
     problem, estimate = result.problem, result.estimate
     for place, name in enumerate(estimate.free):
-        own = f"{estimate.values[place]:.5g} ± {estimate.standard_errors[place]:.2g}"
+        fitted = f"{estimate.values[place]:.5g} ± {estimate.standard_errors[place]:.2g}"
         before = f"{problem.prior_mean[place]:.5g} ± {problem.prior_error[place]:.2g}"
         share = f"{100 * result.identifiability.share[place]:.0f} %"
-        rows.append([name.removeprefix("derivatives."), own, before, share])
+        rows.append([name.removeprefix("derivatives."), fitted, before, share])
     return rows
 
 
 def following_rows(result: Identification) -> list[list[object]]:
-    """Run, fitted or held out, yaw-rate error over windows and over the whole run, before and now."""
-    rows: list[list[object]] = []
-    pairs = [("fitted", result.before, result.fit)]
-    if result.holdout and result.before_holdout:
-        pairs.append(("held out", result.before_holdout, result.holdout))
-    for word, before, now in pairs:
-        for old, new in zip(before.following, now.following, strict=True):
-            noise = result.noise.get("motion.r", 0.0)
-            rows.append([new.name, word, *(_yaw_error(one, noise) for one in (old, new))])
-    return rows
+    """Run, fitted or held out, yaw-rate error over windows and over the whole run, before and after."""
+    noise = result.noise.get("motion.r", 0.0)
+    return [
+        [new.name, word, _yaw_error(old, noise), _yaw_error(new, noise)]
+        for word, before, after in result.comparisons
+        for old, new in zip(before.following, after.following, strict=True)
+    ]
 
 
 def structure_rows(result: Identification) -> list[list[object]]:
-    """Structure, mean yaw-rate error of runs left out one at a time, and of those of largest amplitude, %."""
+    """Structure, mean yaw-rate error of single runs held out, and of the runs of largest amplitude held out, %."""
     return [
         [name, 100 * float(np.mean(structure.errors[:-1])), 100 * float(structure.errors[-1])]
         for name, structure in result.structures.items()
@@ -144,14 +140,11 @@ def structure_rows(result: Identification) -> list[list[object]]:
 
 
 def figure_rows(result: Identification) -> list[list[object]]:
-    """Trial, fitted or held out, figure, measured, predicted before and now, error now, 95 % interval."""
+    """Trial, fitted or held out, figure, measured, predicted before and after, error after, 95 % interval."""
     rows: list[list[object]] = []
-    pairs = [("fitted", result.before, result.fit)]
-    if result.holdout and result.before_holdout:
-        pairs.append(("held out", result.before_holdout, result.holdout))
-    for word, before, now in pairs:
+    for word, before, after in result.comparisons:
         old = {(figure.trial, figure.name): figure for figure in before.figures}
-        for figure in now.figures:
+        for figure in after.figures:
             earlier = old.get((figure.trial, figure.name))
             error = f"{100 * figure.error:+.1f} %" if figure.name.endswith("_m") else f"{figure.error:+.2f}"
             rows.append(
@@ -170,32 +163,33 @@ def figure_rows(result: Identification) -> list[list[object]]:
 
 
 def identified_card_text(result: Identification, trials: list[str]) -> str:
-    """Text of the card found, with the trials told in its source."""
+    """Text of the card found, with the names of the trials in its source."""
     card = result.card
-    how = f"identified by tank2sim ({result.estimate.method}, {result.structure}) from {', '.join(trials)}"
+    origin = f"identified by tank2sim ({result.estimate.method}, {result.structure}) from {', '.join(trials)}"
     if result.forced:
-        how = f"{FORCED}, although not of this ship by the rudder's moment: {how}"
-    changes: dict[str, object] = {"ship.source": f"{card.ship.source}; {how}"}
+        origin = f"{FORCED}, although not of this ship by the rudder's moment: {origin}"
+    changes: dict[str, object] = {"ship.source": f"{card.ship.source}; {origin}"}
     if card.ship.notes:
-        changes["ship.notes"] = f"Before it was {how}: {card.ship.notes}"
-    head = f"# {how[0].upper()}{how[1:]}.\n# Comments below are of the card before, except keys marked as identified.\n"
+        changes["ship.notes"] = f"Before it was {origin}: {card.ship.notes}"
+    head = f"# {origin[0].upper()}{origin[1:]}.\n"
+    head += "# Comments below are of the card before, except keys marked as identified.\n"
     text = changed_text(card.text, card.source, changes)
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
     return mark + head + text.removeprefix(mark)
 
 
 def _windows(comparison: Comparison) -> dict[str, float]:
-    runs = {one.name: one.relative("motion.r") for one in comparison.following if "motion.r" in one.windows}
+    runs = {run.name: run.relative("motion.r") for run in comparison.following if "motion.r" in run.windows}
     return {**runs, "all": pooled(comparison.following, "motion.r")}
 
 
-def _yaw_error(one: Following, noise: float) -> str:
-    """Error of the yaw rate over windows, %; in words where a share of it would say nothing."""
-    if "motion.r" not in one.windows:
+def _yaw_error(following: Following, noise: float) -> str:
+    """Error of the yaw rate over windows, %; a phrase where such a share has no meaning."""
+    if "motion.r" not in following.windows:
         return "no yaw rate measured"
-    if one.windows["motion.r"][1] < NO_YAW * noise:
+    if following.windows["motion.r"][1] < NO_YAW * noise:
         return "no yaw"
-    return f"{100 * one.relative('motion.r'):.3g} %"
+    return f"{100 * following.relative('motion.r'):.3g} %"
 
 
 def _figure(figure: FigureComparison) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""From a card and trials to a better card, with what the trials can and cannot tell."""
+"""Identification of a better card from a card and trials, with the identifiability of its parameters."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from tank2sim.identification.trials.assessment.model_selection import (
 from tank2sim.identification.trials.assessment.other_ship import other_ship
 from tank2sim.identification.trials.assessment.prediction_intervals import (
     FittedProblem,
-    bootstrapped,
+    bootstrap_estimates,
+    compare_held_out,
     criteria_or_none,
-    held_out,
 )
 from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.methods.kalman import kalman
@@ -38,28 +38,30 @@ from tank2sim.identification.trials.methods.recursive import recursive
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 from tank2sim.identification.trials.problem.picklable import portable
 from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.problem_from_card import answered, problem_from_card, with_range
+from tank2sim.identification.trials.problem.problem_from_card import card_with_estimate, problem_from_card, with_range
 from tank2sim.identification.trials.problem.structures import AUTO, STRUCTURES
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.recorded import recorded
 
 PIECE = 5.0
 """Length of the pieces of output error, in L/u0: on the KVLCC2 30 s of model time, in which the model's error stays
-small against the motion; shorter pieces see less of what the derivatives do, longer ones run away when unstable."""
+small against the motion; shorter pieces show less of the derivatives, longer ones diverge on unstable ships."""
 
 LEAST_PIECE = 0.5
-"""Shortest piece, in L/u0: in less the state hardly answers the rudder, and there are more initial states than data."""
+"""Shortest piece, in L/u0: in less the state hardly responds to the rudder, and initial states outnumber the data."""
 
 WHOLE_RUN_MISFIT = 3.0
-"""Whole runs are fitted when the model follows them, too: to this many times the noise, in every signal (project
+"""Whole runs are fitted, too, when the model follows them to this many times the noise in every signal (project
 choice)."""
+
+_NO_UNCERTAINTY = "the card states no uncertainty: 2 % of each derivative is taken, and widened as the trials demand"
 
 TRIAL_METHODS: tuple[str, ...] = ("output_error", "equation_error", "kalman", "recursive")
 
 
 @dataclass(frozen=True)
 class IdentificationOptions:
-    """How trials are fitted.
+    """Options of a fit to trials.
 
     Parameters
     ----------
@@ -72,15 +74,15 @@ class IdentificationOptions:
     piece_s : float, optional
         Length of the pieces of output error, s; by default :data:`PIECE`.
     scale_prior : bool
-        Let the trials tell how far the card's standard errors may be trusted.
+        Widen the card's standard errors as far as the trials require.
     members : int
-        Simulations from which the intervals of the figures of trials held out are taken; 0 for none.
+        Simulations for the prediction intervals of the figures of held-out trials; 0 for none.
     bootstrap : int
         Members of a parametric bootstrap of the estimates; 0 for none.
     hold : tuple of str
-        Derivatives (``Xuuu``) and parameters of effects (``wind.yaw_coefficient``) that stay as the card has them.
+        Derivatives (``Xuuu``) and parameters of effects (``wind.yaw_coefficient``) that keep the card's values.
     force : bool
-        Fit trials also where they look like those of another ship (:mod:`.other_ship`).
+        Fit trials even if they look like those of another ship (:mod:`.other_ship`).
     """
 
     method: str = "output_error"
@@ -96,37 +98,37 @@ class IdentificationOptions:
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """What came of trials.
+    """Result of an identification.
 
     Parameters
     ----------
     started : ManoeuvringCard
-        The card from which the estimate began: that given, in the structure asked for.
+        The start card of the estimate: the given card in the requested structure.
     card : ManoeuvringCard
         With the estimates and their standard errors.
     problem : Problem
-        What was asked of the trials to fit.
+        The problem of the fitted trials.
     estimate : Estimate
     identifiability : Identifiability
     noise : mapping
-        Standard deviation of measurement noise by variable, from the files or estimated: the unit of misfit.
+        Standard deviation of measurement noise by variable, stated in the files or estimated: the unit of misfit.
     fit, holdout : Comparison
-        The new card against the trials it was fitted to, and against those it was not (None: there are none).
+        Comparison of the new card with the fitted trials, and with the held-out trials (None without any).
     before, before_holdout : Comparison
-        The card that was given, against the same.
+        The same for the given card.
     structure : str
-        Of the model: the one asked for, or chosen.
+        Of the model, as requested or chosen.
     manoeuvres : mapping
-        Trial to what it was recognised as, in words.
+        Trial to a description of the recognised manoeuvre.
     forced : tuple of str
-        What speaks against the trials being of the card's ship, where they were fitted all the same.
+        Evidence that the trials are not of the card's ship, where the fit was forced.
     structures : mapping
-        Cross-validation of each structure that was tried: none, unless the choice was left to it.
+        Cross-validation of each structure; empty unless the structure is :data:`.structures.AUTO`.
     criteria : Criteria or None
-        Information criteria of the fit, to compare with those of another model of the same trials; None where the
-        velocities for them were not measured.
+        Information criteria of the fit, for comparison with another model of the same trials; None where the
+        velocities were not measured.
     bootstrap : array (members, k) or None
-        Estimates from trials that were simulated again with the estimate (:mod:`.prediction`), where asked for.
+        Estimates from trials simulated with the estimate (:mod:`.prediction_intervals`), on request.
     notices : tuple of str
     """
 
@@ -148,6 +150,14 @@ class Identification:
     forced: tuple[str, ...]
     notices: tuple[str, ...]
 
+    @property
+    def comparisons(self) -> tuple[tuple[str, Comparison, Comparison], ...]:
+        """The given and the new card on the trials "fitted" and, if there are any, on those "held out"."""
+        fitted = "fitted", self.before, self.fit
+        if self.holdout is None or self.before_holdout is None:
+            return (fitted,)
+        return fitted, ("held out", self.before_holdout, self.holdout)
+
 
 def identify_trials(
     card: ManoeuvringCard,
@@ -162,24 +172,24 @@ def identify_trials(
     Parameters
     ----------
     card : ManoeuvringCard
-        What is known of the ship; its standard errors say how well.
+        Prior of the ship: values and standard errors.
     trials, holdout : Measured
-        Trials to fit, and trials only to compare with.
+        Trials to fit, and trials for comparison only.
     options : IdentificationOptions, optional
     progress : callable
-        Called with each better estimate. A KeyboardInterrupt ends the search with the best so far.
+        Called with each better estimate. A KeyboardInterrupt ends the search with the best estimate so far.
     executor : concurrent.futures.Executor, optional
         For the fits of cross-validation and bootstrap, and the simulations behind intervals.
 
     Raises
     ------
     InputError
-        The trials look like those of another ship than the card's, or of two, do not excite what is to be estimated,
-        lack signals that are needed, or are driven otherwise than those held out.
+        The trials look like those of another ship than the card's, or of two ships, do not excite the estimated
+        parameters, lack necessary signals, or are driven by another rudder signal than the held-out trials.
     """
     options = options or IdentificationOptions()
     try:
-        return _identified(card, trials, holdout, options, (progress, executor))
+        return _identified(card, trials, holdout, options, progress, executor)
     except np.linalg.LinAlgError:
         names = ", ".join(trial.name for trial in trials.trials)
         remedy = "add runs in which rudder, yaw, sway and speed change, or hold terms (--hold)"
@@ -191,24 +201,24 @@ def _identified(
     trials: Measured,
     holdout: Measured | None,
     options: IdentificationOptions,
-    how: tuple[SearchReport, Executor | None],
+    progress: SearchReport,
+    executor: Executor | None,
 ) -> Identification:
-    progress, executor = how
-    tried = cross_validated(card, trials, options, executor) if options.structure == AUTO else {}
-    structure = simplest(tried) if tried else options.structure
+    structures = cross_validate_structures(card, trials, options, executor) if options.structure == AUTO else {}
+    structure = simplest(structures) if structures else options.structure
     started = STRUCTURES[structure].start(card)
     problem = problem_from_card(started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold)
     unseen = refuse_unseen(problem)
     problem = problem.without(unseen)
-    against = other_ship(problem_from_card(card, trials.trials, trials.driven_by))  # not in a structure that knows less
-    if against and not options.force:
+    evidence = other_ship(problem_from_card(card, trials.trials, trials.driven_by))  # in the structure of the card
+    if evidence and not options.force:
         names = ", ".join(trial.name for trial in trials.trials)
-        problem_told = f"not trials of the ship of {card.source}: {'; '.join(against)}"
-        raise InputError(names, "", problem_told, "give the card and the trials of one ship, or --force")
-    estimate = estimated(problem, options, progress)
-    improved = with_range(answered(started, estimate), problem)
+        problem_text = f"not trials of the ship of {card.source}: {'; '.join(evidence)}"
+        raise InputError(names, "", problem_text, "give the card and the trials of one ship, or --force")
+    estimate = estimate_parameters(problem, options, progress)
+    improved = with_range(card_with_estimate(started, estimate), problem)
     whole = started.model.valid_speed_mps is None
-    answer = FittedProblem(problem, estimate, improved, whole)
+    fitted = FittedProblem(problem, estimate, improved, whole)
     noise = noise_of(trials, problem)
     result = identifiability(problem, estimate)
     held = holdout if holdout is not None and holdout.trials else None
@@ -220,22 +230,22 @@ def _identified(
         identifiability=result,
         noise=noise,
         fit=compare_card(improved, trials, estimate.noise, whole=whole),
-        holdout=held_out(answer, held, options.members, executor) if held else None,
+        holdout=compare_held_out(fitted, held, options.members, executor) if held else None,
         before=compare_card(card, trials, estimate.noise),
         before_holdout=compare_card(card, held, estimate.noise) if held else None,
         structure=structure,
-        structures=tried,
-        criteria=criteria_or_none(answer),
-        bootstrap=bootstrapped(
-            answer, trials.driven_by, partial(_in_pieces, options=options), options.bootstrap, executor
+        structures=structures,
+        criteria=criteria_or_none(fitted),
+        bootstrap=bootstrap_estimates(
+            fitted, trials.driven_by, partial(_in_pieces, options=options), options.bootstrap, executor
         ),
-        forced=against,
+        forced=evidence,
         manoeuvres=_manoeuvres(improved, (*trials.trials, *(held.trials if held else ()))),
         notices=(
             *trials.notices,
             *(held.notices if held else ()),
-            *_told(card),
-            *_told_unseen(unseen),
+            *(() if card.uncertainty else (_NO_UNCERTAINTY,)),
+            *_unseen_notice(unseen),
             *estimate.notices,
         ),
     )
@@ -244,11 +254,11 @@ def _identified(
 def _manoeuvres(card: ManoeuvringCard, trials: Sequence[Trial]) -> dict[str, str]:
     model = build(card)
     known = {trial.name: recorded(trial, model) for trial in trials}
-    return {name: what.words for name, what in known.items() if what is not None}
+    return {name: manoeuvre.words for name, manoeuvre in known.items() if manoeuvre is not None}
 
 
-def estimated(problem: Problem, options: IdentificationOptions, progress: SearchReport = silent) -> Estimate:
-    """The estimate by the method asked for; output error begins at what equation error found, if that is better."""
+def estimate_parameters(problem: Problem, options: IdentificationOptions, progress: SearchReport = silent) -> Estimate:
+    """The estimate by the method of the options; output error starts at the estimate of equation error."""
     if options.method == "kalman":
         return kalman(problem, progress=progress)
     if options.method == "recursive":
@@ -258,9 +268,7 @@ def estimated(problem: Problem, options: IdentificationOptions, progress: Search
     length = options.piece_s or PIECE * problem.ship_time
     if length < LEAST_PIECE * problem.ship_time:
         least = LEAST_PIECE * problem.ship_time
-        raise InputError(
-            "--piece", "", f"is {length:g} s", f"{least:.3g} s or more ({LEAST_PIECE:g} L/u0) tell anything"
-        )
+        raise InputError("--piece", "", f"is {length:g} s", f"give {least:.3g} s or more ({LEAST_PIECE:g} L/u0)")
     settings = OutputErrorSettings(piece_s=length, scale_prior=options.scale_prior)
     in_pieces = output_error(problem, _start(problem), settings, progress)
     if in_pieces.notices or not _follows_whole_runs(problem, in_pieces):
@@ -268,25 +276,25 @@ def estimated(problem: Problem, options: IdentificationOptions, progress: Search
     return output_error(problem, in_pieces.values, replace(settings, piece_s=None), progress)
 
 
-def cross_validated(
+def cross_validate_structures(
     card: ManoeuvringCard, trials: Measured, options: IdentificationOptions, executor: Executor | None = None
 ) -> dict[str, CrossValidation]:
-    """Each structure fitted without some of the trials, and its yaw-rate error on them."""
+    """Cross-validation of each structure by its yaw-rate error on held-out trials."""
     results = {}
     for name, structure in STRUCTURES.items():
         started = structure.start(card)
         problem = problem_from_card(
             started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold
         )
-        asked = portable(problem, started, trials.driven_by)
-        results[name] = cross_validate(asked, partial(_in_pieces, options=options), yaw_rate_error, executor)
+        posed = portable(problem, started, trials.driven_by)
+        results[name] = cross_validate(posed, partial(_in_pieces, options=options), yaw_rate_error, executor)
     return results
 
 
 def _in_pieces(problem: Problem, options: IdentificationOptions) -> Estimate:
-    """What a fold is fitted by: pieces only, and fewer rounds, for it is compared with its like."""
+    """The estimate of a fold: pieces only and fewer rounds, which is enough for a comparison of folds."""
     if options.method != "output_error":
-        return estimated(problem, options)
+        return estimate_parameters(problem, options)
     length = options.piece_s or PIECE * problem.ship_time
     return output_error(
         problem, _start(problem), OutputErrorSettings(length, scale_prior=options.scale_prior, rounds=3)
@@ -294,7 +302,7 @@ def _in_pieces(problem: Problem, options: IdentificationOptions) -> Estimate:
 
 
 def _start(problem: Problem) -> Array | None:
-    """Values from which output error begins: those of the weak form, which needs no start; None without velocities."""
+    """Start values of output error: those of the weak form, which needs none itself; None without velocities."""
     try:
         return equation_error(problem).values
     except InputError:
@@ -302,7 +310,7 @@ def _start(problem: Problem) -> Array | None:
 
 
 def _recursive(problem: Problem, options: IdentificationOptions, progress: SearchReport) -> Estimate:
-    """The recursive estimator, which takes its prior as it is: widened first by what the weak form says of it."""
+    """The recursive estimate with the prior widened by the weak form, because recursion does not scale it."""
     if not options.scale_prior:
         return recursive(problem, progress=progress)
     scale = equation_error(problem).prior_scale
@@ -316,14 +324,8 @@ def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
     return all(error <= limits[name] for result in results for name, error in result.whole.items())
 
 
-def _told_unseen(names: Sequence[str]) -> Sequence[str]:
+def _unseen_notice(names: Sequence[str]) -> Sequence[str]:
     if not names:
         return ()
     text = ", ".join(name.removeprefix("derivatives.") for name in names)
     return (f"the trials show nothing of {text}: held as the card has them",)
-
-
-def _told(card: ManoeuvringCard) -> Sequence[str]:
-    if card.uncertainty:
-        return ()
-    return ("the card states no uncertainty: 2 % of each derivative is taken, and widened as the trials demand",)

@@ -1,4 +1,4 @@
-"""The added yaw inertia found, as N_rdot of a ship's card or as a card of the rig itself."""
+"""The added yaw inertia as N_rdot of a ship's card, or in a card of the rig."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tank2sim.identification.yaw.estimate import YawEstimate
 from tank2sim.identification.yaw.identify import YAW_METHODS, YawIdentification
 
 TANK_WATER_KGPM3 = 1000.0
-"""Density of the tank's water where no record states it; fresh water, as the paper calculates with."""
+"""Density of the tank's water where no record states it; fresh water, as in the paper."""
 
 
 def nrdot_prime(
@@ -27,7 +27,7 @@ def nrdot_prime(
 ) -> tuple[float, float | None]:
     """N_rdot' = -lambda661 / (1/2 rho L^5) of the body in the tank, and its standard error.
 
-    At equal Froude number the ship's is the same: an added inertia has no viscosity in it. Raises as
+    At equal Froude number the ship's is the same: an added inertia does not depend on viscosity. Raises as
     :func:`known_added_inertia`.
     """
     value, error = known_added_inertia(result, method)
@@ -41,20 +41,20 @@ def known_added_inertia(result: YawIdentification, method: str) -> tuple[float, 
     Raises
     ------
     InputError
-        It is not known: the records are of air, or J_zz is not known; or it is negative, which no body's is.
+        It is unknown, because the records are of air or J_zz is unknown; or it is negative, which is impossible.
     """
     source = result.records[0].path
     found = result.added_inertia(method)
     if found is None:
         remedy = "give records in water, and in air or --inertia-kgm2"
-        raise InputError(source, "", "does not separate the added inertia from the body's own", remedy)
+        raise InputError(source, "", "does not separate the added inertia from that of the body", remedy)
     if found[0] <= 0:
         raise InputError(source, "", "gives a negative added inertia, which no body has", "check J_zz and k_t")
     return found
 
 
 def body_length(result: YawIdentification, given_m: float | None) -> float:
-    """The body's length by which N_rdot is made non-dimensional.
+    """The body's length that makes N_rdot non-dimensional.
 
     Raises
     ------
@@ -86,10 +86,12 @@ def with_nrdot(card: ManoeuvringCard, result: YawIdentification, method: str, le
     scales = card.scales if card.model.scaling == "dimensional" else None
     factor = file_factor(known_term("Nrdot"), scales, rudder_to_port=False)
     key = card.places.get("Nrdot", "Nrdot")
-    text = _replaced(card.text, card.source, f"derivatives.{key}", value * factor, f"yaw rig, {method}")
+    text = _replace_key(card.text, card.source, f"derivatives.{key}", value * factor, f"yaw rig, {method}")
     if error is not None:
-        spelt = next((own for own in _section(text, "uncertainty") if own.lower() == "nrdot"), key)
-        text = _replaced(text, card.source, f"uncertainty.{spelt}", error * abs(factor), f"yaw rig, {method}")
+        spelt = next(
+            (key_in_file for key_in_file in _section(text, "uncertainty") if key_in_file.lower() == "nrdot"), key
+        )
+        text = _replace_key(text, card.source, f"uncertainty.{spelt}", error * abs(factor), f"yaw rig, {method}")
     new = parse_card(text, card.source)
     assert isinstance(new, ManoeuvringCard)
     return new
@@ -100,10 +102,10 @@ def _section(text: str, section: str) -> tomlkit.items.Table | dict[str, object]
     return found if isinstance(found, tomlkit.items.Table) else {}
 
 
-def _replaced(text: str, source: str, key: str, value: float, origin: str) -> str:
-    section, _, own = key.partition(".")
+def _replace_key(text: str, source: str, key: str, value: float, origin: str) -> str:
+    section, _, name = key.partition(".")
     old = _section(text, section)
-    was = f"was {old[own].as_string()}" if own in old else "not stated before"  # type: ignore[union-attr]
+    was = f"was {old[name].as_string()}" if name in old else "not stated before"  # type: ignore[union-attr]
     return changed_text(text, source, {key: float(f"{value:.6g}")}, comment=f"{origin}; {was}")
 
 
@@ -156,7 +158,7 @@ def rig_card_text(result: YawIdentification, method: str, *, name: str, source: 
 
 
 def _gravity(estimate: YawEstimate, known: YawRig) -> dict[str, float]:
-    """G and psi_0 of the moment found, with what was known of it: -G sin(psi - psi_0)."""
+    """G and psi_0 of the estimated moment plus the known moment: -G sin(psi - psi_0)."""
     found = [estimate.friction.get(term, (0.0, None))[0] for term in ("gravity_sine", "gravity_cosine")]
     if not any(found):
         return {}
@@ -167,4 +169,4 @@ def _gravity(estimate: YawEstimate, known: YawRig) -> dict[str, float]:
 
 
 BEST = YAW_METHODS[0]
-"""The method whose numbers a card gets unless another is asked for."""
+"""Default method for the numbers of a card."""

@@ -1,4 +1,4 @@
-"""What is looked at before and after an estimate from records of the yaw rig, and what the user is reported."""
+"""Checks before and after an estimate from records of the yaw rig, with notes for the user."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from tank2sim.records.yaw import YawRecord
 
 _NOT_QUITE_MIRRORED = 0.03
 _FULL = 0.995
-"""Share of the largest current from which the motor is taken for saturated."""
+"""Share of the largest current from which the motor counts as saturated."""
 _ANOTHER_UNIT = 20.0
 _STRONG_A = 20.0
-"""More than a motor of such a rig takes; the paper's has 1 A."""
+"""More current than a motor of such a rig takes; the paper's has 1 A."""
 _LEAST_A = 1e-9
 """A current that stays below it turns no body. Project choice: a billionth of what the paper's motor takes (1 A)."""
 _NOT_THE_PROGRAMME = 1.5
-"""A turn that is so many times more or less than programmed is a mistake of units, not of tracking."""
+"""A turn that differs from the programme by this factor is an error of units, not of tracking."""
 _PULSE_RAD = 2 * math.pi / 3000
-"""Of the paper's encoder; where (3) holds, about a quarter of it is left."""
+"""Pulse of the paper's encoder; where (3) holds, the residual is about a quarter of it."""
 _APART = 3.0
 _SHARPER = 3.0
 
 
 def check_current(records: tuple[YawRecord, ...]) -> list[str]:
-    """What to say of the files and their currents; InputError where the motor is saturated in one or idle."""
+    """Notes on the files and their currents; InputError for a motor that is saturated or idle."""
     notes = []
     for record in records:
-        notes += [f"{record.path.name}: {told}" for told in record.notes]
+        notes += [f"{record.path.name}: {note}" for note in record.notes]
         largest = float(np.abs(record.current_A).max())
         if largest < _LEAST_A:
             problem, remedy = f"stays below {_LEAST_A:g} A: the motor did not turn the body", "give the current in A"
@@ -65,14 +65,14 @@ def check_current(records: tuple[YawRecord, ...]) -> list[str]:
 
 
 def check_turn(record: YawRecord) -> None:
-    """Raise InputError if the body does not turn about as far as the programme: the units are then not what they say.
+    """Raise InputError if the turn of the body differs grossly from the programme: its units are then wrong.
 
-    Looked at while the rate is held, where a wrong start_s does little.
+    Checked while the rate is constant, where a wrong start_s has little effect.
     """
-    own = record.programme
-    for number in range(own.humps):
-        ends = own.start_s + number * own.period_s + own.rise_s * np.array([1.0, 2.0])
-        programmed = float(abs(np.diff(own.at(ends).angle_rad)[0]))
+    turn = record.programme
+    for number in range(turn.humps):
+        ends = turn.start_s + number * turn.period_s + turn.rise_s * np.array([1.0, 2.0])
+        programmed = float(abs(np.diff(turn.at(ends).angle_rad)[0]))
         measured = float(abs(np.diff(np.interp(ends, record.time_s, record.angle_rad))[0]))
         if not programmed / _NOT_THE_PROGRAMME < measured < programmed * _NOT_THE_PROGRAMME:
             problem = (
@@ -91,14 +91,14 @@ def check_sign(record: YawRecord, fit: EnergyFit) -> None:
 
 
 def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limit: float) -> list[str]:
-    """What to say of intervals that are not quite mirror images; InputError beyond the limit."""
+    """Notes on intervals that are not quite mirror images; InputError beyond the limit."""
     place = 0
     for record in records:
         for number in range(record.programme.humps):
             if mirror[place] > limit:
                 pair = record.programme.pairs()[number]
                 problem = (
-                    f"the intervals {_span(pair.accelerating_s)} and {_span(pair.braking_s)} are no mirror images: "
+                    f"the intervals {_span(pair.accelerating_s)} and {_span(pair.braking_s)} are not mirror images: "
                     f"their rates differ by up to {100 * mirror[place]:.1f} % of the largest, and {100 * limit:g} % is "
                     "allowed"
                 )
@@ -109,7 +109,7 @@ def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limi
     if worst > _NOT_QUITE_MIRRORED:
         return [
             f"The accelerating and braking intervals are mirror images to {100 * worst:.1f} % of the largest rate: the "
-            "two-interval formulas are biased by what that does to the dissipation."
+            "two-interval formulas are biased by the difference in dissipation."
         ]
     return []
 
@@ -119,24 +119,24 @@ def _span(ends: tuple[float, float]) -> str:
 
 
 def check_explained(records: tuple[YawRecord, ...], misfit_rad: float | None) -> list[str]:
-    """What to say where (3) does not give the record's motion, or a single hump cannot show that it does not."""
+    """Notes if (3) does not explain the record's motion, or a single hump cannot show it."""
     notes = []
     if misfit_rad is not None and misfit_rad > _PULSE_RAD:
         notes.append(
             f"(3) leaves {misfit_rad:.2g} rad of the angle (rms), more than an encoder's pulse: gravity, walls or "
-            "something else acts that is not among the terms, and no standard error contains what they do."
+            "another effect is missing in the terms, and no standard error includes it."
         )
-    (first, *others) = records
-    if not others and first.programme.humps == 1 and first.programme.turn_per_interval_rad < 2 * math.pi:
+    (first, *further) = records
+    if not further and first.programme.humps == 1 and first.programme.turn_per_interval_rad < 2 * math.pi:
         notes.append(
-            "One hump of part of a turn does not tell a moment of gravity from inertia: give two humps or more, which "
-            "begin at other angles."
+            "One hump of part of a turn does not distinguish a moment of gravity from inertia: give two humps or more "
+            "that begin at other angles."
         )
     return notes
 
 
-def judged(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[str]:
-    """What to say of the estimates."""
+def estimate_notes(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[str]:
+    """Notes on the estimates."""
     best, two = estimates["energy_least_squares"], estimates["two_intervals"]
     notes = []
     if two.bias_kgm2 is not None:
@@ -144,9 +144,9 @@ def judged(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[str]:
         parts = two.bias_from
         notes.append(
             f"The two-interval formula (1) lies {1e4 * two.bias_kgm2:+.3g}e-4 kg m2 ({share:+.2g} % of the total) from "
-            f"the least squares: {1e4 * parts['dissipation']:+.3g}e-4 because the intervals do not dissipate alike, "
+            f"the least squares: {1e4 * parts['dissipation']:+.3g}e-4 because the intervals differ in dissipation, "
             f"{1e4 * parts['speeds']:+.3g}e-4 because their end speeds differ. Its standard error does not "
-            "contain that."
+            "include this bias."
         )
     if len(two.by_hump_kgm2) > 1:
         humps = ", ".join(f"{1e4 * value:.4g}" for value in two.by_hump_kgm2)
@@ -157,23 +157,24 @@ def judged(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[str]:
     for term, (value, error) in best.friction.items():
         if error is not None and abs(value) < 2 * error:
             notes.append(f"{term} does not differ from zero: {value:.3g} ± {error:.2g} {ENERGY_TERMS[term][1]}.")
-    return [*notes, *_compared(best, estimates.get("output_error"))]
+    return [*notes, *_comparison_notes(best, estimates.get("output_error"))]
 
 
-def _compared(best: YawEstimate, other: YawEstimate | None) -> list[str]:
-    """The energy least squares next to the nonlinear ones, where these say more, or something else."""
-    if other is None or not best.inertia_error_kgm2 or not other.inertia_error_kgm2:
+def _comparison_notes(best: YawEstimate, nonlinear: YawEstimate | None) -> list[str]:
+    """Note on the nonlinear least squares, where they are more accurate or disagree with the energy least squares."""
+    if nonlinear is None or not best.inertia_error_kgm2 or not nonlinear.inertia_error_kgm2:
         return []
-    apart = abs(best.total_inertia_kgm2 - other.total_inertia_kgm2)
-    error = math.hypot(best.inertia_error_kgm2, other.inertia_error_kgm2)
-    if apart > _APART * error:
+    difference = abs(best.total_inertia_kgm2 - nonlinear.total_inertia_kgm2)
+    error = math.hypot(best.inertia_error_kgm2, nonlinear.inertia_error_kgm2)
+    if difference > _APART * error:
         return [
-            f"energy_least_squares and output_error differ by {1e4 * apart:.3g}e-4 kg m2, {apart / error:.2g} times "
-            "their errors: something in the record is in neither's equations, and neither error contains it."
+            f"energy_least_squares and output_error differ by {1e4 * difference:.3g}e-4 kg m2, "
+            f"{difference / error:.2g} times their errors: an effect in the record is missing in the equations of "
+            "both, and in both errors."
         ]
-    if other.inertia_error_kgm2 < best.inertia_error_kgm2 / _SHARPER:
+    if nonlinear.inertia_error_kgm2 < best.inertia_error_kgm2 / _SHARPER:
         return [
-            f"output_error is sharper here, ± {1e4 * other.inertia_error_kgm2:.2g}e-4 against "
+            f"output_error is more accurate, ± {1e4 * nonlinear.inertia_error_kgm2:.2g}e-4 against "
             f"± {1e4 * best.inertia_error_kgm2:.2g}e-4 kg m2; --method output_error puts it into a card."
         ]
     return []

@@ -4,8 +4,8 @@ Over any stretch of time the work of the motor is that against each term of (3):
 
     k_t int w I dt = (J + lambda661) D(w^2)/2 + f_c int |w| dt + f_1 int w^2 dt + f_662 int |w|^3 dt
 
-The least squares over subintervals need no mirror images. The two-interval formulas take the dissipation of both
-intervals for the same; a loop that follows the programme with a lag does not make it so, and they are biased by it.
+The least squares over subintervals need no mirror images. The two-interval formulas assume the same dissipation in both
+intervals; a control loop with a lag makes them differ, which biases the formulas.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ IntervalPair = tuple[Interval, Interval]
 
 PARTS = 6
 """Subintervals of an interval: with six, each of some 0.3 s in the paper's programme, the four terms of (3) are well
-apart; more are shorter than the spline of the rate can resolve."""
+distinguished; more subintervals are too short for the spline of the rate."""
 
 _HOPELESS = 1e7
 
@@ -45,7 +45,7 @@ class Balance:
     rows : array, (n, terms)
         Work per unit of each term.
     work_J : array, (n,)
-        Of the motor, less what is known.
+        Work of the motor, less known work.
     pairs : tuple
         The intervals; row ``((pair * 2 + braking) * parts + part)``.
     parts : int
@@ -58,13 +58,13 @@ class Balance:
     parts: int
 
     def whole(self, values: Array) -> Array:
-        """Sums over the parts of each interval of one number a subinterval, (pairs, 2)."""
+        """Sums over the parts of each interval of a number for each subinterval, (pairs, 2)."""
         sums: Array = values.reshape(len(self.pairs), 2, self.parts).sum(axis=2)
         return sums
 
 
 class EnergyFit(NamedTuple):
-    """Coefficients of the terms with their covariance, what is left (J, (n,)), and the balance they are of."""
+    """Coefficients of the terms with their covariance, residuals (J, (n,)), and their balance."""
 
     coefficients: Array
     covariance: Array
@@ -79,38 +79,39 @@ def energy_balance(
     rig: YawRig | None,
     parts: int = PARTS,
 ) -> Balance:
-    """The balance of every subinterval of mirror pairs; `rig` tells what is known beyond (3)."""
+    """The balance of every subinterval of mirror pairs; `rig` has the known effects beyond (3)."""
     rows, work = [], []
     for pair in pairs:
-        for own in pair:
-            rows += work_rows(own, terms, parts)
-            work += [motor_work(own.part(place, parts), torque_constant_NmpA, rig) for place in range(parts)]
+        for interval in pair:
+            rows += work_rows(interval, terms, parts)
+            work += [motor_work(interval.part(place, parts), torque_constant_NmpA, rig) for place in range(parts)]
     return Balance(terms=terms, rows=np.array(rows), work_J=np.array(work), pairs=tuple(pairs), parts=parts)
 
 
 def fit_energy(balance: Balance, record: YawRecord, programmed: Balance | None = None) -> EnergyFit:
     """Least squares over all subintervals, with the `programmed` motion for instruments.
 
-    A rate from an encoder has errors, and plain least squares take them for motion: the inertia comes out too small,
-    by several per cent where the encoder is coarse or the rows are few. The programme has no such errors and moves
-    with the body, so that Z'(y - X b) = 0, Z the rows of the programme, is free of that (instrumental variables,
-    Reiersol 1945).
+    Errors of the encoder's rate bias plain least squares: the inertia is too small, by several per cent with a coarse
+    encoder or few rows. The programme has no such errors and correlates with the motion, so that Z'(y - X b) = 0, Z the
+    rows of the programme, is unbiased (instrumental variables, Reiersol 1945).
 
     Raises
     ------
     InputError
-        The subintervals do not tell the terms apart.
+        The subintervals do not distinguish the terms.
     """
     rows, work = balance.rows, balance.work_J
     freedom = len(rows) - len(balance.terms)
     if freedom < 1 or not scaled_condition(rows) < _HOPELESS:
         unknowns = ", ".join(balance.terms)
-        raise InputError(record.path, "", f"does not tell {unknowns} apart", "give more records, or take fewer --terms")
+        raise InputError(
+            record.path, "", f"does not distinguish {unknowns}", "give more records, or take fewer --terms"
+        )
     inverse = _inverse(rows, rows if programmed is None else programmed.rows)
     coefficients = inverse @ work
     residuals = work - rows @ coefficients
-    # Errors of neighbouring parts hang together: the speed at which one ends is that at which the next begins. The
-    # covariance is therefore taken from what each whole interval leaves, where that is the larger.
+    # Errors of neighbouring parts are correlated: they share the speed at their common end. The covariance is therefore
+    # that of the residuals of whole intervals, where it is larger.
     variance = float(residuals @ residuals) / freedom
     spread = np.diag(np.full(len(rows), variance))
     covariance = inverse @ spread @ inverse.T
@@ -121,8 +122,8 @@ def fit_energy(balance: Balance, record: YawRecord, programmed: Balance | None =
 
 def _inverse(rows: Array, instruments: Array) -> Array:
     """(Z'X)^-1 Z'; with Z = X that of least squares."""
-    norms, other = column_norms(rows), column_norms(instruments)
-    scaled = (instruments / other).T
+    norms, instrument_norms = column_norms(rows), column_norms(instruments)
+    scaled = (instruments / instrument_norms).T
     inverse: Array = np.linalg.solve(scaled @ (rows / norms), scaled) / norms[:, None]
     return inverse
 
@@ -131,8 +132,8 @@ def _clustered(inverse: Array, residuals: Array, balance: Balance) -> Array:
     """Covariance from the scatter of whole intervals, each taken as one draw (Liang & Zeger 1986)."""
     count = 2 * len(balance.pairs)
     each = (inverse * residuals).reshape(len(balance.terms), count, balance.parts).sum(axis=2)
-    more = count / max(1, count - 1)
-    covariance: Array = more * each @ each.T
+    correction = count / max(1, count - 1)
+    covariance: Array = correction * each @ each.T
     return covariance
 
 
@@ -172,11 +173,10 @@ def estimate_from(
 
 
 def as_many_equations(method: str, fit: EnergyFit, ideal: Interval) -> YawEstimate:
-    """As the paper describes it: as many equations as unknowns.
+    """The paper's method: as many equations as unknowns.
 
-    One is the difference (1) of the whole intervals, the others are sums (2) of mirrored parts, one for each term of
-    friction; each is the mean over the pairs. The standard errors are those of the least squares' scatter carried
-    through these equations.
+    The first is the difference (1) of the whole intervals, the others are sums (2) of mirrored parts, one for each term
+    of friction; each is the mean over the pairs. The standard errors propagate the scatter of the least squares.
     """
     balance = fit.balance
     unknowns, pairs, parts = len(balance.terms), len(balance.pairs), balance.parts
@@ -195,14 +195,14 @@ def as_many_equations(method: str, fit: EnergyFit, ideal: Interval) -> YawEstima
 def two_intervals(method: str, balance: Balance, fit: EnergyFit) -> YawEstimate:
     """(1) and (2), the mean over the pairs, with its bias against the least squares `fit` of actual speeds.
 
-    The standard error is the scatter of the pairs: a bias that is the same in each is not in it.
+    The standard error is the scatter of the pairs, without their common bias.
     """
     work = balance.whole(balance.work_J)
     inertia, lost = [], []
-    for pair, (one, other) in zip(balance.pairs, work, strict=True):
+    for pair, (accelerating, braking) in zip(balance.pairs, work, strict=True):
         w1, w2 = float(pair[0].rate_radps[0]), float(pair[0].rate_radps[-1])
-        inertia.append(inertia_from_work(float(one), float(other), w1, w2))
-        lost.append(dissipation_from_work(float(one), float(other)))
+        inertia.append(inertia_from_work(float(accelerating), float(braking), w1, w2))
+        lost.append(dissipation_from_work(float(accelerating), float(braking)))
     total = float(np.mean(inertia))
     return YawEstimate(
         method=method,
@@ -221,8 +221,8 @@ def _mean_error(values: list[float]) -> float | None:
 
 
 def _bias_parts(fit: EnergyFit) -> dict[str, float]:
-    """Why (1) with actual speeds is off: with D the work against friction and S the change of w^2 in an interval,
-    (D12 - D56)/S12 and (J + lambda)(-S56 - S12)/(2 S12), each the mean over the pairs."""
+    """Parts of the bias of (1) with actual speeds: with D the work against friction and S the change of w^2 in an
+    interval, (D12 - D56)/S12 and (J + lambda)(-S56 - S12)/(2 S12), each the mean over the pairs."""
     balance = fit.balance
     square = balance.whole(2 * balance.rows[:, 0])
     lost = balance.whole(balance.rows[:, 1:] @ fit.coefficients[1:])

@@ -1,4 +1,4 @@
-"""What one method makes of records of the yaw rig: inertia, dissipation, friction, and how sure they are."""
+"""Estimates from records of the yaw rig by one method: inertia, dissipation and friction with their errors."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ class YawEstimate:
     ----------
     method : str
     total_inertia_kgm2, inertia_error_kgm2 : float
-        J_zz + lambda661 (in air J_zz) and its standard error; None where the data do not tell.
+        J_zz + lambda661 (in air J_zz) and its standard error; None where the data do not determine it.
     dissipation_J, dissipation_error_J : float
         B + D over one interval.
     friction : mapping
         Other terms of :data:`tank2sim.identification.yaw.intervals.ENERGY_TERMS` to (value, standard error), in SI.
     misfit : float or None
-        Root mean square of what is left: J for methods of energy, rad for those of the angle.
+        Root mean square of the residuals: J for methods of energy, rad for those of the angle.
     bias_kgm2 : float or None
-        How far a two-interval formula lies from the energy least squares of the same records.
+        Difference of a two-interval formula from the energy least squares of the same records.
     bias_from : mapping
-        Parts of that: ``dissipation`` (not the same in both intervals) and ``speeds`` (w1, w2 not those of w6, w5).
+        Parts of the bias: ``dissipation`` (different in both intervals) and ``speeds`` (w1, w2 differ from w6, w5).
     by_hump_kgm2 : tuple of float
         J_zz + lambda661 of each pair of intervals by a two-interval formula, of which the estimate is the mean.
     """
@@ -44,8 +44,8 @@ class YawEstimate:
     by_hump_kgm2: tuple[float, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
-        """As plain data; the unit of a number stands in its key."""
-        told: dict[str, Any] = {
+        """As plain data; the unit of a number is in its key."""
+        result: dict[str, Any] = {
             "total_inertia_kgm2": self.total_inertia_kgm2,
             "total_inertia_standard_error_kgm2": self.inertia_error_kgm2,
             "dissipation_J": self.dissipation_J,
@@ -53,9 +53,9 @@ class YawEstimate:
         }
         for term, (value, error) in self.friction.items():
             unit = ENERGY_TERMS[term][1]
-            told[f"{term}_{unit}"], told[f"{term}_standard_error_{unit}"] = value, error
+            result[f"{term}_{unit}"], result[f"{term}_standard_error_{unit}"] = value, error
         if self.bias_kgm2 is not None:
-            told["bias_against_least_squares_kgm2"] = self.bias_kgm2
-            told["bias_from_kgm2"] = dict(self.bias_from)
-            told["total_inertia_by_hump_kgm2"] = list(self.by_hump_kgm2)
-        return told
+            result["bias_against_least_squares_kgm2"] = self.bias_kgm2
+            result["bias_from_kgm2"] = dict(self.bias_from)
+            result["total_inertia_by_hump_kgm2"] = list(self.by_hump_kgm2)
+        return result

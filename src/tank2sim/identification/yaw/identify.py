@@ -19,7 +19,7 @@ from tank2sim.identification.yaw.diagnostics import (
     check_mirror,
     check_sign,
     check_turn,
-    judged,
+    estimate_notes,
 )
 from tank2sim.identification.yaw.energy import (
     EnergyFit,
@@ -48,7 +48,7 @@ YAW_METHODS = (
     "energy_least_squares_reference",
     "two_intervals_reference",
 )
-"""The first is the one whose numbers go into a card; ``_reference`` takes the programme's speeds for the body's."""
+"""The first gives the numbers of a card; ``_reference`` uses the programme's speeds instead of the body's."""
 
 AIR_TERMS = ("inertia", "coulomb", "viscous")
 WATER_TERMS = ("inertia", "coulomb", "viscous", "quadratic")
@@ -61,20 +61,20 @@ TORQUE_CONSTANT_NMPA = 0.051
 
 @dataclass(frozen=True, kw_only=True)
 class YawOptions:
-    """What is known besides the records, and how to go about them.
+    """Known values in addition to the records, and options of their evaluation.
 
     Parameters
     ----------
     inertia_kgm2, inertia_error_kgm2 : float, optional
-        J_zz, and its standard error; by default from records in air, or as the file says.
+        J_zz, and its standard error; by default from records in air or from the file.
     torque_constant_NmpA, torque_constant_error : float, optional
         k_t, and its relative standard error.
     known : YawRig, optional
-        Walls, gravity, and differences between accelerating and braking that are known.
+        Known walls, gravity, and differences between accelerating and braking.
     terms : tuple of str, optional
         Terms to estimate, by default those of (3) for the medium.
     mirror_limit : float
-        Largest difference of the rates of two mirror images, over the largest rate, that is accepted.
+        Largest accepted difference of the rates of two mirror images, over the largest rate.
     """
 
     inertia_kgm2: float | None = None
@@ -88,7 +88,7 @@ class YawOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class BodyInertia:
-    """J_zz in kg m2, its standard error (None if unknown), where it is from, and if by the k_t of the records."""
+    """J_zz in kg m2, its standard error (None if unknown), its source, and True if it depends on the records' k_t."""
 
     value_kgm2: float
     error_kgm2: float | None
@@ -103,13 +103,13 @@ class YawIdentification:
     Parameters
     ----------
     records : tuple of YawRecord
-        Those of the medium.
+        Records of the medium.
     medium : str
         ``water``, or ``air`` if no record is of water.
     torque_constant_NmpA, torque_constant_error : float
         k_t and its relative standard error.
     body : BodyInertia or None
-        J_zz; None in air, where it is what is estimated, and where nothing states it.
+        J_zz; None in air, where it is estimated, and where it is unknown.
     estimates : dict
         Method to estimate.
     fit : EnergyFit
@@ -117,11 +117,11 @@ class YawIdentification:
     ideal : Interval
         The programme's accelerating interval.
     angle : AngleFit or None
-        Of the nonlinear least squares, where it converged.
+        The nonlinear least squares, where they converged.
     mirror : tuple of float
         Difference of the rates of each pair, over the largest.
     notes : tuple of str
-        What the user should know, in whole sentences.
+        Messages for the user, in sentences.
     """
 
     records: tuple[YawRecord, ...]
@@ -140,28 +140,28 @@ class YawIdentification:
     def added_inertia(self, method: str) -> tuple[float, float | None] | None:
         """lambda661 by a method and its standard error, kg m2; None where J_zz is not known.
 
-        The errors of the total, of J_zz and of k_t count. The last acts in proportion: on the total where J_zz is
-        known otherwise, on the difference where J_zz was found in air with the same k_t.
+        Combines the errors of the total, of J_zz and of k_t. The last is proportional to the total, or to the
+        difference where J_zz was found in air with the same k_t.
         """
         if self.body is None:
             return None
-        own = self.estimates[method]
-        added = own.total_inertia_kgm2 - self.body.value_kgm2
-        scaled = added if self.body.by_torque_constant else own.total_inertia_kgm2
-        parts = [own.inertia_error_kgm2, self.body.error_kgm2, self.torque_constant_error * scaled]
+        estimate = self.estimates[method]
+        added = estimate.total_inertia_kgm2 - self.body.value_kgm2
+        scaled = added if self.body.by_torque_constant else estimate.total_inertia_kgm2
+        parts = [estimate.inertia_error_kgm2, self.body.error_kgm2, self.torque_constant_error * scaled]
         known = [part for part in parts if part is not None]
-        return added, math.hypot(*known) if own.inertia_error_kgm2 is not None else None
+        return added, math.hypot(*known) if estimate.inertia_error_kgm2 is not None else None
 
     def as_json(self) -> dict[str, Any]:
-        """The result as plain data; ``added_inertia_kgm2`` and ``dissipation_J`` by method, the rest in ``methods``;
-        histories, balance and residuals to draw (:mod:`tank2sim.identification.yaw.plot_data`)."""
+        """The result as plain data; ``added_inertia_kgm2`` and ``dissipation_J`` by method, more in ``methods``;
+        histories, balance and residuals for charts (:mod:`tank2sim.identification.yaw.plot_data`)."""
         added = {method: self.added_inertia(method) for method in self.estimates}
         methods = {}
         for method, estimate in self.estimates.items():
-            own = added[method]
+            value = added[method]
             methods[method] = {
-                "added_inertia_kgm2": own[0] if own else None,
-                "added_inertia_standard_error_kgm2": own[1] if own else None,
+                "added_inertia_kgm2": value[0] if value else None,
+                "added_inertia_standard_error_kgm2": value[1] if value else None,
                 **estimate.as_json(),
             }
         return {
@@ -171,8 +171,8 @@ class YawIdentification:
             "body_inertia_kgm2": self.body.value_kgm2 if self.body else None,
             "body_inertia_standard_error_kgm2": self.body.error_kgm2 if self.body else None,
             "body_inertia_source": self.body.source if self.body else None,
-            "added_inertia_kgm2": {method: own[0] if own else None for method, own in added.items()},
-            "dissipation_J": {method: own.dissipation_J for method, own in self.estimates.items()},
+            "added_inertia_kgm2": {method: value[0] if value else None for method, value in added.items()},
+            "dissipation_J": {method: value.dissipation_J for method, value in self.estimates.items()},
             "methods": methods,
             "mirror_difference": list(self.mirror),
             "histories": record_histories(self.records, self.fit),
@@ -187,12 +187,12 @@ class YawIdentification:
 def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None) -> YawIdentification:
     """Estimate the added yaw inertia and the dissipation of one body.
 
-    Records in air give J_zz, if there are any in addition to those in water; alone, they are evaluated themselves.
+    Records in air give J_zz for records in water; alone, they are evaluated themselves.
 
     Raises
     ------
     InputError
-        The intervals of a record are no mirror images, the motor saturates in one, the encoder steps too rarely, or
+        The intervals of a record are not mirror images, the motor saturates in one, the encoder steps too rarely, or
         the records do not separate the terms.
     """
     options = options or YawOptions()
@@ -209,12 +209,12 @@ def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None
 def torque_constant(reference: YawIdentification, known_inertia_kgm2: float) -> tuple[float, float]:
     """k_t (N m/A) and its relative standard error, from records in air of a body whose inertia is known.
 
-    All terms of (3) are proportional to k_t: the records give J/k_t, whatever k_t they were evaluated with.
+    All terms of (3) are proportional to k_t: the records give J/k_t, independent of the k_t of the evaluation.
 
     Raises
     ------
     InputError
-        The records are of water, where the added inertia is unknown too.
+        The records are of water, where the added inertia is unknown, too.
     """
     if reference.medium != "air":
         path = reference.records[0].path
@@ -263,8 +263,8 @@ def _result(
     terms = options.terms or (AIR_TERMS if medium == "air" else WATER_TERMS)
     fit, reference = fitted(terms)
     if options.terms is None and (found := _with_gravity(fit, fitted)):
-        (fit, reference), told_of_gravity = found
-        notes += told_of_gravity
+        (fit, reference), gravity_notes = found
+        notes += gravity_notes
     check_sign(records[0], fit)
     ideal = programmed[0][0]
     estimates = {
@@ -274,12 +274,12 @@ def _result(
         "energy_least_squares_reference": least_squares_estimate("energy_least_squares_reference", reference, ideal),
         "two_intervals_reference": two_intervals("two_intervals_reference", reference.balance, fit),
     }
-    angle, left_out = _angle(records, _rig(constant, rig), estimates["energy_least_squares"], ideal)
-    notes += [*left_out, *check_explained(records, angle.estimate.misfit if angle else None)]
+    angle, omissions = _angle(records, _rig(constant, rig), estimates["energy_least_squares"], ideal)
+    notes += [*omissions, *check_explained(records, angle.estimate.misfit if angle else None)]
     if angle:
         estimates["output_error"] = angle.estimate
     body, remarks = _body(records, medium, options, air)
-    result = YawIdentification(
+    return YawIdentification(
         records=records,
         medium=medium,
         torque_constant_NmpA=constant,
@@ -290,54 +290,56 @@ def _result(
         ideal=ideal,
         angle=angle,
         mirror=mirror,
-        notes=(*notes, *remarks, *judged(fit, estimates)),
+        notes=(*notes, *remarks, *estimate_notes(fit, estimates)),
         air=air,
     )
-    return result
 
 
 Fits = tuple[EnergyFit, EnergyFit]
 
 
 def _with_gravity(fit: EnergyFit, fitted: Callable[[tuple[str, ...]], Fits]) -> tuple[Fits, list[str]] | None:
-    """The fits with a moment of gravity, and what to say, where the work left over goes with the angle.
+    """The fits with a moment of gravity, with a note, if the residual work varies with the angle.
 
-    By the F test of the two terms, at a thousandth, and if the moment is at least a hundredth of the motor's mean:
-    the test alone finds the roundings of a record without noise.
+    By the F test of the two terms at a thousandth, for a moment of at least a hundredth of the motor's mean: the test
+    alone would find the rounding of a record without noise.
     """
     try:
-        more, reference = fitted((*fit.balance.terms, *GRAVITY))
+        extended, reference = fitted((*fit.balance.terms, *GRAVITY))
     except InputError:  # the angles do not separate it
         return None
-    freedom = len(more.residuals_J) - len(more.coefficients)
-    rest, before = float(more.residuals_J @ more.residuals_J), float(fit.residuals_J @ fit.residuals_J)
-    moment = float(np.hypot(*more.coefficients[-2:]))
-    turned = sum(abs(own.angle_rad[-1] - own.angle_rad[0]) for pair in more.balance.pairs for own in pair)
-    mean = float(np.abs(more.balance.work_J).sum()) / turned
-    if moment < _SLIGHT * mean or f_test.sf((before - rest) / 2 / (rest / freedom), 2, freedom) > _RARE:
+    freedom = len(extended.residuals_J) - len(extended.coefficients)
+    after, before = float(extended.residuals_J @ extended.residuals_J), float(fit.residuals_J @ fit.residuals_J)
+    moment = float(np.hypot(*extended.coefficients[-2:]))
+    turned = sum(
+        abs(interval.angle_rad[-1] - interval.angle_rad[0]) for pair in extended.balance.pairs for interval in pair
+    )
+    mean = float(np.abs(extended.balance.work_J).sum()) / turned
+    if moment < _SLIGHT * mean or f_test.sf((before - after) / 2 / (after / freedom), 2, freedom) > _RARE:
         return None
     note = (
-        f"What (3) leaves goes with the angle: a moment of gravity of {moment:.3g} N m is among the terms "
-        f"(--terms {','.join(fit.balance.terms[1:])} leaves it out). The two-interval formulas do not know it."
+        f"The residual of (3) varies with the angle: a moment of gravity of {moment:.3g} N m is among the terms "
+        f"(--terms {','.join(fit.balance.terms[1:])} omits it). The two-interval formulas neglect it."
     )
-    return (more, reference), [note]
+    return (extended, reference), [note]
 
 
 def _angle(
     records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, ideal: Interval
 ) -> tuple[AngleFit | None, list[str]]:
-    """The nonlinear least squares, and why they are left out."""
+    """The nonlinear least squares, or None with the reason."""
     beyond = [term for term in first.friction if term not in (*WATER_TERMS, *GRAVITY)]
     if beyond:
         return None, [
-            f"output_error fits the terms of (3) and gravity and is left out, for {', '.join(beyond)} is asked for."
+            f"output_error fits the terms of (3) and gravity and is left out, because {', '.join(beyond)} was "
+            "requested."
         ]
     angle = fit_angle(records, rig, first, ideal)
     return angle, [] if angle else ["output_error: the fit of the angle did not converge and is left out."]
 
 
 def _rig(constant: float, known: YawRig | None) -> YawRig:
-    """The rig that the nonlinear least squares integrate: its own terms are theirs to find."""
+    """The rig of the nonlinear least squares, with the known terms."""
     return (known or UNKNOWN_RIG).model_copy(update={"torque_constant_NmpA": constant})
 
 
@@ -379,7 +381,7 @@ def _body(
             inertia = BodyInertia(value_kgm2=stated, error_kgm2=error, source=f"comment of {record.path.name}")
             return inertia, _lacking(inertia)
     return None, [
-        "J_zz is not known, so that the added inertia cannot be separated from the total: give a record in air as "
+        "J_zz is unknown, so that the added inertia cannot be separated from the total: give a record in air as "
         "well, or --inertia-kgm2."
     ]
 
@@ -388,6 +390,6 @@ def _lacking(body: BodyInertia) -> list[str]:
     if body.error_kgm2 is not None:
         return []
     return [
-        "J_zz has no standard error, and that of the added inertia is without it: give --inertia-error-kgm2, or a line "
-        "'# inertia_error_kgm2: 0.0002'."
+        "J_zz has no standard error, and that of the added inertia does not include one: give --inertia-error-kgm2, "
+        "or a line '# inertia_error_kgm2: 0.0002'."
     ]

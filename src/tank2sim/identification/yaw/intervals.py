@@ -1,8 +1,7 @@
-"""The intervals of a yaw record as the energy method needs them: rate, work, and what each term of (3) does.
+"""The intervals of a yaw record for the energy method: rate, work of the motor, and work of each term of (3).
 
-The rate of the body is not measured: the encoder counts pulses. A spline is laid through the moments at which the
-count changes, where the angle is known to the time of one sample, and not through the counts between, which are off by
-up to a pulse.
+The rate of the body is not measured: the encoder counts pulses. A spline is fitted to the changes of the count, where
+the angle is known to the time of a sample, and not to the counts between, whose error is up to a pulse.
 """
 
 from __future__ import annotations
@@ -25,18 +24,18 @@ from tank2sim.records.yaw import YawRecord
 Speeds = Literal["actual", "reference"]
 
 KNOTS_S = (0.5, 0.35, 0.25, 0.17, 0.1)
-"""Distances of the knots of the spline to choose from: the shortest follows the swings of a closed loop of some 0.1 s,
-the longest smooths away more of an encoder's noise. Each interval takes that of the least generalised cross-validation
-(Craven & Wahba 1979), the longest of equals."""
+"""Candidate distances of the spline's knots: the shortest follows the swings of a closed loop of some 0.1 s, the
+longest smooths more of an encoder's noise. Each interval uses that of least generalised cross-validation (Craven &
+Wahba 1979), the longest of equals."""
 _CORRELATION = 3.0
-"""How much the errors of an encoder hang together. Neighbouring points share a sample, and where the body passes about
-a whole count a sample the errors drift from one side to the other, which looks like motion. Our choice: with 1 a rate
-from 50 or 100 rows a second has four times the variance."""
+"""Sum of the correlations of an encoder's errors. Neighbouring points share a sample, and where the body passes about a
+whole count in a sample the errors drift from one side to the other, which looks like motion. Project choice: with 1 a
+rate from 50 or 100 rows a second has four times the variance."""
 _MARGIN_S = 0.35
-"""How far the spline reaches beyond an interval, as far as the body moves there: its ends are its worst places."""
+"""Extension of the spline beyond an interval, while the body moves: its errors are largest at its ends."""
 _DEGREE = 5
 STEPS_PER_COEFFICIENT = 2
-"""Encoder steps that a coefficient of the spline must have at least."""
+"""Least number of encoder steps for each coefficient of the spline."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -48,7 +47,7 @@ class Interval:
     time_s, angle_rad, rate_radps, acceleration_radps2, current_A : array
     braking : bool
     number : int
-        Of the pair it belongs to.
+        Number of its pair.
     """
 
     time_s: Array
@@ -89,12 +88,12 @@ class Interval:
 Work = Callable[[Interval], float]
 
 
-def _change_of_square(own: Interval) -> float:
-    return float(own.rate_radps[-1] ** 2 - own.rate_radps[0] ** 2) / 2
+def _change_of_square(interval: Interval) -> float:
+    return float(interval.rate_radps[-1] ** 2 - interval.rate_radps[0] ** 2) / 2
 
 
 def _swept(power: int) -> Work:
-    return lambda own: own.integral(np.abs(own.rate_radps) ** power)
+    return lambda interval: interval.integral(np.abs(interval.rate_radps) ** power)
 
 
 ENERGY_TERMS: dict[str, tuple[Work, str]] = {
@@ -102,9 +101,9 @@ ENERGY_TERMS: dict[str, tuple[Work, str]] = {
     "coulomb": (_swept(1), "Nm"),
     "viscous": (_swept(2), "Nms"),
     "quadratic": (_swept(3), "Nms2"),
-    "braking_quadratic": (lambda own: own.integral(np.abs(own.rate_radps) ** 3) if own.braking else 0.0, "Nms2"),
-    "gravity_sine": (lambda own: float(np.cos(own.angle_rad[0]) - np.cos(own.angle_rad[-1])), "Nm"),
-    "gravity_cosine": (lambda own: float(np.sin(own.angle_rad[-1]) - np.sin(own.angle_rad[0])), "Nm"),
+    "braking_quadratic": (lambda part: _swept(3)(part) if part.braking else 0.0, "Nms2"),
+    "gravity_sine": (lambda part: float(np.cos(part.angle_rad[0]) - np.cos(part.angle_rad[-1])), "Nm"),
+    "gravity_cosine": (lambda part: float(np.sin(part.angle_rad[-1]) - np.sin(part.angle_rad[0])), "Nm"),
 }
 """Term to the work (per unit of its coefficient) that the motor does against it over an interval, and its unit:
 inertia is J + lambda661, braking_quadratic f_662d - f_662a; the moment of gravity is -sine sin(psi) - cosine cos(psi).
@@ -117,12 +116,12 @@ def intervals(record: YawRecord, speeds: Speeds = "actual") -> tuple[tuple[Inter
     Parameters
     ----------
     speeds : str
-        ``actual``, as measured, or ``reference``, the programme's in their place.
+        ``actual``, as measured, or ``reference``, of the programme.
 
     Raises
     ------
     InputError
-        There are too few steps of the encoder in an interval.
+        An interval has too few steps of the encoder.
     """
     return tuple(
         (
@@ -137,19 +136,19 @@ def _interval(record: YawRecord, ends: tuple[float, float], speeds: Speeds, *, b
     begin, end = ends
     time = record.time_s
     inside = (time > begin + 1e-9) & (time < end - 1e-9)
-    own = np.concatenate([[begin], time[inside], [end]])
+    times = np.concatenate([[begin], time[inside], [end]])
     if speeds == "reference":
-        angle, rate, acceleration = record.programme.at(own)
+        angle, rate, acceleration = record.programme.at(times)
         angle = angle + np.interp(record.programme.start_s, time, record.angle_rad)
     else:
         spline = smooth_angle(record, ends)
-        angle, rate, acceleration = (spline(own, nu) for nu in (0, 1, 2))
+        angle, rate, acceleration = (spline(times, nu) for nu in (0, 1, 2))
     return Interval(
-        time_s=own,
+        time_s=times,
         angle_rad=angle,
         rate_radps=rate,
         acceleration_radps2=acceleration,
-        current_A=np.interp(own, time, record.current_A),
+        current_A=np.interp(times, time, record.current_A),
         braking=braking,
         number=number,
     )
@@ -180,13 +179,13 @@ def smooth_angle(record: YawRecord, ends: tuple[float, float]) -> BSpline:
         raise InputError(record.path, "column phi_rad", problem, remedy)
     splines = [spline for knot in KNOTS_S if (spline := _spline(middle, value, knot)) is not None]
     if not splines:
-        problem = f"stands still for a while between {begin:.3g} and {end:.3g} s, where the programme moves"
+        problem = f"does not move for a while between {begin:.3g} and {end:.3g} s, where the programme moves"
         raise InputError(record.path, "column phi_rad", problem, "check start_s, rise_s and the encoder")
     return min(splines, key=lambda spline: _cross_validation(spline, middle, value))
 
 
 def _spline(time: Array, angle: Array, knot_s: float) -> BSpline | None:
-    """Least-squares spline with knots so far apart; None if the points are too few, or leave out a piece."""
+    """Least-squares spline with knots at that distance; None if the points are too few, or a piece has none."""
     pieces = max(1, round((time[-1] - time[0]) / knot_s))
     if len(time) < STEPS_PER_COEFFICIENT * (pieces + _DEGREE):
         return None
@@ -199,53 +198,53 @@ def _spline(time: Array, angle: Array, knot_s: float) -> BSpline | None:
 
 
 def _cross_validation(spline: BSpline, time: Array, angle: Array) -> float:
-    """n RSS / (n - c m)^2, c the sum of the correlations of one error with all others (Altman 1990)."""
-    left = angle - spline(time)
+    """n RSS / (n - c m)^2, c the sum of the correlations of an error with all others (Altman 1990)."""
+    residual = angle - spline(time)
     free = len(time) - _CORRELATION * len(spline.c)
-    return float(len(time) * (left @ left) / free**2) if free > 0 else math.inf
+    return float(len(time) * (residual @ residual) / free**2) if free > 0 else math.inf
 
 
-def known_work(own: Interval, rig: YawRig) -> float:
-    """Work (J) against what is known beyond (3): walls, gravity, and what differs between accelerating and braking.
+def known_work(interval: Interval, rig: YawRig) -> float:
+    """Work (J) against known effects beyond (3): walls, gravity, and differences between accelerating and braking.
 
-    Of the pair f_662a, f_662d the difference is counted, when braking; lambda_662 |w|^1.5 and the walls' added inertia
-    take part with the acceleration.
+    Of the pair f_662a, f_662d the difference counts when braking; lambda_662 |w|^1.5 and the walls' added inertia
+    multiply the acceleration.
     """
-    rate, acceleration = own.rate_radps, own.acceleration_radps2
+    rate, acceleration = interval.rate_radps, interval.acceleration_radps2
     inertia, damping = np.zeros_like(rate), np.zeros_like(rate)
     if rig.walls:
         heading = ca.SX.sym("psi")
         walls = ca.Function("walls", [heading], list(wall_terms(heading, rig.walls)))
-        inertia, damping = (np.asarray(value).ravel() for value in walls(own.angle_rad[None, :]))
-    more = rig.inertia_braking_kgm2 if own.braking else rig.inertia_accelerating_kgm2
-    inertia = inertia + more * np.abs(rate) ** 1.5
-    rougher = rig.quadratic_braking - rig.quadratic_Nms2 if own.braking else 0.0
-    gravity = rig.gravity_Nm * np.sin(own.angle_rad - rig.gravity_angle_rad)
-    return own.integral(
+        inertia, damping = (np.asarray(value).ravel() for value in walls(interval.angle_rad[None, :]))
+    extra = rig.inertia_braking_kgm2 if interval.braking else rig.inertia_accelerating_kgm2
+    inertia = inertia + extra * np.abs(rate) ** 1.5
+    rougher = rig.quadratic_braking - rig.quadratic_Nms2 if interval.braking else 0.0
+    gravity = rig.gravity_Nm * np.sin(interval.angle_rad - rig.gravity_angle_rad)
+    return interval.integral(
         inertia * rate * acceleration + damping * rate**2 + rougher * np.abs(rate) ** 3 + gravity * rate
     )
 
 
-def motor_work(own: Interval, torque_constant_NmpA: float, rig: YawRig | None = None) -> float:
-    """k_t int w I dt less the work against what is known, J."""
-    work = torque_constant_NmpA * own.integral(own.rate_radps * own.current_A)
-    return work - known_work(own, rig) if rig else work
+def motor_work(interval: Interval, torque_constant_NmpA: float, rig: YawRig | None = None) -> float:
+    """k_t int w I dt less the work against known effects, J."""
+    work = torque_constant_NmpA * interval.integral(interval.rate_radps * interval.current_A)
+    return work - known_work(interval, rig) if rig else work
 
 
 def mirror_difference(pair: tuple[Interval, Interval]) -> float:
-    """Largest difference of the rates of two intervals run against each other, over the largest rate in them."""
+    """Largest difference of the rates of two mirrored intervals, over their largest rate."""
     speeding, braking = pair
     x = np.linspace(0, 1, 101)
 
-    def at(own: Interval, share: Array) -> Array:
-        time = own.time_s[0] + share * (own.time_s[-1] - own.time_s[0])
-        rate: Array = np.abs(np.interp(time, own.time_s, own.rate_radps))
+    def at(interval: Interval, share: Array) -> Array:
+        time = interval.time_s[0] + share * (interval.time_s[-1] - interval.time_s[0])
+        rate: Array = np.abs(np.interp(time, interval.time_s, interval.rate_radps))
         return rate
 
-    one, other = at(speeding, x), at(braking, 1 - x)
-    return float(np.max(np.abs(one - other)) / max(one.max(), other.max()))
+    speeding_rates, braking_rates = at(speeding, x), at(braking, 1 - x)
+    return float(np.max(np.abs(speeding_rates - braking_rates)) / max(speeding_rates.max(), braking_rates.max()))
 
 
-def work_rows(own: Interval, terms: Mapping[str, float] | tuple[str, ...], parts: int) -> list[list[float]]:
+def work_rows(interval: Interval, terms: Mapping[str, float] | tuple[str, ...], parts: int) -> list[list[float]]:
     """Work per unit of each term in each part of an interval."""
-    return [[ENERGY_TERMS[term][0](own.part(place, parts)) for term in terms] for place in range(parts)]
+    return [[ENERGY_TERMS[term][0](interval.part(place, parts)) for term in terms] for place in range(parts)]

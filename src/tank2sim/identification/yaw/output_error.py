@@ -1,8 +1,7 @@
 """The paper's nonlinear least squares: (3) integrated under the recorded current, fitted to the recorded angle.
 
-The paper fits J, f_c, f_1, f_662 to runs with prescribed currents; the same is done here with whatever current the
-record has. Each hump has a start of its own, fitted with the rest, so that what the record's small errors add up to
-does not run on from hump to hump.
+The paper fits J, f_c, f_1, f_662 to runs with prescribed currents; this module uses the recorded current. Each hump has
+its own start, fitted with the other unknowns, so that errors do not accumulate from hump to hump.
 """
 
 from __future__ import annotations
@@ -28,18 +27,18 @@ from tank2sim.records.yaw import YawRecord
 from tank2sim.simulation.scheme import runge_kutta_step
 
 _STEP_S = 0.02
-"""Step of the integration, at least a record's own. The current is its mean over a step."""
+"""Least step of the integration; a record with a longer step uses its own. The current is its mean over a step."""
 _SUBSTEPS = 2
-"""Runge-Kutta steps in one: a light body in air is so stiff in its dry friction that one alone may be unstable."""
+"""Runge-Kutta steps in one step: a single one may be unstable with the stiff dry friction of a light body in air."""
 _AWAKE = 0.25
-"""Rise times left out at both ends of a hump, where the programme's rate is below a fifth: there the body may stick,
-and what holds it then says nothing of the inertia."""
+"""Rise times omitted at both ends of a hump, where the programme's rate is below a fifth: the body may stick there, and
+static friction does not depend on the inertia."""
 _MEMORY = 0.2
-"""Share of a hump over which its residuals may hang together: long enough for what the current's noise adds up to."""
-_ONE_SIGMA = 0.8413
-"""Probability of less than one standard error, by which Student's distribution is made comparable."""
+"""Share of a hump over which its residuals may be correlated: long enough for the accumulated noise of the current."""
+_SIGMA_LEVEL = 0.8413
+"""Probability of less than one standard error, which makes Student's distribution comparable."""
 _TRIES = 40
-"""Steps of the search: from the energy least squares it takes three to ten."""
+"""Most steps of the search: from the energy least squares it needs three to ten."""
 _GRAVITY = ("gravity_sine", "gravity_cosine")
 _NAMES = {
     "inertia": "added.inertia",
@@ -47,7 +46,7 @@ _NAMES = {
     "viscous": "friction.viscous",
     "quadratic": "friction.quadratic",
 }
-"""Term to the parameter of the model that it is; J_zz is 0 there, so that the added inertia is the total."""
+"""Term to the parameter of the model; its J_zz is 0, so that the added inertia is the total."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +61,7 @@ class _Hump:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AngleFit:
-    """What the fitted model leaves of the angle: times (s), residuals (rad), in the order of the humps."""
+    """Residuals of the angle: times (s), residuals (rad), in the order of the humps."""
 
     estimate: YawEstimate
     time_s: Array
@@ -75,13 +74,13 @@ def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, i
     Parameters
     ----------
     records : tuple of YawRecord
-        Of one body in one medium.
+        Records of the same body and medium.
     rig : YawRig
-        Its torque constant, and what is known beyond (3).
+        Its torque constant, and known effects beyond (3).
     first : YawEstimate
-        Where to start, and the terms to fit.
+        Start values, and the terms to fit.
     ideal : Interval
-        The programme's, whose dissipation is reported.
+        The programme's interval, whose dissipation is reported.
     """
     terms = tuple(term for term in (*_NAMES, *_GRAVITY) if term == "inertia" or term in first.friction)
     humps = [hump for record in records for hump in _humps(record)]
@@ -92,15 +91,15 @@ def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, i
     begin = np.concatenate([values / scale, *(hump.start for hump in humps)])
 
     def evaluate(unknown: Array) -> tuple[Array, Array]:
-        left, slopes = [], []
+        residuals, slopes = [], []
         for place, hump in enumerate(humps):
             at = count + 2 * place
             angle, sensitivity = predict(unknown[:count] * scale, unknown[at : at + 2], hump)
-            left.append(angle - hump.angle_rad)
+            residuals.append(angle - hump.angle_rad)
             wide = np.zeros((len(angle), len(unknown)))
             wide[:, :count], wide[:, at : at + 2] = sensitivity[:, :count] * scale, sensitivity[:, count:]
             slopes.append(wide)
-        return np.concatenate(left), np.vstack(slopes)
+        return np.concatenate(residuals), np.vstack(slopes)
 
     last: list[tuple[Array, Array, Array]] = []
 
@@ -109,7 +108,7 @@ def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, i
             last[:] = [(unknown.copy(), *evaluate(unknown))]
         return last[0][1], last[0][2]
 
-    found = _searched(kept, begin, count)
+    found = _search(kept, begin, count)
     if found is None or not np.isfinite(found.x).all() or found.x[0] == 0:
         return None
     best = dict(zip(terms, found.x[:count] * scale, strict=True))
@@ -120,8 +119,9 @@ def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, i
     return AngleFit(estimate=estimate, time_s=np.concatenate([h.time_s for h in humps]), residual_rad=found.fun)
 
 
-def _searched(evaluate: Callable[[Array], tuple[Array, Array]], begin: Array, count: int) -> OptimizeResult | None:
-    """The search from `begin`; from friction below zero the integration may run away, and then once more from none."""
+def _search(evaluate: Callable[[Array], tuple[Array, Array]], begin: Array, count: int) -> OptimizeResult | None:
+    """The search from `begin`; if the integration diverges with negative friction, a second search from zero
+    friction."""
     upright = begin.copy()
     upright[1:count] = np.maximum(upright[1:count], 0.0)
     for start in (begin, upright):
@@ -147,7 +147,7 @@ def _from_current(parts: list[Array], humps: list[_Hump], gain: tuple[float, flo
     variances = np.zeros(len(parts[0]))
     for part, hump in zip(parts, humps, strict=True):
         since = np.maximum(0.0, hump.time_s[:, None] - hump.time_s[None, 1:])
-        # Angle that one step of a moment leaves behind: that of a body that the water brakes.
+        # Angle after a step of moment on a body that the water brakes.
         swung = -np.expm1(-gain[1] * since) / gain[1] if gain[1] > 1e-6 else since
         response = gain[0] * np.diff(hump.time_s) * swung
         variances += hump.noise_A2 * np.sum((part @ response) ** 2, axis=1)
@@ -155,12 +155,12 @@ def _from_current(parts: list[Array], humps: list[_Hump], gain: tuple[float, flo
 
 
 def _covariance(residuals: Array, design: Array, humps: list[_Hump], gain: tuple[float, float]) -> Array:
-    """Covariance; the residuals hang together over seconds, and from hump to hump.
+    """Covariance; the residuals are correlated over seconds, and from hump to hump.
 
-    The largest of four, term by term: residuals taken as independent, with what the noise of the current does next to;
-    each hump as one draw, with Student's factor for how few they are; and the humps one by one and laid upon each
-    other, with the correlation along them (Newey & West 1987). The last sees what is alike in every hump, as the
-    encoder's errors are where the humps turn by whole counts. `gain` is k_t/J and the decay of the rate.
+    The largest of four, term by term: independent residuals plus the noise of the current; each hump as a draw, with
+    Student's factor for their small number; and single and stacked humps, with the correlation along them (Newey & West
+    1987). The last includes errors common to all humps, such as those of the encoder where the humps turn by whole
+    counts. `gain` is k_t/J and the decay of the rate.
     """
     norms = column_norms(design)
     inverse = np.linalg.pinv(design / norms) / norms[:, None]
@@ -173,11 +173,11 @@ def _covariance(residuals: Array, design: Array, humps: list[_Hump], gain: tuple
     lags = max(1, round(_MEMORY * folded.shape[1]))
     along = [_newey_west(folded, lags), sum(_newey_west(part, lags) for part in parts)]
     noise = _from_current(np.split(inverse, ends, axis=1), humps, gain)
-    variances = [np.diag(alone) + noise, *(np.diag(own) / (1 - _MEMORY) for own in along)]
+    variances = [np.diag(alone) + noise, *(np.diag(matrix) / (1 - _MEMORY) for matrix in along)]
     if len(humps) > 1:
-        # The start of a hump is free and soaks up its own draw, so the sums are nearly those of the shared terms alone.
+        # The free start of a hump absorbs its draw, so that the sums are nearly those of the shared terms alone.
         draws = np.array([part.sum(axis=1) for part in parts]).T
-        few = float(student.ppf(_ONE_SIGMA, len(humps) - 1)) ** 2
+        few = float(student.ppf(_SIGMA_LEVEL, len(humps) - 1)) ** 2
         variances.append(few * len(humps) / (len(humps) - 1) * np.sum(draws**2, axis=1))
     wider = np.sqrt(np.max(variances, axis=0) / np.diag(alone))
     widened: Array = alone * np.outer(wider, wider)
@@ -185,7 +185,7 @@ def _covariance(residuals: Array, design: Array, humps: list[_Hump], gain: tuple
 
 
 def _newey_west(scores: Array, lags: int) -> Array:
-    """Covariance of the sum of the columns, with Bartlett's weights up to so many lags."""
+    """Covariance of the sum of the columns, with Bartlett's weights up to `lags`."""
     covariance: Array = scores @ scores.T
     for lag in range(1, lags + 1):
         cross = scores[:, lag:] @ scores[:, :-lag].T
@@ -197,24 +197,25 @@ def _humps(record: YawRecord) -> list[_Hump]:
     programme, time = record.programme, record.time_s
     step = max(_STEP_S, float(np.median(np.diff(time))))
     work = np.concatenate([[0.0], np.cumsum(np.diff(time) * (record.current_A[1:] + record.current_A[:-1]) / 2)])
-    # Third differences leave of the current little but its noise; the median leaves out where the body breaks loose.
+    # Third differences of the current are nearly its noise; the median ignores the instants at which the body breaks
+    # loose.
     noise_A2 = (1.4826 * float(np.median(np.abs(np.diff(record.current_A, 3))))) ** 2 / 20
     humps = []
     for number in range(programme.humps):
         begin = programme.start_s + number * programme.period_s
         first = begin + _AWAKE * programme.rise_s
         last = min(begin + (3 - _AWAKE) * programme.rise_s, float(time[-1]))
-        # Counted, with room for rounding: a step more or less moves the result by a good part of its error.
-        own: Array = first + step * np.arange(int((last - first) / step + 1e-6), dtype=np.float64)
-        if len(own) < 10:
+        # With room for rounding: a step more or less changes the result by a good part of its error.
+        times: Array = first + step * np.arange(int((last - first) / step + 1e-6), dtype=np.float64)
+        if len(times) < 10:
             raise InputError(record.path, "column t_s", f"has fewer than 10 rows in hump {number + 1}", "sample faster")
         spline = smooth_angle(record, (first, first + programme.rise_s))
         humps.append(
             _Hump(
-                own,
-                np.interp(own, time, record.angle_rad),
-                np.diff(np.interp(own, time, work)) / np.diff(own),
-                (float(spline(own[0])), float(spline(own[0], 1))),
+                times,
+                np.interp(times, time, record.angle_rad),
+                np.diff(np.interp(times, time, work)) / np.diff(times),
+                (float(spline(times[0])), float(spline(times[0], 1))),
                 noise_A2 * float(np.median(np.diff(time))) / step,
             )
         )
@@ -230,7 +231,7 @@ def _predictor(rig: YawRig, terms: tuple[str, ...]):  # type: ignore[no-untyped-
     rougher = rig.quadratic_braking - rig.quadratic_Nms2
     given, x = ca.SX.sym("c", len(terms)), model.x
     whole = ca.SX(parameters)
-    for place, value in zip(chosen, ca.vertsplit(given), strict=False):  # gravity's, if any, are the last
+    for place, value in zip(chosen, ca.vertsplit(given), strict=False):  # terms of gravity are the last
         whole[place] = value
     if extra := dict(zip(terms[len(chosen) :], ca.vertsplit(given)[len(chosen) :], strict=True)):
         sine = rig.gravity_Nm * math.cos(rig.gravity_angle_rad) + extra.get("gravity_sine", 0.0)

@@ -1,6 +1,6 @@
-"""What is drawn of records of the yaw rig: histories next to the programme, the energy balance part by part, residuals.
+"""Chart data of records of the yaw rig: histories with the programme, the energy balance of the parts, residuals.
 
-As JSON has it: plain lists, thinned to draw.
+For JSON: plain lists, thinned for a chart.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from tank2sim.records.thinning import drawn_columns
 from tank2sim.records.yaw import YawRecord
 
 _HISTORY_SAMPLES = 900
-"""Of a record, for each peak to be seen in any of its signals."""
+"""Samples of a record, enough to show each peak of its signals."""
 
 STAGES = ("accelerating", "braking")
 
 
 def record_histories(records: Sequence[YawRecord], fit: EnergyFit) -> dict[str, dict[str, list[float]]]:
-    """Of each record by its name: rate where it is evaluated, that of the programme, tracking error and current."""
+    """Record name to histories: evaluated rate, rate of the programme, tracking error and current."""
     found, before = {}, 0
     for record in records:
         programme, time = record.programme, record.time_s
         reference = programme.at(time)
         rate = np.full(len(time), np.nan)
         for pair in fit.balance.pairs[before : before + programme.humps]:
-            for own in pair:
-                inside = (time >= own.time_s[0]) & (time <= own.time_s[-1])
-                rate[inside] = np.interp(time[inside], own.time_s, own.rate_radps)
+            for interval in pair:
+                inside = (time >= interval.time_s[0]) & (time <= interval.time_s[-1])
+                rate[inside] = np.interp(time[inside], interval.time_s, interval.rate_radps)
         before += programme.humps
         offset = record.angle_rad[0] - float(programme.at(time[:1]).angle_rad[0])
         columns = {
@@ -46,11 +46,10 @@ def record_histories(records: Sequence[YawRecord], fit: EnergyFit) -> dict[str, 
 
 
 def balance_as_json(fit: EnergyFit) -> dict[str, Any]:
-    """Work of the motor in each part of the intervals, and what it is spent on, J: means over all pairs, in the order
-    of time."""
+    """Work of the motor and of each term in each part of the intervals, J: means over all pairs, in order of time."""
     balance = fit.balance
     shape = (len(balance.pairs), 2, balance.parts)
-    # Braking parts are counted as mirror images.
+    # Braking parts are numbered as mirror images.
     order = (slice(None), slice(None, None, -1))
 
     def stages(values: np.ndarray) -> dict[str, list[float]]:
@@ -65,26 +64,26 @@ def balance_as_json(fit: EnergyFit) -> dict[str, Any]:
 
 
 def residuals_as_json(fit: EnergyFit) -> list[dict[str, Any]]:
-    """What the least squares leave of each subinterval's work, J, with the mean rate in it, deg/s."""
-    balance, left = fit.balance, iter(fit.residuals_J.tolist())
+    """Residual work of each subinterval, J, with its mean rate, deg/s."""
+    balance, residuals = fit.balance, iter(fit.residuals_J.tolist())
     return [
         {
-            "stage": STAGES[own.braking],
-            "hump": own.number + 1,
-            "rate_degps": float(np.degrees(np.mean(own.part(part, balance.parts).rate_radps))),
-            "left_J": next(left),
+            "stage": STAGES[interval.braking],
+            "hump": interval.number + 1,
+            "rate_degps": float(np.degrees(np.mean(interval.part(part, balance.parts).rate_radps))),
+            "left_J": next(residuals),
         }
         for pair in balance.pairs
-        for own in pair
+        for interval in pair
         for part in range(balance.parts)
     ]
 
 
 def angle_residual_as_json(angle: AngleFit | None) -> dict[str, list[float]] | None:
-    """What the integrated equation leaves of the angle, a gap (nan) where nothing is fitted."""
+    """Residual angle of the integrated equation, with a gap (nan) between fitted parts."""
     if angle is None:
         return None
-    time, left = angle.time_s, angle.residual_rad
+    time, residual = angle.time_s, angle.residual_rad
     breaks = np.flatnonzero(np.abs(np.diff(time)) > 1.0) + 1
     time = np.insert(time, breaks, time[breaks - 1] + 0.01)
-    return drawn_columns({"t_s": time, "residual_rad": np.insert(left, breaks, np.nan)}, peaks=True)
+    return drawn_columns({"t_s": time, "residual_rad": np.insert(residual, breaks, np.nan)}, peaks=True)

@@ -64,7 +64,7 @@ def _derivatives(reduction: Reduction, card: Contents) -> PageTable:
 
 
 def _left_out(reduction: Reduction) -> PageTable:
-    rows: list[list[Cell]] = [[choice.name, choice.reason, choice.told] for choice in terms_left_out(reduction)]
+    rows: list[list[Cell]] = [[choice.name, choice.reason, choice.explanation] for choice in terms_left_out(reduction)]
     return PageTable(caption="Left out", columns=[Column(title=head) for head in ("term", "reason", "why")], rows=rows)
 
 

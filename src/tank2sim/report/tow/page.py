@@ -198,7 +198,7 @@ def _by_tow(study: TowStudy) -> PageSection:
         rows: list[list[Cell]] = [["all tows", *way.together.tolist()]]
         numbers = range(1, len(way.alone) + 1)
         rows += [[f"tow {n} alone", *row.tolist()] for n, row in zip(numbers, way.alone, strict=True)]
-        rows += [[f"all but tow {n}", *row.tolist()] for n, row in zip(numbers, way.left_out, strict=True)]
+        rows += [[f"all but tow {n}", *row.tolist()] for n, row in zip(numbers, way.held_out, strict=True)]
         rows.append(["standard error, one left out in turn", *way.jackknife_errors.tolist()])
         rows.append(["the same, 95 % half-width", *way.half_widths.tolist()])
         rows.append(["standard error, spread of the tows", *way.spread_errors.tolist()])

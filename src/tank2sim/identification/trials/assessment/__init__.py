@@ -1,1 +1,1 @@
-"""What an estimate is worth: identifiability, prediction intervals, held-out trials."""
+"""Quality of an estimate: identifiability, prediction intervals, held-out trials."""

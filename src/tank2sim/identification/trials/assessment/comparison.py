@@ -1,4 +1,4 @@
-"""A card's model against trials, in the noise of their sensors."""
+"""Comparison of a card's model with trials, in units of sensor noise."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.audit import record_noise
 
 _LEAST_NOISE = 1e-3
-"""Noise of a signal that states none is taken as this share of its standard deviation at least (project choice)."""
+"""Noise of a signal without stated noise is taken as this share of its standard deviation at least (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A model against trials: over windows and whole runs, and in the figures of manoeuvres."""
+    """Comparison of a model with trials: over windows and whole runs, and in the figures of manoeuvres."""
 
     following: tuple[Following, ...]
     figures: tuple[FigureComparison, ...]
@@ -35,20 +35,20 @@ class Comparison:
 def compare_card(
     card: ManoeuvringCard, trials: Measured, residual: Mapping[str, float], *, whole: bool = False
 ) -> Comparison:
-    """A card's model against trials.
+    """Compare a card's model with trials.
 
     Parameters
     ----------
     card, trials
-        At the same size.
+        Of the same size.
     residual : mapping
-        Standard deviation that is to be expected of each variable's error: it weighs the signals where the initial
-        state of a window is found. Weighed by the noise of the sensors alone, the state would follow one signal.
+        Expected standard deviation of each variable's error: it weighs the signals in the fit of a window's initial
+        state. With weights of sensor noise alone, the state would follow a single signal.
     whole : bool
-        Compare also outside the range of speeds that the card states.
+        Compare also outside the card's range of speeds.
     """
     posed = problem_from_card(card, trials.trials, trials.driven_by, whole=whole)
-    # Nothing is estimated here: one free parameter instead of all saves making and compiling their sensitivities.
+    # Without estimation a single free parameter is enough; the sensitivities of the others need not be compiled.
     problem = replace(posed, free=posed.free[:1], prior_mean=posed.prior_mean[:1], prior_error=posed.prior_error[:1])
     weights = {name: residual.get(name) or 1.0 for name in problem.seen}
     return Comparison(
@@ -60,7 +60,7 @@ def compare_card(
 def noise_of(trials: Measured, problem: Problem) -> dict[str, float]:
     """Measurement noise of each variable, SI: as stated in the files, else estimated; the largest of all trials.
 
-    At least :data:`_LEAST_NOISE`: a record that was smoothed shows no noise, and still is not that exact.
+    At least :data:`_LEAST_NOISE`: a smoothed record shows no noise, but is not exact.
     """
     noise: dict[str, float] = {}
     for trial in trials.trials:

@@ -1,4 +1,4 @@
-"""How well a model follows trials: over windows, over whole runs, and in the figures of the manoeuvres."""
+"""Errors of a model on trials: over windows, over whole runs, and in the figures of the manoeuvres."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ _WINDOW = 5.0
 
 TURN_FIGURE_NAMES = ("advance_m", "transfer_m", "tactical_diameter_m")
 _OVERSHOOTS = 2
-"""Overshoots that are compared: those of IMO MSC.137(76). Later ones repeat the errors of the first."""
+"""Number of compared overshoots: those of IMO MSC.137(76). Later ones repeat the errors of the first."""
 
 
 @dataclass(frozen=True)
 class Following:
-    """How a model follows one run.
+    """Errors of a model on one run.
 
     Parameters
     ----------
     name : str
     windows : mapping
-        Signal to (root mean square of error, of what was measured less its mean) over windows of :data:`_WINDOW`, each
-        from a state of its own; SI.
+        Signal to (root mean square of the error, of the measurement less its mean) over windows of :data:`_WINDOW`,
+        each with its own initial state; SI.
     whole : mapping
-        Signal to root mean square error over the whole run from one initial state; inf where the motion ran away.
+        Signal to root mean square error over the whole run from one initial state; inf where the motion diverged.
     """
 
     name: str
@@ -55,15 +55,15 @@ class Following:
 
 
 def replay_error(problem: Problem, values: Array, noise: Mapping[str, float]) -> tuple[Following, ...]:
-    """How the model at `values` (k,) follows each run of a problem; `noise` weighs signals in the initial states."""
+    """Errors of the model at `values` (k,) on each run of a problem; `noise` weighs signals in the initial states."""
     shooting = Shooting(problem)
-    own = [white(noise[name]) for name in problem.seen]
+    weights = [white(noise[name]) for name in problem.seen]
     results = []
     for run in problem.runs:
         found = {}
         for length in (_WINDOW * problem.ship_time, None):
             pieces = cut(problem, run, length)
-            starts = _settled(shooting, pieces, values, own)
+            starts = _settled(shooting, pieces, values, weights)
             found[length] = shooting.residuals(pieces, starts, values)[0], pieces.measured
         windows, whole = found.values()
         results.append(
@@ -88,7 +88,7 @@ def pooled(results: Sequence[Following], signal: str) -> float:
     """Error over windows of all runs together, as a share of the signal."""
     pairs = np.array([result.windows[signal] for result in results if signal in result.windows])
     if not len(pairs) or not pairs[:, 1].any():
-        return np.nan  # of a signal that is zero throughout there is no share
+        return np.nan  # a signal that is zero throughout has no relative error
     return float(np.sqrt(np.sum(pairs[:, 0] ** 2) / np.sum(pairs[:, 1] ** 2)))
 
 
@@ -99,12 +99,12 @@ class FigureComparison:
     Parameters
     ----------
     trial, name : str
-        Of which trial; its name with its unit.
+        Trial, and name of the figure with its unit.
     measured : float
     predicted : float or None
-        By the closed-loop simulation; None where that does not reach it.
+        By the closed-loop simulation; None where the simulation does not reach it.
     interval : (float, float) or None
-        In which it is expected with 95 % probability; None where that was not computed.
+        95 % prediction interval; None where it was not computed.
     """
 
     trial: str
@@ -130,40 +130,43 @@ def predicted_figures(card: ManoeuvringCard, trials: Sequence[Trial]) -> tuple[F
     card : ManoeuvringCard
         Of the ship.
     trials : sequence of Trial
-        At the ship's size; others than turns and zigzags are passed over.
+        At the ship's size; trials other than turns and zigzags are ignored.
     """
     model = build(steerable(card))
     integrator = Integrator(model)
     figures = []
     for trial in trials:
-        what = recorded(trial, model)
-        if what is None:
+        record = recorded(trial, model)
+        if record is None:
             continue
         try:
-            simulated = repeat(what, integrator).figures
+            simulated = repeat(record, integrator).figures
         except InputError:  # the motion left all bounds: none of its figures is reached
             simulated = {}
-        for name, value in select_figures(what.figures, turn=isinstance(what.manoeuvre, Turn)).items():
-            there = select_figures(simulated, turn=isinstance(what.manoeuvre, Turn)).get(name)
-            figures.append(FigureComparison(trial.name, name, value, there))
+        turn = isinstance(record.manoeuvre, Turn)
+        predicted = select_figures(simulated, turn=turn)
+        figures += [
+            FigureComparison(trial.name, name, value, predicted.get(name))
+            for name, value in select_figures(record.figures, turn=turn).items()
+        ]
     return tuple(figures)
 
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """One trial next to what a model makes of it.
+    """One trial and its simulation by a model.
 
     Parameters
     ----------
     name : str
         Of the trial.
     closed_loop : bool
-        True for a turn or zigzag, in which the model was steered as the manoeuvre asks from the measured start; else
-        it was given the recorded rudder, from the initial state that suits the record best.
+        True for a turn or zigzag: the model was steered as in the manoeuvre, from the measured start. False: it was
+        driven by the recorded rudder, from the initial state that fits the record best.
     time_s : array (n,)
         In the trial's own time.
     measured : mapping
-        Some of :data:`_SHOWN` to what was measured (n,), nan where nothing was.
+        Measured signals among :data:`_SHOWN` (n,), nan where not measured.
     model_time_s : array (m,)
         In the trial's own time; empty where the motion left all bounds.
     simulated : mapping
@@ -186,12 +189,12 @@ _SHOWN = ("rudder", "motion.psi", "motion.r", "motion.speed", "motion.beta", "mo
 def comparison_windows(
     problem: Problem, card: ManoeuvringCard, trials: Sequence[Trial], noise: Mapping[str, float]
 ) -> tuple[Passage, ...]:
-    """Trials next to their simulations by a card's model: turns and zigzags in closed loop, others replayed.
+    """Trials and their simulations by a card's model: turns and zigzags in closed loop, others replayed.
 
     Parameters
     ----------
     problem : Problem
-        Posed with a card and these trials; its prior means are the card's values.
+        Set up with a card and these trials; its prior means are the card's values.
     card : ManoeuvringCard
         That card.
     trials : sequence of Trial
@@ -203,26 +206,26 @@ def comparison_windows(
     integrator, shooting = Integrator(model), None
     found = []
     for trial, run in zip(trials, problem.runs, strict=True):
-        what = recorded(trial, model)
+        manoeuvre = recorded(trial, model)
         ground = not {"motion.u", "motion.v"} <= set(_given(run))
         simulated: Trajectory | None
-        if what is None:
+        if manoeuvre is None:
             shooting = shooting or Shooting(problem)
             begin, replayed = run.begin_s, _replayed(shooting, run, noise)
             simulated = replayed if replayed.is_finite() else None
         else:
             try:
-                begin, simulated = what.begin_s, repeat(what, integrator).trajectory
+                begin, simulated = manoeuvre.begin_s, repeat(manoeuvre, integrator).trajectory
             except InputError:  # the motion left all bounds
-                begin, simulated = what.begin_s, None
+                begin, simulated = manoeuvre.begin_s, None
         columns = {} if simulated is None else _shown_of(simulated, ground=ground)
         times = np.zeros(0) if simulated is None else begin + simulated.t
-        found.append(Passage(run.name, what is not None, run.times, _measured_in(run, problem), times, columns))
+        found.append(Passage(run.name, manoeuvre is not None, run.times, _measured_in(run, problem), times, columns))
     return tuple(found)
 
 
 def _given(run: SampledRun) -> dict[str, Array]:
-    """What was measured in a run, by variable."""
+    """Measured columns of a run, by variable."""
     return {name: run.column(name) for name in run.seen if not np.isnan(run.column(name)).all()}
 
 
@@ -257,7 +260,7 @@ def _drift(side: Array, speed: Array) -> Array:
 
 
 def _replayed(shooting: Shooting, run: SampledRun, noise: Mapping[str, float]) -> Trajectory:
-    """The whole run with its recorded inputs, from the initial state that suits the record best."""
+    """The whole run with its recorded inputs, from the initial state that fits the record best."""
     problem = shooting.problem
     model, values = problem.model, problem.prior_mean
     pieces = cut(problem, run, None)
@@ -269,9 +272,9 @@ def _replayed(shooting: Shooting, run: SampledRun, noise: Mapping[str, float]) -
 
 
 def _settled(shooting: Shooting, pieces: Pieces, values: Array, noise: Sequence[ColouredNoise]) -> NDArray[np.float64]:
-    """Initial states (pieces, nx) that suit the record best, at these parameters."""
+    """Initial states (pieces, nx) that fit the record best, at these parameters."""
     starts = pieces.starts.copy()
-    for _ in range(3):  # the motion is nearly linear in its initial state: three steps are plenty
+    for _ in range(3):  # the motion is nearly linear in its initial state: three steps are enough
         cost = shooting.cost(pieces, starts, values, noise)
         if not np.isfinite(cost):
             break
@@ -284,7 +287,7 @@ def _settled(shooting: Shooting, pieces: Pieces, values: Array, noise: Sequence[
 
 
 def select_figures(figures: Mapping[str, object], *, turn: bool) -> dict[str, float]:
-    """The figures that are compared, each a number."""
+    """Compared figures, each a number."""
     if turn:
         return {name: float(value) for name in TURN_FIGURE_NAMES if isinstance(value := figures.get(name), float)}
     overshoots = figures.get("overshoots_deg", [])
@@ -300,6 +303,6 @@ def _rms(values: Array) -> float:
 
 
 def _spread(name: str, values: Array) -> float:
-    """Size of a signal: of a rate or a sway velocity about zero, of the others about their mean."""
+    """Size of a signal: of a rate or a sway velocity about zero, of any other signal about its mean."""
     about = 0.0 if name in ("motion.r", "motion.v") else np.nanmean(values)
     return float(np.sqrt(np.nanmean((values - about) ** 2)))

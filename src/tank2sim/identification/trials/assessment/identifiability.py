@@ -1,4 +1,4 @@
-"""What trials can tell of the free parameters, and what they cannot: before they are fitted, and after.
+"""Identifiability of the free parameters by trials, before and after the fit.
 
 The derivatives of an Abkowitz model drift: where sway and yaw are nearly proportional, as in every zigzag, only a
 combination of ``Nv`` and ``Nr`` is determined (Hwang 1980, J. Ship Research 26; Abkowitz 1980, Trans. SNAME 88).
@@ -23,48 +23,48 @@ from tank2sim.identification.trials.problem.measured_motion import MEASURED_STAT
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
 CLOSE_CORRELATION = 0.95
-"""Correlation from which two parameters are reported as one: their difference has 39 times the variance of their
+"""Correlation from which two parameters are reported as a pair: their difference has 39 times the variance of their
 sum."""
 
 WEAK = 0.1
-"""A direction in which the trials tell less than this share of what the prior tells counts as not seen (project
+"""A direction in which the trials give less than this share of the prior's information counts as unseen (project
 choice)."""
 
 PART = 0.3
 """Least component of a direction for its parameter to be named (project choice)."""
 
 _ALONE = 1e-6
-"""Information of the prior, of its own, that is left in what "the data alone" say: it keeps matrices regular."""
+"""Share of the prior's information that remains in "the data alone": it keeps matrices regular."""
 
 LEAST_OF_LINEAR = 1e-3
-"""The same measure for linear terms, which no other term replaces: what is left out of a linear model swells the
-residuals, and a clear change of speed would not stand out against them (ours; a straight run shows 1e-24)."""
+"""The same measure for linear terms, which no other term replaces: terms absent from a linear model enlarge the
+residuals and would hide a clear change of speed (project choice; a straight run shows 1e-24)."""
 
 STILL = {"motion.u": 0.002, "motion.v": 0.002, "motion.r": 0.002, "rudder": 0.002}
-"""Standard deviation below which a signal counts as constant: u, v over u0, r L/u0, rudder in rad (ours: 0.1 deg of
-drift or rudder, a tenth of what the smallest manoeuvre shows)."""
+"""Standard deviation below which a signal counts as constant: u, v over u0, r L/u0, rudder in rad (project choice:
+0.1 deg of drift or rudder, a tenth of the smallest manoeuvre's)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """How well trials determine k parameters; everything in units of the prior's standard errors (with its scale).
+    """Identifiability of k parameters; everything in units of the prior's standard errors (with its scale).
 
     Parameters
     ----------
     free : tuple of str
         Names of the parameters.
     singular_values : array (k,)
-        Of the weighted sensitivities, falling; below 1 the prior tells more than the trials.
+        Of the weighted sensitivities, falling; below 1 the prior has more information than the trials.
     condition : float
         Largest over smallest of them, inf where the smallest is zero.
     correlation : array (k, k)
         Of the estimates by the trials alone.
     pairs : tuple of (str, str, float)
-        Parameters whose correlation exceeds :data:`CLOSE_CORRELATION` either way, the closest first.
+        Parameters whose absolute correlation exceeds :data:`CLOSE_CORRELATION`, the closest first.
     unseen : tuple of tuple of str
-        Combinations of parameters that the trials do not see.
+        Combinations of parameters that the trials do not determine.
     share : array (k,)
-        Share of each parameter's information that the trials give: 1 - (variance after / variance before).
+        Share of each parameter's information from the trials: 1 - (variance after / variance before).
     notices : tuple of str
         The same in words.
     """
@@ -80,14 +80,14 @@ class Identifiability:
 
 
 def identifiability(problem: Problem, estimate: Estimate) -> Identifiability:
-    """What the trials told an estimator of the parameters.
+    """Identifiability of the parameters after a fit.
 
     Parameters
     ----------
     problem : Problem
-        What was asked: its prior.
+        The prior.
     estimate : Estimate
-        The answer: its information and the scale of the prior.
+        Its information and the scale of the prior.
     """
     unit = scaled_prior(problem, estimate.prior_scale)
     information = estimate.information * np.outer(unit, unit)
@@ -110,21 +110,21 @@ def identifiability(problem: Problem, estimate: Estimate) -> Identifiability:
 
 
 def refuse_unseen(problem: Problem) -> tuple[str, ...]:
-    """Free parameters of which trials show nothing; trials without which nothing can be said are refused.
+    """Return the free parameters that the trials do not show; raise if a necessary one is among them.
 
-    Sway, yaw and rudder must show in a manoeuvring trial: their linear derivatives are refused if they do not, and so
-    are acceleration derivatives, which are free only where they were asked for. The others are returned, to be held at
-    what was known of them before: a zigzag need not show what the speed does, least of all without a log.
+    A manoeuvring trial must show sway, yaw and rudder: unseen linear derivatives of these are refused, and so are
+    acceleration derivatives, which are free only on request. Other unseen parameters are returned, to be held at their
+    prior means: a zigzag need not show the effect of speed, in particular without a log.
 
-    A parameter is seen if a large change (:func:`_large`) would show in the weak form of the equations: move the mean
-    accelerations by one standard deviation of the residuals, all windows taken together. What moves no more than its
-    own noise counts as constant, and the constant part of a term that needs motion counts as nothing, for a constant
-    force does the same.
+    A parameter is seen if a large change (:func:`_large`) moves the mean accelerations of the weak form by one standard
+    deviation of the residuals, all windows taken together. A signal that moves no more than its noise counts as
+    constant, and the constant part of a term that needs motion is not counted, because a constant force has the same
+    effect.
 
     Raises
     ------
     InputError
-        Names the parameters that are refused, and what must move to show them.
+        With the refused parameters, and the motions that show them.
     """
     estimate = equation_error(problem, settings=EquationErrorSettings(rounds=2))
     form = WeakForm(problem)
@@ -142,28 +142,28 @@ def refuse_unseen(problem: Problem) -> tuple[str, ...]:
         least = LEAST_OF_LINEAR if term is not None and _linear(term) else 1.0
         if form.seen[place] and np.sum(shown**2) < least:
             missing.append(name)
-    needed = [name for name in missing if _needed(parse_term(_short(name)))]
-    if needed:
+    refused = [name for name in missing if _needed(parse_term(_short(name)))]
+    if refused:
         runs = ", ".join(dict.fromkeys(run.origin for run in problem.runs))
-        text = ", ".join(_short(name) for name in needed)
-        raise InputError(runs, "", f"shows nothing of {text}", _remedy(needed))
+        text = ", ".join(_short(name) for name in refused)
+        raise InputError(runs, "", f"shows nothing of {text}", _remedy(refused))
     return tuple(missing)
 
 
 def _needed(term: Term | None) -> bool:
-    """True for a derivative without which trials are of no manoeuvre, or that is free only because it was asked for."""
+    """True for a derivative that every manoeuvre shows, or that is free only on request."""
     return term is not None and (bool(term.acceleration) or (_linear(term) and not term.u))
 
 
 def _large(problem: Problem, values: Array) -> Array:
     """A large change of each free parameter (k,): its prior error, its value, or that of the largest linear derivative
-    of the same force, whichever is most. In the prime system terms of one force have coefficients of one size."""
+    of the same force, whichever is largest. In the prime system terms of one force have coefficients of one size."""
     size = np.maximum(problem.prior_error, np.abs(values))
     model = dict(zip(problem.model.parameter_names, problem.parameters(values), strict=True))
     terms = {name: term for name in model if (term := parse_term(_short(name))) is not None}
     for place, name in enumerate(problem.free):
         if name in terms and not terms[name].acceleration:
-            same = [model[other] for other, term in terms.items() if term.force == terms[name].force and _linear(term)]
+            same = [model[key] for key, term in terms.items() if term.force == terms[name].force and _linear(term)]
             size[place] = max(size[place], *np.abs(same), 0.0)
     return size
 
@@ -180,7 +180,7 @@ def _quietened(form: WeakForm, place: int) -> SampledRun:
     speed, length = float(values["ship.speed"]), float(values["ship.length"])
     signals = motion.smooth.copy()
     units = (speed, speed, speed / length)
-    for column, (name, unit, noise) in enumerate(zip(MEASURED_STATES, units, motion.left, strict=False)):
+    for column, (name, unit, noise) in enumerate(zip(MEASURED_STATES, units, motion.remaining_noise, strict=False)):
         if signals[:, column].std() < max(3 * noise, STILL[name] * unit):
             signals[:, column] = signals[:, column].mean()
     signals[np.isnan(motion.velocities).any(axis=1), :3] = np.nan
@@ -199,7 +199,7 @@ def _remedy(missing: list[str]) -> str:
     verb = "changes" if len(needed) == 1 else "change"
     moving = f"add a run in which {_listed(needed)} {verb}, or " if needed else ""
     held = " ".join(f"--hold {_short(name)}" for name in missing)
-    return f"{moving}leave them as they are: {held}"
+    return f"{moving}hold them at the card's values: {held}"
 
 
 def _pairs(names: tuple[str, ...], correlations: Array) -> tuple[tuple[str, str, float], ...]:
@@ -209,49 +209,49 @@ def _pairs(names: tuple[str, ...], correlations: Array) -> tuple[tuple[str, str,
 
 
 def _directions(names: tuple[str, ...], vectors: Array) -> tuple[tuple[str, ...], ...]:
-    """Each of the unseen directions (k, m) by the parameters in it, with as few in each as possible.
+    """The parameters in each of the unseen directions (k, m), as few in each as possible.
 
-    Any mixture of unseen directions is one too: the mixture is taken in which each has a parameter of its own.
+    Any mixture of unseen directions is unseen too: the chosen mixture gives each direction a parameter of its own.
     """
     count = vectors.shape[1]
     if not count:
         return ()
     pivots = qr(vectors.T, pivoting=True, mode="r")[1][:count]
-    plain = vectors @ np.linalg.inv(vectors[pivots])
-    plain = plain / np.abs(plain).max(axis=0)
+    mixture = vectors @ np.linalg.inv(vectors[pivots])
+    mixture = mixture / np.abs(mixture).max(axis=0)
     return tuple(
         tuple(names[place] for place in np.argsort(-np.abs(column), kind="stable") if abs(column[place]) > PART)
-        for column in plain.T
+        for column in mixture.T
     )
 
 
 def _pair_messages(pairs: tuple[tuple[str, str, float], ...]) -> list[str]:
-    """Correlated pairs by what they have in common, a message for each kind."""
+    """Messages on correlated pairs, one for each cause."""
     drifting: list[str] = []
-    others: list[str] = []
+    remaining: list[str] = []
     for first, second, value in pairs:
         a, b = parse_term(first), parse_term(second)
         drifts = a is not None and b is not None and _drift(a, b)
-        (drifting if drifts else others).append(f"{first} and {second} ({value:.3f})")
+        (drifting if drifts else remaining).append(f"{first} and {second} ({value:.3f})")
     messages = []
     if drifting:
-        why = "sway and yaw are nearly proportional in these trials"
-        messages.append(f"the estimates of {_listed(drifting)} are correlated, and drift together: {why}")
-    if others:
-        messages.append(f"the estimates of {_listed(others)} are correlated: the trials hardly distinguish them")
+        cause = "sway and yaw are nearly proportional in these trials"
+        messages.append(f"the estimates of {_listed(drifting)} are correlated, and drift together: {cause}")
+    if remaining:
+        messages.append(f"the estimates of {_listed(remaining)} are correlated: the trials hardly distinguish them")
     return messages
 
 
-def _drift(one: Term, other: Term) -> bool:
-    """True if the terms differ by sway in place of yaw alone."""
-    same = one.force == other.force and (one.d, one.u) == (other.d, other.u) and one.name != other.name
-    return same and not (one.acceleration or other.acceleration) and one.v + one.r == other.v + other.r
+def _drift(first: Term, second: Term) -> bool:
+    """True if the terms differ only by sway in place of yaw."""
+    same = first.force == second.force and (first.d, first.u) == (second.d, second.u) and first.name != second.name
+    return same and not (first.acceleration or second.acceleration) and first.v + first.r == second.v + second.r
 
 
 def _direction_messages(unseen: tuple[tuple[str, ...], ...]) -> list[str]:
     single = [direction[0] for direction in unseen if len(direction) == 1]
-    several = [f"{_listed(list(direction))}" for direction in unseen if len(direction) > 1]
-    messages = [f"the trials say next to nothing of {_listed(single)}: the prior remains"] if single else []
+    several = [_listed(list(direction)) for direction in unseen if len(direction) > 1]
+    messages = [f"the trials show next to nothing of {_listed(single)}: the prior remains"] if single else []
     if several:
         messages.append(f"the trials determine only a combination of {'; of '.join(several)}")
     return messages

@@ -1,6 +1,6 @@
-"""Which model to take: information criteria, and how well each predicts manoeuvres that it was not fitted to.
+"""Model selection by information criteria, and by the prediction of manoeuvres held out of the fit.
 
-Of models that predict alike the simpler one is taken: the rule of one standard error (Breiman et al. 1984,
+Of models that predict alike the simplest is taken: the rule of one standard error (Breiman et al. 1984,
 Classification and Regression Trees, 3.4.3; Hastie, Tibshirani and Friedman 2009, 7.10).
 """
 
@@ -24,11 +24,11 @@ from tank2sim.identification.trials.problem.picklable import Portable, map_tasks
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
 FARTHEST = 4
-"""One in this many runs, those of largest amplitude, is left out to see how a model extrapolates (project choice)."""
+"""One in this many runs, those of largest amplitude, is held out to test extrapolation (project choice)."""
 
 TrialEstimator = Callable[[Problem], Estimate]
 Score = Callable[[Problem, Estimate], float]
-"""``score(problem with the runs left out, estimate) -> error``, the smaller the better."""
+"""``score(problem of the held-out runs, estimate) -> error``, the smaller the better."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class Criteria:
     aic, bic : float
         Akaike (1974) and Schwarz (1978): -2 log likelihood + 2 k, + k log n.
     samples : float
-        n, of independent residuals that tell as much as these coloured ones.
+        n, number of independent residuals with the same information as these coloured ones.
     parameters : float
-        k, that the trials fix: a parameter that the prior holds counts for less than one.
+        k, effective number that the trials determine: a parameter held by the prior counts less than one.
     """
 
     aic: float
@@ -52,16 +52,16 @@ class Criteria:
 
 
 def criteria(problem: Problem, estimate: Estimate, samples: float | None = None) -> Criteria:
-    """Information criteria from the weak form's residuals, which every model of the same runs has alike.
+    """Information criteria from the weak form's residuals, which are comparable between models of the same runs.
 
     Parameters
     ----------
     problem : Problem
-        What was asked.
+        Prior and runs.
     estimate : Estimate
         By any method.
     samples : float, optional
-        n; give each rival that of the first (by default from this model's own residuals), or differences in n drown
+        n, by default from the residuals of this model; give every model the n of the first, or differences in n exceed
         those in fit.
     """
     form = WeakForm(problem)
@@ -84,7 +84,7 @@ def criteria_of(series: Sequence[Array], parameters: float, samples: float | Non
 
 
 def effective_samples(series: Sequence[Array]) -> float:
-    """Number of independent residuals that tell as much as these: N / (1 + 2 sum of autocorrelations).
+    """Number of independent residuals with the same information: N / (1 + 2 sum of autocorrelations).
 
     The sum ends at the first that is not positive (Geyer 1992, Statistical Science 7). Pieces (n, m); the m components
     are taken together, each in units of its own deviation.
@@ -108,7 +108,7 @@ class HeldOutFold:
 
     Parameters
     ----------
-    left_out : tuple of str
+    held_out : tuple of str
         Names of the runs.
     error : float
         Of the score on them; inf where the fit or the prediction failed.
@@ -116,21 +116,21 @@ class HeldOutFold:
         Estimates without them, empty where the fit failed.
     """
 
-    left_out: tuple[str, ...]
+    held_out: tuple[str, ...]
     error: float
     values: Array
 
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """How a model predicts manoeuvres that it was not fitted to.
+    """Prediction of manoeuvres held out of the fit.
 
     Parameters
     ----------
     single : tuple of HeldOutFold
-        Each run left out once, in the order of the runs.
+        Each run held out once, in the order of the runs.
     extrapolation : HeldOutFold
-        The runs of largest amplitude left out together.
+        The runs of largest amplitude held out together.
     """
 
     single: tuple[HeldOutFold, ...]
@@ -138,14 +138,14 @@ class CrossValidation:
 
     @property
     def errors(self) -> Array:
-        """Of all folds (runs + 1,), extrapolation last."""
+        """Errors of all folds (runs + 1,), extrapolation last."""
         return np.array([*(fold.error for fold in self.single), self.extrapolation.error])
 
 
 def cross_validate(
     problem: Problem | Portable, estimator: TrialEstimator, score: Score, executor: Executor | None = None
 ) -> CrossValidation:
-    """Leave out one run at a time, and then the runs of largest amplitude together.
+    """Hold out one run at a time, and then the runs of largest amplitude together.
 
     Parameters
     ----------
@@ -155,14 +155,14 @@ def cross_validate(
     estimator : callable
         ``estimator(problem) -> Estimate``.
     score : callable
-        ``score(problem, estimate) -> float``, told the runs left out.
+        ``score(problem, estimate) -> float``, where the problem has the held-out runs.
     executor : concurrent.futures.Executor, optional
-        By default one fold after the other, here.
+        By default the folds run in sequence in this process.
 
     Raises
     ------
     InputError
-        There are fewer than two runs.
+        The problem has fewer than two runs.
     """
     runs = problem.runs
     if len(runs) < 2:
@@ -174,9 +174,9 @@ def cross_validate(
 
 
 def farthest(runs: Sequence[SampledRun]) -> tuple[int, ...]:
-    """Places of the runs of largest amplitude, one in :data:`FARTHEST` and one at least.
+    """Indices of the runs of largest amplitude, one in :data:`FARTHEST` and one at least.
 
-    Amplitude: the 95th percentile of the yaw rate either way, or of the heading's slope where none was measured.
+    Amplitude: the 95th percentile of the absolute yaw rate, or of the heading's slope where it was not measured.
     """
     amplitudes = []
     for run in runs:
@@ -189,7 +189,7 @@ def farthest(runs: Sequence[SampledRun]) -> tuple[int, ...]:
 
 
 def simplest(candidates: Mapping[str, CrossValidation]) -> str:
-    """Name of the model to take: the simplest whose errors are not surely larger than the best one's.
+    """Name of the simplest model whose errors are not significantly larger than those of the best.
 
     Parameters
     ----------
@@ -198,11 +198,11 @@ def simplest(candidates: Mapping[str, CrossValidation]) -> str:
 
     Notes
     -----
-    Best is the least mean error over all folds. A simpler one is as good if the mean of its differences from the best,
-    fold by fold, is within one standard error of that mean: folds differ in difficulty, and the pairs take that out.
+    The best model has the least mean error over all folds. A simpler model is as good if the mean of its paired
+    differences from the best is within one standard error of that mean; pairs cancel the difficulty of each fold.
     """
     if not candidates:
-        raise ValueError("there is nothing to choose from")
+        raise ValueError("the mapping has no candidates")
     errors = {name: candidate.errors for name, candidate in candidates.items()}
     best = min(errors, key=lambda name: float(np.mean(errors[name])))
 
@@ -223,14 +223,14 @@ def yaw_rate_error(problem: Problem, estimate: Estimate) -> float:
 
 
 def _fold(task: tuple[Problem | Portable, tuple[int, ...], TrialEstimator, Score]) -> HeldOutFold:
-    asked, group, estimator, score = task
-    problem = asked.problem() if isinstance(asked, Portable) else asked
-    left = tuple(run for place, run in enumerate(problem.runs) if place in group)
-    kept = tuple(run for place, run in enumerate(problem.runs) if place not in group)
-    names = tuple(run.name for run in left)
+    posed, group, estimator, score = task
+    problem = posed.problem() if isinstance(posed, Portable) else posed
+    held_out = tuple(run for place, run in enumerate(problem.runs) if place in group)
+    fitted = tuple(run for place, run in enumerate(problem.runs) if place not in group)
+    names = tuple(run.name for run in held_out)
     try:
-        estimate = estimator(problem.with_runs(kept))
-        error = float(score(problem.with_runs(left), estimate))
+        estimate = estimator(problem.with_runs(fitted))
+        error = float(score(problem.with_runs(held_out), estimate))
     except (InputError, np.linalg.LinAlgError):
         return HeldOutFold(names, math.inf, np.empty(0))
     return HeldOutFold(names, error if math.isfinite(error) else math.inf, estimate.values)

@@ -1,4 +1,4 @@
-"""What a user should know of an identification: where it is worse, what it rests on, where its card fails."""
+"""Notices of an identification: recognised manoeuvres, choices, errors that grew, and the limits of its card."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.run import simulate
 
 HARD_TURN = math.radians(35.0)
-"""Rudder of the turn that a card is tried with (IMO MSC.137(76)), or the gear's largest angle if that is less."""
+"""Rudder angle of the turn in which a card is tested (IMO MSC.137(76)); the gear's largest angle if that is less."""
 
 STOPPED = 0.15
 """A ship that keeps less than this share of its speed in a turn has stopped: full hulls keep a third (project
 choice)."""
 
 WORSE = 1.05
-"""An error that grew by less than this factor is the same (project choice)."""
+"""An error that grew by less than this factor counts as unchanged (project choice)."""
 
 
 def remarks(result: Identification) -> tuple[str, ...]:
-    """All of them, as sentences."""
+    """All notices, as sentences."""
     return (
         *_recognised(result),
         *_chosen(result),
@@ -63,14 +63,12 @@ def _widened(scale: Mapping[str, float]) -> list[str]:
 
 def _worse(result: Identification) -> list[str]:
     messages = []
-    pairs = [("the trials fitted", result.before, result.fit)]
-    if result.holdout and result.before_holdout:
-        pairs.append(("the trials held out", result.before_holdout, result.holdout))
-    for words, before, now in pairs:
-        old, new = pooled(before.following, "motion.r"), pooled(now.following, "motion.r")
+    for words, before, after in result.comparisons:
+        old, new = pooled(before.following, "motion.r"), pooled(after.following, "motion.r")
         if new > WORSE * old:
             messages.append(
-                f"WORSE than the card before on {words}: yaw-rate error {100 * old:.3g} % before, {100 * new:.3g} %"
+                f"WORSE than the card before on the trials {words}: "
+                f"yaw-rate error {100 * old:.3g} % before, {100 * new:.3g} %"
             )
     return messages
 
@@ -87,7 +85,7 @@ def _outside(result: Identification) -> list[str]:
 
 
 def _stops(card: ManoeuvringCard) -> list[str]:
-    """Trials seldom hold a full turn: the card is tried in one, either way."""
+    """Trials seldom hold a full turn: simulate a turn to each side with the card."""
     gear = card.steering_gear
     largest = HARD_TURN if gear is None or gear.max_angle_rad is None else min(HARD_TURN, gear.max_angle_rad)
     messages = []

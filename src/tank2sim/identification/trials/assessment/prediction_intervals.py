@@ -1,32 +1,54 @@
-"""What an answer predicts: intervals of the figures of trials held out, scatter of the estimates, criteria."""
+"""Prediction intervals of manoeuvring figures, and the scatter of estimates, by simulation with random disturbances.
+
+Each member has its own random generator (numpy's SeedSequence, spawned): results depend on the seed alone, not on the
+executor or the order of its work.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.assessment.comparison import Comparison, compare_card
 from tank2sim.identification.trials.assessment.model_selection import Criteria, criteria
-from tank2sim.identification.trials.assessment.monte_carlo import PredictionSettings as BandSettings
-from tank2sim.identification.trials.assessment.monte_carlo import bands, bootstrap
-from tank2sim.identification.trials.assessment.residual_forces import Disturbances, disturbances_of
+from tank2sim.identification.trials.assessment.residual_forces import (
+    Disturbances,
+    disturbances_of,
+    disturbed,
+    draw_disturbances,
+    fastest_rate,
+)
+from tank2sim.identification.trials.methods.shooting import cut
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
-from tank2sim.identification.trials.problem.picklable import PicklableShip, portable
+from tank2sim.identification.trials.problem.measured_motion import sensor_noise
+from tank2sim.identification.trials.problem.picklable import PicklableShip, Portable, map_tasks, portable
 from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.simulation.recorded import recorded, steerable
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.simulation.figures import Figures
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Manoeuvre
+from tank2sim.simulation.recorded import Recorded, recorded, repeat, steerable
+from tank2sim.simulation.rows import Chain, RowFunction
+from tank2sim.simulation.run import simulate
+from tank2sim.simulation.scheme import runge_kutta_step
 
 IN_BANDS = {f"overshoots_deg.{number}": f"overshoot_{number}_deg" for number in (1, 2)}
-"""Name of a figure in :mod:`.prediction` to its name here, where they differ."""
+"""Name of a figure in :class:`Bands` to its name in a comparison, where they differ."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedProblem:
-    """A problem, what was found, and the card with it; `whole` if it is compared with runs at all their speeds."""
+    """A problem, its estimate, and the card with it; `whole` for a comparison with runs at all their speeds."""
 
     problem: Problem
     estimate: Estimate
@@ -34,63 +56,275 @@ class FittedProblem:
     whole: bool = False
 
 
-def held_out(answer: FittedProblem, held: Measured, members: int, executor: Executor | None = None) -> Comparison:
-    """The new card against trials held out, with the interval in which each figure was to be expected.
+@dataclass(frozen=True)
+class PredictionSettings:
+    """Number of members, seed and quantiles.
 
-    The interval is that of simulations with coefficients drawn from their covariance, under random forces as large and
-    as slow as those that the fit left unexplained (:mod:`.prediction`).
+    Parameters
+    ----------
+    members : int
+        Simulations; 200 give the ends of a 95 % band to about a tenth of its width (project choice).
+    seed : int
+    levels : tuple of float
+        Levels of the quantiles.
     """
-    plain = compare_card(answer.card, held, answer.estimate.noise, whole=answer.whole)
+
+    members: int = 200
+    seed: int = 0
+    levels: tuple[float, ...] = (0.025, 0.5, 0.975)
+
+
+@dataclass(frozen=True, eq=False)
+class Bands:
+    """Predicted distribution of the figures of a manoeuvre.
+
+    Parameters
+    ----------
+    levels : tuple of float
+    quantiles : mapping
+        Figure to its value at each level; those of a list are ``overshoots_deg.1`` and so on.
+    members : mapping
+        Figure to its value in each member (members,), nan where not reached.
+    failed : int
+        Members whose motion left all bounds.
+    """
+
+    levels: tuple[float, ...]
+    quantiles: Mapping[str, tuple[float, ...]]
+    members: Mapping[str, Array]
+    failed: int
+
+
+def bands(
+    ship: PicklableShip,
+    estimate: Estimate,
+    manoeuvre: Manoeuvre | Recorded,
+    disturbances: Disturbances | None = None,
+    settings: PredictionSettings | None = None,
+    executor: Executor | None = None,
+) -> Bands:
+    """Bands of a manoeuvre's figures: coefficients drawn from their covariance, random forces during the manoeuvre.
+
+    Parameters
+    ----------
+    ship : PicklableShip
+        The model is driven by the rudder's order, also if the trials were driven by its angle.
+    estimate : Estimate
+        Values and covariance of parameters of the ship's model; drawn values stay within the model's bounds.
+    manoeuvre
+        One of :mod:`tank2sim.simulation.manoeuvres`, or a recorded one, repeated from its start.
+    disturbances : Disturbances, optional
+        By default none: only coefficients are uncertain.
+    settings : PredictionSettings, optional
+    executor : concurrent.futures.Executor, optional
+        By default the members run in sequence in this process.
+
+    Raises
+    ------
+    InputError
+        The motion of every member leaves all bounds.
+    """
+    settings = settings or PredictionSettings()
+    ship = replace(ship, driven_by="order")
+    model = ship.model()
+    tasks = []
+    for rng in _generators(settings):
+        values = _within_bounds(model, estimate.free, rng.multivariate_normal(estimate.values, estimate.covariance))
+        if disturbances is not None:
+            values |= draw_disturbances(disturbances, fastest_rate(model), rng)
+        tasks.append((ship, manoeuvre, values))
+    results = list(map_tasks(_figures, tasks, executor))
+    reached = [figures for figures in results if figures is not None]
+    if not reached:
+        raise InputError(model.origin, "", "the motion leaves all bounds in every member", "check the estimates")
+    names = list(dict.fromkeys(name for figures in reached for name in figures))
+    members = {
+        name: np.array([np.nan if figures is None else figures.get(name, np.nan) for figures in results])
+        for name in names
+    }
+    members = {name: column for name, column in members.items() if not np.isnan(column).all()}
+    quantiles = {name: tuple(map(float, np.nanquantile(member, settings.levels))) for name, member in members.items()}
+    return Bands(settings.levels, quantiles, members, len(results) - len(reached))
+
+
+def bootstrap(
+    problem: Portable,
+    estimate: Estimate,
+    estimator: Callable[[Problem], Estimate],
+    disturbances: Disturbances,
+    settings: PredictionSettings | None = None,
+    executor: Executor | None = None,
+) -> Array:
+    """Parametric bootstrap: estimates (members, k) from runs that were simulated with the estimate (Efron 1979).
+
+    Each run is simulated under its own inputs, with random forces and white noise of the sensors' size; the prior means
+    are drawn, too, around the estimate. Members in which a run leaves all bounds are omitted; this happens in long runs
+    of a course-unstable ship.
+
+    Parameters
+    ----------
+    problem : Portable
+        The estimated problem.
+    estimate : Estimate
+        The true values of the simulation.
+    estimator : callable
+        ``estimator(problem) -> Estimate``; a function of a module for an executor of processes.
+    disturbances : Disturbances
+        Random forces on the simulated ship.
+    settings, executor
+        As for :func:`bands`.
+    """
+    tasks = [(problem, estimate, estimator, disturbances, rng) for rng in _generators(settings or PredictionSettings())]
+    estimates = [values for values in map_tasks(_again, tasks, executor) if values is not None]
+    return np.array(estimates).reshape(-1, len(estimate.free))
+
+
+def _generators(settings: PredictionSettings) -> list[np.random.Generator]:
+    return [np.random.default_rng(seed) for seed in np.random.SeedSequence(settings.seed).spawn(settings.members)]
+
+
+def _within_bounds(model: Model, names: tuple[str, ...], values: Array) -> dict[str, float]:
+    within = {}
+    for name, value in zip(names, values, strict=True):
+        lowest, highest = model[name].minimum, model[name].maximum
+        within[name] = float(np.clip(value, lowest, highest)) if (lowest, highest) != (None, None) else float(value)
+    return within
+
+
+@lru_cache(maxsize=8)
+def _integrator(ship: PicklableShip) -> Integrator:
+    return Integrator(disturbed(ship.model()))
+
+
+def _figures(task: tuple[PicklableShip, Manoeuvre | Recorded, dict[str, float]]) -> dict[str, float] | None:
+    """Figures of one member, None if its motion leaves all bounds."""
+    ship, manoeuvre, values = task
+    integrator = _integrator(ship)
+    try:
+        if isinstance(manoeuvre, Recorded):
+            return flat(repeat(manoeuvre, integrator, values).figures)
+        return flat(simulate(integrator.model, manoeuvre, parameters=values, integrator=integrator).figures)
+    except InputError:
+        return None
+
+
+def flat(figures: Figures) -> dict[str, float]:
+    """Figures as single numbers: those of a list with their position in the name, None as nan."""
+    single: dict[str, float] = {}
+    for name, value in figures.items():
+        if isinstance(value, list | tuple):
+            single |= {f"{name}.{place}": float(item) for place, item in enumerate(value, start=1)}
+        else:
+            single[name] = float(value) if isinstance(value, int | float) else np.nan
+    return single
+
+
+@dataclass(frozen=True, eq=False)
+class _Simulator:
+    """Motion of a disturbed ship, and its observed values."""
+
+    model: Model
+    steps: Chain
+    shown: RowFunction
+
+
+@lru_cache(maxsize=8)
+def _simulator(ship: PicklableShip, seen: tuple[str, ...]) -> _Simulator:
+    model = disturbed(ship.model())
+    shown = ca.densify(model.expand(ca.vcat([model.symbol(name) for name in seen])))
+    function = ca.Function("shown", [model.x, model.u, model.p], [shown], {"cse": True})
+    return _Simulator(model, Chain(runge_kutta_step(model)), RowFunction(function))
+
+
+_Again = tuple[Portable, Estimate, Callable[[Problem], Estimate], Disturbances, np.random.Generator]
+
+
+def _again(task: _Again) -> Array | None:
+    """The estimate from one simulated set of runs, None if a run leaves all bounds."""
+    portable, estimate, estimator, disturbances, rng = task
+    problem = portable.problem()
+    simulator = _simulator(portable.ship, problem.seen)
+    runs = []
+    for run in problem.runs:
+        forces = draw_disturbances(disturbances, fastest_rate(simulator.model), rng)
+        values = dict(zip(estimate.free, map(float, estimate.values), strict=True))
+        p = simulator.model.parameter_values({**values, **forces})
+        measured = _simulated(problem, run, simulator, p)
+        if measured is None:
+            return None
+        noise = sensor_noise(problem, run) * rng.standard_normal(measured.shape)
+        runs.append(replace(run, measured=np.where(np.isnan(run.measured), np.nan, measured + noise)))
+    mean = estimate.values + problem.prior_error * rng.standard_normal(len(estimate.values))
+    return estimator(replace(problem, runs=tuple(runs), prior_mean=mean)).values
+
+
+def _simulated(problem: Problem, run: SampledRun, simulator: _Simulator, p: Array) -> Array | None:
+    """Observed values (n, ny) of a run under its own inputs; None if the motion leaves all bounds."""
+    start = np.append(cut(problem, run, None).starts[0], 0.0)  # the clock is the last state
+    states = simulator.steps.run(start, run.inputs[:-1], p, np.array([run.step_s]))
+    if not np.isfinite(states).all() or np.abs(states).max() > 1e9:
+        return None
+    return simulator.shown(states, run.inputs, p)[0]
+
+
+def compare_held_out(
+    fitted: FittedProblem, held: Measured, members: int, executor: Executor | None = None
+) -> Comparison:
+    """Comparison of the new card with held-out trials, with a 95 % prediction interval of each figure.
+
+    The intervals are of simulations with coefficients drawn from their covariance, under random forces with the size
+    and correlation time of those that the fit does not explain (:func:`bands`).
+    """
+    plain = compare_card(fitted.card, held, fitted.estimate.noise, whole=fitted.whole)
     if not members or not plain.figures:
         return plain
-    card = steerable(answer.card)
+    card = steerable(fitted.card)
     ship, model = PicklableShip(card.text, "order"), build(card)
-    left = _disturbances(answer)
+    disturbances, settings = _disturbances(fitted), PredictionSettings(members=members)
     intervals: dict[tuple[str, str], tuple[float, float]] = {}
     for trial in held.trials:
-        what = recorded(trial, model)
-        if what is None:
+        manoeuvre = recorded(trial, model)
+        if manoeuvre is None:
             continue
         try:
-            found = bands(ship, answer.estimate, what, left, BandSettings(members=members), executor).quantiles
-        except InputError:  # every member ran away: no interval can be told
+            quantiles = bands(ship, fitted.estimate, manoeuvre, disturbances, settings, executor).quantiles
+        except InputError:  # the motion of every member diverged: no interval
             continue
-        for name, (lowest, *_, highest) in found.items():
+        for name, (lowest, *_, highest) in quantiles.items():
             intervals[trial.name, IN_BANDS.get(name, name)] = (lowest, highest)
     figures = tuple(replace(figure, interval=intervals.get((figure.trial, figure.name))) for figure in plain.figures)
     return replace(plain, figures=figures)
 
 
-def criteria_or_none(answer: FittedProblem) -> Criteria | None:
-    """Information criteria of the fit; None where the velocities for them were not measured."""
+def criteria_or_none(fitted: FittedProblem) -> Criteria | None:
+    """Information criteria of the fit; None where the velocities were not measured."""
     try:
-        return criteria(answer.problem, answer.estimate)
+        return criteria(fitted.problem, fitted.estimate)
     except InputError:
         return None
 
 
-def bootstrapped(
-    answer: FittedProblem,
+def bootstrap_estimates(
+    fitted: FittedProblem,
     driven_by: str,
     estimator: Callable[[Problem], Estimate],
     members: int,
     executor: Executor | None,
 ) -> Array | None:
-    """Estimates from trials simulated again; None where they were not asked for, or the residual forces are unknown."""
+    """Estimates from simulated trials (:func:`bootstrap`); None without `members` or without known residual forces."""
     if not members:
         return None
-    left = _disturbances(answer)
-    if left is None:  # no velocities: nothing tells how large the forces are that the model leaves out
+    disturbances = _disturbances(fitted)
+    if disturbances is None:  # without velocities the residual forces are unknown
         return None
-    # Simulated trials are as wide awake as the estimate says: the prior stays what it was when that was found.
-    asked = portable(answer.problem, answer.card, driven_by)
-    settings = BandSettings(members=members)
-    return bootstrap(asked, answer.estimate, estimator, left, settings, executor)
+    # The prior is that of the fit, without its scale: the estimator scales it again.
+    problem = portable(fitted.problem, fitted.card, driven_by)
+    return bootstrap(problem, fitted.estimate, estimator, disturbances, PredictionSettings(members=members), executor)
 
 
-def _disturbances(answer: FittedProblem) -> Disturbances | None:
-    """What the fit left unexplained, as random forces; None where the velocities for it were not measured."""
+def _disturbances(fitted: FittedProblem) -> Disturbances | None:
+    """Random forces that the fit does not explain; None where the velocities were not measured."""
     try:
-        return disturbances_of(answer.problem, answer.estimate.values)
+        return disturbances_of(fitted.problem, fitted.estimate.values)
     except InputError:
         return None

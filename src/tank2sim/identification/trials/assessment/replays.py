@@ -1,4 +1,4 @@
-"""Trials next to what the card that was given and the card that was found make of them."""
+"""Trials and their simulations by the given card and by the card found."""
 
 from __future__ import annotations
 
@@ -26,18 +26,17 @@ _SAMPLES = 240
 
 
 def replays(card: ManoeuvringCard, result: Identification, trials: Measured) -> tuple[tuple[Passage, Passage], ...]:
-    """Each trial next to `card`, the one that was given, and next to the card found."""
+    """Each trial with the simulation by `card`, the given card, and with that by the card found."""
     both = []
-    whole = card.model.valid_speed_mps is None  # the card found states the speeds of the trials fitted alone
-    for one in (card, result.card):
-        problem = problem_from_card(one, trials.trials, trials.driven_by, whole=whole)
-        both.append(comparison_windows(problem, one, trials.trials, result.estimate.noise))
+    whole = card.model.valid_speed_mps is None  # the card found states only the speeds of the fitted trials
+    for each_card in (card, result.card):
+        problem = problem_from_card(each_card, trials.trials, trials.driven_by, whole=whole)
+        both.append(comparison_windows(problem, each_card, trials.trials, result.estimate.noise))
     return tuple(zip(*both, strict=True))
 
 
 def replays_as_json(found: Sequence[tuple[Passage, Passage]], *, held_out: bool) -> list[dict[str, object]]:
-    """As JSON has them: columns of what was measured and of both simulations, each over its own time, thinned to
-    draw."""
+    """JSON form: columns of the measurement and of both simulations, each over its own time, thinned for a chart."""
     return [
         {
             "trial": after.name,
@@ -54,5 +53,5 @@ def replays_as_json(found: Sequence[tuple[Passage, Passage]], *, held_out: bool)
 def _columns(time_s: Array, signals: Mapping[str, Array]) -> dict[str, list[float]]:
     if not len(time_s):
         return {}
-    own = {_COLUMNS[name]: from_si(_COLUMNS[name], 1.0) * values for name, values in signals.items()}
-    return drawn_columns({"t_s": time_s, **own}, _SAMPLES)
+    columns = {_COLUMNS[name]: from_si(_COLUMNS[name], 1.0) * values for name, values in signals.items()}
+    return drawn_columns({"t_s": time_s, **columns}, _SAMPLES)

@@ -1,4 +1,4 @@
-"""Random forces that no model explains: how large they were in trials, and what they do to manoeuvres.
+"""Random forces that the model does not explain: their size in trials, and their simulation in manoeuvres.
 
 First-order Gauss-Markov forces X, Y, N: covariance P exp(-|tau|/T). In simulation each is a sum of harmonics,
 
@@ -25,7 +25,7 @@ HARMONICS = 16
 """Harmonics of a force (project choice): one in each sixteenth of its power, from slow drift to shaking."""
 
 LAGS = 12
-"""Residuals up to this many half windows apart tell the correlation time (ours: 4 L/u0)."""
+"""Residuals up to this many half windows apart determine the correlation time (project choice: 4 L/u0)."""
 
 FORCES = {"X": "N", "Y": "N", "N": "N.m"}
 
@@ -53,10 +53,10 @@ class Disturbances:
 
 
 def disturbances_of(problem: Problem, values: Array) -> Disturbances:
-    """Forces that the trials had beyond the model with its free parameters at `values` (k,).
+    """Forces in the trials beyond the model with its free parameters at `values` (k,).
 
-    From the covariances of the weak form's residuals from window to window, less what sensor noise makes of them. Model
-    error is in them: it looks like a force.
+    From the covariances of the weak form's residuals from window to window, less the part of sensor noise. They include
+    model error, which looks like a force.
     """
     form = WeakForm(problem)
     acceleration, correlation_s = gauss_markov(form, form.at(values))
@@ -65,7 +65,7 @@ def disturbances_of(problem: Problem, values: Array) -> Disturbances:
 
 
 def gauss_markov(form: WeakForm, windows: list[WeakWindows]) -> tuple[Array, float]:
-    """Covariance (3, 3) and correlation time, s, of the random accelerations that explain the residuals best.
+    """Covariance (3, 3) and correlation time, s, of the random accelerations that fit the residuals best.
 
     Least squares over the covariances at lags 0 to :data:`LAGS`.
     """
@@ -74,36 +74,36 @@ def gauss_markov(form: WeakForm, windows: list[WeakWindows]) -> tuple[Array, flo
     bump = bump[bump > 0]
     noise = np.mean([run.motion.noise**2 for run in form.runs], axis=0)
     count, lag = len(bump), len(bump) // 2
-    found = _lagged(form, windows)
-    size = np.sqrt(np.maximum(np.diag(found[0]), 1e-100))
+    covariances = _lagged(form, windows)
+    size = np.sqrt(np.maximum(np.diag(covariances[0]), 1e-100))
     slopes = np.diff(np.concatenate([[0.0], bump, [0.0]])) / step
-    for place in range(min(3, len(found))):  # noise of a sample is in all windows that hold it
+    for place in range(min(3, len(covariances))):  # noise of a sample is in every window that contains it
         shared = slopes[place * lag :] @ slopes[: len(slopes) - place * lag]
-        found[place] -= np.diag(noise) * shared
-    together = np.array([np.trace(one / np.outer(size, size)) for one in found])
+        covariances[place] -= np.diag(noise) * shared
+    traces = np.array([np.trace(lagged / np.outer(size, size)) for lagged in covariances])
     overlap = np.correlate(bump, bump, "full")
     apart = np.arange(-count + 1, count) * step
 
     def theory(correlation_s: float) -> Array:
-        distances = np.abs(apart[None, :] - np.arange(len(found))[:, None] * lag * step)
+        distances = np.abs(apart[None, :] - np.arange(len(covariances))[:, None] * lag * step)
         return np.asarray(np.exp(-distances / correlation_s) @ overlap)
 
     def misfit(logarithm: float) -> float:
         shape = theory(float(np.exp(logarithm)))
-        height = max(float(shape @ together / (shape @ shape)), 0.0)
-        return float(np.sum((together - height * shape) ** 2))
+        height = max(float(shape @ traces / (shape @ shape)), 0.0)
+        return float(np.sum((traces - height * shape) ** 2))
 
     half = lag * step
     best = minimize_scalar(misfit, bounds=(np.log(0.1 * half), np.log(30 * half)), method="bounded")
     correlation_s = float(np.exp(best.x))
     shape = theory(correlation_s)
-    covariance = np.einsum("l,lij->ij", shape, found) / (shape @ shape)
+    covariance = np.einsum("l,lij->ij", shape, covariances) / (shape @ shape)
     values, vectors = np.linalg.eigh((covariance + covariance.T) / 2 / np.outer(size, size))
     return (vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(size, size), correlation_s
 
 
 def disturbed(model: Model) -> Model:
-    """A model on which random forces act; their parameters, all 0 at first, are those of :func:`draw_disturbances`."""
+    """The model with random forces; their parameters, 0 by default, are those of :func:`draw_disturbances`."""
     clock = State(
         name="disturbance.clock",
         unit="s",
@@ -133,9 +133,9 @@ def draw_disturbances(disturbances: Disturbances, fastest: float, rng: np.random
     Parameters
     ----------
     disturbances : Disturbances
-        How large they are.
+        Their covariance and correlation time.
     fastest : float
-        Highest frequency that integration resolves, rad/s: one beyond it is put there.
+        Highest frequency that integration resolves, rad/s: higher frequencies are set to it.
     rng : numpy.random.Generator
     """
     share = (np.arange(HARMONICS) + rng.random(HARMONICS)) / HARMONICS  # one in each part of equal power
@@ -160,7 +160,7 @@ def _parameter(name: str, unit: str) -> Parameter:
 
 
 def _lagged(form: WeakForm, windows: list[WeakWindows]) -> Array:
-    """Covariances (lags, 3, 3) of residuals so many half windows apart."""
+    """Covariances (lags, 3, 3) of residuals at lags of half windows."""
     pieces = [window.residuals[part] for window, run in zip(windows, form.runs, strict=True) for part in run.pieces]
     lags = min(LAGS + 1, max(len(piece) for piece in pieces))
     sums, counts = np.zeros((lags, 3, 3)), np.zeros(lags)
@@ -173,7 +173,7 @@ def _lagged(form: WeakForm, windows: list[WeakWindows]) -> Array:
 
 
 def _mass_matrix(model: Model, p: Array) -> Array:
-    """Forces by accelerations (3, 3) at rest, SI."""
+    """Mass matrix (3, 3) at rest, SI."""
     names = ("surge", "sway", "sway_yaw", "yaw_sway", "yaw")
     expression = model.expand(ca.vcat([model.symbol(f"inertia.{name}") for name in names]))
     function = ca.Function("masses", [model.x, model.u, model.p], [expression])

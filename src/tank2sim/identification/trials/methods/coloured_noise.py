@@ -1,4 +1,4 @@
-"""Residuals as white noise plus first-order autoregressive noise, and the filter that makes them white again.
+"""Residuals as white noise plus first-order autoregressive noise, and the filter that whitens them.
 
 A sum of white noise and an AR(1) process is an ARMA(1,1) process (Granger and Morris 1976, J. R. Stat. Soc. A 139):
 ``e[k] - phi e[k-1] = w[k] - psi w[k-1]`` with w white. The filter is that equation solved for w.
@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from tank2sim.arrays import Array
 
 LARGEST_PHI = 0.995
-"""Above it a residual would count as drift, and only its steps from sample to sample would weigh (project choice)."""
+"""Above it a residual would count as drift, and only its steps from sample to sample would count (project choice)."""
 
 
 @dataclass(frozen=True)
@@ -28,20 +28,17 @@ class ColouredNoise:
 
     @property
     def deviation(self) -> float:
-        """Standard deviation of the coloured residual itself."""
+        """Standard deviation of the coloured residual."""
         colour = (1 - 2 * self.phi * self.psi + self.psi**2) / (1 - self.phi**2)
         return self.sigma * float(np.sqrt(colour))
 
     def whitened(self, residuals: Array) -> Array:
         """``w / sigma`` of residuals or their derivatives, along axis -2 if 3-D (pieces, n, columns), else axis 1.
 
-        The first sample of a piece stands for the stationary past: it is divided by the deviation of the residual.
+        The first sample of a piece represents the stationary past: it is divided by the deviation of the residual.
         """
-        axis = 1
-        white: Array = lfilter([1.0, -self.phi], [1.0, -self.psi], residuals, axis=axis) / self.sigma
-        first = residuals[:, 0] / self.deviation
-        # The filter's own start-up: as if the residual before had been zero; scaled to unit variance.
-        white[:, 0] = first
+        white: Array = lfilter([1.0, -self.phi], [1.0, -self.psi], residuals, axis=1) / self.sigma
+        white[:, 0] = residuals[:, 0] / self.deviation  # unit variance, as if the previous residual had been zero
         return white
 
 
@@ -56,13 +53,13 @@ def estimate_coloured_noise(pieces: Sequence[Array], smallest: float) -> Coloure
     Parameters
     ----------
     pieces : sequence of arrays (n,)
-        Residuals of continuous pieces, nan where nothing was measured.
+        Residuals of continuous pieces, nan where not measured.
     smallest : float
-        Least deviation to believe in, in the signal's unit (rounding of the record).
+        Least plausible deviation, in the signal's unit (rounding of the record).
 
     Notes
     -----
-    The AR(1) part follows from the autocovariances at lags 1 and 2, the white part from what lag 0 has beyond them;
+    The AR(1) part follows from the autocovariances at lags 1 and 2, the white part from the excess at lag 0;
     psi is the root within the unit circle of the spectral factorisation.
     """
     g0, g1, g2 = (_autocovariance(pieces, lag) for lag in (0, 1, 2))
@@ -73,12 +70,12 @@ def estimate_coloured_noise(pieces: Sequence[Array], smallest: float) -> Coloure
     if phi < 0.05:
         return ColouredNoise(float(np.sqrt(g0)))
     coloured = min(g1 / phi, g0)
-    rest = max(g0 - coloured, 0.0)
-    if rest < 1e-9 * g0:
+    uncoloured = max(g0 - coloured, 0.0)
+    if uncoloured < 1e-9 * g0:
         return ColouredNoise(float(np.sqrt(coloured * (1 - phi**2))), phi)
     # (1 - phi q) white + shock: autocovariances c0 and c1 of the MA(1) side
-    c0 = coloured * (1 - phi**2) + rest * (1 + phi**2)
-    c1 = -phi * rest
+    c0 = coloured * (1 - phi**2) + uncoloured * (1 + phi**2)
+    c1 = -phi * uncoloured
     half = c0 / (2 * c1)
     psi = float(-half - np.sqrt(half**2 - 1)) if half < 0 else float(-half + np.sqrt(half**2 - 1))
     psi = psi if abs(psi) < 1 else 1 / psi

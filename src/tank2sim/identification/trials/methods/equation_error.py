@@ -1,10 +1,10 @@
-"""Equation error in its weak form: the model's accelerations are held against the measured changes of velocity.
+"""Equation error in its weak form: comparison of the model's accelerations with the measured changes of velocity.
 
 Generalised least squares: the covariance of the three equations and the colour of their residuals are estimated from
-them, the prior is a ridge. Linear in derivatives, so that one step solves for them; no start is too bad, and nothing is
-simulated but what no sensor saw. Noise in the regressors pulls the estimates towards zero: they are smoothed first, and
-the user is reported how much is left. Gusts move the ship in step with themselves, which pulls the damping towards
-zero by the share of the motion that they cause (as in any regression on the motion itself): a start for output error.
+them, the prior is a ridge. The problem is linear in the derivatives, so that a single step solves it from any start,
+and only unmeasured states are simulated. Noise in the regressors pulls the estimates towards zero: they are smoothed
+first, and a notice gives the remaining share. Gusts move the ship in phase with themselves, which pulls the damping
+towards zero by the share of the motion that they cause (as in any regression on the motion): a start for output error.
 """
 
 from __future__ import annotations
@@ -16,27 +16,27 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, estimate_coloured_noise, white
+from tank2sim.identification.trials.methods.gauss_newton import SearchLimits, damped_gauss_newton
 from tank2sim.identification.trials.methods.posterior import BLOCK, evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.weak_form import WEAK_EQUATIONS, WIDTH, WeakForm, WeakWindows
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 
-TOLD_NOISE = 0.01
-"""Share of noise in a regressor's variance from which the user is reported: so much too small its coefficients may
-be."""
+REPORTED_NOISE = 0.01
+"""Share of noise in a regressor's variance from which a notice reports it: its coefficients may be too small by it."""
 
 
 @dataclass(frozen=True)
 class EquationErrorSettings:
-    """How equation error is done.
+    """Settings of equation error.
 
     Parameters
     ----------
     width : float
-        Of the test functions, in L/u0.
+        Width of the test functions, in L/u0.
     scale_prior : bool
-        The prior's standard errors are multiplied, by groups, by the factor of largest evidence, at least 1.
+        Multiply the prior's standard errors, by groups, by the factor of largest evidence, at least 1.
     rounds : int
-        Times that noise (and prior) are estimated again.
+        Number of estimates of noise (and prior).
     """
 
     width: float = WIDTH
@@ -46,7 +46,7 @@ class EquationErrorSettings:
 
 @dataclass(frozen=True, eq=False)
 class WhiteningWeights:
-    """What makes residuals white: the root of the covariance of the three equations, and the colour of each.
+    """Weights that whiten residuals: the root of the covariance of the three equations, and the colour of each.
 
     Parameters
     ----------
@@ -60,15 +60,15 @@ class WhiteningWeights:
     colour: tuple[ColouredNoise, ...]
 
     def whitened(self, values: Array, pieces: tuple[slice, ...]) -> Array:
-        """Residuals (windows, 3) or their derivatives (windows, 3, k), made white."""
+        """Residuals (windows, 3) or their derivatives (windows, 3, k), whitened."""
         flat = values.reshape(len(values), 3, -1)
-        alone = np.einsum("ij,wjk->iwk", self.inverse, flat)
-        whole = np.empty_like(alone)
-        for place, one in enumerate(self.colour):
+        components = np.einsum("ij,wjk->iwk", self.inverse, flat)
+        whole = np.empty_like(components)
+        for place, noise in enumerate(self.colour):
             for piece in pieces:
-                if not alone[place, piece].size:
+                if not components[place, piece].size:
                     continue
-                whole[place, piece] = one.whitened(alone[place, piece][None])[0]
+                whole[place, piece] = noise.whitened(components[place, piece][None])[0]
         result: Array = whole.transpose(1, 0, 2).reshape(values.shape)
         return result
 
@@ -96,15 +96,15 @@ def equation_error(
     problem : Problem
         k free parameters.
     start : array (k,), optional
-        Where the search begins; by default the prior's mean.
+        Start of the search; by default the prior's mean.
     settings : EquationErrorSettings, optional
     progress : callable
-        Called with each better estimate; what it raises passes through.
+        Called with each better estimate; its exceptions propagate.
 
     Raises
     ------
     InputError
-        A run lacks velocities, and they do not follow from what it has; or all runs are shorter than a window.
+        A run lacks velocities and signals that determine them, or all runs are shorter than a window.
     """
     settings = settings or EquationErrorSettings()
     form = WeakForm(problem, settings.width)
@@ -116,7 +116,7 @@ def equation_error(
     costs = []
     for number in range(settings.rounds):
         prior = scaled_prior(problem, scale)
-        values, windows, normal = _minimise(form, values, windows, (weights, prior), progress)
+        values, windows, normal = _minimise(form, values, windows, weights, prior, progress)
         costs.append(normal.cost)
         if number < settings.rounds - 1:
             weights = weights_of(form, windows)
@@ -132,7 +132,7 @@ def equation_error(
         noise=dict(zip(WEAK_EQUATIONS, map(float, deviations), strict=True)),
         cost=tuple(costs),
         prior_scale=scale,
-        notices=(*form.notices, *_told(form)),
+        notices=(*form.notices, *_form_notices(form)),
     )
 
 
@@ -145,14 +145,14 @@ def refuse_empty(form: WeakForm) -> None:
 
 
 def first_weights(form: WeakForm) -> WhiteningWeights:
-    """A tenth of the spread of each acceleration: nothing is known of the residuals yet."""
+    """A tenth of the spread of each acceleration, before any residual is known."""
     every = np.concatenate([run.change for run in form.runs])
     spread = 0.1 * np.sqrt(np.mean(every**2, axis=0))
     return WhiteningWeights(np.diag(1 / np.where(spread > 0, spread, 1.0)), (white(1.0),) * 3)
 
 
 def weights_of(form: WeakForm, windows: list[WeakWindows]) -> WhiteningWeights:
-    """Covariance and colour of the residuals as they are."""
+    """Covariance and colour of the residuals."""
     every = np.concatenate([window.residuals for window in windows])
     covariance = every.T @ every / len(every)
     smallest = 1e-12 * np.mean(np.concatenate([run.change for run in form.runs]) ** 2, axis=0)
@@ -186,60 +186,68 @@ def normal_equations(form: WeakForm, windows: list[WeakWindows], weights: Whiten
     return _Normal(cost, information, gradient, scores)
 
 
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """Parameters (k,), the windows with them, and the sum of squares with the prior."""
+
+    values: Array
+    windows: list[WeakWindows]
+    cost: float
+
+
 def _minimise(
     form: WeakForm,
     values: Array,
     windows: list[WeakWindows],
-    known: tuple[WhiteningWeights, Array],
+    weights: WhiteningWeights,
+    errors: Array,
     progress: SearchReport,
 ) -> tuple[Array, list[WeakWindows], _Normal]:
     """Damped Gauss-Newton steps; values, windows and normal equations at the best point."""
-    weights, errors = known
     problem = form.problem
     prior = 1 / errors**2
 
-    def cost_at(at: Array, there: list[WeakWindows]) -> float:
-        own = float(np.sum(prior * (at - problem.prior_mean) ** 2))
-        runs = zip(there, form.runs, strict=True)
-        return own + sum(float(np.sum(weights.whitened(one.residuals, run.pieces) ** 2)) for one, run in runs)
+    def point(values: Array, windows: list[WeakWindows]) -> _Point:
+        cost = float(np.sum(prior * (values - problem.prior_mean) ** 2))
+        for window, run in zip(windows, form.runs, strict=True):
+            cost += float(np.sum(weights.whitened(window.residuals, run.pieces) ** 2))
+        return _Point(values, windows, cost)
 
-    best, damping = cost_at(values, windows), 0.0
-    for _ in range(20):
-        normal = normal_equations(form, windows, weights)
-        H = normal.information + np.diag(prior)
-        g = normal.gradient + prior * (values - problem.prior_mean)
-        for _ in range(10):
-            # In units of the prior's errors the matrix is well scaled.
-            scaled = H * np.outer(errors, errors)
-            step = -errors * np.linalg.solve(scaled + damping * np.diag(np.diag(scaled)), g * errors)
-            step = np.clip(values + step, *problem.bounds) - values
-            there = form.at(values + step)
-            cost = cost_at(values + step, there)
-            if cost < best:
-                break
-            damping = max(10 * damping, 1e-3)
-        else:
-            return values, windows, normal
-        gain, best, values, windows = best - cost, cost, values + step, there
-        damping = damping / 10 if damping > 1e-6 else 0.0
-        progress("equation error", values, cost)
-        if gain < 1e-6 * max(1.0, best):
-            break
-    return values, windows, normal_equations(form, windows, weights)
+    def linearise(start: _Point) -> _Normal:
+        return normal_equations(form, start.windows, weights)
+
+    def move(start: _Point, normal: _Normal, damping: float) -> _Point:
+        # In units of the prior's errors the matrix is well scaled.
+        scaled = (normal.information + np.diag(prior)) * np.outer(errors, errors)
+        gradient = normal.gradient + prior * (start.values - problem.prior_mean)
+        step = errors * np.linalg.solve(scaled + damping * np.diag(np.diag(scaled)), gradient * errors)
+        values = np.clip(start.values - step, *problem.bounds)
+        return point(values, form.at(values))
+
+    found = damped_gauss_newton(
+        point(values, windows),
+        linearise,
+        move,
+        SearchLimits(steps=20, attempts=10),
+        lambda gain, cost: gain < 1e-6 * max(1.0, cost),
+        lambda better: progress("equation error", better.values, better.cost),
+    )
+    (*_, best), last = found
+    return best.values, best.windows, last or linearise(best)
 
 
-def _told(form: WeakForm) -> list[str]:
-    """Regressors in which noise is left, and parameters that no acceleration depends on."""
+def _form_notices(form: WeakForm) -> list[str]:
+    """Notices of regressors with remaining noise, and of parameters that no acceleration depends on."""
     messages = []
     spread = np.concatenate([run.motion.smooth[:, :3] for run in form.runs]).std(axis=0)
-    left = np.sqrt(np.mean([run.motion.left**2 for run in form.runs], axis=0))
-    for name, own, noise in zip("uvr", spread, left, strict=True):
-        share = (noise / own) ** 2 if own > 0 else 0.0
-        if share > TOLD_NOISE:
+    noise = np.sqrt(np.mean([run.motion.remaining_noise**2 for run in form.runs], axis=0))
+    for name, size, error in zip("uvr", spread, noise, strict=True):
+        share = (error / size) ** 2 if size > 0 else 0.0
+        if share > REPORTED_NOISE:
             messages.append(
                 f"{100 * share:.0f} % of the variance of {name} is noise: its coefficients come out too small"
             )
     blind = [name for name, seen in zip(form.problem.free, form.seen, strict=True) if not seen]
     if blind:
-        messages.append(f"equation error does not see {', '.join(blind)}: no acceleration depends on them")
+        messages.append(f"equation error does not determine {', '.join(blind)}: no acceleration depends on them")
     return messages

@@ -1,8 +1,8 @@
-"""The Kalman filter's gains along a trajectory that is linearised already, its innovations, and the smoother.
+"""The Kalman filter's gains along a linearised trajectory, the derivatives of its innovations, and the smoother.
 
-Runs of one batch are padded to one length; an instant without a measurement has a row of zeros in C, a residual of 0
-and a variance of 1, and so adds nothing to the likelihood. Everything works on stacks of small matrices with any
-leading axes, of which the last is the run.
+Runs of a batch are padded to the same length; an instant without a measurement has a row of zeros in C, a residual of 0
+and a variance of 1, and adds nothing to the likelihood. All functions work on stacks of small matrices with any leading
+axes, of which the last is the run.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ class Variances:
     Parameters
     ----------
     process : array (..., runs, nz)
-        Of what is added to the state in a step (diagonal).
+        Of the noise added to the state in a step (diagonal).
     measurement : array (..., runs, n, ny)
-        1 where nothing was measured.
+        1 where not measured.
     start : array (..., runs, nz, nz)
         Covariance of the first state.
     """
@@ -36,7 +36,7 @@ class Variances:
 
 @dataclass(frozen=True, eq=False)
 class Gains:
-    """What a pass of the filter leaves.
+    """Gains and covariances of a pass of the filter.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def gains(A: Array, C: Array, variances: Variances) -> Gains:
     return result
 
 
-def varied(
+def variant_likelihoods(
     tangents: Tangents, variances: Variances, innovations: Array, after: Array, factors: Array
 ) -> tuple[Array, Array]:
     """Likelihood of filters with other noise levels, along the same linearised trajectory.
@@ -86,7 +86,7 @@ def varied(
     innovations, after : arrays (runs, n, ny), (runs, n, nz)
         Of the first variant: innovations, and states after each measurement.
     factors : array (variants, runs, g)
-        What is left of each of the last g states after a step.
+        Share of each of the last g states that remains after a step.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def varied(
     information : array (variants, variants)
         Sum of ``d d' + t t' / 2``, with d and t the changes against the first variant of each innovation over its
         standard deviation and of the logarithm of its variance: Fisher's information for small changes if the signals
-        of an instant were independent. (The true one was tried: where the model is far off, its steps are too short.)
+        of an instant were independent. (With the true information the steps are too short where the model is far off.)
     """
     count, runs, g = factors.shape
     n, _, nz = tangents.C.shape[1:]
@@ -110,12 +110,12 @@ def varied(
         e = innovations[:, k, :, None] - C @ before
         white = W @ e
         cost += (white[..., 0] ** 2 - 2 * np.log(np.diagonal(W, axis1=-2, axis2=-1))).sum(axis=(1, 2))
-        own = np.diagonal(S, axis1=-2, axis2=-1)
-        d = ((e - e[:1])[..., 0] / np.sqrt(own[:1])).reshape(count, -1)
-        t = ((own - own[:1]) / own[:1]).reshape(count, -1)
+        variance = np.diagonal(S, axis1=-2, axis2=-1)
+        d = ((e - e[:1])[..., 0] / np.sqrt(variance[:1])).reshape(count, -1)
+        t = ((variance - variance[:1]) / variance[:1]).reshape(count, -1)
         information += d @ d.T + 0.5 * t @ t.T
-        gained = np.swapaxes(M, -1, -2) @ white
-        before = A @ (before + gained - gained[:1])  # away from the state of the first variant
+        correction = np.swapaxes(M, -1, -2) @ white
+        before = A @ (before + correction - correction[:1])  # relative to the state of the first variant
         before[..., nz - g :, 0] += (factors - factors[:1]) * after[:, k, nz - g :]
         P = _following(P, M, A, variances.process)
     return cost, information
@@ -144,7 +144,7 @@ def smooth_states(A: Array, C: Array, found: Gains, before: Array, innovations: 
     """States (runs, n, nz) from all measurements, before and after each instant, and their standard errors.
 
     The smoother of Rauch, Tung and Striebel (1965, AIAA J. 3) in the form of Bierman (1973, Automatica 9), which needs
-    no inverse of the state's covariance: that is nearly singular where process noise is small.
+    no inverse of the state's covariance, nearly singular where process noise is small.
     """
     runs, n, nz = before.shape
     states, errors = np.empty_like(before), np.empty_like(before)
@@ -165,9 +165,10 @@ def smooth_states(A: Array, C: Array, found: Gains, before: Array, innovations: 
 
 
 def innovation_tangents(tangents: Tangents, found: Gains, start: Array | None = None) -> tuple[Array, Array]:
-    """Derivatives of the whitened innovations by the parameters (runs, n, ny, k), gains held.
+    """Derivatives of the whitened innovations by the parameters (runs, n, ny, k), with the gains held.
 
-    Also those of the state before the last measurement (runs, nz, k); `start` are those before the first, by default 0.
+    Second result: derivatives of the state before the last measurement (runs, nz, k). `start`: those before the first,
+    by default 0.
     """
     A, B, C, D = tangents.A, tangents.B, tangents.C, tangents.D
     runs, n, _, k = D.shape

@@ -22,15 +22,15 @@ class Batch:
     ----------
     inputs : array (runs, n, nu)
     measured : array (runs, n, ny)
-        0 where nothing was measured.
+        0 where not measured.
     known : array of bool (runs, n, ny)
-        Where something was measured; False in the padding.
+        True where measured; False in the padding.
     lengths : tuple of int
         Instants of each run.
     steps : array (runs,)
         s.
     starts : array (runs, nz)
-        First guess of the first states, from the measurements near them; no random acceleration or drift.
+        First guess of the first states, from the nearby measurements; without random acceleration or drift.
     spread : array (runs, nz, nz), optional
         Covariance of the first states; by default wide.
     """
@@ -54,8 +54,8 @@ class Batch:
         return Batch(self.inputs[where], measured, known, (known.shape[1],), steps, start[None], covariance)
 
 
-def batch_of(problem: Problem, lasting: int) -> Batch:
-    """The runs of a problem, for a filter with that many random accelerations and drifts."""
+def batch_of(problem: Problem, correlated: int) -> Batch:
+    """The runs of a problem, for a filter with `correlated` random accelerations and drifts."""
     pieces = [cut(problem, run, None) for run in problem.runs]
     lengths = tuple(len(run.measured) for run in problem.runs)
     n = max(lengths)
@@ -68,7 +68,7 @@ def batch_of(problem: Problem, lasting: int) -> Batch:
         ]
     )
     known = ~np.isnan(measured)
-    starts = np.stack([np.append(piece.starts[0], np.zeros(lasting)) for piece in pieces])
+    starts = np.stack([np.append(piece.starts[0], np.zeros(correlated)) for piece in pieces])
     steps = np.array([run.step_s for run in problem.runs])
     return Batch(inputs, np.where(known, measured, 0.0), known, lengths, steps, starts)
 
@@ -93,23 +93,23 @@ class Levels:
 
     @property
     def vector(self) -> Array:
-        """All that can vary."""
+        """All finite levels."""
         times = self.time[np.isfinite(self.time)]
         whole: Array = np.concatenate([self.process, times, self.measurement])
         return whole
 
     def at(self, vector: Array) -> Levels:
-        """Levels with those values in place of their own."""
+        """Levels with the values of `vector`."""
         g, ny = len(self.process), len(self.measurement)
         time = self.time.copy()
         time[np.isfinite(time)] = vector[g : len(vector) - ny]
         return Levels(vector[:g], time, vector[len(vector) - ny :])
 
     def factors(self, steps: Array) -> Array:
-        """phi (runs, g): what is left of an acceleration or a drift after a step of each run."""
+        """phi (runs, g): share of an acceleration or a drift that remains after a step of each run."""
         with np.errstate(divide="ignore"):
-            left: Array = np.exp(-steps[:, None] / np.exp(self.time))
-        return left
+            remaining: Array = np.exp(-steps[:, None] / np.exp(self.time))
+        return remaining
 
     def variances(self, batch: Batch, nominal: Array) -> Variances:
         """Variances for the filter; the first states are known to within a nominal value."""
@@ -123,16 +123,16 @@ class Levels:
 
 @dataclass(frozen=True, eq=False)
 class FilterPass:
-    """What a filter with given parameters and levels made of the runs.
+    """Filtered runs with given parameters and levels.
 
     Parameters
     ----------
     before, after : arrays (runs, n, nz)
         States before and after each measurement.
     innovations : array (runs, n, ny)
-        Measured less predicted; 0 where nothing was measured.
+        Measured less predicted; 0 where not measured.
     tangents : Tangents
-        Stacked (runs, n, ...), along the trajectory at which the gains were taken.
+        Stacked (runs, n, ...), along the trajectory at which the gains were computed.
     gains : Gains
     cost : float
         -2 log likelihood except for a constant; inf where the motion leaves all bounds.
@@ -156,16 +156,16 @@ def filter_pass(disturbed: Disturbed, batch: Batch, p: Array, levels: Levels, al
     """Gains along a trajectory (before, after), and the observer with these gains on its own trajectory."""
     factors = levels.factors(batch.steps)
     cases = [(p, phi, np.array([h])) for phi, h in zip(factors, batch.steps, strict=True)]
-    every = [
+    stacked = [
         disturbed.tangents(before, after, inputs, case)
         for before, after, inputs, case in zip(*along, batch.inputs, cases, strict=True)
     ]
     mask = batch.known[..., None]
     tangents = Tangents(
-        A=np.stack([one.A for one in every]),
-        B=np.stack([one.B for one in every]),
-        C=np.where(mask, np.stack([one.C for one in every]), 0.0),
-        D=np.where(mask, np.stack([one.D for one in every]), 0.0),
+        A=np.stack([run_tangents.A for run_tangents in stacked]),
+        B=np.stack([run_tangents.B for run_tangents in stacked]),
+        C=np.where(mask, np.stack([run_tangents.C for run_tangents in stacked]), 0.0),
+        D=np.where(mask, np.stack([run_tangents.D for run_tangents in stacked]), 0.0),
     )
     found = gains(tangents.A, tangents.C, levels.variances(batch, disturbed.nominal))
     runs = zip(batch.starts, batch.inputs, batch.measured, found.K, cases, strict=True)
@@ -180,7 +180,7 @@ def filter_pass(disturbed: Disturbed, batch: Batch, p: Array, levels: Levels, al
 
 
 def measured_trajectory(problem: Problem, batch: Batch) -> tuple[Array, Array]:
-    """A first trajectory: the measured states where there are any, else those of the beginning."""
+    """A first trajectory: the measured states, and the first states where none were measured."""
     n = batch.measured.shape[1]
     states = np.repeat(batch.starts[:, None], n, axis=1)
     for place, name in enumerate(problem.model.state_names):

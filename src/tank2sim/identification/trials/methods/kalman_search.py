@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.identification.trials.methods.kalman_gains import Variances, innovation_tangents, varied
+from tank2sim.identification.trials.methods.gauss_newton import SearchLimits, damped_gauss_newton
+from tank2sim.identification.trials.methods.kalman_gains import Variances, innovation_tangents, variant_likelihoods
 from tank2sim.identification.trials.methods.kalman_pass import (
     Batch,
     FilterPass,
@@ -23,24 +24,25 @@ from tank2sim.identification.trials.problem.estimation_problem import Problem
 
 USUAL_TIME = 0.5
 """Time constant of a random acceleration before the trials, in ship times L/u0, to within a factor of
-:data:`TIME_FACTOR` (ours: what a model leaves out of the flow passes with the ship's own length)."""
+:data:`TIME_FACTOR` (project choice: unmodelled flow passes with the ship's own length)."""
 
 TIME_FACTOR = 3.0
 """Standard error of that, as a factor (project choice)."""
 
 USUAL_PUSH = 0.2
-"""Random acceleration at which the search begins, in nominal values of the state a ship time (ours: rather much, for
-then the problem is nearly linear)."""
+"""Random acceleration at which the search begins, in nominal values of the state a ship time (project
+choice: rather large, because the problem is then nearly linear)."""
 
 RANGE = 1e5
-"""Factor by which process noise may leave the level at which the search begins, to either side: to nothing, or all."""
+"""Factor by which process noise may leave the level at which the search begins, to either side: practically none, or
+all."""
 
 _FINEST = 0.1
-"""A measurement's noise is at least this share of what its third differences show (ours: a smoothed record is rougher
-than its noise, and likelihood would take it for exact)."""
+"""A measurement's noise is at least this share of the value from its third differences (project choice: a smoothed
+record is rougher than its noise, and the likelihood would treat it as exact)."""
 
 VARIATION = 1e-3
-"""Step of the finite differences by the logarithm of a noise level."""
+"""Step of the finite differences in the logarithm of a noise level."""
 
 ENOUGH = 0.05
 """A search ends when an iteration gains less in -2 log likelihood: no estimate moves by a quarter of its error."""
@@ -51,18 +53,18 @@ LONGEST_STEP = 1.5
 
 @dataclass(frozen=True, eq=False)
 class SearchTask:
-    """What does not change during a search.
+    """Constants of a search.
 
     Parameters
     ----------
     problem : Problem
         k free parameters.
     disturbed : Disturbed
-        Its model with random accelerations.
+        The problem's model with random accelerations.
     batch : Batch
-        Its runs.
+        The problem's runs.
     first : Levels
-        Where the levels begin.
+        First noise levels.
     """
 
     problem: Problem
@@ -70,21 +72,22 @@ class SearchTask:
     batch: Batch
     first: Levels
 
-    def stand(self, values: Array, levels: Levels, along: tuple[Array, Array]) -> Stand:
+    def point(self, values: Array, levels: Levels, along: tuple[Array, Array]) -> SearchPoint:
         """A pass of the filter, linearised along a trajectory (before, after), and -2 log posterior."""
-        made = filter_pass(self.disturbed, self.batch, self.problem.parameters(values), levels, along)
-        own = ((values - self.problem.prior_mean) / self.problem.prior_error) ** 2
-        usual = self.time_precision * (levels.vector - self.first.vector) ** 2
-        return Stand(values, levels, made, made.cost + float(own.sum() + usual.sum()))
+        filtered = filter_pass(self.disturbed, self.batch, self.problem.parameters(values), levels, along)
+        penalty = ((values - self.problem.prior_mean) / self.problem.prior_error) ** 2
+        level_penalty = self.time_precision * (levels.vector - self.first.vector) ** 2
+        return SearchPoint(values, levels, filtered, filtered.cost + float(penalty.sum() + level_penalty.sum()))
 
-    def again(self, stand: Stand) -> Stand:
-        """The same parameters and levels, looked at once more along the newest trajectory."""
-        return self.stand(stand.values, stand.levels, (stand.made.before, stand.made.after))
+    def relinearise(self, point: SearchPoint) -> SearchPoint:
+        """The same parameters and levels, linearised along the newest trajectory."""
+        return self.point(point.values, point.levels, (point.filtered.before, point.filtered.after))
 
-    def begin(self, values: Array) -> Stand:
-        """Where a search begins: linearised along the trajectory of a first pass, which was along what was measured."""
-        first = self.stand(values, self.first, measured_trajectory(self.problem, self.batch))
-        return self.again(first)
+    def first_point(self, values: Array) -> SearchPoint:
+        """First point of a search, linearised along the trajectory of a pass that is linearised along the
+        measurements."""
+        first = self.point(values, self.first, measured_trajectory(self.problem, self.batch))
+        return self.relinearise(first)
 
     @property
     def time_precision(self) -> Array:
@@ -94,37 +97,39 @@ class SearchTask:
         precision[m : count - ny] = 1 / np.log(TIME_FACTOR) ** 2
         return precision
 
-    def moved(self, levels: Levels, matrix: Array, slope: Array, damping: float) -> Levels:
-        """Levels after a damped step within their range; one that pushes against an end of it takes no part."""
+    def move_levels(self, levels: Levels, matrix: Array, slope: Array, damping: float) -> Levels:
+        """Levels after a damped step within their range; a level pressed against an end of it does not move."""
         first, ny, logs = self.first.vector, len(self.first.measurement), levels.vector
         low, high = first - np.log(RANGE), first + np.log(RANGE)
         low[-ny:] = first[-ny:] + np.log(_FINEST)
         free = ~(((logs <= low) & (slope > 0)) | ((logs >= high) & (slope < 0)))
-        own = matrix[np.ix_(free, free)]
+        reduced = matrix[np.ix_(free, free)]
         step = np.zeros(len(logs))
-        step[free] = np.linalg.solve(own + damping * np.diag(np.diag(own)), slope[free])
+        step[free] = np.linalg.solve(reduced + damping * np.diag(np.diag(reduced)), slope[free])
         return levels.at(np.clip(logs - np.clip(step, -LONGEST_STEP, LONGEST_STEP), low, high))
 
 
 @dataclass(frozen=True, eq=False)
-class Stand:
-    """Where a search stands: parameters (k,), levels, the filter's pass with them, -2 log posterior less a constant."""
+class SearchPoint:
+    """Point of a search: parameters (k,), levels, the filter's pass with them, -2 log posterior less a constant."""
 
     values: Array
     levels: Levels
-    made: FilterPass
+    filtered: FilterPass
     cost: float
 
 
 def task_of(problem: Problem, *, white: bool = False, drifting: bool = False) -> SearchTask:
-    """The task of a problem, with white random accelerations or such with a time constant, and sensors that drift."""
+    """The search task of a problem, with `white` or time-correlated random accelerations, and with sensors that
+    drift."""
     disturbed = Disturbed(problem.model, problem.free, problem.seen, drifting=drifting)
-    batch = batch_of(problem, disturbed.lasting)
+    batch = batch_of(problem, disturbed.correlated)
     return SearchTask(problem, disturbed, batch, _first_levels(problem, disturbed, batch, white))
 
 
 def _first_levels(problem: Problem, disturbed: Disturbed, batch: Batch, white: bool) -> Levels:
-    """Measurement noise from third differences (their variance is 20 times that of white noise), and usual pushes."""
+    """Measurement noise from third differences (their variance is 20 times that of white noise), and usual
+    accelerations."""
     roughness = []
     for column in np.moveaxis(np.where(batch.known, batch.measured, np.nan), 2, 0):
         known = column[~np.isnan(column)]
@@ -134,7 +139,7 @@ def _first_levels(problem: Problem, disturbed: Disturbed, batch: Batch, white: b
         rough = float(np.sqrt(np.mean(third**2) / 20)) if len(third) else 0.1 * spread
         roughness.append(max(rough, 1e-6 * spread, 1e-12))
     nominal = [state.nominal for state in problem.model.states if state.name in disturbed.pushed]
-    drifts = disturbed.lasting - len(nominal)
+    drifts = disturbed.correlated - len(nominal)
     process = np.append(USUAL_PUSH * np.array(nominal) / problem.ship_time, roughness[:drifts])
     time = np.full(len(process), USUAL_TIME * problem.ship_time)
     with np.errstate(divide="ignore"):  # log 0 for white
@@ -142,79 +147,75 @@ def _first_levels(problem: Problem, disturbed: Disturbed, batch: Batch, white: b
     return Levels(np.log(process), time, np.log(roughness))
 
 
-def maximised(
-    task: SearchTask, stand: Stand, iterations: int, report: Callable[[Stand], None], *, hold: bool = False
-) -> list[Stand]:
-    """Damped steps of parameters and levels together while the likelihood grows: where the search stood, best last.
+def maximise(
+    task: SearchTask, start: SearchPoint, iterations: int, report: Callable[[SearchPoint], None], *, hold: bool = False
+) -> list[SearchPoint]:
+    """Damped steps of parameters and levels together while the likelihood grows: all points, the best last.
 
-    With `hold` the parameters stay, and only the levels move.
+    With `hold` the parameters do not change, only the levels.
     """
-    path, damping = [stand], 0.0
-    for _ in range(iterations):
-        stand = path[-1]
-        H, g = (np.eye(len(stand.values)), np.zeros(len(stand.values))) if hold else normal(task, stand)
-        matrix, slope = _level_normal(task, stand)
-        for _attempt in range(8):
-            values = stand.values - np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
-            values = np.clip(values, *task.problem.bounds)
-            levels = task.moved(stand.levels, matrix, slope, damping)
-            with np.errstate(all="ignore"):  # a step too far may leave all bounds
-                tried = task.stand(values, levels, (stand.made.before, stand.made.after))
-            if tried.cost < stand.cost:
-                break
-            damping = max(10 * damping, 1e-2)
-        else:
-            break
-        path.append(tried)
-        damping = damping / 10 if damping > 1e-3 else 0.0
-        report(tried)
-        if stand.cost - tried.cost < ENOUGH:
-            break
-    return path
+
+    def linearise(point: SearchPoint) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        k = len(point.values)
+        return (np.eye(k), np.zeros(k)) if hold else normal(task, point), _level_normal(task, point)
+
+    def move(
+        point: SearchPoint, system: tuple[tuple[Array, Array], tuple[Array, Array]], damping: float
+    ) -> SearchPoint:
+        (H, g), (matrix, slope) = system
+        values = point.values - np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
+        levels = task.move_levels(point.levels, matrix, slope, damping)
+        along = point.filtered.before, point.filtered.after
+        with np.errstate(all="ignore"):  # too long a step may leave all bounds
+            return task.point(np.clip(values, *task.problem.bounds), levels, along)
+
+    limits = SearchLimits(iterations, attempts=8, first_damping=1e-2, last_damping=1e-3)
+    return damped_gauss_newton(start, linearise, move, limits, lambda gain, _: gain < ENOUGH, report)[0]
 
 
-def normal(task: SearchTask, stand: Stand) -> tuple[Array, Array]:
+def normal(task: SearchTask, point: SearchPoint) -> tuple[Array, Array]:
     """Normal equations (k, k), (k,) of the parameters, gains held, with the prior."""
-    J, r = whitened(stand.made)
+    J, r = whitened_innovations(point.filtered)
     problem = task.problem
     flat = J.reshape(-1, J.shape[-1])
     H: Array = flat.T @ flat + np.diag(1 / problem.prior_error**2)
-    g: Array = flat.T @ r.reshape(-1) + (stand.values - problem.prior_mean) / problem.prior_error**2
+    g: Array = flat.T @ r.reshape(-1) + (point.values - problem.prior_mean) / problem.prior_error**2
     return H, g
 
 
-def scores(task: SearchTask, made: FilterPass) -> list[Array]:
-    """Shares (blocks, k) of each run's blocks of time in the gradient."""
-    J, r = whitened(made)
+def scores(task: SearchTask, filtered: FilterPass) -> list[Array]:
+    """Contribution (blocks, k) of each run's blocks of time to the gradient."""
+    J, r = whitened_innovations(filtered)
     pull = (J * r[..., None]).sum(axis=2)
     found = []
-    for one, length, step in zip(pull, task.batch.lengths, task.batch.steps, strict=True):
+    for run_pull, length, step in zip(pull, task.batch.lengths, task.batch.steps, strict=True):
         blocks = min(length, max(1, round(length * step / (BLOCK * task.problem.ship_time))))
         edges = np.linspace(0, length, blocks + 1).astype(int)[:-1]
-        found.append(np.add.reduceat(one[:length], edges, axis=0))
+        found.append(np.add.reduceat(run_pull[:length], edges, axis=0))
     return found
 
 
-def whitened(made: FilterPass) -> tuple[Array, Array]:
-    """Derivatives (runs, n, ny, k) of the whitened innovations by the parameters, gains held, and themselves."""
-    J, _ = innovation_tangents(made.tangents, made.gains)
-    return J, made.white
+def whitened_innovations(filtered: FilterPass) -> tuple[Array, Array]:
+    """Derivatives (runs, n, ny, k) of the whitened innovations by the parameters, with the gains held, and the
+    innovations."""
+    J, _ = innovation_tangents(filtered.tangents, filtered.gains)
+    return J, filtered.white
 
 
-def _level_normal(task: SearchTask, stand: Stand) -> tuple[Array, Array]:
+def _level_normal(task: SearchTask, point: SearchPoint) -> tuple[Array, Array]:
     """Information on the levels' logarithms and slope of half the cost, by finite differences along the trajectory."""
-    levels, made = stand.levels, stand.made
+    levels, filtered = point.levels, point.filtered
     logs = levels.vector
     variants = [levels, *(levels.at(logs + VARIATION * row) for row in np.eye(len(logs)))]
     each = [variant.variances(task.batch, task.disturbed.nominal) for variant in variants]
     variances = Variances(
-        np.stack([one.process for one in each]),
-        np.stack([one.measurement for one in each]),
-        np.stack([one.start for one in each]),
+        np.stack([variant.process for variant in each]),
+        np.stack([variant.measurement for variant in each]),
+        np.stack([variant.start for variant in each]),
     )
     factors = np.stack([variant.factors(task.batch.steps) for variant in variants])
-    cost, information = varied(made.tangents, variances, made.innovations, made.after, factors)
+    cost, information = variant_likelihoods(filtered.tangents, variances, filtered.innovations, filtered.after, factors)
     prior = task.time_precision
     slope = 0.5 * (cost[1:] - cost[0]) / VARIATION + prior * (logs - task.first.vector)
-    matrix = information[1:, 1:] / VARIATION**2 + np.diag(prior + 1e-3)  # a level that nothing shows stays
+    matrix = information[1:, 1:] / VARIATION**2 + np.diag(prior + 1e-3)  # a level without information does not move
     return matrix, slope

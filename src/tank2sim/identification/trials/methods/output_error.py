@@ -1,8 +1,8 @@
-"""Output error by multiple shooting: the model's own motion is held against the measured one, piece by piece.
+"""Output error by multiple shooting: comparison of the model's motion with the measured one, piece by piece.
 
 Gauss-Newton with Levenberg's damping on exact derivatives; noise of each signal is white plus first-order
-autoregressive and estimated from the residuals (:mod:`.noise`); initial states are estimated with the parameters. The
-width of the prior can be scaled by the evidence (MacKay 1992, Neural Computation 4).
+autoregressive and estimated from the residuals (:mod:`.coloured_noise`); initial states are estimated with the
+parameters. The width of the prior can be scaled by the evidence (MacKay 1992, Neural Computation 4).
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, estimate_coloured_noise, white
+from tank2sim.identification.trials.methods.gauss_newton import SearchLimits, damped_gauss_newton
 from tank2sim.identification.trials.methods.posterior import evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.shooting import Normal, Pieces, Shooting, cut
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
@@ -22,23 +23,23 @@ from tank2sim.identification.trials.problem.estimation_problem import Estimate, 
 LONGEST_SEARCH = 25
 """Steps after which a search ends; it needs 3 to 10."""
 
-INTERRUPTED = "interrupted: the estimates are the best found until then"
+INTERRUPTED = "interrupted: the estimates are the best found so far"
 
 
 @dataclass(frozen=True)
 class OutputErrorSettings:
-    """How output error is done.
+    """Settings of output error.
 
     Parameters
     ----------
     piece_s : float or None
-        Length of a piece, s; None takes whole runs (never for a course-unstable ship: its motion runs away).
+        Length of a piece, s; None takes whole runs (not for a course-unstable ship: its motion diverges).
     coloured : bool
-        Noise with its autoregressive part; else white.
+        Noise with an autoregressive part; else white.
     scale_prior : bool
-        The prior's standard errors are multiplied by the factor of largest evidence, at least 1.
+        Multiply the prior's standard errors by the factor of largest evidence, at least 1.
     rounds : int
-        Times that noise (and prior) are estimated again.
+        Number of estimates of noise (and prior).
     """
 
     piece_s: float | None = None
@@ -47,9 +48,18 @@ class OutputErrorSettings:
     rounds: int = 4
 
 
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """Parameters (k,), initial states of each run, and the sum of squares with the prior."""
+
+    values: Array
+    starts: list[Array]
+    cost: float
+
+
 @dataclass
 class _Search:
-    """Where the search stands."""
+    """State of a search."""
 
     values: Array
     starts: list[Array]
@@ -71,10 +81,10 @@ def output_error(
     problem : Problem
         k free parameters.
     start : array (k,), optional
-        Where the search begins; by default the prior's mean.
+        Start of the search; by default the prior's mean.
     settings : OutputErrorSettings, optional
     progress : callable
-        Called with each better estimate; what it raises passes through.
+        Called with each better estimate; its exceptions propagate.
     """
     settings = settings or OutputErrorSettings()
     shooting = Shooting(problem)
@@ -95,20 +105,21 @@ def output_error(
                         search.scale = evidence_scale(problem, information, search.values, search.scale)
         except KeyboardInterrupt:
             notices.append(INTERRUPTED)
-            normals = work.normals(search)
+            normals = work.normals(search.values, search.starts, search.noise)
     return _estimate(problem, search, normals, tuple(notices))
 
 
 def _first_noise(problem: Problem, pieces: list[Pieces]) -> tuple[ColouredNoise, ...]:
-    """A tenth of the spread of each signal: nothing is known of the residuals yet."""
+    """A tenth of the spread of each signal, before any residual is known."""
     every = np.concatenate([piece.run.measured for piece in pieces])
     spread = np.nanstd(every, axis=0)
-    return tuple(white(0.1 * float(one) if one > 0 else 1.0) for one in spread)
+    return tuple(white(0.1 * float(size) if size > 0 else 1.0) for size in spread)
 
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """What does not change during a search. Runs are independent, and machine code lets threads run side by side."""
+    """Constants of a search. Runs are independent and machine code releases the lock, so that threads run in
+    parallel."""
 
     problem: Problem
     shooting: Shooting
@@ -116,55 +127,59 @@ class _Work:
     threads: ThreadPoolExecutor
     progress: SearchReport
 
-    def normals(self, search: _Search) -> list[Normal]:
-        """Normal equations of all runs where the search stands."""
+    def normals(self, values: Array, starts: list[Array], noise: tuple[ColouredNoise, ...]) -> list[Normal]:
+        """Normal equations of all runs."""
         return list(
             self.threads.map(
-                lambda piece, start: self.shooting.normal(piece, start, search.values, search.noise),
-                self.pieces,
-                search.starts,
+                lambda piece, start: self.shooting.normal(piece, start, values, noise), self.pieces, starts
             )
         )
 
-    def cost(self, search: _Search, values: Array, starts: list[Array], prior: Array) -> float:
-        """Sum of squares of all runs and of the prior at other values and initial states."""
-        own = float(np.sum(((values - self.problem.prior_mean) / prior) ** 2))
-        runs = self.threads.map(
-            lambda piece, start: self.shooting.cost(piece, start, values, search.noise), self.pieces, starts
+    def cost(self, values: Array, starts: list[Array], noise: tuple[ColouredNoise, ...]) -> float:
+        """Sum of squares of all runs."""
+        return sum(
+            self.threads.map(lambda piece, start: self.shooting.cost(piece, start, values, noise), self.pieces, starts)
         )
-        return own + sum(runs)
 
 
 def _minimise(work: _Work, search: _Search, tolerance: float) -> list[Normal]:
-    """Damped Gauss-Newton steps from where the search stands; leaves it at the best point."""
-    problem, damping = work.problem, 0.0
+    """Damped Gauss-Newton steps from the state of the search, which holds the best point afterwards."""
+    problem, noise = work.problem, search.noise
     prior = scaled_prior(problem, search.scale)
-    best = work.cost(search, search.values, search.starts, prior)
-    for _ in range(LONGEST_SEARCH):
-        normals = work.normals(search)
+
+    def point(values: Array, starts: list[Array]) -> _Point:
+        penalty = float(np.sum(((values - problem.prior_mean) / prior) ** 2))
+        return _Point(values, starts, penalty + work.cost(values, starts, noise))
+
+    def linearise(start: _Point) -> list[Normal]:
+        return work.normals(start.values, start.starts, noise)
+
+    def move(start: _Point, normals: list[Normal], damping: float) -> _Point:
         H = sum(normal.matrix for normal in normals) + np.diag(1 / prior**2)
-        g = sum(normal.vector for normal in normals) + (search.values - problem.prior_mean) / prior**2
-        for _ in range(12):
-            step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
-            step = np.clip(search.values + step, *problem.bounds) - search.values
-            starts = [
-                start - (normal.step + normal.states @ step).reshape(start.shape)
-                for start, normal in zip(search.starts, normals, strict=True)
-            ]
-            cost = work.cost(search, search.values + step, starts, prior)
-            if cost < best:
-                break
-            damping = max(10 * damping, 1e-3)
-        else:
-            return normals
-        gain, best = best - cost, cost
-        search.values, search.starts = search.values + step, starts
-        search.costs.append(cost)
-        damping = damping / 10 if damping > 1e-6 else 0.0
-        work.progress("output error", search.values, cost)
-        if gain < tolerance * max(1.0, 1e-3 * best):
-            break
-    return work.normals(search)
+        g = sum(normal.vector for normal in normals) + (start.values - problem.prior_mean) / prior**2
+        step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
+        step = np.clip(start.values + step, *problem.bounds) - start.values
+        starts = [
+            states - (normal.step + normal.states @ step).reshape(states.shape)
+            for states, normal in zip(start.starts, normals, strict=True)
+        ]
+        return point(start.values + step, starts)
+
+    def report(better: _Point) -> None:
+        search.values, search.starts = better.values, better.starts
+        search.costs.append(better.cost)
+        work.progress("output error", better.values, better.cost)
+
+    found = damped_gauss_newton(
+        point(search.values, search.starts),
+        linearise,
+        move,
+        SearchLimits(steps=LONGEST_SEARCH, attempts=12),
+        lambda gain, cost: gain < tolerance * max(1.0, 1e-3 * cost),
+        report,
+    )
+    (*_, best), last = found
+    return last or linearise(best)
 
 
 def _new_noise(
@@ -172,7 +187,7 @@ def _new_noise(
 ) -> tuple[ColouredNoise, ...]:
     noise = []
     for place in range(len(problem.seen)):
-        residuals = [one for normal in normals for one in normal.residuals[:, :, place]]
+        residuals = [residual for normal in normals for residual in normal.residuals[:, :, place]]
         measured = np.concatenate([piece.measured[:, :, place].ravel() for piece in pieces])
         smallest = 1e-6 * float(np.nanmax(np.abs(measured)) or 1.0)
         found = estimate_coloured_noise(residuals, smallest)
@@ -189,7 +204,7 @@ def _estimate(problem: Problem, search: _Search, normals: list[Normal], notices:
         values=search.values,
         covariance=sandwich(information, prior, [normal.scores for normal in normals]),
         information=information,
-        noise={name: one.deviation for name, one in zip(problem.seen, search.noise, strict=True)},
+        noise={name: noise.deviation for name, noise in zip(problem.seen, search.noise, strict=True)},
         cost=tuple(search.costs),
         prior_scale=search.scale,
         notices=notices,

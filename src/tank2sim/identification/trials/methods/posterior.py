@@ -1,4 +1,4 @@
-"""What estimators of trials share: standard errors for residuals that hang together, and the width of the prior."""
+"""Standard errors of estimates with correlated residuals, and the width of the prior by its evidence."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from tank2sim.arrays import Array
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 
 BLOCK = 5.0
-"""Residuals farther apart than this many ship lengths count as independent in standard errors (ours: the memory of the
-flow and of a slow model error are of that order)."""
+"""Residuals farther apart than this many ship lengths count as independent in standard errors (project choice: the
+memory of the flow and of a slow model error are of that order)."""
 
 MOST_FITTED = 2 / 3
-"""Share of the residuals' variance that parameters are believed to have fitted away at most: beyond it there are hardly
-more blocks than parameters, and the correction of their scatter would itself be scatter (project choice)."""
+"""Largest assumed share of the residuals' variance that the fit absorbed: beyond it the blocks hardly outnumber the
+parameters, and the correction of their scatter would itself be scatter (project choice)."""
 
 
 def scaled_prior(problem: Problem, scale: Mapping[str, float]) -> Array:
@@ -27,7 +27,7 @@ def scaled_prior(problem: Problem, scale: Mapping[str, float]) -> Array:
 
 def evidence_scale(problem: Problem, information: Array, values: Array, scale: Mapping[str, float]) -> dict[str, float]:
     """Factor on the prior's errors of each group that has the largest evidence, at least 1 (MacKay 1992, Neural
-    Computation 4): distance from the prior's mean over how many parameters the trials fix.
+    Computation 4): distance from the prior's mean over the number of parameters that the trials determine.
 
     Parameters
     ----------
@@ -38,37 +38,39 @@ def evidence_scale(problem: Problem, information: Array, values: Array, scale: M
     values : array (k,)
         Estimates.
     scale : mapping
-        The factors with which they were found.
+        The factors of these estimates.
     """
     prior = scaled_prior(problem, scale)
-    own = information * np.outer(prior, prior)
-    fixed = 1 - np.diag(np.linalg.inv(own + np.eye(len(prior))))
-    away = ((values - problem.prior_mean) / problem.prior_error) ** 2
+    scaled = information * np.outer(prior, prior)
+    fixed = 1 - np.diag(np.linalg.inv(scaled + np.eye(len(prior))))
+    distances = ((values - problem.prior_mean) / problem.prior_error) ** 2
     groups = np.array(problem.groups)
     return {
-        group: max(1.0, float(np.sqrt(away[groups == group].sum() / max(fixed[groups == group].sum(), 1.0))))
+        group: max(1.0, float(np.sqrt(distances[groups == group].sum() / max(fixed[groups == group].sum(), 1.0))))
         for group in sorted(set(problem.groups) - {""})
     }
 
 
 def sandwich(information: Array, prior_error: Array, scores: Sequence[Array]) -> Array:
-    """Covariance (k, k) of estimates, for residuals as they are (Huber 1967; Newey and West 1987).
+    """Covariance (k, k) of estimates, robust to the true correlation of the residuals (Huber 1967; Newey and West
+    1987).
 
     Parameters
     ----------
     information : array (k, k)
-        Of the trials alone, as if the noise model were true.
+        Of the trials alone, under the noise model.
     prior_error : array (k,)
         With its scale.
     scores : sequence of arrays (blocks, k)
         Gradient of each run by blocks of :data:`BLOCK` ship lengths, in the order of time.
     """
-    # Everything in units of the prior's errors: well scaled, and what no trial sees has information 0 against 1.
-    own = information * np.outer(prior_error, prior_error)
+    # In units of the prior's errors the matrices are well scaled: a parameter without trials has information 0 against
+    # 1.
+    scaled = information * np.outer(prior_error, prior_error)
     identity = np.eye(len(prior_error))
-    bread = np.linalg.inv(own + identity)
+    bread = np.linalg.inv(scaled + identity)
     determined = len(prior_error) - float(np.trace(bread))
-    spread = bread @ (_meat(own, [score * prior_error for score in scores], determined) + identity) @ bread
+    spread = bread @ (_meat(scaled, [score * prior_error for score in scores], determined) + identity) @ bread
     covariance: Array = spread * np.outer(prior_error, prior_error)
     return covariance
 
@@ -76,10 +78,10 @@ def sandwich(information: Array, prior_error: Array, scores: Sequence[Array]) ->
 def _meat(information: Array, scores: Sequence[Array], determined: float) -> Array:
     """Covariance of the gradient (k, k) from blocks of time and their neighbours (Newey and West 1987, one lag).
 
-    Model error makes residuals hang together far longer than the noise model says; white-noise theory would make the
-    intervals several times too narrow. In no direction is it less than that theory's `information`. The `determined`
-    parameters have fitted some of the residuals away: with B blocks of equal weight a share determined/B of them (Bell
-    and McCaffrey 2002, Survey Methodology 28).
+    Model error correlates residuals far longer than the noise model; white-noise theory would make the intervals
+    several times too narrow. The result is at least that theory's `information` in every direction. The fit of the
+    `determined` parameters absorbs a share of the residuals: determined/B with B blocks of equal weight (Bell and
+    McCaffrey 2002, Survey Methodology 28).
     """
     total = np.zeros_like(information)
     for score in scores:
@@ -87,7 +89,9 @@ def _meat(information: Array, scores: Sequence[Array], determined: float) -> Arr
         total += score.T @ score + 0.5 * (lagged + lagged.T)
     count = sum(len(score) for score in scores)
     total *= 1 / (1 - min(determined / max(count, 1), MOST_FITTED))
-    values, vectors = eigh(total, information + 1e-9 * np.eye(len(total)))  # 1e-9 of what the prior knows: nothing
+    values, vectors = eigh(
+        total, information + 1e-9 * np.eye(len(total))
+    )  # 1e-9 of the prior's information: negligible
     root = information @ vectors
     meat: Array = (root * np.maximum(values, 1.0)) @ root.T
     return meat

@@ -1,8 +1,8 @@
-"""A model on which random accelerations act, and what a filter needs of it: steps, tangents, what is seen.
+"""A model with random accelerations, and the functions of a filter for it: steps, tangents, observed values.
 
 The accelerations are held over a step and decay from step to step: ``a[k+1] = phi a[k] + w[k]``, a first-order
-Gauss-Markov process (white for phi = 0). So may the sensors drift, each by a b that is added to what is seen. The
-filter's state is z = (x, a, b).
+Gauss-Markov process (white for phi = 0). The sensors may drift in the same way, each by a b that is added to its
+observed value. The filter's state is z = (x, a, b).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from tank2sim.simulation.rows import Chain, RowFunction
 from tank2sim.simulation.scheme import runge_kutta_step
 
 PUSHED = ("motion.u", "motion.v", "motion.r")
-"""States on whose rates random accelerations act, as far as the model has them."""
+"""States whose rates have random accelerations, if the model has the state."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ class Tangents:
     A, B : arrays (n, nz, nz), (n, nz, k)
         Of the next state by the state (after the measurement) and by the free parameters.
     C, D : arrays (n, ny, nz), (n, ny, k)
-        Of what is seen by the state (before the measurement) and by the free parameters.
+        Of the observed values by the state (before the measurement) and by the free parameters.
     """
 
     A: Array
@@ -48,7 +48,7 @@ class Disturbed:
     model : Model
         nx states; m of :data:`PUSHED` are among them.
     free : sequence of str
-        Names of the k parameters by which to derive.
+        Names of the k parameters of the derivatives.
     seen : sequence of str
         Names of the ny states and quantities that are measured.
     drifting : bool
@@ -61,22 +61,22 @@ class Disturbed:
         self.nominal = np.array([state.nominal for state in model.states])
         whole, pushes = _pushed(model, [state.derivative for state in pushed])
         drifts = ca.SX.sym("drift", len(seen) if drifting else 0)
-        lasting = ca.vertcat(pushes, drifts)
-        self.lasting = int(lasting.numel())
-        z, phi, h = ca.vertcat(model.x, lasting), ca.SX.sym("phi", self.lasting), ca.SX.sym("h")
+        correlated = ca.vertcat(pushes, drifts)
+        self.correlated = int(correlated.numel())
+        z, phi, h = ca.vertcat(model.x, correlated), ca.SX.sym("phi", self.correlated), ca.SX.sym("h")
         theta = ca.vcat([model.symbol(name) for name in free])
         moved = runge_kutta_step(whole)(model.x, ca.vertcat(model.u, pushes), model.p, h)
-        following = ca.vertcat(moved, phi * lasting)
+        following = ca.vertcat(moved, phi * correlated)
         shown = whole.expand(ca.vcat([model.symbol(name) for name in seen]))
         shown = shown + drifts if drifting else shown
         y, K = ca.SX.sym("y", len(seen)), ca.SX.sym("K", z.numel(), len(seen))
         corrected = ca.substitute(following, z, z + K @ (y - shown))
-        where, cse = [z, model.u, model.p], {"cse": True}
-        by = [ca.densify(ca.jacobian(following, one)) for one in (z, theta)]
-        shown_by = [ca.densify(one) for one in (shown, ca.jacobian(shown, z), ca.jacobian(shown, theta))]
-        self._observer = Chain(ca.Function("observer", [*where, y, ca.vec(K), phi, h], [corrected], cse))
-        self._tangents = RowFunction(ca.Function("pushed_tangents", [*where, phi, h], by, cse))
-        self._shown = RowFunction(ca.Function("pushed_shown", where, shown_by, cse))
+        arguments, cse = [z, model.u, model.p], {"cse": True}
+        step_derivatives = [ca.densify(ca.jacobian(following, expression)) for expression in (z, theta)]
+        shown_by = [ca.densify(expression) for expression in (shown, ca.jacobian(shown, z), ca.jacobian(shown, theta))]
+        self._observer = Chain(ca.Function("observer", [*arguments, y, ca.vec(K), phi, h], [corrected], cse))
+        self._tangents = RowFunction(ca.Function("pushed_tangents", [*arguments, phi, h], step_derivatives, cse))
+        self._shown = RowFunction(ca.Function("pushed_shown", arguments, shown_by, cse))
 
     def predicted(self, start: Array, inputs: Array, measured: Array, gains: Array, case: tuple[Array, ...]) -> Array:
         """States (n, nz) before each measurement, of the observer with given gains.
@@ -86,7 +86,7 @@ class Disturbed:
         start : array (nz,)
         inputs : array (n, nu)
         measured : array (n, ny)
-            Without nan: where nothing was measured any value, with a column of zeros in the gain.
+            Without nan: any value where not measured, with a column of zeros in the gain.
         gains : array (n, nz, ny)
         case : tuple
             Parameters p, factors phi (nz - nx,), step h (1,).
@@ -96,7 +96,7 @@ class Disturbed:
         return self._observer.run(start, inputs[:-1], p, measured[:-1], columns, phi, h)
 
     def seen(self, states: Array, inputs: Array, p: Array) -> Array:
-        """What is seen (n, ny) at states z (n, nz)."""
+        """Observed values (n, ny) at states z (n, nz)."""
         return self._shown(states, inputs, p)[0]
 
     def tangents(self, before: Array, after: Array, inputs: Array, case: tuple[Array, ...]) -> Tangents:

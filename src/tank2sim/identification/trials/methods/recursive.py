@@ -1,17 +1,17 @@
 """Recursive estimation: a stochastic approximation of the maximum of likelihood, in order of time.
 
-The innovations of a Kalman filter (:mod:`.kalman`) are taken block by block. After each block the whitened innovation r
-and its derivative J by the parameters, carried on from block to block, move the estimate,
+The innovations of a Kalman filter (:mod:`.kalman`) are processed block by block. After each block the whitened
+innovation r and its derivative J by the parameters, carried on from block to block, move the estimate,
 
     D <- f D + J' J,    b <- f b + J' (J theta - r),    theta = (P + D)^-1 (P m + b),
 
 with m and P the prior's mean and inverse covariance: the recursive prediction-error method in its Gauss-Newton form,
 with the gain sequence of Robbins and Monro (1951, Ann. Math. Stat. 22; Ljung and Soderstrom 1983, Theory and Practice
-of Recursive Identification, ch. 3). What is forgotten is data, never the prior, so that nothing drifts where a
-manoeuvre shows nothing. The path of the estimates shows which coefficients settle, and when.
+of Recursive Identification, ch. 3). Data are forgotten, never the prior, so that a coefficient without
+information does not drift. The path of the estimates shows which coefficients settle, and when.
 
-Why not pieces that start at measured states: tried on made-up ships with process noise, such estimates are biased by up
-to half of a coefficient, whether the initial state is corrected or not.
+Pieces that start at measured states are no alternative: on synthetic ships with process noise their estimates are
+biased by up to half of a coefficient, with and without a correction of the initial state.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.kalman_gains import innovation_tangents
 from tank2sim.identification.trials.methods.kalman_pass import FilterPass, filter_pass
-from tank2sim.identification.trials.methods.kalman_search import SearchTask, Stand, maximised, task_of
+from tank2sim.identification.trials.methods.kalman_search import SearchPoint, SearchTask, maximise, task_of
 from tank2sim.identification.trials.methods.posterior import BLOCK, sandwich
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 
@@ -35,35 +35,35 @@ _SETTLED = 2.0
 choice)."""
 
 LEARNED = 0.5
-"""... and its standard error has come below this share of the prior's (project choice)."""
+"""... and its standard error is below this share of the prior's (project choice)."""
 
 LATEST = 0.75
-"""What comes to rest later than in this share of the time has not settled: at the end everything rests (project
+"""A coefficient that settles after this share of the time counts as unsettled: at the end all settle (project
 choice)."""
 
 LEVEL_ITERATIONS = 15
-"""Steps of the noise levels before each pass, at most."""
+"""Most steps of the noise levels before each pass."""
 
 
 @dataclass(frozen=True)
 class RecursiveSettings:
-    """How the recursion is done.
+    """Settings of the recursion.
 
     Parameters
     ----------
     block : float
-        Time between two corrections of the estimate in ship times L/u0 (one by default: ours).
+        Time between two corrections of the estimate in ship times L/u0 (default 1: project choice).
     forgetting : float
         Factor on the weight of older data at each block, above 0 and up to 1 (nothing is forgotten).
     power : float
         The gain of the t-th block is proportional to ``t**-power``, 1/2 < power <= 1 (Robbins and Monro). With 1 all
-        blocks weigh alike; with less the early ones, of poor estimates, weigh less.
+        blocks weigh alike; with less the early blocks, of poor estimates, weigh less.
     passes : int
-        Times over all runs. Noise levels are those of largest likelihood at the estimate before a pass. In the first
-        the model is linearised at the estimate so far, in each further one at the last estimate of the pass before;
-        each begins with the prior, so that nothing counts twice.
+        Passes over all runs. Noise levels are those of largest likelihood at the estimate before a pass. In the first
+        pass the model is linearised at the current estimate, in each further pass at the last estimate of the previous
+        one; each begins with the prior, so that no data count twice.
     white : bool
-        Random accelerations are white, else they have a time constant.
+        Random accelerations are white; else they have a time constant.
     drifting : bool
         Each sensor has a drift next to its white noise.
     """
@@ -79,10 +79,10 @@ class RecursiveSettings:
         if not 0 < self.forgetting <= 1 or not 0.5 < self.power <= 1:
             raise ValueError("forgetting is above 0 and up to 1, power above 1/2 and up to 1")
         if self.block <= 0 or self.passes < 1:
-            raise ValueError("a block has a length, and there is at least one pass")
+            raise ValueError("block is above 0, passes at least 1")
 
     def kept(self, number: int) -> float:
-        """Factor on the weight of what was known before block `number` (from 1) for the gain sequence."""
+        """Factor on the weight of the data before block `number` (from 1) for the gain sequence."""
         if number == 1:
             return self.forgetting
         gain, before = number**-self.power, (number - 1) ** -self.power
@@ -96,13 +96,13 @@ class RecursiveEstimate(Estimate):
     Parameters
     ----------
     times_s : array (n,)
-        Time of trials seen so far, s.
+        Time of trials up to the end of each block, s.
     runs : tuple of str
         Name of the run of each block.
     path, path_errors : arrays (n, k)
         Estimates and their standard errors.
     prior_error : array (k,)
-        Standard errors before.
+        Standard errors before the trials.
     """
 
     times_s: Array = field(default_factory=lambda: np.zeros(0))
@@ -113,10 +113,10 @@ class RecursiveEstimate(Estimate):
 
     @property
     def settled_s(self) -> Array:
-        """Time from which each coefficient has settled (k,), s; nan for one that never did, or was not learnt."""
+        """Time from which each coefficient has settled (k,), s; nan for one that did not settle or was not learnt."""
         near = np.abs(self.path - self.values) <= _SETTLED * self.path_errors[-1]
-        there = near & (self.path_errors <= LEARNED * self.prior_error)
-        stays = np.logical_and.accumulate(there[::-1], axis=0)[::-1]
+        close = near & (self.path_errors <= LEARNED * self.prior_error)
+        stays = np.logical_and.accumulate(close[::-1], axis=0)[::-1]
         first = np.where(stays.any(axis=0), self.times_s[np.argmax(stays, axis=0)], np.nan)
         settled: Array = np.where(first <= LATEST * self.times_s[-1], first, np.nan)
         return settled
@@ -124,7 +124,7 @@ class RecursiveEstimate(Estimate):
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """What one block told, and the estimate after it."""
+    """Normal equations of a block, and the estimate after it."""
 
     run: int
     length_s: float
@@ -151,10 +151,10 @@ def recursive(
         k free parameters; the model has at least one of u, v and r as a state. The prior is the initial estimate and
         its covariance.
     start : array (k,), optional
-        Where the model is linearised at first; by default the prior's mean.
+        First point of linearisation; by default the prior's mean.
     settings : RecursiveSettings, optional
     progress : callable
-        Called with the estimate after each run; what it raises passes through.
+        Called with the estimate after each run; its exceptions propagate.
 
     Raises
     ------
@@ -164,14 +164,14 @@ def recursive(
     settings = settings or RecursiveSettings()
     task = task_of(problem, white=settings.white, drifting=settings.drifting)
     at = (problem.prior_mean if start is None else start).copy()
-    stand = task.begin(at)
+    point = task.first_point(at)
     costs: list[float] = []
     for number in range(settings.passes):
         if number:
-            stand = task.stand(at, stand.levels, (stand.made.before, stand.made.after))
-        stand = maximised(task, stand, LEVEL_ITERATIONS, lambda _: None, hold=True)[-1]
+            point = task.point(at, point.levels, (point.filtered.before, point.filtered.after))
+        point = maximise(task, point, LEVEL_ITERATIONS, lambda _: None, hold=True)[-1]
         steps: list[_Step] = []
-        for step in _pass(task, stand, settings, hold=number > 0):
+        for step in _pass(task, point, settings, hold=number > 0):
             steps.append(step)
             if steps[-1].run != steps[max(len(steps) - 2, 0)].run:
                 progress("recursive", step.values, sum(step.cost for step in steps))
@@ -181,9 +181,9 @@ def recursive(
     return _estimate(problem, settings, steps, costs)
 
 
-def _pass(task: SearchTask, stand: Stand, settings: RecursiveSettings, *, hold: bool) -> Iterator[_Step]:
-    """Steps over all runs; with `hold` the model stays linearised where the pass begins."""
-    problem, at = task.problem, stand.values
+def _pass(task: SearchTask, point: SearchPoint, settings: RecursiveSettings, *, hold: bool) -> Iterator[_Step]:
+    """Steps over all runs; with `hold` the model stays linearised at the start of the pass."""
+    problem, at = task.problem, point.values
     precision = np.diag(1 / problem.prior_error**2)
     D, b, number = np.zeros_like(precision), np.zeros(len(at)), 0
     for run, length in enumerate(task.batch.lengths):
@@ -192,12 +192,12 @@ def _pass(task: SearchTask, stand: Stand, settings: RecursiveSettings, *, hold: 
         edges = np.linspace(0, length, min(count, length) + 1).astype(int)
         for begin, end in pairwise(edges):
             number += 1
-            made, J, carried = _block(task, stand, at, (run, int(begin), int(end)), carried)
-            r, flat = made.white.reshape(-1), J.reshape(-1, len(at))
+            filtered, J, carried = _block(task, point, at, (run, int(begin), int(end)), carried)
+            r, flat = filtered.white.reshape(-1), J.reshape(-1, len(at))
             matrix, vector, kept = flat.T @ flat, flat.T @ r, settings.kept(number)
             D, b = kept * D + matrix, kept * b + matrix @ at - vector
             values = np.asarray(np.linalg.solve(precision + D, precision @ problem.prior_mean + b), dtype=float)
-            innovations = np.where(task.batch.known[run, begin:end], made.innovations[0, : end - begin], np.nan)
+            innovations = np.where(task.batch.known[run, begin:end], filtered.innovations[0, : end - begin], np.nan)
             length_s = float((end - begin) * task.batch.steps[run])
             yield _Step(run, length_s, at, matrix, vector, kept, values, innovations, float(r @ r))
             at = at if hold else np.clip(values, *problem.bounds)
@@ -205,23 +205,24 @@ def _pass(task: SearchTask, stand: Stand, settings: RecursiveSettings, *, hold: 
 
 def _block(
     task: SearchTask,
-    stand: Stand,
+    point: SearchPoint,
     at: Array,
     where: tuple[int, int, int],
     carried: tuple[Array, Array | None, Array | None],
 ) -> tuple[FilterPass, Array, tuple[Array, Array | None, Array | None]]:
-    """The filter over one block: pass, derivatives, and what the next begins with (state, covariance, derivatives)."""
+    """The filter over one block: pass, derivatives, and the start of the next block (state, covariance,
+    derivatives)."""
     run, begin, end = where
     state, spread, tangent = carried
     batch = task.batch.part(run, begin, end, state, spread)
     rows = slice(run, run + 1), slice(begin, end + 1)
-    along = stand.made.before[rows], stand.made.after[rows]
-    made = filter_pass(task.disturbed, batch, task.problem.parameters(at), stand.levels, along)
-    if not np.isfinite(made.cost):
+    along = point.filtered.before[rows], point.filtered.after[rows]
+    filtered = filter_pass(task.disturbed, batch, task.problem.parameters(at), point.levels, along)
+    if not np.isfinite(filtered.cost):
         name = task.problem.runs[run].origin
         raise InputError(name, "", "the model's motion leaves all bounds", "start from a card nearer to the ship")
-    J, last = innovation_tangents(made.tangents, made.gains, tangent)
-    return made, J, (made.before[0, -1], made.gains.P[0, -1], last)
+    J, last = innovation_tangents(filtered.tangents, filtered.gains, tangent)
+    return filtered, J, (filtered.before[0, -1], filtered.gains.P[0, -1], last)
 
 
 def _estimate(
@@ -233,7 +234,7 @@ def _estimate(
     weighted: list[Array] = []
     for step in steps:
         information = step.kept * information + step.matrix
-        weighted = [*(step.kept * one for one in weighted), step.vector + step.matrix @ (values - step.at)]
+        weighted = [*(step.kept * score for score in weighted), step.vector + step.matrix @ (values - step.at)]
         covariances.append(sandwich(information, problem.prior_error, _blocks(weighted, steps, group)))
     innovations = np.concatenate([step.innovations for step in steps])
     count = np.count_nonzero(~np.isnan(innovations), axis=0)
@@ -258,5 +259,5 @@ def _blocks(scores: list[Array], steps: list[_Step], group: int) -> list[Array]:
     """Scores of each run, summed over `group` blocks at a time."""
     runs = np.array([step.run for step in steps[: len(scores)]])
     every = np.stack(scores)
-    own = [every[runs == run] for run in np.unique(runs)]
-    return [np.add.reduceat(one, np.arange(0, len(one), group), axis=0) for one in own]
+    by_run = [every[runs == run] for run in np.unique(runs)]
+    return [np.add.reduceat(run_scores, np.arange(0, len(run_scores), group), axis=0) for run_scores in by_run]

@@ -1,8 +1,8 @@
-"""Multiple shooting: runs cut into pieces, each with an initial state of its own that is estimated with the parameters.
+"""Multiple shooting: runs cut into pieces, each with its own initial state, which is estimated with the parameters.
 
-What a piece shows is compared with what was measured; its end is not tied to the beginning of the next. The initial
-states are eliminated from the normal equations (a Schur complement), so that what remains has the size of the
-parameters. The `noise` of the methods is that of each seen variable (ny).
+Each piece is compared with its measurements; its end is not tied to the start of the next. The initial states are
+eliminated from the normal equations (a Schur complement), so that these have the size of the parameters. The `noise` of
+the methods is that of each seen variable (ny).
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ class Pieces:
     Parameters
     ----------
     run : SampledRun
-        Where they come from.
+        The run.
     inputs : array (pieces, n + 1, nu)
     measured : array (pieces, n + 1, ny)
-        The last row is nan but in the last piece: it is the first of the next piece.
+        The last row is nan except in the last piece: it is the first of the next piece.
     starts : array (pieces, nx)
         First guess of the initial states.
     """
@@ -45,7 +45,7 @@ class Pieces:
 
 
 def cut(problem: Problem, run: SampledRun, length_s: float | None) -> Pieces:
-    """Pieces of about `length_s` s; the whole run for None. Up to one step a piece at the end is left over."""
+    """Pieces of about `length_s` s; the whole run for None. Up to one step per piece remains unused at the end."""
     steps = len(run.measured) - 1
     count = 1 if length_s is None else max(1, round(steps * run.step_s / length_s))
     n = steps // count
@@ -57,7 +57,7 @@ def cut(problem: Problem, run: SampledRun, length_s: float | None) -> Pieces:
 
 
 def _start(problem: Problem, run: SampledRun, first: int) -> Array:
-    """State of the model at an instant, from what was measured near it; else its start value."""
+    """State of the model at an instant, from nearby measurements; else its start value."""
     model = problem.model
     values = {name: _local(run.column(name), first) for name in run.seen}
     p = model.parameter_values()
@@ -119,8 +119,8 @@ class Shooting:
     def __init__(self, problem: Problem):
         self.problem = problem
         self.sensitivity = Sensitivity(problem.model, problem.free, problem.seen)
-        nominal = [state.nominal for state in problem.model.states]
-        self._wide = np.array(nominal)  # weak knowledge of initial states: within a nominal value of the guess
+        # Weak prior of initial states: within a nominal value of the guess.
+        self._wide = np.array([state.nominal for state in problem.model.states])
 
     def residuals(self, pieces: Pieces, starts: Array, values: Array) -> tuple[Array, Array]:
         """Simulated less measured (pieces, n + 1, ny), and the states (pieces, n + 1, nx)."""
@@ -150,10 +150,10 @@ class Shooting:
         white_by = _whitened(residuals, by.reshape(*by.shape[:2], -1), noise, by.shape[3])
         r = white.reshape(count, -1)
         J = white_by.reshape(count, -1, by.shape[3])
-        own = J.transpose(0, 2, 1) @ J
+        products = J.transpose(0, 2, 1) @ J
         pull = (J.transpose(0, 2, 1) @ r[:, :, None])[:, :, 0]
         # Unknowns: initial states of all pieces, then parameters.
-        k = own.shape[1] - nx
+        k = products.shape[1] - nx
         size = count * nx
         H = np.zeros((size + k, size + k))
         shares = np.zeros((count, size + k))
@@ -161,7 +161,7 @@ class Shooting:
         H[np.arange(size), np.arange(size)] = 1 / spread**2
         for piece in range(count):
             at = np.r_[piece * nx : (piece + 1) * nx, size : size + k]
-            H[np.ix_(at, at)] += own[piece]
+            H[np.ix_(at, at)] += products[piece]
             shares[piece, at] += pull[piece]
         g = shares.sum(axis=0)
         g[:size] += ((starts - pieces.starts) / self._wide**2).ravel()
@@ -178,28 +178,28 @@ class Shooting:
         )
 
     def _scores(self, pieces: Pieces, r: Array, J: Array, mixed: Array) -> Array:
-        """Share of each block of time in the gradient by the parameters, (blocks, k)."""
+        """Contribution of each block of time to the gradient by the parameters, (blocks, k)."""
         count, nx = pieces.starts.shape
         rows, ny = pieces.measured.shape[1:]
         ship_time = self.problem.ship_time
         blocks = max(1, round(rows * pieces.run.step_s / (BLOCK * ship_time)))
         edges = np.linspace(0, rows, blocks + 1).astype(int)[:-1] * ny
         pull = np.add.reduceat(J * r[:, :, None], edges, axis=1)  # (pieces, blocks, nx + k)
-        own = mixed.reshape(count, nx, -1)
-        scores: Array = pull[:, :, nx:] - np.einsum("pbx,pxk->pbk", pull[:, :, :nx], own)
+        by_piece = mixed.reshape(count, nx, -1)
+        scores: Array = pull[:, :, nx:] - np.einsum("pbx,pxk->pbk", pull[:, :, :nx], by_piece)
         return scores.reshape(count * blocks, -1)
 
 
 def _whitened(residuals: Array, values: Array, noise: Sequence[ColouredNoise], columns: int = 1) -> Array:
-    """Values (pieces, n, ny * columns) made white as the residuals are; 0 where nothing was measured."""
+    """Values (pieces, n, ny * columns) whitened like the residuals; 0 where not measured."""
     shape = (*residuals.shape[:2], residuals.shape[2], columns)
     values = values.reshape(shape)
     result = np.zeros(shape)
-    for place, one in enumerate(noise):
+    for place, signal_noise in enumerate(noise):
         known = ~np.isnan(residuals[:, :, place])
         filled = np.where(known[:, :, None], values[:, :, place, :], 0.0)
-        whole = one.whitened(filled)
-        if one.phi:  # what follows a gap would be compared with the filled-in zero
+        whole = signal_noise.whitened(filled)
+        if signal_noise.phi:  # a sample after a gap would be compared with the filled-in zero
             after = known[:, :-1]
             known = known & np.concatenate([np.ones_like(after[:, :1]), after], axis=1)
         result[:, :, place, :] = np.where(known[:, :, None], whole, 0.0)

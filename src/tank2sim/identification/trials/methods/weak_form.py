@@ -1,4 +1,4 @@
-"""Equations of motion multiplied by test functions and integrated: no acceleration is ever formed.
+"""Equations of motion multiplied by test functions and integrated, without numerical accelerations.
 
 For window w and equation i, with bump functions phi_w = (1 - s^2)^2 that half overlap,
 
@@ -50,11 +50,11 @@ class WeakWindows:
 
 @dataclass(frozen=True, eq=False)
 class _Prepared:
-    """What of a run does not depend on the parameters."""
+    """The part of a run's weak form that does not depend on the parameters."""
 
     run: SampledRun
     motion: MeasuredMotion
-    middle: Array  # KNOWN in the middle of each step
+    middle: Array  # MEASURED_STATES in the middle of each step
     averaging: sparse.csr_matrix  # (windows, steps)
     change: Array  # mean measured acceleration of each window
     pieces: tuple[slice, ...]  # windows that follow each other without a gap
@@ -68,12 +68,12 @@ class WeakForm:
     problem : Problem
         k free parameters.
     width : float
-        Of a window, in L/u0.
+        Width of a window, in L/u0.
 
     Raises
     ------
     InputError
-        A run lacks velocities, and they do not follow from what it has.
+        A run lacks velocities and signals that determine them.
     """
 
     def __init__(self, problem: Problem, width: float = WIDTH):
@@ -97,7 +97,7 @@ class WeakForm:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What was derived."""
+        """Notices of derived signals."""
         return tuple(notice for run in self.runs for notice in run.motion.notices)
 
     def at(self, values: Array) -> list[WeakWindows]:
@@ -109,10 +109,10 @@ class WeakForm:
         k = len(self.problem.free)
         inputs = np.hstack([run.run.inputs[:-1], run.middle])
         hidden, by_theta = self._hidden_states(run, inputs, p)
-        values, own, by_hidden = self._accelerations(hidden, inputs, p)
-        jacobian = own.reshape(-1, k, 3)
+        values, by_parameters, by_hidden = self._accelerations(hidden, inputs, p)
+        jacobian = by_parameters.reshape(-1, k, 3)
         if by_theta is not None:
-            jacobian = jacobian + by_theta.transpose(0, 2, 1) @ by_hidden.reshape(len(own), -1, 3)
+            jacobian = jacobian + by_theta.transpose(0, 2, 1) @ by_hidden.reshape(len(by_parameters), -1, 3)
         mean = run.averaging @ jacobian.reshape(len(jacobian), -1)
         return WeakWindows(
             residuals=run.change - run.averaging @ values,
@@ -120,8 +120,8 @@ class WeakForm:
         )
 
     def _hidden_states(self, run: _Prepared, inputs: Array, p: Array) -> tuple[Array, Array | None]:
-        """States that were not measured, simulated next to the measured ones: in the middle of steps (n, nz), and by
-        the free parameters (n, nz, k)."""
+        """Simulated values of the unmeasured states in the middle of steps (n, nz), and their derivatives by the free
+        parameters (n, nz, k)."""
         if self._sensitivity is None:
             return np.zeros((len(inputs), 0)), None
         start = np.array(self.problem.model.initial(p)).ravel()
@@ -164,14 +164,11 @@ class WeakForm:
 
 
 def _hidden_model(model: Model) -> Model:
-    """The model of the states that no record holds, with the recorded ones among its inputs."""
+    """The model of the unmeasured states, with the measured ones among its inputs."""
     known = []
     for state in (model[name] for name in MEASURED_STATES):
         copy = Input(name=state.name, unit=state.unit, description=state.description, display_unit=state.display_unit)
-        copy.__dict__["symbol"] = state.symbol  # what the quantities already refer to
+        copy.__dict__["symbol"] = state.symbol  # quantities refer to it
         known.append(copy)
-    others = tuple(state for state in model.states if state.name not in MEASURED_STATES)
-    return replace(model, states=others, inputs=(*model.inputs, *known), outputs=())
-
-
-__all__ = ["WEAK_EQUATIONS", "WIDTH", "WeakForm", "WeakWindows"]
+    hidden = tuple(state for state in model.states if state.name not in MEASURED_STATES)
+    return replace(model, states=hidden, inputs=(*model.inputs, *known), outputs=())

@@ -1,4 +1,4 @@
-"""What is asked of an estimator of free-running trials, and what it answers: the same for every method."""
+"""The problem that an estimator of free-running trials solves, and its estimate: the same for every method."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from tank2sim.dynamics.model import Model
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
 LITTLE_KNOWN = 0.25
-"""A standard error of this share of the value or more is taken as it is (project choice)."""
+"""A standard error of at least this share of the value is not widened (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Free parameters of a model, what is known of them beforehand, and the runs that tell more.
+    """Free parameters of a model, their prior, and the runs that determine them.
 
     Parameters
     ----------
     model : Model
-        Driven as the runs were (:mod:`.driving`).
+        Driven by the input that the runs recorded (:func:`.problem_from_card.driven_model`).
     free : tuple of str
         Names of the k parameters to estimate.
     prior_mean, prior_error : array (k,)
@@ -39,10 +39,11 @@ class Problem:
 
     @property
     def groups(self) -> tuple[str, ...]:
-        """Group of each parameter whose error may be too small (k,): its equation, X, Y or N; "" for all others.
+        """Group of each parameter whose error may be too small (k,): its equation, X, Y or N; "" for every other
+        parameter.
 
-        A card's standard errors are of the tests that gave it; another basin, Reynolds number or ship differs by more.
-        An error of the size of the value itself says already that little is known.
+        A card's standard errors describe the tests behind it; another basin, Reynolds number or ship differs by more.
+        An error of the size of the value already states that little is known.
         """
         return tuple(
             name.partition(".")[2][0] if name.startswith("derivatives.") and error < LITTLE_KNOWN * abs(mean) else ""
@@ -64,33 +65,35 @@ class Problem:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest value of each free parameter (k,), infinite where the model states none."""
-        chosen = [self.model[name] for name in self.free]
-        lowest = np.array([-np.inf if one.minimum is None else one.minimum for one in chosen])
-        return lowest, np.array([np.inf if one.maximum is None else one.maximum for one in chosen])
+        parameters = [self.model[name] for name in self.free]
+        lowest = np.array([-np.inf if parameter.minimum is None else parameter.minimum for parameter in parameters])
+        return lowest, np.array(
+            [np.inf if parameter.maximum is None else parameter.maximum for parameter in parameters]
+        )
 
     def parameters(self, values: Array) -> Array:
         """The model's parameter vector with the free ones at `values` (k,)."""
         return self.model.parameter_values(dict(zip(self.free, map(float, values), strict=True)))
 
     def without(self, names: Collection[str]) -> Problem:
-        """The same question with some of the free parameters held at what was known of them before."""
+        """The problem with the free parameters in `names` held at their prior means."""
         kept = [place for place, name in enumerate(self.free) if name not in names]
         free = tuple(self.free[place] for place in kept)
         return replace(self, free=free, prior_mean=self.prior_mean[kept], prior_error=self.prior_error[kept])
 
     def with_runs(self, runs: tuple[SampledRun, ...]) -> Problem:
-        """The same question, asked of other runs."""
+        """The problem with other runs."""
         return replace(self, runs=runs)
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What a method found.
+    """Estimate of the free parameters by one method.
 
     Parameters
     ----------
     method : str
-        Its name.
+        Name of the method.
     free : tuple of str
         The k parameters.
     values : array (k,)
@@ -98,15 +101,15 @@ class Estimate:
     covariance : array (k, k)
         Of the estimates, for the residuals as they are (coloured, with model error), not as white noise.
     information : array (k, k)
-        What the trials alone tell: the inverse covariance without the prior.
+        Of the trials alone: the inverse covariance without the prior.
     noise : mapping
         Standard deviation of the residual by variable.
     cost : tuple of float
-        What was minimised, after each iteration.
+        Minimised function after each iteration.
     prior_scale : mapping
-        Factor on the prior's standard errors by group (:attr:`Problem.groups`) that was chosen.
+        Chosen factor on the prior's standard errors by group (:attr:`Problem.groups`).
     notices : tuple of str
-        What a user should know.
+        Messages for the user.
     """
 
     method: str
@@ -121,7 +124,7 @@ class Estimate:
 
     @property
     def standard_errors(self) -> Array:
-        """Of the estimates (k,)."""
+        """Standard errors of the estimates (k,)."""
         errors: Array = np.sqrt(np.diag(self.covariance))
         return errors
 
@@ -131,4 +134,4 @@ SearchReport = Callable[[str, Array, float], None]
 
 
 def silent(stage: str, values: Array, cost: float) -> None:
-    """Progress that nobody watches."""
+    """Ignore progress."""

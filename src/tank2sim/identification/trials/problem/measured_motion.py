@@ -1,6 +1,6 @@
-"""The measured motion of a run as equation error takes it: velocities as measured, and states smoothed as regressors.
+"""The measured motion of a run for equation error: velocities as measured, and smoothed states as regressors.
 
-What was not measured is derived where it follows from the rest: yaw rate from heading, velocities through the water
+Missing signals are derived where the measured ones determine them: yaw rate from heading, velocities through the water
 from positions or from velocities over the ground.
 """
 
@@ -27,13 +27,13 @@ MEASURED_STATES = (*VELOCITIES, *POSITION)
 """States that equation error takes from the record."""
 
 SMALL_NOISE = 1e-4
-"""A signal whose noise has less than this share of its variance is not smoothed: it pulls coefficients towards zero by
-that share (Fuller 1987, Measurement Error Models), and smoothing might do more harm."""
+"""A signal whose noise has less than this share of its variance is not smoothed: the noise pulls coefficients towards
+zero by that share (Fuller 1987, Measurement Error Models), and smoothing might do more harm."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredMotion:
-    """What was measured of a run.
+    """Measured motion of a run.
 
     Parameters
     ----------
@@ -43,16 +43,16 @@ class MeasuredMotion:
         :data:`MEASURED_STATES`, smoothed against noise in the regressors, without gaps.
     noise : array (3,)
         Standard deviation of the measurement of u, v, r.
-    left : array (3,)
-        Of the same after smoothing.
+    remaining_noise : array (3,)
+        The same after smoothing.
     notices : tuple of str
-        What was derived.
+        One for each derived signal.
     """
 
     velocities: Array
     smooth: Array
     noise: Array
-    left: Array
+    remaining_noise: Array
     notices: tuple[str, ...]
 
 
@@ -62,7 +62,7 @@ def measured_motion(problem: Problem, run: SampledRun) -> MeasuredMotion:
     Raises
     ------
     InputError
-        Velocities are neither measured nor do they follow from heading and positions.
+        Velocities are neither measured nor determined by heading and positions.
     """
     columns = {name: run.column(name) for name in MEASURED_STATES}
     missing = {name for name, column in columns.items() if np.isnan(column).all()}
@@ -79,19 +79,19 @@ def measured_motion(problem: Problem, run: SampledRun) -> MeasuredMotion:
         columns["motion.psi"] = cumulative_trapezoid(_filled(columns["motion.r"]), dx=run.step_s, initial=0.0)
     derived = missing & {"motion.u", "motion.v"}
     if derived:
-        own, how = _velocities(problem.model, run, columns, window)
-        columns |= {name: own[name] for name in derived}
-        notices.append(f"{run.name}: {' and '.join(name[7:] for name in sorted(derived))} {how}")
+        derived_columns, source = _velocities(problem.model, run, columns, window)
+        columns |= {name: derived_columns[name] for name in derived}
+        notices.append(f"{run.name}: {' and '.join(name[7:] for name in sorted(derived))} {source}")
     _complete_positions(columns, missing, run.step_s)
     velocities = np.column_stack([columns[name] for name in VELOCITIES])
-    smooth, noise, left = zip(*(_smoothed(columns[name], window) for name in VELOCITIES), strict=True)
+    smooth, noise, remaining = zip(*(_smoothed(columns[name], window) for name in VELOCITIES), strict=True)
     position = [_filled(columns[name]) for name in POSITION]
     every = np.column_stack([*smooth, *position])
-    return MeasuredMotion(velocities, every, np.array(noise), np.array(left), tuple(notices))
+    return MeasuredMotion(velocities, every, np.array(noise), np.array(remaining), tuple(notices))
 
 
 def sensor_noise(problem: Problem, run: SampledRun) -> Array:
-    """Standard deviation of what is too fast for a ship in each signal of a run (ny,), 0 where nothing was measured."""
+    """Standard deviation of the part of each signal that is too fast for a ship (ny,), 0 for an unmeasured signal."""
     window = _window(problem, run)
     columns = [run.column(name) for name in run.seen]
     return np.array([0.0 if np.isnan(column).all() else _smoothed(column, window)[1] for column in columns])
@@ -110,17 +110,17 @@ def _velocities(model: Model, run: SampledRun, columns: dict[str, Array], window
             remedy = "give u_mps and v_mps, or x_m, y_m and psi_deg"
             raise InputError(run.origin, "header", "has neither velocities nor positions", remedy)
         north, east = (_slope(columns[name], window, run.step_s) for name in ("motion.x", "motion.y"))
-        how = "from the slope of the smoothed positions"
+        source = "from the slope of the smoothed positions"
     else:
         north, east = _turned(*ground, psi)
-        how = "from the velocities over the ground"
+        source = "from the velocities over the ground"
     drift = drift_over_ground(model, run.inputs, _filled(psi))
     u, v = _turned(north - drift[:, 0], east - drift[:, 1], -psi)
-    return {"motion.u": u, "motion.v": v}, how
+    return {"motion.u": u, "motion.v": v}, source
 
 
 def _complete_positions(columns: dict[str, Array], missing: set[str], step: float) -> None:
-    """Positions that were not measured, from the velocities: wind and banks need no more than their rough course."""
+    """Add unmeasured positions from the velocities: wind and banks need only their rough course."""
     if not missing & {"motion.x", "motion.y"}:
         return
     u, v, psi = (_filled(columns[name]) for name in ("motion.u", "motion.v", "motion.psi"))
@@ -146,7 +146,9 @@ def _smoothed(column: Array, window: int) -> tuple[Array, float, float]:
     """A signal without gaps and noise; standard deviation of its noise before and after."""
     whole = _filled(column)
     smooth: Array = savgol_filter(whole, window, 3)
-    gain = float(savgol_coeffs(window, 3)[window // 2])  # its own sample's weight: var(raw - smooth) = (1 - gain) var
+    gain = float(
+        savgol_coeffs(window, 3)[window // 2]
+    )  # weight of the sample itself: var(raw - smooth) = (1 - gain) var
     noise = float(np.std(whole - smooth)) / np.sqrt(1 - gain)
     if noise**2 < SMALL_NOISE * float(np.var(whole)):
         return whole, noise, noise

@@ -1,4 +1,5 @@
-"""Problems that can be sent to another process: a model holds symbols that cannot, and is built again from its card."""
+"""Problems that can be sent to another process: a model cannot, because of its symbols, and is rebuilt from its
+card."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ _Result = TypeVar("_Result")
 
 @dataclass(frozen=True)
 class PicklableShip:
-    """A model in two words: the text of its card, and by what trials drive it.
+    """The text of a model's card, and the rudder signal that drives the model.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ def _model(ship: PicklableShip) -> Model:
 
 @dataclass(frozen=True, eq=False)
 class Portable:
-    """A :class:`Problem` with its ship in place of its model."""
+    """A :class:`Problem` with a :class:`PicklableShip` in place of its model."""
 
     ship: PicklableShip
     free: tuple[str, ...]
@@ -61,33 +62,33 @@ class Portable:
     runs: tuple[SampledRun, ...]
 
     def problem(self) -> Problem:
-        """The problem itself."""
+        """The problem with its model."""
         return Problem(self.ship.model(), self.free, self.prior_mean, self.prior_error, self.runs)
 
     def with_runs(self, runs: tuple[SampledRun, ...]) -> Portable:
-        """The same question, asked of other runs."""
+        """The problem with other runs."""
         return replace(self, runs=runs)
 
 
 def portable(problem: Problem, card: ManoeuvringCard, driven_by: str) -> Portable:
-    """A problem made portable.
+    """Return a problem in its portable form.
 
     Parameters
     ----------
     problem : Problem
-        Posed by :func:`tank2sim.identification.trials.problem.problem_from_card.problem_from_card`.
+        Set up by :func:`tank2sim.identification.trials.problem.problem_from_card.problem_from_card`.
     card : ManoeuvringCard
     driven_by : str
-        The card and the driving with which it was posed.
+        The arguments with which it was set up.
 
     Raises
     ------
     ValueError
-        The problem's model is not the one that these give.
+        The problem's model differs from the model of the card.
     """
     ship = PicklableShip(card.text, driven_by)
     if ship.model().parameter_names != problem.model.parameter_names:
-        raise ValueError("the problem was posed for another card")
+        raise ValueError("the problem was set up for another card")
     return Portable(ship, problem.free, problem.prior_mean, problem.prior_error, problem.runs)
 
 

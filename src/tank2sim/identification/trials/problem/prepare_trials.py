@@ -1,4 +1,4 @@
-"""Trials as they are taken for identification: audited, repaired, and brought to the size of the card's ship."""
+"""Preparation of trials for identification: audit, repair, and scaling to the size of the card's ship."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from tank2sim.records.same_record import refuse_copies
 from tank2sim.records.trials import RUDDERS, Trial, froude_scaled
 
 TYPICAL_SPEED = 95
-"""Percentile of the speed that stands for a trial's approach: some begin at rest, and all are slower afterwards."""
+"""Percentile of the speed that is taken as a trial's approach speed: some begin at rest, and all are slower later."""
 
 SAME_LENGTH = 0.03
-"""Lengths that differ by less than this share are those of one ship: not all count them alike."""
+"""Lengths that differ by less than this share are of the same ship: definitions of length differ."""
 
 FARTHEST_FROUDE = 2.5
 """A trial whose approach speed differs from the card's speed by more than this factor is at another scale."""
@@ -37,7 +37,7 @@ class Measured:
     driven_by : str
         ``angle`` if the rudder's angle was measured in all of them, ``order`` if only its order is known.
     notices : tuple of str
-        What was repaired and scaled.
+        Repairs and scalings.
     """
 
     trials: tuple[Trial, ...]
@@ -46,7 +46,7 @@ class Measured:
 
 
 def measured(given: Iterable[Path | Trial], card: ManoeuvringCard) -> Measured:
-    """Read trials, repair what the audit is sure of, and scale them to the card's ship.
+    """Read trials, make the audit's safe repairs, and scale them to the card's ship.
 
     Parameters
     ----------
@@ -58,9 +58,9 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard) -> Measured:
     Raises
     ------
     InputError
-        A file is at fault, the audit finds a fault that it cannot repair, two trials have one name or are one record, a
-        trial is of another size and does not tell its scale, or the rudder's angle is known in some trials and only its
-        order in others.
+        A file has an error, the audit finds a fault that it cannot repair, two trials share a name or a record, a trial
+        is of another size without stating its scale, or the rudder's angle is known in some trials and only its order
+        in others.
     """
     trials, notices = [], []
     for item in given:
@@ -86,12 +86,12 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard) -> Measured:
     if any(by_angle) and not all(by_angle):
         odd = trials[by_angle.index(False)]
         remedy = "give trials that all have delta_deg, or all only delta_order_deg"
-        raise InputError(odd.path, "header", "has no delta_deg, as others have", remedy)
+        raise InputError(odd.path, "header", "has no delta_deg, but other trials have", remedy)
     return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(dict.fromkeys(notices)))
 
 
 def _refuse_open(finding: Finding) -> None:
-    """Refuse a trial of which a column is not what its name says, and nobody knows what it is instead."""
+    """Refuse a trial with a column that does not hold the quantity of its name and cannot be repaired."""
     if finding.open:
         place = f"column{'s' * (len(finding.columns) > 1)} {finding.column}"
         remedy = f"probably {finding.likely_truth}: correct the file, or leave the column out"
@@ -99,7 +99,7 @@ def _refuse_open(finding: Finding) -> None:
 
 
 def _unused(trial: Trial, card: ManoeuvringCard) -> list[str]:
-    """What of a trial does not enter, in words."""
+    """Notices of the parts of a trial that are not used."""
     notices = []
     for name, effect in EFFECTS.items():
         signals = set(effect.measured_as.values())
@@ -119,13 +119,13 @@ def _unused(trial: Trial, card: ManoeuvringCard) -> list[str]:
 def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
     """The trial at the size of the card's ship, and the factor on its lengths.
 
-    A trial that tells its scale may hold numbers of the model or of the ship, and the card may be of either: the factor
-    is the scale, one over it, or 1, whichever brings the approach speed nearest to the card's.
+    A trial that states its scale may hold numbers of the model or of the ship, and the card may be of either: the
+    factor is the scale, one over it, or 1, whichever brings the approach speed nearest to the card's.
 
     Raises
     ------
     InputError
-        None of them brings it near.
+        No factor brings it near.
     """
     if trial.length_m is not None:
         return _at_length(trial, card)
@@ -134,10 +134,10 @@ def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
     if speed is None:
         return trial, 1.0
     if speed == 0:
-        raise InputError(trial.path, "", "the ship lies still in it", "leave it out: nothing of a motion is in it")
-    away = [abs(math.log(speed * math.sqrt(factor) / card.model.speed_mps)) for factor in candidates]
-    factor = candidates[int(np.argmin(away))]
-    if min(away) > math.log(FARTHEST_FROUDE) and trial.scale is None:
+        raise InputError(trial.path, "", "the ship does not move in it", "leave it out: it holds no motion")
+    distances = [abs(math.log(speed * math.sqrt(factor) / card.model.speed_mps)) for factor in candidates]
+    factor = candidates[int(np.argmin(distances))]
+    if min(distances) > math.log(FARTHEST_FROUDE) and trial.scale is None:
         problem = f"reaches {speed:.3g} m/s, and the card is of {card.model.speed_mps:.3g} m/s"
         remedy = "if one of the two is a model, add the comment '# scale: LAMBDA' (ship length over model length)"
         raise InputError(trial.path, "", problem, remedy)
@@ -145,11 +145,12 @@ def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
 
 
 def _at_length(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
-    """The same for a trial whose format tells the length of the ship or model: it must be the card's, or its model."""
+    """The same for a trial whose format states the length of the ship or model: it must be that of the card or its
+    model."""
     assert trial.length_m is not None
-    own, scale = card.ship.length_m / trial.length_m, trial.scale or 1.0
-    factor = min((1.0, scale, 1 / scale), key=lambda one: abs(math.log(own / one)))
-    if abs(math.log(own / factor)) > SAME_LENGTH:
+    ratio, scale = card.ship.length_m / trial.length_m, trial.scale or 1.0
+    factor = min((1.0, scale, 1 / scale), key=lambda candidate: abs(math.log(ratio / candidate)))
+    if abs(math.log(ratio / factor)) > SAME_LENGTH:
         problem = f"is of a ship or model of {trial.length_m:g} m, and the card of one of {card.ship.length_m:g} m"
         raise InputError(trial.path, "", problem, f"neither is the other at 1:{scale:g}; give the card of that ship")
     return (trial if factor == 1 else froude_scaled(trial, factor)), factor
@@ -165,7 +166,7 @@ def approach_speed(trial: Trial) -> float | None:
         known = ~np.isnan(signals["x_m"] + signals["y_m"])
         t, x, y = (values[known] for values in (trial.time_s, signals["x_m"], signals["y_m"]))
         if len(t) > 1:
-            stride = max(1, len(t) // 100)  # over a hundredth of the trial, so that noise of positions does not count
+            stride = max(1, len(t) // 100)  # over a hundredth of the trial, so that noise of positions is negligible
             way = np.hypot(np.diff(x[::stride]), np.diff(y[::stride])) / np.diff(t[::stride])
             return float(np.percentile(way, TYPICAL_SPEED))
     return None

@@ -1,9 +1,11 @@
-"""The problem that a card and trials pose: what is free, and what was known of it before."""
+"""The estimation problem of a card and trials: the driven model, the free parameters and their prior."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 
 from tank2sim.arrays import Array
@@ -13,10 +15,10 @@ from tank2sim.cards.reading import revised
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.kinematics import earth_velocity
+from tank2sim.dynamics.model import Model, Quantity
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
-from tank2sim.identification.trials.problem.rudder_input import driven_by_angle, with_ground_velocities
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, in_range, prepare, seen_in
 from tank2sim.records.trials import Trial
 from tank2sim.units import from_si
@@ -30,7 +32,7 @@ REVOLUTIONS_ERROR = 0.2
 choice)."""
 
 REVOLUTIONS_VARY = 0.01
-"""Revolutions that vary by less than this share of their nominal number tell nothing of their effect."""
+"""Revolutions that vary by less than this share of their nominal number show nothing of their effect."""
 
 ASSUMED_EFFECT_ERROR = 0.25
 """Standard error of an effect's parameter without one, as a share of its bounds' distance (project choice)."""
@@ -42,11 +44,46 @@ def driven_model(card: ManoeuvringCard, driven_by: str) -> Model:
     return driven_by_angle(model) if driven_by == "angle" else model
 
 
+def driven_by_angle(model: Model) -> Model:
+    """The model without its steering gear: ``rudder.command`` is the angle of the rudder.
+
+    For trials in which the angle was measured: the record contains the action of the gear.
+    """
+    angle, order = model.symbol("rudder.angle"), model.symbol("rudder.command")
+    removed = {"rudder.rate", "rudder.angle"}
+    quantities = []
+    for quantity in model.quantities:
+        if quantity.name in removed:
+            continue
+        copy = replace(quantity, value=ca.substitute(quantity.value, angle, order))
+        copy.__dict__["symbol"] = quantity.symbol  # quantities refer to it
+        quantities.append(copy)
+    return replace(
+        model,
+        states=tuple(state for state in model.states if state.name != "rudder.angle"),
+        quantities=tuple(quantities),
+        outputs=tuple(name for name in model.outputs if name not in removed),
+    )
+
+
+def with_ground_velocities(model: Model) -> Model:
+    """The model with ``motion.u_ground`` and ``motion.v_ground``, the velocity over the ground in body axes, m/s."""
+    north, east, psi = (model.symbol(name) for name in ("motion.xdot", "motion.ydot", "motion.psi"))
+    forward, starboard = earth_velocity(north, east, -psi)
+    return model.extend(
+        Quantity(name="motion.u_ground", unit="m/s", description="Velocity ahead over the ground", value=forward),
+        Quantity(
+            name="motion.v_ground", unit="m/s", description="Velocity to starboard over the ground", value=starboard
+        ),
+    )
+
+
 def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str, tuple[float, float]]:
     """Name in the model of each free parameter, to its value and standard error before the trials.
 
     Every derivative that the card has (with a value or an uncertainty) except for accelerations, unless `inertia`
-    asks for them: motion alone cannot tell a mass from a force. Every parameter of the card's effects that is no input.
+    requests them: motion alone does not determine a mass and a force. Every parameter of the card's effects that is
+    not an input.
     """
     free = {}
     for name in {**card.derivatives, **card.uncertainty}:
@@ -58,15 +95,9 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
     for entry in card.effects:
         effect = EFFECTS[entry.name]
         for parameter in effect.parameters:
-            unsaid = (
-                parameter.default is not None
-                and parameter.absent is not None
-                and parameter.name not in entry.parameters
-            )
-            if (
-                parameter.input_name or unsaid
-            ):  # an input, or a part of the effect that the card does not say to be there
-                continue
+            optional = parameter.default is not None and parameter.absent is not None
+            if parameter.input_name or (optional and parameter.name not in entry.parameters):
+                continue  # an input, or a part of the effect that the card does not have
             error = entry.uncertainty.get(
                 parameter.name, ASSUMED_EFFECT_ERROR * (parameter.maximum - parameter.lowest(card))
             )
@@ -87,7 +118,7 @@ def problem_from_card(
 ) -> Problem:
     """The problem of fitting a card's free parameters to trials, except for those in `hold`.
 
-    Parts of runs at speeds outside the range that the card states are left out, unless runs are to stay `whole`.
+    Parts of runs at speeds outside the range of the card are omitted, unless `whole` is True.
 
     Raises
     ------
@@ -101,11 +132,11 @@ def problem_from_card(
     for name in hold:
         known = name if name in free else f"derivatives.{name}"
         if known not in free:
-            text = " ".join(one.removeprefix("derivatives.") for one in free)
-            raise InputError("--hold", "", f"{name} is not estimated anyway", f"estimated are {text}")
+            text = " ".join(parameter.removeprefix("derivatives.") for parameter in free)
+            raise InputError("--hold", "", f"{name} is not an estimated parameter", f"estimated are {text}")
         del free[known]
     if not free:
-        raise InputError(card.source, "derivatives", "there is nothing to estimate", "give derivatives with a value")
+        raise InputError(card.source, "derivatives", "nothing is left to estimate", "give derivatives with a value")
     seen = seen_in(model, trials)
     if not seen:
         raise InputError(trials[0].path, "header", "none of its signals can be compared", "give u_mps, r_degps, ...")
@@ -125,13 +156,13 @@ def _revolutions_vary(propulsion: Propulsion, trials: Sequence[Trial]) -> bool:
 
 
 def _parts(card: ManoeuvringCard, model: Model, run: SampledRun) -> tuple[SampledRun, ...]:
-    """The parts of a run at speeds at which the card says that it holds; the whole run if it does not say."""
+    """The parts of a run within the card's range of speeds; the whole run if the card states none."""
     if card.model.valid_speed_mps is None:
         return (run,)
     return in_range(run, model, card.model.valid_speed_mps, LEAST_PART * card.ship.length_m / card.model.speed_mps)
 
 
-def answered(card: ManoeuvringCard, estimate: Estimate) -> ManoeuvringCard:
+def card_with_estimate(card: ManoeuvringCard, estimate: Estimate) -> ManoeuvringCard:
     """The card with the estimates in place of its values, and their standard errors."""
     found = dict(zip(estimate.free, zip(estimate.values, estimate.standard_errors, strict=True), strict=True))
     derivatives = {
@@ -155,11 +186,11 @@ def answered(card: ManoeuvringCard, estimate: Estimate) -> ManoeuvringCard:
 
 
 def with_range(card: ManoeuvringCard, problem: Problem) -> ManoeuvringCard:
-    """The card with the range that it holds in after the fit.
+    """The card with its range of validity after the fit.
 
-    The speeds of the runs, if it states none and they are known; its largest drift, yaw rate and rudder angle where the
-    runs went further than it states. The polynomial itself is used down to the speed at which it ended before: no trial
-    says anything about where it breaks down.
+    The speeds of the runs, if the card states none and they are known; the largest drift, yaw rate and rudder angle
+    where the runs exceed the card's. The lower speed limit of the polynomial does not change: no trial shows where it
+    breaks down.
     """
     changes: dict[str, object] = {}
     columns = {name: np.concatenate([run.column(f"motion.{name}") for run in problem.runs]) for name in "uvr"}
@@ -182,7 +213,7 @@ def with_range(card: ManoeuvringCard, problem: Problem) -> ManoeuvringCard:
 
 
 def _reached(card: ManoeuvringCard, problem: Problem, columns: Mapping[str, Array]) -> dict[str, float]:
-    """Largest drift angle (rad), r L/U and rudder angle (rad) of the runs: of 99 in 100 instants, for noise."""
+    """Largest drift angle (rad), r L/U and rudder angle (rad) of the runs: the 99th percentile, because of noise."""
     known = columns["u"] > 0
     found = {
         "valid_drift_rad": np.arctan2(np.abs(columns["v"][known]), columns["u"][known]),
@@ -195,7 +226,7 @@ def _reached(card: ManoeuvringCard, problem: Problem, columns: Mapping[str, Arra
 
 
 def rounded(value: float, error: float) -> float:
-    """A value to a thousandth of its standard error: no figure is lost that means anything."""
+    """Return a value rounded to a thousandth of its standard error: no significant figure is lost."""
     if not 0 < error < np.inf:
         return float(f"{value:.10g}")
     places = int(np.ceil(3 - np.log10(error)))

@@ -1,4 +1,4 @@
-"""Trials as an estimator takes them: equal steps, inputs held over each, and what was measured at each instant."""
+"""Trials on equal steps for the estimators: inputs held over each step, measured signals at each instant."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MOST_INSTANTS_A_ROW = 100
 """Instants of an even time a row of the file: beyond, 99 % of the record is missing, and one bad time (an epoch among
 seconds) would ask for gigabytes. Project choice: records of what a ship does have gaps of a few per cent."""
 LONGEST_GAP = 3
-"""Gaps of up to this many samples are bridged; in longer ones nothing counts as measured (project choice)."""
+"""Gaps of up to this many samples are bridged; longer ones count as unmeasured (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +41,9 @@ class SampledRun:
     begin_s, step_s : float
         Time of the first instant in the trial's own time, and the step, s.
     inputs : array (n, nu)
-        Mean of each of the model's inputs from an instant to the next; the last row repeats the one before.
+        Mean of each of the model's inputs from an instant to the next; the last row repeats the previous row.
     measured : array (n, ny)
-        In the order of `seen`; nan where nothing was measured.
+        In the order of `seen`; nan where not measured.
     seen : tuple of str
         Names of the model's variables that are measured.
     file : str
@@ -70,7 +70,7 @@ class SampledRun:
         return times
 
     def column(self, name: str) -> Array:
-        """What was measured of a variable (n,), nan where nothing was."""
+        """Measured values of a variable (n,), nan where it was not measured."""
         if name not in self.seen:
             return np.full(len(self.measured), np.nan)
         column: Array = self.measured[:, self.seen.index(name)]
@@ -86,10 +86,11 @@ class SampledRun:
 
 
 def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | None = None) -> SampledRun:
-    """A trial on equal steps, for a model that is driven as the trial was (:mod:`.driving`).
+    """A trial on equal steps, for a model driven by the trial's rudder signal
+    (:func:`.problem_from_card.driven_model`).
 
     The step is a whole number of sampling steps near `step_s` (by default 1.5 times the model's own). Signals are
-    averaged over a step, so that no measurement is thrown away. A rudder order holds until the next and enters with its
+    averaged over a step, so that no measurement is lost. A rudder order holds until the next and enters with its
     mean over the step; a measured angle is taken as straight between samples.
 
     Raises
@@ -116,19 +117,17 @@ def prepare(model: Model, trial: Trial, seen: Sequence[str], *, step_s: float | 
     signals = {variable: signal for signal, variable in OBSERVED_SIGNALS.items()}
     measured = np.full((count, len(seen)), np.nan)
     for place, name in enumerate(seen):
-        if (values_there := trial.signals.get(signals[name])) is not None:
-            measured[:, place] = _averaged(trial.time_s, values_there, grid, stride)
+        if (signal := trial.signals.get(signals[name])) is not None:
+            measured[:, place] = _averaged(trial.time_s, signal, grid, stride)
     if np.isnan(measured).all():
-        raise InputError(
-            trial.path, "header", "none of the signals to be compared is there", "give u_mps, r_degps, ..."
-        )
+        raise InputError(trial.path, "header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
     return SampledRun(trial.name, begin, step, inputs, measured, tuple(seen), str(trial.path))
 
 
 def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s: float) -> tuple[SampledRun, ...]:
-    """The parts of a run in which the ship goes at speeds (m/s) at which the model holds, each of `least_s` s or more.
+    """The parts of a run at speeds (m/s) at which the model holds, each of `least_s` s or more.
 
-    Speed is judged by its mean over half of L/u0, for single readings jump. Without a measured speed the run is kept.
+    Speed is its mean over half of L/u0, because single readings jump. Without a measured speed the run is kept.
     """
     speed = _speed(run)
     if speed is None:
@@ -155,9 +154,9 @@ def _speed(run: SampledRun) -> Array | None:
 
 
 def seen_in(model: Model, trials: Sequence[Trial]) -> tuple[str, ...]:
-    """Variables of the model that at least one of the trials measured."""
-    there = {signal for trial in trials for signal in trial.signals}
-    return tuple(variable for signal, variable in OBSERVED_SIGNALS.items() if signal in there and variable in model)
+    """Variables of the model that at least one trial measured."""
+    measured = {signal for trial in trials for signal in trial.signals}
+    return tuple(variable for signal, variable in OBSERVED_SIGNALS.items() if signal in measured and variable in model)
 
 
 def _input_signals(model: Model, trial: Trial) -> dict[str, Array]:
@@ -200,9 +199,9 @@ def _averaged(time: Array, values: Array, grid: Array, stride: int) -> Array:
     sampling = float(np.median(np.diff(time)))
     places = (np.arange(stride) - 0.5 * (stride - 1)) * sampling
     fine = (grid[:, None] + places).ravel()
-    there = np.interp(fine, time[known], values[known], left=np.nan, right=np.nan)
+    interpolated = np.interp(fine, time[known], values[known], left=np.nan, right=np.nan)
     after = np.clip(np.searchsorted(time[known], fine), 1, len(known) - 1)
     gap = time[known[after]] - time[known[after - 1]]
-    there[gap > (LONGEST_GAP + 1.5) * sampling] = np.nan  # three missing: four steps from known to known
-    mean: Array = there.reshape(len(grid), stride).mean(axis=1)
+    interpolated[gap > (LONGEST_GAP + 1.5) * sampling] = np.nan  # three missing: four steps from known to known
+    mean: Array = interpolated.reshape(len(grid), stride).mean(axis=1)
     return mean

@@ -1,4 +1,4 @@
-"""The trials that a card was fitted to, written on it with some of their rows, by which a copy is known again."""
+"""The trials that a card was fitted to: a signature of each in the card, by which a copy is recognised."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tank2sim.records.trials import Trial
 
 
 def with_fitted_trials(text: str, source: str, trials: Sequence[Trial]) -> str:
-    """A card's text with trials, at the size of its ship, among its ``[[fitted_trials]]``; each once."""
+    """A card's text with trials, at the size of its ship, added to its ``[[fitted_trials]]``; each once."""
     card = parse_card(text, source)
     assert isinstance(card, ManoeuvringCard)
     new = []
@@ -29,12 +29,13 @@ def with_fitted_trials(text: str, source: str, trials: Sequence[Trial]) -> str:
 
 
 def fitted_as(card: ManoeuvringCard, trial: Trial) -> str | None:
-    """Name on the card of the fitted trial whose record this is, whatever its file is called; None if it is none.
+    """Name on the card of the fitted trial with the same record, whatever the name of its file; None if there is none.
 
-    `trial` is at the size of the card's ship. See :func:`tank2sim.records.same_record.same_record` for what it may
-    differ by.
+    `trial` is at the size of the card's ship. :func:`tank2sim.records.same_record.same_record` states the tolerance.
     """
-    return next((one.name for one in card.fitted_trials if one.t_s and same_record(_record(one), trial)), None)
+    return next(
+        (fitted.name for fitted in card.fitted_trials if fitted.t_s and same_record(_record(fitted), trial)), None
+    )
 
 
 def _record(fitted: FittedTrial) -> Trial:

@@ -1,7 +1,7 @@
-"""Structures of the model that trials can be fitted with: each turns a card into the card to start from.
+"""Structures of the model that trials can be fitted with: each turns a card into the start card.
 
-A structure says which terms and effects the model has, with a value and a standard error before the trials for each.
-Because it is a card, everything downstream (simulation, linearisation, FMU) takes it as it is.
+A structure sets the terms and effects of the model, with a value and a standard error before the trials for each. The
+result is a card, so that simulation, linearisation and FMU accept it unchanged.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ TYPICAL = {"v": 0.3, "r": 0.7, "d": 0.6, "u": 0.4}
 """Primes of a hard turn (v', r', rudder in rad, Du'): sizes at which terms are compared (KVLCC2, 35 deg turn)."""
 
 SHARE_OF_LINEAR = 0.3
-"""Standard error before the trials of a term that a card has not: this share of the linear force in a hard turn."""
+"""Standard error before the trials of a term that the card lacks: this share of the linear force in a hard turn."""
 
-SHARE_BESIDE_DRAG = 0.1
-"""The same for cubic terms of the yaw moment next to cross-flow drag, which takes one coefficient for bow and stern. A
-tenth is ours; of 0, 0.1 and 0.3 it was the one that followed KVLCC2's 35 deg turn at MARIN (tactical diameter -12, -3
-and +8 %) after fits of HSVA's zigzags, which themselves cannot tell the three apart."""
+SHARE_WITH_DRAG = 0.1
+"""The same for cubic terms of the yaw moment next to cross-flow drag, which takes one coefficient for bow and stern.
+Project choice: of 0, 0.1 and 0.3, 0.1 is closest to KVLCC2's 35 deg turn at MARIN (tactical diameter -12, -3 and +8 %)
+after fits of HSVA's zigzags, which do not distinguish the three."""
 
 SHARE_OF_ASYMMETRY = 0.02
 """The same for terms of asymmetry (Y0, N0, Y0u, N0u): the lateral force of a single screw is a few percent (project
@@ -42,7 +42,8 @@ TURNING = ("Xvv", "Xvr", "Xrr", "Xdd")
 _LOADED_RUDDER = {"loading": (0.6, 0.15), "straightening": (0.55, 0.2), "lever": (-0.71, 0.3)}
 """Value and standard error before the trials. Values: the KVLCC2 of Yasukawa and Yoshimura (2015): its rudder's inflow
 speed rises by 0.62 to 0.65 of the loading, whose straightening is 0.395 to port and 0.640 to starboard over a rudder
-inflow of 0.92 U, and whose lever is -0.710; standard errors ours, wide enough for another single-screw ship."""
+inflow of 0.92 U, and whose lever is -0.710; standard errors are a project choice, wide enough for another single-screw
+ship."""
 
 CROSS_FLOW = (0.6, 0.3)
 """Cross-flow drag coefficient before the trials: 0.4 to 0.9 for full hulls (Faltinsen 1990, Sea Loads, 6.4)."""
@@ -57,9 +58,9 @@ class ModelStructure:
     Parameters
     ----------
     name : str
-        As the command line has it.
+        Value of ``--structure`` on the command line.
     description : str
-        A sentence for people.
+        A sentence for the help text.
     start : callable
         ``start(card) -> card``: with value and standard error of all that is to be estimated.
     """
@@ -67,10 +68,6 @@ class ModelStructure:
     name: str
     description: str
     start: Callable[[ManoeuvringCard], ManoeuvringCard]
-
-
-def _as_it_is(card: ManoeuvringCard) -> ManoeuvringCard:
-    return card
 
 
 def _linear(card: ManoeuvringCard) -> ManoeuvringCard:
@@ -93,7 +90,7 @@ def _cross_flow(card: ManoeuvringCard) -> ManoeuvringCard:
     replaced |= {name for name in ABKOWITZ_TERMS["X"] if known_term(name).d and name != "Xdd"}
     bare = _without(card, replaced)
     bare = with_terms(bare, [*ASYMMETRY, *TURNING, "Yd", "Nd"])
-    bare = with_terms(bare, ["Nvvr", "Nvrr", "Nrrr"], SHARE_BESIDE_DRAG)
+    bare = with_terms(bare, ["Nvvr", "Nvrr", "Nrrr"], SHARE_WITH_DRAG)
     bare = with_effect(bare, hull.CROSS_FLOW_DRAG.name, {"drag_coefficient": CROSS_FLOW})
     return with_effect(bare, loaded_rudder.LOADED_RUDDER.name, _LOADED_RUDDER)
 
@@ -105,23 +102,23 @@ STRUCTURES: Registry[ModelStructure] = Registry(
     "tank2sim.structures",
     (
         ModelStructure("linear", "linear derivatives alone (3.5)", _linear),
-        ModelStructure("card", "the terms and effects that the card has", _as_it_is),
+        ModelStructure("card", "the terms and effects that the card has", lambda card: card),
         ModelStructure("cross_flow", "linear hull, cross-flow drag, rudder in the propeller's slipstream", _cross_flow),
         ModelStructure("third_order", "the card's terms and all third-order terms in v and r", _third_order),
     ),
     ModelStructure,
     reserved=(AUTO,),
 )
-"""From the simplest to the one with most parameters, then those of installed packages: of two that predict alike the
-earlier is taken."""
+"""From the fewest to the most parameters, then those of installed packages: of two that predict alike the first is
+taken."""
 
 
 def prior_of_absent(card: ManoeuvringCard, name: str, share: float = SHARE_OF_LINEAR) -> tuple[float, float]:
-    """Value and standard error (prime) before the trials of a term that the card has not.
+    """Value and standard error (prime) before the trials of a term that the card lacks.
 
     X_vr is -Yvdot: in ideal fluid the force of the added mass in sway, m_y v r (the MMG model's (m + m_y) v r); where
-    the card's terms in r are "total", it holds m v r as well. All others are 0 within `share` of the linear force of a
-    hard turn, asymmetry within :data:`SHARE_OF_ASYMMETRY` of it.
+    the card's terms in r are "total", it holds m v r as well. All other terms are 0 within `share` of the linear force
+    of a hard turn, asymmetry within :data:`SHARE_OF_ASYMMETRY` of it.
     """
     known = card.derivatives
     term = known_term(name)
@@ -142,7 +139,7 @@ def prior_of_absent(card: ManoeuvringCard, name: str, share: float = SHARE_OF_LI
 
 
 def with_terms(card: ManoeuvringCard, names: Sequence[str], share: float = SHARE_OF_LINEAR) -> ManoeuvringCard:
-    """The card with these terms: those that it lacks, or has without uncertainty, with their values before the trials.
+    """The card with terms: a missing one gets its value before the trials, one of asymmetry at least that error.
 
     Parameters
     ----------
@@ -173,7 +170,7 @@ def _without(card: ManoeuvringCard, names: set[str]) -> ManoeuvringCard:
 
 
 def with_effect(card: ManoeuvringCard, name: str, parameters: Terms) -> ManoeuvringCard:
-    """The card with an effect; one that it has already stays as it is.
+    """The card with an effect; an effect that it already has does not change.
 
     Parameters
     ----------
@@ -181,7 +178,7 @@ def with_effect(card: ManoeuvringCard, name: str, parameters: Terms) -> Manoeuvr
     name : str
         Of the effect.
     parameters : mapping
-        Its parameters as a card spells them, to value and standard error before the trials.
+        Parameter, as spelt in a card, to value and standard error before the trials.
     """
     if any(entry.name == name for entry in card.effects):
         return card
