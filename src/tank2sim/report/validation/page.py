@@ -269,7 +269,7 @@ def _replay_history(one: Passed) -> alt.VConcatChart:
 
 def _standards(criteria: Sequence[ImoCriterion]) -> PageSection:
     rows: list[list[Cell]] = [
-        [criterion.name, criterion.found, criterion.allowed, criterion.unit, imo_verdict(criterion), criterion.remark]
+        [criterion.name, criterion.found, criterion.allowed, criterion.unit, imo_verdict(plain_json(criterion.as_json())), criterion.remark]
         for criterion in criteria
     ]
     columns = [Column(title=title) for title in ("criterion", "found", "allowed", "unit", "verdict", "remark")]
