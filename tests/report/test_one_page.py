@@ -22,6 +22,16 @@ def _yaw(folder: Path) -> Result:
     return t2s.yaw(written(folder / "water.csv", truth, record(truth)), inertia_kgm2=0.0204)
 
 
+def _validation(folder: Path) -> Result:
+    t2s.load("mariner").zigzag(20, 20).to_csv(folder / "zigzag.csv")
+    return t2s.validate("mariner", folder, members=3)
+
+
+def _signals(folder: Path) -> Result:
+    t2s.load("mariner").zigzag(20, 20).to_csv(folder / "zigzag.csv")
+    return t2s.signals(folder / "zigzag.csv", "r_degps", filter="lowpass:0.1")
+
+
 RESULTS: dict[str, Callable[[Path], Result]] = {
     "stability": lambda _: t2s.load("esso-osaka").stability(),
     "stability of an ensemble": lambda _: t2s.load("kvlcc2").stability(spirals=False, members=3),
@@ -30,6 +40,8 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "yaw": _yaw,
     "glide": lambda _: t2s.load("kulikovsky-velikanov").glide([-30, -45], as_printed=True),
     "steering card": lambda _: t2s.steering_models("poznyakov-yudin"),
+    "validate": _validation,
+    "signals": _signals,
     "simulate": lambda _: t2s.load("mariner").turn(35),
 }
 

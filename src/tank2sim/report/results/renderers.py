@@ -13,11 +13,11 @@ from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Page, PageSection
 from tank2sim.report.results.fleet import told_fleet_page
 from tank2sim.report.results.motions import audit_sections, from_the_bridge, identified, simulated
-from tank2sim.report.results.signals import signals_drawn
+from tank2sim.report.signals.page import signals_page
 from tank2sim.report.stability.page import stability_page
 from tank2sim.report.steering_card.page import steering_catalogue_page
 from tank2sim.report.tow.page import tow_page
-from tank2sim.report.validation.charts import validated
+from tank2sim.report.validation.page import validation_page
 from tank2sim.report.yaw.page import yaw_page
 
 
@@ -54,11 +54,6 @@ _DRAWERS: Mapping[str, _Drawer] = {
             "ensemble.track",
         ),
     ),
-    "Signals": _Drawer(
-        signals_drawn,
-        {"trials": list},
-        tuple(f"trials.*.{one}" for one in ("columns", "rudder_to_yaw_rate", "notices", "trial")),
-    ),
     "Audit of trials": _Drawer(audit_sections, {"findings": list, "trials": list}, ("trials.*.histories", "findings")),
     "Coefficients from trials": _Drawer(identified, {"replays": list}, ("replays",)),
     "Bridge": _Drawer(
@@ -66,7 +61,6 @@ _DRAWERS: Mapping[str, _Drawer] = {
         {"turning_circles_deep": list, "turning_circles_shallow": list, "stops": list},
         tuple(f"{one}.*.{way}" for one in ("turning_circles_deep", "turning_circles_shallow", "stops") for way in _WAY),
     ),
-    "Validation": _Drawer(validated, {"figures": list}, ("replays",)),
 }
 
 _PAGES: Mapping[str, _Page] = {
@@ -103,6 +97,12 @@ _PAGES: Mapping[str, _Page] = {
         steering_catalogue_page,
         {"diagrams": dict, "histories": dict, "titles": dict, "printed_influence": dict, "missing": dict},
     ),
+    "Validation": _Page(
+        validation_page,
+        {"documentation": dict, "coefficients": dict, "figures": list, "verification": list}
+        | {"imo": list, "replays": list, "notices": list},
+    ),
+    "Signals": _Page(signals_page, {"trials": list}),
     "Fleet": _Page(told_fleet_page, {"fleet": str, "ships": list}),
     "Influence coefficients": _Page(
         influence_page, {"figures": dict, "parameters": dict, "influence_percent": dict, "notices": list}
