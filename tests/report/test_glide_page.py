@@ -10,6 +10,7 @@ import pytest
 from tank2sim.analysis.glide.study import GlideQuestion, study
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
+from tank2sim.files import plain_json
 from tank2sim.report.glide.charts import SpacePath, elevation_chart, isometric_chart, plan_chart, polar_chart
 from tank2sim.report.glide.page import glide_page
 from tank2sim.report.kit.charts import chart_specification
@@ -41,7 +42,7 @@ def lines(chart, layer=0):
 
 
 def test_the_page_has_the_figures_and_every_chart(found) -> None:
-    page = glide_page(found)
+    page = glide_page(plain_json(found.as_json()))
     assert page.figures[0].value == pytest.approx(23.385, abs=5e-4)
     charts = [one for section in page.sections for one in section.charts]
     assert len(charts) == 7

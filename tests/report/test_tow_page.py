@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tank2sim.bundled import bundled
+from tank2sim.files import plain_json
 from tank2sim.identification.tow import paper as tow_paper
 from tank2sim.identification.tow.identify import identify_tow
 from tank2sim.identification.tow.study import study_tows, towed_body
@@ -26,10 +27,10 @@ def study(table_1):
 
 
 def test_the_page_holds_the_paper_beside_what_its_tows_give(study):
-    page = tow_page(study)
+    page = tow_page(plain_json(study.as_json()))
     assert [figure.value for figure in page.figures[:3]] == [2772, 529, "2.55 to 3.40"]
     estimates, speeds, models, by_tow, drag, theory = page.sections
-    assert estimates.notes == study.notes
+    assert estimates.notes == list(study.notes)
     rows = {row[0]: row for row in estimates.tables[1].rows}
     assert rows["2, printed"][1:4] == list(tow_paper.TABLE_2[2][0])
     assert len(rows) == 8 and len(speeds.charts) == 1 and len(models.charts) == 2 and len(by_tow.tables) == 3
@@ -41,11 +42,11 @@ def test_the_page_holds_the_paper_beside_what_its_tows_give(study):
 
 def test_other_tows_are_not_held_beside_the_paper(table_1):
     one = replace(table_1.only(0), body={})
-    page = tow_page(study_tows(identify_tow(one, terms=("B3",))))
+    page = tow_page(plain_json(study_tows(identify_tow(one, terms=("B3",))).as_json()))
     assert [section.heading for section in page.sections] == [
         "Estimates",
         "Speeds and residuals",
-        "What these tows can tell",
+        "What these tows determine",
     ]
     assert len(page.sections[0].tables[1].rows) == 4
 

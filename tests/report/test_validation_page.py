@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from tank2sim.analysis.stability.imo import ImoCriterion
+from tank2sim.analysis.validation.documentation import model_documentation
 from tank2sim.analysis.validation.study import TURN_FIGURES, ZIGZAG_FIGURES, Validated, Validation, Verified
+from tank2sim.files import plain_json
 from tank2sim.report.kit.charts import chart_specification
 from tank2sim.report.kit.page import Verdict, render_page
-from tank2sim.report.validation.page import ValidationEvidence, validation_page
+from tank2sim.report.validation.page import validation_page
 from tests.report.browser import measured_in_browser
 
 FIGURES = (
@@ -20,15 +23,27 @@ FIGURES = (
 )
 
 
-@pytest.fixture
-def evidence(mariner_card, mariner) -> ValidationEvidence:
-    verified = (Verified("turn", "advance_m", 500.0, 1e-4, 8.0),)
-    criteria = (ImoCriterion("advance", 3.6, 4.5, "L"),)
-    return ValidationEvidence(mariner_card, mariner, Validation(FIGURES, 40), verified, criteria, (), ("a notice",))
+def validation_json(**changes: object) -> Any:
+    """The JSON of a validation with some of its parts replaced."""
+    verified = Verified("turn", "advance_m", 500.0, 1e-4, 8.0)
+    return plain_json(
+        {
+            "ship": "A ship",
+            "documentation": {},
+            "coefficients": {"Yv": {"value": -0.01, "standard_error": 0.001, "stated": True}},
+            "propulsion": True,
+            **Validation(FIGURES, 40).as_json(),
+            "verification": [{**vars(verified), "U_num": verified.numerical}],
+            "imo": [ImoCriterion("advance", 3.6, 4.5, "L").as_json()],
+            "replays": [],
+            "notices": ["a notice"],
+        }
+        | changes
+    )
 
 
-def test_each_figure_has_its_verdict(evidence) -> None:
-    page = validation_page(evidence)
+def test_each_figure_has_its_verdict() -> None:
+    page = validation_page(validation_json())
     section = next(one for one in page.sections if one.heading == "Validation")
     verdicts = [row[-1] for row in section.tables[1].rows]
     assert verdicts == ["validated", "not validated", "not validated"]
@@ -37,8 +52,9 @@ def test_each_figure_has_its_verdict(evidence) -> None:
     assert sorted(row["e"] for data in drawn for row in data if "e" in row)[:1] == [2.0]
 
 
-def test_what_the_procedure_asks_for_is_documented(evidence) -> None:
-    text = render_page(validation_page(evidence))
+def test_what_the_procedure_asks_for_is_documented(mariner_card, mariner) -> None:
+    documentation = model_documentation(mariner_card, mariner)
+    text = render_page(validation_page(validation_json(documentation=documentation)))
     for item in (
         "Source of the coefficients",
         "Scale effects",
@@ -51,32 +67,29 @@ def test_what_the_procedure_asks_for_is_documented(evidence) -> None:
     assert "rate 5 deg/s" in text and "Froude number" in text and "E = S" in text
 
 
-def test_without_trials_the_report_says_that_nothing_is_validated(evidence) -> None:
-    bare = ValidationEvidence(
-        evidence.card, evidence.model, Validation((), 0), evidence.verified, evidence.criteria, ()
-    )
-    page = validation_page(bare)
+def test_without_trials_the_report_says_that_nothing_is_validated() -> None:
+    page = validation_page(validation_json(**Validation((), 0).as_json()))
     assert page.figures[0].verdict is Verdict.CAUTION
     assert "not validated" in render_page(page)
 
 
-def test_a_trial_that_made_the_card_is_no_validation(evidence) -> None:
-    own = tuple(replace(one, made_card=True) for one in FIGURES[:1])
-    page = validation_page(replace(evidence, validation=Validation(own, 40)))
+def test_a_trial_that_made_the_card_is_no_validation() -> None:
+    figures = tuple(replace(figure, made_card=True) for figure in FIGURES[:1])
+    page = validation_page(validation_json(**Validation(figures, 40).as_json()))
     assert page.figures[0].value == "0 of 1" and page.figures[0].verdict is Verdict.CAUTION
     assert "only fitted" in page.figures[0].note
 
 
-def test_a_criterion_beyond_the_card_has_no_verdict(evidence) -> None:
-    beyond = (ImoCriterion("advance", 2.4, 4.5, "L", "leaves the card's validity", beyond_card=True),)
-    page = validation_page(replace(evidence, criteria=beyond))
+def test_a_criterion_beyond_the_card_has_no_verdict() -> None:
+    beyond = ImoCriterion("advance", 2.4, 4.5, "L", "leaves the card's validity", beyond_card=True)
+    page = validation_page(validation_json(imo=[beyond.as_json()]))
     table = next(one for one in page.sections if one.heading == "Standard manoeuvres").tables[0]
     assert table.rows[0][4] == "beyond the card"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [1440, 1160, 1100])
-def test_the_verdicts_stand_on_the_page_without_scrolling(evidence, tmp_path, width) -> None:
+def test_the_verdicts_stand_on_the_page_without_scrolling(tmp_path, width) -> None:
     figures = tuple(
         Validated("zigzag of a long name", "zigzag", name, 123.456, 234.567, 0.001234, 12.3456, 3.45678)
         for name in (*ZIGZAG_FIGURES, *TURN_FIGURES)
@@ -85,8 +98,8 @@ def test_the_verdicts_stand_on_the_page_without_scrolling(evidence, tmp_path, wi
         Verified("turn 35 deg to starboard", name, 1234.5, -1.2345e-4, 12.345)
         for name in ("steady_rate_degps", "speed_loss_percent", "initial_turning_distance_m", "tactical_diameter_m")
     )
-    own = replace(evidence, validation=Validation(figures, 40), verified=verified)
-    html = render_page(validation_page(own))
+    verification = [{**vars(row), "U_num": row.numerical} for row in verified]
+    html = render_page(validation_page(validation_json(**Validation(figures, 40).as_json(), verification=verification)))
     script = """<script>setTimeout(() => { document.body.dataset.wide = JSON.stringify(
       [...document.querySelectorAll(".table")].map((one) => one.scrollWidth - one.clientWidth)); }, 500);</script>"""
     wide = measured_in_browser(

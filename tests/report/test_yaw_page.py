@@ -60,7 +60,7 @@ def test_every_subinterval_has_its_residual(told):
 
 
 def test_page_has_a_chart_for_each_record_and_says_what_is_noted(result, told):
-    page = yaw_page(result)
+    page = yaw_page(told)
     notes = [note for section in page.sections for note in section.notes]
     assert notes == list(result.notes)
     assert values(record_chart(*next(iter(told["histories"].items()))), "run")

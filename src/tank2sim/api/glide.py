@@ -17,8 +17,6 @@ from tank2sim.cards import GliderCard
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tank2sim.report.kit.page import Page
-
 BUNDLED_GLIDER = "kulikovsky-velikanov"
 """Name of the bundled glider."""
 
@@ -143,12 +141,6 @@ class GlideResult(PagedResult):
                 )
             )
         return tuple(tables)
-
-    def layout(self) -> Page:
-        """As :meth:`.PagedResult.layout`."""
-        from tank2sim.report.glide.page import glide_page
-
-        return glide_page(self.found)
 
 
 def glide_with(ship: Ship, question: GlideQuestion) -> GlideResult:

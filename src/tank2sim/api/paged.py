@@ -1,8 +1,7 @@
-"""Results with a page of their own, whose charts are those of the page."""
+"""Results whose charts are those of their page."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -11,25 +10,15 @@ from tank2sim.api.result import Result
 if TYPE_CHECKING:
     import altair as alt
 
-    from tank2sim.report.kit.page import Page, PageSection
+    from tank2sim.report.kit.page import PageSection
 
 
 class PagedResult(Result):
-    """A result with a page of its own."""
-
-    @abstractmethod
-    def layout(self) -> Page:
-        """Sections, tables and charts of the page."""
+    """A result whose charts are those of its page."""
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
         """Charts of the page by their titles."""
         return charts_of(self.layout().sections)
-
-    def page(self) -> str:
-        """As :meth:`.Result.page`."""
-        from tank2sim.report.kit.page import render_page
-
-        return render_page(self.layout())
 
 
 def charts_of(sections: Iterable[PageSection]) -> dict[str, alt.TopLevelMixin]:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import altair as alt
     import pandas as pd
 
-    from tank2sim.report.kit.page import PageSection
+    from tank2sim.report.kit.page import Page, PageSection
 
 SCHEMA_VERSION = 1
 """Version of the JSON of all results: it grows when a key is removed or changes its meaning. Project choice."""
@@ -166,18 +166,23 @@ class Result(ABC):
 
         return chart_png(self.plot(name=name))
 
-    def page(self) -> str:
-        """The page of the result: self-contained HTML.
+    def layout(self) -> Page:
+        """Return sections, tables and charts of the page, made from :meth:`to_dict` alone.
 
         Raises
         ------
         InputError
             The result cannot be drawn.
         """
-        from tank2sim.report.kit.page import render_page
         from tank2sim.report.results.page import result_page
 
-        return render_page(result_page(self.to_dict(), f"tank2sim {self.command}"))
+        return result_page(self.to_dict(), f"tank2sim {self.command}")
+
+    def page(self) -> str:
+        """Return the page of the result: self-contained HTML. Raises as :meth:`layout`."""
+        from tank2sim.report.kit.page import render_page
+
+        return render_page(self.layout())
 
     def to_html(self, path: str | Path) -> None:
         """Write :meth:`page` to a file."""

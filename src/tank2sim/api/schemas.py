@@ -331,6 +331,7 @@ class SignalsKeys(_Keys):
     """Statistics, spectra and filters of records."""
 
     trials: list[dict[str, Any]]
+    filter: NotRequired[dict[str, Any]]
 
 
 class SteerKeys(_Keys):
@@ -365,6 +366,9 @@ class ValidateKeys(_Keys):
     kind: str
     ship: str
     source: str
+    documentation: dict[str, str]
+    coefficients: dict[str, dict[str, float | bool]]
+    propulsion: bool
     verdict: str
     counts: dict[str, int]
     figures: list[dict[str, Any]]

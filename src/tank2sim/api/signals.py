@@ -16,6 +16,7 @@ from tank2sim.records.signals.effect import Filtered
 from tank2sim.records.signals.requests import FilterRequest, parse_filter
 from tank2sim.records.signals.sampling import Series, even_series
 from tank2sim.records.signals.writing import thinned, with_filtered
+from tank2sim.records.thinning import drawn_columns
 from tank2sim.records.trials import Trial
 
 if TYPE_CHECKING:
@@ -130,7 +131,14 @@ class SignalsResult(Result):
         content: dict[str, object] = {"trials": [analysis_as_json(analysis) for analysis in self.analyses]}
         if done := self.filtering:
             column = SignalName(done.before.name).file
-            content["filter"] = {"name": done.request.text, "column": column, **effect_as_json(done.after.effect)}
+            content["filter"] = {
+                "name": done.request.text,
+                "column": column,
+                "sentence": done.sentence,
+                **effect_as_json(done.after.effect),
+                "before": _history(done.before),
+                "after": _history(done.after.series),
+            }
         return content
 
     @property
@@ -145,26 +153,12 @@ class SignalsResult(Result):
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
         """Density, correlation and spectrum of each signal, rudder to yaw rate, and the filter, by file stem."""
-        from tank2sim.report.signals.page import chart_name
+        from tank2sim.report.signals.page import signals_charts
 
-        return {chart_name(key): chart for key, chart in self._charts().items()}
-
-    def page(self) -> str:
-        """As :meth:`.Result.page`."""
-        from tank2sim.report.kit.page import render_page
-        from tank2sim.report.signals.page import signals_page
-
-        sentence = self.filtering.sentence if self.filtering else ""
-        return render_page(signals_page(self.analyses, self._charts(), sentence))
+        return {"_".join(key): chart for key, chart in signals_charts(self.to_dict()).items()}
 
     def _columns(self) -> list[tuple[Trial, ColumnAnalysis]]:
         return [(analysis.trial, column) for analysis in self.analyses for column in analysis.columns]
-
-    def _charts(self) -> dict[tuple[str, str], alt.TopLevelMixin]:
-        from tank2sim.report.signals.page import signals_charts
-
-        done = self.filtering
-        return signals_charts(self.analyses, (done.before, done.request.text, done.after) if done else None)
 
 
 def signals(
@@ -234,6 +228,12 @@ def _filter(trials: Sequence[Trial], request: FilterRequest, settings: SignalSet
     sentence = f"{what} filtered by {request.text}: {after[0].effect.sentence}"
     changed = thinned(trial, after, sentence) if request.thins else with_filtered(trial, after[0], sentence)
     return FilteredSignal(request, before[0], after[0], sentence, changed)
+
+
+def _history(series: Series) -> dict[str, list[float]]:
+    """A signal over time in the unit of its column, thinned to draw."""
+    name = SignalName(series.name)
+    return drawn_columns({"t_s": series.time_s, name.file: name.factor * series.values}, peaks=True)
 
 
 def _table(analysis: TrialAnalysis) -> ResultTable:

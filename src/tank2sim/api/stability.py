@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tank2sim.analysis.ensemble.results import EnsembleRequest, StabilityBands, stability_bands
@@ -13,12 +12,12 @@ from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.stability.study import StabilityStudy, stability_study
 from tank2sim.api.bands import band_table, criteria_table
 from tank2sim.api.ensemble import EnsembleOptions
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.paged import PagedResult
+from tank2sim.api.result import ResultTable
 from tank2sim.native.compiler import find_compiler
 from tank2sim.simulation.integrator import NO_COMPILER
 
 if TYPE_CHECKING:
-    import altair as alt
     import pandas as pd
 
     from tank2sim.api.ship import Ship
@@ -27,7 +26,7 @@ STRONGEST = 5
 """Coefficients whose influence on C' the table shows; JSON and page have all. Project choice."""
 
 
-class StabilityResult(Result):
+class StabilityResult(PagedResult):
     """Stability, steady turning and IMO criteria of a ship.
 
     Parameters
@@ -122,24 +121,6 @@ class StabilityResult(Result):
         if self.bands is None:
             return tables
         return *tables, band_table(self.bands.figures, self.bands.asked), criteria_table(self.bands)
-
-    def charts(self) -> dict[str, alt.TopLevelMixin]:
-        """Charts of the page by their captions."""
-        from tank2sim.report.stability.page import stability_page
-
-        page = stability_page(self.study, list(self.notices))
-        return {chart.caption: chart.chart for section in page.sections for chart in section.charts}
-
-    def page(self) -> str:
-        """As :meth:`.Result.page`."""
-        from tank2sim.report.ensemble.sections import stability_section
-        from tank2sim.report.kit.page import render_page
-        from tank2sim.report.stability.page import stability_page
-
-        page = stability_page(self.study, list(self.notices))
-        return render_page(
-            replace(page, sections=[*page.sections, stability_section(self.bands)]) if self.bands else page
-        )
 
 
 def judge_stability(

@@ -16,8 +16,6 @@ from tank2sim.cards.steering_card import SteeringCard, read_steering_card
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tank2sim.report.kit.page import Page
-
 
 class SteeringModelsResult(PagedResult):
     """The models of a steering card: steady turns, influence coefficients, manoeuvres, and what is not known.
@@ -102,12 +100,6 @@ class SteeringModelsResult(PagedResult):
         if isinstance(found.tuning, TwoPointTuning):
             tables.append(turn_table(found.tuning))
         return tuple(tables)
-
-    def layout(self) -> Page:
-        """As :meth:`.PagedResult.layout`."""
-        from tank2sim.report.steering_card.page import steering_catalogue_page
-
-        return steering_catalogue_page(self.card, self.found)
 
     def _prediction_rows(self) -> list[list[object]]:
         rows: list[list[object]] = []

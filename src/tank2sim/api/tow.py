@@ -125,16 +125,7 @@ class TowResult(Result):
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
         """Charts of the page: speeds, models of different size, joint regions, drag."""
-        from tank2sim.report.tow.page import tow_page
-
-        return section_charts(tow_page(self.study).sections)
-
-    def page(self) -> str:
-        """As :meth:`.Result.page`."""
-        from tank2sim.report.kit.page import render_page
-        from tank2sim.report.tow.page import tow_page
-
-        return render_page(tow_page(self.study))
+        return section_charts(self.layout().sections)
 
     def _estimates(self) -> ResultTable:
         result = self.study.result

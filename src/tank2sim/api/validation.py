@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
+from tank2sim.analysis.validation.documentation import model_documentation
 from tank2sim.analysis.validation.standard_trials import MEMBERS, TrialShip, ship_of
 from tank2sim.analysis.validation.study import REQUIRED, Validated, Validation, Verified, verify
 from tank2sim.analysis.validation.study import validate_card as validate_figures
@@ -16,6 +20,7 @@ from tank2sim.api.ship import Ship, as_ship
 from tank2sim.api.trial import TrialPaths, trials_of
 from tank2sim.arrays import Array
 from tank2sim.cards import Card, ManoeuvringCard
+from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.errors import InputError
 from tank2sim.gap.outcome.export import signal_display_name
 from tank2sim.gap.proof.card_replay import replay_by_card
@@ -29,7 +34,6 @@ if TYPE_CHECKING:
     import altair as alt
     import pandas as pd
 
-    from tank2sim.report.validation.page import ValidationEvidence
 
 REPLAY_SAMPLES = 240
 """Samples of each trial in the JSON, for charts. Project choice: a chart is a few hundred pixels wide, and the record
@@ -101,11 +105,14 @@ class ValidationResult(Result):
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""
-        card = self.ready.card
+        card, model = self.ready.card, self.ready.model
         return {
             "kind": "validate",
             "ship": card.ship.name,
             "source": card.ship.source,
+            "documentation": model_documentation(card, model),
+            "coefficients": _coefficients(card),
+            "propulsion": card.propulsion is not None,
             **self.validation.as_json(),
             "verification": [{**vars(row), "U_num": row.numerical} for row in self.verified],
             "imo": [criterion.as_json() for criterion in self.criteria],
@@ -144,24 +151,7 @@ class ValidationResult(Result):
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
         """Comparison errors, and track and histories of each replay."""
-        from tank2sim.report.validation.page import validation_page
-
-        return section_charts(validation_page(self._evidence()).sections)
-
-    def page(self) -> str:
-        """As :meth:`.Result.page`."""
-        from tank2sim.report.kit.page import render_page
-        from tank2sim.report.validation.page import validation_page
-
-        return render_page(validation_page(self._evidence()))
-
-    def _evidence(self) -> ValidationEvidence:
-        from tank2sim.report.validation.page import ValidationEvidence
-
-        card, model = self.ready.card, self.ready.model
-        return ValidationEvidence(
-            card, model, self.validation, self.verified, self.criteria, self.replays, self.notices
-        )
+        return section_charts(self.layout().sections)
 
 
 def validate(
@@ -218,7 +208,42 @@ def _replay_as_json(replay: Passed) -> dict[str, object]:
         in_file = {column.file: column.factor * values[name] for name, column in names.items()}
         return drawn_columns({"t_s": replay.time_s, **in_file}, REPLAY_SAMPLES)
 
-    return {"trial": replay.name, "measured": columns(replay.measured), "simulated": columns(replay.before)}
+    errors = [_replay_error(replay, name) for name in replay.noise]
+    runs = {"measured": columns(replay.measured), "simulated": columns(replay.before)}
+    return {"trial": replay.name, "errors": errors, **runs}
+
+
+_ANGLES = ("motion.r", "motion.psi", "motion.cog", "motion.phi")
+_UNITS = {"motion.r": "deg/s", "motion.psi": "deg", "motion.cog": "deg", "motion.phi": "deg"}
+_UNITS |= dict.fromkeys(("motion.x", "motion.y"), "m")
+
+
+def _replay_error(replay: Passed, name: str) -> dict[str, str | float | None]:
+    """Root mean square error of a signal, also in per cent of its range, and the noise of its measurement."""
+    factor = math.degrees(1.0) if name in _ANGLES else 1.0
+    known = np.isfinite(replay.measured[name])
+    measured, simulated = replay.measured[name][known], replay.before[name][known]
+    error, spread = float(np.sqrt(np.mean((simulated - measured) ** 2))), float(np.ptp(measured))
+    return {
+        "signal": name.removeprefix("motion."),
+        "unit": _UNITS.get(name, "m/s"),
+        "rms_error": factor * error,
+        "percent_of_range": 100 * error / spread if spread > 0 else None,
+        "noise": factor * replay.noise[name],
+    }
+
+
+def _coefficients(card: ManoeuvringCard) -> dict[str, dict[str, float | bool | None]]:
+    """The derivatives of a card with their standard errors, prime; `stated` is false where the error is assumed."""
+    return {
+        name: {
+            "value": card.derivatives[name],
+            "standard_error": card.standard_error(name),
+            "stated": name in card.uncertainty,
+        }
+        for name in ALL_TERMS
+        if card.derivatives.get(name)
+    }
 
 
 def _numbers(row: Validated) -> tuple[float | None, ...]:

@@ -189,16 +189,7 @@ class YawResult(Result):
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
         """Charts of the page: estimates, energy balance, records, residuals."""
-        from tank2sim.report.yaw.page import yaw_page
-
-        return section_charts(yaw_page(self.identification, self.theory).sections)
-
-    def page(self) -> str:
-        """As :meth:`.Result.page`."""
-        from tank2sim.report.kit.page import render_page
-        from tank2sim.report.yaw.page import yaw_page
-
-        return render_page(yaw_page(self.identification, self.theory))
+        return section_charts(self.layout().sections)
 
     def _known_method(self) -> str:
         known = self.identification.estimates

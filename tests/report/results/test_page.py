@@ -215,21 +215,6 @@ def test_a_fleet_is_told_by_the_names_of_the_folders_without_ways_that_lead_nowh
     assert list(section(page, "Without a result").tables[0].rows[0]) == ["two", "no card"]
 
 
-def test_signals_have_a_row_each_in_one_table_a_statistic():
-    steady = {"verdict": "stationary", "p_values": {"about_level": {"kpss": 0.1}}}
-    one = {"unit": "m/s", "mean": 7.0, "constant": False, "stationarity": steady}
-    trial = {"trial": "a/turn.csv", "columns": {"u_mps": one, "v_mps": one}, "notices": ["look"]}
-    page = result_page({"trials": [trial]}, "signals.json")
-    drawn, told = page.sections
-    assert drawn.heading == "turn.csv" and drawn.notes == ["look"]
-    assert [(table.caption, [row[0] for row in table.rows]) for table in told.tables] == [
-        ("Signals", ["u", "v"]),
-        ("Stationarity", ["u", "v"]),
-    ]
-    assert [column.title for column in told.tables[1].columns] == ["signal", "verdict", "kpss p about level"]
-    assert page.figures[1].value == "2 of 2"
-
-
 DAMAGES = st.sampled_from(["text", 5, True, [1, 2], {"a": 5}, [{}], ["x"] * 20, [None], {"a": {}}])
 NEEDED = {kind.title: [*kind.keys, *needs_of(kind.title), "notices", "figures", "effects"] for kind in RESULT_TYPES}
 

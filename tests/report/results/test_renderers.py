@@ -59,15 +59,27 @@ AUDITED = {
 }
 VALIDATED = {
     "kind": "validate",
+    "ship": "A ship",
+    "documentation": {"Ship": "length 100 m"},
+    "coefficients": {},
+    "propulsion": True,
+    "imo": [],
+    "notices": [],
     "verdict": "of 1 figures 1 validated",
-    "counts": {"validated": 1},
+    "counts": {"validated": 1, "not validated": 0},
     "figures": [
         {"trial": "zigzag", "name": "overshoot_1_deg", "measured": 10.0, "simulated": 11.0, "error": 1.0}
-        | {"level_percent": 15.0, "outcome": "validated"}
+        | {"level_percent": 15.0, "outcome": "validated", "manoeuvre": "zigzag 20/20", "inputs": 0.5, "data": 0.5}
+        | {"numerical": 0.0, "uncertainty": 1.5, "required_percent": 20.0}
     ],
     "verification": [],
     "replays": [
-        {"trial": "zigzag", "measured": HISTORIES, "simulated": {**HISTORIES, "u_mps": [7.0, 6.95, 6.9, 6.85]}}
+        {
+            "trial": "zigzag",
+            "errors": [],
+            "measured": HISTORIES,
+            "simulated": {**HISTORIES, "u_mps": [7.0, 6.95, 6.9, 6.85]},
+        }
     ],
 }
 

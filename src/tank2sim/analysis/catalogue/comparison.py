@@ -22,7 +22,7 @@ from tank2sim.analysis.catalogue.tables import (
 )
 from tank2sim.analysis.turning.points import SteadyTurn, TurningPoints
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning, WantedTurn, levers_of_form, tune_to_two_points
-from tank2sim.cards.steering_card import SteeringCard, SteeringPoint
+from tank2sim.cards.steering_card import PrintedInfluence, SteeringCard, SteeringPoint
 from tank2sim.errors import InputError
 from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.figures import Figures
@@ -82,6 +82,8 @@ class SteeringComparison:
         Known ones of the diagram.
     speed_mps : float
         Of the approach, at which a radius is a yaw rate.
+    printed : PrintedInfluence or None
+        Influence coefficients that the source prints.
     """
 
     ship: str
@@ -98,6 +100,7 @@ class SteeringComparison:
     diagrams: Mapping[str, tuple[SteadyTurn, ...]]
     points: tuple[SteeringPoint, ...]
     speed_mps: float
+    printed: PrintedInfluence | None
 
     def as_json(self) -> dict[str, object]:
         """All of it, in m, deg and deg/min; turning circles thinned to draw."""
@@ -113,6 +116,12 @@ class SteeringComparison:
                 for name, run in self.runs.items()
             },
             "combined_predictions": {name: vars(prediction) for name, prediction in self.predictions.items()},
+            "printed_influence": self.printed
+            and {
+                "draught_m": self.printed.draughts_m[-1],
+                "K_percent": {name: values[-1] for name, values in self.printed.K_percent.items() if values},
+                "misread_as": dict(self.printed.misread_as),
+            },
             "influence_over_draught": {name: list(values) for name, values in self.polynomials.items()},
             "two_point_tuning": tuning,
             "missing": {name: list(words) for name, words in self.missing.items()},
@@ -128,8 +137,9 @@ class SteeringComparison:
             rate = point.yaw_rate_radps or math.copysign(
                 self.speed_mps / (point.radius_m or math.inf), point.rudder_rad
             )
-            told = {"rudder_deg": math.degrees(point.rudder_rad), "yaw_rate_degpmin": 60 * math.degrees(rate)}
-            points.append({"label": point.label, "source": point.source, **told})
+            place = {"rudder_deg": math.degrees(point.rudder_rad), "yaw_rate_degpmin": 60 * math.degrees(rate)}
+            known = {"radius_measured": bool(point.measured and point.radius_m)}
+            points.append({"label": point.label, "source": point.source, **place, **known})
         models = {
             label: {name: [turn.as_json()[name] for turn in turns] for name in names}
             for label, turns in self.diagrams.items()
@@ -172,6 +182,7 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
         diagrams=_diagrams(card, max(turn.rudder_rad for one in turns for turn in one.turns), same, (main, tuning)),
         points=card.points,
         speed_mps=card.ship.speed_mps,
+        printed=printed,
     )
 
 

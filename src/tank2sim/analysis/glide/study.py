@@ -102,7 +102,12 @@ class GlideStudy:
             | {"force_residual_N": force_residual(self.card, glide)}
             for glide, radius in zip(self.glides, self.radii_m, strict=True)
         ]
-        result: dict[str, object] = {"glider": self.card.ship.name, "states": states}
+        result: dict[str, object] = {
+            "glider": self.card.ship.name,
+            "source": self.card.ship.source,
+            "buoyancy_kg": self.card.glider.buoyancy_kg,
+            "states": states,
+        }
         result["design"] = {
             "smallest_angle_deg": math.degrees(self.smallest_angle_rad),
             "best_glide": self.best.as_json(),

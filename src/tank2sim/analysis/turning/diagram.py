@@ -35,6 +35,9 @@ from tank2sim.simulation.card_range import range_left
 _LARGEST_RUDDER = math.radians(35.0)
 """The diagram goes to 35 deg of rudder (MSC.137(76)), or as far as the gear allows."""
 
+_REPORTED_RUDDERS_DEG = (-35, -20, -10, -5, 0, 5, 10, 20, 35)
+"""Rudder angles whose steady turns a report lists. Project choice."""
+
 _MOTION = ("motion.u", "motion.v", "motion.r")
 _PLACE = ("motion.x", "motion.y", "motion.psi")
 _FASTEST, _MOST_YAW, _MOST_ELSE = 2.5, 12.0, 50.0
@@ -134,6 +137,11 @@ class SteadyTurning:
         }
         if self.heel_rad is not None:
             points["heel_deg"] = np.degrees(self.heel_rad)
+        turns = [
+            {"rudder_deg": rudder, "yaw_rate_degps": math.degrees(rate), "stable": stable}
+            for rudder in _REPORTED_RUDDERS_DEG
+            for rate, stable in self.turns_at(math.copysign(max(0.0, abs(math.radians(rudder)) - 1e-9), rudder))
+        ]
         loop = self.loop and {
             "width_deg": math.degrees(self.loop.width_rad),
             "height_degps": None if self.loop.height_radps is None else math.degrees(self.loop.height_radps),
@@ -144,6 +152,7 @@ class SteadyTurning:
         ]
         return {
             "points": points,
+            "turns": turns,
             "folds": folds,
             "loop": loop,
             "ended": {"port": self.ended[0], "starboard": self.ended[1]},

@@ -130,6 +130,7 @@ class TowFit:
         """The fit as plain data."""
         matrix = self.correlation
         return {
+            "estimated": list(self.free),
             "estimates": self.estimates,
             "standard_errors": self.standard_errors,
             "correlation": None if matrix is None else {"of": list(self.unknowns), "matrix": matrix.tolist()},

@@ -33,6 +33,7 @@ from tank2sim.identification.tow.model_selection import (
     tow_by_tow,
 )
 from tank2sim.identification.tow.output_error import simulated_speeds
+from tank2sim.identification.tow.paper import are_of_the_paper
 from tank2sim.records.tows import Tows
 
 _LEVEL = 0.95
@@ -141,6 +142,7 @@ class TowStudy:
     def as_json(self) -> dict[str, Any]:
         """The study as plain data, including that of the result."""
         studies: dict[str, Any] = {
+            "tows_of_the_paper": are_of_the_paper(self.result.tows),
             "speed_polynomials": [polynomial._asdict() for polynomial in self.polynomials],
             "models": [model.as_json() for model in self.models],
             "mass_range_kg": self.mass_range_kg,

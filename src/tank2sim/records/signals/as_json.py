@@ -36,7 +36,7 @@ def effect_as_json(effect: FilterEffect) -> dict[str, Any]:
 
 def _column(column: ColumnAnalysis) -> dict[str, Any]:
     name = SignalName(column.series.name)
-    told: dict[str, Any] = {
+    content: dict[str, Any] = {
         "unit": name.unit,
         "samples": len(column.series.values),
         "step_s": column.series.step_s,
@@ -45,7 +45,7 @@ def _column(column: ColumnAnalysis) -> dict[str, Any]:
         "on_circle": column.series.name in DIRECTION_COLUMNS,
         "constant": column.randomness is None,
     }
-    return told | (_random(column.randomness, name) if column.randomness else {})
+    return content | (_random(column.randomness, name) if column.randomness else {})
 
 
 def _random(found: Randomness, name: SignalName) -> dict[str, Any]:
@@ -84,6 +84,7 @@ def _random(found: Randomness, name: SignalName) -> dict[str, Any]:
             "high": square * spectrum.high,
             "unit": f"({name.unit})^2/Hz",
             **_averaging(spectrum.averaging),
+            "peak_in_words": spectrum.peak_in_words,
             "peak": None
             if peak is None
             else {

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import altair as alt
 
 from tank2sim.analysis.ensemble.questions import ENSEMBLE_SIGNALS
-from tank2sim.analysis.ensemble.results import ManoeuvreBands, StabilityBands
-from tank2sim.files import plain_json
+from tank2sim.analysis.ensemble.results import ManoeuvreBands
 from tank2sim.report.ensemble.charts import curve_charts
 from tank2sim.report.kit.charts import History, TrackData, history_chart, track_chart
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Cell, Column, PageSection, PageTable
 from tank2sim.report.kit.run_series import SHIP_SIGNALS, history_of, signals_of, track_data
 from tank2sim.report.results.motions import HIGH, LOW, MIDDLE
-from tank2sim.report.stability.page import BEYOND_CARD_TEXT
-from tank2sim.simulation.bands import Band, small_edge_first
+from tank2sim.simulation.bands import small_edge_first
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import in_words
+
+BEYOND_CARD_TEXT = "beyond the card"
+"""In place of a verdict, where the trial left the range of the card."""
 
 _TEXT = (
     "Members of the ensemble are this ship with numbers drawn from the standard errors of its card, and from their "
@@ -26,7 +27,7 @@ _TEXT = (
     "stream of its own, so that the same seed gives the same members everywhere."
 )
 _CHANCES = (
-    " A criterion is met with the probability told: the share of all usable members that meet it, with the 95 % "
+    " The probability that a criterion is met is the share of all usable members that meet it, with the 95 % "
     "interval that their number leaves (Wilson). A member whose trial does not show the figure counts as one that "
     "does not meet it. Where the trial of the card itself leaves the card's range no probability is reported."
 )
@@ -57,49 +58,53 @@ def banded_chart(label: str, run: Trajectory, bands: ManoeuvreBands) -> alt.VCon
     return alt.vconcat(track, history_chart(histories, signals_of(run.model, SHIP_SIGNALS)))
 
 
-def stability_section(found: StabilityBands) -> PageSection:
-    """The section of a page of stability."""
+def stability_section(found: Json, criteria: Sequence[Mapping[str, Json]]) -> PageSection:
+    """Return the section of the page of stability: from ``ensemble`` and ``imo`` of the JSON."""
+    beyond_card = {criterion["name"]: criterion["beyond_card"] for criterion in criteria}
     rows: list[list[Cell]] = []
-    for chance in found.chances:
-        ends: list[Cell] = (
-            [chance.band.low, chance.band.median, chance.band.high] if chance.band else [None, None, None]
+    for chance in found["imo"]:
+        beyond, met, interval = beyond_card[chance["name"]], chance["probability_met"], chance["interval_95"]
+        band = chance["band"] or {}
+        rows.append(
+            [
+                chance["name"],
+                *(band.get(key) for key in ("p5", "p50", "p95")),
+                chance["allowed"],
+                chance["unit"],
+                BEYOND_CARD_TEXT if beyond and met is not None else met,
+                f"{interval[0]:.3f} to {interval[1]:.3f}" if interval and not beyond else None,
+                chance["not_shown"],
+            ]
         )
-        between = f"{chance.between[0]:.3f} to {chance.between[1]:.3f}" if chance.between else None
-        criterion = chance.criterion
-        met: Cell = BEYOND_CARD_TEXT if criterion.beyond_card and chance.met is not None else chance.met
-        between = None if criterion.beyond_card else between
-        rows.append([criterion.name, *ends, criterion.allowed, criterion.unit, met, between, chance.left_open])
     heads = ["criterion", LOW, MIDDLE, HIGH, "allowed", "unit", "probability met", "95 % interval", "not shown by"]
     columns = [Column(title=head) for head in heads]
-    stable = "" if found.stable is None else f" It is stable on a straight course with probability {found.stable:.3g}."
-    criteria = PageTable(caption="IMO MSC.137(76), worse side, over the ensemble.", columns=columns, rows=rows)
-    straight = _table("The straight course at the card's speed.", found.figures)
-    return PageSection(
-        heading=f"Ensemble of {found.asked.members}",
-        text=_TEXT + _CHANCES + stable,
-        tables=[criteria, straight],
-        charts=curve_charts(plain_json(found.curves.as_json())) if found.curves else (),
-        notes=found.asked.notices,
-    )
-
-
-def figures_section(found: Json) -> PageSection:
-    """The section of a page of influence coefficients, from what JSON has of a
-    :class:`tank2sim.analysis.ensemble.results.FigureBands`."""
-    bands = {name: Band(one["p5"], one["p50"], one["p95"], one["shown_by"]) for name, one in found["figures"].items()}
+    probability = found["probability_stable"]
+    stable = "" if probability is None else f" It is stable on a straight course with probability {probability:.3g}."
+    criteria_table = PageTable(caption="IMO MSC.137(76), worse side, over the ensemble.", columns=columns, rows=rows)
     return PageSection(
         heading=f"Ensemble of {found['members']}",
-        text=_TEXT,
-        tables=[_table("Figures over the ensemble.", bands)],
+        text=_TEXT + _CHANCES + stable,
+        tables=[criteria_table, _table("The straight course at the card's speed.", found["figures"])],
+        charts=curve_charts(found["curves"]) if found["curves"] else (),
         notes=found["notices"],
     )
 
 
-def _table(caption: str, bands: Mapping[str, Band]) -> PageTable:
+def figures_section(found: Json) -> PageSection:
+    """Return the section of a page of influence coefficients, from ``ensemble`` of the JSON."""
+    return PageSection(
+        heading=f"Ensemble of {found['members']}",
+        text=_TEXT,
+        tables=[_table("Figures over the ensemble.", found["figures"])],
+        notes=found["notices"],
+    )
+
+
+def _table(caption: str, bands: Mapping[str, Json]) -> PageTable:
     columns = [Column(title=head) for head in ("figure", "unit", LOW, MIDDLE, HIGH, "shown by")]
     rows: list[list[Cell]] = []
     for name, band in bands.items():
         kind, at, argument = name.partition("@")
         words, unit = in_words(kind)
-        rows.append([words + at + argument, unit, band.low, band.median, band.high, band.shown])
+        rows.append([words + at + argument, unit, *(band[key] for key in ("p5", "p50", "p95", "shown_by"))])
     return PageTable(caption=caption, columns=columns, rows=rows)

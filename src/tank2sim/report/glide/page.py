@@ -5,9 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from tank2sim.analysis.glide.steady import SteadyGlide
-from tank2sim.analysis.glide.study import GlideStudy
-from tank2sim.files import plain_json
 from tank2sim.report.glide.charts import (
     corners_of,
     elevation_chart,
@@ -23,37 +20,39 @@ from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable
 
 
-def glide_page(found: GlideStudy) -> Page:
-    """The page of a study with views."""
+def glide_page(found: Json) -> Page:
+    """Return the page of the JSON of ``tank2sim glide``."""
     sections = [_design(found)]
-    if found.glides:
-        sections.append(_glides(found))
-    if found.path:
+    glides = [state for state in found["states"] if "duration_s" not in state]  # the others are of the programme
+    if glides:
+        sections.append(_glides(glides, found.get("as_printed") or ()))
+    if "path" in found:
         sections.append(_path(found))
-    if found.errors:
-        sections.append(_quasi_steady(plain_json(found.as_json()["quasi_steady_error"])))
-    sections.append(PageSection(heading="What to know of this card", notes=found.notices))
+    if errors := found.get("quasi_steady_error"):
+        sections.append(_quasi_steady(errors))
+    sections.append(PageSection(heading="What to know of this card", notes=found["notices"]))
     return Page(
-        title=found.card.ship.name,
-        subtitle=f"Underwater glider. {found.card.ship.source}",
+        title=found["glider"],
+        subtitle=f"Underwater glider. {found['source']}",
         figures=_figures(found),
         sections=sections,
     )
 
 
-def _figures(found: GlideStudy) -> list[KeyFigure]:
-    least, fast = found.smallest_angle_rad, found.fastest
+def _figures(found: Json) -> list[KeyFigure]:
+    least, fastest = found["design"]["smallest_angle_deg"], found["design"]["fastest_glide"]
+    fast = f"{fastest['horizontal_speed_mps']:.4g} m/s"
+    distance = 1 / math.tan(math.radians(least))
     figures = [
-        KeyFigure(label="Smallest path angle", value=math.degrees(least), unit="deg", note="the best glide"),
-        KeyFigure(label="Way for each metre of depth", value=1 / math.tan(least), unit="m", note="at this angle"),
-        KeyFigure(label="Fastest over the ground", value=math.degrees(-fast.path_angle_rad), unit="deg",
-               note=f"{fast.horizontal_speed_mps:.4g} m/s"),
-    ]  # fmt: skip
-    if found.compared:
+        KeyFigure(label="Smallest path angle", value=least, unit="deg", note="the best glide"),
+        KeyFigure(label="Distance for each metre of depth", value=distance, unit="m", note="at this angle"),
+        KeyFigure(label="Fastest over the ground", value=-fastest["path_angle_deg"], unit="deg", note=fast),
+    ]
+    if transient := found.get("transient"):
         figures.append(
             KeyFigure(
                 label="Programme flown by the transient model",
-                value=float(found.compared.distance_m.max()),
+                value=max(transient["distance_m"]),
                 unit="m",
                 note="farthest from the path of steady glides",
             )
@@ -74,54 +73,44 @@ _HEADS = (
 )
 
 
-def _row(glide: SteadyGlide) -> list[Cell]:
-    angles = [math.degrees(angle) for angle in (glide.incidence_rad, glide.pitch_rad)]
-    return [
-        math.degrees(glide.path_angle_rad),
-        math.degrees(glide.roll_rad),
-        glide.buoyancy_kg,
-        *angles,
-        glide.speed_mps,
-        glide.lift_coefficient,
-        glide.drag_coefficient,
-        glide.turning_radius_m if math.isfinite(glide.turning_radius_m) else None,
-    ]
+_KEYS = (
+    "path_angle_deg",
+    "roll_deg",
+    "buoyancy_kg",
+    "incidence_deg",
+    "pitch_deg",
+    "speed_mps",
+    "lift_coefficient",
+    "drag_coefficient",
+    "turning_radius_m",
+)
+"""Key of each of :data:`_HEADS`."""
 
 
-def _design(found: GlideStudy) -> PageSection:
-    marked = [("best glide", found.best), ("fastest over the ground", found.fastest)]
+def _row(glide: Json) -> list[Cell]:
+    return [glide[key] for key in _KEYS]
+
+
+def _design(found: Json) -> PageSection:
+    design = found["design"]
+    marked = {"best glide": design["best_glide"], "fastest over the ground": design["fastest_glide"]}
     tables = [
         PageTable(
             caption="Design glides",
             columns=[Column(title=""), *_HEADS],
-            rows=[[name, *_row(one)] for name, one in marked],
+            rows=[[name, *_row(glide)] for name, glide in marked.items()],
         )
     ]
-    if found.ranges:
-        tables.append(_ranges(found))
+    if design["ranges"]:
+        tables.append(_ranges(design["ranges"]))
     text = (
         "The path angle, not the buoyancy, settles incidence and ratio of lift to drag; speeds go with the root of the "
-        f"net buoyancy, here {found.card.glider.buoyancy_kg:g} kg. Below the smallest angle the drag is too large for "
+        f"net buoyancy, here {found['buoyancy_kg']:g} kg. Below the smallest angle the drag is too large for "
         "the lift at any incidence."
     )
-    return PageSection(heading="What is best", text=text, tables=tables, charts=_polar(plain_json(found.as_json())))
-
-
-def glides_drawn(found: Json) -> list[PageSection]:
-    """The charts of a study, from its JSON: polar, path, and the errors of the steady glides."""
-    sections = [PageSection(heading="What is best", charts=_polar(found))]
-    if "path_histories" in found:
-        sections.append(PageSection(heading="Path of the programme", charts=_paths(found)))
-    if errors := found.get("quasi_steady_error"):
-        sections.append(_quasi_steady(errors))
-    return [section for section in sections if section.charts]
-
-
-def _polar(found: Json) -> list[Illustration]:
-    design = found["design"]
-    marked = {"best glide": design["best_glide"], "fastest over the ground": design["fastest_glide"]}
     caption = "From the best glide to almost straight down. A line from the origin has the angle of the path."
-    return [Illustration(chart=polar_chart(found["polar"], marked, title="Glide polar"), caption=caption)]
+    polar = Illustration(chart=polar_chart(found["polar"], marked, title="Glide polar"), caption=caption)
+    return PageSection(heading="What is best", text=text, tables=tables, charts=[polar])
 
 
 def _paths(found: Json) -> list[Illustration]:
@@ -144,8 +133,7 @@ def _paths(found: Json) -> list[Illustration]:
     return charts
 
 
-def _ranges(found: GlideStudy) -> PageTable:
-    first = found.ranges[0]
+def _ranges(ranges: Sequence[Json]) -> PageTable:
     columns = [
         Column(title="path angle", unit="deg"),
         Column(title="net buoyancy", unit="kg"),
@@ -154,28 +142,22 @@ def _ranges(found: GlideStudy) -> PageTable:
         Column(title="time", unit="days"),
         Column(title="work against the pressure", unit="kJ"),
     ]
-    rows: list[list[Cell]] = []
-    for one in found.ranges:
-        start: list[Cell] = [math.degrees(one.path_angle_rad), one.buoyancy_kg, one.cycles]
-        rows.append([*start, one.range_m / 1000, one.duration_s / 86400, one.energy_J / 1000])
-    caption = f"Range on {first.budget_kg:g} kg of ballast pushed out at {first.depth_m:g} m"
+    units = {"path_angle_deg": 1, "buoyancy_kg": 1, "cycles": 1, "range_m": 1000, "duration_s": 86400, "energy_J": 1000}
+    rows: list[list[Cell]] = [[row[key] / unit for key, unit in units.items()] for row in ranges]
+    caption = f"Range on {ranges[0]['budget_kg']:g} kg of ballast pushed out at {ranges[0]['depth_m']:g} m"
     return PageTable(caption=caption, columns=columns, rows=rows)
 
 
-def _glides(found: GlideStudy) -> PageSection:
+def _glides(glides: Sequence[Json], printed: Sequence[Json]) -> PageSection:
     columns = [*_HEADS, Column(title="with added mass", unit="m")]
-    rows: list[Sequence[Cell]] = [
-        [*_row(glide), radius if math.isfinite(radius) else None]
-        for glide, radius in zip(found.glides, found.radii_m, strict=True)
-    ]
+    rows = [[*_row(glide), glide["turning_radius_with_added_mass_m"]] for glide in glides]
     tables = [PageTable(caption="Steady glides at the angles asked for", columns=columns, rows=rows)]
-    if found.printed:
-        heads = [*_HEADS, Column(title="speed by the right one", digits=3)]
-        rows = [
-            [*_row(printed), printed.speed_mps / glide.speed_mps]
-            for printed, glide in zip(found.printed, found.glides, strict=True)
-        ]
-        tables.append(PageTable(caption="The same by the equations as the paper prints them", columns=heads, rows=rows))
+    if printed:
+        columns = [*_HEADS, Column(title="speed over that of the corrected equations", digits=3)]
+        pairs = zip(printed, glides, strict=True)
+        rows = [[*_row(row), row["speed_mps"] / glide["speed_mps"]] for row, glide in pairs]
+        caption = "The same by the equations as the paper prints them"
+        tables.append(PageTable(caption=caption, columns=columns, rows=rows))
     return PageSection(
         heading="Steady glides",
         text="Angles + up, incidence + when the flow comes from below, roll + starboard side down: it turns a dive to "
@@ -185,16 +167,12 @@ def _glides(found: GlideStudy) -> PageSection:
     )
 
 
-def _path(found: GlideStudy) -> PageSection:
-    assert found.path is not None
-    heads = ("t|s", "x north|m", "y east|m", "height|m", "heading|deg")
-    columns = [Column(title=head.split("|")[0], unit=head.split("|")[1]) for head in heads]
-    rows: list[list[Cell]] = [
-        [place.time_s, place.north_m, place.east_m, place.height_m, math.degrees(place.heading_rad)]
-        for place in found.path.places
-    ]
+def _path(found: Json) -> PageSection:
+    heads = {"t_s": "t|s", "x_m": "x north|m", "y_m": "y east|m", "height_m": "height|m", "heading_deg": "heading|deg"}
+    columns = [Column(title=head.split("|")[0], unit=head.split("|")[1]) for head in heads.values()]
+    rows: list[list[Cell]] = [[place[key] for key in heads] for place in found["path"]]
     table = PageTable(caption="Start and end of each step, steady glides", columns=columns, rows=rows)
-    return PageSection(heading="Path of the programme", tables=[table], charts=_paths(plain_json(found.as_json())))
+    return PageSection(heading="Path of the programme", tables=[table], charts=_paths(found))
 
 
 def _quasi_steady(errors: Json) -> PageSection:

@@ -122,6 +122,14 @@ class PageSection:
     notes: Sequence[str] = ()
 
 
+def notices_section(notices: Sequence[str]) -> list[PageSection]:
+    """Return the section with the notices of a result, empty without any."""
+    table = PageTable(
+        caption="What the reader should know.", columns=[Column(title="")], rows=[[notice] for notice in notices]
+    )
+    return [PageSection(heading="Notices", tables=[table])] if notices else []
+
+
 @dataclass(frozen=True, kw_only=True)
 class Page:
     """All of a page, from top to bottom; everything is plain text, never HTML."""

@@ -91,7 +91,7 @@ def _page(result: Mapping[str, Json], kind: ResultType, source: str) -> Page:
     ]
     return Page(
         title=f"{kind.title}: {Path(name).name}" if name else kind.title,
-        subtitle=f"From {source}",
+        subtitle=f"From {_origin(result, source)}",
         figures=headlines(result, kind),
         sections=[
             *(first if overview or notices or kind.note else []),
@@ -99,6 +99,12 @@ def _page(result: Mapping[str, Json], kind: ResultType, source: str) -> Page:
             *(section for section in sections if section.tables or section.charts),
         ],
     )
+
+
+def _origin(result: Mapping[str, Json], source: str) -> str:
+    """The command that wrote a result, which any copy of the file states; of older files, which do not, the file."""
+    schema = str(result.get("schema") or "").split("/")
+    return f"tank2sim {schema[1]}" if len(schema) == 3 else source
 
 
 def _section(key: str, value: Json) -> PageSection:

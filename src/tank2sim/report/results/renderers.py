@@ -7,18 +7,18 @@ from dataclasses import dataclass
 
 from tank2sim.report.autopilot.page import autopilot_page
 from tank2sim.report.comparison.page import compared_page
-from tank2sim.report.glide.page import glides_drawn
+from tank2sim.report.glide.page import glide_page
 from tank2sim.report.influence.page import influence_page
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Page, PageSection
 from tank2sim.report.results.fleet import told_fleet_page
 from tank2sim.report.results.motions import audit_sections, from_the_bridge, identified, simulated
-from tank2sim.report.results.signals import signals_drawn
-from tank2sim.report.stability.page import stability_drawn
-from tank2sim.report.steering_card.page import catalogue_drawn
-from tank2sim.report.tow.page import tows_drawn
-from tank2sim.report.validation.charts import validated
-from tank2sim.report.yaw.page import yaw_drawn
+from tank2sim.report.signals.page import signals_page
+from tank2sim.report.stability.page import stability_page
+from tank2sim.report.steering_card.page import steering_catalogue_page
+from tank2sim.report.tow.page import tow_page
+from tank2sim.report.validation.page import validation_page
+from tank2sim.report.yaw.page import yaw_page
 
 
 @dataclass(frozen=True)
@@ -54,11 +54,6 @@ _DRAWERS: Mapping[str, _Drawer] = {
             "ensemble.track",
         ),
     ),
-    "Signals": _Drawer(
-        signals_drawn,
-        {"trials": list},
-        tuple(f"trials.*.{one}" for one in ("columns", "rudder_to_yaw_rate", "notices", "trial")),
-    ),
     "Audit of trials": _Drawer(audit_sections, {"findings": list, "trials": list}, ("trials.*.histories", "findings")),
     "Coefficients from trials": _Drawer(identified, {"replays": list}, ("replays",)),
     "Bridge": _Drawer(
@@ -66,47 +61,6 @@ _DRAWERS: Mapping[str, _Drawer] = {
         {"turning_circles_deep": list, "turning_circles_shallow": list, "stops": list},
         tuple(f"{one}.*.{way}" for one in ("turning_circles_deep", "turning_circles_shallow", "stops") for way in _WAY),
     ),
-    "Validation": _Drawer(validated, {"figures": list}, ("replays",)),
-    "Stability": _Drawer(
-        stability_drawn,
-        {
-            "margins": dict,
-            "trim": dict,
-            "responses": list,
-            "steady_turning": dict,
-            "characteristic": dict,
-            "spirals": dict,
-        },
-        (
-            "responses",
-            "characteristic.curve",
-            "spirals",
-            "margins.speed",
-            "steady_turning.points",
-            "trim.inoue_1981.C_prime",
-            "trim.inoue_1981.trim_by_stern_over_length",
-            "ensemble.curves",
-        ),
-    ),
-    "Towed vehicle": _Drawer(tows_drawn, {"speeds": dict, "models": list}, ("speeds", "confidence_ellipses")),
-    "Yaw rig": _Drawer(
-        yaw_drawn,
-        {"histories": dict, "energy_balance": dict, "methods": dict, "energy_residuals": list},
-        ("histories", "energy_balance", "energy_residuals", "angle_residual"),
-    ),
-    "Underwater glider": _Drawer(
-        glides_drawn,
-        {"polar": dict},
-        (
-            "polar",
-            "path_histories",
-            "path_as_printed_histories",
-            "quasi_steady_error",
-            "transient.histories",
-            "transient.orders",
-        ),
-    ),
-    "Steering catalogue": _Drawer(catalogue_drawn, {"diagrams": object}, ("diagrams", "histories", "titles")),
 }
 
 _PAGES: Mapping[str, _Page] = {
@@ -116,6 +70,39 @@ _PAGES: Mapping[str, _Page] = {
     "Heading control": _Page(
         autopilot_page, {"ship_alone": dict, "responses": list, "histories": dict, "notices": list}
     ),
+    "Stability": _Page(
+        stability_page,
+        {
+            "operating_point": dict,
+            "margins": dict,
+            "trim": dict,
+            "responses": list,
+            "steady_turning": dict,
+            "characteristic": dict,
+            "spirals": dict,
+            "imo": list,
+            "notices": list,
+        },
+    ),
+    "Towed vehicle": _Page(
+        tow_page, {"tows_of_the_paper": bool, "speeds": dict, "models": list, "tow_by_tow": dict, "methods": dict}
+    ),
+    "Yaw rig": _Page(
+        yaw_page, {"histories": dict, "energy_balance": dict, "methods": dict, "energy_residuals": list, "notes": list}
+    ),
+    "Underwater glider": _Page(
+        glide_page, {"source": str, "states": list, "design": dict, "polar": dict, "notices": list}
+    ),
+    "Steering catalogue": _Page(
+        steering_catalogue_page,
+        {"diagrams": dict, "histories": dict, "titles": dict, "printed_influence": dict, "missing": dict},
+    ),
+    "Validation": _Page(
+        validation_page,
+        {"documentation": dict, "coefficients": dict, "figures": list, "verification": list}
+        | {"imo": list, "replays": list, "notices": list},
+    ),
+    "Signals": _Page(signals_page, {"trials": list}),
     "Fleet": _Page(told_fleet_page, {"fleet": str, "ships": list}),
     "Influence coefficients": _Page(
         influence_page, {"figures": dict, "parameters": dict, "influence_percent": dict, "notices": list}

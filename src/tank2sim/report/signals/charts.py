@@ -7,12 +7,7 @@ from collections.abc import Sequence
 import altair as alt
 import numpy as np
 
-from tank2sim.arrays import Array
 from tank2sim.records.signals.columns import SignalName
-from tank2sim.records.signals.correlation import Autocorrelation, Correlation
-from tank2sim.records.signals.effect import FilterEffect
-from tank2sim.records.signals.spectra import Spectrum, Transfer
-from tank2sim.records.signals.statistics import Density
 from tank2sim.records.thinning import thin_line, thin_points
 from tank2sim.report.captive.charts import BAND_OPACITY
 from tank2sim.report.kit.chart_parts import (
@@ -28,54 +23,54 @@ from tank2sim.report.kit.chart_parts import (
     records,
     series_look,
     stacked,
+    vector,
     with_unit,
 )
+from tank2sim.report.kit.json_values import Json
 
 _SIZE_PX = (720, 300)
 _LEAST_DECIBEL = -120.0
 _PHASE = "phase (deg), below zero: later"
 
 
-def density_chart(name: SignalName, density: Density, *, title: str = "") -> alt.LayerChart:
-    """Probability density of a signal next to the normal one, in the unit of its column."""
+def density_chart(name: SignalName, density: Json, *, title: str = "") -> alt.LayerChart:
+    """Probability density of a signal next to the normal one, from ``probability_density`` of the JSON."""
     x = alt.X("x:Q", title=with_unit(name.words, name.unit), scale=alt.Scale(zero=False, nice=False))
     up = with_unit("probability density", f"1/({name.unit})")
-    curves = {"estimated": density.density, "normal": density.normal}
+    curves = {"estimated": density["density"], "normal": density["normal"]}
     rows = [
         row
         for label, curve in curves.items()
-        for row in records(label, {"x": name.factor * density.values, "v": curve / name.factor})
+        for row in records(label, {"x": vector(density["values"]), "v": vector(curve)})
     ]
     return _lines(rows, list(curves), x, alt.Y("v:Q", title=up), title)
 
 
-def autocorrelation_chart(name: SignalName, correlation: Autocorrelation, *, title: str = "") -> alt.LayerChart:
-    """Autocorrelation against the lag, the correlation time marked."""
+def autocorrelation_chart(name: SignalName, column: Json, *, title: str = "") -> alt.LayerChart:
+    """Autocorrelation against the lag, the correlation time marked; from a column of the JSON."""
     label = f"{name.words} with itself"
-    rows = _thinned(label, correlation.lag_s, correlation.coefficient)
-    chart = _correlation_layers(rows, label, marks_s=[correlation.correlation_time_s], levels=[0.0], title=title)
+    rows = _thinned(label, column["autocorrelation"])
+    chart = _correlation_layers(rows, label, marks_s=[column["correlation_time_s"]], levels=[0.0], title=title)
     return chart.properties(description=f"Autocorrelation of {name.words}; the upright line is the correlation time.")
 
 
-def cross_correlation_chart(first: SignalName, second: SignalName, found: Correlation, *, title: str) -> alt.LayerChart:
-    """Cross-correlation against the lag, with its largest value and what two independent signals stay within."""
+def cross_correlation_chart(first: SignalName, second: SignalName, found: Json, *, title: str) -> alt.LayerChart:
+    """Cross-correlation against the lag, with its largest value and the bound of two independent signals; from
+    ``cross_correlation`` of the JSON."""
     label = f"{second.words} after {first.words}"
-    rows = _thinned(label, found.lag_s, found.coefficient)
-    levels = [-found.bound, 0.0, found.bound]
-    chart = _correlation_layers(rows, label, marks_s=[found.largest[0]], levels=levels, title=title)
+    bound = found["bound_if_independent"]
+    levels, marks = [-bound, 0.0, bound], [found["lag_of_largest_s"]]
+    chart = _correlation_layers(_thinned(label, found), label, marks_s=marks, levels=levels, title=title)
     return chart.properties(description=f"Correlation of {second.words} with {first.words} against the lag.")
 
 
-def spectrum_chart(name: SignalName, spectrum: Spectrum, *, title: str = "") -> alt.LayerChart:
-    """Power spectral density with its 95 % confidence band, both axes logarithmic."""
-    square = name.factor**2
-    columns = {"v": spectrum.density, "low": spectrum.low, "high": spectrum.high}
-    shown = np.log10(np.maximum(spectrum.density, np.finfo(float).tiny))
-    kept = thin_line([shown], LINE_SAMPLES)
+def spectrum_chart(name: SignalName, spectrum: Json, *, title: str = "") -> alt.LayerChart:
+    """Power spectral density with its 95 % confidence band, both axes logarithmic; from ``spectrum`` of the JSON."""
+    keys = {"x": "frequency_hz", "v": "density", "low": "low", "high": "high"}
+    columns = {name: vector(spectrum[key]) for name, key in keys.items()}
+    kept = thin_line([np.log10(np.maximum(columns["v"], np.finfo(float).tiny))], LINE_SAMPLES)
     label = name.words
-    rows = records(
-        label, {"x": spectrum.frequency_hz[kept]} | {key: square * column[kept] for key, column in columns.items()}
-    )
+    rows = records(label, {name: values[kept] for name, values in columns.items()})
     rows = [row for row in rows if row["low"]]  # what is exactly zero has no place on a logarithmic scale
     x = alt.X("x:Q", title="frequency (Hz)", scale=alt.Scale(type="log", nice=False), axis=alt.Axis(format="~g"))
     up = f"power density (({name.unit})²/Hz)"
@@ -88,31 +83,28 @@ def spectrum_chart(name: SignalName, spectrum: Spectrum, *, title: str = "") -> 
     )
 
 
-def transfer_chart(source: SignalName, result: SignalName, transfer: Transfer, *, title: str = "") -> alt.VConcatChart:
-    """Gain, phase and coherence against frequency; gain and phase with 95 % intervals, where coherence is sure.
-
-    The gain is in 1/s if the source is an angle and the result its rate.
-    """
-    sure = np.flatnonzero(transfer.sure)
-    kept = sure[thin_points([np.log10(transfer.gain[sure]), transfer.phase_rad[sure]], POINT_SAMPLES)]
-    # An interval of more than a whole gain says nothing but that; it would only stretch the axis.
-    error = np.minimum(transfer.half_width[kept], 1.0)
-    gain = transfer.gain[kept] * _gain_factor(source, result)
-    phase, half = np.rad2deg(transfer.phase_rad[kept]), np.rad2deg(error)
-    frequency = transfer.frequency_hz
+def transfer_chart(source: SignalName, result: SignalName, transfer: Json, *, title: str = "") -> alt.VConcatChart:
+    """Gain (1/s), phase and coherence against frequency; gain and phase with 95 % intervals, where coherence is
+    above chance; from ``rudder_to_yaw_rate`` of the JSON."""
+    keys = ("frequency_hz", "gain_per_s", "phase_rad", "half_width_95", "coherence")
+    frequency, gain, phase, half_width, coherence_of = (vector(transfer[key]) for key in keys)
+    sure = np.flatnonzero(transfer["sure"])
+    kept = sure[thin_points([np.log10(gain[sure]), phase[sure]], POINT_SAMPLES)]
+    # A wider interval than a whole gain only stretches the axis.
+    error = np.minimum(half_width[kept], 1.0)
+    gain, phase, half = gain[kept], np.rad2deg(phase[kept]), np.rad2deg(error)
     label = f"{source.words} to {result.words}"
-    unit = "1/s" if (source.unit, result.unit) == ("deg", "deg/s") else f"({result.unit})/({source.unit})"
     gains = records(
         label, {"x": frequency[kept], "v": gain, "low": gain * np.exp(-error), "high": gain * np.exp(error)}
     )
     phases = records(label, {"x": frequency[kept], "v": phase, "low": phase - half, "high": phase + half})
-    shown = thin_line([transfer.coherence], LINE_SAMPLES)
-    coherence = records(label, {"x": frequency[shown], "v": transfer.coherence[shown]})
+    shown = thin_line([coherence_of], LINE_SAMPLES)
+    coherence = records(label, {"x": frequency[shown], "v": coherence_of[shown]})
     span = [float(frequency[0]), float(frequency[-1])]
     panels = [
-        _points_panel(gains, span, axis_above(with_unit("gain", unit), format="~g"), alt.Scale(type="log")),
+        _points_panel(gains, span, axis_above(with_unit("gain", "1/s"), format="~g"), alt.Scale(type="log")),
         _points_panel(phases, span, axis_above(_PHASE, values=[-180, -90, 0, 90, 180]), alt.Scale(domain=[-180, 180])),
-        _coherence_panel(coherence, span, transfer.significant),
+        _coherence_panel(coherence, span, transfer["coherence_by_chance"]),
     ]
     return stacked(
         [panel.properties(width=_SIZE_PX[0], height=150) for panel in panels],
@@ -121,29 +113,28 @@ def transfer_chart(source: SignalName, result: SignalName, transfer: Transfer, *
     )
 
 
-def effect_chart(label: str, effect: FilterEffect, *, title: str = "") -> alt.VConcatChart:
-    """Gain (dB), phase (deg) and group delay (s) of a filter against frequency."""
-    decibel = np.maximum(20.0 * np.log10(np.maximum(effect.gain, 1e-30)), _LEAST_DECIBEL)
-    # The phase of what is not let through is that of rounding.
-    phase = np.where(decibel > _LEAST_DECIBEL, np.rad2deg(effect.phase_rad), np.nan)
-    span = [float(effect.frequency_hz[0]), float(effect.frequency_hz[-1])]
-    curves = {"gain (dB)": decibel, _PHASE: phase, "group delay (s)": effect.delay_s}
+def effect_chart(label: str, effect: Json, *, title: str = "") -> alt.VConcatChart:
+    """Gain (dB), phase (deg) and group delay (s) of a filter against frequency; from ``filter`` of the JSON."""
+    keys = ("frequency_hz", "gain", "phase_rad", "group_delay_s")
+    frequency, gain, phase, delay = (vector(effect[key]) for key in keys)
+    decibel = np.maximum(20.0 * np.log10(np.maximum(gain, 1e-30)), _LEAST_DECIBEL)
+    # Where nothing passes, the phase is that of rounding.
+    phase = np.where(decibel > _LEAST_DECIBEL, np.rad2deg(phase), np.nan)
+    span = [float(frequency[0]), float(frequency[-1])]
+    curves = {"gain (dB)": decibel, _PHASE: phase, "group delay (s)": delay}
     panels = []
     for place, (up, curve) in enumerate(curves.items()):
-        rows = records(label, {"x": effect.frequency_hz, "v": curve})
+        rows = records(label, {"x": frequency, "v": curve})
         x = _frequency_axis(span, named=place == len(curves) - 1)
         y = alt.Y("v:Q", axis=axis_above(up), scale=alt.Scale(zero=False))
         panels.append(alt.layer(*_curve(rows, [label], x, y)).properties(width=_SIZE_PX[0], height=130))
     return stacked(panels, title=title, description=f"Gain, phase and group delay of {label}.")
 
 
-def _gain_factor(source: SignalName, result: SignalName) -> float:
-    return result.factor / source.factor
-
-
-def _thinned(label: str, x: Array, y: Array) -> list[ChartRecord]:
-    kept = thin_line([y], LINE_SAMPLES)
-    return records(label, {"x": x[kept], "v": y[kept]})
+def _thinned(label: str, correlation: Json) -> list[ChartRecord]:
+    lag, coefficient = vector(correlation["lag_s"]), vector(correlation["coefficient"])
+    kept = thin_line([coefficient], LINE_SAMPLES)
+    return records(label, {"x": lag[kept], "v": coefficient[kept]})
 
 
 def _correlation_layers(

@@ -1,16 +1,17 @@
-"""The page of measured signals: what each is like, how the yaw rate follows the rudder, what a filter does."""
+"""The page of measured signals: statistics of each, the response of the yaw rate to the rudder, the effect of a
+filter."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import PurePath
 
 import altair as alt
 
-from tank2sim.records.signals.analysis import ColumnAnalysis, TrialAnalysis
 from tank2sim.records.signals.columns import SignalName
-from tank2sim.records.signals.effect import Filtered
-from tank2sim.records.signals.sampling import Series
 from tank2sim.records.signals.statistics import Stationary
+from tank2sim.report.kit.chart_parts import vector
+from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.motion_charts import History, Signal, history_chart
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable
 from tank2sim.report.signals.charts import (
@@ -21,11 +22,12 @@ from tank2sim.report.signals.charts import (
     spectrum_chart,
     transfer_chart,
 )
+from tank2sim.units import to_si
 
 ChartKey = tuple[str, str]
-"""Label of a trial, and what a chart shows of it: ``("zigzag", "r_density")``; of a filter the label is empty."""
+"""Label of a trial and subject of a chart: ``("zigzag", "r_density")``; of a filter the label is ``filter``."""
 
-_FILTER = ""
+_FILTER = "filter"
 _UNITS = {"rad": "rad", "radps": "rad/s", "mps": "m/s", "m": "m"}
 
 _HOW = (
@@ -37,106 +39,109 @@ _HOW = (
 )
 
 
-def trial_labels(analyses: Sequence[TrialAnalysis]) -> list[str]:
-    """A name for each trial, numbered where files of several folders have one name."""
-    names = [analysis.trial.name for analysis in analyses]
+def signals_page(found: Json) -> Page:
+    """Return the page of the JSON of ``tank2sim signals``."""
+    trials = found["trials"]
+    columns = [column for trial in trials for column in trial["columns"].values()]
+    stationary = [column for column in columns if _is_stationary(column)]
+    figures = [
+        KeyFigure(label="Trials", value=len(trials)),
+        KeyFigure(label="Signals", value=len(columns)),
+        KeyFigure(label="Stationary", value=len(stationary), note="of these signals"),
+    ]
+    sections: list[PageSection] = []
+    for label, trial in zip(trial_labels(trials), trials, strict=True):
+        steering = trial["rudder_to_yaw_rate"] or {"notices": ()}
+        charts = [Illustration(chart=chart, caption=_caption(key[1])) for key, chart in _trial_charts(label, trial)]
+        sections.append(
+            PageSection(
+                heading=label,
+                text="" if sections else _HOW,
+                tables=[_signals(trial["columns"]), _tests(trial["columns"])],
+                charts=charts,
+                notes=[*trial["notices"], *steering["notices"]],
+            )
+        )
+    if (applied := found.get("filter")) and "before" in applied:
+        charts = [Illustration(chart=chart) for _, chart in _filter_charts(applied)]
+        sections.append(PageSection(heading="Filter", text=applied["sentence"], charts=charts))
+    title = _name(trials[0]) if len(trials) == 1 else f"{len(trials)} trials"
+    return Page(title=title, subtitle="Measured signals", figures=figures, sections=sections)
+
+
+def signals_charts(found: Json) -> dict[ChartKey, alt.TopLevelMixin]:
+    """Return the charts of the page: three of each signal that varies, two of rudder and yaw rate, two of a filter."""
+    trials = found["trials"]
+    charts = {
+        key: chart
+        for label, trial in zip(trial_labels(trials), trials, strict=True)
+        for key, chart in _trial_charts(label, trial)
+    }
+    return charts | dict(_filter_charts(found["filter"]) if found.get("filter") else ())
+
+
+def trial_labels(trials: Sequence[Json]) -> list[str]:
+    """Return a name for each trial, numbered where files of several folders have one name."""
+    names = [_name(trial) for trial in trials]
     return [
         name if names.count(name) == 1 else f"{name}_{names[: place + 1].count(name)}"
         for place, name in enumerate(names)
     ]
 
 
-def chart_name(key: ChartKey) -> str:
-    """Stem of the file of a chart's picture."""
-    return f"{key[0] or 'filter'}_{key[1]}"
+def _name(trial: Json) -> str:
+    return PurePath(str(trial["trial"])).stem
 
 
-def signals_charts(
-    analyses: Sequence[TrialAnalysis], filtering: tuple[Series, str, Filtered] | None
-) -> dict[ChartKey, alt.TopLevelMixin]:
-    """The charts: three of each signal that varies, two of rudder and yaw rate, two of a filter.
-
-    Parameters
-    ----------
-    analyses : sequence of TrialAnalysis
-        What was found.
-    filtering : (Series, str, Filtered) or None
-        A signal before, the filter's name, and after.
-    """
-    charts: dict[ChartKey, alt.TopLevelMixin] = {}
-    for label, analysis in zip(trial_labels(analyses), analyses, strict=True):
-        for column in analysis.columns:
-            if (found := column.randomness) is None:
-                continue
-            name = SignalName(column.series.name)
-            stem, of = name.stem, f"{name.words}, {label}"
-            charts[label, f"{stem}_density"] = density_chart(name, found.density, title=f"Probability density of {of}")
-            charts[label, f"{stem}_correlation"] = autocorrelation_chart(
-                name, found.correlation, title=f"Autocorrelation of {of}"
-            )
-            charts[label, f"{stem}_spectrum"] = spectrum_chart(name, found.spectrum, title=f"Spectrum of {of}")
-        if steering := analysis.steering:
-            pair = SignalName(steering.rudder), SignalName("r_radps")
-            of = f"{pair[0].words} and {pair[1].words}, {label}"
-            charts[label, "cross_correlation"] = cross_correlation_chart(
-                *pair, steering.correlation, title=f"Cross-correlation of {of}"
-            )
-            title = f"From {pair[0].words} to {pair[1].words}, {label}"
-            charts[label, "transfer"] = transfer_chart(*pair, steering.transfer, title=title)
-    if filtering:
-        charts |= _filter_charts(*filtering)
-    return charts
+def _signal(column: str) -> SignalName:
+    """The signal of a column of a trial file."""
+    return SignalName(to_si(column, 1.0)[0])
 
 
-def signals_page(
-    analyses: Sequence[TrialAnalysis], charts: Mapping[ChartKey, alt.TopLevelMixin], filter_text: str
-) -> Page:
-    """The page; `charts` as :func:`signals_charts` gives them, `filter_text` what the filter does, in words."""
-    columns = [column for analysis in analyses for column in analysis.columns]
-    steady = [c for c in columns if c.randomness and c.randomness.stationarity.verdict is Stationary.YES]
-    figures = [
-        KeyFigure(label="Trials", value=len(analyses)),
-        KeyFigure(label="Signals", value=len(columns)),
-        KeyFigure(label="Stationary", value=len(steady), note="of these signals"),
-    ]
-    sections: list[PageSection] = []
-    for label, analysis in zip(trial_labels(analyses), analyses, strict=True):
-        steering = analysis.steering
-        notes = [*analysis.notices, *(steering.notices if steering else ())]
-        of_trial = {kind: chart for (trial, kind), chart in charts.items() if trial == label}
-        sections.append(
-            PageSection(
-                heading=label,
-                text="" if sections else _HOW,
-                tables=[_signals(analysis), _tests(analysis)],
-                charts=[Illustration(chart=chart, caption=_caption(kind)) for kind, chart in of_trial.items()],
-                notes=notes,
-            )
-        )
-    if filter_text:
-        illustrations = [Illustration(chart=chart) for (trial, _), chart in charts.items() if trial == _FILTER]
-        sections.append(PageSection(heading="Filter", text=filter_text, charts=illustrations))
-    title = analyses[0].trial.name if len(analyses) == 1 else f"{len(analyses)} trials"
-    return Page(title=title, subtitle="Measured signals", figures=figures, sections=sections)
+def _is_stationary(column: Json) -> bool:
+    return not column["constant"] and column["stationarity"]["verdict"] == Stationary.YES.value
 
 
-def _filter_charts(before: Series, text: str, filtered: Filtered) -> dict[ChartKey, alt.TopLevelMixin]:
-    name = SignalName(before.name)
+def _trial_charts(label: str, trial: Json) -> Iterator[tuple[ChartKey, alt.TopLevelMixin]]:
+    for file, column in trial["columns"].items():
+        if column["constant"]:
+            continue
+        name = _signal(file)
+        stem, subject = name.stem, f"{name.words}, {label}"
+        density, spectrum = column["probability_density"], column["spectrum"]
+        yield (label, f"{stem}_density"), density_chart(name, density, title=f"Probability density of {subject}")
+        yield (label, f"{stem}_correlation"), autocorrelation_chart(name, column, title=f"Autocorrelation of {subject}")
+        yield (label, f"{stem}_spectrum"), spectrum_chart(name, spectrum, title=f"Spectrum of {subject}")
+    if steering := trial["rudder_to_yaw_rate"]:
+        pair = _signal(steering["rudder"]), _signal("r_degps")
+        title = f"Cross-correlation of {pair[0].words} and {pair[1].words}, {label}"
+        correlation = steering["cross_correlation"]
+        yield (label, "cross_correlation"), cross_correlation_chart(*pair, correlation, title=title)
+        title = f"From {pair[0].words} to {pair[1].words}, {label}"
+        yield (label, "transfer"), transfer_chart(*pair, steering, title=title)
+
+
+def _filter_charts(applied: Json) -> Iterator[tuple[ChartKey, alt.TopLevelMixin]]:
+    text, column = applied["name"], applied["column"]
+    name, (si, factor) = _signal(column), to_si(column, 1.0)
     shown = Signal(
-        name=before.name,
+        name=si,
         title=name.words,
-        unit=_UNITS.get(before.name.rpartition("_")[2], "1"),
+        unit=_UNITS.get(si.rpartition("_")[2], "1"),
         display_unit="rpm" if name.unit == "rpm" else None,
     )
-    after = filtered.series
-    runs = [
-        History(label="as measured", time_s=before.time_s, values={before.name: before.values}, measured=True),
-        History(label=text, time_s=after.time_s, values={before.name: after.values}),
-    ]
-    return {
-        (_FILTER, "response"): effect_chart(text, filtered.effect, title=f"What {text} does"),
-        (_FILTER, "signal"): history_chart(runs, [shown], title=f"{name.words} before and after", height_px=300),
-    }
+    before, after = (
+        History(
+            label=label,
+            time_s=vector(applied[key]["t_s"]),
+            values={si: factor * vector(applied[key][column])},
+            measured=key == "before",
+        )
+        for key, label in (("before", "as measured"), ("after", text))
+    )
+    yield (_FILTER, "response"), effect_chart(text, applied, title=f"What {text} does")
+    title = f"{name.words} before and after"
+    yield (_FILTER, "signal"), history_chart([before, after], [shown], title=title, height_px=300)
 
 
 def _caption(kind: str) -> str:
@@ -152,7 +157,7 @@ def _caption(kind: str) -> str:
     return next((caption for end, caption in captions.items() if kind.endswith(end)), "")
 
 
-def _signals(analysis: TrialAnalysis) -> PageTable:
+def _signals(columns: Json) -> PageTable:
     heads = [
         Column(title="signal"),
         Column(title="unit"),
@@ -162,25 +167,22 @@ def _signals(analysis: TrialAnalysis) -> PageTable:
         Column(title="independent samples", digits=3),
         Column(title="main peak", unit="Hz"),
     ]
-    return PageTable(caption="Signals", columns=heads, rows=[_row(column) for column in analysis.columns])
-
-
-def _row(column: ColumnAnalysis) -> list[Cell]:
-    name = SignalName(column.series.name)
-    row: list[Cell] = [
-        name.words,
-        name.unit,
-        f"{name.factor * column.mean:.4g}",
-        f"{name.factor * column.standard_deviation:.4g}",
+    rows: list[list[Cell]] = [
+        [
+            _signal(file).words,
+            column["unit"],
+            f"{column['mean']:.4g}",
+            f"{column['standard_deviation']:.4g}",
+            column.get("correlation_time_s"),
+            column.get("effective_count"),
+            "constant" if column["constant"] else column["spectrum"].get("peak_in_words"),
+        ]
+        for file, column in columns.items()
     ]
-    if (found := column.randomness) is None:
-        return [*row, None, None, "constant"]
-    correlation = found.correlation
-    peak = found.spectrum.peak_in_words
-    return [*row, correlation.correlation_time_s, correlation.effective_count, peak]
+    return PageTable(caption="Signals", columns=heads, rows=rows)
 
 
-def _tests(analysis: TrialAnalysis) -> PageTable:
+def _tests(columns: Json) -> PageTable:
     heads = [
         Column(title="signal"),
         Column(title="stationarity"),
@@ -192,12 +194,12 @@ def _tests(analysis: TrialAnalysis) -> PageTable:
         Column(title="excess kurtosis", digits=2),
     ]
     rows: list[list[Cell]] = []
-    for column in analysis.columns:
-        if (found := column.randomness) is None:
+    for file, column in columns.items():
+        if column["constant"]:
             continue
-        steady, normal = found.stationarity, found.normality
-        least = min(normal.p_values.values()) if normal.p_values else None
-        tests: list[Cell] = [steady.verdict.value, steady.level.dickey_fuller, steady.level.kpss]
-        shape: list[Cell] = [normal.verdict, least, normal.skewness, normal.excess_kurtosis]
-        rows.append([SignalName(column.series.name).words, *tests, *shape])
+        level, normal = column["stationarity"]["p_values"]["about_level"], column["normality"]
+        least = min((value for value in normal["p_values"].values() if value is not None), default=None)
+        tests: list[Cell] = [column["stationarity"]["verdict"], level["dickey_fuller"], level["kpss"]]
+        shape: list[Cell] = [normal["verdict"], least, normal["skewness"], normal["excess_kurtosis"]]
+        rows.append([_signal(file).words, *tests, *shape])
     return PageTable(caption="Tests", columns=heads, rows=rows)

@@ -26,6 +26,10 @@ from tank2sim.report.kit.chart_parts import stacked as stacked_panels
 from tank2sim.report.kit.json_values import Json
 
 STABLE, UNSTABLE, DIRECT, REVERSE = "stable turns", "unstable turns", "spiral", "reverse spiral"
+BECH = ("b0_rad", "b1_s", "b2_s2_per_rad", "b3_s3_per_rad2")
+NORRBIN = ("n0_radps", "n1", "n2_s_per_rad", "n3_s2_per_rad2")
+"""Keys of the coefficients of the two cubics, by rising powers of the yaw rate."""
+
 _FEW = 14
 """Coefficients in the chart of influences; the table has all."""
 
@@ -228,8 +232,7 @@ def characteristic_chart(found: Json, *, title: str = "") -> alt.LayerChart:
     rate = vector(found["curve"]["yaw_rate_degps"])
     kept = np.abs(rate) <= found["fitted_up_to_degps"] * (1 + 1e-9)
     rate, rudder = rate[kept], vector(found["curve"]["rudder_deg"])[kept]
-    bech = [found["bech"][name] for name in ("b0_rad", "b1_s", "b2_s2_per_rad", "b3_s3_per_rad2")]
-    norrbin = [found["norrbin"][name] for name in ("n0_radps", "n1", "n2_s_per_rad", "n3_s2_per_rad2")]
+    bech, norrbin = [found["bech"][name] for name in BECH], [found["norrbin"][name] for name in NORRBIN]
 
     def cubic(coefficients: Sequence[float]) -> Array:
         return np.asarray(np.degrees(np.polynomial.polynomial.polyval(np.radians(rate), coefficients)))

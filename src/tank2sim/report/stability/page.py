@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-import altair as alt
-
-from tank2sim.analysis.stability.imo import ImoCriterion
-from tank2sim.analysis.stability.study import StabilityStudy
-from tank2sim.analysis.turning.characteristic import SteeringCharacteristic
-from tank2sim.analysis.turning.diagram import SteadyTurning
-from tank2sim.files import plain_json
-from tank2sim.report.ensemble.charts import curve_charts
+from tank2sim.report.ensemble.sections import BEYOND_CARD_TEXT, stability_section
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.report.kit.page import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Page,
+    PageSection,
+    PageTable,
+    Verdict,
+    notices_section,
+)
 from tank2sim.report.stability.charts import (
+    BECH,
+    NORRBIN,
     characteristic_chart,
     criterion_by_speed_chart,
     influence_chart,
@@ -27,10 +31,7 @@ from tank2sim.report.stability.charts import (
     trim_chart,
 )
 
-BEYOND_CARD_TEXT = "beyond the card"
-"""In place of a verdict, where the trial left what the card holds for."""
-
-_VERDICTS = {True: Verdict.PASSED, False: Verdict.FAILED, None: Verdict.NONE}
+_VERDICTS = {True: Verdict.PASSED, False: Verdict.FAILED}
 
 _CRITERION = (
     "C′ = Y′v (N′r − m′x′G) − N′v (Y′r − m′), from the slopes of the full forces on the straight course. Its sign is "
@@ -41,7 +42,7 @@ _CRITERION = (
 _TRIM = (
     "A card holds for one trim; this is an estimate. Paper 2 (Krezelewski and Misiag) says that 1 % of trim changes "
     "one of Y_r and N_r by 7.5 %; its print does not show which, nor which way and 1 % of what: both readings are "
-    "drawn, as growing with trim by the stern over length. Beside them stand the corrections of Inoue, Hirano and "
+    "drawn, as growing with trim by the stern over length. The chart also shows the corrections of Inoue, Hirano and "
     "Kijima (1981) to Y_v, Y_r, N_v and N_r. All act on the hydrodynamic part, without the inertia."
 )
 _RESPONSE = (
@@ -70,91 +71,75 @@ _IMO = (
 )
 
 
-def stability_page(study: StabilityStudy, notices: Sequence[str]) -> Page:
-    """The page; `notices` stand under the criteria."""
-    found = study.stability
-    sections = [_straight(study), _moving(study), _response(study)]
-    if study.turning is not None:
-        sections.append(_turning(study, study.turning))
-    if study.characteristic is not None:
-        sections.append(_characteristic(study.characteristic))
-    sections.append(PageSection(heading="IMO criteria", text=_IMO, tables=[_imo(study.imo)]))
-    if notices:
-        rows: list[list[Cell]] = [[notice] for notice in notices]
-        table = PageTable(caption="What the reader should know.", columns=[Column(title="")], rows=rows)
-        sections.append(PageSection(heading="Notices", tables=[table]))
-    subtitle = f"Stability and manoeuvrability, {found.speed_mps:.4g} m/s"
-    return Page(title=found.name, subtitle=subtitle, figures=_figures(study), sections=sections)
+def stability_page(found: Json) -> Page:
+    """Return the page of the JSON of ``tank2sim stability``."""
+    sections = [_straight_line(found), _margin_influences(found), _response(found["responses"])]
+    if found["steady_turning"]:
+        sections.append(_turning(found["steady_turning"], found["spirals"]))
+    if found["characteristic"]:
+        sections.append(_characteristic(found["characteristic"]))
+    sections.append(PageSection(heading="IMO criteria", text=_IMO, tables=[_imo(found["imo"])]))
+    sections += notices_section(found["notices"])
+    if found.get("ensemble"):
+        sections.append(stability_section(found["ensemble"], found["imo"]))
+    subtitle = f"Stability and manoeuvrability, {found['operating_point']['speed_mps']:.4g} m/s"
+    return Page(title=found["ship"], subtitle=subtitle, figures=_figures(found), sections=sections)
 
 
-def _figures(study: StabilityStudy) -> list[KeyFigure]:
-    found = study.stability
-    met = [one.passed for one in study.imo]
-    beyond = sum(one.beyond_card and one.found is not None for one in study.imo)
+def _figures(found: Json) -> list[KeyFigure]:
+    straight, prime = found["stability_criterion"], found["nomoto"]["prime"]
+    met = [criterion["passed"] for criterion in found["imo"]]
+    beyond = sum(criterion["beyond_card"] and criterion["found"] is not None for criterion in found["imo"])
     failed, unknown = met.count(False), met.count(None) - beyond
     verdict = Verdict.FAILED if failed else Verdict.CAUTION if unknown or beyond else Verdict.PASSED
-    open_ones = [f"{unknown} open"] if unknown else []
-    notes = [*open_ones, *([f"{beyond} beyond the card's validity"] if beyond else [])]
-    shown = [
+    notes = [*([f"{unknown} open"] if unknown else []), *([f"{beyond} beyond the card's validity"] if beyond else [])]
+    figures = [
         KeyFigure(
             label="Straight course",
-            value="stable" if found.stable else "unstable",
-            verdict=Verdict.PASSED if found.stable else Verdict.CAUTION,
-            note=f"C′ = {found.criterion:.4g}",
+            value="stable" if straight["stable"] else "unstable",
+            verdict=Verdict.PASSED if straight["stable"] else Verdict.CAUTION,
+            note=f"C′ = {straight['C_prime']:.4g}",
         ),
-        _margin_figure(study),
-        KeyFigure(label="Nomoto K′", value=found.nomoto_prime.K_per_s, note=f"T′ = {found.nomoto_prime.T_s:.3g}"),
+        _margin_figure(straight, found["margins"]),
+        KeyFigure(label="Nomoto K′", value=prime["K_prime"], note=f"T′ = {prime['T_prime']:.3g}"),
         KeyFigure(
-            label="IMO criteria met",
-            value=f"{met.count(True)} of {len(met)}",
-            verdict=verdict,
-            note=", ".join(notes),
+            label="IMO criteria met", value=f"{met.count(True)} of {len(met)}", verdict=verdict, note=", ".join(notes)
         ),
     ]
-    if study.turning is not None and study.turning.loop is not None:
-        width = math.degrees(study.turning.loop.width_rad)
-        shown.insert(
-            3, KeyFigure(label="Hysteresis loop", value=width, unit="deg", note="of rudder, between the folds")
-        )
-    return shown
+    if loop := (found["steady_turning"] or {}).get("loop"):
+        note = "of rudder, between the folds"
+        figures.insert(3, KeyFigure(label="Hysteresis loop", value=loop["width_deg"], unit="deg", note=note))
+    return figures
 
 
-def _margin_figure(study: StabilityStudy) -> KeyFigure:
-    found, margin = study.stability, study.margin
-    if not found.criterion_decides:
-        note = f"a mode grows at {found.growth_per_s:.3g} 1/s that C′ does not see"
+def _margin_figure(straight: Json, margins: Json) -> KeyFigure:
+    if not straight["C_prime_decides"]:
+        note = f"a mode grows at {straight['growth_per_s']:.3g} 1/s that C′ does not show"
         return KeyFigure(label="Margin", value="none", verdict=Verdict.CAUTION, note=note)
-    return KeyFigure(label="Margin", value=margin.percent, unit="%", note=f"levers {margin.lever:.3g} L apart")
+    note = f"levers {margins['lever_margin_lengths']:.3g} L apart"
+    return KeyFigure(label="Margin", value=margins["margin_percent"], unit="%", note=note)
 
 
-def _straight(study: StabilityStudy) -> PageSection:
-    found, margin = study.stability, study.margin
-    with_effects = "".join(f", {name}" for name in found.effect_states)
-    modes = [
-        [eigenvalue.real, eigenvalue.imag, -1 / eigenvalue.real if eigenvalue.real else None]
-        for eigenvalue in found.eigenvalues
-    ]
+def _straight_line(found: Json) -> PageSection:
+    straight, margins, nomoto = found["stability_criterion"], found["margins"], found["nomoto"]
+    states = straight["settled_states"]
     eigenvalues = PageTable(
-        caption=f"Eigenvalues of surge, sway and yaw{with_effects}.",
+        caption=f"Eigenvalues of surge, sway and yaw{''.join(f', {name}' for name in states)}.",
         columns=[
             Column(title="real part", unit="1/s"),
             Column(title="imaginary part", unit="1/s"),
             Column(title="time constant", unit="s"),
         ],
-        rows=modes,
+        rows=[[real, imaginary, -1 / real if real else None] for real, imaginary in found["eigenvalues"]],
     )
-    slow = f", in slow motions ({', '.join(found.effect_states)} at rest)" if found.effect_states else ""
-    heads = [Column(title=""), *(Column(title=name) for name in ("K", "T", "T1", "T2", "T3"))]
-    nomoto = [
-        [scaling, *vars(one).values()]
-        for scaling, one in (("1/s and s", found.nomoto), ("prime (L/U)", found.nomoto_prime))
-    ]
+    name = "margin" if straight["C_prime_decides"] else "margin of C′ alone"
     levers: list[list[Cell]] = [
-        ["yaw damping lever", format_number(margin.damping_lever), "L"],
-        ["sway lever", format_number(margin.sway_lever), "L"],
-        ["levers apart", format_number(margin.lever), "L"],
-        ["margin" if found.criterion_decides else "margin of C′ alone", format_number(margin.percent), "%"],
+        ["yaw damping lever", format_number(margins["damping_lever_lengths"]), "L"],
+        ["sway lever", format_number(margins["sway_lever_lengths"]), "L"],
+        ["levers apart", format_number(margins["lever_margin_lengths"]), "L"],
+        [name, format_number(margins["margin_percent"]), "%"],
     ]
+    slow = f", in slow motions ({', '.join(states)} at rest)" if states else ""
     return PageSection(
         heading="Straight-line stability",
         text=_CRITERION,
@@ -165,16 +150,24 @@ def _straight(study: StabilityStudy) -> PageSection:
                 rows=levers,
             ),
             eigenvalues,
-            PageTable(caption=f"Nomoto's coefficients, yaw rate by rudder{slow}.", columns=heads, rows=nomoto),
+            PageTable(
+                caption=f"Nomoto's coefficients, yaw rate by rudder{slow}.",
+                columns=[Column(title=title) for title in ("", "K", "T", "T1", "T2", "T3")],
+                rows=[
+                    ["1/s and s", *nomoto["dimensional"].values()],
+                    ["prime (L/U)", *nomoto["prime"].values()],
+                ],
+            ),
         ],
     )
 
 
-def _moving(study: StabilityStudy) -> PageSection:
-    margin = study.margin
+def _margin_influences(found: Json) -> PageSection:
+    margins, trim = found["margins"], found["trim"]
+    keys = ("value", "percent", "neutral_value", "neutral_percent")
     rows: list[list[Cell]] = [
-        [influence.short_name, influence.value, influence.percent, influence.neutral_value, influence.neutral_percent]
-        for influence in margin.influences
+        [influence["name"].rpartition(".")[2], *(influence[key] for key in keys)]
+        for influence in margins["derivatives"]
     ]
     table = PageTable(
         caption="Exact sensitivity of C′, and the value at which the ship is neutral, all else unchanged.",
@@ -187,119 +180,62 @@ def _moving(study: StabilityStudy) -> PageSection:
         ],
         rows=rows,
     )
-    return PageSection(
-        heading="What moves the margin",
-        text=f"Derivatives are prime, mass in kg and x_G in m. {_TRIM}",
-        tables=[table],
-        charts=_moving_charts(plain_json(margin.as_json()), plain_json(study.trim.as_json())),
-    )
-
-
-def _response(study: StabilityStudy) -> PageSection:
-    responses = study.responses
-    if not responses:
-        return PageSection(heading="Response to the rudder", text="The yaw rate does not answer to the rudder.")
-    return PageSection(
-        heading="Response to the rudder",
-        text=_RESPONSE,
-        charts=_response_charts([plain_json(response.as_json()) for response in responses]),
-    )
-
-
-def _turning(study: StabilityStudy, turning: SteadyTurning) -> PageSection:
-    rows: list[list[Cell]] = []
-    for angle in (-35, -20, -10, -5, 0, 5, 10, 20, 35):
-        for rate, stable in turning.turns_at(math.copysign(max(0.0, abs(math.radians(angle)) - 1e-9), angle)):
-            rows.append([angle, math.degrees(rate), "stable" if stable else "unstable"])
-    tables = [
-        PageTable(
-            caption="Steady turns.",
-            columns=[Column(title="rudder", unit="deg"), Column(title="yaw rate", unit="deg/s"), Column(title="")],
-            rows=rows,
+    changes = trim["inoue_1981"]["change_percent_by_1_percent"].items()
+    caption = ", ".join(f"{name} {change:+.3g} %" for name, change in changes)
+    charts = [
+        Illustration(
+            chart=trim_chart(trim, title="Trim (estimate)"),
+            caption=f"After Inoue, 1 % of length of trim by the stern changes {caption}.",
         )
     ]
-    if turning.folds:
-        folds: list[list[Cell]] = [
-            [math.degrees(fold.rudder_rad), math.degrees(fold.yaw_rate_radps)] for fold in turning.folds
-        ]
-        heads = [Column(title="rudder", unit="deg"), Column(title="yaw rate", unit="deg/s")]
-        tables.append(PageTable(caption="Folds, where the ship leaves its branch.", columns=heads, rows=folds))
-    spirals = study.direct is not None or study.reverse is not None
-    run = {"direct": study.direct, "reverse": study.reverse}
-    told = {name: one.as_json() for name, one in run.items() if one is not None}
-    return PageSection(
-        heading="Steady turning",
-        text=f"{_TURNING}\n\n{_SPIRALS}" if spirals else _TURNING,
-        tables=tables,
-        charts=[_diagram(plain_json(turning.as_json()), plain_json(told))],
-    )
+    if speed := margins["speed"]:
+        chart = criterion_by_speed_chart(speed, title="Speed")
+        charts.insert(0, Illustration(chart=chart, caption="Over the card's range of speeds."))
+    if margins["derivatives"]:
+        charts.insert(0, Illustration(chart=influence_chart(margins, title="Influence on C′")))
+    text = f"Derivatives are prime, mass in kg and x_G in m. {_TRIM}"
+    return PageSection(heading="What moves the margin", text=text, tables=[table], charts=charts)
 
 
-def stability_drawn(found: Json) -> list[PageSection]:
-    """The charts of a study, from its JSON."""
-    sections = [PageSection(heading="What moves the margin", charts=_moving_charts(found["margins"], found["trim"]))]
-    if found["responses"]:
-        sections.append(PageSection(heading="Response to the rudder", charts=_response_charts(found["responses"])))
-    if found["steady_turning"]:
-        chart = _diagram(found["steady_turning"], found["spirals"])
-        sections.append(PageSection(heading="Steering diagram", text=_TURNING, charts=[chart]))
-    if found["characteristic"]:
-        chart = Illustration(chart=_rudder_that_holds(found["characteristic"]))
-        sections.append(PageSection(heading="Nonlinear steering characteristic", charts=[chart]))
-    if curves := (found.get("ensemble") or {}).get("curves"):
-        sections.append(PageSection(heading="Over the ensemble", charts=curve_charts(curves)))
-    return sections
-
-
-def _moving_charts(margins: Json, trim: Json) -> list[Illustration]:
-    changes = ", ".join(
-        f"{name} {change:+.3g} %" for name, change in trim["inoue_1981"]["change_percent_by_1_percent"].items()
-    )
-    caption = f"After Inoue, 1 % of length of trim by the stern changes {changes}."
-    speed = margins["speed"]
-    return [
-        *([Illustration(chart=influence_chart(margins, title="Influence on C′"))] if margins["derivatives"] else []),
-        *(
-            [
-                Illustration(
-                    chart=criterion_by_speed_chart(speed, title="Speed"), caption="Over the card's range of speeds."
-                )
-            ]
-            if speed
-            else []
-        ),
-        Illustration(chart=trim_chart(trim, title="Trim (estimate)"), caption=caption),
-    ]
-
-
-def _response_charts(responses: Sequence[Json]) -> list[Illustration]:
-    return [
+def _response(responses: Sequence[Json]) -> PageSection:
+    heading = "Response to the rudder"
+    if not responses:
+        return PageSection(heading=heading, text="The yaw rate does not answer to the rudder.")
+    charts = [
         Illustration(chart=steering_poles(responses, title="Poles and zeros")),
         Illustration(chart=steering_bode(responses, title="Bode diagram")),
         Illustration(chart=step_chart(responses, title="Step of the rudder")),
     ]
+    return PageSection(heading=heading, text=_RESPONSE, charts=charts)
 
 
-def _diagram(turning: Json, spirals: Json) -> Illustration:
-    return Illustration(chart=steering_diagram(turning, spirals, title="Steady turns against the rudder"))
-
-
-def _rudder_that_holds(found: Json) -> alt.LayerChart:
-    return characteristic_chart(found, title="Rudder that holds a yaw rate")
-
-
-def _characteristic(found: SteeringCharacteristic) -> PageSection:
-    n, b = found.n, found.bech.coefficients
+def _turning(turning: Json, spirals: Json) -> PageSection:
+    heads = [Column(title="rudder", unit="deg"), Column(title="yaw rate", unit="deg/s")]
     rows: list[list[Cell]] = [
+        [turn["rudder_deg"], turn["yaw_rate_degps"], "stable" if turn["stable"] else "unstable"]
+        for turn in turning.get("turns") or ()
+    ]
+    tables = [PageTable(caption="Steady turns.", columns=[*heads, Column(title="")], rows=rows)]
+    if turning["folds"]:
+        folds: list[list[Cell]] = [[fold["rudder_deg"], fold["yaw_rate_degps"]] for fold in turning["folds"]]
+        tables.append(PageTable(caption="Folds, where the ship leaves its branch.", columns=heads, rows=folds))
+    chart = steering_diagram(turning, spirals, title="Steady turns against the rudder")
+    return PageSection(
+        heading="Steady turning",
+        text=f"{_TURNING}\n\n{_SPIRALS}" if any(spirals.values()) else _TURNING,
+        tables=tables,
+        charts=[Illustration(chart=chart)],
+    )
+
+
+def _characteristic(found: Json) -> PageSection:
+    bech, norrbin = found["bech"], found["norrbin"]
+    rows: list[list[Cell]] = [
+        ["Bech", *(bech[key] for key in BECH), *bech["error"].values()],
         [
-            "Bech",
-            *(float(one) for one in b),
-            *_errors(found.bech.rms_rad, found.bech.largest_rad, found.bech.beyond_rad),
-        ],
-        [
-            f"Norrbin, K = {found.K_per_s:.4g} 1/s",
-            *(float(one) for one in n),
-            *_errors(found.norrbin.rms_rad, found.norrbin.largest_rad, found.norrbin.beyond_rad),
+            f"Norrbin, K = {norrbin['K_per_s']:.4g} 1/s",
+            *(norrbin[key] for key in NORRBIN),
+            *norrbin["error"].values(),
         ],
     ]
     heads = [
@@ -314,32 +250,24 @@ def _characteristic(found: SteeringCharacteristic) -> PageSection:
         heading="Nonlinear steering characteristic",
         text=_CHARACTERISTIC,
         tables=[PageTable(caption=caption, columns=heads, rows=rows)],
-        charts=[Illustration(chart=_rudder_that_holds(plain_json(found.as_json())))],
+        charts=[Illustration(chart=characteristic_chart(found, title="Rudder that holds a yaw rate"))],
     )
 
 
-def _errors(*values: float | None) -> list[float | None]:
-    return [None if value is None else math.degrees(value) for value in values]
-
-
-def imo_verdict(one: ImoCriterion) -> Cell:
-    """The verdict of a criterion as a table has it."""
-    if one.beyond_card and one.found is not None:
+def imo_verdict(criterion: Mapping[str, Json]) -> Cell:
+    """Return the verdict of one of ``imo`` of the JSON as a cell."""
+    if criterion["beyond_card"] and criterion["found"] is not None:
         return BEYOND_CARD_TEXT
-    return "open" if one.passed is None else _VERDICTS[one.passed]
+    return "open" if criterion["passed"] is None else _VERDICTS[criterion["passed"]]
 
 
-def _imo(criteria: Sequence[ImoCriterion]) -> PageTable:
+def _imo(criteria: Sequence[Mapping[str, Json]]) -> PageTable:
     rows: list[list[Cell]] = [
         [
-            criterion.name,
-            criterion.found,
-            criterion.allowed,
-            criterion.unit,
+            *(criterion[key] for key in ("name", "found", "allowed", "unit")),
             imo_verdict(criterion),
-            None if criterion.beyond_card else criterion.margin,
-            None if criterion.beyond_card else criterion.margin_percent,
-            criterion.remark,
+            *(None if criterion["beyond_card"] else criterion[key] for key in ("margin", "margin_percent")),
+            criterion["remark"],
         ]
         for criterion in criteria
     ]

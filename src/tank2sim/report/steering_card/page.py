@@ -1,16 +1,11 @@
-"""The page of a steering card: its models next to each other by turns, tracks and influence, and what is missing."""
+"""The page of a steering card: its models compared by turns, tracks and influence, and what is missing."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import altair as alt
 
-from tank2sim.analysis.catalogue.comparison import SteeringComparison
-from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning
-from tank2sim.cards.steering_card import SteeringCard
-from tank2sim.files import plain_json
 from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, pan_zoom, plain, series_look
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.motion_charts import TrackData, track_chart
@@ -18,48 +13,47 @@ from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page
 from tank2sim.report.kit.theme import SHAPES
 
 
-def steering_catalogue_page(card: SteeringCard, found: SteeringComparison) -> Page:
-    """The page of a comparison (:func:`tank2sim.analysis.catalogue.comparison.compare_steering_models`)."""
-    told = plain_json(found.as_json())
+def steering_catalogue_page(found: Json) -> Page:
+    """Return the page of the JSON of ``tank2sim influence`` for a steering card."""
     return Page(
-        title=found.ship,
+        title=found["ship"],
         subtitle="Steering models compared by their turns and their influence coefficients",
-        figures=_figures(card, found),
+        figures=_figures(found),
         sections=[
-            _turning(card, found, told),
-            _influence(card, found, told),
-            *([_agreed(card, found)] if found.predictions else []),
-            _manoeuvres(card, found, told),
-            *([_tuning(found)] if found.tuning else []),
-            _missing(card, found),
+            _turning(found),
+            _influence(found),
+            *([_joint_variation(found)] if found["combined_predictions"] else []),
+            _manoeuvres(found),
+            *([_tuning(found["two_point_tuning"])] if found["two_point_tuning"] else []),
+            _missing(found),
         ],
     )
 
 
-def _figures(card: SteeringCard, found: SteeringComparison) -> list[KeyFigure]:
+def _figures(found: Json) -> list[KeyFigure]:
     figures = [
         KeyFigure(
-            label=f"Radius, {card.models[one.model].title}",
-            value=one.radius_m,
+            label=f"Radius, {found['titles'][model]}",
+            value=table["radius_m"],
             unit="m",
-            note=f"steady turn, {found.rudder_deg:g} deg of rudder",
+            note=f"steady turn, {found['rudder_deg']:g} deg of rudder",
         )
-        for one in found.influence
+        for model, table in found["influence"].items()
     ]
-    incomplete = len(card.models) - len(found.turns)
-    note = f"of {len(card.models)}: their coefficients are not printed"
+    incomplete = len(found["titles"]) - len(found["steady_turns"])
+    note = f"of {len(found['titles'])}: their coefficients are not printed"
     verdict = Verdict.CAUTION if incomplete else Verdict.NONE
     return [*figures, KeyFigure(label="Models that cannot be computed", value=incomplete, note=note, verdict=verdict)]
 
 
-def _turning(card: SteeringCard, found: SteeringComparison, told: Json) -> PageSection:
-    rows: list[list[Cell]] = []
-    for one in found.turns:
-        if one.model in found.runs:
-            for turn in one.turns:
-                row = turn.as_json()
-                keys = ("rudder_deg", "radius_m", "yaw_rate_degpmin", "drift_deg")
-                rows.append([one.title, *(row[key] for key in keys)])
+def _turning(found: Json) -> PageSection:
+    keys = ("rudder_deg", "radius_m", "yaw_rate_degpmin", "drift_deg")
+    rows: list[list[Cell]] = [
+        [found["titles"][model], *(turn[key] for key in keys)]
+        for model, turns in found["steady_turns"].items()
+        if model in found["manoeuvres"]
+        for turn in turns
+    ]
     columns = [
         Column(title="model"),
         Column(title="rudder", unit="deg"),
@@ -67,41 +61,19 @@ def _turning(card: SteeringCard, found: SteeringComparison, told: Json) -> PageS
         Column(title="yaw rate", unit="deg/min", digits=3),
         Column(title="drift", unit="deg", digits=3),
     ]
-    notes = [f"{point.label}: {point.source}" for point in card.points if point.measured and point.radius_m]
+    points = found["diagrams"]["points"]
     return PageSection(
         heading="Steady turning",
         text="Each model has a speed that does not fall in the turn. Its steady turns are followed from the straight "
         "course, so that they are those that the ship comes to.",
-        charts=[_diagrams(told["diagrams"])],
+        charts=[_diagrams(found["diagrams"])],
         tables=[PageTable(caption="Steady turns", columns=columns, rows=rows)],
-        notes=notes,
+        notes=[f"{point['label']}: {point['source']}" for point in points if point["radius_measured"]],
     )
-
-
-def catalogue_drawn(found: Json) -> list[PageSection]:
-    """The charts of a comparison, from its JSON: steering diagrams, influence, turning circles."""
-    return [
-        PageSection(heading="Steering diagrams", charts=[_diagrams(found["diagrams"])]),
-        PageSection(heading="Influence on the steady radius", charts=[_bars(found)]),
-        PageSection(heading="Turning circles", charts=[_circles(found)]),
-    ]
 
 
 def _diagrams(diagrams: Json) -> Illustration:
     return Illustration(chart=steering_diagram_chart(diagrams), caption="Lines: models. Points: known turns.")
-
-
-def _bars(found: Json) -> Illustration:
-    titles = found["titles"]
-    return Illustration(
-        chart=influence_bars({titles[name]: one["K_percent"] for name, one in found["influence"].items()})
-    )
-
-
-def _circles(found: Json) -> Illustration:
-    runs = found["histories"].items()
-    tracks = [TrackData(label=label, x_m=one["x_m"], y_m=one["y_m"], time_s=one["t_s"]) for label, one in runs]
-    return Illustration(chart=track_chart(tracks, title=f"Turning circles, {found['rudder_deg']:g} deg of rudder"))
 
 
 def steering_diagram_chart(diagrams: Json) -> alt.LayerChart:
@@ -147,24 +119,22 @@ def _diagram(lines: list[ChartRecord], points: list[ChartRecord]) -> alt.LayerCh
     )
 
 
-def _influence(card: SteeringCard, found: SteeringComparison, told: Json) -> PageSection:
-    names = list(dict.fromkeys(name for one in found.influence for name in one.K_percent))
-    printed = card.influence
-    columns = [Column(title=""), *(Column(title=card.models[one.model].title, digits=3) for one in found.influence)]
-    rows: list[list[Cell]] = [[name, *(one.K_percent.get(name) for one in found.influence)] for name in names]
+def _influence(found: Json) -> PageSection:
+    tables, printed = found["influence"], found["printed_influence"]
+    names = list(dict.fromkeys(name for table in tables.values() for name in table["K_percent"]))
+    columns = [Column(title=""), *(Column(title=found["titles"][model], digits=3) for model in tables)]
+    rows: list[list[Cell]] = [[name, *(table["K_percent"].get(name) for table in tables.values())] for name in names]
     if printed:
-        columns += [Column(title=f"printed, {printed.draughts_m[-1]:g} m", digits=3)]
-        rows = [[*row, _last(printed.K_percent.get(str(row[0])))] for row in rows]
+        columns.append(Column(title=f"printed, {printed['draught_m']:g} m", digits=3))
+        rows = [[*row, printed["K_percent"].get(str(row[0]))] for row in rows]
+    models = {found["titles"][model]: table["K_percent"] for model, table in tables.items()}
+    text = f"K: change of the radius in % at {found['rudder_deg']:g} deg of rudder when one coefficient grows by 10 %."
     return PageSection(
         heading="Influence on the steady radius",
-        text=f"K: change of the radius in % at {found.rudder_deg:g} deg of rudder when one coefficient grows by 10 %.",
-        charts=[_bars(told)],
+        text=text,
+        charts=[Illustration(chart=influence_bars(models))],
         tables=[PageTable(caption="K, %", columns=columns, rows=rows)],
     )
-
-
-def _last(values: list[float] | None) -> float | None:
-    return values[-1] if values else None
 
 
 def influence_bars(models: Mapping[str, Mapping[str, float]]) -> alt.LayerChart:
@@ -194,21 +164,22 @@ def influence_bars(models: Mapping[str, Mapping[str, float]]) -> alt.LayerChart:
     )
 
 
-def _agreed(card: SteeringCard, found: SteeringComparison) -> PageSection:
+def _joint_variation(found: Json) -> PageSection:
+    predictions = found["combined_predictions"]
     rows: list[list[Cell]] = []
-    for name, prediction in found.predictions.items():
-        title = card.models[name].title
+    for model, prediction in predictions.items():
+        direct, misread = (
+            100 * (prediction[key] / prediction["radius_m"] - 1) for key in ("direct_m", "direct_misread_m")
+        )
         rows += [
-            [title, "printed K, right pairs", prediction.percent, prediction.predicted_m],
-            [title, "printed K, as the source pairs them", prediction.misread_percent, prediction.misread_m],
-            [title, "K computed here", prediction.own_percent, prediction.own_m],
-            [title, "the model itself", 100 * (prediction.direct_m / prediction.radius_m - 1), prediction.direct_m],
-            [
-                title,
-                "the model with the source's slip",
-                100 * (prediction.direct_misread_m / prediction.radius_m - 1),
-                prediction.direct_misread_m,
-            ],
+            [found["titles"][model], source, percent, radius]
+            for source, percent, radius in (
+                ("printed K, right pairs", prediction["percent"], prediction["predicted_m"]),
+                ("printed K, as the source pairs them", prediction["misread_percent"], prediction["misread_m"]),
+                ("K computed here", prediction["own_percent"], prediction["own_m"]),
+                ("the model itself", direct, prediction["direct_m"]),
+                ("the model with the source's slip", misread, prediction["direct_misread_m"]),
+            )
         ]
     columns = [
         Column(title="to"),
@@ -216,61 +187,62 @@ def _agreed(card: SteeringCard, found: SteeringComparison) -> PageSection:
         Column(title="change", unit="%", digits=3),
         Column(title="radius", unit="m"),
     ]
-    names = list(next(iter(found.predictions.values())).agreed_percent)
-    agreed: list[list[Cell]] = [
-        [k, *(prediction.agreed_percent.get(k) for prediction in found.predictions.values())] for k in names
+    names = next(iter(predictions.values()))["agreed_percent"]
+    variations: list[list[Cell]] = [
+        [name, *(prediction["agreed_percent"].get(name) for prediction in predictions.values())] for name in names
     ]
-    heads = [Column(title=""), *(Column(title=card.models[name].title) for name in found.predictions)]
-    slip = ", ".join(
-        f"{one} with the K of {other}" for one, other in (card.influence.misread_as if card.influence else {}).items()
-    )
+    heads = [Column(title=""), *(Column(title=found["titles"][model]) for model in predictions)]
+    pairs = (found["printed_influence"] or {}).get("misread_as") or {}
+    slip = ", ".join(f"{name} with the K of {misread}" for name, misread in pairs.items())
     return PageSection(
         heading="Agreed variation",
         text="Kc: change of each coefficient in % with 1 % of draught. The sum of Kc K / 10 predicts the radius.",
         tables=[
-            PageTable(caption="Kc, %", columns=heads, rows=agreed),
-            PageTable(caption="Foretold and computed radius", columns=columns, rows=rows),
+            PageTable(caption="Kc, %", columns=heads, rows=variations),
+            PageTable(caption="Predicted and computed radius", columns=columns, rows=rows),
         ],
         notes=[f"The source multiplies {slip}: that slip, not the method, is the difference."] if slip else [],
     )
 
 
-def _manoeuvres(card: SteeringCard, found: SteeringComparison, told: Json) -> PageSection:
+def _manoeuvres(found: Json) -> PageSection:
     keys = ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m")
     rows: list[list[Cell]] = []
-    for name, run in found.runs.items():
-        numbers = [run.turn_figures[key] for key in keys]
-        overshoots = run.zigzag_figures["overshoots_deg"]
-        first = [float(x) for x in overshoots[:2]] if isinstance(overshoots, list) else []
-        cells: list[Cell] = [float(x) if isinstance(x, int | float) else None for x in (*numbers, *first)]
-        rows.append([card.models[name].title, *cells, *[None] * (2 - len(first))])
+    for model, figures in found["manoeuvres"].items():
+        overshoots = [*(figures["zigzag"]["overshoots_deg"] or ()), None, None][:2]
+        rows.append([found["titles"][model], *(figures["turn"][key] for key in keys), *overshoots])
     heads = [Column(title=key.removesuffix("_m").replace("_", " "), unit="m") for key in keys]
-    over = [Column(title=f"{n} overshoot 10/10", unit="deg", digits=3) for n in ("first", "second")]
+    overshoot_heads = [Column(title=f"{n} overshoot 10/10", unit="deg", digits=3) for n in ("first", "second")]
+    tracks = [
+        TrackData(label=label, x_m=history["x_m"], y_m=history["y_m"], time_s=history["t_s"])
+        for label, history in found["histories"].items()
+    ]
+    chart = track_chart(tracks, title=f"Turning circles, {found['rudder_deg']:g} deg of rudder")
+    columns = [Column(title="model"), *heads, *overshoot_heads]
     return PageSection(
         heading="Manoeuvres",
         text="The steady models in time: (1) of the paper, drift angle and yaw rate, from a straight course.",
-        charts=[_circles(told)],
-        tables=[PageTable(caption="Figures", columns=[Column(title="model"), *heads, *over], rows=rows)],
+        charts=[Illustration(chart=chart)],
+        tables=[PageTable(caption="Figures", columns=columns, rows=rows)],
     )
 
 
-def _tuning(found: SteeringComparison) -> PageSection:
+def _tuning(tuning: Json) -> PageSection:
     heading = "Two characteristics, two points"
     text = (
         "A steadier hull (static moment divided, damping multiplied by one factor) and a better rudder are found so "
         "that two measured points of the steering diagram are met."
     )
-    tuning = found.tuning
-    if not isinstance(tuning, TwoPointTuning):
-        return PageSection(heading=heading, text=text, notes=[str(tuning)])
+    if isinstance(tuning, str):
+        return PageSection(heading=heading, text=text, notes=[tuning])
     rows: list[list[Cell]] = [
-        [math.degrees(after.rudder_rad), *(60 * math.degrees(turn.yaw_rate_radps) for turn in (before, after))]
-        for before, after in zip(tuning.before, tuning.after, strict=True)
+        [after["rudder_deg"], before["yaw_rate_degpmin"], after["yaw_rate_degpmin"]]
+        for before, after in zip(tuning["before"], tuning["after"], strict=True)
     ]
     columns = [Column(title=title, unit="deg/min", digits=3) for title in ("rate before", "rate after")]
-    factors: list[list[Cell]] = [["hull", tuning.hull], ["rudder", tuning.rudder]]
+    factors: list[list[Cell]] = [["hull", tuning["hull_factor"]], ["rudder", tuning["rudder_factor"]]]
     notes = []
-    if tuning.stable_before and not tuning.stable_after:
+    if tuning["course_stable_before"] and not tuning["course_stable_after"]:
         notes.append("With these factors the ship, stable before, is unstable on a straight course.")
     return PageSection(
         heading=heading,
@@ -283,11 +255,11 @@ def _tuning(found: SteeringComparison) -> PageSection:
     )
 
 
-def _missing(card: SteeringCard, found: SteeringComparison) -> PageSection:
+def _missing(found: Json) -> PageSection:
     rows: list[list[Cell]] = [
-        [card.models[name].title, words] for name, told in found.missing.items() for words in told
+        [found["titles"][model], text] for model, texts in found["missing"].items() for text in texts
     ]
-    polynomials: list[list[Cell]] = [[name, *values] for name, values in found.polynomials.items()]
+    polynomials: list[list[Cell]] = [[name, *values] for name, values in found["influence_over_draught"].items()]
     degrees = max((len(row) for row in polynomials), default=1) - 1
     heads = [Column(title=""), *(Column(title=f"T^{n}") for n in range(degrees))]
     tables = [PageTable(caption="Not known", columns=[Column(title="model"), Column(title="what")], rows=rows)]

@@ -1,13 +1,17 @@
-"""The page of tows: estimates, speeds and residuals, what the tows can tell, drag coefficients, theory."""
+"""The page of tows: estimates, speeds and residuals, what the tows determine, drag coefficients, theory."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import PurePath
+
+from numpy.polynomial import Polynomial
+
+from tank2sim.dynamics.surge import SurgeCoefficients
 from tank2sim.dynamics.surge_theory import DragPolynomial, TowedBody, drag_polynomial
-from tank2sim.files import plain_json
 from tank2sim.identification.tow import paper as tow_paper
-from tank2sim.identification.tow.fit import TOW_PARAMETERS, TowFit
+from tank2sim.identification.tow.fit import DELAY, TOW_PARAMETERS
 from tank2sim.identification.tow.force import force_words
-from tank2sim.identification.tow.study import TowStudy
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.numbers import format_number
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable
@@ -16,142 +20,129 @@ from tank2sim.report.tow.charts import drag_chart, ellipse_chart, model_chart, t
 _UNITS = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m", "delay": "s"}
 
 
-def tow_page(study: TowStudy) -> Page:
-    """The page of a study."""
-    result = study.result
-    sections = [_estimates(study), _speeds(study), _models(study)]
-    if study.by_tow:
-        sections.append(_by_tow(study))
-    if study.body is not None:
-        sections.append(_drag(study))
-        sections.append(_theory(study))
-    tows = f"{len(result.tows.names)} tows" if len(result.tows.names) > 1 else "one tow"
+def tow_page(found: Json) -> Page:
+    """Return the page of the JSON of ``tank2sim tow``."""
+    best = _best_model(found)
+    sections = [_estimates(found), _speeds(found["speeds"]), _models(found)]
+    if found["tow_by_tow"]:
+        sections.append(_by_tow(found["tow_by_tow"]))
+    if found.get("body"):
+        sections += [_drag(found, best), _theory(found, best)]
+    count = len(found["speeds"]["measured_mps"])
+    tows = f"{count} tows" if count > 1 else "one tow"
+    force = force_words(Polynomial(found["force_polynomial"]))
     return Page(
         title="Surge mass and drag from accelerating tows",
-        subtitle=f"{result.tows.path.name}: {tows}, {force_words(result.force)}, m = {result.mass_kg:g} kg",
-        figures=_figures(study),
+        subtitle=f"{PurePath(found['tows']).name}: {tows}, {force}, m = {found['mass_kg']:g} kg",
+        figures=_figures(found, best),
         sections=sections,
     )
 
 
-def _figures(study: TowStudy) -> list[KeyFigure]:
-    result, best, span = study.result, study.best, study.mass_range_kg
+def _best_model(found: Json) -> Json:
+    """The model of the lowest AIC among those that the tows determine and a hull can have; None without any."""
+    usable = [model for model in found["models"] if model["drag_nowhere_negative"] and model["determined"]]
+    return min(usable, key=lambda model: model["aic"], default=None)
+
+
+def _label(model: Json) -> str:
+    return ", ".join(model["unknowns"])
+
+
+def _figures(found: Json, best: Json) -> list[KeyFigure]:
     figures = []
     if best is not None:
-        mass, half = float(best.fit.estimates[0]), best.fit.half_widths[0]
-        note = f"± {half:.0f} kg at 95 %; output error of {best.model.label}"
+        mass, half = best["estimates"]["M"], best["half_widths_95"]["M"]
+        note = f"± {half:.0f} kg at 95 %; output error of {_label(best)}"
         figures.append(KeyFigure(label="Total mass M", value=round(mass), unit="kg", note=note))
         label = "Added mass λ₁₁ = M − m"
-        figures.append(KeyFigure(label=label, value=round(mass - result.mass_kg), unit="kg", note="of the same model"))
-    if span is not None:
+        added = round(mass - found["mass_kg"])
+        figures.append(KeyFigure(label=label, value=added, unit="kg", note="of the same model"))
+    if span := found["mass_range_kg"]:
         value = f"{span[0] / 1000:.2f} to {span[1] / 1000:.2f}"
-        figures.append(
-            KeyFigure(label="What these tows fix of M", value=value, unit="t", note="over all usable models")
-        )
-    worst = max(result.fits.values(), key=lambda fit: fit.condition_scaled)
-    note = f"scaled, of {', '.join(worst.free)}; 900 can be borne"
-    figures.append(KeyFigure(label="Largest condition number", value=float(f"{worst.condition_scaled:.2g}"), note=note))
+        label = "Range of M that these tows leave"
+        figures.append(KeyFigure(label=label, value=value, unit="t", note="over all usable models"))
+    worst = max(found["methods"].values(), key=lambda fit: fit["condition_scaled"] or 0.0)
+    note = f"scaled, of {', '.join(worst['estimated'])}; up to 900 is acceptable"
+    if worst["condition_scaled"] is not None:
+        condition = float(f"{worst['condition_scaled']:.2g}")
+        figures.append(KeyFigure(label="Largest condition number", value=condition, note=note))
     return figures
 
 
-def _estimates(study: TowStudy) -> PageSection:
-    result = study.result
+_ESTIMATES = (
+    "M dv/dt + B1 v⁴ + B2 v³ + B3 v² = T (1.5). The method of the paper and QR put a polynomial through the mean "
+    "speeds and solve the least squares of the equation; output error integrates the equation and fits all "
+    "readings. ± is one standard error. A force that is wrong by one per cent makes all of them wrong by one per "
+    "cent: a constant force next to T cannot be found."
+)
+_FIT_ROWS = (
+    ("J of (1.6), N √s", "J"),
+    ("condition number, scaled", "condition_scaled"),
+    ("largest speed error, m/s", "largest_speed_error_mps"),
+)
+
+
+def _estimates(found: Json) -> PageSection:
+    methods = found["methods"]
     columns = [Column(title="")]
-    for name in result.fits:
+    for name in methods:
         columns += [Column(title=name.replace("_", " "), digits=5), Column(title="±", digits=2)]
-    unknowns = dict.fromkeys(name for fit in result.fits.values() for name in fit.unknowns)
+    names = {key: name for name, key in TOW_PARAMETERS.items()} | {"added_mass_kg": "added mass"}
     rows: list[list[Cell]] = []
-    for name in (*unknowns, "added mass"):
-        unit = _UNITS.get(name, "kg")
-        key = TOW_PARAMETERS.get(name, "added_mass_kg")
-        cells = [cell for fit in result.fits.values() for cell in _cells(fit, key)]
-        rows.append([f"{name}, {unit}", *cells])
-    more = (
-        ("J of (1.6), N √s", "J"),
-        ("condition number, scaled", "condition_scaled"),
-        ("largest speed error, m/s", "largest_speed_error_mps"),
-    )
-    for words, attribute in more:
-        rows.append([words, *(c for fit in result.fits.values() for c in (_short(getattr(fit, attribute)), None))])
-    text = (
-        "M dv/dt + B1 v⁴ + B2 v³ + B3 v² = T (1.5). The method of the paper and QR put a polynomial through the mean "
-        "speeds and solve the least squares of the equation; output error integrates the equation and fits all "
-        "readings. ± is one standard error. A force that is wrong by one per cent makes all of them wrong by one per "
-        "cent: a constant force next to T cannot be found."
-    )
-    tables = [PageTable(caption="Estimates by method", columns=columns, rows=[[_text(c) for c in row] for row in rows])]
-    return PageSection(heading="Estimates", text=text, tables=[*tables, _polynomials(study)], notes=study.notes)
+    keys = dict.fromkeys(key for fit in methods.values() for key in fit["estimates"] if key != "added_mass_kg")
+    for key in (*keys, "added_mass_kg"):
+        cells = [cell for fit in methods.values() for cell in _cells(fit, key)]
+        rows.append([f"{names[key]}, {_UNITS.get(names[key], 'kg')}", *cells])
+    for title, key in _FIT_ROWS:
+        rows.append([title, *(cell for fit in methods.values() for cell in (_text(fit[key], 5), None))])
+    tables = [PageTable(caption="Estimates by method", columns=columns, rows=rows), _polynomials(found)]
+    return PageSection(heading="Estimates", text=_ESTIMATES, tables=tables, notes=found["warnings"])
 
 
-def _cells(fit: TowFit, key: str) -> tuple[Cell, Cell]:
-    if key not in fit.estimates:
-        return None, None
-    error = fit.standard_errors.get(key)
-    return _short(fit.estimates[key]), float(f"{error:.2g}") if error else None
+def _cells(fit: Json, key: str) -> tuple[Cell, Cell]:
+    """An estimate and its standard error as text: each row has its own unit, so no decimals in common."""
+    error = fit["standard_errors"].get(key)
+    return _text(fit["estimates"].get(key), 5), _text(float(f"{error:.2g}"), 5) if error else None
 
 
-def _short(value: float) -> float:
-    return float(f"{value:.5g}")
+def _text(value: float | None, digits: int) -> Cell:
+    return None if value is None else format_number(float(f"{value:.{digits}g}"), digits)
 
 
-def _text(cell: Cell) -> Cell:
-    # Rows have units of their own, so that the numbers of a column have no common decimals.
-    return format_number(cell, 5) if isinstance(cell, float) else cell
+def _half_width(value: float | None) -> str:
+    return "unknown" if value is None else format_number(value, 2)
 
 
-def _polynomials(study: TowStudy) -> PageTable:
+def _polynomials(found: Json) -> PageTable:
     heads = ("degree", "α₀", "α₁", "α₂", "α₃", "rms", "rms by n − 1")
     columns = [Column(title=head, unit="m/s" if head.startswith("rms") else "", digits=4) for head in heads]
     rows: list[list[Cell]] = []
-    printed = tow_paper.are_of_the_paper(study.result.tows)
-    for polynomial in study.polynomials:
-        coefficients: list[Cell] = [*polynomial.coefficients, *[None] * (3 - polynomial.degree)]
-        rows.append([f"{polynomial.degree}", *coefficients, polynomial.rms_mps, polynomial.rms_less_one_mps])
+    printed = found["tows_of_the_paper"]
+    for polynomial in found["speed_polynomials"]:
+        degree = polynomial["degree"]
+        absent = [None] * (3 - degree)
+        errors = polynomial["rms_mps"], polynomial["rms_less_one_mps"]
+        rows.append([f"{degree}", *polynomial["coefficients"], *absent, *errors])
         if printed:
-            values, error = tow_paper.TABLE_2[polynomial.degree]
-            rows.append([f"{polynomial.degree}, printed", *values, *[None] * (3 - polynomial.degree), error, None])
-    caption = "Polynomials v = α₀ + α₁ t + ... through the mean speeds, m/s over s"
-    beside = ", next to Table 2 of the paper, which no single change of its Table 1 gives" if printed else ""
-    return PageTable(caption=caption + beside, columns=columns, rows=rows)
+            values, error = tow_paper.TABLE_2[degree]
+            rows.append([f"{degree}, printed", *values, *absent, error, None])
+    source = ", next to Table 2 of the paper, which no single change of its Table 1 gives" if printed else ""
+    caption = f"Polynomials v = α₀ + α₁ t + ... through the mean speeds, m/s over s{source}"
+    return PageTable(caption=caption, columns=columns, rows=rows)
 
 
-def _speeds(study: TowStudy) -> PageSection:
-    return PageSection(
-        heading="Speeds and residuals", charts=speed_illustrations(plain_json(study.as_json()["speeds"]))
-    )
-
-
-def speed_illustrations(speeds: Json) -> list[Illustration]:
-    """Readings, simulated speeds and what is between them, from ``speeds`` of the JSON."""
+def _speeds(speeds: Json) -> PageSection:
+    """Readings, simulated speeds and their differences."""
+    heading = "Speeds and residuals"
     if not speeds["simulated_mps"]:
-        return []
+        return PageSection(heading=heading)
     chart = tow_speed_chart(speeds, title="Speeds of the tows and of the models")
-    return [Illustration(chart=chart, caption=f"Below, everything less {next(iter(speeds['simulated_mps']))}.")]
+    caption = f"Below, everything less {next(iter(speeds['simulated_mps']))}."
+    return PageSection(heading=heading, charts=[Illustration(chart=chart, caption=caption)])
 
 
-def model_illustrations(found: Json) -> list[Illustration]:
-    """Models of different size and joint regions of M and B3, from the JSON of a study."""
-    charts = [Illustration(chart=model_chart(found["models"]), caption=_MODELS)] if found["models"] else []
-    if found["confidence_ellipses"]:
-        chart = ellipse_chart(found["confidence_ellipses"], found["tow_by_tow"])
-        charts.append(Illustration(chart=chart, caption=_ELLIPSES))
-    return charts
-
-
-def tows_drawn(found: Json) -> list[PageSection]:
-    """The charts of a study, from its JSON."""
-    charts = [*speed_illustrations(found["speeds"]), *model_illustrations(found)]
-    if body := found.get("body"):
-        drags = {
-            name.replace("_", " "): DragPolynomial(**one["by_length_squared"])
-            for name, one in found["drag_coefficients"].items()
-            if name != "paper" or "qr" not in found["drag_coefficients"]
-        }
-        charts.append(Illustration(chart=drag_chart(drags, TowedBody(**body), found["top_speed_mps"])))
-    return [PageSection(heading="Speeds, models and drag", charts=charts)]
-
-
-def _models(study: TowStudy) -> PageSection:
+def _models(found: Json) -> PageSection:
     columns = [
         Column(title="model"),
         Column(title="estimates with 95 % half-widths"),
@@ -161,17 +152,20 @@ def _models(study: TowStudy) -> PageSection:
         Column(title="drag nowhere negative"),
     ]
     rows: list[list[Cell]] = []
-    for model in study.models:
-        fit = model.fit
-        messages = [
-            f"{name} {format_number(float(value))} ± {format_number(float(half), 2)}"
-            for name, value, half in zip(model.model.unknowns, fit.estimates, fit.half_widths, strict=True)
+    for model in found["models"]:
+        halves = model["half_widths_95"]
+        estimates = [
+            f"{name} {format_number(value)} ± {_half_width(halves[name])}" for name, value in model["estimates"].items()
         ]
-        aic, condition = round(fit.aic, 1), float(f"{fit.condition_scaled:.2g}")
-        rows.append([model.model.label, "; ".join(messages), fit.scatter_mps, aic, condition, model.plausible])
-    charts = model_illustrations(plain_json(study.as_json()))
+        condition = model["condition_scaled"]
+        numbers = [model["scatter_mps"], round(model["aic"], 1), condition and float(f"{condition:.2g}")]
+        rows.append([_label(model), "; ".join(estimates), *numbers, model["drag_nowhere_negative"]])
+    charts = [Illustration(chart=model_chart(found["models"]), caption=_MODELS)] if found["models"] else []
+    if found["confidence_ellipses"]:
+        chart = ellipse_chart(found["confidence_ellipses"], found["tow_by_tow"])
+        charts.append(Illustration(chart=chart, caption=_ELLIPSES))
     return PageSection(
-        heading="What these tows can tell",
+        heading="What these tows determine",
         text="The same readings by output error with fewer and with more unknowns (SI units; delay: the body starts so "
         "much later than t = 0).",
         tables=[PageTable(caption="Models by output error", columns=columns, rows=rows)],
@@ -190,59 +184,62 @@ _ELLIPSES = (
 )
 
 
-def _by_tow(study: TowStudy) -> PageSection:
+def _by_tow(by_tow: Mapping[str, Json]) -> PageSection:
     tables = []
-    for way in study.by_tow:
-        columns = [Column(title="")]
-        columns += [Column(title=name, unit=_UNITS[name]) for name in way.unknowns]
-        rows: list[list[Cell]] = [["all tows", *way.together.tolist()]]
-        numbers = range(1, len(way.alone) + 1)
-        rows += [[f"tow {n} alone", *row.tolist()] for n, row in zip(numbers, way.alone, strict=True)]
-        rows += [[f"all but tow {n}", *row.tolist()] for n, row in zip(numbers, way.held_out, strict=True)]
-        rows.append(["standard error, one left out in turn", *way.jackknife_errors.tolist()])
-        rows.append(["the same, 95 % half-width", *way.half_widths.tolist()])
-        rows.append(["standard error, spread of the tows", *way.spread_errors.tolist()])
-        tables.append(PageTable(caption=way.label[0].upper() + way.label[1:], columns=columns, rows=rows))
+    for label, subset in by_tow.items():
+        columns = [Column(title=""), *(Column(title=name, unit=_UNITS[name]) for name in subset["unknowns"])]
+        rows: list[list[Cell]] = [
+            ["all tows", *subset["together"]],
+            *([f"tow {number} alone", *row] for number, row in enumerate(subset["alone"], 1)),
+            *([f"all but tow {number}", *row] for number, row in enumerate(subset["left_out"], 1)),
+            ["standard error, one left out in turn", *subset["jackknife_standard_errors"]],
+            ["the same, 95 % half-width", *subset["jackknife_half_widths_95"]],
+            ["standard error, spread of the tows", *subset["spread_standard_errors"]],
+        ]
+        tables.append(PageTable(caption=label[0].upper() + label[1:], columns=columns, rows=rows))
     return PageSection(
         heading="Tow by tow",
-        text="Each tow by itself, as the authors wish for at their end, and one left out in turn. These errors hold "
+        text="Each tow by itself, as the authors propose at their end, and one left out in turn. These errors hold "
         "also where the readings of one tow err together.",
         tables=tables,
     )
 
 
-def _drag(study: TowStudy) -> PageSection:
-    assert study.body is not None
+_ORDERS = (("A1", "s²/m²"), ("A2", "s/m"), ("A3", ""))
+
+
+def _drag(found: Json, best: Json) -> PageSection:
+    body = TowedBody(**found["body"])
     drags = {
-        name.replace("_", " "): own for name, own in study.drags.items() if name != "paper" or "qr" not in study.drags
+        name.replace("_", " "): DragPolynomial(**drag["by_length_squared"])
+        for name, drag in found["drag_coefficients"].items()
+        if name != "paper" or "qr" not in found["drag_coefficients"]
     }
-    if study.best is not None:
-        best = drag_polynomial(study.best.coefficients, study.body)
-        if best not in drags.values():
-            drags[f"best usable: {study.best.model.label}"] = best
-    if tow_paper.are_of_the_paper(study.result.tows):
-        drags["paper, printed (2.4)"] = drag_polynomial(tow_paper.SOLUTION, study.body)
+    if best is not None:
+        values = {TOW_PARAMETERS[name]: value for name, value in best["estimates"].items() if name != DELAY}
+        drag_of_best = drag_polynomial(SurgeCoefficients(**values), body)
+        if drag_of_best not in drags.values():
+            drags[f"best usable: {_label(best)}"] = drag_of_best
+    if found["tows_of_the_paper"]:
+        drags["paper, printed (2.4)"] = drag_polynomial(tow_paper.SOLUTION, body)
     columns = [Column(title="")]
     for area in ("L²", "V^(2/3)"):
         columns += [Column(title=f"{name} by {area}", unit=unit) for name, unit in _ORDERS]
     rows: list[list[Cell]] = [
-        [name, *own.as_json().values(), *own.times(study.body.area_ratio).as_json().values()]
-        for name, own in drags.items()
+        [name, *drag.as_json().values(), *drag.times(body.area_ratio).as_json().values()]
+        for name, drag in drags.items()
     ]
     table = PageTable(caption="C = A1 v² + A2 v + A3 (1.3)", columns=columns, rows=rows)
-    chart = drag_chart(drags, study.body, study.result.tows.top_speed_mps)
-    viscosity = format_number(study.body.viscosity_m2ps)
+    chart = drag_chart(drags, body, found["top_speed_mps"])
+    viscosity = format_number(body.viscosity_m2ps)
     caption = (
-        f"L = {study.body.length_m:g} m, V = {study.body.volume_m3:.4g} m³, ν = {viscosity} m²/s. The frame is that of "
-        "the curves that stay above zero; a coefficient below zero is that of no hull."
+        f"L = {body.length_m:g} m, V = {body.volume_m3:.4g} m³, ν = {viscosity} m²/s. The frame is that of "
+        "the curves that stay above zero; no hull has a coefficient below zero."
     )
     return PageSection(heading="Drag coefficient", tables=[table], charts=[Illustration(chart=chart, caption=caption)])
 
 
-_ORDERS = (("A1", "s²/m²"), ("A2", "s/m"), ("A3", ""))
-
-
-def _theory(study: TowStudy) -> PageSection:
+def _theory(found: Json, best: Json) -> PageSection:
     columns = [
         Column(title="k₁₁ of"),
         Column(title="k₁₁", digits=4),
@@ -250,15 +247,16 @@ def _theory(study: TowStudy) -> PageSection:
         Column(title="near the surface, M_s", unit="kg"),
     ]
     rows: list[list[Cell]] = [
-        [one.basis, one.k11, round(one.deep_kg), round(one.near_surface_kg)] for one in study.theory
+        [mass["basis"], mass["k11"], round(mass["deep_kg"]), round(mass["near_surface_kg"])]
+        for mass in found["mass_by_theory"]
     ]
-    found = ""
-    if study.best is not None:
-        mass, half = study.best.fit.estimates[0], study.best.fit.half_widths[0]
-        found = f" The tows give {mass:.0f} ± {half:.0f} kg by the best usable model."
+    estimate = ""
+    if best is not None:
+        mass, half = best["estimates"]["M"], best["half_widths_95"]["M"]
+        estimate = f" The tows give {mass:.0f} ± {half:.0f} kg by the best usable model."
     return PageSection(
         heading="Mass by theory",
         text="M_s = k* (1 + k₁₁) ρ V (2.5), with Lamb's k₁₁ of ellipsoids and k* = 0.96 for the free surface as in the "
-        "paper. Its k₁₁ of 0.156 belongs to a spheroid 2.5 times as long as thick." + found,
+        "paper. Its k₁₁ of 0.156 belongs to a spheroid 2.5 times as long as thick." + estimate,
         tables=[PageTable(caption="Mass in surge by (2.5)", columns=columns, rows=rows)],
     )

@@ -8,36 +8,10 @@ import altair as alt
 
 from tank2sim.report.kit.chart_parts import NUMBER, data, series_look
 from tank2sim.report.kit.json_values import Json
-from tank2sim.report.kit.page import Illustration, PageSection
-from tank2sim.report.results.motions import motions
 from tank2sim.units import in_words
 
 COMPARISON_ERRORS = "Points: E; bars: plus and minus U_val about zero, in per cent of D."
 """What the chart of comparison errors shows."""
-
-
-def validated(found: Json) -> list[PageSection]:
-    """Comparison errors and the replays of each trial, from the JSON of a validation."""
-    sections = []
-    if any(one["error"] is not None and one["measured"] for one in found["figures"]):
-        chart = Illustration(chart=comparison_error_chart(found["figures"]), caption=COMPARISON_ERRORS)
-        sections.append(PageSection(heading="Comparison errors", charts=[chart]))
-    replays = [
-        drawn
-        for one in found.get("replays") or ()
-        for drawn in motions(
-            one["trial"], {"measured": one["measured"], "simulated": one["simulated"]}, measured=["measured"]
-        )
-    ]
-    if replays:
-        sections.append(PageSection(heading="Replays", text=_REPLAY, charts=replays))
-    return sections
-
-
-_REPLAY = (
-    "Each trial simulated freely over its whole length with the recorded rudder and revolutions. Errors add up in "
-    "position; no verdict is taken from these."
-)
 
 
 def comparison_error_chart(figures: Sequence[Mapping[str, Json]]) -> alt.LayerChart:

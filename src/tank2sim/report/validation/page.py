@@ -1,35 +1,37 @@
-"""The validation report of a simulation model, with what ITTC 7.5-02-06-03 wants to be stated of it."""
+"""The validation report of a simulation model, with the statements that ITTC 7.5-02-06-03 asks for."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
-import altair as alt
 import numpy as np
 
-from tank2sim.analysis.stability.imo import ImoCriterion
-from tank2sim.analysis.validation.coefficients import CardCoefficient
-from tank2sim.analysis.validation.study import ComparisonOutcome, Validation, Verified
-from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, ManoeuvringCard
-from tank2sim.dynamics.abkowitz import ALL_TERMS
-from tank2sim.dynamics.model import Model
-from tank2sim.gap.result import Passed
-from tank2sim.report.kit.motion_charts import History, Signal, TrackData, history_chart, track_chart
+from tank2sim.analysis.validation.study import ComparisonOutcome
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR
+from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.report.kit.page import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Page,
+    PageSection,
+    PageTable,
+    Verdict,
+    notices_section,
+)
+from tank2sim.report.results.motions import motions
 from tank2sim.report.stability.page import imo_verdict
 from tank2sim.report.validation.charts import COMPARISON_ERRORS, comparison_error_chart
-from tank2sim.report.validation.model_documentation import documentation
 from tank2sim.units import in_words
 
 _METHOD = (
     "E = S − D is the simulated less the measured figure. U_val = 2 √(u_num² + u_input² + u_D²) is what numerics, "
     "coefficients and data leave open, with 95 % probability (ASME V&V 20; ITTC 7.5-03-01-01). Where |E| ≤ U_val the "
     "error of the model is hidden in U_val, and the figure is validated at that level; where |E| > U_val the model "
-    "errs by about E. A level above the required one tells little: such a figure counts as too uncertain. A trial that "
-    "the card was identified from can refute it, and not validate it: its figures are only fitted."
+    "errs by about E. A level above the required one is of little use: such a figure counts as too uncertain. A trial "
+    "that the card was identified from can refute it, and not validate it: its figures are only fitted."
 )
 _SOURCES_OF_U = (
     "u_num comes from repeating the simulation with half the step (three times the change, Roache's factor for two "
@@ -50,94 +52,73 @@ _NUMERICAL = (
     "Classical Runge-Kutta of the fourth order with a fixed step. The change of each figure when the step is halved, "
     "the numerical uncertainty from it, and the deviation by the errors of the coefficients."
 )
-_SIGNALS = (
-    Signal(name="motion.u", title="u", unit="m/s"),
-    Signal(name="motion.v", title="v", unit="m/s"),
-    Signal(name="motion.r", title="r", unit="rad/s"),
-    Signal(name="motion.psi", title="ψ", unit="rad"),
-)
 
 
-@dataclass(frozen=True, eq=False)
-class ValidationEvidence:
-    """What a validation report is made of.
-
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    model : Model
-    validation : Validation
-    verified : tuple of Verified
-    criteria : tuple of ImoCriterion
-    replays : tuple of Passed
-    notices : tuple of str
-    """
-
-    card: ManoeuvringCard
-    model: Model
-    validation: Validation
-    verified: tuple[Verified, ...]
-    criteria: tuple[ImoCriterion, ...]
-    replays: tuple[Passed, ...]
-    notices: tuple[str, ...] = ()
+def validation_page(found: Json) -> Page:
+    """Return the page of the JSON of ``tank2sim validate``."""
+    return Page(
+        title=found["ship"],
+        subtitle="Validation of the manoeuvring simulation model, in the manner of ITTC 7.5-02-06-03",
+        figures=_figures(found),
+        sections=[
+            _documentation(found["documentation"]),
+            _coefficients(found["coefficients"]),
+            _verification(found["verification"]),
+            _comparison(found["figures"], found["verdict"]),
+            *([_replays(found["replays"])] if found["replays"] else []),
+            _standards(found["imo"]),
+            _causes(found["propulsion"]),
+            *notices_section(found["notices"]),
+        ],
+    )
 
 
-def validation_page(evidence: ValidationEvidence) -> Page:
-    """The report."""
-    sections = [
-        documentation(evidence.card, evidence.model),
-        _coefficients(evidence.card),
-        _numerical(evidence.verified),
-    ]
-    sections.append(_comparison(evidence.validation))
-    if evidence.replays:
-        sections.append(_replays(evidence.replays))
-    sections += [_standards(evidence.criteria), _limits(evidence)]
-    if evidence.notices:
-        rows: list[list[Cell]] = [[notice] for notice in evidence.notices]
-        table = PageTable(caption="What the reader should know.", columns=[Column(title="")], rows=rows)
-        sections.append(PageSection(heading="Notices", tables=[table]))
-    subtitle = "Validation of the manoeuvring simulation model, in the manner of ITTC 7.5-02-06-03"
-    return Page(title=evidence.card.ship.name, subtitle=subtitle, figures=_figures(evidence), sections=sections)
-
-
-def _figures(evidence: ValidationEvidence) -> list[KeyFigure]:
-    found = evidence.validation
-    total = len(found.figures)
-    if not total:
+def _figures(found: Json) -> list[KeyFigure]:
+    figures, counts = found["figures"], found["counts"]
+    if not figures:
         shown = [KeyFigure(label="Validation", value="none", verdict=Verdict.CAUTION, note="no trial to compare with")]
     else:
-        worst = Verdict.FAILED if found.count(ComparisonOutcome.REFUTED) else Verdict.CAUTION
-        verdict = Verdict.PASSED if found.count(ComparisonOutcome.VALIDATED) == total else worst
-        value = f"{found.count(ComparisonOutcome.VALIDATED)} of {total}"
-        shown = [KeyFigure(label="Figures validated", value=value, verdict=verdict, note=found.verdict)]
+        validated = counts[ComparisonOutcome.VALIDATED]
+        incomplete = Verdict.FAILED if counts[ComparisonOutcome.REFUTED] else Verdict.CAUTION
+        verdict = Verdict.PASSED if validated == len(figures) else incomplete
+        value = f"{validated} of {len(figures)}"
+        shown = [KeyFigure(label="Figures validated", value=value, verdict=verdict, note=found["verdict"])]
         errors = [
-            abs(figure.error / figure.measured)
-            for figure in found.figures
-            if figure.error is not None and figure.measured
+            abs(figure["error"] / figure["measured"])
+            for figure in figures
+            if figure["error"] is not None and figure["measured"]
         ]
-        levels = [figure.level_percent for figure in found.figures if figure.level_percent is not None]
+        levels = [figure["level_percent"] for figure in figures if figure["level_percent"] is not None]
         if errors:
             shown.append(KeyFigure(label="Median error |E|", value=100 * float(np.median(errors)), unit="% of D"))
         if levels:
             shown.append(KeyFigure(label="Median level U_val", value=float(np.median(levels)), unit="% of D"))
-    numerical = [abs(one.numerical / one.value) for one in evidence.verified if one.numerical is not None and one.value]
+    numerical = [abs(row["U_num"] / row["value"]) for row in found["verification"] if row["U_num"] and row["value"]]
     if numerical:
         shown.append(KeyFigure(label="Largest numerical uncertainty", value=100 * max(numerical), unit="%"))
     return shown
 
 
-def _coefficients(card: ManoeuvringCard) -> PageSection:
-    found = {
-        name: CardCoefficient(card.derivatives[name], card.standard_error(name), name in card.uncertainty)
-        for name in ALL_TERMS
-        if card.derivatives.get(name)
-    }
-    rows: list[list[Cell]] = []
-    for name, one in found.items():
-        assert one.value is not None and one.standard_error is not None
-        percent = 100 * one.standard_error / abs(one.value)
-        rows.append([name, 1000 * one.value, 1000 * one.standard_error, percent, "stated" if one.stated else "assumed"])
+def _documentation(items: Mapping[str, str]) -> PageSection:
+    table = PageTable(
+        caption="Documentation asked for by ITTC 7.5-02-06-03.",
+        columns=[Column(title="item"), Column(title="here")],
+        rows=[[item, text] for item, text in items.items()],
+    )
+    return PageSection(heading="The simulation model", tables=[table])
+
+
+def _coefficients(coefficients: Mapping[str, Json]) -> PageSection:
+    rows: list[list[Cell]] = [
+        [
+            name,
+            1000 * row["value"],
+            1000 * row["standard_error"],
+            100 * row["standard_error"] / abs(row["value"]),
+            "stated" if row["stated"] else "assumed",
+        ]
+        for name, row in coefficients.items()
+    ]
     columns = [
         Column(title="coefficient"),
         Column(title="value"),
@@ -152,12 +133,13 @@ def _coefficients(card: ManoeuvringCard) -> PageSection:
     )
 
 
-def _numerical(verified: Sequence[Verified]) -> PageSection:
+def _verification(verified: Sequence[Json]) -> PageSection:
     rows: list[list[Cell]] = []
-    for one in verified:
-        deviation = None if one.deviation is None or not one.value else 100 * one.deviation / abs(one.value)
-        values = _text(one.value), _text(one.halving, 2), _text(one.numerical, 2), _text(one.deviation, 3)
-        rows.append([one.trial, _named(one.name), *values, deviation])
+    for row in verified:
+        value, deviation = row["value"], row["deviation"]
+        percent = None if deviation is None or not value else 100 * deviation / abs(value)
+        texts = _text(value), _text(row["halving"], 2), _text(row["U_num"], 2), _text(deviation, 3)
+        rows.append([row["trial"], _named(row["name"]), *texts, percent])
     columns = [
         Column(title="trial"),
         Column(title="figure"),
@@ -171,21 +153,27 @@ def _numerical(verified: Sequence[Verified]) -> PageSection:
     return PageSection(heading="Verification and uncertainty of the simulation", text=_NUMERICAL, tables=[table])
 
 
-def _comparison(found: Validation) -> PageSection:
-    if not found.figures:
+def _comparison(figures: Sequence[Json], verdict: str) -> PageSection:
+    if not figures:
         text = "No turning circle or zigzag was given: the model is documented and verified here, and not validated."
-        return PageSection(heading="Validation", text=text, notes=[found.verdict])
-    rows: list[list[Cell]] = []
-    manoeuvres: dict[str, str] = {}
-    for figure in found.figures:
-        manoeuvres[figure.trial] = figure.manoeuvre
-        parts = (figure.measured, figure.simulated, figure.error), (figure.inputs, figure.data, figure.uncertainty)
-        values = [_text(value) for value in parts[0]] + [_text(value, 3) for value in parts[1]]
-        number = list(manoeuvres).index(figure.trial) + 1
-        rows.append([f"{number}: {_named(figure.name)}", *values, figure.level_percent, str(figure.outcome)])
-    trials: list[list[Cell]] = [[place, *pair] for place, pair in enumerate(manoeuvres.items(), start=1)]
-    heads = [Column(title="no."), Column(title="trial"), Column(title="manoeuvre, as recognised")]
-    benchmark = PageTable(caption="Benchmark data.", columns=heads, rows=trials)
+        return PageSection(heading="Validation", text=text, notes=[verdict])
+    manoeuvres = {figure["trial"]: figure["manoeuvre"] for figure in figures}
+    numbers = {trial: number for number, trial in enumerate(manoeuvres, start=1)}
+    rows: list[list[Cell]] = [
+        [
+            f"{numbers[figure['trial']]}: {_named(figure['name'])}",
+            *(_text(figure[key]) for key in ("measured", "simulated", "error")),
+            *(_text(figure[key], 3) for key in ("inputs", "data", "uncertainty")),
+            figure["level_percent"],
+            figure["outcome"],
+        ]
+        for figure in figures
+    ]
+    benchmark = PageTable(
+        caption="Benchmark data.",
+        columns=[Column(title="no."), Column(title="trial"), Column(title="manoeuvre, as recognised")],
+        rows=[[numbers[trial], trial, manoeuvre] for trial, manoeuvre in manoeuvres.items()],
+    )
     columns = [
         *(Column(title=title) for title in ("no.: figure", "D", "S", "E")),
         *(Column(title=title, digits=2) for title in ("u_input", "u_D")),
@@ -193,17 +181,12 @@ def _comparison(found: Validation) -> PageSection:
         Column(title="level", unit="%", digits=3),
         Column(title="verdict"),
     ]
-    required = found.figures[0].required_percent
-    largest = max(
-        (100 * figure.numerical / abs(figure.measured) for figure in found.figures if figure.measured), default=0.0
-    )
-    numerical = f"u_num is {format_number(largest, 2)} % of D at most."
-    level = f"The level is U_val in per cent of D; required here: {required:g} %."
+    shares = (100 * figure["numerical"] / abs(figure["measured"]) for figure in figures if figure["measured"])
+    numerical = f"u_num is {format_number(max(shares, default=0.0), 2)} % of D at most."
+    level = f"The level is U_val in per cent of D; required here: {figures[0]['required_percent']:g} %."
     text = f"{_METHOD} {level}\n\n{_SOURCES_OF_U} {numerical}\n\n{_CLOSED_LOOP}"
-    table = PageTable(caption=f"{found.verdict[:1].upper()}{found.verdict[1:]}.", columns=columns, rows=rows)
-    chart = Illustration(
-        chart=comparison_error_chart([figure.as_json() for figure in found.figures]), caption=COMPARISON_ERRORS
-    )
+    table = PageTable(caption=f"{verdict[:1].upper()}{verdict[1:]}.", columns=columns, rows=rows)
+    chart = Illustration(chart=comparison_error_chart(figures), caption=COMPARISON_ERRORS)
     return PageSection(heading="Validation", text=text, tables=[benchmark, table], charts=[chart])
 
 
@@ -217,14 +200,11 @@ def _named(name: str) -> str:
     return f"{words} ({unit})" if unit else words
 
 
-def _replays(replays: Sequence[Passed]) -> PageSection:
-    rows: list[list[Cell]] = []
-    charts = []
-    for replay in replays:
-        rows += [[replay.name, *_replay_error(replay, name)] for name in replay.noise]
-        if {"motion.x", "motion.y"} <= set(replay.noise):
-            charts.append(Illustration(chart=_replay_track(replay)))
-        charts.append(Illustration(chart=_replay_history(replay)))
+def _replays(replays: Sequence[Json]) -> PageSection:
+    keys = ("signal", "unit", "rms_error", "percent_of_range", "noise")
+    rows: list[list[Cell]] = [
+        [replay["trial"], *(error[key] for key in keys)] for replay in replays for error in replay["errors"]
+    ]
     columns = [
         Column(title="trial"),
         Column(title="signal"),
@@ -233,68 +213,47 @@ def _replays(replays: Sequence[Passed]) -> PageSection:
         Column(title="of its range", unit="%", digits=3),
         Column(title="noise", digits=2),
     ]
+    charts = [
+        chart
+        for replay in replays
+        for chart in motions(
+            replay["trial"], {key: replay[key] for key in ("measured", "simulated")}, measured=["measured"]
+        )
+    ]
     table = PageTable(caption="Free-running replays with the recorded inputs.", columns=columns, rows=rows)
     return PageSection(heading="Replays", text=_REPLAY, tables=[table], charts=charts)
 
 
-def _replay_error(one: Passed, name: str) -> list[Cell]:
-    angle = name in ("motion.r", "motion.psi", "motion.cog", "motion.phi")
-    factor = 180 / math.pi if angle else 1.0
-    known = np.isfinite(one.measured[name])
-    measured, simulated = one.measured[name][known], one.before[name][known]
-    error = float(np.sqrt(np.mean((simulated - measured) ** 2)))
-    spread = float(np.ptp(measured))
-    unit = {"motion.r": "deg/s", "motion.x": "m", "motion.y": "m"}.get(name, "deg" if angle else "m/s")
-    share = 100 * error / spread if spread > 0 and math.isfinite(error) else None
-    shown = factor * error if math.isfinite(error) else None
-    return [name.removeprefix("motion."), unit, shown, share, factor * one.noise[name]]
-
-
-def _replay_track(one: Passed) -> alt.LayerChart:
-    tracks = [
-        TrackData(label="measured", x_m=one.measured["motion.x"], y_m=one.measured["motion.y"], measured=True),
-        TrackData(label="simulated", x_m=one.before["motion.x"], y_m=one.before["motion.y"], time_s=one.time_s),
-    ]
-    return track_chart(tracks, title=f"Track: {one.name}", height_px=360)
-
-
-def _replay_history(one: Passed) -> alt.VConcatChart:
-    signals = [signal for signal in _SIGNALS if signal.name in one.measured]
-    runs = [
-        History(label="measured", time_s=one.time_s, values=one.measured, measured=True),
-        History(label="simulated", time_s=one.time_s, values=one.before),
-    ]
-    return history_chart(runs, signals, title=f"Histories: {one.name}", height_px=90)
-
-
-def _standards(criteria: Sequence[ImoCriterion]) -> PageSection:
+def _standards(criteria: Sequence[Json]) -> PageSection:
     rows: list[list[Cell]] = [
-        [criterion.name, criterion.found, criterion.allowed, criterion.unit, imo_verdict(criterion), criterion.remark]
+        [
+            *(criterion[key] for key in ("name", "found", "allowed", "unit")),
+            imo_verdict(criterion),
+            criterion["remark"],
+        ]
         for criterion in criteria
     ]
     columns = [Column(title=title) for title in ("criterion", "found", "allowed", "unit", "verdict", "remark")]
     table = PageTable(caption="IMO MSC.137(76), the worse of starboard and port.", columns=columns, rows=rows)
-    text = "What the model says of the standards; it holds as far as the figures above are validated."
+    text = "Figures of the model next to the standards; they hold as far as the figures above are validated."
     return PageSection(heading="Standard manoeuvres", text=text, tables=[table])
 
 
-def _limits(evidence: ValidationEvidence) -> PageSection:
-    card = evidence.card
-    causes = [
-        "Forces that the structure has not: higher orders, heel, flow memory, interaction of rudder and propeller.",
-        "Coefficients that no test of the source excites, or that are estimated (see the source and the comments).",
-        "Scale effects between model and ship, in resistance, wake and rudder flow.",
-        "Weather, current, depth and loading of the trials, as far as no effect of the card holds them.",
-        "Errors of the coefficients that go together, where no covariance is next to the card.",
-    ]
-    if card.propulsion is None:
-        causes.append(
-            "Engine and propeller: the card has none, so loss of revolutions in a turn is in the coefficients."
-        )
-    rows: list[list[Cell]] = [[cause] for cause in causes]
+_CAUSES = (
+    "Forces that the structure has not: higher orders, heel, flow memory, interaction of rudder and propeller.",
+    "Coefficients that no test of the source excites, or that are estimated (see the source and the comments).",
+    "Scale effects between model and ship, in resistance, wake and rudder flow.",
+    "Weather, current, depth and loading of the trials, as far as no effect of the card holds them.",
+    "Errors of the coefficients that go together, where no covariance is next to the card.",
+)
+_NO_PROPULSION = "Engine and propeller: the card has none, so loss of revolutions in a turn is in the coefficients."
+
+
+def _causes(propulsion: bool) -> PageSection:
+    rows: list[list[Cell]] = [[cause] for cause in (*_CAUSES, *([] if propulsion else [_NO_PROPULSION]))]
     text = (
-        "What can be behind an error E (7.5-02-06-03, potential causes of prediction error). The command influence "
-        "tells how each figure depends on each coefficient (sensitivity), the command gap looks for the missing effect."
+        "Potential causes of an error E (7.5-02-06-03). The command influence gives the dependence of each figure on "
+        "each coefficient (sensitivity), the command gap looks for the missing effect."
     )
     table = PageTable(caption="Potential causes of prediction error.", columns=[Column(title="cause")], rows=rows)
     return PageSection(heading="Causes of error and sensitivity", text=text, tables=[table])

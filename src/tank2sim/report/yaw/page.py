@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from pathlib import PurePath
 
-from tank2sim.dynamics.yaw_theory import TheoryValue
-from tank2sim.files import plain_json
-from tank2sim.identification.yaw.identify import YAW_METHODS, YawIdentification
+from tank2sim.identification.yaw.identify import YAW_METHODS
 from tank2sim.identification.yaw.intervals import ENERGY_TERMS
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.numbers import format_number
@@ -30,43 +28,6 @@ _HOW = {
 }
 
 
-def yaw_page(result: YawIdentification, theory: Sequence[TheoryValue] = ()) -> Page:
-    """The page of a result, and what `theory` gives for the body's form."""
-    names = ", ".join(record.path.name for record in result.records)
-    estimates, balance, *more = yaw_drawn(plain_json(result.as_json()))
-    return Page(
-        title="Added yaw inertia by the energy method",
-        subtitle=f"{names}, in {result.medium}",
-        figures=_figures(result),
-        sections=[
-            replace(estimates, tables=[_estimates(result)], notes=result.notes),
-            replace(balance, tables=[_friction(result)]),
-            *more,
-            *_theory(theory),
-        ],
-    )
-
-
-def yaw_drawn(found: Json) -> list[PageSection]:
-    """The sections with the charts of a result, from its JSON: estimates, energy balance, record and, where it is
-    known, what the integrated equation leaves of the angle."""
-    records = [Illustration(chart=record_chart(name, columns)) for name, columns in found["histories"].items()]
-    estimates = Illustration(chart=estimates_chart(found["methods"]), caption="Dashed: the energy least squares.")
-    balance = Illustration(
-        chart=balance_chart(found["energy_balance"]), caption="The mean over all pairs of intervals."
-    )
-    residuals = Illustration(chart=energy_residual_chart(found["energy_residuals"]))
-    sections = [
-        PageSection(heading="Estimates by method", text=_ESTIMATES, charts=[estimates]),
-        PageSection(heading="Energy balance", text=_BALANCE, charts=[balance, residuals]),
-        PageSection(heading="Record and programme", text="The rate is shown where it is evaluated.", charts=records),
-    ]
-    if found["angle_residual"]:
-        chart = Illustration(chart=angle_residual_chart(found["angle_residual"]))
-        sections.append(PageSection(heading="Nonlinear least squares", text=_ANGLE, charts=[chart]))
-    return sections
-
-
 _ESTIMATES = (
     "Inertia and dissipation of one accelerating interval. Bars are 95 % intervals of scatter; a bias that is the same "
     "in every pair of intervals is not in them."
@@ -77,7 +38,38 @@ _ANGLE = (
 )
 
 
-def _theory(values: Sequence[TheoryValue]) -> list[PageSection]:
+def yaw_page(found: Json) -> Page:
+    """Return the page of the JSON of ``tank2sim yaw``."""
+    estimates = Illustration(chart=estimates_chart(found["methods"]), caption="Dashed: the energy least squares.")
+    balance = Illustration(
+        chart=balance_chart(found["energy_balance"]), caption="The mean over all pairs of intervals."
+    )
+    residuals = Illustration(chart=energy_residual_chart(found["energy_residuals"]))
+    records = [Illustration(chart=record_chart(name, columns)) for name, columns in found["histories"].items()]
+    sections = [
+        PageSection(
+            heading="Estimates by method",
+            text=_ESTIMATES,
+            tables=[_estimates(found["methods"])],
+            charts=[estimates],
+            notes=found["notes"],
+        ),
+        PageSection(heading="Energy balance", text=_BALANCE, tables=[_friction(found)], charts=[balance, residuals]),
+        PageSection(heading="Record and programme", text="The rate is shown where it is evaluated.", charts=records),
+    ]
+    if residual := found["angle_residual"]:
+        chart = Illustration(chart=angle_residual_chart(residual))
+        sections.append(PageSection(heading="Nonlinear least squares", text=_ANGLE, charts=[chart]))
+    names = ", ".join(PurePath(record).name for record in found["records"])
+    return Page(
+        title="Added yaw inertia by the energy method",
+        subtitle=f"{names}, in {found['medium']}",
+        figures=_figures(found),
+        sections=[*sections, *_theory(found.get("theory") or ())],
+    )
+
+
+def _theory(values: Sequence[Json]) -> list[PageSection]:
     if not values:
         return []
     columns = [
@@ -87,41 +79,37 @@ def _theory(values: Sequence[TheoryValue]) -> list[PageSection]:
         Column(title="remark"),
     ]
     rows: list[list[Cell]] = [
-        [
-            own.formula,
-            1e4 * own.value_kgm2,
-            None if own.printed_kgm2 is None else 1e4 * own.printed_kgm2,
-            own.remark,
-        ]
-        for own in values
+        [value["formula"], _scaled(value["value_kgm2"]), _scaled(value["printed_kgm2"]), value["remark"]]
+        for value in values
     ]
     text = "Added yaw inertia from the body's form, by the formulas (7), (8) and (9) of Alyshev (2019)."
-    return [
-        PageSection(
-            heading="Theory", text=text, tables=[PageTable(caption="From the form", columns=columns, rows=rows)]
-        )
-    ]
+    table = PageTable(caption="From the form", columns=columns, rows=rows)
+    return [PageSection(heading="Theory", text=text, tables=[table])]
 
 
-def _figures(result: YawIdentification) -> list[KeyFigure]:
-    best = result.estimates[YAW_METHODS[0]]
-    added = result.added_inertia(YAW_METHODS[0])
-    value, error = added or (best.total_inertia_kgm2, best.inertia_error_kgm2)
-    worst = 100 * max(result.mirror)
-    two = result.estimates["two_intervals"]
-    bias = 100 * (two.bias_kgm2 or 0.0) / best.total_inertia_kgm2
+def _scaled(value: float | None) -> float | None:
+    """A value in 10⁻⁴ of its unit."""
+    return None if value is None else 1e4 * value
+
+
+def _figures(found: Json) -> list[KeyFigure]:
+    best = found["methods"][YAW_METHODS[0]]
+    kind = "total" if best["added_inertia_kgm2"] is None else "added"
+    inertia, error = best[f"{kind}_inertia_kgm2"], best[f"{kind}_inertia_standard_error_kgm2"]
+    bias = 100 * (found["methods"]["two_intervals"].get("bias_against_least_squares_kgm2") or 0.0)
+    bias /= best["total_inertia_kgm2"]
     return [
         KeyFigure(
-            label="Added yaw inertia" if added else "Yaw inertia",
-            value=float(f"{1e4 * value:.5g}"),
+            label="Added yaw inertia" if kind == "added" else "Yaw inertia",
+            value=float(f"{1e4 * inertia:.5g}"),
             unit="10⁻⁴ kg m²",
             note="energy least squares" + (f", ± {1e4 * error:.2g}" if error is not None else ""),
         ),
         KeyFigure(
             label="Dissipation B + D",
-            value=float(f"{1e4 * best.dissipation_J:.4g}"),
+            value=float(f"{1e4 * best['dissipation_J']:.4g}"),
             unit="10⁻⁴ J",
-            note=f"± {1e4 * (best.dissipation_error_J or 0):.2g}",
+            note=f"± {1e4 * (best['dissipation_standard_error_J'] or 0):.2g}",
         ),
         KeyFigure(
             label="Bias of the two-interval formula",
@@ -132,49 +120,51 @@ def _figures(result: YawIdentification) -> list[KeyFigure]:
         ),
         KeyFigure(
             label="Mirror images differ by",
-            value=float(f"{worst:.3g}"),
+            value=float(f"{100 * max(found['mirror_difference']):.3g}"),
             unit="%",
             note="of the largest rate, in the worst pair",
         ),
     ]
 
 
-def _estimates(result: YawIdentification) -> PageTable:
-    rows: list[list[Cell]] = []
-    for method, estimate in result.estimates.items():
-        added, error = result.added_inertia(method) or (None, None)
-        bias = estimate.bias_kgm2
-        numbers = (
-            added,
-            error,
-            estimate.total_inertia_kgm2,
-            estimate.dissipation_J,
-            estimate.dissipation_error_J,
-            bias,
-        )
-        scaled = [None if number is None else 1e4 * number for number in numbers]
-        rows.append([method.replace("_", " "), _HOW[method], *scaled])
-    heads = ("method", "how", "added inertia", "±", "total inertia", "B + D", "±", "bias")
-    units = ("", "", "10⁻⁴ kg m²", "", "10⁻⁴ kg m²", "10⁻⁴ J", "", "10⁻⁴ kg m²")
-    digits = (4, 4, 5, 3, 5, 4, 3, 3)
-    columns = [
-        Column(title=head, unit=unit, digits=count) for head, unit, count in zip(heads, units, digits, strict=True)
+_COLUMNS = (
+    ("added inertia", "10⁻⁴ kg m²", 5, "added_inertia_kgm2"),
+    ("±", "", 3, "added_inertia_standard_error_kgm2"),
+    ("total inertia", "10⁻⁴ kg m²", 5, "total_inertia_kgm2"),
+    ("B + D", "10⁻⁴ J", 4, "dissipation_J"),
+    ("±", "", 3, "dissipation_standard_error_J"),
+    ("bias", "10⁻⁴ kg m²", 3, "bias_against_least_squares_kgm2"),
+)
+
+
+def _estimates(methods: Json) -> PageTable:
+    rows: list[list[Cell]] = [
+        [method.replace("_", " "), _HOW[method], *(_scaled(estimate.get(key)) for *_, key in _COLUMNS)]
+        for method, estimate in methods.items()
     ]
-    return PageTable(caption="Estimates with standard errors", columns=columns, rows=rows)
+    columns = [Column(title=title, unit=unit, digits=digits) for title, unit, digits, _ in _COLUMNS]
+    heads = [Column(title="method"), Column(title="how")]
+    return PageTable(caption="Estimates with standard errors", columns=[*heads, *columns], rows=rows)
 
 
-def _friction(result: YawIdentification) -> PageTable:
+def _friction(found: Json) -> PageTable:
     """A row for each term, a column for each method that gives it."""
-    methods = [method for method, estimate in result.estimates.items() if estimate.friction]
+    _, *terms = found["energy_balance"]["spent_J"]
+    units = {term: ENERGY_TERMS[term][1] for term in terms}
+    methods = {
+        name: estimate
+        for name, estimate in found["methods"].items()
+        if any(f"{term}_{unit}" in estimate for term, unit in units.items())
+    }
     rows: list[list[Cell]] = []
-    for term in result.fit.balance.terms[1:]:
-        row: list[Cell] = [term.replace("_", " "), _UNITS[ENERGY_TERMS[term][1]]]
-        for method in methods:
-            value, error = result.estimates[method].friction.get(term, (None, None))
-            shown = None if value is None else format_number(1e4 * value)
+    for term, unit in units.items():
+        row: list[Cell] = [term.replace("_", " "), _UNITS[unit]]
+        for estimate in methods.values():
+            value, error = _scaled(estimate.get(f"{term}_{unit}")), estimate.get(f"{term}_standard_error_{unit}")
+            shown = None if value is None else format_number(value)
             row.append(shown if error is None else f"{shown} ± {format_number(1e4 * error, 2)}")
         rows.append(row)
-    columns = [Column(title="term"), Column(title="unit"), *(Column(title=name.replace("_", " ")) for name in methods)]
+    columns = [Column(title=title) for title in ("term", "unit", *(name.replace("_", " ") for name in methods))]
     return PageTable(caption="Friction and water, times 10⁴", columns=columns, rows=rows)
 
 

@@ -1,4 +1,4 @@
-"""What ITTC 7.5-02-06-03 wants documented of a simulation model, as far as its card tells."""
+"""Documentation of a simulation model that ITTC 7.5-02-06-03 asks for, as far as its card states it."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import math
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.model import Model
-from tank2sim.report.kit.page import Cell, Column, PageSection, PageTable
 
 
-def documentation(card: ManoeuvringCard, system: Model) -> PageSection:
-    """What a card and its model say to each item."""
+def model_documentation(card: ManoeuvringCard, system: Model) -> dict[str, str]:
+    """Return what a card and its model state about each item, in words."""
     ship, model, environment, gear = card.ship, card.model, card.environment, card.steering_gear
     kind = {"abkowitz": "third-order polynomial (Abkowitz), whole ship", "linear": "linear"}[model.kind]
     froude = model.speed_mps / math.sqrt(environment.gravity_mps2 * ship.length_m)
@@ -26,29 +25,24 @@ def documentation(card: ManoeuvringCard, system: Model) -> PageSection:
             if value is not None
         ]
         steering = ", ".join([lag, *limits])
-    rows: list[list[Cell]] = [
-        ["Ship", _particulars(card)],
-        ["Mathematical model", f"{kind}; surge, sway and yaw, {len(system.states)} states"],
-        ["Source of the coefficients", ship.source],
-        ["Notes of the card", ship.notes or "none"],
-        ["Speed of expansion", f"{model.speed_mps:.4g} m/s, Froude number {froude:.3g}"],
-        ["Range of speeds", f"{slowest:.4g} to {fastest:.4g} m/s{stated}"],
-        ["Scaling and signs", _conventions(card)],
-        ["Scale effects", f"Reynolds number {reynolds:.3g}; no correction between model and ship is made"],
-        ["Steering gear", steering],
-        ["Autopilot", "none: rudder by the manoeuvre (zigzag reversed at its heading) or by the record"],
-        ["Propulsion", _propulsion(card)],
-        ["Effects", "; ".join(effect.name for effect in card.effects) or "none"],
-        ["Environment", _environment(card)],
-        ["Integration", f"classical Runge-Kutta, fourth order, step {system.step_s:.3g} s"],
-        [
-            "Low speed",
-            f"below {model.low_speed_bound_mps:.4g} m/s: cross-flow drag and linear damping without division by speed",
-        ],
-    ]
-    columns = [Column(title="item"), Column(title="here")]
-    table = PageTable(caption="Documentation asked for by ITTC 7.5-02-06-03.", columns=columns, rows=rows)
-    return PageSection(heading="The simulation model", tables=[table])
+    return {
+        "Ship": _particulars(card),
+        "Mathematical model": f"{kind}; surge, sway and yaw, {len(system.states)} states",
+        "Source of the coefficients": ship.source,
+        "Notes of the card": ship.notes or "none",
+        "Speed of expansion": f"{model.speed_mps:.4g} m/s, Froude number {froude:.3g}",
+        "Range of speeds": f"{slowest:.4g} to {fastest:.4g} m/s{stated}",
+        "Scaling and signs": _conventions(card),
+        "Scale effects": f"Reynolds number {reynolds:.3g}; no correction between model and ship is made",
+        "Steering gear": steering,
+        "Autopilot": "none: rudder by the manoeuvre (zigzag reversed at its heading) or by the record",
+        "Propulsion": _propulsion(card),
+        "Effects": "; ".join(effect.name for effect in card.effects) or "none",
+        "Environment": _environment(card),
+        "Integration": f"classical Runge-Kutta, fourth order, step {system.step_s:.3g} s",
+        "Low speed": f"below {model.low_speed_bound_mps:.4g} m/s: cross-flow drag and linear damping without division "
+        "by speed",
+    }
 
 
 def _particulars(card: ManoeuvringCard) -> str:
