@@ -83,12 +83,12 @@ def test_the_json_has_the_record_to_draw_with_its_peaks_and_the_places_of_findin
 
 def test_bad_input_is_refused_and_nothing_is_written(write, tmp_path):
     result = tmp_path / "result.json"
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="does not exist"):
         run(write("good.csv"), tmp_path / "none.csv", "--json", result)
     assert not result.exists()
     bad = tmp_path / "bad.csv"
     bad.write_text("t_s,delta_deg,u_mps\n0,0,x\n1,0,1\n")
-    with pytest.raises(InputError, match="line 2, column u_mps: 'x' is no number"):
+    with pytest.raises(InputError, match="line 2, column u_mps: 'x' is not a number"):
         run(bad)
 
 

@@ -115,8 +115,8 @@ def test_the_measured_trial_is_never_overwritten(path, tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [(["--out", "x.csv"], "needs a filter"), (["--filter", "lowpass:0.3"], "named by --column"),
-     (["--column", "r", "--filter", "lowpass:77"], "not between"), (["--column", "r", "--filter", "x"], "is no filter"),
-     (["--column", "r", "--filter", "decimate:2"], "leave --column out"), (["--segment", "900"], "no length")],
+     (["--column", "r", "--filter", "lowpass:77"], "not between"), (["--column", "r", "--filter", "x"], "not a filter"),
+     (["--column", "r", "--filter", "decimate:2"], "leave --column out"), (["--segment", "900"], "not a length")],
 )  # fmt: skip
 def test_what_does_not_fit_is_refused_in_one_line(path, options, words):
     with pytest.raises(InputError, match=words):

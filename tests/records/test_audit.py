@@ -238,7 +238,7 @@ def test_a_rudder_that_stops_before_its_order_is_noted():
     record = trial(MOTIONS["zigzag"])
     order = {"delta_order_rad": 1.5 * record.signals["delta_rad"]}
     (finding,) = audit_trial(replace(record, signals={**record.signals, **order}))
-    assert "stands at 20 deg" in finding.what
+    assert "stays at 20 deg" in finding.what
 
 
 def test_velocities_over_ground_that_are_through_the_water_are_found():

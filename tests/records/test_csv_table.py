@@ -97,9 +97,9 @@ def test_comments_are_looked_up_by_key_and_free_text_is_kept(write):
 @pytest.mark.parametrize(
     ("comment", "said"),
     [
-        ("# force_N: 11,63", "'11,63' is no number"),
-        ("# force_N: inf", "'inf' is no number"),
-        ("# force_N:", "'' is no number"),
+        ("# force_N: 11,63", "'11,63' is not a number"),
+        ("# force_N: inf", "'inf' is not a number"),
+        ("# force_N:", "'' is not a number"),
         ("# force_N: 1\n# force_N: 2", "is given more than once"),
     ],
 )
@@ -110,7 +110,7 @@ def test_a_comment_that_must_be_a_number_is_checked(write, comment, said):
 
 
 def test_missing_file(tmp_path):
-    assert refusal(tmp_path / "none.csv") == "there is no such file; check the name"
+    assert refusal(tmp_path / "none.csv") == "the file does not exist; check the name"
 
 
 @pytest.mark.parametrize(
@@ -121,21 +121,21 @@ def test_missing_file(tmp_path):
         ("0,1\n1,2\n", "line 1: there is no header: the first line has numbers"),
         ("t_s,u_mps\n\n# end\n", "there are no rows under the header"),
         ("# a\nt_s,,u\n0,1,2\n", "line 2: column 2 has no name"),
-        ("t_s,u_mps, t_s\n0,1,2\n", "line 1, column t_s: stands twice"),
+        ("t_s,u_mps, t_s\n0,1,2\n", "line 1, column t_s: is given twice"),
         ("t_s;u_mps\n0;1,5\n", "line 1: the columns are not separated by commas"),
         ("t_s,u_mps\n0,1\n\n1,2,3\n", "line 4: the number of cells is 3, and that of columns 2"),
         ("t_s,u_mps\n0,1\n1\n", "line 3: the number of cells is 1, and that of columns 2"),
-        ("t_s,u_mps\n0,1\n1,fast\n2,slow\n", "line 3, column u_mps: 'fast' is no number; write digits"),
-        ("t_s,u_mps\n0,1 2\n", "line 2, column u_mps: '1 2' is no number"),
-        ("t_s,u_mps\n0,1.2.3\n", "line 2, column u_mps: '1.2.3' is no number"),
-        ("t_s,u_mps\n0,1_000\n", "line 2, column u_mps: '1_000' is no number"),
-        ("t_s,u_mps\n0,１\n", "line 2, column u_mps: '１' is no number"),
-        ("t_s,u_mps\n0,0x10\n", "line 2, column u_mps: '0x10' is no number"),
-        ("t_s,u_mps\n0,NaN\n", "line 2, column u_mps: 'NaN' is no number; leave the cell empty"),
-        ("t_s,u_mps\n0,-inf\n", "line 2, column u_mps: '-inf' is no number; leave the cell empty"),
-        ("t_s,u_mps\n0,-\n", "line 2, column u_mps: '-' is no number; leave the cell empty"),
+        ("t_s,u_mps\n0,1\n1,fast\n2,slow\n", "line 3, column u_mps: 'fast' is not a number; write digits"),
+        ("t_s,u_mps\n0,1 2\n", "line 2, column u_mps: '1 2' is not a number"),
+        ("t_s,u_mps\n0,1.2.3\n", "line 2, column u_mps: '1.2.3' is not a number"),
+        ("t_s,u_mps\n0,1_000\n", "line 2, column u_mps: '1_000' is not a number"),
+        ("t_s,u_mps\n0,１\n", "line 2, column u_mps: '１' is not a number"),
+        ("t_s,u_mps\n0,0x10\n", "line 2, column u_mps: '0x10' is not a number"),
+        ("t_s,u_mps\n0,NaN\n", "line 2, column u_mps: 'NaN' is not a number; leave the cell empty"),
+        ("t_s,u_mps\n0,-inf\n", "line 2, column u_mps: '-inf' is not a number; leave the cell empty"),
+        ("t_s,u_mps\n0,-\n", "line 2, column u_mps: '-' is not a number; leave the cell empty"),
         ("t_s,u_mps\n0,1e999\n", "line 2, column u_mps: '1e999' is too large"),
-        ("t_s,u_mps\n0," + "x" * 300 + "\n", "line 2, column u_mps: '" + "x" * 30 + "...' is no number"),
+        ("t_s,u_mps\n0," + "x" * 300 + "\n", "line 2, column u_mps: '" + "x" * 30 + "...' is not a number"),
         ("t_s,u_mps\n0," + "x" * 200_000 + "\n", "line 2: cannot be read"),
     ],
 )

@@ -27,7 +27,7 @@ def test_bundled_tows_are_table_1_of_the_paper():
     assert tows.force_N == 11.63
     assert tows.mass_kg == 2243.0
     np.testing.assert_array_equal(tows.time_s, np.arange(0, 51, 5))
-    # true means of papers.md 1.2, which the paper prints but for a slip at 5 s (.0148)
+    # true means of papers.md 1.2, which the paper prints except a slip at 5 s (.0148)
     means = [0, 0.0142, 0.0282, 0.0536, 0.0740, 0.0950, 0.1100, 0.1224, 0.1408, 0.1524, 0.1690]
     np.testing.assert_allclose(tows.mean_speed_mps, means, atol=1e-12)
     np.testing.assert_array_equal(tows.counts, [5, 5, 5, 5, 5, 4, 5, 5, 5, 5, 4])
@@ -60,15 +60,15 @@ def test_rows_without_a_reading_are_left_out(write):
             "5,0.01,0\n10,0.03,\n15,0.04,1e-9\n20,0.05,0",
             "column speed_2_mps: never reaches 1e-06 m/s",
         ),
-        ("speed_2_mps", "force_N", "column force_N: is no speed of a tow"),
-        ("speed_2_mps", "speed_mps", "column speed_mps: is no speed of a tow"),
-        ("speed_2_mps", "speed_2_knots", "column speed_2_knots: is no speed in m/s; convert it to m/s"),
-        ("speed_2_mps", "speed_2_cmps", "column speed_2_cmps: is no speed in m/s; convert it to m/s"),
-        ("0.06", "x", "line 5, column speed_2_mps: 'x' is no number"),
+        ("speed_2_mps", "force_N", "column force_N: is not a speed of a tow"),
+        ("speed_2_mps", "speed_mps", "column speed_mps: is not a speed of a tow"),
+        ("speed_2_mps", "speed_2_knots", "column speed_2_knots: is not a speed in m/s; convert it to m/s"),
+        ("speed_2_mps", "speed_2_cmps", "column speed_2_cmps: is not a speed in m/s; convert it to m/s"),
+        ("0.06", "x", "line 5, column speed_2_mps: 'x' is not a number"),
         ("15,0.04,0.06\n", "", "has readings at 4 times only; give readings at 5 times or more"),
         ("t_s,", "# force_N: 0\nt_s,", "comment force_N: is 0; a positive number was expected"),
         ("t_s,", "# mass_kg: -2\nt_s,", "comment mass_kg: is -2; a positive number was expected"),
-        ("t_s,", "# force_N: 1 kN\nt_s,", "comment force_N: '1 kN' is no number"),
+        ("t_s,", "# force_N: 1 kN\nt_s,", "comment force_N: '1 kN' is not a number"),
     ],
 )
 def test_faulty_tows_are_refused_with_their_place(write, old, new, said):

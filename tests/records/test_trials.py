@@ -53,9 +53,9 @@ def test_a_foreign_column_is_left_out_and_named(write):
     [
         ("t_s", "time", "header: there is no column t_s"),
         ("delta_deg", "helm_deg", "header: there is no rudder; add delta_deg"),
-        ("r_degps", "r_deg", "column r_deg: is no signal of a trial; call it as r_radps"),
+        ("r_degps", "r_deg", "column r_deg: is not a signal of a trial; call it as r_radps"),
         ("1,10,2", ",10,2", "line 3, column t_s: is empty"),
-        ("1,10,2", "x,10,2", "line 3, column t_s: 'x' is no number"),
+        ("1,10,2", "x,10,2", "line 3, column t_s: 'x' is not a number"),
         ("1,10,2", "0,10,2", "row 2, column t_s: 0 does not come after 0 of the row before"),
         ("t_s,", "# rudder_sign: left\nt_s,", "comment rudder_sign: is 'left'"),
         ("t_s,", "# noise: u_mps\nt_s,", "comment noise: 'u_mps' is not understood"),
@@ -114,8 +114,8 @@ def test_a_sample_lost_from_a_record_of_marin_is_not_papered_over(write):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (HSVA.replace("HSVA,", "SSPA,"), "line 1: is no record of MARIN or HSVA"),
-        (HSVA.replace(" 1.5 ", " x "), "line 6, column x_m: 'x' is no number"),
+        (HSVA.replace("HSVA,", "SSPA,"), "line 1: is not a record of MARIN or HSVA"),
+        (HSVA.replace(" 1.5 ", " x "), "line 6, column x_m: 'x' is not a number"),
         (HSVA.replace(" 1.5 ", " "), "line 6: the number of cells is 11, and that of columns 12"),
         (HSVA[:100], "has no rows of measured values"),
     ],
@@ -137,7 +137,7 @@ def test_a_record_of_the_esso_osaka_may_hold_nan(write):
     np.testing.assert_allclose(read.signals["n_radps"], 2 * np.pi * np.array([10, -10, 10]))
     assert read.signals["delta_rad"][0] == 0.2
     assert read.signals["wind_direction_rad"][0] == 4
-    with pytest.raises(InputError, match=re.escape("line 3, column delta_rudder [rad]: 'x' is no number")):
+    with pytest.raises(InputError, match=re.escape("line 3, column delta_rudder [rad]: 'x' is not a number")):
         read_trial_file(write(header + "\n".join(rows).replace("-10,.2", "-10,x")))
     with pytest.raises(InputError, match=re.escape("there is not one column vm_velo [m/s]")):
         read_trial_file(write((header + "\n".join(rows)).replace("vm_velo", "v")))

@@ -25,7 +25,7 @@ the smallest of them, is about 1e-3 in prime, and no gauge resolves a millionth 
 class Condition:
     """One row of averages: SI, radians, rudder positive to starboard, forces in the sense of the file.
 
-    ``name`` tells file and line.
+    ``name`` states file and line.
     """
 
     name: str
@@ -109,7 +109,7 @@ def _number(file: Path, place: tuple[int, str], text: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) <= LARGEST:
-        problem = f"{text[:30]!r} is no number" + (f" up to {LARGEST:g}" if math.isfinite(value) else "")
+        problem = f"{text[:30]!r} is not a number" + (f" up to {LARGEST:g}" if math.isfinite(value) else "")
         raise InputError(file, f"line {place[0]}, column {place[1]}", problem, "give each condition its value")
     return value
 

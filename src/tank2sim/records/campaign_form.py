@@ -149,7 +149,7 @@ class FullScaleSection(CardSection):
 
 
 class RunSheet(CardSection):
-    """One of ``[[runs]]``: what the test sheet says of a run; what was measured stands in its file."""
+    """One of ``[[runs]]``: what the test sheet says of a run; its file holds what was measured."""
 
     file: Text
     type: RunType

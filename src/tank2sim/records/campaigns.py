@@ -165,7 +165,7 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
     path : path
         ``campaign.toml``; the names of files in it are relative to its folder.
     keep_going : bool
-        Leave out runs that cannot be read (a missing file, text in a number column) and tell them in ``faults``.
+        Leave out runs that cannot be read (a missing file, text in a number column) and list them in ``faults``.
 
     Raises
     ------
@@ -214,7 +214,7 @@ def _copies(runs: list[CaptiveRun]) -> dict[str, InputError]:
     """Runs whose readings are those of a run before, to the last digit: name to fault.
 
     One record may be a part of the other, at its beginning or its end. Noise never repeats itself; records without
-    noise, of a computed campaign or a dead gauge, are no evidence.
+    noise, of a computed campaign or a dead gauge, are not evidence.
     """
     found: dict[str, InputError] = {}
     seen: dict[tuple[str, bytes], list[tuple[CaptiveRun, NDArray[np.float64]]]] = {}
@@ -256,7 +256,7 @@ def _refuse_doubled_names(form: CampaignFile, path: Path) -> None:
     names = [sheet.file for sheet in form.runs]
     for number, name in enumerate(names):
         if name in names[:number]:
-            raise InputError(path, f"runs.{number}.file", f"{name} stands twice", "give each run once")
+            raise InputError(path, f"runs.{number}.file", f"{name} is given twice", "give each run once")
 
 
 def _read_run(sheet: RunSheet, form: CampaignFile, folder: Path) -> CaptiveRun:

@@ -86,7 +86,7 @@ class CsvTable:
         Raises
         ------
         InputError
-            There is no such column.
+            The column does not exist.
         """
         if name not in self.columns:
             present = ", ".join(self.heading(other) for other in self.columns)
@@ -99,7 +99,7 @@ class CsvTable:
         Raises
         ------
         InputError
-            There is no such column, a cell of it is empty, or it does not rise; the message names the first such row.
+            The column does not exist, a cell of it is empty, or it does not rise; the message names the first such row.
         """
         values = self.column(name)
         empty = np.flatnonzero(np.isnan(values))
@@ -113,12 +113,12 @@ class CsvTable:
         return values
 
     def comment_number(self, key: str) -> float | None:
-        """The finite number in the comment line ``# key: number``; None if there is no such line.
+        """The finite number in the comment line ``# key: number``; None without such a line.
 
         Raises
         ------
         InputError
-            Its text is no number, or the line stands twice.
+            Its text is not a number, or the line is given twice.
         """
         if key not in self.comments:
             return None
@@ -129,7 +129,7 @@ class CsvTable:
                 self.path, f"comment {key}", f"{_quoted(text)} is too large", f"at most {LARGEST:g} can be"
             )
         if number is None:
-            problem = f"{_quoted(text)} is no number" if "\n" not in text else "is given more than once"
+            problem = f"{_quoted(text)} is not a number" if "\n" not in text else "is given more than once"
             raise InputError(self.path, f"comment {key}", problem, f"write one line such as '# {key}: 11.63'")
         return number
 
@@ -139,7 +139,7 @@ class CsvTable:
         Raises
         ------
         InputError
-            There is such a line; the message tells the right spelling.
+            There is such a line; the message states the right spelling.
         """
         keys = [(key, f"# {key}:") for key in self.comments if key not in known]
         matches = (_ALMOST_KEY.match(remark) for remark in self.remarks)
@@ -181,7 +181,7 @@ def read_table(path: Path | str) -> CsvTable:
     ------
     InputError
         The file is missing or not UTF-8; there is no header, a column has no name or the name of another; there are
-        no rows; a row has too many or too few cells; a cell is no finite number in digits and a decimal point.
+        no rows; a row has too many or too few cells; a cell is not a finite number in digits and a decimal point.
     """
     path = Path(path)
     all_lines = read_text(path).split("\n")
@@ -215,7 +215,7 @@ def _header(path: Path, number: int, line: str) -> list[str]:
         if not name:
             raise InputError(path, place, f"column {position} has no name", "name it or delete it")
         if name in names[: position - 1]:
-            raise InputError(path, f"{place}, column {name}", "stands twice", "delete or rename one of them")
+            raise InputError(path, f"{place}, column {name}", "is given twice", "delete or rename one of them")
     return names
 
 
@@ -263,10 +263,12 @@ def _cells(path: Path, place: str, line: str) -> list[str]:
 
 def _refuse(path: Path, place: str, cell: str) -> NoReturn:
     if cell.lstrip("+-").lower() in ("nan", "inf", "infinity", "na", "null", "none", "-", ""):
-        raise InputError(path, place, f"{_quoted(cell)} is no number", "leave the cell empty if nothing was recorded")
+        raise InputError(
+            path, place, f"{_quoted(cell)} is not a number", "leave the cell empty if nothing was recorded"
+        )
     if _NUMBER.fullmatch(cell):
         raise InputError(path, place, f"{_quoted(cell)} is too large", f"at most {LARGEST:g} was expected")
-    raise InputError(path, place, f"{_quoted(cell)} is no number", "write digits with a decimal point, or nothing")
+    raise InputError(path, place, f"{_quoted(cell)} is not a number", "write digits with a decimal point, or nothing")
 
 
 def _comments(lines: Sequence[str]) -> tuple[dict[str, str], tuple[str, ...]]:

@@ -1,10 +1,10 @@
 """Free-running records of a 3 m model of the Esso Osaka on a pond (Osaka University 2020), with the measured wind.
 
-Facts that the files do not tell, found from them (13 runs): the rudder is positive to starboard (with way ahead its
+Facts that the files do not state, found from them (13 runs): the rudder is positive to starboard (with way ahead its
 angle and the rate of turn have one sign); u and v are body velocities at midship; the true wind direction is where the
 wind comes from, clockwise from the x axis of the pond, and the relative one where it comes from, clockwise from the
 bow: the relative wind follows from the true one, the velocities and the heading to 0.005 m/s rms, and the opposite
-reading misses by 0.1 m/s to 0.5 m/s. As x stands for north in the trial format, so does it here for the wind.
+reading misses by 0.1 m/s to 0.5 m/s. As in the trial format, x is north, here also for the wind.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def is_esso_osaka(text: str) -> bool:
 
 
 def read_esso_osaka(path: Path | str) -> Trial:
-    """Read a CSV of these records; times as they stand, blank rows at the end are passed over.
+    """Read a CSV of these records; times unchanged, blank rows at the end are passed over.
 
     Revolutions are in 1/s, negative astern; the rest is in SI.
 

@@ -28,7 +28,7 @@ def read_bytes_as_text(path: Path | str) -> str:
     try:
         text = Path(path).read_bytes().decode("latin-1")
     except FileNotFoundError:
-        raise InputError(path, "", "there is no such file", "check the name") from None
+        raise InputError(path, "", "the file does not exist", "check the name") from None
     except OSError as error:
         raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
@@ -40,7 +40,7 @@ def number_rows(path: Path, rows: NumberRows, names: Sequence[str]) -> NDArray[n
     Raises
     ------
     InputError
-        A row has too many or too few cells, or one that is no finite number; or there are fewer than two rows.
+        A row has too many or too few cells, or one that is not a finite number; or there are fewer than two rows.
     """
     if len(rows) < 2:
         raise InputError(path, "", "has no rows of measured values", "give the file as it was published")
@@ -53,7 +53,7 @@ def number_rows(path: Path, rows: NumberRows, names: Sequence[str]) -> NDArray[n
     if faulty.size:
         row, column = (int(place) for place in faulty[0])
         line, cells = rows[row]
-        problem = f"{cells[column][:30]!r} is no number" + (
+        problem = f"{cells[column][:30]!r} is not a number" + (
             f" up to {LARGEST:g}" if np.isfinite(values[row, column]) else ""
         )
         raise InputError(path, f"line {line}, column {names[column]}", problem, "write a number, or nan for none")

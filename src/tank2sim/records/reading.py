@@ -17,7 +17,7 @@ from tank2sim.records.trial_csv import TRIAL_CSV
 from tank2sim.records.trials import Trial, TrialReader, fault_of
 
 HEAD_BYTES = 4096
-"""What of a file is looked at to tell whether it is a trial."""
+"""Bytes of a file that are read to decide whether it is a trial."""
 
 READERS: Registry[TrialReader] = Registry("tank2sim.trial_readers", (TRIAL_CSV, ESSO_OSAKA, SIMMAN), TrialReader)
 """All formats of trials, with those of installed packages."""
@@ -101,5 +101,5 @@ def _refuse_falling_time(trial: Trial) -> None:
     if falls.size:
         row = int(falls[0]) + 1
         problem = f"{trial.time_s[row]:.10g} does not come after {trial.time_s[row - 1]:.10g} of the row before"
-        remedy = "sort the rows and give each time once; 'tank2sim audit' tells more"
+        remedy = "sort the rows and give each time once; 'tank2sim audit' shows more"
         raise InputError(trial.path, f"row {row + 1}, column {trial.heading('t_s')}", problem, remedy)

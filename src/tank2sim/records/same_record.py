@@ -57,7 +57,7 @@ def refuse_copies(trials: Sequence[Trial], others: Sequence[Trial] | None = None
             for before in trials[:number]:
                 if same_record(trial, before):
                     problem = f"is the record of {before.path.name} again"
-                    raise InputError(trial.path, "", problem, "give each record once: a copy is no second run")
+                    raise InputError(trial.path, "", problem, "give each record once: a copy is not a second run")
         return
     for held in others:
         for trial in trials:
@@ -66,17 +66,17 @@ def refuse_copies(trials: Sequence[Trial], others: Sequence[Trial] | None = None
                 raise InputError(held.path, "", problem, "hold out what is not fitted")
 
 
-def same_record(one: Trial, other: Trial) -> bool:
+def same_record(first: Trial, second: Trial) -> bool:
     """True if all signals that both measured are the same at the same times, except for their printed digits.
 
     Times count from the first row of each, or as they are, whichever fits. Both are at the size of one ship. A signal
     that does not move says nothing.
     """
-    if sampling_step(one) < sampling_step(other):  # at the rows of the coarser one, between which nothing is drawn
-        one, other = other, one
-    names = [name for name in MEASURED_COLUMNS if name in one.signals and name in other.signals]
-    shifts = dict.fromkeys((0.0, float(one.time_s[0] - other.time_s[0])))
-    return bool(names) and any(_same_at(one, other, names, shift) for shift in shifts)
+    if sampling_step(first) < sampling_step(second):  # at the rows of the coarser one, between which nothing is drawn
+        first, second = second, first
+    names = [name for name in MEASURED_COLUMNS if name in first.signals and name in second.signals]
+    shifts = dict.fromkeys((0.0, float(first.time_s[0] - second.time_s[0])))
+    return bool(names) and any(_same_at(first, second, names, shift) for shift in shifts)
 
 
 def signature(trial: Trial) -> tuple[list[float], dict[str, list[float]]]:
@@ -110,16 +110,16 @@ def _rounded(values: Array, unit: float) -> list[float]:
     return [round(float(value), places) for value in values]
 
 
-def _same_at(one: Trial, other: Trial, names: Sequence[str], shift: float) -> bool:
-    time = other.time_s + shift
-    inside = (one.time_s >= time[0]) & (one.time_s <= time[-1])
-    spans = [float(times[-1] - times[0]) for times in (one.time_s, time)]
-    common = one.time_s[inside]
+def _same_at(first: Trial, second: Trial, names: Sequence[str], shift: float) -> bool:
+    time = second.time_s + shift
+    inside = (first.time_s >= time[0]) & (first.time_s <= time[-1])
+    spans = [float(times[-1] - times[0]) for times in (first.time_s, time)]
+    common = first.time_s[inside]
     if len(common) < LEAST_ROWS or common[-1] - common[0] < COMMON * min(spans):
         return False
     alike = False
     for name in names:
-        signals = one.signals[name], other.signals[name]
+        signals = first.signals[name], second.signals[name]
         noise = min(white_noise(values) for values in signals), max(rounding(values) for values in signals)
         verdict = _alike(signals[0][inside], _at(common, time, signals[1]), *noise)
         if verdict is False:
@@ -135,16 +135,16 @@ def _at(common: Array, time: Array, values: Array) -> Array:
     return np.interp(common, time[known], values[known])
 
 
-def _alike(one: Array, other: Array, noise: float, unit: float) -> bool | None:
+def _alike(first: Array, second: Array, noise: float, unit: float) -> bool | None:
     """None where neither moves; `noise` is the smaller one of the two, `unit` the coarser one of their digits."""
-    known = ~np.isnan(one + other)
+    known = ~np.isnan(first + second)
     if np.count_nonzero(known) < 2:
         return None
-    one, other = one[known], other[known]
-    spread = float(np.std(one))
+    first, second = first[known], second[known]
+    spread = float(np.std(first))
     if not spread > 0:
         return None
-    apart = float(np.sqrt(np.mean((one - other) ** 2)))
+    apart = float(np.sqrt(np.mean((first - second) ** 2)))
     if apart > _FAR * spread:
         return False
     return apart <= max(PRINTED * spread, NOISE * noise, _ROUNDED * unit / math.sqrt(12))

@@ -25,7 +25,7 @@ KVLCC2_SCALE = 45.714
 @dataclass(frozen=True)
 class _Laboratory:
     columns: tuple[str, ...]
-    left_out: str
+    omission: str
     values: str
     KVLCC2_length_m: float
 
@@ -33,13 +33,13 @@ class _Laboratory:
 _LABORATORIES = {
     "HSVA": _Laboratory(
         columns=tuple("t_s x_m y_m psi_deg u_mps v_mps r_degps heel delta_deg n_rps thrust_N torque_Nm".split()),
-        left_out="column 8 (probably heel), thrust and torque are no part of the trial format and left out",
+        omission="column 8 (probably heel), thrust and torque are not part of the trial format and left out",
         values="values are those of the model",
         KVLCC2_length_m=7.0,
     ),
     "MARIN": _Laboratory(
         columns=tuple("t_s x_m y_m phi_deg psi_deg u_mps v_mps p_degps r_degps delta_deg n_rpm".split()),
-        left_out="the rate of roll is no part of the trial format and left out",
+        omission="the rate of roll is not a part of the trial format and left out",
         values="values are those of the ship, scaled from a model",
         KVLCC2_length_m=320.0,
     ),
@@ -52,7 +52,7 @@ def is_simman(text: str) -> bool:
 
 
 def read_simman(path: Path | str) -> Trial:
-    """Read a ``.dat`` of MARIN (11 columns, full scale) or HSVA (12 columns, model scale); times as they stand.
+    """Read a ``.dat`` of MARIN (11 columns, full scale) or HSVA (12 columns, model scale); times unchanged.
 
     Times of MARIN have three digits and repeat beyond 100 s: they are replaced by a uniform time base that agrees with
     every time printed, and a notice says so.
@@ -66,7 +66,7 @@ def read_simman(path: Path | str) -> Trial:
     text = read_bytes_as_text(path)
     laboratory = _laboratory(text)
     if laboratory is None:
-        problem = "is no record of MARIN or HSVA: its first line names neither"
+        problem = "is not a record of MARIN or HSVA: its first line names neither"
         raise InputError(path, "line 1", problem, "write it as a CSV with a header such as t_s,delta_deg,r_degps")
     header, rows = _split(text)
     values = number_rows(path, rows, laboratory.columns)
@@ -78,11 +78,11 @@ def read_simman(path: Path | str) -> Trial:
     signals: dict[str, Array] = {name: column for name, column in named.items() if name in TRIAL_SIGNALS}
     signals["psi_rad"] = unwrapped(signals["psi_rad"])
     signals["delta_rad"] = 0.0 - signals["delta_rad"]
-    notices = [laboratory.left_out, laboratory.values, "the rudder is positive to port in the file, to starboard here"]
+    notices = [laboratory.omission, laboratory.values, "the rudder is positive to port in the file, to starboard here"]
     time = named["t_s"]
     if np.any(np.diff(time) <= 0):
-        time, told = _uniform_time(path, rows)
-        notices.append(told)
+        time, notice = _uniform_time(path, rows)
+        notices.append(notice)
     known = {name: head for name, head in columns.items() if name in signals and name != head}
     tanker = "KVLCC2" in header
     return Trial(

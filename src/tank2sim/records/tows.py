@@ -43,9 +43,9 @@ class Tows:
     speed_mps : array, (times, tows)
         nan where nothing was recorded; each row and each tow has at least one reading.
     force_N, mass_kg : float or None
-        Towing force and mass of the body with the water in it, where the file tells them.
+        Towing force and mass of the body with the water in it, where the file states them.
     body : dict
-        What else the file tells of the body and the water, SI: the keys of :data:`BODY_KEYS` to numbers.
+        Other numbers that the file gives of the body and the water, SI: the keys of :data:`BODY_KEYS` to numbers.
     """
 
     path: Path
@@ -98,7 +98,7 @@ def read_tows(path: Path | str) -> Tows:
     Raises
     ------
     InputError
-        The table is at fault (:func:`tank2sim.records.csv_table.read_table`), a column is no speed in m/s, a tow has
+        The table is at fault (:func:`tank2sim.records.csv_table.read_table`), a column is not a speed in m/s, a tow has
         no reading, there are fewer than five times with one, or the time does not rise from 0 or later.
     """
     table = read_table(path)
@@ -142,9 +142,9 @@ def _check_name(table: CsvTable, name: str) -> None:
     if _SPEED.fullmatch(name):
         return
     if name.startswith("speed") and not name.endswith("_mps"):
-        problem, remedy = "is no speed in m/s", "convert it to m/s and call it speed_1_mps, speed_2_mps, ..."
+        problem, remedy = "is not a speed in m/s", "convert it to m/s and call it speed_1_mps, speed_2_mps, ..."
     else:
-        problem, remedy = "is no speed of a tow", "delete it, or call it speed_1_mps, speed_2_mps, ..."
+        problem, remedy = "is not a speed of a tow", "delete it, or call it speed_1_mps, speed_2_mps, ..."
     raise InputError(table.path, f"column {name}", problem, remedy)
 
 

@@ -1,4 +1,4 @@
-"""The project's own trial files: a CSV whose column names bear the units, with comment lines."""
+"""The project's own trial files: a CSV whose column names contain the units, with comment lines."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ COMMENT_KEYS = ("rudder_sign", "noise", "scale")
 
 
 def read_trial_csv(path: Path | str) -> Trial:
-    """Read a trial such as ``t_s,delta_deg,n_rpm,u_mps,v_mps,r_degps,psi_deg,x_m,y_m``; times as they stand.
+    """Read a trial such as ``t_s,delta_deg,n_rpm,u_mps,v_mps,r_degps,psi_deg,x_m,y_m``; times unchanged.
 
     Comment lines: ``# rudder_sign: port`` turns rudder angles and orders to positive to starboard; ``# noise: u_mps
     0.03, psi_deg 0.1`` states standard deviations; ``# scale: 45.714`` the length of the ship over that of the model.
-    Columns that are no part of the format are left out, and a notice names them.
+    Columns that are not part of the format are left out, and a notice names them.
 
     Raises
     ------
@@ -38,14 +38,14 @@ def read_trial_csv(path: Path | str) -> Trial:
     if empty.size:
         raise InputError(table.path, table.place(int(empty[0]), "t_s"), "is empty", "give each row its time")
     signals = {name: values for name, values in table.columns.items() if name in TRIAL_SIGNALS}
-    left_out = [name for name in table.columns if name != "t_s" and name not in TRIAL_SIGNALS]
-    for name in left_out:
+    omitted = [name for name in table.columns if name != "t_s" and name not in TRIAL_SIGNALS]
+    for name in omitted:
         _refuse_slip(table, name)
     _check_content(table, signals)
     notices = []
-    if left_out:
-        text = ", ".join(table.heading(name) for name in left_out)
-        notices.append(f"columns that are no part of the trial format are left out: {text}")
+    if omitted:
+        text = ", ".join(table.heading(name) for name in omitted)
+        notices.append(f"columns that are not part of the trial format are left out: {text}")
     if "psi_rad" in signals:
         signals["psi_rad"] = unwrapped(signals["psi_rad"])
     if _rudder_sign(table) == "port":
@@ -65,7 +65,7 @@ def _refuse_slip(table: CsvTable, name: str) -> None:
     near = same or difflib.get_close_matches(name, TRIAL_SIGNALS, n=1, cutoff=0.85)
     if near:
         remedy = f"call it as {near[0]} (or with another unit of that kind), or delete the column"
-        raise InputError(table.path, f"column {table.heading(name)}", "is no signal of a trial", remedy)
+        raise InputError(table.path, f"column {table.heading(name)}", "is not a signal of a trial", remedy)
 
 
 def _check_content(table: CsvTable, signals: dict[str, Array]) -> None:

@@ -18,7 +18,7 @@ MEASURED_COLUMNS = (
     *("u_mps", "v_mps", "u_ground_mps", "v_ground_mps", "sog_mps", "cog_rad", "r_radps", "psi_rad", "x_m", "y_m"),
     *("phi_rad", "wind_speed_mps", "wind_direction_rad", "wind_rel_speed_mps", "wind_rel_direction_rad"),
 )
-"""What sensors tell of the motion and the wind."""
+"""Quantities of the motion and the wind that sensors measure."""
 TRIAL_SIGNALS = (*RUDDERS, "n_radps", *MEASURED_COLUMNS)
 """Every signal of the trial format, in SI."""
 
@@ -41,9 +41,9 @@ class Trial:
     noise : mapping
         Standard deviation of the measurement by signal, where the file states it, SI.
     scale : float or None
-        Length of the ship over that of the model of this trial, where the file or its format tells it.
+        Length of the ship over that of the model of this trial, where the file or its format states it.
     length_m : float or None
-        Length between perpendiculars of what the values belong to, ship or model, where the format tells it.
+        Length between perpendiculars of what the values belong to, ship or model, where the format states it.
     notices : tuple of str
         What was done to the data on reading.
     columns : mapping
@@ -156,7 +156,7 @@ def froude_scaled(trial: Trial, length_ratio: float) -> Trial:
     """The same manoeuvre of a geometrically similar ship whose length is `length_ratio` times as great.
 
     By Froude's law with the same gravity (ITTC): lengths times the ratio, times and speeds times its root, rates of
-    turn and revolutions divided by its root, angles as they are; so the stated noise. ``scale`` tells of the model
+    turn and revolutions divided by its root, angles as they are; so the stated noise. ``scale`` describes the model
     that was tested and stays.
 
     Raises

@@ -49,7 +49,7 @@ class YawRecord:
     programme : YawProgramme
         What was to be run.
     stated : bool
-        The file tells of the programme; else it is the paper's.
+        As the file states it; else the programme of the paper.
     constants : dict
         What else the comments state: ``torque_constant_NmpA``, ``inertia_kgm2`` (J_zz of the body with the rotor),
         its standard error ``inertia_error_kgm2``, ``max_current_A``, ``current_lag_s``, ``length_m``,
@@ -74,8 +74,9 @@ def read_yaw_record(path: Path | str) -> YawRecord:
 
     ``# medium: air``, ``# programme: reversing`` (or unidirectional, full_turn), ``# max_rate_degps: 15``, ``# rise_s:
     4.444``, ``# settle_s: 0.5``, ``# start_s: 0``, ``# humps: 5``, ``# torque_constant_NmpA: 0.051``, ``# inertia_kgm2:
-    0.0204``, ``# inertia_error_kgm2: 0.0002``, ``# max_current_A: 1``. What is not told of the programme is as in the
-    paper, and as many humps as the record has time for. An angle that is counted within one turn is put together.
+    0.0204``, ``# inertia_error_kgm2: 0.0002``, ``# max_current_A: 1``. What the file does not state of the programme is
+    as in the paper, and as many humps as the record has time for. An angle that is counted within one turn is put
+    together.
 
     Raises
     ------
@@ -92,7 +93,7 @@ def read_yaw_record(path: Path | str) -> YawRecord:
         raise InputError(table.path, "comment medium", f"is {medium!r}", "write '# medium: air' or '# medium: water'")
     programme, missing = _programme(table, time)
     notes = (
-        [f"the file does not tell {' and '.join(missing)} of the programme; the paper's is taken."] if missing else []
+        [f"the file does not state {' and '.join(missing)} of the programme; the paper's is taken."] if missing else []
     )
     whole = np.unwrap(angle)
     turns = int(np.count_nonzero(np.abs(np.diff(angle)) > math.pi))
@@ -114,10 +115,10 @@ def read_yaw_record(path: Path | str) -> YawRecord:
 
 def yaw_record_text(record: YawRecord) -> str:
     """The record as the CSV file that :func:`read_yaw_record` reads."""
-    own = record.programme
-    head = [f"# medium: {record.medium}", f"# programme: {own.kind}"]
-    head += [f"# max_rate_degps: {math.degrees(own.max_rate_radps):.12g}", f"# rise_s: {own.rise_s:.12g}"]
-    head += [f"# settle_s: {own.settle_s:g}", f"# start_s: {own.start_s:g}", f"# humps: {own.humps}"]
+    flown = record.programme
+    head = [f"# medium: {record.medium}", f"# programme: {flown.kind}"]
+    head += [f"# max_rate_degps: {math.degrees(flown.max_rate_radps):.12g}", f"# rise_s: {flown.rise_s:.12g}"]
+    head += [f"# settle_s: {flown.settle_s:g}", f"# start_s: {flown.start_s:g}", f"# humps: {flown.humps}"]
     head += [f"# {key}: {value:g}" for key, value in record.constants.items()]
     rows = zip(record.time_s.tolist(), record.angle_rad.tolist(), record.current_A.tolist(), strict=True)
     body = [f"{t:.9g},{angle:.9g},{current:.6g}" for t, angle, current in rows]
@@ -140,7 +141,7 @@ def _positive(table: CsvTable, key: str) -> float | None:
 
 
 def _programme(table: CsvTable, time: Array) -> tuple[YawProgramme, list[str]]:
-    """The programme, and what the file does not tell of it."""
+    """The programme, and what the file does not state of it."""
     kind = table.comments.get("programme", "unidirectional").strip().lower()
     if kind not in (*PROGRAMME_KINDS, "full_turn"):
         expected = ", ".join((*PROGRAMME_KINDS, "full_turn"))
@@ -162,7 +163,7 @@ def _programme(table: CsvTable, time: Array) -> tuple[YawProgramme, list[str]]:
         humps = _humps(table, time, programme, kind)
         whole = replace(programme, humps=humps, kind="reversing" if kind == "reversing" else "unidirectional")
     except ValueError as error:
-        raise InputError(table.path, "programme", str(error), "correct the comments that tell of it") from None
+        raise InputError(table.path, "programme", str(error), "correct the comments that describe it") from None
     return whole, missing
 
 
@@ -178,11 +179,11 @@ def _rate(table: CsvTable) -> float | None:
 
 
 def _humps(table: CsvTable, time: Array, programme: YawProgramme, kind: str) -> int:
-    """How many humps the file has, told or counted; their last braking interval is within it."""
+    """Number of humps in the file, stated or counted; their last braking interval is within it."""
     length = programme.pairs()[0].braking_s[1] - programme.start_s
     fit = math.floor((time[-1] - programme.start_s - length) / programme.period_s + 1e-9) + 1
-    told = table.comment_number("humps")
-    humps = fit - fit % 2 if told is None and kind == "reversing" else fit if told is None else int(told)
+    stated = table.comment_number("humps")
+    humps = fit - fit % 2 if stated is None and kind == "reversing" else fit if stated is None else int(stated)
     if humps < 1 or humps > fit or time[0] > programme.pairs()[0].accelerating_s[0]:
         problem = (
             f"lasts from {time[0]:g} to {time[-1]:g} s, and {max(humps, 1)} humps of the programme take from "

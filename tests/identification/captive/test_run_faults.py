@@ -19,7 +19,7 @@ CASES = {
     "degrees": ("yaw_02", "column r_radps: reaches .* cannot be"),
     "short": ("sway_11", "has 0.7. of a period"),
     "wrong type": ("yaw_12", "has type pure_sway"),
-    "missing": ("rudder_+10", "there is no such file"),
+    "missing": ("rudder_+10", "the file does not exist"),
 }
 
 

@@ -155,7 +155,7 @@ def test_what_is_no_filter_is_refused(text):
 @pytest.mark.parametrize(
     ("text", "told"),
     [("lowpass:11", "not between"), ("bandpass:1,0.5", "that rise"), ("savgol:10,3", "odd number"),
-     ("savgol:5001,3", "do not fit"), ("detrend:11", "no degree"), ("detrend:-1", "no degree"),
+     ("savgol:5001,3", "do not fit"), ("detrend:11", "not a degree"), ("detrend:-1", "not a degree"),
      ("decimate:1", "2 or more"), ("decimate:100", "2 or more"), ("spline:0.001", "not between")],
 )  # fmt: skip
 def test_numbers_that_do_not_fit_the_record_are_refused(text, told):

@@ -59,7 +59,7 @@ def test_slow_signals_get_longer_segments():
 
 def test_an_impossible_segment_is_refused():
     for wrong in (0.5, 300.0):
-        with pytest.raises(InputError, match="is no length of a segment"):
+        with pytest.raises(InputError, match="is not a length of a segment"):
             spectrum(series(white(1)), segment_s=wrong)
 
 
@@ -80,7 +80,7 @@ def test_gain_and_phase_of_a_nomoto_ship():
     found = transfer_function(*ship(1, 0.0))
     low = (found.frequency_hz > 0.02) & (found.frequency_hz < 0.5)
     omega = 2 * np.pi * found.frequency_hz[low]
-    # Analytic, of the continuous system, but for the half step by which a held rudder is late.
+    # Analytic, of the continuous system, except the half step by which a held rudder is late.
     analytic = 0.08 / (1.0 + 3.0j * omega) * np.exp(-0.5j * omega * STEP)
     assert np.max(np.abs(found.gain[low] / np.abs(analytic) - 1.0)) < 0.06
     assert np.max(np.abs(found.phase_rad[low] - np.angle(analytic))) < 0.06

@@ -65,7 +65,7 @@ class Finding:
     def as_json(self) -> list[dict[str, Any]]:
         """One entry a column: file, column, what, likely_truth, kind, repaired (by the safe mends), evidence,
         places."""
-        rest = {
+        content = {
             "what": self.what,
             "likely_truth": self.likely_truth,
             "kind": self.kind,
@@ -73,4 +73,4 @@ class Finding:
             "evidence": dict(self.evidence),
             "places_s": [list(place) for place in self.places_s],
         }
-        return [{"file": str(self.source), "column": column, **rest} for column in self.columns]
+        return [{"file": str(self.source), "column": column, **content} for column in self.columns]

@@ -39,9 +39,9 @@ def white_noise(values: Array) -> float:
     if known.size < WINDOW:
         return 0.0
     residual = known - savgol_filter(known, WINDOW, DEGREE)
-    left = 1.0 - float(savgol_coeffs(WINDOW, DEGREE)[WINDOW // 2])
+    noise_share = 1.0 - float(savgol_coeffs(WINDOW, DEGREE)[WINDOW // 2])
     apart = _MAD * float(np.median(np.abs(residual)))
-    return max(apart / math.sqrt(left), resolution(known) / math.sqrt(12.0))
+    return max(apart / math.sqrt(noise_share), resolution(known) / math.sqrt(12.0))
 
 
 def resolution(values: Array) -> float:

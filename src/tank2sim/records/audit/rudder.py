@@ -50,7 +50,7 @@ def rudder_findings(trial: Trial) -> list[Finding]:
 
 
 def rudder_response(trial: Trial, name: str | None = None) -> float:
-    """Positive if a rudder to starboard turns the ship to starboard, negative if to port, 0 if that cannot be told.
+    """Positive if a rudder to starboard turns the ship to starboard, negative if to port, 0 if undetermined.
 
     First by b of dr/dt = a r + b delta + c, and then in its standard errors.
 
@@ -103,7 +103,9 @@ def _rms(values: Array) -> float:
 
 def _too_large(trial: Trial, name: str, largest: float) -> Finding:
     what = f"the rudder angle reaches {np.rad2deg(largest):.4g} deg"
-    truth = "it is in degrees under the name of radians" if largest < np.rad2deg(SIDEWAYS) else "it is no rudder angle"
+    truth = (
+        "it is in degrees under the name of radians" if largest < np.rad2deg(SIDEWAYS) else "it is not a rudder angle"
+    )
 
     def in_degrees(other: Trial) -> Trial:
         return with_signals(other, {name: np.deg2rad(other.signals[name])}, f"{name}: {truth}")
@@ -156,7 +158,7 @@ def _wrong_sign(trial: Trial, name: str, response: float) -> Finding:
 
 
 def _saturation(trial: Trial) -> list[Finding]:
-    """A rudder that stands still at its largest angle while more is ordered."""
+    """A rudder that stays at its largest angle while more is ordered."""
     if not set(RUDDERS) <= set(trial.signals):
         return []
     angle, order = (trial.signals[name] for name in RUDDERS)
@@ -167,7 +169,7 @@ def _saturation(trial: Trial) -> list[Finding]:
     if not at_stop.any() or np.count_nonzero(beyond) < 0.5 * np.count_nonzero(at_stop) or beyond.sum() < 10:
         return []
     share = float(np.mean(beyond))
-    what = f"the rudder stands at {np.rad2deg(stop):.3g} deg while more is ordered, {100 * share:.2g} % of the time"
+    what = f"the rudder stays at {np.rad2deg(stop):.3g} deg while more is ordered, {100 * share:.2g} % of the time"
     truth = "the steering gear or the sensor saturates there"
     evidence = {"stop_deg": float(np.rad2deg(stop)), "share": share}
     return [Finding(trial.path, (trial.heading("delta_rad"),), what, truth, "note", evidence)]

@@ -13,12 +13,12 @@ from tank2sim.records.audit.weak import on_uniform_time
 from tank2sim.records.trials import Trial
 
 _DEGREE = np.pi / 180
-MOVED, AT_REST = 5 * _DEGREE, 1 * _DEGREE
+MOVED, STEADY = 5 * _DEGREE, 1 * _DEGREE
 """A rudder that goes so far, and noise within which it rests. Project choice: any execute, and any usual sensor."""
-REST_ROWS, REACH_ROWS, MOVES = 6, 20, 3
+STEADY_ROWS, REACH_ROWS, MOVES = 6, 20, 3
 """Rows at rest before a movement, rows in which the yaw rate comes half-way, and movements: fewer show no clock."""
 LATE = 0.17
-"""Lateness, as a share of the time in which the yaw rate comes half-way, that is no fault of the short-time expansion:
+"""Lateness, as a share of the time in which the yaw rate comes half-way, that is not due to the short-time expansion:
 free-running models with right clocks (KVLCC2 of HSVA and MARIN, Esso Osaka) stay below 0.15."""
 _BETTER = 2.0
 """Ratio of the sums of squares without and with the shift; wind alone gives up to 1.4. Project choice."""
@@ -53,50 +53,54 @@ def rudder_clock_findings(trial: Trial) -> list[Finding]:
         return []
     reach = int(np.median([move.reach for move in moves]))
     shifts = np.arange(-reach, reach + 1, max(1, reach // 40))
-    left = np.array([sum(_left(move, rudder, rate, step, int(shift)) for move in moves) for shift in shifts])
-    best = int(np.argmin(left))
+    squares = np.array([sum(_squares(move, rudder, rate, step, int(shift)) for move in moves) for shift in shifts])
+    best = int(np.argmin(squares))
     late = float(shifts[best]) * step
-    unshifted = float(left[np.argmin(np.abs(shifts))])
-    if late < LATE * reach * step or unshifted < _BETTER * left[best] or best == len(shifts) - 1:
+    unshifted = float(squares[np.argmin(np.abs(shifts))])
+    if late < LATE * reach * step or unshifted < _BETTER * squares[best] or best == len(shifts) - 1:
         return []
     what = f"the yaw rate answers {late:.3g} s before the rudder moves, in {len(moves)} movements"
     truth = f"the rudder is late by about {late:.2g} s (its clock, or a filter in the sensor)"
-    evidence = {"delay_s": late, "movements": float(len(moves)), "squares_ratio": unshifted / max(left[best], 1e-300)}
+    evidence = {
+        "delay_s": late,
+        "movements": float(len(moves)),
+        "squares_ratio": unshifted / max(squares[best], 1e-300),
+    }
     return [Finding(trial.path, (trial.heading("delta_rad"),), what, truth, "note", evidence)]
 
 
 def _moves(rudder: Array, rate: Array) -> list[_Move]:
     """Movements out of a rest, each with a window as long before as after it, up to the next."""
     starts: list[tuple[int, int, int]] = []
-    rest, row = 0, 1
+    steady_row, row = 0, 1
     while row < len(rudder):
-        middle = float(np.median(rudder[max(rest, row - 5 * REACH_ROWS) : row]))
-        if abs(rudder[row] - middle) <= AT_REST:
+        middle = float(np.median(rudder[max(steady_row, row - 5 * REACH_ROWS) : row]))
+        if abs(rudder[row] - middle) <= STEADY:
             row += 1
             continue
         side = np.sign(rudder[row] - middle)
         last = _end_of_move(rudder * side, row)
         if abs(rudder[last] - middle) > MOVED:
-            starts.append((rest, row - 1, last))
-        rest, row = last, last + 1
+            starts.append((steady_row, row - 1, last))
+        steady_row, row = last, last + 1
     ends = [*(start for _, start, _ in starts), len(rudder) - 1][1:]
     return [move for start, end in zip(starts, ends, strict=True) if (move := _move(start, end, rate)) is not None]
 
 
 def _end_of_move(rising: Array, row: int) -> int:
     last = row
-    while row + 1 < len(rising) and row - last < REST_ROWS:
+    while row + 1 < len(rising) and row - last < STEADY_ROWS:
         row += 1
-        if rising[row] > rising[last] + 0.1 * AT_REST:
+        if rising[row] > rising[last] + 0.1 * STEADY:
             last = row
     return last
 
 
 def _move(start: tuple[int, int, int], end: int, rate: Array) -> _Move | None:
-    rest, row, last = start
-    if row - rest < REST_ROWS or end - last < REST_ROWS:
+    steady_row, row, last = start
+    if row - steady_row < STEADY_ROWS or end - last < STEADY_ROWS:
         return None
-    before = rate[max(rest, row - 10) : row + 1]
+    before = rate[max(steady_row, row - 10) : row + 1]
     answer = rate[row:end]
     if not np.isfinite(before).any() or not np.isfinite(answer).any():
         return None
@@ -104,10 +108,10 @@ def _move(start: tuple[int, int, int], end: int, rate: Array) -> _Move | None:
     reach = int(np.argmax(away > 0.5 * np.nanmax(away)))
     if reach < REACH_ROWS:
         return None
-    return _Move(max(rest, row - reach), row, min(end, row + reach), reach)
+    return _Move(max(steady_row, row - reach), row, min(end, row + reach), reach)
 
 
-def _left(move: _Move, rudder: Array, rate: Array, step: float, shift: int) -> float:
+def _squares(move: _Move, rudder: Array, rate: Array, step: float, shift: int) -> float:
     """Sum of squares that the answer to the rudder, taken `shift` rows later in the record, leaves of r."""
     rows = np.arange(move.begin, move.end)
     taken = np.clip(rows + shift, 0, len(rudder) - 1)

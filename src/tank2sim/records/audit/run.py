@@ -49,8 +49,8 @@ def repair_trial(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
     """The trial with every safe correct applied (frames, signs, units, time base, failed readings left out), and what
     for.
 
-    The notices of the trial tell each change. Findings without a safe correct (:class:`Finding`) are not among those
-    returned: biases, scales and clocks stay as measured.
+    The notices of the trial state each change. Findings without a safe correction (:class:`Finding`) are not among
+    those returned: biases, scales and clocks stay as measured.
     """
     repaired, findings = audit_and_repair(trial)
     return repaired, tuple(finding for finding in findings if finding.safe and finding.repair is not None)

@@ -1,4 +1,4 @@
-"""Each signal by itself: missing values, a sensor that stands still, spikes, values held between slower readings."""
+"""Each signal by itself: missing values, a sensor that does not change, spikes, values held between slower readings."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def sensor_findings(trial: Trial) -> list[Finding]:
     for name, values in trial.signals.items():
         findings += _missing(trial, name, values)
         if name in MOTIONS and np.nanmax(values) == np.nanmin(values):
-            findings += _stands_still(trial, name, noise)
+            findings += _frozen(trial, name, noise)
         elif name in MOTIONS:
             findings += _stuck(trial, name, values)
             findings += _spikes(trial, name, values, noise[name])
@@ -94,11 +94,11 @@ def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
     longest = max(run.stop - run.start for run in runs)
     others = alike.sum() - longest
     chance = max(float(others / max(len(values) - longest, 1)), 1 / len(values))
-    if chance > 0.5:  # rests more often than not: no sensor of a motion, or one far too coarse to tell
+    if chance > 0.5:  # rests more often than not: no sensor of a motion, or one far too coarse to judge
         return []
     least = np.log(len(values) / FALSE_ALARM) / -np.log(chance)
     bends = np.abs(np.diff(values, n=2))
-    # of white noise the bends are 1.7 times the steps, of a curve less; rounding alone is no noise
+    # of white noise the bends are 1.7 times the steps, of a curve less; rounding alone is not noise
     noisy = np.median(bends[bends > 0]) > np.median(moving) and white_noise(values) > _ROUNDING * np.nanmax(abs(values))
     usual = float(np.quantile(moving, 0.9))
     long_enough = [run for run in runs if run.stop - run.start > max(least, 9)]
@@ -107,10 +107,10 @@ def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
         return []
     seconds = sum(run.stop - run.start for run in stuck) * sampling_step(trial)
     first = stuck[0]
-    what = f"stands still for {seconds:.3g} s in all, first at {trial.time_s[first.start]:.6g} s"
+    what = f"does not change for {seconds:.3g} s in all, first at {trial.time_s[first.start]:.6g} s"
     evidence = {"runs": float(len(stuck)), "seconds": seconds, "longest_samples": float(longest + 1)}
     rows = np.concatenate([np.arange(run.start + 1, run.stop + 1) for run in stuck])
-    repair = _left_out(name, rows, "where the sensor stood still")
+    repair = _omitted(name, rows, "where the sensor did not change")
     kind = _kind(len(rows), values)
     truth, places = "the sensor was stuck", _places(trial, stuck)
     return [
@@ -127,7 +127,7 @@ def _jumps(values: Array, run: slice, usual: float) -> bool:
     return bool(abs(after[0] - values[run.stop]) > 3 * max(usual, float(np.median(np.abs(np.diff(after))))))
 
 
-def _stands_still(trial: Trial, name: str, noise: dict[str, float]) -> list[Finding]:
+def _frozen(trial: Trial, name: str, noise: dict[str, float]) -> list[Finding]:
     """A signal of one value: in a measured record, where the others have noise, the sensor was not read."""
     others = [other for other in MOTIONS if other in trial.signals and other != name]
     measured = [noise[other] > _ROUNDING * float(np.nanmax(np.abs(trial.signals[other]))) for other in others]
@@ -148,8 +148,8 @@ def _spikes(trial: Trial, name: str, values: Array, noise: float, least: float =
     if known.size < 4 * WINDOW:
         return []
     away = values[known] - median_filter(values[known], size=2 * SPIKE_SAMPLES + 1, mode="nearest")
-    left = 1.0 - float(savgol_coeffs(WINDOW, DEGREE)[WINDOW // 2])
-    usual = max(1.4826 * float(np.median(np.abs(away))), noise * float(np.sqrt(left)))
+    noise_share = 1.0 - float(savgol_coeffs(WINDOW, DEGREE)[WINDOW // 2])
+    usual = max(1.4826 * float(np.median(np.abs(away))), noise * float(np.sqrt(noise_share)))
     limit = max(least, max(SPIKE, float(norm.isf(FALSE_ALARM / known.size / 2))) * usual)
     runs = _isolated(values[known], np.abs(away) > limit)
     # a signal that often moves as far between neighbours, the spikes left out, has none
@@ -164,7 +164,7 @@ def _spikes(trial: Trial, name: str, values: Array, noise: float, least: float =
     rows = np.concatenate([known[run] for run in runs])
     what = f"{len(runs)} spikes, the first at {trial.time_s[rows[0]]:.6g} s"
     evidence = {"spikes": float(len(runs)), "largest_in_noise": float(np.max(np.abs(away)) / usual) if usual else 0.0}
-    repair = _left_out(name, rows, "spikes")
+    repair = _omitted(name, rows, "spikes")
     truth, kind = "disturbed readings", _kind(len(rows), values)
     places = _places(trial, [slice(known[run.start], known[run.stop - 1] + 1) for run in runs])
     return [
@@ -173,12 +173,12 @@ def _spikes(trial: Trial, name: str, values: Array, noise: float, least: float =
 
 
 def _isolated(values: Array, far: NDArray[np.bool_]) -> list[slice]:
-    """The runs of values far away that are as short as a spike, and stand out."""
-    return [run for run in _runs(far) if run.stop - run.start <= SPIKE_SAMPLES and _stands_out(values, run, far)]
+    """The runs of values far away that are as short as a spike, and exceptional."""
+    return [run for run in _runs(far) if run.stop - run.start <= SPIKE_SAMPLES and _exceptional(values, run, far)]
 
 
-def _stands_out(values: Array, run: slice, far: NDArray[np.bool_]) -> bool:
-    """Whether the steps into and out of a run are twice any step near it: the top of a smooth curve is no spike.
+def _exceptional(values: Array, run: slice, far: NDArray[np.bool_]) -> bool:
+    """Whether the steps into and out of a run are twice any step near it: the top of a smooth curve is not a spike.
 
     Steps from and to other values far away do not count, for spikes may lie close together.
     """
@@ -196,10 +196,10 @@ def _kind(rows: int, values: Array) -> Literal["fault", "note"]:
     return "fault" if rows > _SHORT * len(values) else "note"
 
 
-def _left_out(name: str, rows: NDArray[np.int64], why: str) -> Repair:
-    def left_out(trial: Trial) -> Trial:
+def _omitted(name: str, rows: NDArray[np.int64], why: str) -> Repair:
+    def omit(trial: Trial) -> Trial:
         values = trial.signals[name].copy()
         values[rows] = np.nan
         return with_signals(trial, {name: values}, f"{name}: {len(rows)} values left out, {why}")
 
-    return left_out
+    return omit

@@ -15,7 +15,7 @@ from tank2sim.units import KNOT_MPS
 
 FOOT_M = 0.3048
 _UNITS = {KNOT_MPS: "knots", 1 / 3.6: "km/h", FOOT_M: "ft/s"}
-"""Factor between speed over ground and speed as given, to the unit of the velocities that it tells of."""
+"""Factor between speed over ground and speed as given, to the unit of the velocities that it indicates."""
 LENGTHS = {1e-3: "kilometres", 1 / FOOT_M: "feet", 1 / 1852: "nautical miles"}
 """The same, to the unit of the positions."""
 CERTAIN = 0.02
@@ -126,7 +126,7 @@ def _in_lengths(fault: Finding, places: tuple[str, ...], unit: float, name: str,
 def _scale(track: AuditedTrack, given: Complex, names: tuple[str, ...]) -> _Scale | None:
     """By regression with a current left free, under the reading of the columns that leaves least; else by the speeds.
 
-    Speeds alone, of a record that hardly turns, do not tell a scale from a current.
+    Speeds alone, of a record that hardly turns, do not distinguish a scale from a current.
     """
     mean = track.windows.mean(np.abs(given))
     moving = mean > 0
@@ -144,11 +144,11 @@ def _scale(track: AuditedTrack, given: Complex, names: tuple[str, ...]) -> _Scal
         fits = [] if found is None else [(found.residual, float(found.values[0]), float(found.errors[0]))]
     else:
         fits = [_fitted(track, reading.velocity(given, turn), reading.mirrored) for reading in TRACK_READINGS]
-    fits = [one for one in fits if one[1] > 0]
+    fits = [candidate for candidate in fits if candidate[1] > 0]
     if fits:
-        left, factor, error = min(fits)
-        left /= track.speed
-        return _Scale(factor, error, left) if error < KNOWN * factor else _Scale(ratio, np.inf, left)
+        misfit, factor, error = min(fits)
+        misfit /= track.speed
+        return _Scale(factor, error, misfit) if error < KNOWN * factor else _Scale(ratio, np.inf, misfit)
     return _Scale(ratio, np.inf)
 
 

@@ -45,10 +45,10 @@ def _stray(trial: Trial) -> Finding | None:
         return found
     truth = "a time of another clock or a slip in these rows: they are left out"
 
-    def left_out(other: Trial) -> Trial:
+    def omit(other: Trial) -> Trial:
         return replace(select_rows(other, np.flatnonzero(~far)), notices=(*other.notices, f"time: {truth}"))
 
-    return replace(found, likely_truth=truth, repair=left_out, safe=True)
+    return replace(found, likely_truth=truth, repair=omit, safe=True)
 
 
 def _of_steps(trial: Trial) -> list[Finding]:

@@ -31,7 +31,7 @@ def time_unit_findings(trial: Trial) -> list[Finding]:
     """A finding if yaw and way agree on the rate of the clock; nothing where one of them was not measured.
 
     A known unit of time is repaired. Another rate is not: whether the clock was wrong or rows were left out or
-    repeated, the record does not tell.
+    repeated, the record does not decide.
     """
     turned, gone = _turned(trial), _gone(trial)
     if turned is None or gone is None or abs(abs(turned) / gone - 1) > AGREEMENT:

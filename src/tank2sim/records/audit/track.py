@@ -21,7 +21,7 @@ EVIDENCE = 20.0
 """Gain in twice the log likelihood from which another reading is taken: 10 is "very strong" (Kass & Raftery 1995), and
 some readings are compared."""
 SCALE, OFFSET, CURRENT = 0.01, np.deg2rad(0.3), 0.01
-"""What is worth a word: a log or a current to 1 % of the speed, a compass to 0.3 deg. Choices of ours."""
+"""What is worth a word: a log or a current to 1 % of the speed, a compass to 0.3 deg. Project choices."""
 FASTEST = 0.5
 """Current, as a share of the speed over ground, from which it is none. Project choice: no trial is run in such."""
 
@@ -88,7 +88,7 @@ _EARTH = {truth for reading in OTHERWISE if reading.earth for truth in (reading.
 
 
 def track_findings(trial: Trial) -> list[Finding]:
-    """What velocities and positions, each in its unit, tell of each other; nothing without positions and heading."""
+    """Findings from velocities against positions, each in its unit; none without positions and heading."""
     if not {"x_m", "y_m", "psi_rad"} <= set(trial.signals):
         return []
     findings: list[Finding] = []
@@ -136,8 +136,8 @@ def _of_pair(trial: Trial, pair: tuple[str, str]) -> list[Finding]:
         track = audited_track(trial)
         given = track.signals[pair[0]] + 1j * track.signals[pair[1]]
     lesser = _lesser(trial, track, pair, given)
-    # velocities along the axes of the track have been turned with psi and back: they do not tell of it
-    return findings + [one for one in lesser if not (earth and one.columns == (trial.heading("psi_rad"),))]
+    # velocities along the axes of the track have been turned with psi and back: they do not show it
+    return findings + [item for item in lesser if not (earth and item.columns == (trial.heading("psi_rad"),))]
 
 
 def _frame(trial: Trial, track: AuditedTrack, pair: tuple[str, str], given: Complex) -> Finding | None:
@@ -156,7 +156,7 @@ def _frame(trial: Trial, track: AuditedTrack, pair: tuple[str, str], given: Comp
     turned = quarters % 2 == 1 and best.quarter_truth
     truth, wrong = (best.quarter_truth, best.quarter_wrong) if turned else (best.truth, best.wrong)
     # a rate of turn agrees with the heading by now, or there is none
-    names = [name for name in (_signal(pair, one) for one in wrong) if name in trial.signals]
+    names = [name for name in (_signal(pair, item) for item in wrong) if name in trial.signals]
     columns = tuple(trial.heading(name) for name in names)
     what = (
         f"({', '.join(trial.heading(name) for name in pair)}) as body velocities, turned by psi, miss d(x, y)/dt "
@@ -177,8 +177,8 @@ def _misfit(track: AuditedTrack, reading: TrackReading, given: Complex, turn: Co
     # with the mean, or a straight course would leave the rotation to the noise
     factor = np.vdot(velocity, ground)
     rotation = factor / abs(factor) if abs(factor) > 0 else 1.0
-    rest = ground - rotation * velocity
-    return float(np.sqrt(np.mean(np.abs(rest - rest.mean()) ** 2))), float(np.angle(rotation))
+    remainder = ground - rotation * velocity
+    return float(np.sqrt(np.mean(np.abs(remainder - remainder.mean()) ** 2))), float(np.angle(rotation))
 
 
 def _signal(pair: tuple[str, str], name: str) -> str:

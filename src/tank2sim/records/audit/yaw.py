@@ -78,7 +78,7 @@ def yaw_findings(trial: Trial) -> list[Finding]:
     ends = [trial.heading(name) for name in ("r_radps", "psi_rad")]
     figures = {"correlation": found.correlation}
     what = f"r and dpsi/dt are not the same motion (correlation {found.correlation:.2f})"
-    return [Finding(trial.path, tuple(ends), what, "one of the two is no yaw motion of this ship", evidence=figures)]
+    return [Finding(trial.path, tuple(ends), what, "one of the two is not a yaw motion of this ship", evidence=figures)]
 
 
 def _alike(trial: Trial) -> _Comparison | None:
@@ -92,8 +92,8 @@ def _alike(trial: Trial) -> _Comparison | None:
         found = _comparison(windows, rate, candidate, step)
         if found is not None and not found.alike:
             # noise that the estimate does not see (digits lost, waves) shows as what is left: wider windows take it
-            left = found.fit.residual / windows.noise_of_rate(1.0)
-            found = _comparison(windows_of(candidate, max(left, noise), step), rate, candidate, step)
+            residual_noise = found.fit.residual / windows.noise_of_rate(1.0)
+            found = _comparison(windows_of(candidate, max(residual_noise, noise), step), rate, candidate, step)
         if found is not None and found.alike:
             return found
     return None
@@ -151,7 +151,7 @@ def _headings(trial: Trial, heading: Array) -> list[Array]:
 
 
 def _comparison(windows: AuditWindows, rate: Array, heading: Array, step: float) -> _Comparison | None:
-    """The comparison as they stand, or at the lag that makes them alike; None if there is too little to judge."""
+    """The comparison of both unchanged, or at the lag that makes them alike; None if there is too little to judge."""
     first = _at(windows, rate, heading, step, 0)
     if first is None:
         return None
@@ -256,10 +256,10 @@ def _factor(trial: Trial, found: _Comparison) -> Finding:
 
 
 def _unit(trial: Trial, found: _Comparison) -> Finding | None:
-    """The unit that a factor between dpsi/dt and r tells of, and of which of them, if that can be told."""
+    """The unit that a factor between dpsi/dt and r indicates, and of which of them, if that can be determined."""
     factor = abs(found.factor)
     nearest = min((1.0, 1 / _DEGREE, _DEGREE, 1 / 60), key=lambda unit: abs(np.log(factor / unit)))
-    # few or noisy windows tell a factor less well
+    # few or noisy windows determine a factor less well
     tolerance = max(UNIT_TOLERANCE, min(0.1, 4.5 * float(found.fit.errors[0]) / factor))
     if nearest == 1.0 or abs(np.log(factor / nearest)) > tolerance:
         return None
@@ -312,7 +312,7 @@ def _sign(trial: Trial, found: _Comparison) -> Finding:
 
 
 def _against_track(trial: Trial) -> list[Finding]:
-    """A course that turns against the heading, where no velocities tell which of them is mirrored."""
+    """A course that turns against the heading, where no velocities show which of them is mirrored."""
     slope = _course_slope(trial)
     if slope is None or abs(np.log(abs(slope))) > 1.0 or slope > 0 or {"u_mps", "v_mps"} <= set(trial.signals):
         return []

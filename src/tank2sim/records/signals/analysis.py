@@ -107,8 +107,8 @@ def analyse(trial: Trial, settings: SignalSettings) -> TrialAnalysis:
                 notices.append(f"{SignalName(name).file} is left out: it {error.problem}; {error.remedy}")
         if not series:
             raise InputError(trial.path, "", "no signal of it can be analysed", notices[-1])
-    columns = tuple(_analysed(one, settings.segment_s) for one in series.values())
-    notices += [notice for one in series.values() for notice in one.notices]
+    columns = tuple(_analysed(item, settings.segment_s) for item in series.values())
+    notices += [notice for item in series.values() for notice in item.notices]
     return TrialAnalysis(trial, columns, _steering(series, settings.segment_s), tuple(notices))
 
 

@@ -80,13 +80,13 @@ def cross_correlation(first: Series, second: Series) -> Correlation:
     coefficient = _coefficients(second.values, first.values)
     lags = signal.correlation_lags(count, count)
     kept = np.abs(lags) <= count // 4
-    own = [_coefficients(one.values, one.values)[kept] for one in (first, second)]
-    bound = _NORMAL * float(np.sqrt(max(float(np.sum(own[0] * own[1])), 1.0) / count))
+    auto = [_coefficients(sequence.values, sequence.values)[kept] for sequence in (first, second)]
+    bound = _NORMAL * float(np.sqrt(max(float(np.sum(auto[0] * auto[1])), 1.0) / count))
     return Correlation(first.step_s * lags[kept], coefficient[kept], bound)
 
 
-def _coefficients(one: Array, other: Array) -> Array:
+def _coefficients(sequence: Array, second: Array) -> Array:
     """At all lags from -(n - 1) to n - 1; divided by n and not by the number of pairs, whose scatter is greater."""
-    one, other = one - one.mean(), other - other.mean()
-    product: Array = signal.correlate(one, other, method="fft")
-    return product / (len(one) * float(one.std()) * float(other.std()))
+    sequence, second = sequence - sequence.mean(), second - second.mean()
+    product: Array = signal.correlate(sequence, second, method="fft")
+    return product / (len(sequence) * float(sequence.std()) * float(second.std()))

@@ -1,4 +1,4 @@
-"""Filters and smoothers, each with what it does to amplitude and phase told."""
+"""Filters and smoothers, each with its effect on amplitude and phase."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def butterworth(
     order : int
         Of one pass; of a band pass, of each of its sides.
     causal : bool
-        Forwards alone; it begins as if the first value had always stood.
+        Forwards alone; it begins as if the signal had always had its first value.
 
     Raises
     ------
@@ -226,7 +226,7 @@ def _zero_phase_sentence(effect: FilterEffect, edges: Sequence[float]) -> str:
 
 
 def _causal_sentence(effect: FilterEffect, kind: FilterType, edges: Sequence[float]) -> str:
-    # Told well inside of what is let through: an octave from the edge, or in the middle of the band.
+    # Stated well inside of the passband: an octave from the edge, or in the middle of the band.
     frequency = {
         FilterType.LOW: edges[0] / 2,
         FilterType.HIGH: edges[0] * 2,

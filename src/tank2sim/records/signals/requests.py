@@ -43,10 +43,10 @@ def parse_filter(text: str) -> FilterRequest:
     Raises
     ------
     InputError
-        There is no such filter, or its numbers are not as many and of the kind that it takes.
+        The filter does not exist, or its numbers are not as many and of the kind that it takes.
     """
-    kind, _, rest = text.strip().partition(":")
-    words = [word.strip() for word in rest.split(",") if word.strip()]
+    kind, _, parameters = text.strip().partition(":")
+    words = [word.strip() for word in parameters.split(",") if word.strip()]
     causal = bool(words) and words[-1] == "causal" and kind in set(FilterType)
     try:
         numbers = [float(word) for word in (words[:-1] if causal else words)]
@@ -68,4 +68,4 @@ def parse_filter(text: str) -> FilterRequest:
 
 
 def _refusal(text: str) -> InputError:
-    return InputError("--filter", "", f"{text!r} is no filter", f"write one of {REQUEST_FORMS}")
+    return InputError("--filter", "", f"{text!r} is not a filter", f"write one of {REQUEST_FORMS}")

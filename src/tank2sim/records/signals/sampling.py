@@ -120,8 +120,8 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
         values = _at(time, values, grid, held=name in HELD_COLUMNS)
         way = "held" if name in HELD_COLUMNS else "interpolated by straight lines"
         notices.append(f"is unevenly sampled or has gaps of up to {longest:.4g} s; it was {way} at {step:.4g} s")
-    told = tuple(f"{column.removeprefix('column ')} {notice}" for notice in notices)
-    return Series(trial.path, name, float(time[0]), step, values, told)
+    messages = tuple(f"{column.removeprefix('column ')} {notice}" for notice in notices)
+    return Series(trial.path, name, float(time[0]), step, values, messages)
 
 
 def _usual_step(time: Array) -> float:
@@ -143,7 +143,7 @@ def at_common_times(first: Series, second: Series) -> tuple[Series, Series]:
     end = min(float(first.time_s[-1]), float(second.time_s[-1]))
     step = min(first.step_s, second.step_s)
     count = int(np.floor((end - start) / step + 1e-6)) + 1
-    names = " and ".join(SignalName(one.name).file for one in (first, second))
+    names = " and ".join(SignalName(item.name).file for item in (first, second))
     if count < FEWEST_SAMPLES:
         problem = f"have {max(count, 0)} samples at the same times, and at least {FEWEST_SAMPLES} are needed"
         raise InputError(first.source, f"columns {names}", problem, "give a longer record")
@@ -152,18 +152,18 @@ def at_common_times(first: Series, second: Series) -> tuple[Series, Series]:
 
 
 def _moved(series: Series, grid: Array, step: float) -> Series:
-    own = series.time_s
-    if len(own) == len(grid) and np.max(np.abs(own - grid)) <= _JITTER * step:
+    times = series.time_s
+    if len(times) == len(grid) and np.max(np.abs(times - grid)) <= _JITTER * step:
         return series
-    values = _at(own, series.values, grid, held=series.name in HELD_COLUMNS)
+    values = _at(times, series.values, grid, held=series.name in HELD_COLUMNS)
     return replace(series, start_s=float(grid[0]), step_s=step, values=values)
 
 
 def _at(time: Array, values: Array, grid: Array, *, held: bool) -> Array:
     if held:
         places = np.searchsorted(time, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1
-        stands: Array = values[np.clip(places, 0, None)]
-        return stands
+        held_values: Array = values[np.clip(places, 0, None)]
+        return held_values
     between: Array = np.interp(grid, time, values)
     return between
 

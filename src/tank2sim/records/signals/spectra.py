@@ -203,7 +203,7 @@ def transfer_function(source: Series, result: Series, segment_s: float | None = 
     frequency, power = signal.welch(source.values, **options)
     _, cross = signal.csd(source.values, result.values, **options)
     _, coherence = signal.coherence(source.values, result.values, **_without_scaling(options))
-    names = " and ".join(SignalName(one.name).file for one in (source, result))
+    names = " and ".join(SignalName(item.name).file for item in (source, result))
     if not np.all(power[inner] > 0):
         raise InputError(source.source, f"columns {names}", "have no power at some frequency", "leave them out")
     kept = np.clip(coherence[inner], 1e-12, 1.0)
@@ -218,7 +218,7 @@ def _averaging(signals: Sequence[Series], segment_s: float | None) -> Averaging:
     series = signals[0]
     count = len(series.values)
     if segment_s is None:
-        slowest = max(autocorrelation(one).correlation_time_s for one in signals)
+        slowest = max(autocorrelation(item).correlation_time_s for item in signals)
         # Segments of n samples that begin every n/2: (segments + 1) n/2 samples.
         samples = min(
             count // 2, max(2 * count // (_SEGMENTS + 1), round(_CORRELATION_TIMES * slowest / series.step_s))
@@ -227,7 +227,7 @@ def _averaging(signals: Sequence[Series], segment_s: float | None) -> Averaging:
         samples = round(segment_s / series.step_s)
     if not _FEWEST_IN_SEGMENT <= samples <= count // 2:
         allowed = f"{_FEWEST_IN_SEGMENT * series.step_s:.4g} to {count // 2 * series.step_s:.4g} s"
-        problem = f"{samples * series.step_s:.4g} s is no length of a segment of {series.source}"
+        problem = f"{samples * series.step_s:.4g} s is not a length of a segment of {series.source}"
         raise InputError("--segment", "", problem, f"give {allowed}")
     hop = samples - samples // 2
     segments = (count - samples) // hop + 1
@@ -262,7 +262,7 @@ def _peak(frequency: Array, density: Array, freedom: float) -> Peak | None:
     places = [place - 1 for place in signal.find_peaks(np.concatenate([[0.0], density]))[0]]
     if not places:
         return None
-    place = max(places, key=lambda one: float(density[one]))
+    place = max(places, key=lambda item: float(density[item]))
     top = float(frequency[place])
     below = density[(frequency >= top / 2) & (frequency < top)]
     above = density[(frequency > top) & (frequency <= 2 * top)]

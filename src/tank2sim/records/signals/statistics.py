@@ -46,9 +46,9 @@ class Stationary(StrEnum):
 _MEANINGS = {
     Stationary.YES: "it returns to its level (Dickey-Fuller), and nothing speaks against a steady level (KPSS)",
     Stationary.TREND: "it returns to a straight line in time, and nothing speaks against that; --filter detrend:1",
-    Stationary.NO: "its level wanders as in a random walk (both tests); mean and spectrum tell little, detrend it",
+    Stationary.NO: "its level wanders as in a random walk (both tests); mean and spectrum mean little, detrend it",
     Stationary.CONTRADICTORY: "neither a steady level nor a random walk: a step, a bend or a change of spread",
-    Stationary.UNDECIDED: "the record is too short to tell a steady level from a random walk",
+    Stationary.UNDECIDED: "the record is too short to distinguish a steady level from a random walk",
 }
 
 
@@ -62,7 +62,7 @@ class UnitRootTests:
         Augmented Dickey-Fuller; null hypothesis: a random walk. Small: it returns to its level.
     kpss : float
         Kwiatkowski, Phillips, Schmidt & Shin; null hypothesis: stationary. Small: it does not. Their table ends at
-        0.01 and 0.1, which stand for what is beyond.
+        0.01 and 0.1, which bound what is beyond.
     """
 
     dickey_fuller: float
@@ -214,7 +214,7 @@ def _unit_root_tests(values: Array, about: str) -> UnitRootTests:
     from statsmodels.tsa.stattools import adfuller, kpss
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # p-values beyond the table of KPSS, as Stationarity tells
+        warnings.simplefilter("ignore")  # p-values beyond the table of KPSS, as Stationarity states
         return UnitRootTests(float(adfuller(values, regression=about)[1]), float(kpss(values, regression=about)[1]))
 
 

@@ -16,7 +16,7 @@ HIGHEST_DEGREE = 10
 def detrend(series: Series, degree: int) -> Filtered:
     """The signal less the polynomial of `degree` in time that fits it best (0: its mean, 1: a straight line).
 
-    What it does to a wave depends on where in the record its crests are; the effect told is the mean over all such
+    What it does to a wave depends on where in the record its crests are; the stated effect is the mean over all such
     places, the part of the wave that stays a wave of this frequency. It has no phase.
 
     Raises
@@ -25,7 +25,7 @@ def detrend(series: Series, degree: int) -> Filtered:
         The degree is not from 0 to 10.
     """
     if not 0 <= degree <= HIGHEST_DEGREE:
-        problem = f"{degree} is no degree of a trend"
+        problem = f"{degree} is not a degree of a trend"
         raise InputError("detrend", "", problem, f"give 0 (the mean) to {HIGHEST_DEGREE}, or use highpass")
     count = len(series.values)
     across = np.linspace(-1.0, 1.0, count)
