@@ -137,6 +137,7 @@ print(json.dumps(found))
     np.testing.assert_allclose(pushed - without, [0, force, LEVER * L * force], rtol=1e-9, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_it_simulates_and_its_fmu_does_the_same_without_the_package(site: Path, work: Path) -> None:
     bare = simulate(
         build(parse_card(mariner_text(), "mariner.toml")), Zigzag(math.radians(20), math.radians(20)), duration_s=400
@@ -241,6 +242,7 @@ def write_log(path: Path, record: Mapping[str, np.ndarray]) -> None:
     np.savetxt(path, rows, fmt="%.6f", header="BRIDGE LOG", comments="")
 
 
+@pytest.mark.slow
 def test_a_log_is_read_by_the_package_and_fitted_in_its_structure(site: Path, work: Path) -> None:
     record = measured(work / "zz.csv")
     (work / "logs").mkdir()
@@ -339,6 +341,7 @@ def test_a_faulty_effect_is_refused_where_it_is_used(faulty: Path, tmp_path: Pat
     refused(searched, "entry point tank2sim.effects: lost: ", "no_such_module")
 
 
+@pytest.mark.slow
 def test_faulty_packages_do_not_stop_what_does_not_use_them(faulty: Path, tmp_path: Path) -> None:
     text = (
         mariner_text() + '\n[[effects]]\nname = "wind"\n[effects.parameters]\nspeed_mps = 5.0\ndirection_deg = 40.0\n'
@@ -367,6 +370,7 @@ def test_faulty_packages_do_not_stop_what_does_not_use_them(faulty: Path, tmp_pa
     assert "tank2sim.effects: wind: its name is built in" in listed.stderr
 
 
+@pytest.mark.slow
 def test_a_structure_that_cannot_be_loaded_is_refused_by_its_name(faulty: Path, tmp_path: Path) -> None:
     (tmp_path / "card.toml").write_text(mariner_text())
     rows = "".join(f"{t},10,7.7,0,{0.2 * t},{0.1 * t * t}\n" for t in range(200))

@@ -46,6 +46,7 @@ def test_a_track_is_kept_whatever_form_it_has(pilot: t2s.AutopilotResult, tmp_pa
     assert set(pilot.cross_track.index) == {"line of sight", "with integral"}
 
 
+@pytest.mark.slow
 def test_a_result_fits_a_screen_and_has_a_picture(pilot: t2s.AutopilotResult) -> None:
     assert len(repr(pilot).splitlines()) <= 24
     assert "data:image/png;base64," in pilot._repr_html_()

@@ -53,6 +53,7 @@ def test_examples_in_docstrings_are_true(name: str, tmp_path, monkeypatch: pytes
         assert runner.run(test, out=report.append).failed == 0, "".join(report)
 
 
+@pytest.mark.slow
 def test_a_script_that_uses_the_api_passes_strict_type_checks(tmp_path) -> None:
     script = tmp_path / "script.py"
     script.write_text(

@@ -32,6 +32,7 @@ def one_leg(fmu: str, folder: str, place: str) -> None:
         (legs / f"{leg}.state").write_bytes(saved(ship))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_voyage_in_two_processes_is_that_in_one_to_the_last_bit(
     fmi: int, fmu_file: Callable[[str, int], Path], instantiate: Instantiate, tmp_path: Path

@@ -27,6 +27,7 @@ def test_the_cards_own_ship_and_a_run_without_rudder_raise_no_alarm(off):
     assert other_ship(problem(runs, off=off)) == ()
 
 
+@pytest.mark.slow
 def test_measured_ships_and_ships_with_an_unknown_effect_raise_no_alarm(data: Path) -> None:
     folder = data / "data"
     kvlcc2, esso = read_card("kvlcc2"), read_card("esso-osaka")
