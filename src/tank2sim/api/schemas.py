@@ -10,7 +10,7 @@ from typing import Any, NotRequired
 from pydantic import ConfigDict, TypeAdapter
 from typing_extensions import TypedDict
 
-from tank2sim.api.result import SCHEMA_VERSION
+from tank2sim.files import schema_name
 
 Number = float | None
 """A number; null where it is not finite or not known."""
@@ -417,11 +417,6 @@ KEYS: dict[str, Any] = {
     "yaw": YawKeys,
 }
 """Command to the keys of its JSON; ``report`` and the fleet of ``gap`` have none."""
-
-
-def schema_name(command: str) -> str:
-    """Name of the schema of a command's JSON, which stands in it under ``schema``: ``tank2sim/simulate/1``."""
-    return f"tank2sim/{command}/{SCHEMA_VERSION}"
 
 
 def json_schema(command: str) -> dict[str, Any]:
