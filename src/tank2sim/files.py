@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import stat
@@ -212,6 +213,27 @@ def _umask() -> int:
     value = os.umask(0)
     os.umask(value)
     return value
+
+
+SCHEMA_VERSION = 1
+"""Version of the JSON of all results: it grows when a key is removed or changes its meaning. Project choice."""
+
+
+def schema_name(command: str) -> str:
+    """Return the name of the schema of a command's JSON, its ``schema``: ``tank2sim/simulate/1``."""
+    return f"tank2sim/{command}/{SCHEMA_VERSION}"
+
+
+def schema_command(schema: object) -> str | None:
+    """Return the command whose JSON has a schema; None if this version does not know the schema."""
+    package, _, remaining = str(schema).partition("/")
+    command, _, version = remaining.partition("/")
+    return command if (package, version) == ("tank2sim", str(SCHEMA_VERSION)) and command else None
+
+
+def json_text(values: Mapping[str, object]) -> str:
+    """Return the text of a JSON file with these values (:func:`plain_json`)."""
+    return json.dumps(plain_json(values), indent=1, ensure_ascii=False) + "\n"
 
 
 def plain_json(value: Any) -> Any:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import copy
+import functools
 import json
+from collections.abc import Callable
 
 import jsonschema
 import pytest
@@ -12,6 +14,7 @@ import tank2sim as t2s
 from tank2sim.api.result import Result
 from tank2sim.api.schemas import KEYS
 from tank2sim.report.results.result_types import kind_of
+from tests.made_results import RESULTS, marked
 
 
 def commands(kind: type[Result] = Result) -> set[str]:
@@ -23,28 +26,39 @@ def holds(result: dict[str, object], command: str) -> bool:
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, object]]:
-    ship = t2s.load("mariner")
-    made = ship.to_fmu(tmp_path_factory.mktemp("fmu") / "m.fmu", fmi=2)
-    found = [
-        ship.zigzag(20, 20, members=3),
-        ship.turn(35, duration_s=20.0),
-        t2s.load("kvlcc2").stability(members=3),
-        ship.stability(5.0, spirals=False),
-        made,
-        t2s.check_fmu(made.path),
-    ]
-    return {f"{place} {result.command}": json.loads(result.to_json()) for place, result in enumerate(found)}
+def result(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], dict[str, object]]:
+    """The JSON of the result of a name, as it is read from a file; made once."""
+
+    @functools.cache
+    def made(name: str) -> dict[str, object]:
+        return json.loads(RESULTS[name](tmp_path_factory.mktemp("made")).to_json())
+
+    return made
 
 
-def test_results_follow_their_schemas(results) -> None:
-    for name, result in results.items():
-        jsonschema.validate(result, t2s.json_schema(name.split()[1]))
+@pytest.mark.parametrize("name", marked(RESULTS))
+def test_results_follow_their_schemas_and_no_others(result, name) -> None:
+    command, found = name.split()[0], result(name)
+    jsonschema.validate(found, t2s.json_schema(command))
+    assert found["schema"] == f"tank2sim/{command}/1"
+    without = {key: value for key, value in found.items() if key != "schema"}
+    assert not holds({**found, "not_declared": 1}, command) and not holds(without, command)
+    assert command in kind_of(found, "r.json").commands.split()
+    assert command in kind_of(without, "r.json").commands.split()
+
+
+def test_every_command_but_those_with_long_searches_has_a_result_here() -> None:
+    assert {name.split()[0] for name in RESULTS} == set(KEYS) - {"demo", "gap", "identify", "reduce"}
 
 
 def test_a_campaign_follows_its_schema(data) -> None:
     found = t2s.reduce(data / "data/pmm_synthetic_11/campaign.toml", fill="clarke1983")
     jsonschema.validate(json.loads(found.to_json()), t2s.json_schema("reduce"))
+
+
+@pytest.mark.slow
+def test_the_demonstration_follows_its_schema(tmp_path) -> None:
+    jsonschema.validate(json.loads(t2s.run_demo(tmp_path).to_json()), t2s.json_schema("demo"))
 
 
 @pytest.mark.slow
@@ -56,8 +70,8 @@ def test_trials_follow_their_schemas(data) -> None:
     jsonschema.validate(json.loads(gap.to_json(files=["gap.json"])), t2s.json_schema("gap"))
 
 
-def test_what_is_no_such_result_does_not_hold(results) -> None:
-    run = results["0 simulate"]
+def test_what_is_not_such_a_result_does_not_hold(result) -> None:
+    run = result("simulate a short run")
     wrong = []
     for change in ({"advance_ft": 3.0}, {"figures": 3.0}, {"schema": "tank2sim/stability/1"}, {"notices": None}):
         wrong.append(copy.deepcopy(run) | change)
@@ -65,17 +79,10 @@ def test_what_is_no_such_result_does_not_hold(results) -> None:
     assert holds(run, "simulate") and not any(holds(one, "simulate") for one in wrong)
 
 
-def test_report_finds_a_result_by_its_schema(results) -> None:
-    for name, result in results.items():
-        assert kind_of(result, "r.json").commands.split()[0] == name.split()[1]
-        without = {key: value for key, value in result.items() if key != "schema"}
-        assert kind_of(without, "r.json").commands.split()[0] == name.split()[1]
-
-
-def test_report_refuses_a_schema_that_is_not_known_or_that_the_keys_contradict(results) -> None:
+def test_report_refuses_a_schema_that_is_not_known_or_that_the_keys_contradict(result) -> None:
     for schema, place in (("tank2sim/stability/1", ""), ("tank2sim/simulate/99", "schema"), ("other", "schema")):
         with pytest.raises(t2s.InputError) as raised:
-            kind_of(results["0 simulate"] | {"schema": schema}, "r.json")
+            kind_of(result("simulate") | {"schema": schema}, "r.json")
         assert raised.value.place == place
 
 

@@ -115,6 +115,27 @@ def test_state_space_has_the_eigenvalues_of_the_stability_study(ship) -> None:
     np.testing.assert_allclose(sorted(poles.real), sorted(found.tables[0].df["real (1/s)"]), rtol=1e-3)
 
 
+def test_states_that_are_left_out_follow_the_others_at_once(ship) -> None:
+    signals = {"inputs": ["rudder.command"], "outputs": ["motion.r"]}
+    hull = ship.state_space(states=["motion.v", "motion.r"], **signals)
+    whole = ship.state_space(**signals)
+    assert np.abs(hull.B).min() > 0  # without rudder.angle the order is the rudder
+    assert hull.dcgain() == pytest.approx(ship.stability(spirals=False).study.stability.nomoto.K_per_s, rel=0.02)
+    slow = 1e-4j
+    assert hull(slow) == pytest.approx(whole(slow), rel=0.02)
+    by_angle = ship.state_space(states=["motion.v", "motion.r"], inputs=["rudder.angle"], outputs=["motion.r"])
+    np.testing.assert_allclose(by_angle.B, hull.B)
+
+
+def test_a_state_that_comes_to_no_rest_is_not_left_out() -> None:
+    with pytest.raises(t2s.InputError) as refusal:
+        t2s.load("kvlcc2").state_space(states=["motion.u"])  # unstable in sway and yaw, on which its speed depends
+    assert refusal.value.source == "states" and "motion.r" in refusal.value.remedy
+    with pytest.raises(t2s.InputError) as refusal:
+        t2s.load("mariner").state_space(states=["motion.flap"])
+    assert refusal.value.place == "motion.flap" and "motion.r" in refusal.value.remedy
+
+
 def test_the_criteria_of_imo_are_a_table(ship) -> None:
     imo = ship.stability(spirals=False).imo
     row = imo.loc["tactical diameter"]

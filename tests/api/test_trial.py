@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api.trials import fitted_and_held, trial_files
+from tank2sim.api.trial import fitted_and_held, trial_files
 from tests.records.motions import motion, trial
 
 

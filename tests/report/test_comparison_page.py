@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from tank2sim.analysis.validation.comparison import compare_cards
-from tank2sim.cli.console import json_text
+from tank2sim.files import json_text, plain_json
 from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.kit.charts import chart_specification
 from tank2sim.report.kit.page import render_page
@@ -24,7 +24,7 @@ def found(mariner_card):
 
 
 def test_the_page_tells_what_differs_and_draws_both_tracks(found) -> None:
-    page = compare_page(found)
+    page = compare_page(plain_json(found.as_json()))
     assert [section.heading for section in page.sections][:3] == ["Cards", "Coefficients", "Turn 35 deg to starboard"]
     rows = {row[0]: row for row in page.sections[1].tables[0].rows}
     assert rows["Nd"][5] == pytest.approx(-20.0)  # the file counts its rudder to port: Nd is negative there
@@ -36,11 +36,11 @@ def test_the_page_tells_what_differs_and_draws_both_tracks(found) -> None:
 
 
 def test_the_chart_of_errors_has_a_point_for_each_difference(found) -> None:
-    specification = chart_specification(compare_page(found).sections[1].charts[0].chart)
+    specification = chart_specification(compare_page(plain_json(found.as_json())).sections[1].charts[0].chart)
     points = [row for data in specification["datasets"].values() for row in data if "name" in row]
     assert len(points) == len(found.in_errors(1))
 
 
 def test_the_report_of_the_json_is_this_page(found) -> None:
     told = json.loads(json_text(found.as_json()))
-    assert render_page(result_page(told, "c.json")) == render_page(compare_page(found))
+    assert render_page(result_page(told, "c.json")) == render_page(compare_page(plain_json(found.as_json())))

@@ -10,9 +10,10 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
 from tank2sim.simulation.straight_course import OperatingPoint, straight_course
 
-__all__ = ["OperatingPoint", "jacobians", "signal_name", "state_space", "straight_course"]
+__all__ = ["OperatingPoint", "jacobians", "settled_states", "signal_name", "state_space", "straight_course"]
 
 
 def jacobians(
@@ -81,6 +82,37 @@ def state_space(
         outputs=[signal_name(name) for name in outputs],
         name=signal_name(model.name),
     )
+
+
+def settled_states(
+    model: Model, point: OperatingPoint, states: Sequence[str], inputs: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the states left out of `states` and `inputs` that the rates of `states` depend on, directly or not.
+
+    These follow the others at once (the `settled` of :func:`state_space`); those that nothing depends on, such as the
+    position in calm water, stay where they are.
+
+    Raises
+    ------
+    InputError
+        A state is not one of the model, or those left out come to no rest by themselves.
+    """
+    derivative = {state.name: state.derivative for state in model.states}
+    names = list(derivative)
+    for name in states:
+        if name not in names:
+            raise InputError("states", name, "is not a state of the model", f"there are: {', '.join(names)}")
+    rates, _ = jacobians(model, point, list(derivative.values()), names, [])
+    known = [names.index(name) for name in states]
+    free = [place for place, name in enumerate(names) if name not in states and name not in inputs]
+    found: list[int] = []
+    while added := [place for place in free if place not in found and rates[[*known, *found], place].any()]:
+        found += added
+    if found and np.linalg.eigvals(rates[np.ix_(found, found)]).real.max() >= 0:
+        missing = ", ".join(names[place] for place in found)
+        problem = f"leave out {missing}: the others depend on what is left out, and it does not settle by itself"
+        raise InputError("states", "", problem, f"add {missing} to the states")
+    return tuple(names[place] for place in found)
 
 
 def signal_name(name: str) -> str:

@@ -13,13 +13,12 @@ import numpy as np
 from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
 from tank2sim.analysis.heading.study import AutopilotStudy, StudySettings, check_settings, study_autopilot
 from tank2sim.analysis.heading.track_keeping import check_waypoints, read_waypoints
-from tank2sim.api.paged import PagedResult
-from tank2sim.api.result import ResultTable
+from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.errors import InputError
-from tank2sim.files import plain_json, write_together
+from tank2sim.files import write_together
 from tank2sim.native.compiler import find_compiler
 from tank2sim.simulation.integrator import NO_COMPILER
 from tank2sim.simulation.trial_file import trial_columns
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 
     from tank2sim.fmu.autopilot import LoopDifference
     from tank2sim.fmu.export import ExportedFmu
-    from tank2sim.report.kit.page import Page
 
 
 @dataclass(frozen=True)
@@ -236,12 +234,6 @@ class AutopilotResult(PagedResult):
                 )
             )
         return tuple(tables)
-
-    def layout(self) -> Page:
-        """As :meth:`.PagedResult.layout`."""
-        from tank2sim.report.autopilot.page import autopilot_page
-
-        return autopilot_page(plain_json(self.content()))
 
 
 def pilot_ship(

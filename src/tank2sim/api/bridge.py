@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.analysis.validation.bridge_data import ORDERS_AHEAD, Bridge, bridge_of
 from tank2sim.analysis.validation.comparison import differences_of_size
-from tank2sim.api.paged import charts_of
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import Result, ResultTable, charts_of
 from tank2sim.api.ship import Ship, as_ship
 from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.errors import InputError

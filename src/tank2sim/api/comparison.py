@@ -138,16 +138,7 @@ class ComparisonResult(Result):
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
         """Differences in standard errors, and the tracks of each standard trial."""
-        from tank2sim.report.comparison.page import compare_page
-
-        return section_charts(compare_page(self.comparison).sections)
-
-    def page(self) -> str:
-        """As :meth:`.Result.page`."""
-        from tank2sim.report.comparison.page import compare_page
-        from tank2sim.report.kit.page import render_page
-
-        return render_page(compare_page(self.comparison))
+        return section_charts(self.layout().sections)
 
     def _others(self) -> list[tuple[int, str]]:
         return list(enumerate(self.labels))[1:]

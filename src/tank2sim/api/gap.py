@@ -11,17 +11,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tank2sim.api.gap_files import CORRECTED, REPORT, GapFiles
+from tank2sim.api.gap_files import CORRECTED, REPORT, GapFiles, folder_made, put
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
-from tank2sim.api.trials import TrialPaths, fitted_and_held
+from tank2sim.api.trial import TrialPaths, fitted_and_held
 from tank2sim.cards import Card, parse_card
 from tank2sim.cards.covariance import not_referring
 from tank2sim.cards.derived import derived_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
-from tank2sim.files import writable_folder, write_together
 from tank2sim.gap.diagnosis.error_intervals import acting
 from tank2sim.gap.fleet.search import can_lack
 from tank2sim.gap.fleet.ships import GAP, IMPROVED
@@ -196,20 +195,17 @@ class GapResult(Result):
         return files, notices
 
     def save(self, folder: str | Path) -> tuple[str, ...]:
-        """Write :meth:`files` into a folder, which is made if need be; messages about them.
+        """Write :meth:`files` into a folder in place of those of an earlier run; return messages.
 
         Raises
         ------
         InputError
             The folder cannot be written.
         """
-        writable_folder(Path(folder))
-        files, notices = self.files(Path(folder))
-        if any(path.parent.name == CORRECTED for path in files):
-            writable_folder(Path(folder) / CORRECTED)
         inputs = [trial.path for trial in (*self.fitted.trials, *self.held.trials)]
-        write_together(files, inputs=inputs)
-        return tuple(notices)
+        with folder_made(Path(folder)):
+            files, notices = self.files(Path(folder))
+            return *notices, *put(files, Path(folder), inputs)
 
     @property
     def _found(self) -> list[Found]:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 from tank2sim.analysis.glide.path import GlidePath
 from tank2sim.analysis.glide.steady import SteadyGlide, ballast_kg, force_residual
 from tank2sim.analysis.glide.study import GlideQuestion, GlideStudy, study
-from tank2sim.api.paged import PagedResult
-from tank2sim.api.result import ResultTable
+from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship
 from tank2sim.cards import GliderCard
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from tank2sim.analysis.ensemble.draws import by_file_name
 from tank2sim.api.result import Result, ResultTable
 from tank2sim.api.ship import Ship, as_ship
-from tank2sim.api.trials import TrialPaths, fitted_and_held
+from tank2sim.api.trial import TrialPaths, fitted_and_held
 from tank2sim.cards import Card, ManoeuvringCard, parse_card
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing

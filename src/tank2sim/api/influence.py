@@ -17,22 +17,18 @@ from tank2sim.analysis.tuning.card import tuned_text
 from tank2sim.analysis.tuning.result import Means, Tuned
 from tank2sim.analysis.tuning.targets import TARGET_OPTION, Target, parse_target
 from tank2sim.analysis.tuning.tune import tune
-from tank2sim.api.bands import band_table
-from tank2sim.api.ensemble import EnsembleOptions
-from tank2sim.api.paged import PagedResult
-from tank2sim.api.result import ResultTable
+from tank2sim.api.ensemble import EnsembleOptions, band_table
+from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card
 from tank2sim.cards.derived import derived_card
 from tank2sim.errors import InputError
-from tank2sim.files import plain_json
 from tank2sim.native.compiler import find_compiler
 from tank2sim.simulation.integrator import NO_COMPILER
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tank2sim.report.kit.page import Page
 
 DEFAULT_FIGURES = (
     "criterion_C",
@@ -132,12 +128,6 @@ class InfluenceResult(PagedResult):
         """Figures, coefficients, joint variation; bands of an ensemble."""
         bands = (band_table(self.bands.figures, self.bands.asked),) if self.bands else ()
         return *_influence_tables(self.found), *bands
-
-    def layout(self) -> Page:
-        """As :meth:`.PagedResult.layout`."""
-        from tank2sim.report.influence.page import influence_page
-
-        return influence_page(plain_json(self.content()))
 
     @property
     def _names(self) -> list[str]:

@@ -105,7 +105,7 @@ class ManoeuvreResult(Result):
         figures = ResultTable(self._title, columns, rows)
         if self.bands is None:
             return (figures,)
-        from tank2sim.api.bands import band_table
+        from tank2sim.api.ensemble import band_table
 
         return figures, band_table(self.bands.figures, self.bands.asked)
 

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tank2sim.api.paged import PagedResult
-from tank2sim.api.result import Result, ResultTable
+from tank2sim.api.result import PagedResult, Result, ResultTable
 from tank2sim.errors import InputError
 from tank2sim.files import plain_json, write_together
 from tank2sim.marks import marked

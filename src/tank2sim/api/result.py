@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import html
-import json
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from tank2sim.files import plain_json, write_together
+from tank2sim.files import json_text, plain_json, schema_name, write_together
 from tank2sim.marks import marked
 
 if TYPE_CHECKING:
@@ -20,9 +19,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tank2sim.report.kit.page import Page, PageSection
-
-SCHEMA_VERSION = 1
-"""Version of the JSON of all results: it grows when a key is removed or changes its meaning. Project choice."""
 
 REPR_ROWS = 20
 """Rows of a table in ``repr``: with its heading it fits a screen of 24 lines. Project choice."""
@@ -110,22 +106,22 @@ class Result(ABC):
     @property
     def schema(self) -> str:
         """Name and version of the JSON's schema, for example ``tank2sim/simulate/1``."""
-        return f"tank2sim/{self.command}/{SCHEMA_VERSION}"
+        return schema_name(self.command)
 
     def to_dict(self) -> dict[str, object]:
         """The result as JSON values: lists for arrays, None for what is not a finite number."""
         plain: dict[str, object] = plain_json({"schema": self.schema, **self.content()})
         return plain
 
-    def to_json(self, path: str | Path | None = None, **more: object) -> str:
-        """The result as JSON text, also written to `path`; `more` are further keys at its end.
+    def to_json(self, path: str | Path | None = None, **keys: object) -> str:
+        """Return the result as JSON text, also written to `path`; `keys` are added at its end.
 
         Raises
         ------
         InputError
             The file cannot be written.
         """
-        text = json.dumps({**self.to_dict(), **more}, indent=1, ensure_ascii=False) + "\n"
+        text = json_text({**self.to_dict(), **keys})
         if path is not None:
             write_together({Path(path): text})
         return text
@@ -205,6 +201,24 @@ class Result(ABC):
             f"<p>{html.escape(table.title)}</p>{table.df.to_html(index=False, na_rep='')}" for table in self.tables
         ]
         return "\n".join(parts)
+
+
+class PagedResult(Result):
+    """A result whose charts are those of its page."""
+
+    def charts(self) -> dict[str, alt.TopLevelMixin]:
+        """Charts of the page by their titles."""
+        return charts_of(self.layout().sections)
+
+
+def charts_of(sections: Iterable[PageSection]) -> dict[str, alt.TopLevelMixin]:
+    """Return the charts of the sections of a page by their titles; those without a title by the headings."""
+    charts: dict[str, alt.TopLevelMixin] = {}
+    for section in sections:
+        for illustration in section.charts:
+            name = illustration.title or section.heading
+            charts[f"{name} ({len(charts) + 1})" if name in charts else name] = illustration.chart
+    return charts
 
 
 def section_charts(sections: Iterable[PageSection]) -> dict[str, alt.TopLevelMixin]:

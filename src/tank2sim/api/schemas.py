@@ -10,7 +10,7 @@ from typing import Any, NotRequired
 from pydantic import ConfigDict, TypeAdapter
 from typing_extensions import TypedDict
 
-from tank2sim.api.result import SCHEMA_VERSION
+from tank2sim.files import schema_name
 
 Number = float | None
 """A number; null where it is not finite or not known."""
@@ -208,13 +208,6 @@ class GapKeys(_Keys):
     files: NotRequired[list[str]]
 
 
-class _OpenKeys(TypedDict):
-    """Base of results to which options add keys: those declared are always there."""
-
-    __pydantic_config__ = ConfigDict(extra="allow")  # type: ignore[misc]
-    schema: str
-
-
 class AuditKeys(_Keys):
     """What is wrong with the data of trials."""
 
@@ -222,7 +215,7 @@ class AuditKeys(_Keys):
     trials: list[dict[str, Any]]
 
 
-class AutopilotKeys(_OpenKeys):
+class AutopilotKeys(_Keys):
     """A heading controller, its margins and its runs."""
 
     ship: str
@@ -232,10 +225,15 @@ class AutopilotKeys(_OpenKeys):
     limits: dict[str, Number]
     margins: dict[str, Any]
     closed_loop: dict[str, Any]
+    weather: dict[str, Number]
     track: dict[str, Any] | None
+    ship_alone: dict[str, bool | float | None]
     responses: list[dict[str, Any]]
-    histories: dict[str, Any]
+    histories: dict[str, Columns]
+    track_histories: dict[str, Columns]
+    waypoints_m: list[list[Number]]
     notices: list[str]
+    export: NotRequired[dict[str, Any]]
 
 
 class CompareKeys(_Keys):
@@ -259,48 +257,70 @@ class DemoKeys(_Keys):
     files: list[str]
 
 
-class GlideKeys(_OpenKeys):
+class GlideKeys(_Keys):
     """Steady glides, the polar, and the path of a programme where one was given."""
 
     glider: str
-    states: list[dict[str, Any]]
+    source: str
+    buoyancy_kg: float
+    states: list[dict[str, bool | float | list[Number] | None]]
     design: dict[str, Any]
-    polar: dict[str, Any]
-    notices: list[str]
-    as_printed: NotRequired[list[dict[str, Any]]]
-    path: NotRequired[list[dict[str, Any]]]
+    polar: Columns
+    as_printed: NotRequired[list[dict[str, bool | float | list[Number] | None]]]
+    path: NotRequired[list[dict[str, Number]]]
     length_m: NotRequired[Number]
-    path_histories: NotRequired[dict[str, Any]]
-    transient: NotRequired[dict[str, Any] | None]
+    path_histories: NotRequired[Columns]
+    path_as_printed: NotRequired[list[dict[str, Number]]]
+    path_as_printed_histories: NotRequired[Columns]
+    transient: NotRequired[dict[str, Any]]
+    quasi_steady_error: NotRequired[dict[str, list[dict[str, Any]]]]
+    notices: list[str]
 
 
-class InfluenceKeys(_OpenKeys):
+class InfluenceKeys(_Keys):
     """Sensitivity of figures to the numbers of a card, in per cent for 10 %; a tuning where one was asked for."""
 
     ship: str
     standard_errors: str
-    figures: dict[str, Any]
-    parameters: dict[str, Any]
-    influence_percent: dict[str, Any]
-    notices: list[str]
+    figures: dict[str, dict[str, Any]]
+    parameters: dict[str, dict[str, Any]]
+    influence_percent: dict[str, dict[str, Any]]
+    agreed: NotRequired[dict[str, Any]]
     tuned: NotRequired[dict[str, Any]]
+    ensemble: NotRequired[dict[str, Any]]
+    notices: list[str]
 
 
-class SteeringModelsKeys(_OpenKeys):
-    """The models of a steering card side by side."""
+class SteeringModelsKeys(_Keys):
+    """The models of a steering card compared."""
 
     ship: str
     main_model: str
-    rudder_deg: Number
-    steady_turns: dict[str, Any]
-    manoeuvres: dict[str, Any]
+    rudder_deg: float
+    steady_turns: dict[str, list[dict[str, Number]]]
+    influence: dict[str, dict[str, Any]]
+    manoeuvres: dict[str, dict[str, FigureValues]]
+    combined_predictions: dict[str, dict[str, Any]]
+    printed_influence: dict[str, Any] | None
+    influence_over_draught: dict[str, list[Number]]
+    two_point_tuning: dict[str, Any] | str | None
+    missing: dict[str, list[str]]
+    titles: dict[str, str]
+    diagrams: dict[str, Any]
+    histories: dict[str, Columns]
 
 
-class TwoPointKeys(_OpenKeys):
+class TwoPointKeys(_Keys):
     """A card tuned through two steady turns."""
 
-    hull_factor: Number
-    rudder_factor: Number
+    hull_factor: float
+    rudder_factor: float
+    parameters: dict[str, Number]
+    before: list[dict[str, Number]]
+    after: list[dict[str, Number]]
+    course_stable_before: bool
+    course_stable_after: bool
+    notices: list[str]
 
 
 class BridgeKeys(_Keys):
@@ -344,20 +364,45 @@ class SteerKeys(_Keys):
     notices: list[str]
 
 
-class TowKeys(_OpenKeys):
+class TowMethodKeys(TypedDict):
+    """Estimates of one method; ``estimated`` lists the unknowns that were free."""
+
+    __pydantic_config__ = ConfigDict(extra="forbid")  # type: ignore[misc]
+    estimated: list[str]
+    estimates: dict[str, Number]
+    standard_errors: dict[str, Number]
+    correlation: dict[str, Any] | None
+    condition: Number
+    condition_scaled: Number
+    J: Number
+    largest_speed_error_mps: Number
+
+
+class TowKeys(_Keys):
     """Surge mass and drag from accelerating tows."""
 
     tows: str
-    force_N: Number
-    mass_kg: Number
+    force_N: float
+    force_polynomial: list[float]
+    mass_kg: float
     terms: list[str]
+    start_delay: bool
+    given_total_mass_kg: Number
     readings: int
-    methods: dict[str, Any]
+    top_speed_mps: float
+    speed_polynomial: list[float]
+    methods: dict[str, TowMethodKeys]
     warnings: list[str]
+    tows_of_the_paper: bool
+    speed_polynomials: list[dict[str, Any]]
     models: list[dict[str, Any]]
     mass_range_kg: list[Number] | None
+    tow_by_tow: dict[str, dict[str, Any]]
+    confidence_ellipses: list[dict[str, Any]]
+    mass_by_theory: list[dict[str, str | float]]
     speeds: dict[str, Any]
-    drag_coefficients: dict[str, Any] | None
+    body: NotRequired[dict[str, Number]]
+    drag_coefficients: NotRequired[dict[str, dict[str, dict[str, Number]]] | None]
 
 
 class ValidateKeys(_Keys):
@@ -379,18 +424,26 @@ class ValidateKeys(_Keys):
     notices: list[str]
 
 
-class YawKeys(_OpenKeys):
+class YawKeys(_Keys):
     """Added yaw inertia and dissipation from records of a yaw rig, by method."""
 
     records: list[str]
     medium: str
-    torque_constant_NmpA: Number
+    torque_constant_NmpA: float
     body_inertia_kgm2: Number
+    body_inertia_standard_error_kgm2: Number
+    body_inertia_source: str | None
     added_inertia_kgm2: dict[str, Number] | None
     dissipation_J: dict[str, Number]
-    methods: dict[str, Any]
-    histories: dict[str, Any]
+    methods: dict[str, dict[str, Any]]
+    mirror_difference: list[Number]
+    histories: dict[str, dict[str, Any]]
+    energy_balance: dict[str, Any]
+    energy_residuals: list[dict[str, str | float]]
+    angle_residual: Columns | None
+    air: dict[str, Any] | None
     notes: list[str]
+    theory: list[dict[str, str | float | None]]
 
 
 KEYS: dict[str, Any] = {
@@ -419,11 +472,6 @@ KEYS: dict[str, Any] = {
 """Command to the keys of its JSON; ``report`` and the fleet of ``gap`` have none."""
 
 
-def schema_name(command: str) -> str:
-    """Name of the schema of a command's JSON, which stands in it under ``schema``: ``tank2sim/simulate/1``."""
-    return f"tank2sim/{command}/{SCHEMA_VERSION}"
-
-
 def json_schema(command: str) -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of the JSON that a command writes.
 
@@ -444,6 +492,8 @@ def json_schema(command: str) -> dict[str, Any]:
     {'const': 'tank2sim/simulate/1'}
     """
     schema = TypeAdapter(KEYS[command]).json_schema()
+    if "anyOf" in schema:  # no key is allowed that is not declared, so that one shape alone fits
+        schema["oneOf"] = schema.pop("anyOf")
     for part in (schema, *schema.get("$defs", {}).values()):
         if "schema" in part.get("properties", {}):
             part["properties"]["schema"] = {"const": schema_name(command)}

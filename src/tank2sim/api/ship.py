@@ -288,18 +288,22 @@ class Ship:
         speed_mps : float, optional
             By default the speed of the card.
         states, inputs, outputs : names, optional
-            Of the model (``motion.r``, ``rudder.command``); by default all of them. SI and radians.
+            Of the model (``motion.r``, ``rudder.command``); by default all of them. SI and radians. States that are
+            left out follow the others at once: without ``rudder.angle`` the rudder is where it is ordered. A state may
+            be an input.
 
         Raises
         ------
         InputError
-            The ship holds no straight course, or has no such signal.
+            The ship holds no straight course, a signal is unknown, or a state that is left out comes to no rest.
         """
-        from tank2sim.analysis.linearisation import state_space, straight_course
+        from tank2sim.analysis.linearisation import settled_states, state_space, straight_course
 
-        point = straight_course(self.model, speed_mps)
-        names = [None if given is None else list(given) for given in (states, inputs, outputs)]
-        return state_space(self.model, point, states=names[0], inputs=names[1], outputs=names[2])
+        model = self.model
+        point = straight_course(model, speed_mps)
+        kept, given, shown = (None if names is None else list(names) for names in (states, inputs, outputs))
+        settled = () if kept is None else settled_states(model, point, kept, given or ())
+        return state_space(model, point, states=kept, inputs=given, outputs=shown, settled=settled)
 
     def influence(
         self,

@@ -10,10 +10,8 @@ from tank2sim.analysis.ensemble.results import EnsembleRequest, StabilityBands, 
 from tank2sim.analysis.ensemble.steering import Grid
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.stability.study import StabilityStudy, stability_study
-from tank2sim.api.bands import band_table, criteria_table
-from tank2sim.api.ensemble import EnsembleOptions
-from tank2sim.api.paged import PagedResult
-from tank2sim.api.result import ResultTable
+from tank2sim.api.ensemble import EnsembleOptions, band_table
+from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.native.compiler import find_compiler
 from tank2sim.simulation.integrator import NO_COMPILER
 
@@ -120,7 +118,7 @@ class StabilityResult(PagedResult):
         tables = (eigenvalues, nomoto, influences, _criteria(self.study.imo))
         if self.bands is None:
             return tables
-        return *tables, band_table(self.bands.figures, self.bands.asked), criteria_table(self.bands)
+        return *tables, band_table(self.bands.figures, self.bands.asked), _chances(self.bands)
 
 
 def judge_stability(
@@ -135,6 +133,24 @@ def judge_stability(
         with ensemble.computing() as executor:
             bands = stability_bands(ship.manoeuvring(), study.imo, request, executor, curves)
     return StabilityResult(ship, study, bands)
+
+
+def _chances(found: StabilityBands) -> ResultTable:
+    """Probability of each IMO criterion, with the 95 % interval that the number of members leaves."""
+    rows: list[list[object]] = []
+    for chance in found.chances:
+        beyond = chance.criterion.beyond_card
+        rows.append(
+            [
+                chance.criterion.name,
+                *((f"{value:.4g}" for value in (chance.band.low, chance.band.high)) if chance.band else (None, None)),
+                f"{chance.criterion.allowed:.4g} {chance.criterion.unit}",
+                None if chance.met is None else "beyond card" if beyond else f"{chance.met:.3g}",
+                None if beyond or not chance.between else f"{chance.between[0]:.3f} to {chance.between[1]:.3f}",
+            ]
+        )
+    columns = ("criterion", "5 %", "95 %", "allowed", "P(met)", "interval of P")
+    return ResultTable("IMO MSC.137(76), worse side, over the ensemble", columns, rows)
 
 
 def _criteria(criteria: Sequence[ImoCriterion]) -> ResultTable:

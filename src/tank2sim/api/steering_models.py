@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.analysis.catalogue.comparison import SteeringComparison, compare_steering_models
 from tank2sim.analysis.turning.two_point_tuning import TwoPointTuning
-from tank2sim.api.paged import PagedResult
-from tank2sim.api.result import ResultTable
+from tank2sim.api.result import PagedResult, ResultTable
 from tank2sim.api.turn_tuning import stability_change, turn_table
 from tank2sim.cards.steering_card import SteeringCard, read_steering_card
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from rich.measure import Measurement
 from rich.table import Table
 
 from tank2sim.api.result import Result, cell_text
-from tank2sim.files import STANDARD_OUTPUT, plain_json, writable_folder, write_together
+from tank2sim.files import STANDARD_OUTPUT, writable_folder, write_together
 from tank2sim.marks import marked
 
 screen = Console(highlight=False)
@@ -68,11 +67,6 @@ def show_marked(notices: Iterable[str]) -> list[str]:
     for notice in first:
         screen.print(f"[bold red]{escape(notice)}[/bold red]", soft_wrap=True)
     return [notice for notice in notices if notice not in first]
-
-
-def json_text(result: Mapping[str, object]) -> str:
-    """The result as JSON; arrays become lists, and what is not a finite number becomes null."""
-    return json.dumps(plain_json(result), indent=1, ensure_ascii=False) + "\n"
 
 
 def show_result(result: Result) -> None:

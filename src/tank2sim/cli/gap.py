@@ -8,7 +8,7 @@ import click
 
 from tank2sim.api.gap import find_gap, gap_options
 from tank2sim.api.gap_files import folder_made, put, refuse_early
-from tank2sim.api.trials import trial_files
+from tank2sim.api.trial import trial_files
 from tank2sim.bundled import bundled_cards
 from tank2sim.cli.console import json_option, screen, show_notices, show_result
 from tank2sim.cli.options import executor_option

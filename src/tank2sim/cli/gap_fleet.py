@@ -12,13 +12,13 @@ from pathlib import Path
 
 from tank2sim.api.gap import GapResult, misfit_text
 from tank2sim.api.gap_files import folder_made, put, refuse_early
-from tank2sim.api.trials import fitted_and_held
+from tank2sim.api.trial import fitted_and_held
 from tank2sim.cards import read_card
-from tank2sim.cli.console import json_text, screen, show_notices, show_table
+from tank2sim.cli.console import screen, show_notices, show_table
 from tank2sim.cli.progress import showing_stages
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
-from tank2sim.files import writable_folder, write_together
+from tank2sim.files import json_text, writable_folder, write_together
 from tank2sim.gap.fleet.run_record import NEW, RUN, fleet_run_record, stale, with_results
 from tank2sim.gap.fleet.search import Fault, Sought, can_lack, fault_of_program, found_at_once, found_one_by_one
 from tank2sim.gap.fleet.ships import Fleet, ShipFolder, fleet_in

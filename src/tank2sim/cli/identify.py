@@ -8,7 +8,7 @@ import click
 
 from tank2sim.api.identification import identify
 from tank2sim.api.ship import load
-from tank2sim.api.trials import trial_files
+from tank2sim.api.trial import trial_files
 from tank2sim.cli.console import json_option, screen, show_result, write_result
 from tank2sim.cli.options import executor_option, page_option, plot_folder_option
 from tank2sim.cli.progress import showing_progress

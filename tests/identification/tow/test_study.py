@@ -9,8 +9,8 @@ from numpy.polynomial import Polynomial
 from scipy import stats
 
 from tank2sim.bundled import bundled
-from tank2sim.cli.console import json_text
 from tank2sim.errors import InputError
+from tank2sim.files import json_text
 from tank2sim.identification.tow import paper as tow_paper
 from tank2sim.identification.tow.equation_error import discretise, solve_by_qr
 from tank2sim.identification.tow.identify import identify_tow

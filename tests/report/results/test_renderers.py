@@ -13,7 +13,7 @@ from tank2sim.analysis.glide.study import GlideQuestion
 from tank2sim.analysis.glide.study import study as glide_study
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
-from tank2sim.cli.console import json_text
+from tank2sim.files import json_text
 from tank2sim.identification.tow.identify import identify_tow
 from tank2sim.identification.tow.study import study_tows, towed_body
 from tank2sim.identification.yaw.identify import YawOptions, identify_yaw

@@ -7,13 +7,21 @@ from collections.abc import Mapping, Sequence
 import altair as alt
 
 from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS
-from tank2sim.analysis.validation.comparison import CardComparison
-from tank2sim.files import plain_json
 from tank2sim.report.kit.chart_parts import NUMBER, data, series_look
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.motion_charts import TrackData, track_chart
 from tank2sim.report.kit.numbers import format_number
-from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
+from tank2sim.report.kit.page import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Page,
+    PageSection,
+    PageTable,
+    Verdict,
+    notices_section,
+)
 from tank2sim.units import in_words
 
 _COEFFICIENTS = (
@@ -31,20 +39,12 @@ _TRIALS = (
 )
 
 
-def compare_page(found: CardComparison) -> Page:
-    """The page."""
-    return compared_page(plain_json(found.as_json()))
-
-
-def compared_page(found: Json) -> Page:
-    """The page, from what JSON has of a :class:`CardComparison`."""
+def compare_page(found: Json) -> Page:
+    """Return the page of the JSON of ``tank2sim compare``."""
     labels = [one["label"] for one in found["cards"]]
     sections = [_cards(found["cards"]), _coefficients(found["coefficients"], found.get("effects", []), labels)]
     sections += [_trial(trial, labels, first=place == 0) for place, trial in enumerate(found["trials"])]
-    if found["notices"]:
-        rows: list[list[Cell]] = [[one] for one in found["notices"]]
-        table = PageTable(caption="What the reader should know.", columns=[Column(title="")], rows=rows)
-        sections.append(PageSection(heading="Notices", tables=[table]))
+    sections += notices_section(found["notices"])
     return Page(
         title=found["cards"][0]["ship"],
         subtitle=f"Comparison of cards: {', '.join(labels)}",

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tank2sim.files import schema_command
 from tank2sim.report.kit.json_values import (
     LONGEST_LIST,
     Json,
@@ -103,8 +104,8 @@ def _page(result: Mapping[str, Json], kind: ResultType, source: str) -> Page:
 
 def _origin(result: Mapping[str, Json], source: str) -> str:
     """The command that wrote a result, which any copy of the file states; of older files, which do not, the file."""
-    schema = str(result.get("schema") or "").split("/")
-    return f"tank2sim {schema[1]}" if len(schema) == 3 else source
+    command = schema_command(result.get("schema"))
+    return f"tank2sim {command}" if command else source
 
 
 def _section(key: str, value: Json) -> PageSection:

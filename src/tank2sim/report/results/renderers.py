@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from tank2sim.report.autopilot.page import autopilot_page
-from tank2sim.report.comparison.page import compared_page
+from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.glide.page import glide_page
 from tank2sim.report.influence.page import influence_page
 from tank2sim.report.kit.json_values import Json
@@ -65,7 +65,7 @@ _DRAWERS: Mapping[str, _Drawer] = {
 
 _PAGES: Mapping[str, _Page] = {
     "Cards compared": _Page(
-        compared_page, {"summary": list, "cards": list, "coefficients": list, "trials": list, "notices": list}
+        compare_page, {"summary": list, "cards": list, "coefficients": list, "trials": list, "notices": list}
     ),
     "Heading control": _Page(
         autopilot_page, {"ship_alone": dict, "responses": list, "histories": dict, "notices": list}

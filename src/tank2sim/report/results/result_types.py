@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from tank2sim.errors import InputError
+from tank2sim.files import schema_command
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,6 @@ class ResultType:
     note: str = ""
 
 
-_SCHEMA = re.compile(r"tank2sim/([a-z]+)/1")
 _GAP_NOTE = (
     "Tracks and time histories are not in gap.json: they are in report.html, which tank2sim gap wrote next to it."
 )
@@ -98,8 +97,7 @@ def _types_of(schema: object, source: str) -> Sequence[ResultType]:
     """The types that a schema may mean; without one all of them."""
     if schema is None:
         return RESULT_TYPES
-    found = _SCHEMA.fullmatch(str(schema))
-    types = [kind for kind in RESULT_TYPES if found and found[1] in kind.commands.split()]
+    types = [kind for kind in RESULT_TYPES if schema_command(schema) in kind.commands.split()]
     if not types:
         remedy = "give what this version of tank2sim wrote with --json"
         raise InputError(source, "schema", f"is {str(schema)[:60]!r}, which is not known", remedy)

@@ -1,0 +1,89 @@
+"""One small result of every command, made from bundled ships and data that the tests generate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import pytest
+from _pytest.mark import ParameterSet
+
+import tank2sim as t2s
+from tank2sim.api.bundled_ships import list_ships
+from tank2sim.api.result import Result
+from tank2sim.bundled import bundled
+from tests.yaw_truth import Truth, record, written
+
+
+def _trials(folder: Path) -> Path:
+    t2s.load("mariner").zigzag(20, 20).to_csv(folder / "zigzag.csv")
+    return folder / "zigzag.csv"
+
+
+def _yaw(folder: Path, **options: str) -> Result:
+    truth = Truth(humps=1)
+    return t2s.yaw(written(folder / "water.csv", truth, record(truth)), inertia_kgm2=0.0204, **options)
+
+
+def _tow(**options: object) -> Result:
+    return t2s.tow(bundled("models", "wilinski-zellman", "tows.csv"), **options)
+
+
+def _glide_programme(folder: Path) -> Result:
+    path = folder / "programme.csv"
+    path.write_text("duration_s,path_angle_deg,roll_deg\n20,-30,0\n20,30,10\n", encoding="utf-8")
+    options = {"programme": path, "budget_kg": 10.0, "depth_m": 100.0, "views": True}
+    return t2s.load("kulikovsky-velikanov").glide([-30, -45], as_printed=True, **options)
+
+
+def _check(folder: Path) -> Result:
+    return t2s.check_fmu(t2s.load("mariner").to_fmu(folder / "m.fmu", fmi=2).path)
+
+
+def _tune(_: Path) -> Result:
+    return t2s.load("mariner").tune("steady_radius_m@20=460", figures="criterion_C", members=2)
+
+
+RESULTS: dict[str, Callable[[Path], Result]] = {
+    "audit": lambda folder: t2s.audit(_trials(folder)),
+    "autopilot": lambda _: t2s.load("mariner").autopilot(),
+    "autopilot along a track": lambda _: t2s.load("mariner").autopilot(track=[[0, 0], [3000, 0], [6000, 1500]]),
+    "check": _check,
+    "compare": lambda _: t2s.compare(["mariner", "kvlcc2"], members=2),
+    "export": lambda folder: t2s.load("mariner").to_fmu(folder / "m.fmu", fmi=2),
+    "glide": lambda _: t2s.load("kulikovsky-velikanov").glide([-30, -45]),
+    "glide of a programme": _glide_programme,
+    "influence": lambda _: t2s.load("mariner").influence(
+        ["criterion_C", "K_per_s"], joint_variation={"Yv": 1.0}, members=2
+    ),
+    "influence of a steering card": lambda _: t2s.steering_models("poznyakov-yudin"),
+    "influence with targets": _tune,
+    "influence through two points": lambda _: t2s.load("mariner").tune_through("35@35", "1400m@3"),
+    "pilotcard": lambda _: t2s.load("mariner").pilot_card(),
+    "poster": lambda _: t2s.load("mariner").poster(),
+    "ships": lambda _: list_ships(),
+    "signals": lambda folder: t2s.signals(_trials(folder)),
+    "signals with a filter": lambda folder: t2s.signals(_trials(folder), "r_degps", filter="lowpass:0.1"),
+    "simulate": lambda _: t2s.load("mariner").zigzag(20, 20),
+    "simulate an ensemble": lambda _: t2s.load("mariner").turn(35, duration_s=60.0, members=3),
+    "simulate a short run": lambda _: t2s.load("mariner").turn(35, duration_s=20.0),
+    "stability": lambda _: t2s.load("esso-osaka").stability(),
+    "stability of an ensemble": lambda _: t2s.load("kvlcc2").stability(spirals=False, members=3),
+    "steer": lambda _: t2s.load("mariner").steering_page(),
+    "tow": lambda _: _tow(),
+    "tow of one term": lambda _: _tow(terms="B3", length_m=3.8, start_delay=True),
+    "validate": lambda folder: t2s.validate("mariner", _trials(folder), members=3),
+    "yaw": _yaw,
+}
+"""Name, of which the first word is the command, to a function that makes the result in a folder."""
+
+OWN_DOCUMENTS = ("pilotcard", "poster", "steer")
+"""Commands whose result is a document of its own, which is no page of tables and charts."""
+
+SLOW = ("steer",)
+"""Names whose result takes 10 s or more."""
+
+
+def marked(names: Iterable[str]) -> list[ParameterSet]:
+    """Parameters of a test, those of slow results marked."""
+    return [pytest.param(name, marks=[pytest.mark.slow] if name in SLOW else []) for name in names]
