@@ -106,8 +106,8 @@ class SteeringComparison:
             "ship": self.ship,
             "main_model": self.main,
             "rudder_deg": self.rudder_deg,
-            "steady_turns": {one.model: [turn.as_json() for turn in one.turns] for one in self.turns},
-            "influence": {one.model: vars(one) for one in self.influence},
+            "steady_turns": {row.model: [turn.as_json() for turn in row.turns] for row in self.turns},
+            "influence": {row.model: vars(row) for row in self.influence},
             "manoeuvres": {
                 name: {"turn": dict(run.turn_figures), "zigzag": dict(run.zigzag_figures)}
                 for name, run in self.runs.items()
@@ -128,8 +128,8 @@ class SteeringComparison:
             rate = point.yaw_rate_radps or math.copysign(
                 self.speed_mps / (point.radius_m or math.inf), point.rudder_rad
             )
-            told = {"rudder_deg": math.degrees(point.rudder_rad), "yaw_rate_degpmin": 60 * math.degrees(rate)}
-            points.append({"label": point.label, "source": point.source, **told})
+            row = {"rudder_deg": math.degrees(point.rudder_rad), "yaw_rate_degpmin": 60 * math.degrees(rate)}
+            points.append({"label": point.label, "source": point.source, **row})
         models = {
             label: {name: [turn.as_json()[name] for turn in turns] for name in names}
             for label, turns in self.diagrams.items()
@@ -154,7 +154,7 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
     rudder = rudder_deg or (math.degrees(printed.rudder_rad) if printed else 20.0)
     main = printed.model if printed else names[0]
     same = [name for name in names if card.models[name].draught_m == card.models[main].draught_m]
-    others = [name for name in names if name not in same and card.models[name].form == card.models[main].form]
+    candidates = [name for name in names if name not in same and card.models[name].form == card.models[main].form]
     turns, runs = tuple(turns_of(card, name, RUDDERS_DEG) for name in names), {n: _runs(card, n, rudder) for n in same}
     tuning = tuned(card, main)
     return SteeringComparison(
@@ -164,12 +164,12 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
         turns=turns,
         influence=tuple(influence_of(card, name, rudder) for name in same),
         runs=runs,
-        predictions={name: combined_prediction(card, name) for name in others} if printed else {},
+        predictions={name: combined_prediction(card, name) for name in candidates} if printed else {},
         polynomials=draught_polynomials(card) if printed else {},
         tuning=tuning,
         missing=missing_of(card),
         titles={name: entry.title for name, entry in card.models.items()},
-        diagrams=_diagrams(card, max(turn.rudder_rad for one in turns for turn in one.turns), same, (main, tuning)),
+        diagrams=_diagrams(card, max(turn.rudder_rad for row in turns for turn in row.turns), same, (main, tuning)),
         points=card.points,
         speed_mps=card.ship.speed_mps,
     )
@@ -192,7 +192,7 @@ def _circle(turn: Trajectory) -> dict[str, list[float]]:
 
 def missing_of(card: SteeringCard) -> dict[str, tuple[str, ...]]:
     """What is not known of the card's models, by name: coefficients not given, what the source leaves out, notes."""
-    told: dict[str, tuple[str, ...]] = {}
+    unknown: dict[str, tuple[str, ...]] = {}
     forms: set[str] = set()
     for name, entry in card.models.items():
         form = form_of(card, name)
@@ -202,8 +202,8 @@ def missing_of(card: SteeringCard) -> dict[str, tuple[str, ...]]:
         words += (entry.notes,) if entry.notes else ()
         forms.add(form.name)
         if words:
-            told[name] = words
-    return told
+            unknown[name] = words
+    return unknown
 
 
 def tuned(card: SteeringCard, name: str) -> TwoPointTuning | str | None:
@@ -211,7 +211,7 @@ def tuned(card: SteeringCard, name: str) -> TwoPointTuning | str | None:
     measured = [point for point in card.points if point.measured][:2]
     if len(measured) < 2:
         return None
-    first, second = (WantedTurn(one.rudder_rad, one.yaw_rate_radps, one.radius_m) for one in measured)
+    first, second = (WantedTurn(turn.rudder_rad, turn.yaw_rate_radps, turn.radius_m) for turn in measured)
     try:
         return tune_to_two_points(model_of(card, name), levers_of_form(form_of(card, name)), first, second)
     except InputError as error:

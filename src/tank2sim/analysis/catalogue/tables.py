@@ -139,9 +139,9 @@ def influence_of(card: SteeringCard, name: str, rudder_deg: float = 20.0, percen
     return InfluenceTable(name, turn.rudder_rad, turn.radius_m, percent, influence, radii)
 
 
-def agreed_variation(card: SteeringCard, base: str, other: str) -> dict[str, float]:
+def agreed_variation(card: SteeringCard, base: str, target: str) -> dict[str, float]:
     """Kc: change of each coefficient from one model to another in per cent; Table 4. What does not change is absent."""
-    values, changed = card.models[base].coefficients, card.models[other].coefficients
+    values, changed = card.models[base].coefficients, card.models[target].coefficients
     return {
         name: change_percent(changed[name], value)
         for name, value in values.items()
@@ -183,7 +183,7 @@ class CombinedPrediction:
     direct_misread_m: float
 
 
-def combined_prediction(card: SteeringCard, other: str) -> CombinedPrediction:
+def combined_prediction(card: SteeringCard, changed: str) -> CombinedPrediction:
     """Table 5: what the K predict for another model of the card (another draught), and what that model gives.
 
     Raises
@@ -193,15 +193,15 @@ def combined_prediction(card: SteeringCard, other: str) -> CombinedPrediction:
     """
     printed = _influence(card)
     base, rudder = printed.model, math.degrees(printed.rudder_rad)
-    agreed = agreed_variation(card, base, other)
+    agreed = agreed_variation(card, base, changed)
     table = influence_of(card, base, rudder, printed.change_percent)
     at = printed.draughts_m.index(_draught(card, base))
     K = {name: values[at] for name, values in printed.K_percent.items()}
     swapped = {name: K[printed.misread_as.get(name, name)] for name in K}
-    percents = [combined_percent(one, agreed) for one in (K, swapped, table.K_percent)]
+    percents = [combined_percent(percents_of, agreed) for percents_of in (K, swapped, table.K_percent)]
     radii = (printed.radius_m, printed.radius_m, table.radius_m)
     predicted = [radius * (1 + percent / 100) for radius, percent in zip(radii, percents, strict=True)]
-    direct = turns_of(card, other, [rudder]).turns[0].radius_m
+    direct = turns_of(card, changed, [rudder]).turns[0].radius_m
     return CombinedPrediction(
         agreed_percent=agreed,
         radius_m=table.radius_m,
@@ -212,18 +212,18 @@ def combined_prediction(card: SteeringCard, other: str) -> CombinedPrediction:
         own_percent=percents[2],
         own_m=predicted[2],
         direct_m=direct,
-        direct_misread_m=_direct_misread(card, printed, other, agreed),
+        direct_misread_m=_direct_misread(card, printed, changed, agreed),
     )
 
 
-def _direct_misread(card: SteeringCard, printed: PrintedInfluence, other: str, agreed: Mapping[str, float]) -> float:
-    """Radius of the other model with the larger of two mistaken variations put on the wrong coefficient as well."""
+def _direct_misread(card: SteeringCard, printed: PrintedInfluence, target: str, agreed: Mapping[str, float]) -> float:
+    """Radius of the target model with the larger of two mistaken variations put on the wrong coefficient as well."""
     values = card.models[printed.model].coefficients
     largest = max(printed.misread_as, key=lambda name: abs(agreed.get(name, 0.0)), default=None)
     if largest is None:
-        return turns_of(card, other, [math.degrees(printed.rudder_rad)]).turns[0].radius_m
+        return turns_of(card, target, [math.degrees(printed.rudder_rad)]).turns[0].radius_m
     wrong = printed.misread_as[largest]
-    points = TurningPoints(model_of(card, other))
+    points = TurningPoints(model_of(card, target))
     changed = {f"coefficients.{wrong}": values[wrong] * (1 + agreed[largest] / 100)}
     return points.turn_at(printed.rudder_rad, changed)[0].radius_m
 

@@ -32,10 +32,10 @@ def draws_with(errors: JointErrors, seed: int) -> Draws:
     """Draws of parameters with these errors; those that are exact are not drawn."""
     uncertain = np.flatnonzero(np.diag(errors.covariance) > 0)
     chosen = [errors.parameters[place] for place in uncertain]
-    bounds = [one.bounds for one in chosen]
+    bounds = [parameter.bounds for parameter in chosen]
     return Draws(
-        names=tuple(one.name for one in chosen),
-        mean=np.array([one.value for one in chosen]),
+        names=tuple(parameter.name for parameter in chosen),
+        mean=np.array([parameter.value for parameter in chosen]),
         root=_root(errors.covariance[np.ix_(uncertain, uncertain)]),
         lowest=np.array([-np.inf if low is None else low for low, _ in bounds]),
         highest=np.array([np.inf if high is None else high for _, high in bounds]),
@@ -45,12 +45,12 @@ def draws_with(errors: JointErrors, seed: int) -> Draws:
 
 def by_file_name(card: ManoeuvringCard, names: Sequence[str], matrix: Array) -> Covariance:
     """A covariance of parameters of the model as the card's file has them; what is not on the card is left out."""
-    found = {one.name: one for one in card_parameters(card, study_model(card))}
+    found = {parameter.name: parameter for parameter in card_parameters(card, study_model(card))}
     rows = [place for place, name in enumerate(names) if name in found]
     chosen: list[CardParameter] = [found[names[place]] for place in rows]
-    factors = np.array([one.factor for one in chosen])
+    factors = np.array([parameter.factor for parameter in chosen])
     kept = matrix[np.ix_(rows, rows)] * np.outer(factors, factors)
-    return Covariance(tuple(one.key for one in chosen), (kept + kept.T) / 2)
+    return Covariance(tuple(parameter.key for parameter in chosen), (kept + kept.T) / 2)
 
 
 def _root(covariance: Array) -> Array:

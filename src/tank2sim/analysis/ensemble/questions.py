@@ -95,10 +95,10 @@ class OfManoeuvre:
     def _driven(self, integrator: Integrator) -> AskOne:
         """Members driven one by one, as a manoeuvre with events is."""
         model = integrator.model
-        own = _parameters(model)
+        defaults = _parameters(model)
 
         def ask(values: Mapping[str, float]) -> MemberResult:
-            if fault := mass_fault(own | dict(values)):
+            if fault := mass_fault(defaults | dict(values)):
                 return MemberResult({}, trouble=fault)
             duration = self.duration_s
             try:
@@ -112,12 +112,12 @@ class OfManoeuvre:
     def _held(self, integrator: Integrator, turn: Turn, steps: int) -> Ask:
         """Members whose rudder is held for a time: all in one call of the compiled loop."""
         model, h = integrator.model, integrator.model.step_s
-        own, u = _parameters(model), model.input_values({"rudder.command": turn.rudder})
+        defaults, u = _parameters(model), model.input_values({"rudder.command": turn.rudder})
         t = np.append(np.arange(0, steps, EVERY), steps) * h
         inputs = np.tile(u, (len(t), 1))
 
         def ask(members: Sequence[Mapping[str, float]]) -> list[MemberResult]:
-            whole = [own | dict(values) for values in members]
+            whole = [defaults | dict(values) for values in members]
             p = np.array([list(values.values()) for values in whole])
             states = integrator.rollouts(np.array(model.initial(p.T)).T, u, p, (h, steps))
             found = []
@@ -127,7 +127,7 @@ class OfManoeuvre:
                 if fault:
                     found.append(MemberResult({}, trouble=fault))
                     continue
-                figures = figures_of(turn, run, own["ship.length"])
+                figures = figures_of(turn, run, defaults["ship.length"])
                 found.append(MemberResult(_numbers(figures), _sampled(run, self.times)))
             return found
 
@@ -147,10 +147,10 @@ class OfFigures:
         from tank2sim.analysis.influence.study import Study
 
         study = Study(self.ship.card(), [parse_figure(text) for text in self.figures])
-        names, own = [parameter.name for parameter in study.parameters], _parameters(study.model)
+        names, defaults = [parameter.name for parameter in study.parameters], _parameters(study.model)
 
         def ask(values: Mapping[str, float]) -> MemberResult:
-            if fault := mass_fault(own | dict(values)):
+            if fault := mass_fault(defaults | dict(values)):
                 return MemberResult({}, trouble=fault)
             given = dict(zip(names, study.values.tolist(), strict=True)) | dict(values)
             try:
@@ -172,12 +172,12 @@ class OfCriteria:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         whole = build(self.ship.card())
         model = _reading_off(whole, *(name for names in _READ_OFF.values() for name in names))
-        integrator, own = Integrator(model, every=EVERY), _parameters(model)
+        integrator, parameters = Integrator(model, every=EVERY), _parameters(model)
 
         def ask(values: Mapping[str, float]) -> MemberResult:
             # What is an input (a current) is calm in these trials.
-            given = {name: value for name, value in values.items() if name in own}
-            if fault := mass_fault(own | given):
+            given = {name: value for name, value in values.items() if name in parameters}
+            if fault := mass_fault(parameters | given):
                 return MemberResult({}, trouble=fault)
             criteria = imo_criteria(model, given, integrator)
             return MemberResult(

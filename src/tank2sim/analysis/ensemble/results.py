@@ -100,7 +100,7 @@ class Chance:
         Share of all usable members that meet it; None where no member shows it.
     between : tuple or None
         95 % interval of that probability, from the number of members alone (Wilson 1927, J. Amer. Stat. Assoc. 22).
-    left_open : int
+    undecided : int
         Usable members whose trial does not show it; they count as not meeting it.
     band : Band or None
         Of what was found.
@@ -109,19 +109,19 @@ class Chance:
     criterion: ImoCriterion
     met: float | None
     between: tuple[float, float] | None
-    left_open: int
+    undecided: int
     band: Band | None
 
     def as_json(self) -> dict[str, object]:
         """As JSON has it."""
-        one = self.criterion
+        found = self.criterion
         return {
-            "name": one.name,
-            "allowed": one.allowed,
-            "unit": one.unit,
+            "name": found.name,
+            "allowed": found.allowed,
+            "unit": found.unit,
             "probability_met": self.met,
             "interval_95": self.between,
-            "not_shown": self.left_open,
+            "not_shown": self.undecided,
             "band": self.band and self.band.as_json(),
         }
 
@@ -143,7 +143,7 @@ class StabilityBands:
             **self.asked.as_json(),
             "figures": {name: band.as_json() for name, band in self.figures.items()},
             "probability_stable": self.stable,
-            "imo": [one.as_json() for one in self.chances],
+            "imo": [chance.as_json() for chance in self.chances],
             "curves": self.curves and self.curves.as_json(),
         }
 
@@ -172,21 +172,21 @@ def manoeuvre_bands(
     executor: Executor | None = None,
 ) -> ManoeuvreBands:
     """Bands of a manoeuvre; `run_s` is the duration asked for, and how long the run of the card itself took."""
-    draws, told = draws_of(card, asked.seed)
+    draws, notices = draws_of(card, asked.seed)
     times = np.linspace(0.0, run_s[1], TIMES)
     question = OfManoeuvre(ShipText.of(card), manoeuvre, run_s[0], times)
     found = ensemble(question, draws, asked.members, executor)
     if asked.members > KEPT:
-        told.append(f"bands of tracks and histories are of the first {KEPT} members; figures are of all")
+        notices.append(f"bands of tracks and histories are of the first {KEPT} members; figures are of all")
     shown, histories, track = history_bands(found, times, tuple(ENSEMBLE_SIGNALS))
     if 0 < len(shown) < len(times):
         share = f"{100 * STILL_RUNNING:g} % of the members"
-        told.append(f"bands over time end at {shown[-1]:.4g} s, up to which {share} run; figures are of all")
+        notices.append(f"bands over time end at {shown[-1]:.4g} s, up to which {share} run; figures are of all")
     if track is not None and track.count < len(shown):
         last = shown[track.count - 1]
         share = f"{100 * STILL_RUNNING:g} % of the members"
-        told.append(f"the band of the track ends at {last:.4g} s, as far as {share} come while they run")
-    return ManoeuvreBands(_members(found, told), figure_bands(found), shown, histories, track)
+        notices.append(f"the band of the track ends at {last:.4g} s, as far as {share} come while they run")
+    return ManoeuvreBands(_members(found, notices), figure_bands(found), shown, histories, track)
 
 
 def stability_bands(
@@ -198,55 +198,55 @@ def stability_bands(
 ) -> StabilityBands:
     """Bands of the straight course at the card's speed, the chances of the IMO `criteria`, and, if asked, bands of
     `curves`: at a speed (None: the card's), on a grid."""
-    draws, told = draws_of(card, asked.seed)
+    draws, messages = draws_of(card, asked.seed)
     trials = ensemble(OfCriteria(ShipText.of(card)), draws, asked.members, executor)
-    told.append("an ensemble is judged at the card's speed")
+    messages.append("an ensemble is judged at the card's speed")
     try:
         straight = ensemble(OfFigures(ShipText.of(card), STRAIGHT), draws, asked.members, executor)
     except InputError as error:
         straight = Ensemble(asked.members, asked.seed, {})
-        told.append(f"no bands of the straight course: {error.problem}")
+        messages.append(f"no bands of the straight course: {error.problem}")
     chances = tuple(chance(criterion, trials) for criterion in criteria)
     unseen = answering_states(build(card))
     if unseen:
-        told.append(
+        messages.append(
             "no probability of stability: the figures of the members are those of slow motions, which "
             f"{', '.join(unseen)} follow at once"
         )
     stable = None if unseen else _stable(straight)
     bands, through = bands_without_poles(straight)
-    told += through
+    messages += through
     drawn = steering_bands(ShipText.of(card), draws, asked.members, curves, executor) if curves else None
-    told += drawn.notices if drawn else ()
-    return StabilityBands(_members(trials, told), bands, stable, chances, drawn)
+    messages += drawn.notices if drawn else ()
+    return StabilityBands(_members(trials, messages), bands, stable, chances, drawn)
 
 
 def named_bands(
     card: ManoeuvringCard, figures: Sequence[str], asked: EnsembleRequest, executor: Executor | None = None
 ) -> FigureBands:
     """Bands of figures by name (:mod:`tank2sim.analysis.influence.figures`)."""
-    draws, told = draws_of(card, asked.seed)
+    draws, notices = draws_of(card, asked.seed)
     found = ensemble(OfFigures(ShipText.of(card), tuple(figures)), draws, asked.members, executor)
     bands, through = bands_without_poles(found)
-    told += through
+    notices += through
     deviations = {name: float(np.nanstd(found.figures[name], ddof=1)) for name in bands} if asked.members > 1 else {}
     deviations = {name: deviations.get(name, math.nan) for name in bands}
     for name, band in bands.items():
         if band.shown < found.usable:
-            told.append(f"{name}: {found.usable - band.shown} of {asked.members} members do not show it")
-    return FigureBands(_members(found, told), bands, deviations)
+            notices.append(f"{name}: {found.usable - band.shown} of {asked.members} members do not show it")
+    return FigureBands(_members(found, notices), bands, deviations)
 
 
 def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
     """Bands of figures by name, except for those of :data:`POLES` that go through infinity, and messages about
     these."""
     bands = figure_bands(found)
-    own = [name for name in POLES if name in bands]
-    if not own:
+    poles = [name for name in POLES if name in bands]
+    if not poles:
         return bands, []
     judged = found.figures.get("criterion_C")
-    signs = {name: np.sign(found.figures[name] if judged is None else judged) for name in own}
-    gone = [name for name in own if (signs[name] > 0).any() and (signs[name] < 0).any()]
+    signs = {name: np.sign(found.figures[name] if judged is None else judged) for name in poles}
+    gone = [name for name in poles if (signs[name] > 0).any() and (signs[name] < 0).any()]
     if not gone:
         return bands, []
     usable, words = found.usable, " and ".join(in_words(name)[0] for name in gone)
@@ -278,5 +278,5 @@ def _stable(straight: Ensemble) -> float | None:
         return float(np.sum((straight.figures["criterion_C"] > 0) & (total > 0))) / straight.usable
 
 
-def _members(found: Ensemble, told: Sequence[str]) -> Members:
-    return Members(found.members, found.seed, found.unusable, (*told, *found.notices))
+def _members(found: Ensemble, messages: Sequence[str]) -> Members:
+    return Members(found.members, found.seed, found.unusable, (*messages, *found.notices))

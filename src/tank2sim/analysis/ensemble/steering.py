@@ -103,7 +103,7 @@ class SteeringBands:
     ----------
     members : int
         Whose curves these are, and can be used.
-    own : mapping
+    reference : mapping
         The curves of the ship itself.
     with_loop : int
         Members that have a loop; the width of the others is 0.
@@ -111,7 +111,7 @@ class SteeringBands:
 
     grid: Grid
     members: int
-    own: Mapping[str, Array]
+    reference: Mapping[str, Array]
     curves: Mapping[str, BandOverTime]
     loop_width_deg: Band | None
     with_loop: int
@@ -120,19 +120,19 @@ class SteeringBands:
     def as_json(self) -> dict[str, object]:
         """As JSON has it."""
 
-        def those(*names: str) -> dict[str, object]:
-            return {name: self.curves[name].as_json() | {"own": self.own[name]} for name in names}
+        def bands_of(*names: str) -> dict[str, object]:
+            return {name: self.curves[name].as_json() | {"own": self.reference[name]} for name in names}
 
         return {
             "members": self.members,
             "steady_turning": {
                 "rudder_deg": np.degrees(self.grid.rudder_rad),
-                **those(FROM_STARBOARD, FROM_PORT),
+                **bands_of(FROM_STARBOARD, FROM_PORT),
                 "loop_width_deg": self.loop_width_deg and self.loop_width_deg.as_json(),
                 "with_loop": self.with_loop,
             },
-            "bode": {"omega_radps": self.grid.omega_radps, **those(MAGNITUDE, PHASE)},
-            "step": {"time_s": self.grid.time_s, **those(STEP)},
+            "bode": {"omega_radps": self.grid.omega_radps, **bands_of(MAGNITUDE, PHASE)},
+            "step": {"time_s": self.grid.time_s, **bands_of(STEP)},
         }
 
 
@@ -145,16 +145,16 @@ def steering_bands(
     """
     speed, grid = about
     question = OfSteering(ship, speed, grid)
-    (own,) = question.prepared()([{}])
+    (reference,) = question.prepared()([{}])
     found = ensemble(question, draws, min(members, CURVES), executor)
-    if found.histories is None or own.histories is None:
+    if found.histories is None or reference.histories is None:
         return None
     messages = [f"no steady turns: {notice}" for notice in found.notices if "cannot be used" in notice]
     if members > CURVES:
         messages.append(f"bands of steady turns, Bode diagram and step are of the first {CURVES} members")
     width = found.figures["loop_width_deg"]
     loops = int(np.sum(width > 0))
-    herself = {name: row.astype(float) for name, row in zip(_CURVES, own.histories, strict=True)}
+    herself = {name: row.astype(float) for name, row in zip(_CURVES, reference.histories, strict=True)}
     bands = {name: _band(found, row) for row, name in enumerate(_CURVES)}
     if not all(np.isfinite(bands[name].low).all() for name in (FROM_STARBOARD, FROM_PORT)):
         share = f"{100 * (1 - STILL_RUNNING):.2g} % of the members"
@@ -166,7 +166,7 @@ def steering_bands(
 def branches(turning: SteadyTurning, rudder_rad: Sequence[float] | Array) -> tuple[Array, Array]:
     """Yaw rates (n,), deg/s, of the stable turns to which a spiral comes from starboard and from port: the one farthest
     to that side; one and the same outside a hysteresis loop, nan where no turn is stable."""
-    found = [[rate for rate, stable in turning.turns_at(float(one)) if stable] for one in rudder_rad]
+    found = [[rate for rate, stable in turning.turns_at(float(angle)) if stable] for angle in rudder_rad]
     return (
         np.degrees([max(rates, default=math.nan) for rates in found]),
         np.degrees([min(rates, default=math.nan) for rates in found]),

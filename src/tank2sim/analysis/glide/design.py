@@ -76,8 +76,8 @@ class Range:
 
     def as_json(self) -> dict[str, object]:
         """As JSON has it; the angle in degrees."""
-        rest = {name: value for name, value in vars(self).items() if name != "path_angle_rad"}
-        return {"path_angle_deg": math.degrees(self.path_angle_rad), **rest}
+        values = {name: value for name, value in vars(self).items() if name != "path_angle_rad"}
+        return {"path_angle_deg": math.degrees(self.path_angle_rad), **values}
 
 
 def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth_m: float) -> Range:

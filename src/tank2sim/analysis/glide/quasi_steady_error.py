@@ -105,10 +105,10 @@ def _velocity_error(card: GliderCard) -> Callable[[Trajectory, slice], float]:
     def error(run: Trajectory, part: slice) -> float:
         down = -run["pitch.angle"][part]
         steady = speed(down) * np.sqrt(np.abs(run["buoyancy.mass"][part]) / card.glider.buoyancy_kg)
-        angle, own = run["motion.path_angle"][part], run["motion.speed"][part]
-        along = own * np.cos(angle) - steady * np.cos(path(down))
-        up = own * np.sin(angle) - steady * np.sin(path(down))
-        return float(np.sqrt(np.mean(along**2 + up**2)) / np.mean(own))
+        angle, speed_mps = run["motion.path_angle"][part], run["motion.speed"][part]
+        along = speed_mps * np.cos(angle) - steady * np.cos(path(down))
+        up = speed_mps * np.sin(angle) - steady * np.sin(path(down))
+        return float(np.sqrt(np.mean(along**2 + up**2)) / np.mean(speed_mps))
 
     return error
 

@@ -128,11 +128,11 @@ def smallest_angle(card: GliderCard, roll_rad: float = 0.0) -> float:
 
     There the ratio of lift to drag is at its greatest, so that without roll this is also the best glide.
     """
-    own = card.glider
-    part = own.lift_quadratic * own.drag_zero
-    root = math.sqrt(part**2 + own.lift_slope**2 * own.drag_quadratic * own.drag_zero)
+    section = card.glider
+    part = section.lift_quadratic * section.drag_zero
+    root = math.sqrt(part**2 + section.lift_slope**2 * section.drag_quadratic * section.drag_zero)
     # 2 (root - part) / C_L0^2 without the difference of two almost equal numbers
-    tau = 2 * own.drag_quadratic * own.drag_zero / (root + part)
+    tau = 2 * section.drag_quadratic * section.drag_zero / (root + part)
     return math.atan2(tau, math.cos(roll_rad))
 
 
@@ -168,19 +168,19 @@ def steady_glide(
             f"{math.degrees(path_angle_rad):g} deg cannot be flown{with_roll}: the drag is too large for the lift",
             f"the smallest that can is {math.degrees(least):.3f} deg",
         )
-    own = card.glider
+    section = card.glider
     tau = math.tan(steep) * math.cos(roll_rad)
-    slope = own.lift_slope * tau
-    under = slope**2 - 4 * (own.drag_quadratic - own.lift_quadratic * tau) * own.drag_zero
+    slope = section.lift_slope * tau
+    under = slope**2 - 4 * (section.drag_quadratic - section.lift_quadratic * tau) * section.drag_zero
     # The small root, written so that nothing cancels and that it also holds where C_D = C_L tau.
-    size = 2 * own.drag_zero / (slope + math.sqrt(max(0.0, under)))
-    lift = lift_coefficient(size, own.lift_slope, own.lift_quadratic)
-    drag = drag_coefficient(size, own.drag_zero, own.drag_quadratic)
-    half = 0.5 * card.environment.water_density_kgpm3 * own.reference_area_m2
+    size = 2 * section.drag_zero / (slope + math.sqrt(max(0.0, under)))
+    lift = lift_coefficient(size, section.lift_slope, section.lift_quadratic)
+    drag = drag_coefficient(size, section.drag_zero, section.drag_quadratic)
+    half = 0.5 * card.environment.water_density_kgpm3 * section.reference_area_m2
     share = drag * math.sin(steep) + lift * math.cos(roll_rad) * math.cos(steep)
     speed = math.sqrt(abs(buoyancy) * card.environment.gravity_mps2 / (half * share))
     aside = half * lift * abs(math.sin(roll_rad))
-    radius = own.mass_kg * math.cos(steep) ** 2 / aside if aside else math.inf
+    radius = section.mass_kg * math.cos(steep) ** 2 / aside if aside else math.inf
     return _made(_Found(path_angle_rad, roll_rad, buoyancy, size, speed, radius, lift, drag), half)
 
 
@@ -227,17 +227,17 @@ def glide_as_printed(
     """
     buoyancy = _buoyancy(card, path_angle_rad, buoyancy_kg)
     _check(path_angle_rad, roll_rad)
-    own = card.glider
+    section = card.glider
     steep, upright = abs(path_angle_rad), math.cos(roll_rad)
     tau = math.tan(steep) * upright
-    under = own.drag_quadratic - own.lift_quadratic * tau
-    size = (own.lift_slope * tau - own.drag_zero) / under if under > 0 else -1.0
+    under = section.drag_quadratic - section.lift_quadratic * tau
+    size = (section.lift_slope * tau - section.drag_zero) / under if under > 0 else -1.0
     if size <= 0:
         problem = f"{math.degrees(path_angle_rad):g} deg gives no incidence by (8) as printed"
         raise InputError(card.source, "path angle", problem, "give another angle, or leave --as-printed out")
-    drag = size * (own.drag_zero + own.drag_quadratic * size)
-    lift = lift_coefficient(size, own.lift_slope, own.lift_quadratic)
-    half = 0.5 * card.environment.water_density_kgpm3 * own.reference_area_m2
+    drag = size * (section.drag_zero + section.drag_quadratic * size)
+    lift = lift_coefficient(size, section.lift_slope, section.lift_quadratic)
+    half = 0.5 * card.environment.water_density_kgpm3 * section.reference_area_m2
     share = drag * math.sin(steep) + lift * upright * math.cos(steep)
     speed = math.sqrt(abs(buoyancy) * card.environment.gravity_mps2 / (half * share))
     radius = radius_as_printed(card, lift, path_angle_rad, roll_rad)
@@ -257,10 +257,10 @@ def force_residual(card: GliderCard, glide: SteadyGlide) -> tuple[float, float, 
 
     Lift and drag are those of (6) and (7) at the glide's incidence and speed, whatever equations gave the glide.
     """
-    own = card.glider
-    pressure = 0.5 * card.environment.water_density_kgpm3 * own.reference_area_m2 * glide.speed_mps**2
-    lift = pressure * lift_coefficient(glide.incidence_rad, own.lift_slope, own.lift_quadratic)
-    drag = pressure * drag_coefficient(glide.incidence_rad, own.drag_zero, own.drag_quadratic)
+    section = card.glider
+    pressure = 0.5 * card.environment.water_density_kgpm3 * section.reference_area_m2 * glide.speed_mps**2
+    lift = pressure * lift_coefficient(glide.incidence_rad, section.lift_slope, section.lift_quadratic)
+    drag = pressure * drag_coefficient(glide.incidence_rad, section.drag_zero, section.drag_quadratic)
     along, up = math.cos(glide.path_angle_rad), math.sin(glide.path_angle_rad)
     upright, aside = math.cos(glide.roll_rad), math.sin(glide.roll_rad)
     centripetal = card.glider.mass_kg * glide.horizontal_speed_mps * glide.turn_rate_radps

@@ -107,11 +107,11 @@ class GlideStudy:
             "smallest_angle_deg": math.degrees(self.smallest_angle_rad),
             "best_glide": self.best.as_json(),
             "fastest_glide": self.fastest.as_json(),
-            "ranges": [one.as_json() for one in self.ranges],
+            "ranges": [row.as_json() for row in self.ranges],
         }
         names = ("path_angle_deg", "horizontal_speed_mps", "climb_mps")
-        polar = [one.as_json() for one in self.polar]
-        result["polar"] = {name: [one[name] for one in polar] for name in names}
+        polar = [row.as_json() for row in self.polar]
+        result["polar"] = {name: [row[name] for row in polar] for name in names}
         if self.printed:
             result["as_printed"] = [
                 {**glide.as_json(), "force_residual_N": force_residual(self.card, glide)} for glide in self.printed
@@ -126,7 +126,7 @@ class GlideStudy:
         if self.compared:
             result["transient"] = self.compared.as_json()
         if self.errors:
-            steps, swings = ([one.as_json() for one in found] for found in (self.errors, self.swings))
+            steps, swings = ([row.as_json() for row in found] for found in (self.errors, self.swings))
             result["quasi_steady_error"] = {"steps": steps, "swings": swings}
         return result | {"notices": list(self.notices)}
 

@@ -80,13 +80,13 @@ def equilibrium(model: Model, glide: SteadyGlide) -> GlideEquilibrium:
         x[names.index(name)] = value
     places = [names.index("motion.u"), names.index("motion.w")]
     residual = ca.substitute(ca.substitute(model.rates[places], model.u, ca.DM(u)), model.p, ca.DM(p))
-    others = [place for place in range(len(names)) if place not in places]
-    residual = ca.substitute(residual, model.x[others], ca.DM(x[others]))
+    given = [place for place in range(len(names)) if place not in places]
+    residual = ca.substitute(residual, model.x[given], ca.DM(x[given]))
     problem = {"x": model.x[places], "g": residual}
     solver = ca.rootfinder("equilibrium", "newton", problem, {"abstol": _ACCURACY, "error_on_fail": False})
     x[places] = np.array(solver(x[places], [])).ravel()
-    left = np.abs(np.array(model.rhs(x, u, p)).ravel()[places])
-    if not np.all(left < 1e3 * _ACCURACY):
+    rates = np.abs(np.array(model.rhs(x, u, p)).ravel()[places])
+    if not np.all(rates < 1e3 * _ACCURACY):
         raise InputError(
             model.origin, "", "the transient model has no equilibrium near this glide", "give another angle"
         )
@@ -127,8 +127,8 @@ class Compared:
         times = [place.time_s for place in self.path.places]
         named = {"x_m": "motion.x", "y_m": "motion.y", "depth_m": "motion.z", "speed_mps": "motion.speed"}
         rows = [{"t_s": time} | {key: self.motion.at(name, time) for key, name in named.items()} for time in times]
-        told = {"path": rows, "distance_m": self.distance_m, "distance_by_length": self.share}
-        return told | {"histories": self._histories(), "orders": self._orders()}
+        result = {"path": rows, "distance_m": self.distance_m, "distance_by_length": self.share}
+        return result | {"histories": self._histories(), "orders": self._orders()}
 
     def _histories(self) -> dict[str, list[float]]:
         """The transient motion, thinned to draw."""
@@ -201,6 +201,6 @@ def quasi_steady_error(
     for label, pair in kinds.items():
         glides = [steady_glide(card, angle, roll_rad=rolled) for angle, rolled in (*pair, *pair)]
         found = [compare_with_steady(integrator, path_of(glides, [duration] * len(glides))) for duration in durations_s]
-        distance = np.array([float(one.distance_m.max()) for one in found])
-        errors.append(ProgrammeError(label, np.array(durations_s), distance, np.array([one.share for one in found])))
+        distance = np.array([float(path.distance_m.max()) for path in found])
+        errors.append(ProgrammeError(label, np.array(durations_s), distance, np.array([path.share for path in found])))
     return tuple(errors)

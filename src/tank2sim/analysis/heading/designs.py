@@ -166,11 +166,11 @@ def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant
 
 def _placed(plant: SteeringPlant, name: str, *, integral: bool) -> HeadingDesign:
     gains = heading_gains(plant.found.nomoto, plant.largest_rudder_rad)
-    told = f"integral {SLOWNESS:g} of the natural frequency"
+    note = f"integral {SLOWNESS:g} of the natural frequency"
     if not integral:
-        gains, told = _without_integral(plant, gains), "no integral"
+        gains, note = _without_integral(plant, gains), "no integral"
     source = (
-        f"Pole placement (relative damping {DAMPING:g}, {told}) on Nomoto's model of {plant.found.name} at "
+        f"Pole placement (relative damping {DAMPING:g}, {note}) on Nomoto's model of {plant.found.name} at "
         f"{plant.found.speed_mps:.4g} m/s"
     )
     return HeadingDesign(

@@ -66,10 +66,10 @@ class LoopMargins:
 
     def as_json(self) -> dict[str, object]:
         """The result as JSON has it; poles as [real, imaginary], what is unbounded as null."""
-        own = {key: value for key, value in vars(self).items() if key != "poles"}
+        values = {key: value for key, value in vars(self).items() if key != "poles"}
         decibel = 20 * math.log10(self.gain_margin_up) if math.isfinite(self.gain_margin_up) else None
         poles = [[pole.real, pole.imag] for pole in self.poles]
-        return {**own, "gain_margin_dB": decibel, "stable": self.stable, "poles": poles}
+        return {**values, "gain_margin_dB": decibel, "stable": self.stable, "poles": poles}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,13 +121,13 @@ def loop_transfer(ship: Model, autopilot: Model, speed_mps: float | None = None)
     states = [name for name in ship.state_names if name not in _HELD]
     seen = ["motion.psi", "motion.r"]
     plant = state_space(ship, point, states=states, inputs=["rudder.command"], outputs=seen)
-    pilot = _at_rest(autopilot, seen)
+    pilot = _linearised_pilot(autopilot, seen)
     return -control.ss(pilot.A, pilot.B, pilot.C, pilot.D) * control.ss(plant.A, plant.B, plant.C, plant.D)
 
 
-def _at_rest(autopilot: Model, inputs: list[str]) -> control.StateSpace:
-    rest = OperatingPoint(_states(autopilot, 0.0), autopilot.input_values(), autopilot.parameter_values())
-    return state_space(autopilot, rest, inputs=inputs, outputs=["rudder.command"])
+def _linearised_pilot(autopilot: Model, inputs: list[str]) -> control.StateSpace:
+    point = OperatingPoint(_states(autopilot, 0.0), autopilot.input_values(), autopilot.parameter_values())
+    return state_space(autopilot, point, inputs=inputs, outputs=["rudder.command"])
 
 
 def _states(autopilot: Model, held: float) -> Array:
@@ -142,11 +142,13 @@ def closed_loop_transfer(ship: Model, autopilot: Model, speed_mps: float | None 
     course = straight_course(ship, speed_mps)
     joint = closed_loop_model(ship, autopilot)
     held = float(course.x[ship.state_names.index("rudder.angle")])
-    own = _states(autopilot, held)
+    autopilot_states = _states(autopilot, held)
     u = joint.input_values()
     if "autopilot.integral" not in autopilot:  # a heading error holds the rudder that keeps the course
-        u[joint.input_names.index("heading.command")] = held / float(_at_rest(autopilot, ["heading.command"]).D.item())
-    point = OperatingPoint(np.concatenate([course.x, own]), u, joint.parameter_values())
+        u[joint.input_names.index("heading.command")] = held / float(
+            _linearised_pilot(autopilot, ["heading.command"]).D.item()
+        )
+    point = OperatingPoint(np.concatenate([course.x, autopilot_states]), u, joint.parameter_values())
     states = [name for name in joint.state_names if name not in _HELD]
     outputs = ["motion.psi", "rudder.command", "rudder.rate"]
     return state_space(joint, point, states=states, inputs=["heading.command"], outputs=outputs)
@@ -192,15 +194,17 @@ def growing_effects(ship: Model, speed_mps: float | None = None) -> tuple[str, .
     participation in it is more than half: \\|w_i v_i\\|, w and v its left and right eigenvectors (Perez-Arriaga,
     Verghese and Schweppe 1982).
     """
-    own = settled_states(ship)
+    effect_states = settled_states(ship)
     states = [name for name in ship.state_names if name not in (*_HELD, "motion.psi")]
     found = state_space(ship, straight_course(ship, speed_mps), states=states, inputs=["rudder.command"])
     modes, right = np.linalg.eig(found.A)
     shares = np.abs(right * np.linalg.inv(right).T)  # (states, modes)
     shares /= shares.sum(axis=0)
-    theirs = [states.index(name) for name in own]
+    theirs = [states.index(name) for name in effect_states]
     growing = (modes.real > 0) & (shares[theirs].sum(axis=0) > 0.5)
-    return tuple(name for name, place in zip(own, theirs, strict=True) if np.any(shares[place, growing] > _TAKES_PART))
+    return tuple(
+        name for name, place in zip(effect_states, theirs, strict=True) if np.any(shares[place, growing] > _TAKES_PART)
+    )
 
 
 def margin_frequencies(loop: control.StateSpace) -> Array:

@@ -227,9 +227,9 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
         As :func:`design_heading`, :func:`keep_track` and :meth:`HeadingLoop.run`; or the loop is not stable.
     """
     only = card.model.kind == "linear"
-    _refuse_other_speed(card, settings.speed_mps if only else None)
+    _refuse_fixed_speed(card, settings.speed_mps if only else None)
     design = _design(ship, settings)
-    margins, notices = _margins(ship, design, settings.speed_mps, only_own=only)
+    margins, notices = _margins(ship, design, settings.speed_mps, design_speed_only=only)
     if not margins[0].stable:
         raise _not_stable(ship, design, settings.speed_mps)
     values = {parameter.name: parameter.start for parameter in ship.parameters}
@@ -275,11 +275,11 @@ def _tracks(loop: HeadingLoop, waypoints: Array | None, inputs: Mapping[str, flo
     return {name: keep_track(loop, waypoints, Guidance(integral_share=share), inputs) for name, share in shares.items()}
 
 
-def _refuse_other_speed(card: ManoeuvringCard, speed: float | None) -> None:
-    own = card.model.speed_mps
-    if speed is not None and abs(speed / own - 1) > 1e-6:
+def _refuse_fixed_speed(card: ManoeuvringCard, speed: float | None) -> None:
+    card_speed = card.model.speed_mps
+    if speed is not None and abs(speed / card_speed - 1) > 1e-6:
         problem = f"{speed:g} m/s is not the speed of {card.ship.name}, whose forces are linear"
-        raise InputError("--speed", "", problem, f"leave it out: a linear card holds at {own:g} m/s alone")
+        raise InputError("--speed", "", problem, f"leave it out: a linear card holds at {card_speed:g} m/s alone")
 
 
 def _not_stable(ship: Model, design: HeadingDesign, speed: float | None) -> InputError:
@@ -301,24 +301,24 @@ def _design(ship: Model, settings: StudySettings) -> HeadingDesign:
 
 
 def _margins(
-    ship: Model, design: HeadingDesign, speed: float | None, *, only_own: bool
+    ship: Model, design: HeadingDesign, speed: float | None, *, design_speed_only: bool
 ) -> tuple[tuple[LoopMargins, ...], list[str]]:
     """At the speed of the design and at five across the card's range; and notices of those without.
 
     The forces of a linear card are those at its own speed by definition: others would repeat its margins.
     """
     values = {parameter.name: parameter.start for parameter in ship.parameters}
-    own = values["ship.speed"] if speed is None else speed
-    found, notices = [loop_margins(ship, design.autopilot, own)], []
-    if only_own:
-        return tuple(found), [f"margins at {own:.4g} m/s alone: a linear card does not hold at other speeds"]
-    for other in np.linspace(values["ship.slowest"], values["ship.fastest"], 5).tolist():
-        if abs(other / own - 1) < 1e-6:
+    design_speed = values["ship.speed"] if speed is None else speed
+    found, notices = [loop_margins(ship, design.autopilot, design_speed)], []
+    if design_speed_only:
+        return tuple(found), [f"margins at {design_speed:.4g} m/s alone: a linear card does not hold at other speeds"]
+    for card_speed in np.linspace(values["ship.slowest"], values["ship.fastest"], 5).tolist():
+        if abs(card_speed / design_speed - 1) < 1e-6:
             continue
         try:
-            found.append(loop_margins(ship, design.autopilot, other))
+            found.append(loop_margins(ship, design.autopilot, card_speed))
         except InputError as error:  # the polynomial of a card may lose its rudder at an end of its range
-            notices.append(f"no margins at {other:.4g} m/s: {error.problem}")
+            notices.append(f"no margins at {card_speed:.4g} m/s: {error.problem}")
     return tuple(found), notices
 
 

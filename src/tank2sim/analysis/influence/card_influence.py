@@ -104,9 +104,9 @@ class CardInfluence:
         """Which standard errors those of the figures are from."""
         if not self.errors.together:
             return "standard errors of figures are from those of the card's numbers, as if these were independent"
-        others = "" if len(self.errors.together) == len(self.parameters) else ", others as if independent"
+        remainder = "" if len(self.errors.together) == len(self.parameters) else ", others as if independent"
         count = len(self.errors.together)
-        return f"standard errors of figures are from the covariance next to the card ({count} numbers{others})"
+        return f"standard errors of figures are from the covariance next to the card ({count} numbers{remainder})"
 
     @property
     def _variances(self) -> Array:
@@ -225,8 +225,8 @@ def _agreed(study: Study, found: CardInfluence, percent: Mapping[str, float]) ->
 
 def _differing(study: Study, sloped: Array) -> Iterable[str]:
     """A word where the slopes are those of another value than the figure's: the event behind it is not the same."""
-    for figure, one, other in zip(study.figures, study.base, sloped, strict=True):
-        if not abs(one - other) <= 1e-4 * max(abs(one), 1e-3):
+    for figure, value, sloped_value in zip(study.figures, study.base, sloped, strict=True):
+        if not abs(value - sloped_value) <= 1e-4 * max(abs(value), 1e-3):
             yield f"{figure.text}: its slopes are not to be trusted, the manoeuvre has no clean event there"
 
 

@@ -66,9 +66,9 @@ class EquilibriumFigures:
     def at(self, near: Array, inputs: Mapping[str, float], p: Array) -> tuple[Array, Array] | None:
         """Unknowns (nz,) and values (n,) at the state of rest next to `near`; None if there is none."""
         u = self._model.input_values(inputs)
-        z, values = (np.array(one).ravel() for one in self._values(near, u, p))
-        left = np.array(self._residual(z, u, p))
-        return (z, values) if np.all(np.abs(left) < _ACCURACY) and np.isfinite(values).all() else None
+        z, values = (np.array(value).ravel() for value in self._values(near, u, p))
+        residual = np.array(self._residual(z, u, p))
+        return (z, values) if np.all(np.abs(residual) < _ACCURACY) and np.isfinite(values).all() else None
 
     def slopes(self, z: Array, inputs: Mapping[str, float], p: Array) -> Array:
         """Slopes (n, np) of the values by all parameters, at a state of rest."""
@@ -140,8 +140,8 @@ def straight_courses(model: Model) -> tuple[EquilibriumFigures, Array]:
     """
     unknown = ca.SX.sym("z", 2)
     speed0 = model.symbol("ship.speed")
-    own = {"motion.v": unknown[0] * speed0, "rudder.angle": unknown[1]}
-    x = ca.vcat([own.get(state.name, ca.SX(state.start)) for state in model.states])
+    nominal = {"motion.v": unknown[0] * speed0, "rudder.angle": unknown[1]}
+    x = ca.vcat([nominal.get(state.name, ca.SX(state.start)) for state in model.states])
     time = model.symbol("ship.length") / speed0
     motion = model.expand(ca.vcat([model.symbol("motion.vdot") * time / speed0, model.symbol("motion.rdot") * time**2]))
     shown = _linear_figures(model)
@@ -180,7 +180,9 @@ def _reduced(model: Model, values: Sequence[str]) -> tuple[ca.SX, ca.SX]:
     """Slopes (n, 2) by v and r and (n, 1) by the rudder, with :func:`settled_states` eliminated."""
     settled = settled_states(model)
     derivative = {state.name: state.derivative for state in model.states}
-    rows = model.expand(ca.vcat([model.symbol(name) for name in (*values, *(derivative[one] for one in settled))]))
+    rows = model.expand(
+        ca.vcat([model.symbol(name) for name in (*values, *(derivative[settled_state] for settled_state in settled))])
+    )
     columns = ca.vcat([model.symbol(name) for name in ("motion.v", "motion.r", *settled, "rudder.angle")])
     whole = ca.jacobian(rows, columns)
     n = len(values)

@@ -33,8 +33,8 @@ class JointErrors:
     @property
     def in_words(self) -> list[str]:
         """What a user should know of them."""
-        told = standard_errors_in_words(self.parameters, self.together)
-        return [self.together_in_words, *told] if self.together else told
+        words = standard_errors_in_words(self.parameters, self.together)
+        return [self.together_in_words, *words] if self.together else words
 
     @property
     def together_in_words(self) -> str:
@@ -51,14 +51,14 @@ def joint_errors(card: ManoeuvringCard, parameters: Sequence[CardParameter]) -> 
         The covariance to which the card refers is at fault.
     """
     known = read_covariance(card)
-    own = np.array([parameter.standard_error for parameter in parameters])
-    covariance = np.diag(own**2)
+    standard_errors = np.array([parameter.standard_error for parameter in parameters])
+    covariance = np.diag(standard_errors**2)
     if known is None:
         return JointErrors(tuple(parameters), covariance, frozenset())
     places = {parameter.key: place for place, parameter in enumerate(parameters)}
     names = [name for name in known.names if name in places]
     rows = [places[name] for name in names]
-    here = [known.names.index(name) for name in names]
+    columns = [known.names.index(name) for name in names]
     factors = np.array([parameters[row].factor for row in rows])
-    covariance[np.ix_(rows, rows)] = known.matrix[np.ix_(here, here)] / np.outer(factors, factors)
+    covariance[np.ix_(rows, rows)] = known.matrix[np.ix_(columns, columns)] / np.outer(factors, factors)
     return JointErrors(tuple(parameters), covariance, frozenset(names))

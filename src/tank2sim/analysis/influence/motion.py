@@ -34,7 +34,7 @@ from tank2sim.simulation.trajectory import Trajectory
 Sloped = tuple[float, Array]
 """A value and its slopes (k,) by the parameters."""
 
-BESIDE_KINK = 1e-4
+KINK_MARGIN = 1e-4
 """Steps end this share of a step before a kink and begin as far behind it, so that no stage of a step falls on it:
 there the slopes would be those of one side or the other, as rounding has it."""
 
@@ -140,8 +140,8 @@ class MotionSlopes:
         rows = int(np.searchsorted(run.t, last)) + 2
         course = _Course(run.t[:rows], run.x[:rows], run.u[:rows])
         times = [time for _, time in places]
-        beside = BESIDE_KINK * self.model.step_s
-        sides = [time + step for time in self._kink_times(course, p) for step in (-beside, beside)]
+        margin = KINK_MARGIN * self.model.step_s
+        sides = [time + step for time in self._kink_times(course, p) for step in (-margin, margin)]
         course = self._with_samples(course, [*times, *(time for time in sides if 0 < time < last)], p)
         wanted = {int(np.argmin(np.abs(course.t - time))): None for time in times}
         slopes = self._forward(course, wanted, p)
@@ -202,10 +202,10 @@ class MotionSlopes:
         """Times at which the right-hand side has a kink, within steps."""
         if self._kinks is None:
             return []
-        (left,) = self._kinks(course.x[:-1], course.u[:-1], p)
+        (before,) = self._kinks(course.x[:-1], course.u[:-1], p)
         (right,) = self._kinks(course.x[1:], course.u[:-1], p)
         found = []
-        for row, column in np.argwhere((left < 0) != (right < 0)):
+        for row, column in np.argwhere((before < 0) != (right < 0)):
             gap = float(course.t[row + 1] - course.t[row])
             indicator = self._indicator(course, int(row), int(column), p)
             if (indicator(0.0) < 0) != (indicator(gap) < 0):  # not where rounding alone has changed the sign

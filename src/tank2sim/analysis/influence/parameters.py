@@ -68,7 +68,11 @@ def card_parameters(card: ManoeuvringCard, model: Model) -> tuple[CardParameter,
     """Parameters of a card that are in its model, except for those that are zero without a standard error."""
     found = (*_derivatives(card, model), *_rigid_body(card), *_gear(card), *_propulsion(card), *_effects(card, model))
     known = set(model.parameter_names)
-    return tuple(one for one in found if one.name in known and (one.value != 0 or one.standard_error > 0))
+    return tuple(
+        parameter
+        for parameter in found
+        if parameter.name in known and (parameter.value != 0 or parameter.standard_error > 0)
+    )
 
 
 def find_parameter(parameters: Sequence[CardParameter], name: str, option: str) -> CardParameter:
@@ -171,16 +175,16 @@ def _effects(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
 
 def standard_errors_in_words(parameters: Sequence[CardParameter], known: Collection[str] = frozenset()) -> list[str]:
     """What a user should know of the standard errors that are taken; those of the keys `known` stand elsewhere."""
-    others = [parameter for parameter in parameters if parameter.key not in known]
-    assumed = [other.short for other in others if other.assumed and other.standard_error > 0]
-    exact = [other.short for other in others if other.standard_error == 0]
+    remaining = [parameter for parameter in parameters if parameter.key not in known]
+    assumed = [unlisted.short for unlisted in remaining if unlisted.assumed and unlisted.standard_error > 0]
+    exact = [unlisted.short for unlisted in remaining if unlisted.standard_error == 0]
     messages = []
     if assumed:
         every = len(assumed) + len(exact) == len(parameters)
-        which = "any number" if every else ", ".join(assumed)
+        subject = "any number" if every else ", ".join(assumed)
         mark = f"{ASSUMED}, not measured ones: " if every else ""
         share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of the value is taken"
-        messages.append(f"{mark}the card states no standard error of {which}: {share}")
+        messages.append(f"{mark}the card states no standard error of {subject}: {share}")
     if exact:
         messages.append(f"taken as exact, for a card states no standard error of them: {', '.join(exact)}")
     return messages
@@ -198,8 +202,8 @@ def agreed_by_name(
     """
     found: dict[str, float] = {}
     for name, percent in agreed.items():
-        own = find_parameter(parameters, name, option).name
-        if own in found:
+        parameter = find_parameter(parameters, name, option).name
+        if parameter in found:
             raise InputError(option, name, "is given twice", "give each parameter once")
-        found[own] = percent
+        found[parameter] = percent
     return found

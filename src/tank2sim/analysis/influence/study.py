@@ -62,12 +62,12 @@ class Study:
         self.parameters: tuple[CardParameter, ...] = card_parameters(card, self.model)
         self.values: Array = np.array([parameter.value for parameter in self.parameters])
         self._integrator = Integrator(self.model)
-        own = dict(zip(self.model.parameter_names, self.model.parameter_values().tolist(), strict=True))
-        self._length, self._speed = own["ship.length"], own["ship.speed"]
+        card_values = dict(zip(self.model.parameter_names, self.model.parameter_values().tolist(), strict=True))
+        self._length, self._speed = card_values["ship.length"], card_values["ship.speed"]
         self._places = [self.model.parameter_names.index(parameter.name) for parameter in self.parameters]
-        self._rest_near: dict[float, Array] = {}
+        self._equilibria: dict[float, Array] = {}
         self._long_enough: dict[Turn | Zigzag, float] = {}
-        self._told: dict[str, None] = dict.fromkeys(self.model.notices)
+        self._notices: dict[str, None] = dict.fromkeys(self.model.notices)
         self._known = False  # whether the figures of the card itself have been found: others say nothing of it
         self.base: Array = self.figures_at(self.values)
         self._known = True
@@ -93,7 +93,7 @@ class Study:
     @property
     def notices(self) -> tuple[str, ...]:
         """What limits the ship of the card and its manoeuvres."""
-        return tuple(self._told)
+        return tuple(self._notices)
 
     def figures_at(self, values: Array) -> Array:
         """Figures (nf,) of the ship with parameters `values` (k,); nan for those that it does not show."""
@@ -139,11 +139,11 @@ class Study:
         return {name: (float(v), by) for name, v, by in zip(course.names, shown, slopes, strict=True)}
 
     def _steady(self, turn: Turn, text: str, p: Array, sloped: bool) -> dict[str, tuple[float, Array | None]]:
-        if turn.rudder not in self._rest_near:
-            self._rest_near[turn.rudder] = self._first_turn(turn, text, p)
+        if turn.rudder not in self._equilibria:
+            self._equilibria[turn.rudder] = self._first_turn(turn, text, p)
         side = math.copysign(1.0, turn.rudder)
         order = {"rudder.command": turn.rudder}
-        found = self._turning.at(self._rest_near[turn.rudder], order, p)
+        found = self._turning.at(self._equilibria[turn.rudder], order, p)
         if found is None:
             return {}
         z, (u, v, r, _) = found
@@ -198,7 +198,7 @@ class Study:
             angles = [manoeuvre.rudder, *([manoeuvre.heading] if isinstance(manoeuvre, Zigzag) else [])]
             words = f"{type(manoeuvre).__name__.lower()} {'/'.join(f'{math.degrees(angle):.4g}' for angle in angles)}"
             marked = {f"{words}: {run.reading.message}": None} if run.reading.message else {}
-            self._told |= marked | dict.fromkeys(notice for notice in run.notices if notice != run.reading.message)
+            self._notices |= marked | dict.fromkeys(notice for notice in run.notices if notice != run.reading.message)
         return run
 
 

@@ -82,9 +82,9 @@ class _Trials:
         """A trial, or why there is none."""
         # MSC.137(76) asks for calm water: a current on the card is part of one place, not of the ship.
         calm = undisturbed_inputs(self.model)
-        own, integrator = self.parameters, self.integrator
+        defaults, integrator = self.parameters, self.integrator
         try:
-            run = simulate(self.model, manoeuvre, inputs=calm, parameters=own, integrator=integrator)
+            run = simulate(self.model, manoeuvre, inputs=calm, parameters=defaults, integrator=integrator)
         except InputError as error:
             return _Trial({}, f"{error.place}: {error.problem}" if error.place else error.problem)
         return _Trial(run.figures, _wrong_way(manoeuvre, run.trajectory), run.reading)
@@ -125,11 +125,11 @@ class _Worse:
 
     value: float | None
     remark: str
-    left_range: bool = False
+    beyond_range: bool = False
 
     @property
     def beyond(self) -> bool:
-        return self.left_range or (self.value is not None and bool(self.remark))
+        return self.beyond_range or (self.value is not None and bool(self.remark))
 
 
 def _wrong_way(manoeuvre: Manoeuvre, run: Trajectory) -> str:
@@ -176,7 +176,7 @@ def imo_criteria(
     (of_twenty,) = trials.worst([Zigzag(twenty, twenty), Zigzag(-twenty, twenty)], ("overshoots_deg", 0))
 
     def criterion(name: str, found: _Worse, allowed: float, unit: str, remark: str = "") -> ImoCriterion:
-        text = "; ".join(one for one in (found.remark, remark) if one)
+        text = "; ".join(text_part for text_part in (found.remark, remark) if text_part)
         return ImoCriterion(name, found.value, allowed, unit, text, found.beyond)
 
     return (
@@ -201,7 +201,7 @@ def _stopping(trials: _Trials) -> ImoCriterion:
     remark = f"at {FULL_ASTERN:.0%} of the nominal revolutions astern, reached at once: an assumption of the simulation"
     if found is not None and STOPPING < found <= STOPPING_OF_LARGE_SHIPS:
         remark += "; up to 20 L may be allowed to a ship of large displacement"
-    remark = "; ".join(one for one in (worse.remark, remark if found is not None else "") if one)
+    remark = "; ".join(text_part for text_part in (worse.remark, remark if found is not None else "") if text_part)
     return ImoCriterion(name, found, STOPPING, "L", remark, worse.beyond)
 
 

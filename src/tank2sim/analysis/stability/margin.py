@@ -163,7 +163,7 @@ class StabilityCriterion:
         if speed is not None:
             x[self._speed] = speed
         for _ in range(20):
-            residual, jacobian = (np.array(one) for one in self._course(x, point.u, p))
+            residual, jacobian = (np.array(value) for value in self._course(x, point.u, p))
             if not np.isfinite(jacobian).all() or np.linalg.matrix_rank(jacobian) < 2:
                 return None
             change = np.linalg.solve(jacobian, -residual.ravel())
@@ -181,10 +181,10 @@ def _prime_slopes(model: Model, by_speed: bool) -> ca.SX:
     derivative = {state.name: state.derivative for state in model.states}
     settled = [name for name in hull_states(model) if name not in ("motion.u", "motion.v", "motion.r")]
     if settled:
-        own = ca.vcat([model.symbol(name) for name in settled])
+        effect_states = ca.vcat([model.symbol(name) for name in settled])
         rates = model.expand(ca.vcat([model.symbol(derivative[name]) for name in settled]))
-        follow = ca.solve(ca.densify(ca.jacobian(rates, own)), ca.densify(ca.jacobian(rates, motion)))
-        slopes -= ca.jacobian(forces, own) @ follow
+        follow = ca.solve(ca.densify(ca.jacobian(rates, effect_states)), ca.densify(ca.jacobian(rates, motion)))
+        slopes -= ca.jacobian(forces, effect_states) @ follow
     length, density = model.symbol("ship.length"), model.symbol("ship.water_density")
     speed = model.symbol("ship.speed")
     if by_speed:
@@ -223,7 +223,7 @@ def stability_margin(model: Model, speed_mps: float | None = None) -> Margin:
         sway_lever=_ratio(slopes[1, 0], slopes[0, 0]),
         percent=100 * _ratio(value, abs(slopes[0, 0] * slopes[1, 1])),
         slopes=slopes,
-        influences=tuple(sorted(moving, key=lambda one: -abs(one.percent))),
+        influences=tuple(sorted(moving, key=lambda item: -abs(item.percent))),
         speeds_mps=speeds,
         criteria=criteria,
         speed_slopes=by_speed,
@@ -245,20 +245,20 @@ def _influence(criterion: StabilityCriterion, point: OperatingPoint, name: str, 
 def _neutral(criterion: StabilityCriterion, point: OperatingPoint, place: int) -> float | None:
     """The value of a parameter at which C' = 0, by Newton's method along the straight course."""
     value = float(point.p[place])
-    size, now = abs(value), point
+    size, current = abs(value), point
     for _ in range(30):
-        found, total, _ = criterion.at(now)
+        found, total, _ = criterion.at(current)
         if not total[place]:
             return None
         change = -found / total[place]
-        p = now.p.copy()
+        p = current.p.copy()
         p[place] += change
         if not abs(p[place] - value) < 10 * size:
             return None
-        following = criterion.moved(now, p=p)
+        following = criterion.moved(current, p=p)
         if following is None:
             return None
-        now = following
+        current = following
         if abs(change) < 1e-12 * size:
             return float(p[place])
     return None
@@ -272,11 +272,11 @@ def _over_speed(criterion: StabilityCriterion, point: OperatingPoint) -> tuple[A
     speeds = np.linspace(start["ship.slowest"], start["ship.fastest"], SPEEDS)
     rows = []
     for speed in speeds:
-        there = criterion.moved(point, speed=float(speed))
-        if there is None:
+        shifted = criterion.moved(point, speed=float(speed))
+        if shifted is None:
             rows.append((np.nan, np.nan))
             continue
-        value, total, _ = criterion.at(there)
+        value, total, _ = criterion.at(shifted)
         rows.append((value, float(total[-1])))
     criteria, slopes = np.array(rows).T
     return speeds, criteria, slopes

@@ -89,7 +89,7 @@ def steering_responses(model: Model, point: OperatingPoint, nomoto: Nomoto) -> t
     omega = np.geomspace(slowest / 20, fastest * 20, _FREQUENCIES)
     time = _times(hull.poles(), slowest)
     found = [_response(label, system, omega, time) for label, system in systems.items()]
-    return tuple(one for one in found if np.all(np.abs(one.response) > 0))
+    return tuple(candidate for candidate in found if np.all(np.abs(candidate.response) > 0))
 
 
 def _times(poles: NDArray[np.complex128], slowest: float) -> NDArray[np.float64]:

@@ -138,7 +138,7 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
     steering = state_space(
         model, point, states=["motion.v", "motion.r"], inputs=["rudder.angle"], outputs=["motion.r"], settled=settled
     )
-    own = nomoto(steering)
+    models = nomoto(steering)
     time = length / scaling
     return Stability(
         name=model.name,
@@ -148,13 +148,13 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
         eigenvalues=tuple(eigenvalues),
         criterion=criterion,
         steering_modes=_modes(model, point, steering_states(model)),
-        nomoto=own,
+        nomoto=models,
         nomoto_prime=Nomoto(
-            own.K_per_s * time,
-            own.T_s / time,
-            own.T1_s and own.T1_s / time,
-            own.T2_s and own.T2_s / time,
-            own.T3_s / time,
+            models.K_per_s * time,
+            models.T_s / time,
+            models.T1_s and models.T1_s / time,
+            models.T2_s and models.T2_s / time,
+            models.T3_s / time,
         ),
         effect_states=answering_states(model),
     )
@@ -176,7 +176,7 @@ def answering_states(model: Model) -> tuple[str, ...]:
 
     def answers(name: str) -> bool:
         rate = model.expand(model.symbol(derivative[name]))
-        return any(ca.depends_on(rate, model.symbol(other)) for other in states if other != name)
+        return any(ca.depends_on(rate, model.symbol(state_name)) for state_name in states if state_name != name)
 
     return tuple(name for name in states[2:] if answers(name))
 
@@ -188,11 +188,11 @@ def speed_acts(model: Model, point: OperatingPoint) -> bool:
     """
     motion = ["motion.v", "motion.r", "rudder.angle"]
     place = model.state_names.index("motion.u")
-    own = float(point.p[model.parameter_names.index("ship.speed")])
+    design_speed = float(point.p[model.parameter_names.index("ship.speed")])
     fastest = float(point.p[model.parameter_names.index("ship.fastest")])
     found = []
     # both where the card holds: below its slowest speed a linear card, too, goes over to the forces at low speed
-    for speed in (own, 0.5 * (own + fastest) if fastest > own else 1.01 * own):
+    for speed in (design_speed, 0.5 * (design_speed + fastest) if fastest > design_speed else 1.01 * design_speed):
         x = point.x.copy()
         x[place] = speed
         found.append(jacobians(model, OperatingPoint(x, point.u, point.p), ["force.Y", "force.N"], motion, [])[0])
@@ -201,8 +201,8 @@ def speed_acts(model: Model, point: OperatingPoint) -> bool:
 
 def settled_states(model: Model) -> list[str]:
     """States of effects (the memory of the flow, roll) that follow at once in the slow motions of C' and Nomoto."""
-    own = {f"motion.{name}" for name in ("u", "v", "r", "psi", "x", "y")}
-    return [name for name in model.state_names if name not in own and not name.startswith("rudder.")]
+    rigid_body = {f"motion.{name}" for name in ("u", "v", "r", "psi", "x", "y")}
+    return [name for name in model.state_names if name not in rigid_body and not name.startswith("rudder.")]
 
 
 def nomoto(steering: control.StateSpace) -> Nomoto:
@@ -211,7 +211,7 @@ def nomoto(steering: control.StateSpace) -> Nomoto:
     From A (2, 2), B (2, 1), C (1, 2): 1/(T1 T2) = det A, T1 + T2 = -tr A / det A, T3 from the zero.
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # a ship that is neutral has K and T without end
-        K, total, product, T3 = (float(one) for one in steering_constants(steering.A, steering.B, steering.C))
+        K, total, product, T3 = (float(constant) for constant in steering_constants(steering.A, steering.B, steering.C))
     # T1 and T2 are the roots of T^2 - (T1 + T2) T + T1 T2; those of a pair that oscillates are not real.
     discriminant = total**2 - 4 * product
     T1 = 0.5 * (total + math.copysign(math.sqrt(discriminant), total)) if discriminant >= 0 else None

@@ -68,7 +68,7 @@ class StabilityStudy:
                 "direct": self.direct and self.direct.as_json(),
                 "reverse": self.reverse and self.reverse.as_json(),
             },
-            "imo": [one.as_json() for one in self.imo],
+            "imo": [criterion.as_json() for criterion in self.imo],
             "notices": list(self.notices),
         }
 
@@ -97,8 +97,8 @@ def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bo
     except InputError as error:
         notices.append(f"no steady-turning diagram: {_reason(error)}")
     if turning is not None and spirals:
-        direct, reverse, told = _spirals(model, turning)
-        notices += told
+        direct, reverse, spiral_notes = _spirals(model, turning)
+        notices += spiral_notes
     return StabilityStudy(
         stability=found,
         margin=margin,
@@ -119,17 +119,19 @@ def _reason(error: InputError) -> str:
 
 def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[str]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-    slowest, fastest, own = values["ship.slowest"], values["ship.fastest"], values["ship.speed"]
+    slowest, fastest, card_speed = values["ship.slowest"], values["ship.fastest"], values["ship.speed"]
     messages = []
     if not by_speed:
         messages.append(
-            f"the forces of this card do not change with speed: a linear card is that of {own:.4g} m/s alone, C' and "
-            "the prime numbers are made with that speed, and there is no curve over speed"
+            f"the forces of this card do not change with speed: a linear card is that of {card_speed:.4g} m/s alone, "
+            "C' and the prime numbers are made with that speed, and there is no curve over speed"
         )
     if not slowest <= found.speed_mps <= fastest:
         messages.append(f"{found.speed_mps:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
-    if abs(found.speed_mps / own - 1) > _SAME_SPEED:
-        messages.append(f"steady turns, spirals and the IMO criteria are those at the card's speed, {own:.4g} m/s")
+    if abs(found.speed_mps / card_speed - 1) > _SAME_SPEED:
+        messages.append(
+            f"steady turns, spirals and the IMO criteria are those at the card's speed, {card_speed:.4g} m/s"
+        )
     return messages
 
 

@@ -82,8 +82,8 @@ def trim_effect(model: Model, margin: Margin) -> TrimEffect:
     bare = {"Yv": Yv, "Yr": Yr + inertia["Yr"], "Nv": Nv, "Nr": Nr + inertia["Nr"]}
 
     def criterion(factors: Mapping[str, float]) -> float:
-        now = {name: value * factors.get(name, 1.0) for name, value in bare.items()}
-        return float(now["Yv"] * (now["Nr"] - inertia["Nr"]) - now["Nv"] * (now["Yr"] - inertia["Yr"]))
+        trimmed = {name: value * factors.get(name, 1.0) for name, value in bare.items()}
+        return float(trimmed["Yv"] * (trimmed["Nr"] - inertia["Nr"]) - trimmed["Nv"] * (trimmed["Yr"] - inertia["Yr"]))
 
     draught = values["ship.draught"]
     lever = Nv / Yv if Yv and Nv else np.inf

@@ -13,7 +13,9 @@ TARGET_OPTION = "--tune"
 
 EQUAL, AT_MOST, AT_LEAST = "=", "<=", ">="
 
-_WISH = re.compile(r"(?P<name>[^@<>=]+)(?P<at>@[^<>=]+)?(?P<relation><=|>=|=)(?P<value>[^@<>=]+)(?P<behind>@[^<>=]+)?")
+_TARGET = re.compile(
+    r"(?P<name>[^@<>=]+)(?P<at>@[^<>=]+)?(?P<relation><=|>=|=)(?P<value>[^@<>=]+)(?P<behind>@[^<>=]+)?"
+)
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ def parse_target(text: str) -> Target:
     InputError
         It is not a target, its figure does not exist, or its value is not finite or not possible of a ship.
     """
-    found = _WISH.fullmatch(text.strip())
+    found = _TARGET.fullmatch(text.strip())
     if found is None or (found["at"] and found["behind"]):
         remedy = "give FIGURE@ARGUMENT=VALUE, <= or >=, as steady_radius_m@20=424 or 'overshoot1_deg@20/20<=25'"
         raise InputError(TARGET_OPTION, text, "is not a target", remedy)

@@ -90,11 +90,11 @@ class _Problem:
         parameters, means = self.study.parameters, self.means
         held = {find_parameter(parameters, name, "--hold").name for name in means.hold}
         stated = {find_parameter(parameters, name, "--bound").name: pair for name, pair in means.bounds.items()}
-        for one in (
+        for change in (
             parameter for parameter in parameters if parameter.name in stated and parameter.name in self._agreed
         ):
             remedy = "leave out the bound, or take the parameter out of --agreed"
-            raise InputError("--bound", one.short, "moves with the agreed variation alone", remedy)
+            raise InputError("--bound", change.short, "moves with the agreed variation alone", remedy)
         columns, ends = [], []
         for place, parameter in enumerate(parameters):
             size = parameter.standard_error
@@ -176,9 +176,9 @@ class _Problem:
         kept = list(range(len(self.targets))) if rows is None else list(rows)
 
         def slopes(part: Array) -> Array:
-            own = _with(z, free, part)
-            unmet = (self.missing(own) != 0)[kept]
-            found: Array = self._slopes(own)[kept][:, free] * unmet[:, None]
+            moved = _with(z, free, part)
+            unmet = (self.missing(moved) != 0)[kept]
+            found: Array = self._slopes(moved)[kept][:, free] * unmet[:, None]
             return found
 
         inner = 1e-9 * (self._highest - self._lowest)
@@ -226,14 +226,14 @@ class _Problem:
         """The smallest moves of `free` that come as near to the targets as moves `z` do.
 
         What is not reached is held at what is; of figures that hang together (a radius and its diameter, a target that
-        is given twice) one is enough, and more would leave the search without a solution.
+        is given twice) index is enough, and more would leave the search without a solution.
         """
         figures, missed = self.figures(z), np.abs(self.missing(z)) > _REACHED
         if not np.all(np.isfinite(figures)):
             return z
         loose = [row for row, target in enumerate(self.targets) if target.relation != EQUAL and not missed[row]]
         tight = [row for row in range(len(self.targets)) if row not in loose]
-        kept = [tight[one] for one in _independent(self._slopes(z)[tight][:, free])] if tight else []
+        kept = [tight[index] for index in _independent(self._slopes(z)[tight][:, free])] if tight else []
         held = [
             Target(self.targets[row].figure, EQUAL, float(figures[row] if missed[row] else self._wanted[row]))
             for row in kept
@@ -265,14 +265,14 @@ class _Problem:
         lower, upper = aim - _REACHED, aim + _REACHED
         lower[[target.relation == AT_MOST for target in self.targets]] = -np.inf
         upper[[target.relation == AT_LEAST for target in self.targets]] = np.inf
-        one, none = np.eye(m), np.zeros((m, m))
+        unit, zero = np.eye(m), np.zeros((m, m))
         # unknowns: moves z, whether each is used b, and its size t >= |z|
         constraints = [
             LinearConstraint(np.hstack([slopes, np.zeros((len(off), 2 * m))]), lower, upper),
-            LinearConstraint(np.hstack([one, -np.diag(self._highest), none]), -np.inf, 0.0),
-            LinearConstraint(np.hstack([one, -np.diag(self._lowest), none]), 0.0, np.inf),
-            LinearConstraint(np.hstack([one, none, -one]), -np.inf, 0.0),
-            LinearConstraint(np.hstack([one, none, one]), 0.0, np.inf),
+            LinearConstraint(np.hstack([unit, -np.diag(self._highest), zero]), -np.inf, 0.0),
+            LinearConstraint(np.hstack([unit, -np.diag(self._lowest), zero]), 0.0, np.inf),
+            LinearConstraint(np.hstack([unit, zero, -unit]), -np.inf, 0.0),
+            LinearConstraint(np.hstack([unit, zero, unit]), 0.0, np.inf),
         ]
         for free in tried:
             row = -np.ones(m)
@@ -297,12 +297,12 @@ class _Problem:
         kept = list(range(len(self.targets)))
         everything = np.arange(len(self._lowest))
         for row in list(kept):
-            rest = [one for one in kept if one != row]
-            if not rest:
+            fewer = [kept_row for kept_row in kept if kept_row != row]
+            if not fewer:
                 break
-            z = self.nearest(self.start(), everything, rest)
-            if np.max(np.abs(self.missing(z)[rest])) > _REACHED:
-                kept = rest
+            z = self.nearest(self.start(), everything, fewer)
+            if np.max(np.abs(self.missing(z)[fewer])) > _REACHED:
+                kept = fewer
         return tuple(self.targets[row] for row in kept)
 
     def result(self, z: Array, contradiction: tuple[Target, ...]) -> Tuned:
@@ -340,14 +340,16 @@ def _with(z: Array, free: Slice, part: Array) -> Array:
     return whole
 
 
-def _ends(one: CardParameter, size: float, within: float, stated: tuple[float, float] | None) -> tuple[float, float]:
+def _ends(
+    parameter: CardParameter, size: float, within: float, stated: tuple[float, float] | None
+) -> tuple[float, float]:
     """Lowest and highest move of a parameter: as stated in the file's unit, or `within` standard errors; and never
     beyond what the parameter can be."""
-    low, high = one.value - within * size, one.value + within * size
+    low, high = parameter.value - within * size, parameter.value + within * size
     if stated is not None:
-        low, high = sorted(end / one.factor for end in stated)
-    least, most = one.bounds
+        low, high = sorted(end / parameter.factor for end in stated)
+    least, most = parameter.bounds
     low, high = max(low, -np.inf if least is None else least), min(high, np.inf if most is None else most)
     if not low < high:
-        raise InputError("--bound", one.short, "leaves no room", "give LOW..HIGH with LOW below HIGH")
-    return (low - one.value) / size, (high - one.value) / size
+        raise InputError("--bound", parameter.short, "leaves no room", "give LOW..HIGH with LOW below HIGH")
+    return (low - parameter.value) / size, (high - parameter.value) / size

@@ -126,9 +126,9 @@ def _cubic(rate: Array, rudder: Array, inside: NDArray[np.bool_], kept: Array) -
     powers = np.vander(rate / largest, 4, increasing=True)
     scales = largest ** np.arange(4.0)
     n = len(kept)
-    left = rudder - powers[:, :n] @ (kept * scales[:n])
-    rest = np.linalg.lstsq(powers[inside, n:], left[inside], rcond=None)[0] / scales[n:]
-    coefficients = np.concatenate([kept, rest])
+    residual = rudder - powers[:, :n] @ (kept * scales[:n])
+    higher = np.linalg.lstsq(powers[inside, n:], residual[inside], rcond=None)[0] / scales[n:]
+    coefficients = np.concatenate([kept, higher])
     error = np.abs(powers @ (coefficients * scales) - rudder)
     beyond = float(error[~inside].max()) if not inside.all() else None
     return CubicCharacteristic(

@@ -107,11 +107,11 @@ def follow_branch(equations: ContinuationEquations, start: Array, direction: Arr
     points, tangents, ended = [start], [found], LONG
     step = LARGEST_STEP / 8
     for _ in range(bounds.steps):
-        there, step = _next(equations, points[-1], tangents[-1], step)
-        if there is None:
+        solution, step = _next(equations, points[-1], tangents[-1], step)
+        if solution is None:
             ended = STALLED
             break
-        point, direction = there
+        point, direction = solution
         if not bounds.least[-1] < point[-1] < bounds.most[-1]:
             last = _on_edge(equations, points[-1], point, direction, bounds)
             points, tangents = points + last[:1], tangents + last[1:]

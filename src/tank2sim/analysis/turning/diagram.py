@@ -30,7 +30,7 @@ from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.marks import EXTRAPOLATED
-from tank2sim.simulation.card_range import range_left
+from tank2sim.simulation.card_range import exceeded_range
 
 _LARGEST_RUDDER = math.radians(35.0)
 """The diagram goes to 35 deg of rudder (MSC.137(76)), or as far as the gear allows."""
@@ -178,8 +178,8 @@ class TurningEquations:
         values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
         speed = float(values["ship.speed"])
         self.ship_time = float(values["ship.length"]) / speed
-        own = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
-        self.scale: Array = np.array([*(own.get(name, nominal[name]) for name in self.names), 1.0])
+        sizes = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
+        self.scale: Array = np.array([*(sizes.get(name, nominal[name]) for name in self.names), 1.0])
         self._symbol = ca.SX.sym("y", len(self.scale))
         self._rates = self._scaled_rates()
         # what stays where it is: inputs and parameters are numbers here, and the functions short
@@ -219,7 +219,7 @@ class TurningEquations:
         newton = ca.Function("fold", [unknown], [system, ca.densify(ca.jacobian(system, unknown))], {"cse": True})
         value = np.concatenate([near, null])
         for _ in range(12):
-            residual, jacobian = (np.array(one) for one in newton(value))
+            residual, jacobian = (np.array(part) for part in newton(value))
             if not np.isfinite(jacobian).all() or np.linalg.cond(jacobian) > 1e14:
                 return None
             change = np.linalg.solve(jacobian, -residual.ravel())
@@ -274,7 +274,7 @@ def _diagram(equations: TurningEquations, port: Curve, starboard: Curve) -> Stea
     states = dict(zip((*equations.names, "rudder.angle"), (y * equations.scale).T, strict=True))
     slopes = dict(zip((*equations.names, "rudder.angle"), (tangents * equations.scale).T, strict=True))
     speed = np.hypot(states["motion.u"], states["motion.v"])
-    growth = np.array([equations.growth(one) for one in y])
+    growth = np.array([equations.growth(point) for point in y])
     growth[places] = 0.0
     rudder, rate = states["rudder.angle"], states["motion.r"]
     heel = next((values for name, values in states.items() if name.endswith(".phi")), None)
@@ -329,10 +329,10 @@ def _judged(model: Model, found: SteadyTurning) -> SteadyTurning:
         rates = [rate for rate, stable in found.turns_at(float(found.rudder_rad[found.straight])) if stable]
         height = max(rates) - min(rates) if len(rates) > 1 else None
         loop = HysteresisLoop(abs(before[-1].rudder_rad - after[0].rudder_rad), height)
-    return replace(found, loop=loop, notices=(*_how_it_ends(found), *_out_of_range(model, found)))
+    return replace(found, loop=loop, notices=(*_end_notices(found), *_out_of_range(model, found)))
 
 
-def _how_it_ends(found: SteadyTurning) -> list[str]:
+def _end_notices(found: SteadyTurning) -> list[str]:
     words = {
         continuation.OUTSIDE: "runs away: the polynomial holds no steady turn beyond",
         continuation.STALLED: "breaks off: no steady turn was found beyond",
@@ -351,5 +351,5 @@ def _how_it_ends(found: SteadyTurning) -> list[str]:
 def _out_of_range(model: Model, found: SteadyTurning) -> list[str]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     rate = found.yaw_rate_radps * values["ship.length"] / found.speed_mps
-    left = range_left(values, found.speed_mps, rate, found.drift_rad, found.rudder_rad)
-    return [f"{EXTRAPOLATED} what the card was measured in: steady turns have {left}"] if left else []
+    outside = exceeded_range(values, found.speed_mps, rate, found.drift_rad, found.rudder_rad)
+    return [f"{EXTRAPOLATED} what the card was measured in: steady turns have {outside}"] if outside else []

@@ -66,8 +66,8 @@ class TurningPoints:
         start = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
         speed = start["ship.speed"]
         self.ship_time = start["ship.length"] / speed
-        own = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
-        self.scale: Array = np.array([*(own.get(name, nominal[name]) for name in self.names), 1.0])
+        sizes = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
+        self.scale: Array = np.array([*(sizes.get(name, nominal[name]) for name in self.names), 1.0])
         self.yaw: Array = np.eye(len(self.scale))[self.names.index("motion.r")]
         self.y = ca.SX.sym("y", len(self.scale))
         self.rates, self.shown = self._expressions()

@@ -82,8 +82,8 @@ def direct_spiral(model: Model, turning: SteadyTurning, integrator: Integrator |
         The motion leaves all bounds.
     """
     largest = float(np.min(np.abs(turning.rudder_rad[[0, -1]])))
-    there = [math.radians(angle) for angle in SPIRAL_RUDDERS_DEG if abs(math.radians(angle)) <= largest * (1 + 1e-9)]
-    rudders = (*there, *there[-2::-1])
+    orders = [math.radians(angle) for angle in SPIRAL_RUDDERS_DEG if abs(math.radians(angle)) <= largest * (1 + 1e-9)]
+    rudders = (*orders, *orders[-2::-1])
     calm = undisturbed_inputs(model)
     trajectory = simulate(model, SpiralManoeuvre(rudders), inputs=calm, integrator=integrator).trajectory
     changes = np.flatnonzero(np.diff(trajectory["rudder.command"]) != 0)
@@ -156,9 +156,9 @@ def _held(running: Running, rates: Sequence[float] | Array, ship_time: float) ->
         end, before, calm = running.time + _LONGEST * ship_time, math.inf, False
         while end - running.time > ship_time and not calm:
             running.run(2 * ship_time)
-            now = running.state("rudder.angle")
-            calm = abs(now - before) < STEADY_RUDDER and abs(running.state("motion.r") - rate) < nearly
-            before = now
+            angle = running.state("rudder.angle")
+            calm = abs(angle - before) < STEADY_RUDDER and abs(running.state("motion.r") - rate) < nearly
+            before = angle
         rudders.append(before)
         steady.append(calm)
     return np.array(rudders), np.array(steady)

@@ -215,10 +215,10 @@ def tune_to_two_points(model: Model, levers: Levers, first: WantedTurn, second: 
 def _refuse_opposed(model: Model, wanted: tuple[WantedTurn, WantedTurn], *turns: SteadyTurn) -> None:
     if abs(wanted[0].rudder_rad - wanted[1].rudder_rad) < 1e-6:
         raise InputError(model.origin, "two points", "have one rudder angle", "give two that are far from each other")
-    for one, turn in zip(wanted, turns, strict=True):
-        if one.yaw_rate_radps is not None and one.yaw_rate_radps * turn.yaw_rate_radps <= 0:
-            place = f"rudder {math.degrees(one.rudder_rad):.4g} deg"
-            problem = f"a yaw rate of {60 * math.degrees(one.yaw_rate_radps):.4g} deg/min is not to its side"
+    for target, turn in zip(wanted, turns, strict=True):
+        if target.yaw_rate_radps is not None and target.yaw_rate_radps * turn.yaw_rate_radps <= 0:
+            place = f"rudder {math.degrees(target.rudder_rad):.4g} deg"
+            problem = f"a yaw rate of {60 * math.degrees(target.yaw_rate_radps):.4g} deg/min is not to its side"
             raise InputError(model.origin, place, problem, "rudder and yaw rate are positive to starboard")
 
 
@@ -237,11 +237,11 @@ class _System:
         scaled = levers.scaled(numbers, ca.exp(self.unknown[-2]), ca.exp(self.unknown[-1]))
         p = ca.vcat([ca.SX(scaled.get(name, numbers[name])) for name in model.parameter_names])
         rows: list[ca.SX] = []
-        for place, one in enumerate(wanted):
+        for place, target in enumerate(wanted):
             y = self.unknown[place * n : (place + 1) * n]
             rates, shown = ca.substitute([points.rates, points.shown], [points.y, model.p], [y, p])
-            measure = ca.fabs(shown[0]) if one.radius_m is None else shown[1] / ca.fabs(shown[0])
-            rows += [rates, y[-1] - one.rudder_rad, ca.log(measure) - goal[place]]
+            measure = ca.fabs(shown[0]) if target.radius_m is None else shown[1] / ca.fabs(shown[0])
+            rows += [rates, y[-1] - target.rudder_rad, ca.log(measure) - goal[place]]
         equations = ca.vcat(rows)
         slopes = ca.densify(ca.jacobian(equations, self.unknown))
         self._newton = ca.Function("tuning", [self.unknown, goal], [equations, slopes], {"cse": True})
@@ -250,7 +250,7 @@ class _System:
         """The unknowns next to `near` that meet the logarithms of the measures; None if Newton's method fails."""
         value = near.copy()
         for _ in range(_ITERATIONS):
-            residual, slopes = (np.array(one) for one in self._newton(value, goal))
+            residual, slopes = (np.array(part) for part in self._newton(value, goal))
             if not (np.isfinite(slopes).all() and np.isfinite(residual).all()):
                 return None
             # Least squares: of a linear ship, whose turns are in proportion to the rudder, hull and rudder act alike.
@@ -263,7 +263,7 @@ class _System:
 
     def act_alike(self, near: Array, goal: Array) -> bool:
         """True if hull and rudder move both measures nearly in one proportion."""
-        residual, slopes = (np.array(one) for one in self._newton(near, goal))
+        residual, slopes = (np.array(part) for part in self._newton(near, goal))
         n = len(residual) // 2
         if np.linalg.cond(slopes) > _SINGULAR:
             return True
@@ -272,11 +272,11 @@ class _System:
 
     def fault(self, problem: str) -> InputError:
         """An error about the two points."""
-        text = " and ".join(_told(one) for one in self.wanted)
+        text = " and ".join(_target_text(target) for target in self.wanted)
         return InputError(self._model.origin, text, problem, "check both points, or change other coefficients first")
 
 
-def _told(wanted: WantedTurn) -> str:
+def _target_text(wanted: WantedTurn) -> str:
     at = f"at {_to_a_side(math.degrees(wanted.rudder_rad), 'deg')}"
     if wanted.yaw_rate_radps is None:
         return f"{wanted.radius_m:.5g} m {at}"

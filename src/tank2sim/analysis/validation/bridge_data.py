@@ -116,12 +116,12 @@ class Bridge:
             "ship": self.card.ship.name,
             "source": self.card.ship.source,
             "rudder_deg": self.rudder_deg,
-            "turning_circles_deep": [one.as_json() for one in self.deep],
-            "turning_circles_shallow": [one.as_json() for one in self.shallow],
+            "turning_circles_deep": [row.as_json() for row in self.deep],
+            "turning_circles_shallow": [row.as_json() for row in self.shallow],
             "stops": [stop.as_json() for stop in self.stops],
             "zigzags": {name: {"figures": zigzag.figures, **zigzag.as_json()} for name, zigzag in self.zigzags.items()},
-            "telegraph": [vars(one) for one in self.telegraph],
-            "full_astern_from": [vars(one) for one in self.stops_from],
+            "telegraph": [vars(row) for row in self.telegraph],
+            "full_astern_from": [vars(row) for row in self.stops_from],
             "hard_over_to_hard_over_s": self.hard_over_s,
             "rudder_neutral_deg": self.neutral_deg,
             "notices": list(self.notices),
@@ -146,7 +146,7 @@ def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) 
     ship = ship_of(card)
     depths = _depths(ship)
     rudder = _rudder(card)
-    circles, told = _circles(ship, rudder, depths)
+    circles, circle_notes = _circles(ship, rudder, depths)
     deep = depths["deep"]
     stops, troubles = _stops(ship, deep)
     telegraph = _telegraph(ship, orders)
@@ -163,7 +163,7 @@ def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) 
         stops_from=_stops_from(ship, telegraph, deep),
         hard_over_s=2 * largest / rate if largest and rate else None,
         neutral_deg=_neutral(ship),
-        notices=tuple(dict.fromkeys((*told, *troubles))),
+        notices=tuple(dict.fromkeys((*circle_notes, *troubles))),
     )
 
 
@@ -248,48 +248,48 @@ def _circles(
                 continue
             track = circle_track(side, run)
             found.setdefault(where, []).append(track)
-            messages += _left(name, track.left)
+            messages += _range_exit_notice(name, track.range_exit)
     return found, messages
 
 
-def _left(name: str, left: TrackMark | None) -> list[str]:
+def _range_exit_notice(name: str, exit_mark: TrackMark | None) -> list[str]:
     """Where a run leaves the card's range, in words."""
-    if left is None:
+    if exit_mark is None:
         return []
-    turned = f" and {left.heading_change_deg:.0f}° of heading" if abs(left.heading_change_deg) >= 1 else ""
-    place = f"after {left.time_s:.0f} s{turned}, at {left.speed_mps:.3g} m/s"
+    turned = f" and {exit_mark.heading_change_deg:.0f}° of heading" if abs(exit_mark.heading_change_deg) >= 1 else ""
+    place = f"after {exit_mark.time_s:.0f} s{turned}, at {exit_mark.speed_mps:.3g} m/s"
     return [f"{name}: leaves the card's range {place}: what follows is not told"]
 
 
 def _stops(ship: TrialShip, inputs: Mapping[str, float]) -> tuple[tuple[ShipTrack, ...], list[str]]:
     if not ship.has_engine:
         return (), []
-    found, told = [], []
+    found, messages = [], []
     for name, manoeuvre in (
         (f"full astern ({FULL_ASTERN:.0%} of nominal)", Stop()),
         (f"engine stopped, to {COASTING_END:.0%} of speed", Stop(0.0)),
     ):
         run = ship.run(manoeuvre, inputs=inputs)
         if isinstance(run, str):
-            told.append(f"{name}: {run}")
+            messages.append(f"{name}: {run}")
             continue
-        told += [f"{name}: {notice}" for notice in run.notices if "not show" in notice]
+        messages += [f"{name}: {notice}" for notice in run.notices if "not show" in notice]
         track = stop_track(name, run)
         found.append(track)
-        told += _left(name, track.left)
-    return tuple(found), told
+        messages += _range_exit_notice(name, track.range_exit)
+    return tuple(found), messages
 
 
 def _stops_from(ship: TrialShip, telegraph: Sequence[Telegraph], inputs: Mapping[str, float]) -> tuple[StopFrom, ...]:
     found = []
-    for one in telegraph:
-        if one.speed_mps is None or not one.within:
+    for entry in telegraph:
+        if entry.speed_mps is None or not entry.within:
             continue
-        run = ship.run(Stop(), {"initial.u": one.speed_mps}, inputs)
+        run = ship.run(Stop(), {"initial.u": entry.speed_mps}, inputs)
         read = _read(run)
         reach, time = (read.figures.get(name) for name in ("track_reach_m", "time_to_stop_s"))
-        order = one.order or f"{one.rpm:.4g} rpm"
-        found.append(StopFrom(order, one.speed_mps, reach, time, not read.outside("track_reach_m")))
+        order = entry.order or f"{entry.rpm:.4g} rpm"
+        found.append(StopFrom(order, entry.speed_mps, reach, time, not read.outside("track_reach_m")))
     return tuple(found)
 
 

@@ -112,8 +112,10 @@ def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[Coeffi
             continue
         found = tuple(_in_sign_of(reference, name, expansion.coefficients.get(name)) for expansion in expansions)
         differences = tuple(
-            Difference(why=expansion.refused[name]) if name in expansion.refused else _difference(found[0], own)
-            for expansion, own in zip(expansions[1:], found[1:], strict=True)
+            Difference(why=expansion.refused[name])
+            if name in expansion.refused
+            else _difference(found[0], expansion_row)
+            for expansion, expansion_row in zip(expansions[1:], found[1:], strict=True)
         )
         rows.append(CoefficientRow(name, found, differences))
     return tuple(rows), tuple(note for expansion in expansions[1:] for note in expansion.notes)
@@ -129,16 +131,16 @@ def _in_sign_of(reference: ManoeuvringCard, name: str, found: CardCoefficient | 
     return replace(found, value=factor * found.value)
 
 
-def _difference(first: CardCoefficient, other: CardCoefficient) -> Difference:
-    if first.value is None or other.value is None:
+def _difference(first: CardCoefficient, second: CardCoefficient) -> Difference:
+    if first.value is None or second.value is None:
         return Difference(why="not in the reference's model" if first.value is None else "not in this model")
-    apart = other.value - first.value
+    apart = second.value - first.value
     percent = 100 * apart / abs(first.value) if first.value else None
-    if first.standard_error and other.standard_error and _same(first.value, other.value):
+    if first.standard_error and second.standard_error and _same(first.value, second.value):
         return Difference(None, percent, SAME)
-    if first.standard_error is None or other.standard_error is None:
+    if first.standard_error is None or second.standard_error is None:
         return Difference(None, percent, "" if apart == 0 else "no standard error")
-    both = math.hypot(first.standard_error, other.standard_error)
+    both = math.hypot(first.standard_error, second.standard_error)
     if both == 0:
         return Difference(0.0 if apart == 0 else None, percent, "" if apart == 0 else "both are stated as certain")
     return Difference(apart / both, percent)
@@ -151,29 +153,31 @@ def compare_effects(cards: Sequence[ManoeuvringCard], models: Sequence[Model]) -
     """
     found = [_of_effects(card, model) for card, model in zip(cards, models, strict=True)]
     rows = []
-    for name in dict.fromkeys(name for own in found for name in own):
-        row = tuple(own.get(name, CardCoefficient(None)) for own in found)
+    for name in dict.fromkeys(name for effects in found for name in effects):
+        row = tuple(effects.get(name, CardCoefficient(None)) for effects in found)
         differences = []
-        for card, model, one in zip(cards[1:], models[1:], row[1:], strict=True):
+        for card, model, coefficient in zip(cards[1:], models[1:], row[1:], strict=True):
             of_size = name in model and model[name].unit not in ("1", "rad")
-            other_size = not math.isclose(card.ship.length_m, cards[0].ship.length_m, rel_tol=1e-6)
-            refused = of_size and other_size
-            differences.append(Difference(why="of a ship of another size") if refused else _difference(row[0], one))
+            sizes_differ = not math.isclose(card.ship.length_m, cards[0].ship.length_m, rel_tol=1e-6)
+            refused = of_size and sizes_differ
+            differences.append(
+                Difference(why="of a ship of another size") if refused else _difference(row[0], coefficient)
+            )
         rows.append(CoefficientRow(name, row, tuple(differences)))
     return tuple(rows)
 
 
 def _of_effects(card: ManoeuvringCard, model: Model) -> dict[str, CardCoefficient]:
     return {
-        one.name: CardCoefficient(one.value, one.standard_error, not one.assumed)
-        for one in card_parameters(card, model)
-        if one.key.startswith("effects.")
+        parameter.name: CardCoefficient(parameter.value, parameter.standard_error, not parameter.assumed)
+        for parameter in card_parameters(card, model)
+        if parameter.key.startswith("effects.")
     }
 
 
-def _same(one: float, other: float) -> bool:
+def _same(first: float, second: float) -> bool:
     """One number except for rounding, as it is left by a change of convention."""
-    return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-15)
+    return math.isclose(first, second, rel_tol=1e-9, abs_tol=1e-15)
 
 
 def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
@@ -185,7 +189,7 @@ def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
     names, matrix, constant = _conversion(card, reference, ratio)
     sources = [name for name in card.derivatives if name in names]
     columns = [names.index(name) for name in sources]
-    own = np.array([card.derivatives[name] for name in sources])
+    values = np.array([card.derivatives[name] for name in sources])
     errors = np.array([card.standard_error(name) for name in sources])
     stated = {name for name in sources if name in card.uncertainty}
     found: dict[str, CardCoefficient] = {name: CardCoefficient(getattr(card.rigid_body, name)) for name in _RIGID_BODY}
@@ -199,7 +203,7 @@ def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
             continue
         known = {source for source, weight in zip(sources, weights, strict=True) if abs(weight) > _ABSENT}
         error = float(np.linalg.norm(weights * errors))
-        value = float(weights @ own + constant[row])
+        value = float(weights @ values + constant[row])
         if outside and (known != {name} or abs(value - card.derivatives[name]) > _ABSENT):
             refused.setdefault(name, "the reference's speed is outside the range in which this card holds")
         found[name] = CardCoefficient(value, error if known else None, bool(known) and known <= stated)
@@ -242,12 +246,16 @@ def _d(name: str) -> int:
 def _notes(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float) -> tuple[str, ...]:
     messages = []
     if ratio != 1:
-        messages.append(f"re-expanded about {ratio:.4g} times its own Froude number, to the third order")
-    own, other = card.model, reference.model
-    if own.speed_scale != other.speed_scale:
-        messages.append(f"primes by the {own.speed_scale} speed converted to the {other.speed_scale} one")
-    if own.yaw_rate_terms != other.yaw_rate_terms:
-        messages.append(f"yaw rate terms converted from {own.yaw_rate_terms} to {other.yaw_rate_terms}")
+        messages.append(f"re-expanded about {ratio:.4g} times its card_model Froude number, to the third order")
+    card_model, reference_model = card.model, reference.model
+    if card_model.speed_scale != reference_model.speed_scale:
+        messages.append(
+            f"primes by the {card_model.speed_scale} speed converted to the {reference_model.speed_scale} one"
+        )
+    if card_model.yaw_rate_terms != reference_model.yaw_rate_terms:
+        messages.append(
+            f"yaw rate terms converted from {card_model.yaw_rate_terms} to {reference_model.yaw_rate_terms}"
+        )
     return tuple(f"{card.ship.name} ({card.source}): {message}" for message in messages)
 
 
@@ -256,11 +264,11 @@ def _conversion(
 ) -> tuple[list[str], np.ndarray, np.ndarray]:
     """Names of the velocity and rudder terms, the matrix from the card's to the reference's, and what is added."""
     names = [*ABKOWITZ_TERMS["X"], *ABKOWITZ_TERMS["Y"], *ABKOWITZ_TERMS["N"]]
-    own = ca.SX.sym("own", len(names))
+    coefficients = ca.SX.sym("own", len(names))
     at = ca.SX.sym("v"), ca.SX.sym("r"), ca.SX.sym("d"), ca.SX.sym("du")
-    forces = _forces_in_primes(card, reference, ratio, dict(zip(names, ca.vertsplit(own), strict=True)), at)
+    forces = _forces_in_primes(card, reference, ratio, dict(zip(names, ca.vertsplit(coefficients), strict=True)), at)
     series = _taylor(forces, at, names)
-    both = ca.Function("conversion", [*at, own], [ca.jacobian(series, own), series])
+    both = ca.Function("conversion", [*at, coefficients], [ca.jacobian(series, coefficients), series])
     matrix, constant = both(0, 0, 0, 0, np.zeros(len(names)))
     return names, np.array(matrix), np.array(constant).ravel()
 
@@ -269,7 +277,7 @@ def _forces_in_primes(
     card: ManoeuvringCard,
     reference: ManoeuvringCard,
     ratio: float,
-    own: Mapping[str, ca.SX],
+    coefficients: Mapping[str, ca.SX],
     at: tuple[ca.SX, ca.SX, ca.SX, ca.SX],
 ) -> ca.SX:
     """X', Y', N' of the card's model in the reference's convention, at a motion in the reference's primes."""
@@ -277,12 +285,12 @@ def _forces_in_primes(
     nominal = _nominal(reference)
     scale = ca.SX(ratio) if nominal else ratio / (ca.sqrt(1 - v**2) - du)
     u, sway, yaw = ratio + du * scale, v * scale, r * scale
-    own_scale = ca.SX(1) if _nominal(card) else ca.sqrt(u**2 + sway**2)
-    primes = sway / own_scale, yaw / own_scale, d, (u - 1) / own_scale
-    X, Y, N = (own_scale**2 * polynomial(ABKOWITZ_TERMS[name], own, *primes) for name in "XYN")
+    card_scale = ca.SX(1) if _nominal(card) else ca.sqrt(u**2 + sway**2)
+    primes = sway / card_scale, yaw / card_scale, d, (u - 1) / card_scale
+    X, Y, N = (card_scale**2 * polynomial(ABKOWITZ_TERMS[name], coefficients, *primes) for name in "XYN")
     # What each convention leaves to the equations: (3.8) with u, or nothing, for V stands in the coefficients already.
-    for one, sign in ((card, 1), (reference, -1)):
-        if one.model.yaw_rate_terms == "hydrodynamic":
+    for each_card, sign in ((card, 1), (reference, -1)):
+        if each_card.model.yaw_rate_terms == "hydrodynamic":
             inertia = inertial_forces(card.rigid_body.mass, card.rigid_body.x_G, u, sway, yaw)
             X, Y, N = X + sign * inertia[0], Y + sign * inertia[1], N + sign * inertia[2]
     if ratio != 1 and card.propulsion and reference.propulsion:

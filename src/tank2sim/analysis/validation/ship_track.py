@@ -9,7 +9,7 @@ import numpy as np
 
 from tank2sim.analysis.validation.standard_trials import figure_numbers
 from tank2sim.arrays import Array
-from tank2sim.simulation.card_range import CardRangeReading, Numbers, left_at
+from tank2sim.simulation.card_range import CardRangeReading, Numbers, range_exit_row
 from tank2sim.simulation.run import Run
 from tank2sim.simulation.trajectory import Trajectory
 
@@ -41,7 +41,7 @@ class ShipTrack:
         Which those are.
     inside : int
         Points of the track until it leaves the card's range.
-    left : TrackMark, optional
+    range_exit : TrackMark, optional
         Where it does; None if it does not.
     """
 
@@ -52,11 +52,11 @@ class ShipTrack:
     figures: Numbers
     reading: CardRangeReading
     inside: int
-    left: TrackMark | None = None
+    range_exit: TrackMark | None = None
 
     def outside(self, mark: TrackMark) -> bool:
         """True if the run has left the card's range at a mark."""
-        return self.left is not None and mark.time_s >= self.left.time_s
+        return self.range_exit is not None and mark.time_s >= self.range_exit.time_s
 
     def as_json(self) -> dict[str, object]:
         """All of it, the track thinned to 200 points."""
@@ -65,7 +65,7 @@ class ShipTrack:
             "name": self.name,
             "figures": self.figures,
             **self.reading.as_json(),
-            "left_card_range_at": vars(self.left) if self.left else None,
+            "left_card_range_at": vars(self.range_exit) if self.range_exit else None,
             "marks": [vars(mark) for mark in self.marks],
             "ahead_m": self.ahead_m[::every],
             "starboard_m": self.starboard_m[::every],
@@ -92,12 +92,19 @@ def _track(name: str, run: Run, change: Array, rows: list[int], end: int) -> Shi
     path = run.trajectory
     ahead, starboard = _in_first_axes(path)
     marks = tuple(_mark(path, change, row) for row in rows)
-    row, figures = left_at(path), figure_numbers(run.figures)
+    row, figures = range_exit_row(path), figure_numbers(run.figures)
     if row is None:
         return ShipTrack(name, ahead[:end], starboard[:end], marks, figures, run.reading, end)
-    left = _mark(path, change, row)
+    exit_mark = _mark(path, change, row)
     return ShipTrack(
-        name, ahead[:end], starboard[:end], marks, figure_numbers(run.figures), run.reading, min(row + 1, end), left
+        name,
+        ahead[:end],
+        starboard[:end],
+        marks,
+        figure_numbers(run.figures),
+        run.reading,
+        min(row + 1, end),
+        exit_mark,
     )
 
 

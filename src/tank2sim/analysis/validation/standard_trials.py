@@ -36,7 +36,7 @@ LEAST_SHARE = 0.9
 _OVERSHOOTS = 2
 """Overshoots that are looked at: those of IMO MSC.137(76)."""
 
-_ONE_SIGMA = (0.158655, 0.841345)
+_SIGMA_QUANTILES = (0.158655, 0.841345)
 
 
 @dataclass(frozen=True)
@@ -118,9 +118,9 @@ def standard_trials(ships: Sequence[TrialShip]) -> dict[str, Manoeuvre]:
 def figure_numbers(figures: Figures) -> Numbers:
     """The figures of a run that are single numbers, with the first overshoots; what it did not show is left out."""
     overshoots = {entry_name("overshoots_deg", place) for place in range(_OVERSHOOTS)}
-    left_out = {"stopped_at_mps", *(name for name in figures if name.endswith("_lengths"))}
+    excluded = {"stopped_at_mps", *(name for name in figures if name.endswith("_lengths"))}
     single = single_figures(figures).items()
-    return {name: value for name, value in single if (name in figures or name in overshoots) and name not in left_out}
+    return {name: value for name, value in single if (name in figures or name in overshoots) and name not in excluded}
 
 
 def members(
@@ -143,12 +143,12 @@ def members(
     errors = joint_errors(card, card_parameters(card, study_model(card)))
     draws, known = draws_with(errors, seed), set(model.parameter_names)
     found = [draws.drawn(number) for number in range(count)]
-    told = Redrawn.of([one.beyond for one in found]).in_words(count)
-    drawn = tuple({name: value for name, value in one.values.items() if name in known} for one in found)
+    words = Redrawn.of([draw.beyond for draw in found]).in_words(count)
+    drawn = tuple({name: value for name, value in draw.values.items() if name in known} for draw in found)
     if errors.together:
-        return drawn, (errors.together_in_words, *told)
+        return drawn, (errors.together_in_words, *words)
     alone = "no covariance is next to the card: errors are taken as independent, and deviations of figures may be too"
-    return drawn, (f"{alone} large where errors go together", *told)
+    return drawn, (f"{alone} large where errors go together", *words)
 
 
 def member_spread(runs: Sequence[Mapping[str, float]]) -> Numbers:
@@ -161,7 +161,7 @@ def member_spread(runs: Sequence[Mapping[str, float]]) -> Numbers:
     found = {name: [run[name] for run in runs if name in run] for name in names}
     enough = max(2.0, LEAST_SHARE * len(runs))
     return {
-        name: float(np.diff(np.quantile(values, _ONE_SIGMA))[0] / 2)
+        name: float(np.diff(np.quantile(values, _SIGMA_QUANTILES))[0] / 2)
         for name, values in found.items()
         if len(values) >= enough
     }

@@ -151,8 +151,8 @@ class Validated:
 
     def as_json(self) -> dict[str, object]:
         """With E, U_val and outcome."""
-        own = {"error": self.error, "uncertainty": self.uncertainty, "level_percent": self.level_percent}
-        return {**vars(self), **own, "outcome": str(self.outcome)}
+        result = {"error": self.error, "uncertainty": self.uncertainty, "level_percent": self.level_percent}
+        return {**vars(self), **result, "outcome": str(self.outcome)}
 
 
 @dataclass(frozen=True)
@@ -188,14 +188,14 @@ class Validation:
         """In words."""
         if not self.figures:
             return "not validated: there is no trial to compare with"
-        messages = [f"{self.count(one)} {one}" for one in ComparisonOutcome if self.count(one)]
+        messages = [f"{self.count(outcome)} {outcome}" for outcome in ComparisonOutcome if self.count(outcome)]
         return f"of {len(self.figures)} figures {', '.join(messages)}"
 
     def as_json(self) -> dict[str, object]:
         """All of it."""
         return {
             "verdict": self.verdict,
-            "counts": {str(one): self.count(one) for one in ComparisonOutcome},
+            "counts": {str(outcome): self.count(outcome) for outcome in ComparisonOutcome},
             "figures": [figure.as_json() for figure in self.figures],
             "members": self.members,
         }
@@ -236,10 +236,10 @@ def validate_card(
             continue
         found, trouble = _validated(what, engines, drawn, between)
         copied = fitted_as(card, trial)
-        own = copied is not None or made_card(card, trial.name)
-        figures += [replace(one, required_percent=required_percent, made_card=own) for one in found]
+        fitted = copied is not None or made_card(card, trial.name)
+        figures += [replace(figure, required_percent=required_percent, made_card=fitted) for figure in found]
         messages += trouble
-        if own:
+        if fitted:
             named = f" (as {copied})" if copied not in (None, trial.name) else ""
             messages.append(
                 f"{trial.name}: the card was identified from this trial{named}: its figures are only fitted"
@@ -278,7 +278,9 @@ def verify(ship: TrialShip, count: int = MEMBERS) -> tuple[tuple[Verified, ...],
             continue
         messages += [f"{trial}: {notice}" for notice in run.notices if EXTRAPOLATED in notice or "not show" in notice]
         many = [ship.run(manoeuvre, member) for member in drawn]
-        deviation = member_spread([{} if isinstance(one, str) else figure_numbers(one.figures) for one in many])
+        deviation = member_spread(
+            [{} if isinstance(repeat, str) else figure_numbers(repeat.figures) for repeat in many]
+        )
         halved = figure_numbers(fine.figures)
         for name, value in figure_numbers(run.figures).items():
             halving = halved[name] - value if name in halved else None
@@ -318,8 +320,8 @@ def _validated(
 def compare_figures(what: Recorded) -> Numbers:
     """The figures of a recorded manoeuvre that are compared."""
     names = TURN_FIGURES if isinstance(what.manoeuvre, Turn) else ZIGZAG_FIGURES
-    own = figure_numbers(what.figures)
-    return {name: own[name] for name in names if name in own}
+    measured = figure_numbers(what.figures)
+    return {name: measured[name] for name in names if name in measured}
 
 
 def kind(what: Recorded) -> str:

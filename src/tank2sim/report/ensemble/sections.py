@@ -68,7 +68,7 @@ def stability_section(found: StabilityBands) -> PageSection:
         criterion = chance.criterion
         met: Cell = BEYOND_CARD_TEXT if criterion.beyond_card and chance.met is not None else chance.met
         between = None if criterion.beyond_card else between
-        rows.append([criterion.name, *ends, criterion.allowed, criterion.unit, met, between, chance.left_open])
+        rows.append([criterion.name, *ends, criterion.allowed, criterion.unit, met, between, chance.undecided])
     heads = ["criterion", LOW, MIDDLE, HIGH, "allowed", "unit", "probability met", "95 % interval", "not shown by"]
     columns = [Column(title=head) for head in heads]
     stable = "" if found.stable is None else f" It is stable on a straight course with probability {found.stable:.3g}."
