@@ -1,4 +1,4 @@
-"""The models of a steering card next to each other: steady turns, manoeuvres, influence, and what is not known."""
+"""Comparison of the models of a steering card: steady turns, manoeuvres, influence, and missing data."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ _TUNED = "through the two trial points"
 _CIRCLE_SAMPLES = 300
 
 ZIGZAG_DEG = 10.0
-"""Rudder and heading of the zigzag by which the models are compared (MSC.137(76))."""
+"""Rudder and heading of the zigzag of the comparison (MSC.137(76))."""
 
 
 @dataclass(frozen=True)
 class ModelRuns:
-    """Manoeuvres of one model: a turning circle, its figures, and those of the 10/10 zigzag."""
+    """Manoeuvres of a model: a turning circle, its figures, and those of the 10/10 zigzag."""
 
     turn: Trajectory
     turn_figures: Figures
@@ -50,14 +50,14 @@ class ModelRuns:
 
 @dataclass(frozen=True)
 class SteeringComparison:
-    """The models of a card, compared on its ship.
+    """Comparison of the models of a card on its ship.
 
     Parameters
     ----------
     ship : str
         Name of the ship.
     main : str
-        The model that printed influence and tuning are about.
+        The model of the printed influence and of the tuning.
     rudder_deg : float
         Rudder of the influence and of the turning circle.
     turns : tuple of ModelTurns
@@ -71,17 +71,17 @@ class SteeringComparison:
     polynomials : mapping
         K over the draught, (4): coefficients of 1, T, T^2.
     tuning : TwoPointTuning, str or None
-        The main model through the first two measured points; a text says why there is none.
+        The main model through the first two measured points; a text with the reason without one.
     missing : mapping
-        Model to what is not known of it.
+        Model to its missing data.
     titles : mapping
         Model to its words.
     diagrams : mapping
         Words to the steering diagram of each model of `runs`, and of the tuned one.
     points : tuple of SteeringPoint
-        Known ones of the diagram.
+        Known points of the diagram.
     speed_mps : float
-        Of the approach, at which a radius is a yaw rate.
+        Approach speed, which converts a radius into a yaw rate.
     """
 
     ship: str
@@ -100,7 +100,7 @@ class SteeringComparison:
     speed_mps: float
 
     def as_json(self) -> dict[str, object]:
-        """All of it, in m, deg and deg/min; turning circles thinned to draw."""
+        """All values, in m, deg and deg/min; turning circles thinned for a chart."""
         tuning = self.tuning.as_json() if isinstance(self.tuning, TwoPointTuning) else self.tuning
         return {
             "ship": self.ship,
@@ -178,7 +178,7 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
 def _diagrams(
     card: SteeringCard, largest: float, names: Sequence[str], tuned: tuple[str, TwoPointTuning | str | None]
 ) -> dict[str, tuple[SteadyTurn, ...]]:
-    """Of the models by their titles, to the largest rudder, and of the one that was tuned."""
+    """Diagrams of the models by their titles, to the largest rudder, and of the tuned one."""
     found = {card.models[name].title: TurningPoints(model_of(card, name)).diagram(largest) for name in names}
     main, tuning = tuned
     if isinstance(tuning, TwoPointTuning):
@@ -191,7 +191,7 @@ def _circle(turn: Trajectory) -> dict[str, list[float]]:
 
 
 def missing_of(card: SteeringCard) -> dict[str, tuple[str, ...]]:
-    """What is not known of the card's models, by name: coefficients not given, what the source leaves out, notes."""
+    """Missing data of the card's models, by name: coefficients not given, omissions of the source, notes."""
     unknown: dict[str, tuple[str, ...]] = {}
     forms: set[str] = set()
     for name, entry in card.models.items():
@@ -207,7 +207,8 @@ def missing_of(card: SteeringCard) -> dict[str, tuple[str, ...]]:
 
 
 def tuned(card: SteeringCard, name: str) -> TwoPointTuning | str | None:
-    """One of the card's models through its first two measured points; why not, or None if there are no two."""
+    """A model of the card tuned to its first two measured points; the reason of a failure, or None without two
+    points."""
     measured = [point for point in card.points if point.measured][:2]
     if len(measured) < 2:
         return None

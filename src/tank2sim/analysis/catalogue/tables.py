@@ -1,8 +1,8 @@
 """The tables of paper 4 (Poznyakov and Yudin 2007) from a steering card: turns, influence, agreed variation.
 
 K of a coefficient is the change of the steady radius in per cent when it grows by 10 %; Kc is the change of a
-coefficient in per cent when the draught grows by 1 %, which all of them share. Both are of
-:mod:`tank2sim.analysis.influence.percent`; here they meet the models of the catalogue.
+coefficient in per cent when the draught grows by 1 %. Both are defined in :mod:`tank2sim.analysis.influence.percent`
+and applied to the models of the catalogue.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ RUDDERS_DEG = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0)
 
 
 def form_of(card: SteeringCard, name: str) -> SteeringForm:
-    """The form of one of the card's models.
+    """The form of a model of the card.
 
     Raises
     ------
     InputError
-        The card has no such model, or its form is not in the catalogue.
+        The model is not on the card, or its form is not in the catalogue.
     """
     if name not in card.models:
         raise InputError(card.source, "models", f"none is called {name!r}", f"one of {', '.join(card.models)}")
@@ -42,7 +42,7 @@ def form_of(card: SteeringCard, name: str) -> SteeringForm:
 
 
 def not_given(card: SteeringCard, name: str) -> tuple[str, ...]:
-    """Coefficients that one of the card's models needs and does not have."""
+    """Missing coefficients of a model of the card."""
     given = card.models[name].coefficients
     return tuple(
         coefficient.name
@@ -57,13 +57,13 @@ def complete(card: SteeringCard) -> tuple[str, ...]:
 
 
 def model_of(card: SteeringCard, name: str) -> Model:
-    """The model of one of a card's entries, parameters ``coefficients.*``; its messages name the card's file.
+    """The model of an entry of the card, with parameters ``coefficients.*``; its messages name the card's file.
 
     Raises
     ------
     InputError
-        There is no such model, a coefficient is missing (the message says what the source does not print), or one is
-        given that the form does not have.
+        The model does not exist, a coefficient is missing (the message names those that the source does not print), or
+        one is not part of the form.
     """
     form = form_of(card, name)
     place = f"{card.place(name)}.coefficients"
@@ -81,7 +81,7 @@ def model_of(card: SteeringCard, name: str) -> Model:
 
 @dataclass(frozen=True)
 class ModelTurns:
-    """Steady turns of one model over the rudder angle: a part of Table 1."""
+    """Steady turns of a model over the rudder angle: a part of Table 1."""
 
     model: str
     title: str
@@ -122,7 +122,7 @@ class InfluenceTable:
 def influence_of(card: SteeringCard, name: str, rudder_deg: float = 20.0, percent: float = 10.0) -> InfluenceTable:
     """K of every coefficient of a model on its steady radius, by the paper's difference. Raises as :func:`turns_of`.
 
-    The coefficients of Table 4 alone are varied: what had to be fitted (inflow, lever, share) is kept.
+    Only the coefficients of Table 4 are varied: fitted ones (inflow, lever, share) do not change.
     """
     model = model_of(card, name)
     points = TurningPoints(model)
@@ -140,7 +140,7 @@ def influence_of(card: SteeringCard, name: str, rudder_deg: float = 20.0, percen
 
 
 def agreed_variation(card: SteeringCard, base: str, target: str) -> dict[str, float]:
-    """Kc: change of each coefficient from one model to another in per cent; Table 4. What does not change is absent."""
+    """Kc: change of each coefficient from one model to another in per cent; Table 4. Unchanged ones are absent."""
     values, changed = card.models[base].coefficients, card.models[target].coefficients
     return {
         name: change_percent(changed[name], value)
@@ -151,7 +151,7 @@ def agreed_variation(card: SteeringCard, base: str, target: str) -> dict[str, fl
 
 @dataclass(frozen=True)
 class CombinedPrediction:
-    """The radius after an agreed variation: Table 5, with its slip and without.
+    """The radius after an agreed variation: Table 5, with its error and without.
 
     Parameters
     ----------
@@ -160,15 +160,15 @@ class CombinedPrediction:
     radius_m : float
         Before the variation, computed.
     percent, predicted_m : float
-        Sum of Kc K / 10 with the printed K of each coefficient, and what it makes of the printed radius.
+        Sum of Kc K / 10 with the printed K of each coefficient, and the printed radius changed by it.
     misread_percent, misread_m : float
-        With the K of other coefficients where the source mistook them.
+        With the K of other coefficients where the source confused them.
     own_percent, own_m : float
         With the K computed here.
     direct_m : float
-        The model of the other draught itself.
+        By the model of the other draught.
     direct_misread_m : float
-        That model with the variations themselves put on the mistaken coefficients.
+        By that model with the variations applied to the confused coefficients.
     """
 
     agreed_percent: Mapping[str, float]
@@ -184,7 +184,7 @@ class CombinedPrediction:
 
 
 def combined_prediction(card: SteeringCard, changed: str) -> CombinedPrediction:
-    """Table 5: what the K predict for another model of the card (another draught), and what that model gives.
+    """Table 5: prediction by K for another model of the card (another draught), and the result of that model.
 
     Raises
     ------
@@ -217,7 +217,8 @@ def combined_prediction(card: SteeringCard, changed: str) -> CombinedPrediction:
 
 
 def _direct_misread(card: SteeringCard, printed: PrintedInfluence, target: str, agreed: Mapping[str, float]) -> float:
-    """Radius of the target model with the larger of two mistaken variations put on the wrong coefficient as well."""
+    """Radius of the target model with the larger of two confused variations applied to the wrong coefficient as
+    well."""
     values = card.models[printed.model].coefficients
     largest = max(printed.misread_as, key=lambda name: abs(agreed.get(name, 0.0)), default=None)
     if largest is None:

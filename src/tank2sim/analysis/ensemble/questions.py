@@ -1,4 +1,4 @@
-"""What can be asked of the members of an ensemble: a manoeuvre, figures with a name, the IMO criteria."""
+"""Evaluations of the members of an ensemble: a manoeuvre, named figures, the IMO criteria."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ ENSEMBLE_SIGNALS: Mapping[str, tuple[str, float]] = {
     "v_mps": ("motion.v", 1.0),
     "delta_deg": ("rudder.angle", math.degrees(1.0)),
 }
-"""Signals of which there are bands over time, to their variable and the factor to their unit."""
+"""Signals with bands over time, to their variable and the factor to their unit."""
 
 EVERY = 10
-"""Of so many steps one is kept: a twentieth of a ship length (:class:`tank2sim.simulation.integrator.Integrator`)."""
+"""Steps between two kept samples: a twentieth of a ship length (:class:`tank2sim.simulation.integrator.Integrator`)."""
 
 _LONGEST = 200_000
-"""Steps of the longest run that a whole batch makes at once: the batch then takes some 40 MB (project choice)."""
+"""Most steps of a run in a joint batch: the batch then takes some 40 MB (project choice)."""
 
-# Of all outputs those that figures are read off: the others would take longer than the motion itself.
+# Only the outputs that the figures need: the others would take longer than the motion itself.
 _READ_OFF: Mapping[type, tuple[str, ...]] = {
     Turn: ("motion.beta",),
     Zigzag: ("motion.rdot",),
@@ -56,14 +56,14 @@ _READ_OFF: Mapping[type, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class ShipText:
-    """A card as it is sent to other processes."""
+    """A card in the form that is sent to other processes."""
 
     text: str
     source: str
 
     @classmethod
     def of(cls, card: ManoeuvringCard) -> ShipText:
-        """Of a card."""
+        """The form of a card."""
         return cls(card.text, card.source)
 
     def card(self) -> ManoeuvringCard:
@@ -93,7 +93,7 @@ class OfManoeuvre:
         return _each(self._driven(integrator))
 
     def _driven(self, integrator: Integrator) -> AskOne:
-        """Members driven one by one, as a manoeuvre with events is."""
+        """Single runs of the members, for a manoeuvre with events."""
         model = integrator.model
         defaults = _parameters(model)
 
@@ -110,7 +110,7 @@ class OfManoeuvre:
         return ask
 
     def _held(self, integrator: Integrator, turn: Turn, steps: int) -> Ask:
-        """Members whose rudder is held for a time: all in one call of the compiled loop."""
+        """Joint runs of members with a constant rudder, in a single call of the compiled loop."""
         model, h = integrator.model, integrator.model.step_s
         defaults, u = _parameters(model), model.input_values({"rudder.command": turn.rudder})
         t = np.append(np.arange(0, steps, EVERY), steps) * h
@@ -164,7 +164,7 @@ class OfFigures:
 
 @dataclass(frozen=True)
 class OfCriteria:
-    """What is found for each of the IMO criteria, by its name; nan where a trial does not show it."""
+    """Value of each IMO criterion by its name; nan where a trial does not show it."""
 
     ship: ShipText
 
@@ -192,7 +192,7 @@ def _each(ask: AskOne) -> Ask:
 
 
 def _numbers(figures: Figures) -> Numbers:
-    """Figures as single numbers, nan for those that the run does not show."""
+    """Figures as single numbers, nan where the run does not show them."""
     return {name: math.nan for name, value in figures.items() if value is None} | single_figures(figures)
 
 

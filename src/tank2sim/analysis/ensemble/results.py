@@ -1,4 +1,4 @@
-"""What an ensemble of a ship says of a manoeuvre, of its stability and the IMO criteria, and of figures by name."""
+"""Results of an ensemble of a ship: a manoeuvre, stability with the IMO criteria, and figures by name."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ TIMES = 201
 """Times of the bands of histories and tracks, over the run of the card itself (project choice)."""
 
 STRAIGHT = ("criterion_C", "K_prime", "T_prime", "T_s", "T3_s")
-"""Figures of the straight course of which there are bands."""
+"""Figures of the straight course that have bands."""
 
 POLES = ("K_per_s", "K_prime", "T_s", "T1_s", "T_prime")
-"""Figures that are a number over C': where that changes its sign they go through infinity, and the quantiles of members
-on both sides enclose everything but where the members are."""
+"""Figures with C' in the denominator: where it changes its sign they pass through infinity, and quantiles over members
+on both sides are meaningless."""
 
 
 @dataclass(frozen=True)
 class EnsembleRequest:
-    """An ensemble as it is asked for: how many members, from which seed."""
+    """Request for an ensemble: number of members, and seed."""
 
     members: int
     seed: int = 0
@@ -44,7 +44,7 @@ class EnsembleRequest:
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """Who was asked: members, seed, those that cannot be used and why, and what is to be reported."""
+    """Members of an ensemble: number, seed, unusable members with the reason, and notices."""
 
     members: int
     seed: int
@@ -53,11 +53,11 @@ class Members:
 
     @property
     def usable(self) -> int:
-        """Members that can be used."""
+        """Number of usable members."""
         return self.members - sum(self.unusable.values())
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         return {
             "members": self.members,
             "seed": self.seed,
@@ -78,7 +78,7 @@ class ManoeuvreBands:
     track: TrackBand | None
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         return {
             **self.asked.as_json(),
             "figures": {name: band.as_json() for name, band in self.figures.items()},
@@ -90,16 +90,16 @@ class ManoeuvreBands:
 
 @dataclass(frozen=True)
 class Chance:
-    """How probable it is that a criterion is met.
+    """Probability that a criterion is met.
 
     Parameters
     ----------
     criterion : ImoCriterion
-        With what was found for the card itself.
+        The criterion, with the value of the card's ship.
     met : float or None
-        Share of all usable members that meet it; None where no member shows it.
+        Share of all usable members that meet it; None if no member shows it.
     between : tuple or None
-        95 % interval of that probability, from the number of members alone (Wilson 1927, J. Amer. Stat. Assoc. 22).
+        95 % interval of that probability, by the number of members (Wilson 1927, J. Amer. Stat. Assoc. 22).
     undecided : int
         Usable members whose trial does not show it; they count as not meeting it.
     band : Band or None
@@ -113,7 +113,7 @@ class Chance:
     band: Band | None
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         found = self.criterion
         return {
             "name": found.name,
@@ -128,8 +128,8 @@ class Chance:
 
 @dataclass(frozen=True, eq=False)
 class StabilityBands:
-    """Bands of the straight course at the card's speed, how probable it is that it is stable there, and the chances
-    of each criterion."""
+    """Bands of the straight course at the card's speed, the probability of stability there, and of meeting each
+    criterion."""
 
     asked: Members
     figures: Mapping[str, Band]
@@ -138,7 +138,7 @@ class StabilityBands:
     curves: SteeringBands | None = None
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         return {
             **self.asked.as_json(),
             "figures": {name: band.as_json() for name, band in self.figures.items()},
@@ -157,7 +157,7 @@ class FigureBands:
     deviations: Mapping[str, float]
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         figures = {
             name: {**band.as_json(), "standard_deviation": self.deviations[name]} for name, band in self.figures.items()
         }
@@ -168,15 +168,15 @@ def manoeuvre_bands(
     card: ManoeuvringCard,
     manoeuvre: Manoeuvre,
     run_s: tuple[float | None, float],
-    asked: EnsembleRequest,
+    request: EnsembleRequest,
     executor: Executor | None = None,
 ) -> ManoeuvreBands:
-    """Bands of a manoeuvre; `run_s` is the duration asked for, and how long the run of the card itself took."""
-    draws, notices = draws_of(card, asked.seed)
+    """Bands of a manoeuvre; `run_s` is the requested duration, and that of the card's own run."""
+    draws, notices = draws_of(card, request.seed)
     times = np.linspace(0.0, run_s[1], TIMES)
     question = OfManoeuvre(ShipText.of(card), manoeuvre, run_s[0], times)
-    found = ensemble(question, draws, asked.members, executor)
-    if asked.members > KEPT:
+    found = ensemble(question, draws, request.members, executor)
+    if request.members > KEPT:
         notices.append(f"bands of tracks and histories are of the first {KEPT} members; figures are of all")
     shown, histories, track = history_bands(found, times, tuple(ENSEMBLE_SIGNALS))
     if 0 < len(shown) < len(times):
@@ -192,19 +192,19 @@ def manoeuvre_bands(
 def stability_bands(
     card: ManoeuvringCard,
     criteria: Sequence[ImoCriterion],
-    asked: EnsembleRequest,
+    request: EnsembleRequest,
     executor: Executor | None = None,
     curves: tuple[float | None, Grid] | None = None,
 ) -> StabilityBands:
-    """Bands of the straight course at the card's speed, the chances of the IMO `criteria`, and, if asked, bands of
-    `curves`: at a speed (None: the card's), on a grid."""
-    draws, messages = draws_of(card, asked.seed)
-    trials = ensemble(OfCriteria(ShipText.of(card)), draws, asked.members, executor)
+    """Bands of the straight course at the card's speed, the probabilities of the IMO `criteria`, and on request bands
+    of `curves`: at a speed (None: the card's), on a grid."""
+    draws, messages = draws_of(card, request.seed)
+    trials = ensemble(OfCriteria(ShipText.of(card)), draws, request.members, executor)
     messages.append("an ensemble is judged at the card's speed")
     try:
-        straight = ensemble(OfFigures(ShipText.of(card), STRAIGHT), draws, asked.members, executor)
+        straight = ensemble(OfFigures(ShipText.of(card), STRAIGHT), draws, request.members, executor)
     except InputError as error:
-        straight = Ensemble(asked.members, asked.seed, {})
+        straight = Ensemble(request.members, request.seed, {})
         messages.append(f"no bands of the straight course: {error.problem}")
     chances = tuple(chance(criterion, trials) for criterion in criteria)
     unseen = answering_states(build(card))
@@ -216,30 +216,29 @@ def stability_bands(
     stable = None if unseen else _stable(straight)
     bands, through = bands_without_poles(straight)
     messages += through
-    drawn = steering_bands(ShipText.of(card), draws, asked.members, curves, executor) if curves else None
+    drawn = steering_bands(ShipText.of(card), draws, request.members, curves, executor) if curves else None
     messages += drawn.notices if drawn else ()
     return StabilityBands(_members(trials, messages), bands, stable, chances, drawn)
 
 
 def named_bands(
-    card: ManoeuvringCard, figures: Sequence[str], asked: EnsembleRequest, executor: Executor | None = None
+    card: ManoeuvringCard, figures: Sequence[str], request: EnsembleRequest, executor: Executor | None = None
 ) -> FigureBands:
     """Bands of figures by name (:mod:`tank2sim.analysis.influence.figures`)."""
-    draws, notices = draws_of(card, asked.seed)
-    found = ensemble(OfFigures(ShipText.of(card), tuple(figures)), draws, asked.members, executor)
+    draws, notices = draws_of(card, request.seed)
+    found = ensemble(OfFigures(ShipText.of(card), tuple(figures)), draws, request.members, executor)
     bands, through = bands_without_poles(found)
     notices += through
-    deviations = {name: float(np.nanstd(found.figures[name], ddof=1)) for name in bands} if asked.members > 1 else {}
+    deviations = {name: float(np.nanstd(found.figures[name], ddof=1)) for name in bands} if request.members > 1 else {}
     deviations = {name: deviations.get(name, math.nan) for name in bands}
     for name, band in bands.items():
         if band.shown < found.usable:
-            notices.append(f"{name}: {found.usable - band.shown} of {asked.members} members do not show it")
+            notices.append(f"{name}: {found.usable - band.shown} of {request.members} members do not show it")
     return FigureBands(_members(found, notices), bands, deviations)
 
 
 def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
-    """Bands of figures by name, except for those of :data:`POLES` that go through infinity, and messages about
-    these."""
+    """Bands of figures by name, except for those of :data:`POLES` that pass through infinity, with notices on these."""
     bands = figure_bands(found)
     poles = [name for name in POLES if name in bands]
     if not poles:
@@ -256,7 +255,7 @@ def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
 
 
 def chance(criterion: ImoCriterion, found: Ensemble) -> Chance:
-    """The chance of a criterion, from what members found for it by its name."""
+    """The probability of a criterion, from the values of the members."""
     values = found.figures.get(criterion.name, np.zeros(0))
     shown = values[np.isfinite(values)]
     if not len(shown):

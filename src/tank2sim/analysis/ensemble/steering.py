@@ -1,4 +1,4 @@
-"""Bands of what a ship's stability page draws: its steady turns against the rudder, and its linear response to it."""
+"""Bands of the curves of a ship's stability page: steady turns over the rudder, and the linear response to it."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from tank2sim.simulation.bands import QUANTILES, STILL_RUNNING, Band, BandOverTi
 from tank2sim.simulation.ensemble import Ask, Draws, Ensemble, MemberResult, ensemble
 
 CURVES = 200
-"""Members of the bands of curves: the first ones. Each takes half a second, and the share below a quantile is known
-from them to 1.5 % (project choice)."""
+"""Number of members, the first, for the bands of curves. Each takes half a second, and the share below a quantile is
+known to 1.5 % (project choice)."""
 
 _POINTS = 121
 """Points of every curve (project choice)."""
@@ -42,9 +42,10 @@ _CURVES = (FROM_STARBOARD, FROM_PORT, MAGNITUDE, PHASE, STEP)
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Where curves are read off, (n,) each: rudder (rad), frequency (rad/s) and time after a step (s).
+    """Grid of the curves, (n,) each: rudder (rad), frequency (rad/s) and time after a step (s).
 
-    `phase_deg` is that of the ship itself at the highest frequency: those of the members are within half a turn of it.
+    `phase_deg` is the phase of the card's ship at the highest frequency: the members' phases are within half a turn of
+    it.
     """
 
     rudder_rad: Array
@@ -54,7 +55,7 @@ class Grid:
 
     @staticmethod
     def of(model: Model, response: SteeringResponse) -> Grid:
-        """The rudder that the gear allows, and what the response of the ship itself is drawn over."""
+        """The grid over the rudder range of the gear, and over frequency and time of the card's own response."""
         largest = largest_rudder(model) * (1 - 1e-9)
         omega = np.geomspace(response.omega_radps[0], response.omega_radps[-1], _POINTS)
         phase = float(np.degrees(np.unwrap(np.angle(response.response)))[-1])
@@ -97,16 +98,16 @@ class OfSteering:
 
 @dataclass(frozen=True, eq=False)
 class SteeringBands:
-    """Bands over a grid of what ``stability`` draws, by name of the curve, and of the width of the hysteresis loop.
+    """Bands over a grid of the curves of ``stability``, by name, and of the width of the hysteresis loop.
 
     Parameters
     ----------
     members : int
-        Whose curves these are, and can be used.
+        Usable members behind the curves.
     reference : mapping
-        The curves of the ship itself.
+        The curves of the card's ship.
     with_loop : int
-        Members that have a loop; the width of the others is 0.
+        Members with a loop; without one the width is 0.
     """
 
     grid: Grid
@@ -118,7 +119,7 @@ class SteeringBands:
     notices: tuple[str, ...]
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
 
         def bands_of(*names: str) -> dict[str, object]:
             return {name: self.curves[name].as_json() | {"own": self.reference[name]} for name in names}
@@ -141,7 +142,7 @@ def steering_bands(
 ) -> SteeringBands | None:
     """Bands of the first :data:`CURVES` members; `about` is the speed (None: the card's) and the grid.
 
-    None where no member has such curves.
+    None if no member has such curves.
     """
     speed, grid = about
     question = OfSteering(ship, speed, grid)
@@ -164,8 +165,8 @@ def steering_bands(
 
 
 def branches(turning: SteadyTurning, rudder_rad: Sequence[float] | Array) -> tuple[Array, Array]:
-    """Yaw rates (n,), deg/s, of the stable turns to which a spiral comes from starboard and from port: the one farthest
-    to that side; one and the same outside a hysteresis loop, nan where no turn is stable."""
+    """Yaw rates (n,), deg/s, of the stable turns that a spiral reaches from starboard and from port: the farthest to
+    that side; equal outside a hysteresis loop, nan without a stable turn."""
     found = [[rate for rate, stable in turning.turns_at(float(angle)) if stable] for angle in rudder_rad]
     return (
         np.degrees([max(rates, default=math.nan) for rates in found]),
@@ -187,7 +188,7 @@ def _responses(model: Model, speed_mps: float | None, grid: Grid) -> list[Array]
 
 
 def _band(found: Ensemble, row: int) -> BandOverTime:
-    """Quantiles where nearly all members that can be used show the curve, nan elsewhere."""
+    """Quantiles where nearly all usable members have the curve, nan elsewhere."""
     assert found.histories is not None
     values = found.histories[:, row].astype(float)
     shown = np.isfinite(values).sum(axis=0) >= STILL_RUNNING * max(found.usable, 1)

@@ -1,4 +1,4 @@
-"""What the steady glides of paper 5 leave out: the model's own equilibria, and the path while it goes between them."""
+"""Transient effects that the steady glides of paper 5 neglect: equilibria of the full model, and paths between them."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class GlideEquilibrium:
     Parameters
     ----------
     point : OperatingPoint
-        Where it is, for :func:`tank2sim.analysis.linearisation.state_space`.
+        Operating point, for :func:`tank2sim.analysis.linearisation.state_space`.
     speed_mps, path_angle_rad, incidence_rad, turn_rate_radps : float
         As in :class:`tank2sim.analysis.glide.steady.SteadyGlide`.
     turning_radius_m : float
-        Without sign; inf where it does not turn.
+        Without sign; inf without a turn.
     """
 
     point: OperatingPoint
@@ -52,13 +52,13 @@ class GlideEquilibrium:
 def equilibrium(model: Model, glide: SteadyGlide) -> GlideEquilibrium:
     """The equilibrium of the transient model under the pitch, roll and buoyancy of a glide, by CasADi's Newton solver.
 
-    `glide` is the first guess. Its u and w come to rest; on a straight path it is the same glide, in a turn the added
-    mass, which the closed form has not, changes it.
+    `glide` is the first guess. Its u and w are constant; on a straight path it is the same glide, in a turn it includes
+    the added mass, which the closed form neglects.
 
     Raises
     ------
     InputError
-        There is no equilibrium near the glide.
+        No equilibrium exists near the glide.
     """
     p = model.parameter_values()
     u = model.input_values(
@@ -101,7 +101,7 @@ def equilibrium(model: Model, glide: SteadyGlide) -> GlideEquilibrium:
 
 @dataclass(frozen=True)
 class Compared:
-    """A path of steady glides, the motion of the transient model under the same orders, and what is between them.
+    """A path of steady glides, the motion of the transient model under the same orders, and their distance.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class Compared:
         return float(self.distance_m.max()) / self.path.length_m if self.path.length_m else math.nan
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it: the transient places at the ends of steps, and the distances."""
+        """The JSON form: the transient places at the ends of steps, and the distances."""
         times = [place.time_s for place in self.path.places]
         named = {"x_m": "motion.x", "y_m": "motion.y", "depth_m": "motion.z", "speed_mps": "motion.speed"}
         rows = [{"t_s": time} | {key: self.motion.at(name, time) for key, name in named.items()} for time in times]
@@ -131,7 +131,7 @@ class Compared:
         return result | {"histories": self._histories(), "orders": self._orders()}
 
     def _histories(self) -> dict[str, list[float]]:
-        """The transient motion, thinned to draw."""
+        """The transient motion, thinned for a chart."""
         run, degrees = self.motion, math.degrees(1.0)
         angles = {"pitch_deg": "pitch.angle", "roll_deg": "roll.angle", "incidence_deg": "motion.incidence"}
         columns = {"t_s": run.t, "x_m": run["motion.x"], "y_m": run["motion.y"], "height_m": -run["motion.z"]}
@@ -139,7 +139,7 @@ class Compared:
         return drawn_columns(columns | {"speed_mps": run["motion.speed"]})
 
     def _orders(self) -> dict[str, list[float]]:
-        """What is ordered and the steady glides of it, each held through its step."""
+        """The orders and their steady glides, each constant through its step."""
         ends = np.array([place.time_s for place in self.path.places])
         steps = [glide.as_json() for glide in self.path.glides]
         names = ("buoyancy_kg", "pitch_deg", "roll_deg", "incidence_deg", "speed_mps")
@@ -160,12 +160,12 @@ def compare_with_steady(integrator: Integrator, path: GlidePath) -> Compared:
 
 @dataclass(frozen=True)
 class ProgrammeError:
-    """The quasi-steady error of one kind of programme.
+    """The quasi-steady error of a kind of programme.
 
     Parameters
     ----------
     label : str
-        What the steps alternate between.
+        Name of the alternating orders.
     duration_s : array (n,)
         Of one step.
     distance_m, share : arrays (n,)
@@ -178,14 +178,14 @@ class ProgrammeError:
     share: Array
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         return dict(vars(self))
 
 
 def quasi_steady_error(
     card: GliderCard, integrator: Integrator, durations_s: Sequence[float] = SWEEP_DURATIONS_S
 ) -> tuple[ProgrammeError, ...]:
-    """How far the paper's assumption leads from the transient model, against the length of the steps.
+    """Distance of the quasi-steady path from the transient model, against the length of the steps.
 
     Four steps, from a steady glide, of three kinds (project choice): from dive to climb and back, from a shallow to a
     steep dive and back, and with roll to starboard and to port; all from 6 deg above the smallest angle.

@@ -1,13 +1,13 @@
-"""The steady-turning diagram of a ship: yaw rate, speed, drift and heel against the rudder angle, unstable turns too.
+"""The steady-turning diagram of a ship: yaw rate, speed, drift and heel over the rudder angle, with unstable turns.
 
 Every steady turn of the nonlinear model solves
 
     du/dt = dv/dt = dr/dt = 0   (and the states of effects that act on the hull: roll, the memory of the flow)
 
-at constant revolutions in calm water. From the straight course the curve of solutions is followed both ways by
-pseudo-arclength (:mod:`tank2sim.analysis.turning.continuation`) with the exact Jacobian, so that it goes on through
-the folds of a ship that is unstable on a straight course. A turn is stable if all eigenvalues of that Jacobian with the
-rudder held have a negative real part. Folds are solved for, not read off (Moore and Spence 1980): F = 0, F_z phi = 0.
+at constant revolutions in calm water. From the straight course the curve of solutions is followed in both directions by
+pseudo-arclength (:mod:`tank2sim.analysis.turning.continuation`) with the exact Jacobian, through the folds of a ship
+that is unstable on a straight course. A turn is stable if all eigenvalues of that Jacobian with the rudder held have a
+negative real part. Folds are solved exactly (Moore and Spence 1980): F = 0, F_z phi = 0.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ from tank2sim.marks import EXTRAPOLATED
 from tank2sim.simulation.card_range import exceeded_range
 
 _LARGEST_RUDDER = math.radians(35.0)
-"""The diagram goes to 35 deg of rudder (MSC.137(76)), or as far as the gear allows."""
+"""Largest rudder of the diagram: 35 deg (MSC.137(76)), or that of the gear."""
 
 _MOTION = ("motion.u", "motion.v", "motion.r")
 _PLACE = ("motion.x", "motion.y", "motion.psi")
 _FASTEST, _MOST_YAW, _MOST_ELSE = 2.5, 12.0, 50.0
-"""Bounds of u/u0 and v/u0, of r L/u0, and of other states over their nominal size. No ship turns in a circle of a
-sixth of its length: what goes beyond has left every ship's range. Project choice."""
+"""Bounds of u/u0 and v/u0, of r L/u0, and of other states over their nominal size. No ship turns in a circle of a sixth
+of its length. Project choice."""
 
 
 @dataclass(frozen=True)
 class TurningFold:
-    """Where the diagram turns back: beyond this rudder (rad) the ship leaves the branch. `place` is its row."""
+    """Fold of the diagram: beyond this rudder (rad) the ship leaves the branch. `place` is its row."""
 
     place: int
     rudder_rad: float
@@ -84,7 +84,7 @@ class SteadyTurning:
     ended : pair of str
         Why the curve ends to port and to starboard (:class:`tank2sim.analysis.turning.continuation.Curve`).
     notices : tuple of str
-        What the reader should know.
+        Messages for the user.
     """
 
     rudder_rad: Array
@@ -123,7 +123,7 @@ class SteadyTurning:
         ]
 
     def as_json(self) -> dict[str, object]:
-        """The diagram in SI and in degrees, as JSON has it."""
+        """The diagram in SI and in degrees, for JSON."""
         points: dict[str, object] = {
             "rudder_deg": np.degrees(self.rudder_rad),
             "yaw_rate_degps": np.degrees(self.yaw_rate_radps),
@@ -153,7 +153,7 @@ class SteadyTurning:
 def hull_states(model: Model, motion: Sequence[str] = _MOTION) -> tuple[str, ...]:
     """States that move with the hull at a held rudder: u, v, r, and those of effects on which their rates depend.
 
-    Of `motion` alone, if less is asked for; the rest of u, v, r is held.
+    With fewer names in `motion`, the remaining ones of u, v, r are constant.
     """
     derivative = {state.name: state.derivative for state in model.states}
     found = list(motion)
@@ -209,7 +209,7 @@ class TurningEquations:
         return float(np.linalg.eigvals(self(y)[1][:, :-1]).real.max()) / self.ship_time
 
     def fold(self, near: Array, direction: Array) -> Array | None:
-        """The fold next to a point with its tangent: F = 0, F_z phi = 0, c phi = 1; None if Newton finds none."""
+        """The fold near a point with its tangent: F = 0, F_z phi = 0, c phi = 1; None if Newton finds none."""
         n = len(self.names)
         null = direction[:n] / np.linalg.norm(direction[:n])
         phi = ca.SX.sym("phi", n)
@@ -236,7 +236,7 @@ def steady_turning(model: Model) -> SteadyTurning:
     Raises
     ------
     InputError
-        The model is no ship, holds no straight course, or keeps no steady speed on it.
+        The model is not a ship, has no straight course, or no steady speed on it.
     """
     point = straight_course(model)
     equations = TurningEquations(model)
@@ -260,7 +260,7 @@ def steady_turning(model: Model) -> SteadyTurning:
 
 
 def largest_rudder(model: Model) -> float:
-    """:data:`_LARGEST_RUDDER`, or the largest that the gear allows, rad."""
+    """:data:`_LARGEST_RUDDER`, or the largest angle of the gear, rad."""
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     return min(_LARGEST_RUDDER, float(values.get("steering.max_angle", _LARGEST_RUDDER)))
 
@@ -300,7 +300,7 @@ def _diagram(equations: TurningEquations, port: Curve, starboard: Curve) -> Stea
 def _with_folds(
     equations: TurningEquations, y: Array, tangents: Array, straight: int
 ) -> tuple[Array, Array, int, list[int]]:
-    """The curve with its folds put in, the row of the straight course, and the rows of the folds."""
+    """The curve with its folds inserted, the row of the straight course, and the rows of the folds."""
     turns = np.flatnonzero(np.diff(np.sign(tangents[:, -1])) != 0)
     places: list[int] = []
     for turn in turns.tolist():
@@ -320,7 +320,7 @@ def _with_folds(
 
 
 def _judged(model: Model, found: SteadyTurning) -> SteadyTurning:
-    """With its loop and messages about it."""
+    """The diagram with its loop and notices."""
     before = [fold for fold in found.folds if fold.place <= found.straight]
     after = [fold for fold in found.folds if fold.place > found.straight]
     loop = None

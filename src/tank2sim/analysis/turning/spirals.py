@@ -1,8 +1,8 @@
-"""Simulated spirals on the steady-turning diagram: the direct one on its stable branches, the reverse one on all.
+"""Simulated spirals on the steady-turning diagram: the direct spiral on its stable branches, the reverse spiral on all.
 
 Direct (Dieudonne): a series of rudder angles, each held until the turn is steady. Reverse (Bech): a series of yaw
-rates, each held by a controller of the rudder until the rudder is steady; it reaches the turns that are unstable with
-the rudder held, too (ITTC 7.5-04-02-01). Both run on the nonlinear model with its steering gear, in calm water.
+rates, each held by a controller of the rudder until the rudder is steady; it also reaches the turns that are unstable
+with the rudder held (ITTC 7.5-04-02-01). Both run on the nonlinear model with its steering gear, in calm water.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ _BANDWIDTH = 1.0
 growth. Project choice."""
 
 STEADY_RUDDER = math.radians(0.002)
-"""Steady: over two ship lengths the rudder moves by less, and the yaw rate is within :data:`_HELD` of its order. A
-choice of ours, far less than a dial shows."""
+"""Largest rudder motion over two ship lengths of a steady point, whose yaw rate is within :data:`_HELD` of its order.
+Project choice: far less than the resolution of a dial."""
 
 _HELD = 1e-3
-"""Share of the largest yaw rate by which the one held may miss its order."""
+"""Largest error of a held yaw rate, as a share of the largest yaw rate."""
 
 _LONGEST = 60.0
-"""A yaw rate is held at most so many L/u0."""
+"""Longest time at a yaw rate, L/u0."""
 
 
 @dataclass(frozen=True)
 class SpiralPoints:
-    """Points of a simulated spiral in the order they were run.
+    """Points of a simulated spiral in the order of the run.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def direct_spiral(model: Model, turning: SteadyTurning, integrator: Integrator |
 
 
 def reverse_spiral(model: Model, turning: SteadyTurning, nomoto: Nomoto) -> SpiralPoints | None:
-    """The reverse spiral of a ship over the yaw rates of the diagram; None if its rudder has no linear hold on it.
+    """The reverse spiral of a ship over the yaw rates of the diagram; None if its rudder has no linear effect.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def with_rate_controller(model: Model, nomoto: Nomoto) -> Model:
 
 
 def _held(running: Running, rates: Sequence[float] | Array, ship_time: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Rudder angle (n,) at which each yaw rate (n,) is held, and whether it had come to rest."""
+    """Rudder angle (n,) at which each yaw rate (n,) is held, and True where the rudder was steady."""
     rudders, steady = [], []
     nearly = _HELD * float(np.max(np.abs(rates)))
     for rate in rates:

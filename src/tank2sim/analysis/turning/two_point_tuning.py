@@ -1,23 +1,22 @@
-"""Two points of the steering diagram met by two characteristics of the ship: section 4 of paper 4, on any card.
+"""Two-point tuning: two characteristics of a ship fitted to two points of the steering diagram (paper 4, section 4).
 
-Melkozerova and Pershits (1975; after Poznyakov and Yudin 2007) hold that a model is steered through two
-characteristics of the ship: the reduced fullness of the submerged profile, which counts the areas at the stern
-(deadwood, skegs, a cut-up) by what they do against drift and turn, and the effectiveness of the rudder. They find both
-by making two points of the steering diagram equal to the measured ones: the greatest yaw rate, with the rudder hard
-over, and the yaw rate with the rudder amidships, which an unstable ship has; of a stable ship any other point that is
-far enough from the first.
+Melkozerova and Pershits (1975; after Poznyakov and Yudin 2007) state that two characteristics of the ship determine the
+steering of a model: the reduced fullness of the submerged profile, which weighs the areas at the stern (deadwood,
+skegs, a cut-up) by their effect against drift and turn, and the effectiveness of the rudder. Both follow from two
+measured points of the steering diagram: the greatest yaw rate, with the rudder hard over, and the yaw rate of an
+unstable ship with the rudder amidships, or for a stable ship any other point far enough from the first.
 
-The paper prints no formula by which the fullness enters the coefficients. It names what moves: C_m^beta and C_m^omega,
-the strongest influences of the hull, and C_y^delta, C_m^delta of the rudder (curve 3 of its Fig. 1). So, a choice of
-ours: a fuller stern makes the static moment smaller and the damping greater, both by one factor h,
+The paper prints no formula by which the fullness enters the coefficients. It names the affected coefficients: C_m^beta
+and C_m^omega, the strongest influences of the hull, and C_y^delta, C_m^delta of the rudder (curve 3 of its Fig. 1).
+Project choice: a fuller stern reduces the static moment and increases the damping, both by the same factor h,
 
     N_v / h,   N_r h,   all terms of the rudder times e
 
 with h above 1 for the steadier ship; Taylor terms of N_v and N_r in the speed go with them. N_r is the hydrodynamic
-one: where a card's N_r holds -m x_G, that part stays. The other terms are left as they are.
+one: the part -m x_G in a card's N_r does not change. Other terms do not change.
 
-One after the other, as in 1975, and both at once have the same solution; here both are solved at once, by Newton's
-method along the way from the points that the model has to those that are wanted.
+The sequential method of 1975 and the joint solution agree; this module solves both jointly, by Newton's method with
+continuation from the model's points to the measured ones.
 """
 
 from __future__ import annotations
@@ -47,20 +46,20 @@ _ACCURACY = 1e-10
 _ITERATIONS = 12
 _SINGULAR = 1e13
 _ALIKE = 20.0
-"""Condition of the two factors against the two measures above which the points ask the same thing of them. Project
+"""Condition of the two factors against the two measures above which the points do not determine both. Project
 choice."""
 
 
 @dataclass(frozen=True)
 class Levers:
-    """What the two characteristics of a model move: names of its parameters.
+    """Parameters of a model that the two characteristics scale.
 
     Parameters
     ----------
     static_moment : tuple of str
         Divided by the hull's factor.
     damping : mapping
-        Name to the inertial part that the parameter holds and that is not scaled (0 if none): multiplied by it.
+        Name to the inertial part of the parameter that is not scaled (0 if none): multiplied by the hull's factor.
     rudder : tuple of str
         Multiplied by the rudder's factor.
     """
@@ -98,7 +97,7 @@ def levers_of_ship(card: ManoeuvringCard, model: Model) -> Levers:
 
 
 def levers_of_form(form: SteeringForm) -> Levers:
-    """The levers of a steering model, as the form names them."""
+    """The levers of a steering model, by the names of its form."""
 
     def named(names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(f"coefficients.{name}" for name in names)
@@ -122,7 +121,7 @@ class WantedTurn:
             raise ValueError("a point has a yaw rate or a radius")
 
     def measure(self, turn: SteadyTurn) -> float:
-        """Of a turn what this point is about: its yaw rate or its radius."""
+        """The measured quantity of a turn: its yaw rate or its radius."""
         return turn.radius_m if self.yaw_rate_radps is None else turn.yaw_rate_radps
 
     @property
@@ -142,9 +141,9 @@ class TwoPointTuning:
     parameters : mapping
         Values of the scaled parameters of the model, by name.
     before, after : pairs of SteadyTurn
-        At the two rudder angles with the model as it was, and as it is now.
+        At the two rudder angles, with the model before and after.
     stable_before, stable_after : bool
-        Whether the ship holds a straight course with the rudder held.
+        True if the straight course is stable with the rudder held.
     """
 
     hull: float
@@ -169,7 +168,7 @@ class TwoPointTuning:
 
 
 def tune_to_two_points(model: Model, levers: Levers, first: WantedTurn, second: WantedTurn) -> TwoPointTuning:
-    """The factors of hull and rudder with which the steady turns of a model meet two measured points.
+    """Find the factors of hull and rudder with which the steady turns of a model agree with two measured points.
 
     Parameters
     ----------
@@ -183,8 +182,8 @@ def tune_to_two_points(model: Model, levers: Levers, first: WantedTurn, second: 
     Raises
     ------
     InputError
-        The model does not turn at one of the angles, or no factors between 1/5 and 5 meet both points; the message says
-        how far it came.
+        The model does not turn at one of the angles, or no factors between 1/5 and 5 fit both points; the message
+        states the progress.
     """
     points = TurningPoints(model)
     found = [points.turn_at(wanted.rudder_rad) for wanted in (first, second)]
@@ -223,7 +222,7 @@ def _refuse_opposed(model: Model, wanted: tuple[WantedTurn, WantedTurn], *turns:
 
 
 class _System:
-    """Steady turns at both rudders with the wanted measures: unknowns (y1, y2, ln h, ln e)."""
+    """Steady turns at both rudders with the target measures: unknowns (y1, y2, ln h, ln e)."""
 
     def __init__(self, points: TurningPoints, levers: Levers, wanted: tuple[WantedTurn, WantedTurn]):
         self._model = model = points.model
@@ -247,7 +246,7 @@ class _System:
         self._newton = ca.Function("tuning", [self.unknown, goal], [equations, slopes], {"cse": True})
 
     def solved(self, near: Array, goal: Array) -> Array | None:
-        """The unknowns next to `near` that meet the logarithms of the measures; None if Newton's method fails."""
+        """The unknowns near `near` that fit the logarithms of the measures; None if Newton's method fails."""
         value = near.copy()
         for _ in range(_ITERATIONS):
             residual, slopes = (np.array(part) for part in self._newton(value, goal))
@@ -262,7 +261,7 @@ class _System:
         return None
 
     def act_alike(self, near: Array, goal: Array) -> bool:
-        """True if hull and rudder move both measures nearly in one proportion."""
+        """True if hull and rudder move both measures nearly in the same proportion."""
         residual, slopes = (np.array(part) for part in self._newton(near, goal))
         n = len(residual) // 2
         if np.linalg.cond(slopes) > _SINGULAR:
@@ -288,7 +287,7 @@ def _to_a_side(value: float, unit: str) -> str:
 
 
 def _followed(system: _System, unknown: Array, have: Array, want: Array) -> Array:
-    """The unknowns at the wanted measures, from those at the measures that the model has."""
+    """The unknowns at the target measures, from those at the model's measures."""
     done, step = 0.0, 0.25
     while done < 1.0:
         share = min(1.0, done + step)

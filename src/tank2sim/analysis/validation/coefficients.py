@@ -1,8 +1,8 @@
-"""Cards coefficient by coefficient: brought to one convention and one speed, and compared in standard errors.
+"""Comparison of cards by coefficient, in a common convention and speed, in units of standard errors.
 
-A polynomial in v', r', delta and Du' is another one when it is expanded about another speed, in primes by another
-speed, or with the inertial terms of (3.8) inside or outside. With V the speed of the scaling of the reference, in the
-units of the card's own u0 and of the length (k is the ratio of the Froude numbers),
+A polynomial in v', r', delta and Du' depends on the speed of its expansion, on the speed of its primes, and on whether
+it includes the inertial terms of (3.8). With V the speed of the scaling of the reference, in the units of the card's
+own u0 and of the length (k is the ratio of the Froude numbers),
 
     V = k                            (nominal)
     V = k/(sqrt(1 - v'^2) - Du')     (instantaneous, from V^2 = (k + Du' V)^2 + (v' V)^2)
@@ -30,10 +30,10 @@ from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertial_forces
 
 _SAME_SPEED = 1e-3
-"""Froude numbers that differ by less than this share are one."""
+"""Froude numbers that differ by less than this share count as equal."""
 
 BEYOND_STANDARD_ERRORS = 2.0
-"""Differences of more standard errors than this are reported as such: 5 % of those by chance alone."""
+"""Standard errors from which a difference is reported: chance alone exceeds it in 5 % of the cases."""
 
 _ABSENT = 1e-12
 _RIGID_BODY = ("mass", "yaw_inertia", "x_G")
@@ -41,10 +41,10 @@ _RIGID_BODY = ("mass", "yaw_inertia", "x_G")
 
 @dataclass(frozen=True)
 class CardCoefficient:
-    """A coefficient of one card in the reference's convention, prime; in rows with the rudder's sign of the reference.
+    """A coefficient of a card in the reference's convention, prime; in rows with the rudder's sign of the reference.
 
-    `value` is None where the card's model has no such term, `standard_error` where none is known; `stated` is False
-    where it rests on the default share of the value.
+    `value` is None if the card's model lacks the term, `standard_error` if it is unknown; `stated` is False for a
+    standard error by the default share of the value.
     """
 
     value: float | None
@@ -53,13 +53,13 @@ class CardCoefficient:
 
 
 SAME = "the reference's own number"
-"""Why a number that is the reference's to the last digit has no difference: one of the cards took it over, or both from
-a third. Their errors are one and the same, and 0 standard errors would pass for the agreement of two."""
+"""Reason for a missing difference of identical numbers: one card copied it from the other, or both from a third. Their
+errors are identical, and 0 standard errors would look like an independent agreement."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """A card less the reference: in standard errors, in per cent of the reference, or why there is none."""
+    """A card less the reference: in standard errors, in per cent of the reference, or the reason without either."""
 
     standard_errors: float | None = None
     percent: float | None = None
@@ -68,14 +68,14 @@ class Difference:
 
 @dataclass(frozen=True)
 class CoefficientRow:
-    """One coefficient of all cards, the reference first, and the others' differences from it."""
+    """A coefficient of all cards, the reference first, and the differences from the reference."""
 
     name: str
     cards: tuple[CardCoefficient, ...]
     differences: tuple[Difference, ...]
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         return {
             "name": self.name,
             "cards": [vars(card) for card in self.cards],
@@ -90,9 +90,9 @@ class Expansion:
     Parameters
     ----------
     coefficients : mapping
-        Name to coefficient; what the model has not is left out.
+        Name to coefficient; terms that the model lacks are absent.
     refused : mapping
-        Name to why it cannot be compared.
+        Name to the reason that prevents a comparison.
     notes : tuple of str
         What was converted.
     """
@@ -103,7 +103,7 @@ class Expansion:
 
 
 def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[CoefficientRow, ...], tuple[str, ...]]:
-    """All coefficients of cards (the first is the reference) that any of them has, and notes on what was converted."""
+    """All coefficients of the cards (the first is the reference), with notes on conversions."""
     reference = cards[0]
     expansions = [expanded_as(card, reference) for card in cards]
     rows = []
@@ -147,9 +147,9 @@ def _difference(first: CardCoefficient, second: CardCoefficient) -> Difference:
 
 
 def compare_effects(cards: Sequence[ManoeuvringCard], models: Sequence[Model]) -> tuple[CoefficientRow, ...]:
-    """All parameters of effects that any card has, in SI, as their models have them; `models` are those of the cards.
+    """All parameters of effects of the cards, in SI, in the units of their models; `models` are those of the cards.
 
-    What has a unit (a wind speed, a time) is compared between ships of one size alone.
+    Values with a unit (a wind speed, a time) are compared only between ships of the same size.
     """
     found = [_of_effects(card, model) for card, model in zip(cards, models, strict=True)]
     rows = []
@@ -176,7 +176,7 @@ def _of_effects(card: ManoeuvringCard, model: Model) -> dict[str, CardCoefficien
 
 
 def _same(first: float, second: float) -> bool:
-    """One number except for rounding, as it is left by a change of convention."""
+    """True for numbers that are equal except for rounding by a change of convention."""
     return math.isclose(first, second, rel_tol=1e-9, abs_tol=1e-15)
 
 
@@ -262,7 +262,8 @@ def _notes(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float) -> t
 def _conversion(
     card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float
 ) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Names of the velocity and rudder terms, the matrix from the card's to the reference's, and what is added."""
+    """Names of the velocity and rudder terms, the matrix from the card's to the reference's coefficients, and the
+    constant term."""
     names = [*ABKOWITZ_TERMS["X"], *ABKOWITZ_TERMS["Y"], *ABKOWITZ_TERMS["N"]]
     coefficients = ca.SX.sym("own", len(names))
     at = ca.SX.sym("v"), ca.SX.sym("r"), ca.SX.sym("d"), ca.SX.sym("du")
@@ -288,7 +289,7 @@ def _forces_in_primes(
     card_scale = ca.SX(1) if _nominal(card) else ca.sqrt(u**2 + sway**2)
     primes = sway / card_scale, yaw / card_scale, d, (u - 1) / card_scale
     X, Y, N = (card_scale**2 * polynomial(ABKOWITZ_TERMS[name], coefficients, *primes) for name in "XYN")
-    # What each convention leaves to the equations: (3.8) with u, or nothing, for V stands in the coefficients already.
+    # Terms that each convention leaves to the equations: (3.8) with u, or none, because the coefficients include V.
     for each_card, sign in ((card, 1), (reference, -1)):
         if each_card.model.yaw_rate_terms == "hydrodynamic":
             inertia = inertial_forces(card.rigid_body.mass, card.rigid_body.x_G, u, sway, yaw)
@@ -306,7 +307,7 @@ def _nominal(card: ManoeuvringCard) -> bool:
 
 
 def _taylor(forces: ca.SX, at: tuple[ca.SX, ...], names: Sequence[str]) -> ca.SX:
-    """Coefficients of the Taylor series, before 0 is put in: each derivative over its factorials."""
+    """Coefficients of the Taylor series before evaluation at 0: each derivative over its factorials."""
     known: dict[tuple[int, ...], ca.SX] = {(0, 0, 0, 0): forces}
 
     def derivative(powers: tuple[int, ...]) -> ca.SX:

@@ -1,4 +1,4 @@
-"""Cards of one ship compared: coefficient by coefficient, and by what they do in the standard trials."""
+"""Comparison of cards of a ship: by coefficient, and by their figures in the standard trials."""
 
 from __future__ import annotations
 
@@ -35,13 +35,12 @@ from tank2sim.simulation.run import Run
 from tank2sim.simulation.trajectory import Trajectory
 
 SAME_SIZE = 0.03
-"""Lengths and breadths that differ by less than this share are those of one ship: not all count them alike. Project
-choice."""
+"""Lengths and breadths that differ by less than this share are of the same ship: definitions differ. Project choice."""
 
 
 @dataclass(frozen=True, eq=False)
 class CardTrack:
-    """The path of one card's ship in a trial, at the reference's size: s, m."""
+    """The path of a card's ship in a trial, at the reference's size: s, m."""
 
     label: str
     time_s: Array
@@ -51,16 +50,16 @@ class CardTrack:
 
 @dataclass(frozen=True)
 class FigureRow:
-    """One figure by all cards at the reference's size.
+    """A figure by all cards at the reference's size.
 
     Parameters
     ----------
     name : str
         With its unit.
     values, deviations : tuple of float or None
-        Of each card, the reference first; None where the run did not show it, or nothing is known of its error.
+        Of each card, the reference first; None where the run did not show it, or its error is unknown.
     outside : tuple of bool
-        True where the run had left what the card was measured in before the figure was settled.
+        True where the run had left the card's range before the figure was reached.
     """
 
     name: str
@@ -83,7 +82,7 @@ class FigureRow:
 
 @dataclass(frozen=True, eq=False)
 class TrialComparison:
-    """One standard trial by all cards: figures, tracks, and what went wrong."""
+    """A standard trial by all cards: figures, tracks, and errors."""
 
     name: str
     figures: tuple[FigureRow, ...]
@@ -92,12 +91,12 @@ class TrialComparison:
 
 @dataclass(frozen=True, eq=False)
 class CardComparison:
-    """Cards compared; the first is the reference.
+    """Comparison of cards; the first is the reference.
 
     Parameters
     ----------
     labels, ships, sources : tuple of str
-        What each card is called here, its ship, and where its numbers come from.
+        Label of each card, its ship, and the source of its numbers.
     coefficients, effects : tuple of CoefficientRow
         Coefficients in the reference's convention, and parameters of the effects, SI.
     trials : tuple
@@ -127,11 +126,11 @@ class CardComparison:
         return tuple(difference for difference in found if difference is not None)
 
     def same(self, place: int) -> int:
-        """How many numbers of a card are the reference's own."""
+        """Number of coefficients of a card that are identical to the reference's."""
         return sum(row.differences[place - 1].why == SAME for row in self.rows)
 
     def beyond(self, place: int) -> int:
-        """How many coefficients differ by more than :data:`.BEYOND` standard errors."""
+        """Number of coefficients that differ by more than :data:`.BEYOND` standard errors."""
         return sum(abs(difference) > BEYOND_STANDARD_ERRORS for difference in self.in_errors(place))
 
     def rms(self, place: int) -> float | None:
@@ -140,7 +139,7 @@ class CardComparison:
         return math.sqrt(sum(difference**2 for difference in found) / len(found)) if found else None
 
     def as_json(self) -> dict[str, object]:
-        """All of it; tracks thinned to 200 points."""
+        """All values; tracks thinned to 200 points."""
         columns = range(1, len(self.labels))
         return {
             "kind": "compare",
@@ -193,7 +192,7 @@ class CardComparison:
 
 
 def compare_cards(cards: Sequence[ManoeuvringCard], count: int = MEMBERS) -> CardComparison:
-    """Compare cards of one ship, or of ships and models of one form: the first is the reference, whose size is taken.
+    """Compare cards of a ship, or of ships and models of the same form, at the size of the first, the reference.
 
     Parameters
     ----------
@@ -231,7 +230,7 @@ def compare_cards(cards: Sequence[ManoeuvringCard], count: int = MEMBERS) -> Car
 
 
 def labels_of(cards: Sequence[ManoeuvringCard]) -> tuple[str, ...]:
-    """What each card is called: its file's stem, that of its folder for a bundled one, with a number where doubled."""
+    """Label of each card: its file's stem, or that of its folder for a bundled one, with a number for duplicates."""
     stems = []
     for card in cards:
         path = Path(card.source)
@@ -241,7 +240,8 @@ def labels_of(cards: Sequence[ManoeuvringCard]) -> tuple[str, ...]:
 
 
 def differences_of_size(first: ManoeuvringCard, second: ManoeuvringCard, scale: float = 1.0) -> list[str]:
-    """Length and breadth of two ships that differ by :data:`SAME_SIZE` or more, in words; `scale` is that of `one`."""
+    """Length and breadth of two ships that differ by :data:`SAME_SIZE` or more, in words; `scale` is that of
+    `first`."""
     found = []
     for what, first_size, second_size in (
         ("length", first.ship.length_m, second.ship.length_m),
@@ -307,12 +307,13 @@ def _trial(
 
 
 def _numbers(run: Run | str) -> Numbers:
-    """Figures of a run; none of one that could not be run."""
+    """Figures of a run; empty for one that could not be run."""
     return {} if isinstance(run, str) else figure_numbers(run.figures)
 
 
 def _approach(reference: ManoeuvringCard, card: ManoeuvringCard) -> float:
-    """The reference's speed at the size of the card's ship, m/s; its own where the two are one except for rounding."""
+    """The reference's speed at the size of the card's ship, m/s; its own speed if both are equal except for
+    rounding."""
     speed = reference.model.speed_mps * math.sqrt(card.ship.length_m / reference.ship.length_m)
     return card.model.speed_mps if math.isclose(speed, card.model.speed_mps, rel_tol=1e-6) else speed
 

@@ -1,4 +1,4 @@
-"""Tracks of a ship from an order on, with marks, figures, and the place where the card's range ends."""
+"""Tracks of a ship from an order, with marks, figures, and the end of the card's range."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class TrackMark:
 
 @dataclass(frozen=True, eq=False)
 class ShipTrack:
-    """A track from the order on, in axes of the first course: ahead and to starboard, m.
+    """A track from the order, in axes of the first course: ahead and to starboard, m.
 
     Parameters
     ----------
@@ -36,13 +36,13 @@ class ShipTrack:
     marks : tuple of TrackMark
         At each quarter of a turn (turns), or at equal times (stops).
     figures : mapping
-        Figures, also those that were settled outside what the card was measured in.
+        Figures, including those outside the card's range.
     reading : CardRangeReading
-        Which those are.
+        Figures outside the card's range.
     inside : int
         Points of the track until it leaves the card's range.
     range_exit : TrackMark, optional
-        Where it does; None if it does not.
+        The first point outside the card's range; None if there is none.
     """
 
     name: str
@@ -55,11 +55,11 @@ class ShipTrack:
     range_exit: TrackMark | None = None
 
     def outside(self, mark: TrackMark) -> bool:
-        """True if the run has left the card's range at a mark."""
+        """True if a mark is outside the card's range."""
         return self.range_exit is not None and mark.time_s >= self.range_exit.time_s
 
     def as_json(self) -> dict[str, object]:
-        """All of it, the track thinned to 200 points."""
+        """All values, the track thinned to 200 points."""
         every = max(1, len(self.ahead_m) // 200)
         return {
             "name": self.name,
