@@ -1,1 +1,1 @@
-"""What a model says about the ship: stability, steering."""
+"""Analysis of ship models: stability, turning, steering, influence, validation."""

@@ -1,4 +1,4 @@
-"""A model about an operating point: matrices exact from CasADi, handed to python-control with named signals."""
+"""Linearisation about an operating point: exact matrices from CasADi, for python-control with named signals."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def jacobians(
 ) -> tuple[Array, Array]:
     """Derivatives (nv, ns) and (nv, ni) of named quantities or states by named states and by named inputs.
 
-    States in `settled` are eliminated: they follow the others at once, as if at rest (the Schur complement of their
-    own rates). Other states that are not named stay where they are.
+    States in `settled` are eliminated: their rates are zero at any time (the Schur complement). Other states that are
+    not named are constant.
     """
     if settled:
         derivative = {state.name: state.derivative for state in model.states}
@@ -54,17 +54,17 @@ def state_space(
     outputs: Sequence[str] | None = None,
     settled: Sequence[str] = (),
 ) -> control.StateSpace:
-    """The linearised model as a ``control.StateSpace`` whose signals bear the model's names (:func:`signal_name`).
+    """The linearised model as a ``control.StateSpace`` whose signals have the model's names (:func:`signal_name`).
 
     Parameters
     ----------
     model, point
-        What, and about which point.
+        The model, and its operating point.
     states, inputs, outputs : sequences of str, optional
-        Names to keep; by default all that are real. States left out are held at the point. A state may be an input: the
+        Names to keep; by default all real ones. Omitted states are constant. A state may be an input: the
         rudder angle without its gear.
     settled : sequence of str
-        States left out that follow the others at once (:func:`jacobians`).
+        Omitted states that follow the others at once (:func:`jacobians`).
     """
     states = list(model.state_names if states is None else states)
     inputs = [v.name for v in model.inputs if not v.boolean] if inputs is None else list(inputs)
@@ -116,8 +116,8 @@ def settled_states(
 
 
 def signal_name(name: str) -> str:
-    """A model's name as python-control takes it: ``rudder.command`` is ``rudder_command``.
+    """A model's name in the form of python-control: ``rudder.command`` is ``rudder_command``.
 
-    It keeps the dot for itself, between system and signal.
+    Its dot separates system and signal.
     """
     return name.replace(".", "_")

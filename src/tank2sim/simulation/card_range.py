@@ -79,7 +79,7 @@ NOTHING_READ = CardRangeReading({}, {})
 
 def reading(figures: Figures, run: Trajectory, parameters: Mapping[str, float]) -> CardRangeReading:
     """The figures of a run with the times at which they are settled; `parameters` are all of the model, by name."""
-    row = left_at(run)
+    row = range_exit_row(run)
     left = None if row is None else float(run.t[row])
     settled: Numbers = {}
     for names, last in ((_QUARTER, "time_90_s"), (_HALF, "time_180_s"), (_FIRST_HEADING, "initial_turning_time_s")):
@@ -110,7 +110,7 @@ def entry_name(name: str, place: int) -> str:
     return f"{stem.removesuffix('s')}_{place + 1}_{unit}"
 
 
-def left_at(run: Trajectory) -> int | None:
+def range_exit_row(run: Trajectory) -> int | None:
     """Row at which ``validity`` first leaves 1; None if it never does, or the model does not state it."""
     if "validity" not in run.model.outputs:
         return None
@@ -122,10 +122,10 @@ def _how(run: Trajectory, values: Mapping[str, float]) -> str:
     moving = np.maximum(run["motion.speed"], _STILL * values["ship.speed"])
     rate = run["motion.r"] * values["ship.length"] / moving
     drift = np.arcsin(np.clip(run["motion.v"] / moving, -1.0, 1.0))
-    return range_left(values, run["motion.speed"], rate, drift, run["rudder.angle"])
+    return exceeded_range(values, run["motion.speed"], rate, drift, run["rudder.angle"])
 
 
-def range_left(values: Mapping[str, float], speed: Array, rate: Array, drift: Array, rudder: Array) -> str:
+def exceeded_range(values: Mapping[str, float], speed: Array, rate: Array, drift: Array, rudder: Array) -> str:
     """What of a motion leaves the range of the card, with both ranges, in words; empty if nothing does.
 
     Parameters

@@ -126,7 +126,7 @@ def test_the_chance_of_a_criterion_is_the_share_that_meets_it() -> None:
     found = chance(
         ImoCriterion("c", 1.0, 2.0, "L"), Ensemble(105, 0, {"c": np.append(values, [np.nan] * 5)}, None, {"x": 5})
     )
-    assert found.met == pytest.approx(0.6) and found.left_open == 10
+    assert found.met == pytest.approx(0.6) and found.undecided == 10
     # Wilson's interval of 60 of 100, as tabled.
     assert found.between == pytest.approx((0.5020, 0.6906), abs=1e-4)
     assert chance(ImoCriterion("c", 1.0, 2.0, "L"), Ensemble(3, 0, {})).met is None

@@ -66,7 +66,7 @@ def test_bands_are_the_quantiles_of_the_members_own_responses(found) -> None:
     np.testing.assert_allclose(off - 360 * np.round(off / 360), 0.0, atol=0.2)
     assert abs(bands.curves[PHASE].high[-1] - grid.phase_deg) < 180
     turned = _responses(model, None, replace(grid, phase_deg=grid.phase_deg + 360))[1]
-    np.testing.assert_allclose(turned - bands.own[PHASE], 360.0, atol=1e-4)
+    np.testing.assert_allclose(turned - bands.reference[PHASE], 360.0, atol=1e-4)
 
 
 def _yaw_by_rudder(model, course) -> tuple[np.ndarray, np.ndarray]:
@@ -88,7 +88,7 @@ def test_branches_are_those_of_the_diagram_and_part_in_the_loop_alone(found) -> 
     card, _, grid, bands = found
     turning = steady_turning(build(card))
     starboard, port = branches(turning, grid.rudder_rad)
-    np.testing.assert_allclose(bands.own[FROM_STARBOARD], starboard, rtol=1e-6)
+    np.testing.assert_allclose(bands.reference[FROM_STARBOARD], starboard, rtol=1e-6)
     edge = math.degrees(turning.loop.width_rad) / 2 if turning.loop else 0.0
     middle = math.degrees(turning.rudder_rad[turning.straight])
     parts = np.abs(starboard - port) > 1e-6

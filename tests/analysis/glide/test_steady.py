@@ -125,10 +125,10 @@ def test_the_smallest_angle_is_the_greatest_ratio_of_lift_to_drag() -> None:
         (23.38, 0, "the smallest that can is 23.385 deg"),
         (-20, 0, "23.385"),
         (24, 30, "26.534"),
-        (0, 0, "no glide"),
-        (90, 0, "no glide"),
-        (math.nan, 0, "no glide"),
-        (30, 90, "no roll"),
+        (0, 0, "not a glide"),
+        (90, 0, "not a glide"),
+        (math.nan, 0, "not a glide"),
+        (30, 90, "not a roll"),
     ],
 )
 def test_what_cannot_be_flown_is_refused_and_the_smallest_angle_named(angle, roll, words) -> None:

@@ -89,7 +89,7 @@ def test_a_current_across_leaves_an_error_that_the_integral_takes_away(loop: Hea
         ("x_m,y_m\n0,0\n0,0\n", "line 3: is the same place"),
         ("x_m,y_m\n0,0\n5,\n", "line 3, column y_m: is empty"),
         ("x_m,z_m\n0,0\n5,5\n", "there is no column y_m"),
-        ("x_m,y_m\n0,0\nnorth,5\n", "'north' is no number"),
+        ("x_m,y_m\n0,0\nnorth,5\n", "'north' is not a number"),
         ("x_m,y_m\n0,0\n2e6,0\n3e6,1.5e6\n", "track.csv: its track is 3802.78 km long"),
     ],
 )

@@ -103,7 +103,7 @@ def test_what_is_read_off_before_the_range_ends_is_kept() -> None:
 
 def test_a_card_that_holds_throughout_has_all_its_figures(mariner_card) -> None:
     found = bridge_of(mariner_card)
-    assert all(one.left is None and one.inside == len(one.ahead_m) for one in found.deep)
+    assert all(one.range_exit is None and one.inside == len(one.ahead_m) for one in found.deep)
     assert found.as_json()["turning_circles_deep"][0]["outside_card_range"] == []
     tanker = bridge_of(read_card("kvlcc2", {"model.valid_yaw_rate_prime": 1.0, "model.valid_rudder_deg": 40.0}))
     assert tanker.as_json()["turning_circles_deep"][0]["left_card_range_s"] == pytest.approx(91.6, abs=1)

@@ -139,7 +139,7 @@ def simulated(estimates, force, tows):
 
 def test_notes_tell_the_range_and_offer_a_way_out(study, table_1):
     text = " ".join(study.notes)
-    assert "M only to 2547 to 3399 kg (added mass 304 to 1156 kg)" in text
+    assert "M only within 2547 to 3399 kg (added mass 304 to 1156 kg)" in text
     assert "The model of lowest AIC is M, B1, B2, B3, with a drag that is negative at some speeds" in text
     assert "(--start-delay)" in text and "--terms B3" in text and "--total-mass-kg, 2357 by (2.5)" in text
     posed = study_tows(identify_tow(table_1, terms=("B3",), options=TowOptions(start_delay=True)))

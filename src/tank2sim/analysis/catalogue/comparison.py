@@ -1,4 +1,4 @@
-"""The models of a steering card next to each other: steady turns, manoeuvres, influence, and what is not known."""
+"""Comparison of the models of a steering card: steady turns, manoeuvres, influence, and missing data."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ _TUNED = "through the two trial points"
 _CIRCLE_SAMPLES = 300
 
 ZIGZAG_DEG = 10.0
-"""Rudder and heading of the zigzag by which the models are compared (MSC.137(76))."""
+"""Rudder and heading of the zigzag of the comparison (MSC.137(76))."""
 
 
 @dataclass(frozen=True)
 class ModelRuns:
-    """Manoeuvres of one model: a turning circle, its figures, and those of the 10/10 zigzag."""
+    """Manoeuvres of a model: a turning circle, its figures, and those of the 10/10 zigzag."""
 
     turn: Trajectory
     turn_figures: Figures
@@ -50,14 +50,14 @@ class ModelRuns:
 
 @dataclass(frozen=True)
 class SteeringComparison:
-    """The models of a card, compared on its ship.
+    """Comparison of the models of a card on its ship.
 
     Parameters
     ----------
     ship : str
         Name of the ship.
     main : str
-        The model that printed influence and tuning are about.
+        The model of the printed influence and of the tuning.
     rudder_deg : float
         Rudder of the influence and of the turning circle.
     turns : tuple of ModelTurns
@@ -71,17 +71,17 @@ class SteeringComparison:
     polynomials : mapping
         K over the draught, (4): coefficients of 1, T, T^2.
     tuning : TwoPointTuning, str or None
-        The main model through the first two measured points; a text says why there is none.
+        The main model through the first two measured points; a text with the reason without one.
     missing : mapping
-        Model to what is not known of it.
+        Model to its missing data.
     titles : mapping
         Model to its words.
     diagrams : mapping
         Words to the steering diagram of each model of `runs`, and of the tuned one.
     points : tuple of SteeringPoint
-        Known ones of the diagram.
+        Known points of the diagram.
     speed_mps : float
-        Of the approach, at which a radius is a yaw rate.
+        Approach speed, which converts a radius into a yaw rate.
     printed : PrintedInfluence or None
         Influence coefficients that the source prints.
     """
@@ -103,14 +103,14 @@ class SteeringComparison:
     printed: PrintedInfluence | None
 
     def as_json(self) -> dict[str, object]:
-        """All of it, in m, deg and deg/min; turning circles thinned to draw."""
+        """All values, in m, deg and deg/min; turning circles thinned for a chart."""
         tuning = self.tuning.as_json() if isinstance(self.tuning, TwoPointTuning) else self.tuning
         return {
             "ship": self.ship,
             "main_model": self.main,
             "rudder_deg": self.rudder_deg,
-            "steady_turns": {one.model: [turn.as_json() for turn in one.turns] for one in self.turns},
-            "influence": {one.model: vars(one) for one in self.influence},
+            "steady_turns": {row.model: [turn.as_json() for turn in row.turns] for row in self.turns},
+            "influence": {row.model: vars(row) for row in self.influence},
             "manoeuvres": {
                 name: {"turn": dict(run.turn_figures), "zigzag": dict(run.zigzag_figures)}
                 for name, run in self.runs.items()
@@ -137,9 +137,9 @@ class SteeringComparison:
             rate = point.yaw_rate_radps or math.copysign(
                 self.speed_mps / (point.radius_m or math.inf), point.rudder_rad
             )
-            place = {"rudder_deg": math.degrees(point.rudder_rad), "yaw_rate_degpmin": 60 * math.degrees(rate)}
+            row = {"rudder_deg": math.degrees(point.rudder_rad), "yaw_rate_degpmin": 60 * math.degrees(rate)}
             known = {"radius_measured": bool(point.measured and point.radius_m)}
-            points.append({"label": point.label, "source": point.source, **place, **known})
+            points.append({"label": point.label, "source": point.source, **row, **known})
         models = {
             label: {name: [turn.as_json()[name] for turn in turns] for name in names}
             for label, turns in self.diagrams.items()
@@ -164,7 +164,7 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
     rudder = rudder_deg or (math.degrees(printed.rudder_rad) if printed else 20.0)
     main = printed.model if printed else names[0]
     same = [name for name in names if card.models[name].draught_m == card.models[main].draught_m]
-    others = [name for name in names if name not in same and card.models[name].form == card.models[main].form]
+    candidates = [name for name in names if name not in same and card.models[name].form == card.models[main].form]
     turns, runs = tuple(turns_of(card, name, RUDDERS_DEG) for name in names), {n: _runs(card, n, rudder) for n in same}
     tuning = tuned(card, main)
     return SteeringComparison(
@@ -174,12 +174,12 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
         turns=turns,
         influence=tuple(influence_of(card, name, rudder) for name in same),
         runs=runs,
-        predictions={name: combined_prediction(card, name) for name in others} if printed else {},
+        predictions={name: combined_prediction(card, name) for name in candidates} if printed else {},
         polynomials=draught_polynomials(card) if printed else {},
         tuning=tuning,
         missing=missing_of(card),
         titles={name: entry.title for name, entry in card.models.items()},
-        diagrams=_diagrams(card, max(turn.rudder_rad for one in turns for turn in one.turns), same, (main, tuning)),
+        diagrams=_diagrams(card, max(turn.rudder_rad for row in turns for turn in row.turns), same, (main, tuning)),
         points=card.points,
         speed_mps=card.ship.speed_mps,
         printed=printed,
@@ -189,7 +189,7 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
 def _diagrams(
     card: SteeringCard, largest: float, names: Sequence[str], tuned: tuple[str, TwoPointTuning | str | None]
 ) -> dict[str, tuple[SteadyTurn, ...]]:
-    """Of the models by their titles, to the largest rudder, and of the one that was tuned."""
+    """Diagrams of the models by their titles, to the largest rudder, and of the tuned one."""
     found = {card.models[name].title: TurningPoints(model_of(card, name)).diagram(largest) for name in names}
     main, tuning = tuned
     if isinstance(tuning, TwoPointTuning):
@@ -202,8 +202,8 @@ def _circle(turn: Trajectory) -> dict[str, list[float]]:
 
 
 def missing_of(card: SteeringCard) -> dict[str, tuple[str, ...]]:
-    """What is not known of the card's models, by name: coefficients not given, what the source leaves out, notes."""
-    told: dict[str, tuple[str, ...]] = {}
+    """Missing data of the card's models, by name: coefficients not given, omissions of the source, notes."""
+    unknown: dict[str, tuple[str, ...]] = {}
     forms: set[str] = set()
     for name, entry in card.models.items():
         form = form_of(card, name)
@@ -213,16 +213,17 @@ def missing_of(card: SteeringCard) -> dict[str, tuple[str, ...]]:
         words += (entry.notes,) if entry.notes else ()
         forms.add(form.name)
         if words:
-            told[name] = words
-    return told
+            unknown[name] = words
+    return unknown
 
 
 def tuned(card: SteeringCard, name: str) -> TwoPointTuning | str | None:
-    """One of the card's models through its first two measured points; why not, or None if there are no two."""
+    """A model of the card tuned to its first two measured points; the reason of a failure, or None without two
+    points."""
     measured = [point for point in card.points if point.measured][:2]
     if len(measured) < 2:
         return None
-    first, second = (WantedTurn(one.rudder_rad, one.yaw_rate_radps, one.radius_m) for one in measured)
+    first, second = (WantedTurn(turn.rudder_rad, turn.yaw_rate_radps, turn.radius_m) for turn in measured)
     try:
         return tune_to_two_points(model_of(card, name), levers_of_form(form_of(card, name)), first, second)
     except InputError as error:

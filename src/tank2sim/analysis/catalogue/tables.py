@@ -1,8 +1,8 @@
 """The tables of paper 4 (Poznyakov and Yudin 2007) from a steering card: turns, influence, agreed variation.
 
 K of a coefficient is the change of the steady radius in per cent when it grows by 10 %; Kc is the change of a
-coefficient in per cent when the draught grows by 1 %, which all of them share. Both are of
-:mod:`tank2sim.analysis.influence.percent`; here they meet the models of the catalogue.
+coefficient in per cent when the draught grows by 1 %. Both are defined in :mod:`tank2sim.analysis.influence.percent`
+and applied to the models of the catalogue.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ RUDDERS_DEG = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0)
 
 
 def form_of(card: SteeringCard, name: str) -> SteeringForm:
-    """The form of one of the card's models.
+    """The form of a model of the card.
 
     Raises
     ------
     InputError
-        The card has no such model, or its form is not in the catalogue.
+        The model is not on the card, or its form is not in the catalogue.
     """
     if name not in card.models:
         raise InputError(card.source, "models", f"none is called {name!r}", f"one of {', '.join(card.models)}")
@@ -42,7 +42,7 @@ def form_of(card: SteeringCard, name: str) -> SteeringForm:
 
 
 def not_given(card: SteeringCard, name: str) -> tuple[str, ...]:
-    """Coefficients that one of the card's models needs and does not have."""
+    """Missing coefficients of a model of the card."""
     given = card.models[name].coefficients
     return tuple(
         coefficient.name
@@ -57,13 +57,13 @@ def complete(card: SteeringCard) -> tuple[str, ...]:
 
 
 def model_of(card: SteeringCard, name: str) -> Model:
-    """The model of one of a card's entries, parameters ``coefficients.*``; its messages name the card's file.
+    """The model of an entry of the card, with parameters ``coefficients.*``; its messages name the card's file.
 
     Raises
     ------
     InputError
-        There is no such model, a coefficient is missing (the message says what the source does not print), or one is
-        given that the form does not have.
+        The model does not exist, a coefficient is missing (the message names those that the source does not print), or
+        one is not part of the form.
     """
     form = form_of(card, name)
     place = f"{card.place(name)}.coefficients"
@@ -81,7 +81,7 @@ def model_of(card: SteeringCard, name: str) -> Model:
 
 @dataclass(frozen=True)
 class ModelTurns:
-    """Steady turns of one model over the rudder angle: a part of Table 1."""
+    """Steady turns of a model over the rudder angle: a part of Table 1."""
 
     model: str
     title: str
@@ -122,7 +122,7 @@ class InfluenceTable:
 def influence_of(card: SteeringCard, name: str, rudder_deg: float = 20.0, percent: float = 10.0) -> InfluenceTable:
     """K of every coefficient of a model on its steady radius, by the paper's difference. Raises as :func:`turns_of`.
 
-    The coefficients of Table 4 alone are varied: what had to be fitted (inflow, lever, share) is kept.
+    Only the coefficients of Table 4 are varied: fitted ones (inflow, lever, share) do not change.
     """
     model = model_of(card, name)
     points = TurningPoints(model)
@@ -139,9 +139,9 @@ def influence_of(card: SteeringCard, name: str, rudder_deg: float = 20.0, percen
     return InfluenceTable(name, turn.rudder_rad, turn.radius_m, percent, influence, radii)
 
 
-def agreed_variation(card: SteeringCard, base: str, other: str) -> dict[str, float]:
-    """Kc: change of each coefficient from one model to another in per cent; Table 4. What does not change is absent."""
-    values, changed = card.models[base].coefficients, card.models[other].coefficients
+def agreed_variation(card: SteeringCard, base: str, target: str) -> dict[str, float]:
+    """Kc: change of each coefficient from one model to another in per cent; Table 4. Unchanged ones are absent."""
+    values, changed = card.models[base].coefficients, card.models[target].coefficients
     return {
         name: change_percent(changed[name], value)
         for name, value in values.items()
@@ -151,7 +151,7 @@ def agreed_variation(card: SteeringCard, base: str, other: str) -> dict[str, flo
 
 @dataclass(frozen=True)
 class CombinedPrediction:
-    """The radius after an agreed variation: Table 5, with its slip and without.
+    """The radius after an agreed variation: Table 5, with its error and without.
 
     Parameters
     ----------
@@ -160,15 +160,15 @@ class CombinedPrediction:
     radius_m : float
         Before the variation, computed.
     percent, predicted_m : float
-        Sum of Kc K / 10 with the printed K of each coefficient, and what it makes of the printed radius.
+        Sum of Kc K / 10 with the printed K of each coefficient, and the printed radius changed by it.
     misread_percent, misread_m : float
-        With the K of other coefficients where the source mistook them.
+        With the K of other coefficients where the source confused them.
     own_percent, own_m : float
         With the K computed here.
     direct_m : float
-        The model of the other draught itself.
+        By the model of the other draught.
     direct_misread_m : float
-        That model with the variations themselves put on the mistaken coefficients.
+        By that model with the variations applied to the confused coefficients.
     """
 
     agreed_percent: Mapping[str, float]
@@ -183,8 +183,8 @@ class CombinedPrediction:
     direct_misread_m: float
 
 
-def combined_prediction(card: SteeringCard, other: str) -> CombinedPrediction:
-    """Table 5: what the K predict for another model of the card (another draught), and what that model gives.
+def combined_prediction(card: SteeringCard, changed: str) -> CombinedPrediction:
+    """Table 5: prediction by K for another model of the card (another draught), and the result of that model.
 
     Raises
     ------
@@ -193,15 +193,15 @@ def combined_prediction(card: SteeringCard, other: str) -> CombinedPrediction:
     """
     printed = _influence(card)
     base, rudder = printed.model, math.degrees(printed.rudder_rad)
-    agreed = agreed_variation(card, base, other)
+    agreed = agreed_variation(card, base, changed)
     table = influence_of(card, base, rudder, printed.change_percent)
     at = printed.draughts_m.index(_draught(card, base))
     K = {name: values[at] for name, values in printed.K_percent.items()}
     swapped = {name: K[printed.misread_as.get(name, name)] for name in K}
-    percents = [combined_percent(one, agreed) for one in (K, swapped, table.K_percent)]
+    percents = [combined_percent(percents_of, agreed) for percents_of in (K, swapped, table.K_percent)]
     radii = (printed.radius_m, printed.radius_m, table.radius_m)
     predicted = [radius * (1 + percent / 100) for radius, percent in zip(radii, percents, strict=True)]
-    direct = turns_of(card, other, [rudder]).turns[0].radius_m
+    direct = turns_of(card, changed, [rudder]).turns[0].radius_m
     return CombinedPrediction(
         agreed_percent=agreed,
         radius_m=table.radius_m,
@@ -212,18 +212,19 @@ def combined_prediction(card: SteeringCard, other: str) -> CombinedPrediction:
         own_percent=percents[2],
         own_m=predicted[2],
         direct_m=direct,
-        direct_misread_m=_direct_misread(card, printed, other, agreed),
+        direct_misread_m=_direct_misread(card, printed, changed, agreed),
     )
 
 
-def _direct_misread(card: SteeringCard, printed: PrintedInfluence, other: str, agreed: Mapping[str, float]) -> float:
-    """Radius of the other model with the larger of two mistaken variations put on the wrong coefficient as well."""
+def _direct_misread(card: SteeringCard, printed: PrintedInfluence, target: str, agreed: Mapping[str, float]) -> float:
+    """Radius of the target model with the larger of two confused variations applied to the wrong coefficient as
+    well."""
     values = card.models[printed.model].coefficients
     largest = max(printed.misread_as, key=lambda name: abs(agreed.get(name, 0.0)), default=None)
     if largest is None:
-        return turns_of(card, other, [math.degrees(printed.rudder_rad)]).turns[0].radius_m
+        return turns_of(card, target, [math.degrees(printed.rudder_rad)]).turns[0].radius_m
     wrong = printed.misread_as[largest]
-    points = TurningPoints(model_of(card, other))
+    points = TurningPoints(model_of(card, target))
     changed = {f"coefficients.{wrong}": values[wrong] * (1 + agreed[largest] / 100)}
     return points.turn_at(printed.rudder_rad, changed)[0].radius_m
 

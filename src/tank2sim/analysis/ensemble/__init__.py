@@ -1,1 +1,1 @@
-"""Ships as uncertain as their cards say: what their figures, tracks and verdicts are."""
+"""Ensembles of ships drawn within the errors of a card: their figures, tracks and verdicts."""

@@ -1,4 +1,4 @@
-"""From what a card says of its errors to the draws of an ensemble."""
+"""Draws of an ensemble from the errors of a card."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from tank2sim.simulation.ensemble import Draws
 
 
 def draws_of(card: ManoeuvringCard, seed: int) -> tuple[Draws, list[str]]:
-    """The draws of a card, and messages about them.
+    """The draws of a card, with notices on them.
 
-    Numbers in the card's covariance vary together as it says; all others are independent, with their standard errors.
+    Numbers in the card's covariance are correlated; all other numbers are independent, with their standard errors.
 
     Raises
     ------
     InputError
-        The covariance to which the card refers is at fault.
+        The covariance to which the card refers has an error.
     """
     errors = joint_errors(card, card_parameters(card, study_model(card)))
     return draws_with(errors, seed), errors.in_words
 
 
 def draws_with(errors: JointErrors, seed: int) -> Draws:
-    """Draws of parameters with these errors; those that are exact are not drawn."""
+    """Draws of parameters with these errors; exact parameters are not drawn."""
     uncertain = np.flatnonzero(np.diag(errors.covariance) > 0)
     chosen = [errors.parameters[place] for place in uncertain]
-    bounds = [one.bounds for one in chosen]
+    bounds = [parameter.bounds for parameter in chosen]
     return Draws(
-        names=tuple(one.name for one in chosen),
-        mean=np.array([one.value for one in chosen]),
+        names=tuple(parameter.name for parameter in chosen),
+        mean=np.array([parameter.value for parameter in chosen]),
         root=_root(errors.covariance[np.ix_(uncertain, uncertain)]),
         lowest=np.array([-np.inf if low is None else low for low, _ in bounds]),
         highest=np.array([np.inf if high is None else high for _, high in bounds]),
@@ -44,13 +44,14 @@ def draws_with(errors: JointErrors, seed: int) -> Draws:
 
 
 def by_file_name(card: ManoeuvringCard, names: Sequence[str], matrix: Array) -> Covariance:
-    """A covariance of parameters of the model as the card's file has them; what is not on the card is left out."""
-    found = {one.name: one for one in card_parameters(card, study_model(card))}
+    """A covariance by the names of the card's file instead of the model's; numbers that are not on the card are
+    omitted."""
+    found = {parameter.name: parameter for parameter in card_parameters(card, study_model(card))}
     rows = [place for place, name in enumerate(names) if name in found]
     chosen: list[CardParameter] = [found[names[place]] for place in rows]
-    factors = np.array([one.factor for one in chosen])
+    factors = np.array([parameter.factor for parameter in chosen])
     kept = matrix[np.ix_(rows, rows)] * np.outer(factors, factors)
-    return Covariance(tuple(one.key for one in chosen), (kept + kept.T) / 2)
+    return Covariance(tuple(parameter.key for parameter in chosen), (kept + kept.T) / 2)
 
 
 def _root(covariance: Array) -> Array:

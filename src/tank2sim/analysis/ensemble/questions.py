@@ -1,4 +1,4 @@
-"""What can be asked of the members of an ensemble: a manoeuvre, figures with a name, the IMO criteria."""
+"""Evaluations of the members of an ensemble: a manoeuvre, named figures, the IMO criteria."""
 
 from __future__ import annotations
 
@@ -38,15 +38,15 @@ ENSEMBLE_SIGNALS: Mapping[str, tuple[str, float]] = {
     "v_mps": ("motion.v", 1.0),
     "delta_deg": ("rudder.angle", math.degrees(1.0)),
 }
-"""Signals of which there are bands over time, to their variable and the factor to their unit."""
+"""Signals with bands over time, to their variable and the factor to their unit."""
 
 EVERY = 10
-"""Of so many steps one is kept: a twentieth of a ship length (:class:`tank2sim.simulation.integrator.Integrator`)."""
+"""Steps between two kept samples: a twentieth of a ship length (:class:`tank2sim.simulation.integrator.Integrator`)."""
 
 _LONGEST = 200_000
-"""Steps of the longest run that a whole batch makes at once: the batch then takes some 40 MB (project choice)."""
+"""Most steps of a run in a joint batch: the batch then takes some 40 MB (project choice)."""
 
-# Of all outputs those that figures are read off: the others would take longer than the motion itself.
+# Only the outputs that the figures need: the others would take longer than the motion itself.
 _READ_OFF: Mapping[type, tuple[str, ...]] = {
     Turn: ("motion.beta",),
     Zigzag: ("motion.rdot",),
@@ -56,14 +56,14 @@ _READ_OFF: Mapping[type, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class ShipText:
-    """A card as it is sent to other processes."""
+    """A card in the form that is sent to other processes."""
 
     text: str
     source: str
 
     @classmethod
     def of(cls, card: ManoeuvringCard) -> ShipText:
-        """Of a card."""
+        """The form of a card."""
         return cls(card.text, card.source)
 
     def card(self) -> ManoeuvringCard:
@@ -93,12 +93,12 @@ class OfManoeuvre:
         return _each(self._driven(integrator))
 
     def _driven(self, integrator: Integrator) -> AskOne:
-        """Members driven one by one, as a manoeuvre with events is."""
+        """Single runs of the members, for a manoeuvre with events."""
         model = integrator.model
-        own = _parameters(model)
+        defaults = _parameters(model)
 
         def ask(values: Mapping[str, float]) -> MemberResult:
-            if fault := mass_fault(own | dict(values)):
+            if fault := mass_fault(defaults | dict(values)):
                 return MemberResult({}, trouble=fault)
             duration = self.duration_s
             try:
@@ -110,14 +110,14 @@ class OfManoeuvre:
         return ask
 
     def _held(self, integrator: Integrator, turn: Turn, steps: int) -> Ask:
-        """Members whose rudder is held for a time: all in one call of the compiled loop."""
+        """Joint runs of members with a constant rudder, in a single call of the compiled loop."""
         model, h = integrator.model, integrator.model.step_s
-        own, u = _parameters(model), model.input_values({"rudder.command": turn.rudder})
+        defaults, u = _parameters(model), model.input_values({"rudder.command": turn.rudder})
         t = np.append(np.arange(0, steps, EVERY), steps) * h
         inputs = np.tile(u, (len(t), 1))
 
         def ask(members: Sequence[Mapping[str, float]]) -> list[MemberResult]:
-            whole = [own | dict(values) for values in members]
+            whole = [defaults | dict(values) for values in members]
             p = np.array([list(values.values()) for values in whole])
             states = integrator.rollouts(np.array(model.initial(p.T)).T, u, p, (h, steps))
             found = []
@@ -127,7 +127,7 @@ class OfManoeuvre:
                 if fault:
                     found.append(MemberResult({}, trouble=fault))
                     continue
-                figures = figures_of(turn, run, own["ship.length"])
+                figures = figures_of(turn, run, defaults["ship.length"])
                 found.append(MemberResult(_numbers(figures), _sampled(run, self.times)))
             return found
 
@@ -147,10 +147,10 @@ class OfFigures:
         from tank2sim.analysis.influence.study import Study
 
         study = Study(self.ship.card(), [parse_figure(text) for text in self.figures])
-        names, own = [parameter.name for parameter in study.parameters], _parameters(study.model)
+        names, defaults = [parameter.name for parameter in study.parameters], _parameters(study.model)
 
         def ask(values: Mapping[str, float]) -> MemberResult:
-            if fault := mass_fault(own | dict(values)):
+            if fault := mass_fault(defaults | dict(values)):
                 return MemberResult({}, trouble=fault)
             given = dict(zip(names, study.values.tolist(), strict=True)) | dict(values)
             try:
@@ -164,7 +164,7 @@ class OfFigures:
 
 @dataclass(frozen=True)
 class OfCriteria:
-    """What is found for each of the IMO criteria, by its name; nan where a trial does not show it."""
+    """Value of each IMO criterion by its name; nan where a trial does not show it."""
 
     ship: ShipText
 
@@ -172,12 +172,12 @@ class OfCriteria:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         whole = build(self.ship.card())
         model = _reading_off(whole, *(name for names in _READ_OFF.values() for name in names))
-        integrator, own = Integrator(model, every=EVERY), _parameters(model)
+        integrator, parameters = Integrator(model, every=EVERY), _parameters(model)
 
         def ask(values: Mapping[str, float]) -> MemberResult:
             # What is an input (a current) is calm in these trials.
-            given = {name: value for name, value in values.items() if name in own}
-            if fault := mass_fault(own | given):
+            given = {name: value for name, value in values.items() if name in parameters}
+            if fault := mass_fault(parameters | given):
                 return MemberResult({}, trouble=fault)
             criteria = imo_criteria(model, given, integrator)
             return MemberResult(
@@ -192,7 +192,7 @@ def _each(ask: AskOne) -> Ask:
 
 
 def _numbers(figures: Figures) -> Numbers:
-    """Figures as single numbers, nan for those that the run does not show."""
+    """Figures as single numbers, nan where the run does not show them."""
     return {name: math.nan for name, value in figures.items() if value is None} | single_figures(figures)
 
 

@@ -1,4 +1,4 @@
-"""What an ensemble of a ship says of a manoeuvre, of its stability and the IMO criteria, and of figures by name."""
+"""Results of an ensemble of a ship: a manoeuvre, stability with the IMO criteria, and figures by name."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ TIMES = 201
 """Times of the bands of histories and tracks, over the run of the card itself (project choice)."""
 
 STRAIGHT = ("criterion_C", "K_prime", "T_prime", "T_s", "T3_s")
-"""Figures of the straight course of which there are bands."""
+"""Figures of the straight course that have bands."""
 
 POLES = ("K_per_s", "K_prime", "T_s", "T1_s", "T_prime")
-"""Figures that are a number over C': where that changes its sign they go through infinity, and the quantiles of members
-on both sides enclose everything but where the members are."""
+"""Figures with C' in the denominator: where it changes its sign they pass through infinity, and quantiles over members
+on both sides are meaningless."""
 
 
 @dataclass(frozen=True)
 class EnsembleRequest:
-    """An ensemble as it is asked for: how many members, from which seed."""
+    """Request for an ensemble: number of members, and seed."""
 
     members: int
     seed: int = 0
@@ -44,7 +44,7 @@ class EnsembleRequest:
 
 @dataclass(frozen=True, eq=False)
 class Members:
-    """Who was asked: members, seed, those that cannot be used and why, and what is to be reported."""
+    """Members of an ensemble: number, seed, unusable members with the reason, and notices."""
 
     members: int
     seed: int
@@ -53,11 +53,11 @@ class Members:
 
     @property
     def usable(self) -> int:
-        """Members that can be used."""
+        """Number of usable members."""
         return self.members - sum(self.unusable.values())
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         return {
             "members": self.members,
             "seed": self.seed,
@@ -78,7 +78,7 @@ class ManoeuvreBands:
     track: TrackBand | None
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         return {
             **self.asked.as_json(),
             "figures": {name: band.as_json() for name, band in self.figures.items()},
@@ -90,17 +90,17 @@ class ManoeuvreBands:
 
 @dataclass(frozen=True)
 class Chance:
-    """How probable it is that a criterion is met.
+    """Probability that a criterion is met.
 
     Parameters
     ----------
     criterion : ImoCriterion
-        With what was found for the card itself.
+        The criterion, with the value of the card's ship.
     met : float or None
-        Share of all usable members that meet it; None where no member shows it.
+        Share of all usable members that meet it; None if no member shows it.
     between : tuple or None
-        95 % interval of that probability, from the number of members alone (Wilson 1927, J. Amer. Stat. Assoc. 22).
-    left_open : int
+        95 % interval of that probability, by the number of members (Wilson 1927, J. Amer. Stat. Assoc. 22).
+    undecided : int
         Usable members whose trial does not show it; they count as not meeting it.
     band : Band or None
         Of what was found.
@@ -109,27 +109,27 @@ class Chance:
     criterion: ImoCriterion
     met: float | None
     between: tuple[float, float] | None
-    left_open: int
+    undecided: int
     band: Band | None
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
-        one = self.criterion
+        """The JSON form."""
+        found = self.criterion
         return {
-            "name": one.name,
-            "allowed": one.allowed,
-            "unit": one.unit,
+            "name": found.name,
+            "allowed": found.allowed,
+            "unit": found.unit,
             "probability_met": self.met,
             "interval_95": self.between,
-            "not_shown": self.left_open,
+            "not_shown": self.undecided,
             "band": self.band and self.band.as_json(),
         }
 
 
 @dataclass(frozen=True, eq=False)
 class StabilityBands:
-    """Bands of the straight course at the card's speed, how probable it is that it is stable there, and the chances
-    of each criterion."""
+    """Bands of the straight course at the card's speed, the probability of stability there, and of meeting each
+    criterion."""
 
     asked: Members
     figures: Mapping[str, Band]
@@ -138,12 +138,12 @@ class StabilityBands:
     curves: SteeringBands | None = None
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         return {
             **self.asked.as_json(),
             "figures": {name: band.as_json() for name, band in self.figures.items()},
             "probability_stable": self.stable,
-            "imo": [one.as_json() for one in self.chances],
+            "imo": [chance.as_json() for chance in self.chances],
             "curves": self.curves and self.curves.as_json(),
         }
 
@@ -157,7 +157,7 @@ class FigureBands:
     deviations: Mapping[str, float]
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         figures = {
             name: {**band.as_json(), "standard_deviation": self.deviations[name]} for name, band in self.figures.items()
         }
@@ -168,85 +168,84 @@ def manoeuvre_bands(
     card: ManoeuvringCard,
     manoeuvre: Manoeuvre,
     run_s: tuple[float | None, float],
-    asked: EnsembleRequest,
+    request: EnsembleRequest,
     executor: Executor | None = None,
 ) -> ManoeuvreBands:
-    """Bands of a manoeuvre; `run_s` is the duration asked for, and how long the run of the card itself took."""
-    draws, told = draws_of(card, asked.seed)
+    """Bands of a manoeuvre; `run_s` is the requested duration, and that of the card's own run."""
+    draws, notices = draws_of(card, request.seed)
     times = np.linspace(0.0, run_s[1], TIMES)
     question = OfManoeuvre(ShipText.of(card), manoeuvre, run_s[0], times)
-    found = ensemble(question, draws, asked.members, executor)
-    if asked.members > KEPT:
-        told.append(f"bands of tracks and histories are of the first {KEPT} members; figures are of all")
+    found = ensemble(question, draws, request.members, executor)
+    if request.members > KEPT:
+        notices.append(f"bands of tracks and histories are of the first {KEPT} members; figures are of all")
     shown, histories, track = history_bands(found, times, tuple(ENSEMBLE_SIGNALS))
     if 0 < len(shown) < len(times):
         share = f"{100 * STILL_RUNNING:g} % of the members"
-        told.append(f"bands over time end at {shown[-1]:.4g} s, up to which {share} run; figures are of all")
+        notices.append(f"bands over time end at {shown[-1]:.4g} s, up to which {share} run; figures are of all")
     if track is not None and track.count < len(shown):
         last = shown[track.count - 1]
         share = f"{100 * STILL_RUNNING:g} % of the members"
-        told.append(f"the band of the track ends at {last:.4g} s, as far as {share} come while they run")
-    return ManoeuvreBands(_members(found, told), figure_bands(found), shown, histories, track)
+        notices.append(f"the band of the track ends at {last:.4g} s, as far as {share} come while they run")
+    return ManoeuvreBands(_members(found, notices), figure_bands(found), shown, histories, track)
 
 
 def stability_bands(
     card: ManoeuvringCard,
     criteria: Sequence[ImoCriterion],
-    asked: EnsembleRequest,
+    request: EnsembleRequest,
     executor: Executor | None = None,
     curves: tuple[float | None, Grid] | None = None,
 ) -> StabilityBands:
-    """Bands of the straight course at the card's speed, the chances of the IMO `criteria`, and, if asked, bands of
-    `curves`: at a speed (None: the card's), on a grid."""
-    draws, told = draws_of(card, asked.seed)
-    trials = ensemble(OfCriteria(ShipText.of(card)), draws, asked.members, executor)
-    told.append("an ensemble is judged at the card's speed")
+    """Bands of the straight course at the card's speed, the probabilities of the IMO `criteria`, and on request bands
+    of `curves`: at a speed (None: the card's), on a grid."""
+    draws, messages = draws_of(card, request.seed)
+    trials = ensemble(OfCriteria(ShipText.of(card)), draws, request.members, executor)
+    messages.append("an ensemble is judged at the card's speed")
     try:
-        straight = ensemble(OfFigures(ShipText.of(card), STRAIGHT), draws, asked.members, executor)
+        straight = ensemble(OfFigures(ShipText.of(card), STRAIGHT), draws, request.members, executor)
     except InputError as error:
-        straight = Ensemble(asked.members, asked.seed, {})
-        told.append(f"no bands of the straight course: {error.problem}")
+        straight = Ensemble(request.members, request.seed, {})
+        messages.append(f"no bands of the straight course: {error.problem}")
     chances = tuple(chance(criterion, trials) for criterion in criteria)
     unseen = answering_states(build(card))
     if unseen:
-        told.append(
+        messages.append(
             "no probability of stability: the figures of the members are those of slow motions, which "
             f"{', '.join(unseen)} follow at once"
         )
     stable = None if unseen else _stable(straight)
     bands, through = bands_without_poles(straight)
-    told += through
-    drawn = steering_bands(ShipText.of(card), draws, asked.members, curves, executor) if curves else None
-    told += drawn.notices if drawn else ()
-    return StabilityBands(_members(trials, told), bands, stable, chances, drawn)
+    messages += through
+    drawn = steering_bands(ShipText.of(card), draws, request.members, curves, executor) if curves else None
+    messages += drawn.notices if drawn else ()
+    return StabilityBands(_members(trials, messages), bands, stable, chances, drawn)
 
 
 def named_bands(
-    card: ManoeuvringCard, figures: Sequence[str], asked: EnsembleRequest, executor: Executor | None = None
+    card: ManoeuvringCard, figures: Sequence[str], request: EnsembleRequest, executor: Executor | None = None
 ) -> FigureBands:
     """Bands of figures by name (:mod:`tank2sim.analysis.influence.figures`)."""
-    draws, told = draws_of(card, asked.seed)
-    found = ensemble(OfFigures(ShipText.of(card), tuple(figures)), draws, asked.members, executor)
+    draws, notices = draws_of(card, request.seed)
+    found = ensemble(OfFigures(ShipText.of(card), tuple(figures)), draws, request.members, executor)
     bands, through = bands_without_poles(found)
-    told += through
-    deviations = {name: float(np.nanstd(found.figures[name], ddof=1)) for name in bands} if asked.members > 1 else {}
+    notices += through
+    deviations = {name: float(np.nanstd(found.figures[name], ddof=1)) for name in bands} if request.members > 1 else {}
     deviations = {name: deviations.get(name, math.nan) for name in bands}
     for name, band in bands.items():
         if band.shown < found.usable:
-            told.append(f"{name}: {found.usable - band.shown} of {asked.members} members do not show it")
-    return FigureBands(_members(found, told), bands, deviations)
+            notices.append(f"{name}: {found.usable - band.shown} of {request.members} members do not show it")
+    return FigureBands(_members(found, notices), bands, deviations)
 
 
 def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
-    """Bands of figures by name, except for those of :data:`POLES` that go through infinity, and messages about
-    these."""
+    """Bands of figures by name, except for those of :data:`POLES` that pass through infinity, with notices on these."""
     bands = figure_bands(found)
-    own = [name for name in POLES if name in bands]
-    if not own:
+    poles = [name for name in POLES if name in bands]
+    if not poles:
         return bands, []
     judged = found.figures.get("criterion_C")
-    signs = {name: np.sign(found.figures[name] if judged is None else judged) for name in own}
-    gone = [name for name in own if (signs[name] > 0).any() and (signs[name] < 0).any()]
+    signs = {name: np.sign(found.figures[name] if judged is None else judged) for name in poles}
+    gone = [name for name in poles if (signs[name] > 0).any() and (signs[name] < 0).any()]
     if not gone:
         return bands, []
     usable, words = found.usable, " and ".join(in_words(name)[0] for name in gone)
@@ -256,7 +255,7 @@ def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[str]]:
 
 
 def chance(criterion: ImoCriterion, found: Ensemble) -> Chance:
-    """The chance of a criterion, from what members found for it by its name."""
+    """The probability of a criterion, from the values of the members."""
     values = found.figures.get(criterion.name, np.zeros(0))
     shown = values[np.isfinite(values)]
     if not len(shown):
@@ -278,5 +277,5 @@ def _stable(straight: Ensemble) -> float | None:
         return float(np.sum((straight.figures["criterion_C"] > 0) & (total > 0))) / straight.usable
 
 
-def _members(found: Ensemble, told: Sequence[str]) -> Members:
-    return Members(found.members, found.seed, found.unusable, (*told, *found.notices))
+def _members(found: Ensemble, messages: Sequence[str]) -> Members:
+    return Members(found.members, found.seed, found.unusable, (*messages, *found.notices))

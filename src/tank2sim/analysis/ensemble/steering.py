@@ -1,4 +1,4 @@
-"""Bands of what a ship's stability page draws: its steady turns against the rudder, and its linear response to it."""
+"""Bands of the curves of a ship's stability page: steady turns over the rudder, and the linear response to it."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from tank2sim.simulation.bands import QUANTILES, STILL_RUNNING, Band, BandOverTi
 from tank2sim.simulation.ensemble import Ask, Draws, Ensemble, MemberResult, ensemble
 
 CURVES = 200
-"""Members of the bands of curves: the first ones. Each takes half a second, and the share below a quantile is known
-from them to 1.5 % (project choice)."""
+"""Number of members, the first, for the bands of curves. Each takes half a second, and the share below a quantile is
+known to 1.5 % (project choice)."""
 
 _POINTS = 121
 """Points of every curve (project choice)."""
@@ -42,9 +42,10 @@ _CURVES = (FROM_STARBOARD, FROM_PORT, MAGNITUDE, PHASE, STEP)
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Where curves are read off, (n,) each: rudder (rad), frequency (rad/s) and time after a step (s).
+    """Grid of the curves, (n,) each: rudder (rad), frequency (rad/s) and time after a step (s).
 
-    `phase_deg` is that of the ship itself at the highest frequency: those of the members are within half a turn of it.
+    `phase_deg` is the phase of the card's ship at the highest frequency: the members' phases are within half a turn of
+    it.
     """
 
     rudder_rad: Array
@@ -54,7 +55,7 @@ class Grid:
 
     @staticmethod
     def of(model: Model, response: SteeringResponse) -> Grid:
-        """The rudder that the gear allows, and what the response of the ship itself is drawn over."""
+        """The grid over the rudder range of the gear, and over frequency and time of the card's own response."""
         largest = largest_rudder(model) * (1 - 1e-9)
         omega = np.geomspace(response.omega_radps[0], response.omega_radps[-1], _POINTS)
         phase = float(np.degrees(np.unwrap(np.angle(response.response)))[-1])
@@ -97,42 +98,42 @@ class OfSteering:
 
 @dataclass(frozen=True, eq=False)
 class SteeringBands:
-    """Bands over a grid of what ``stability`` draws, by name of the curve, and of the width of the hysteresis loop.
+    """Bands over a grid of the curves of ``stability``, by name, and of the width of the hysteresis loop.
 
     Parameters
     ----------
     members : int
-        Whose curves these are, and can be used.
-    own : mapping
-        The curves of the ship itself.
+        Usable members behind the curves.
+    reference : mapping
+        The curves of the card's ship.
     with_loop : int
-        Members that have a loop; the width of the others is 0.
+        Members with a loop; without one the width is 0.
     """
 
     grid: Grid
     members: int
-    own: Mapping[str, Array]
+    reference: Mapping[str, Array]
     curves: Mapping[str, BandOverTime]
     loop_width_deg: Band | None
     with_loop: int
     notices: tuple[str, ...]
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
 
-        def those(*names: str) -> dict[str, object]:
-            return {name: self.curves[name].as_json() | {"own": self.own[name]} for name in names}
+        def bands_of(*names: str) -> dict[str, object]:
+            return {name: self.curves[name].as_json() | {"own": self.reference[name]} for name in names}
 
         return {
             "members": self.members,
             "steady_turning": {
                 "rudder_deg": np.degrees(self.grid.rudder_rad),
-                **those(FROM_STARBOARD, FROM_PORT),
+                **bands_of(FROM_STARBOARD, FROM_PORT),
                 "loop_width_deg": self.loop_width_deg and self.loop_width_deg.as_json(),
                 "with_loop": self.with_loop,
             },
-            "bode": {"omega_radps": self.grid.omega_radps, **those(MAGNITUDE, PHASE)},
-            "step": {"time_s": self.grid.time_s, **those(STEP)},
+            "bode": {"omega_radps": self.grid.omega_radps, **bands_of(MAGNITUDE, PHASE)},
+            "step": {"time_s": self.grid.time_s, **bands_of(STEP)},
         }
 
 
@@ -141,20 +142,20 @@ def steering_bands(
 ) -> SteeringBands | None:
     """Bands of the first :data:`CURVES` members; `about` is the speed (None: the card's) and the grid.
 
-    None where no member has such curves.
+    None if no member has such curves.
     """
     speed, grid = about
     question = OfSteering(ship, speed, grid)
-    (own,) = question.prepared()([{}])
+    (reference,) = question.prepared()([{}])
     found = ensemble(question, draws, min(members, CURVES), executor)
-    if found.histories is None or own.histories is None:
+    if found.histories is None or reference.histories is None:
         return None
     messages = [f"no steady turns: {notice}" for notice in found.notices if "cannot be used" in notice]
     if members > CURVES:
         messages.append(f"bands of steady turns, Bode diagram and step are of the first {CURVES} members")
     width = found.figures["loop_width_deg"]
     loops = int(np.sum(width > 0))
-    herself = {name: row.astype(float) for name, row in zip(_CURVES, own.histories, strict=True)}
+    herself = {name: row.astype(float) for name, row in zip(_CURVES, reference.histories, strict=True)}
     bands = {name: _band(found, row) for row, name in enumerate(_CURVES)}
     if not all(np.isfinite(bands[name].low).all() for name in (FROM_STARBOARD, FROM_PORT)):
         share = f"{100 * (1 - STILL_RUNNING):.2g} % of the members"
@@ -164,9 +165,9 @@ def steering_bands(
 
 
 def branches(turning: SteadyTurning, rudder_rad: Sequence[float] | Array) -> tuple[Array, Array]:
-    """Yaw rates (n,), deg/s, of the stable turns to which a spiral comes from starboard and from port: the one farthest
-    to that side; one and the same outside a hysteresis loop, nan where no turn is stable."""
-    found = [[rate for rate, stable in turning.turns_at(float(one)) if stable] for one in rudder_rad]
+    """Yaw rates (n,), deg/s, of the stable turns that a spiral reaches from starboard and from port: the farthest to
+    that side; equal outside a hysteresis loop, nan without a stable turn."""
+    found = [[rate for rate, stable in turning.turns_at(float(angle)) if stable] for angle in rudder_rad]
     return (
         np.degrees([max(rates, default=math.nan) for rates in found]),
         np.degrees([min(rates, default=math.nan) for rates in found]),
@@ -187,7 +188,7 @@ def _responses(model: Model, speed_mps: float | None, grid: Grid) -> list[Array]
 
 
 def _band(found: Ensemble, row: int) -> BandOverTime:
-    """Quantiles where nearly all members that can be used show the curve, nan elsewhere."""
+    """Quantiles where nearly all usable members have the curve, nan elsewhere."""
     assert found.histories is not None
     values = found.histories[:, row].astype(float)
     shown = np.isfinite(values).sum(axis=0) >= STILL_RUNNING * max(found.usable, 1)

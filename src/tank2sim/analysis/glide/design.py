@@ -1,4 +1,4 @@
-"""Views for the design of a glider: its polar, the best and the fastest glide, the range of a buoyancy budget."""
+"""Design of a glider: its polar, the best and the fastest glide, the range of a buoyancy budget."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _STEEPEST = math.radians(89.5)
 def glide_polar(
     card: GliderCard, *, roll_rad: float = 0.0, buoyancy_kg: float | None = None, points: int = 200
 ) -> tuple[SteadyGlide, ...]:
-    """Dives from the smallest angle to almost straight down; `buoyancy_kg` is a size, by default the card's."""
+    """Dives from the smallest angle to almost straight down; `buoyancy_kg` is a magnitude, by default the card's."""
     least = smallest_angle(card, roll_rad)
     # Closer where the path is shallow: speed and incidence change there as the root of the angle above the smallest.
     angles = least + (_STEEPEST - least) * np.linspace(0, 1, points) ** 2
@@ -27,7 +27,7 @@ def glide_polar(
 
 
 def best_glide(card: GliderCard, *, buoyancy_kg: float | None = None) -> SteadyGlide:
-    """The dive that goes farthest for its depth: the smallest angle, at the greatest ratio of lift to drag."""
+    """The dive of largest range for its depth: the smallest angle, at the greatest ratio of lift to drag."""
     size = card.glider.buoyancy_kg if buoyancy_kg is None else abs(buoyancy_kg)
     return steady_glide(card, -smallest_angle(card), buoyancy_kg=-size)
 
@@ -46,22 +46,22 @@ def fastest_glide(card: GliderCard, *, buoyancy_kg: float | None = None) -> Stea
 
 @dataclass(frozen=True, kw_only=True)
 class Range:
-    """How far a glider goes on a budget of ballast water that it can push out.
+    """Range of a glider with a budget of ballast water that it can expel.
 
     Parameters
     ----------
     path_angle_rad, buoyancy_kg, speed_mps : float
         Of its dives and climbs, without sign.
     depth_m : float
-        Between which depth and the surface it goes to and fro.
+        Depth of the dives and climbs.
     budget_kg : float
-        Ballast that the pump can push out in all.
+        Total ballast that the pump can expel.
     cycles : float
-        Dives with their climbs; each takes 2 |m0| in at the surface and pushes it out at depth.
+        Number of dives with their climbs; each takes in 2 |m0| at the surface and expels it at depth.
     range_m, duration_s : float
-        Over the ground; turning points are taken to cost neither time nor way.
+        Over the ground; turning points take neither time nor distance.
     energy_J : float
-        Work of pushing the budget out against the pressure at depth, budget g h, without losses.
+        Work of expelling the budget against the pressure at depth, budget g h, without losses.
     """
 
     path_angle_rad: float
@@ -75,9 +75,9 @@ class Range:
     energy_J: float
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it; the angle in degrees."""
-        rest = {name: value for name, value in vars(self).items() if name != "path_angle_rad"}
-        return {"path_angle_deg": math.degrees(self.path_angle_rad), **rest}
+        """The JSON form; the angle in degrees."""
+        values = {name: value for name, value in vars(self).items() if name != "path_angle_rad"}
+        return {"path_angle_deg": math.degrees(self.path_angle_rad), **values}
 
 
 def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth_m: float) -> Range:
@@ -92,7 +92,7 @@ def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth
         if not 0 < value < math.inf:
             raise InputError(name, "", f"is {value:g}", "a positive number was expected")
     if not glide.buoyancy_kg or glide.turn_rate_radps:
-        raise InputError(card.source, "range", "a glide without buoyancy or with roll goes nowhere", "give another")
+        raise InputError(card.source, "range", "a glide without buoyancy or with roll has no range", "give another")
     size, steep = abs(glide.buoyancy_kg), abs(glide.path_angle_rad)
     cycles = budget_kg / (2 * size)
     return Range(

@@ -1,12 +1,13 @@
-"""Paths of a glider: steady glides strung together, equations (13) to (25) of paper 5, corrected and as printed.
+"""Paths of a glider as sequences of steady glides, equations (13) to (25) of paper 5, corrected and as printed.
 
     dphi_i = v_i cos(epsilon_i) t_i / R_i                                                                (13), (14)
     X_n = X_{n-1} + R_n (sin dphi_n cos phi_{n-1} - (1 - cos dphi_n) sin phi_{n-1})                            (23)
     Z_n = Z_{n-1} + R_n (sin dphi_n sin phi_{n-1} + (1 - cos dphi_n) cos phi_{n-1})                            (25)
     Y_n = Y_{n-1} + v_n t_n sin(epsilon_n),          phi_n = phi_{n-1} + dphi_n                          (22), (15)
 
-with R of the sign of the turn, and X += v cos(epsilon) t cos(phi), Z += v cos(epsilon) t sin(phi) without roll. In
-print dphi = v t / R, and R multiplies the first product of (23) and (25) alone. X is north here, Z east, Y the height.
+with R of the sign of the turn, and X += v cos(epsilon) t cos(phi), Z += v cos(epsilon) t sin(phi) without roll. The
+print has dphi = v t / R, and R multiplies only the first product of (23) and (25). X is north here, Z east, Y the
+height.
 """
 
 from __future__ import annotations
@@ -62,14 +63,14 @@ class GlidePath:
         return math.fsum(glide.speed_mps * time for glide, time in zip(self.glides, self.durations_s, strict=True))
 
     def orders(self) -> list[dict[str, float]]:
-        """The orders with which the transient model flies the same glides."""
+        """The orders of the same glides for the transient model."""
         return [
             {"buoyancy.command": glide.buoyancy_kg, "pitch.command": glide.pitch_rad, "roll.command": glide.roll_rad}
             for glide in self.glides
         ]
 
     def sampled(self) -> Array:
-        """The path in points close enough to draw it, (n, 5) in the order of :class:`PathPoint`."""
+        """The path in points dense enough for a chart, (n, 5) in the order of :class:`PathPoint`."""
         rows: list[PathPoint] = [self.places[0]]
         for glide, duration, begin in zip(self.glides, self.durations_s, self.places, strict=False):
             parts = _POINTS_OF_AN_ARC if glide.turn_rate_radps else 1
@@ -77,19 +78,19 @@ class GlidePath:
         return np.array(rows)
 
     def histories(self) -> dict[str, list[float]]:
-        """The path in points close enough to draw it, as JSON has it."""
+        """The path in points dense enough for a chart, for JSON."""
         rows = self.sampled()
         return drawn_columns({name: rows[:, k] for k, name in enumerate(("t_s", "x_m", "y_m", "height_m"))}, len(rows))
 
     def states_as_json(self) -> list[dict[str, object]]:
-        """The glide of each step as JSON has it, with its duration."""
+        """The glide of each step for JSON, with its duration."""
         return [
             {"duration_s": duration, **glide.as_json()}
             for duration, glide in zip(self.durations_s, self.glides, strict=True)
         ]
 
     def as_json(self) -> list[dict[str, object]]:
-        """The places as JSON has them; the heading in degrees."""
+        """The places for JSON; the heading in degrees."""
         return [
             {
                 "t_s": place.time_s,
@@ -108,14 +109,14 @@ def fly(card: GliderCard, programme: GlideProgramme, *, as_printed: bool = False
     Raises
     ------
     InputError
-        A step cannot be flown; the message names its line and what can.
+        A step cannot be flown; the message names its line and the limit.
     """
     glides = tuple(_glide(card, programme.source, step, as_printed) for step in programme.steps)
     return path_of(glides, [step.duration_s for step in programme.steps])
 
 
 def path_of(glides: Sequence[SteadyGlide], durations_s: Sequence[float]) -> GlidePath:
-    """The path of glides that last for their durations, from the origin, heading north."""
+    """The path of glides with their durations, from the origin, heading north."""
     places = [PathPoint(0.0, 0.0, 0.0, 0.0, 0.0)]
     for glide, duration in zip(glides, durations_s, strict=True):
         places.append(_after(places[-1], glide, duration))

@@ -1,8 +1,8 @@
-"""How slow is slow: controls that swing, and how far the motion is from the steady glide of each moment.
+"""Errors of the quasi-steady assumption with oscillating controls, against the period of the oscillation.
 
-The paper takes each moment for a steady glide, controls changing slowly. Here pitch, buoyancy or roll swing as a sine
-about a dive, and the transient model is compared with the steady glide of the controls as they are at each moment: what
-is left is the inertia alone, not the delay of the controls.
+The paper assumes a steady glide at each instant, with slow controls. This module varies pitch, buoyancy or roll as a
+sine about a dive, and compares the transient model with the steady glide of the instantaneous controls: the difference
+is the effect of inertia alone, without the delay of the controls.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ _PIECES = 200  # orders in a period, each held: what is between them the lag of 
 _PERIODS = 3  # of which the last is evaluated
 
 _PITCH, _ROLL, _BUOYANCY = math.radians(3.0), math.radians(2.0), 0.2
-"""Sizes of the swings, the last as a share of the net buoyancy: choices of ours, within the small incidences."""
+"""Amplitudes of the oscillations, the last as a share of the net buoyancy: project choice, within small incidences."""
 
 
 @dataclass(frozen=True)
 class SwingError:
-    """What inertia does to one kind of swing.
+    """Effect of inertia in a kind of oscillation.
 
     Parameters
     ----------
     label : str
-        What swings.
+        The oscillating control.
     period_s : array (n,)
         Of the swing.
     share : array (n,)
-        Root mean square over a period of the difference from the steady glide of each moment: of the velocity, as a
-        share of the speed; of the rate of turn, where roll swings, as a share of its own root mean square.
+        Root mean square over a period of the difference from the instantaneous steady glide: of the velocity, relative
+        to the speed; for roll of the rate of turn, relative to its root mean square.
     """
 
     label: str
@@ -51,7 +51,7 @@ class SwingError:
     share: Array
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         return dict(vars(self))
 
 
@@ -105,10 +105,10 @@ def _velocity_error(card: GliderCard) -> Callable[[Trajectory, slice], float]:
     def error(run: Trajectory, part: slice) -> float:
         down = -run["pitch.angle"][part]
         steady = speed(down) * np.sqrt(np.abs(run["buoyancy.mass"][part]) / card.glider.buoyancy_kg)
-        angle, own = run["motion.path_angle"][part], run["motion.speed"][part]
-        along = own * np.cos(angle) - steady * np.cos(path(down))
-        up = own * np.sin(angle) - steady * np.sin(path(down))
-        return float(np.sqrt(np.mean(along**2 + up**2)) / np.mean(own))
+        angle, speed_mps = run["motion.path_angle"][part], run["motion.speed"][part]
+        along = speed_mps * np.cos(angle) - steady * np.cos(path(down))
+        up = speed_mps * np.sin(angle) - steady * np.sin(path(down))
+        return float(np.sqrt(np.mean(along**2 + up**2)) / np.mean(speed_mps))
 
     return error
 

@@ -1,6 +1,6 @@
 """Steady glides of an underwater glider in closed form: paper 5 (Kulikovsky and Velikanov 2012), also as printed.
 
-It stands with the steady turning of ships: what solves the equations of :mod:`tank2sim.dynamics.glider` without time.
+The analogue of the steady turning of ships: steady solutions of the equations of :mod:`tank2sim.dynamics.glider`.
 With epsilon the angle of the path (+ up), theta the pitch, alpha the incidence, gamma the roll (+ starboard side down),
 m0 the net buoyancy (kg, + light) and S the reference area:
 
@@ -11,7 +11,7 @@ m0 the net buoyancy (kg, + light) and S the reference area:
     (11)    m (v cos epsilon)^2 / R = L sin gamma
     (12)    R = 2 m cos^2 epsilon / (rho S C_L(|alpha|) sin|gamma|)
 
-The print loses the constant drag in (8), puts a stray alpha before the drag in (10), and has cos epsilon at the wrong
+The print lacks the constant drag in (8), has a surplus alpha before the drag in (10), and cos epsilon in the wrong
 places of (11); its added mass is neglected throughout. A positive roll turns a dive to starboard, where the lift is up,
 and a climb to port, where it is down.
 """
@@ -28,7 +28,7 @@ from tank2sim.dynamics.glider_forces import drag_coefficient, lift_coefficient
 from tank2sim.errors import InputError
 
 _STEEPEST = math.radians(89.9)
-"""Search for a path angle ends here; straight down there is no incidence and no turn."""
+"""Upper end of the search for a path angle; straight down the incidence and the turn vanish."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ class SteadyGlide:
     turn_rate_radps : float
         Rate of the course, + to starboard.
     as_printed : bool
-        True if from the equations as the paper prints them.
+        True for the equations as printed in the paper.
     """
 
     path_angle_rad: float
@@ -84,7 +84,7 @@ class SteadyGlide:
         return self.speed_mps * math.sin(self.path_angle_rad)
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it: angles in degrees; a radius that is infinite is null."""
+        """The JSON form: angles in degrees; an infinite radius is null."""
         return {
             "path_angle_deg": math.degrees(self.path_angle_rad),
             "pitch_deg": math.degrees(self.pitch_rad),
@@ -110,7 +110,7 @@ def ballast_kg(card: GliderCard, buoyancy_kg: float) -> float | None:
     Raises
     ------
     InputError
-        It would have to be negative.
+        It would be negative.
     """
     hull = card.glider.hull_mass_kg
     if hull is None:
@@ -124,15 +124,15 @@ def ballast_kg(card: GliderCard, buoyancy_kg: float) -> float | None:
 
 
 def smallest_angle(card: GliderCard, roll_rad: float = 0.0) -> float:
-    """The smallest |epsilon| (rad) that can be flown with a roll: where the discriminant of (8) vanishes.
+    """The smallest |epsilon| (rad) of flight with a roll: the discriminant of (8) vanishes there.
 
     There the ratio of lift to drag is at its greatest, so that without roll this is also the best glide.
     """
-    own = card.glider
-    part = own.lift_quadratic * own.drag_zero
-    root = math.sqrt(part**2 + own.lift_slope**2 * own.drag_quadratic * own.drag_zero)
+    section = card.glider
+    part = section.lift_quadratic * section.drag_zero
+    root = math.sqrt(part**2 + section.lift_slope**2 * section.drag_quadratic * section.drag_zero)
     # 2 (root - part) / C_L0^2 without the difference of two almost equal numbers
-    tau = 2 * own.drag_quadratic * own.drag_zero / (root + part)
+    tau = 2 * section.drag_quadratic * section.drag_zero / (root + part)
     return math.atan2(tau, math.cos(roll_rad))
 
 
@@ -153,8 +153,8 @@ def steady_glide(
     Raises
     ------
     InputError
-        The angle cannot be flown (the message names the smallest that can), is no glide or the roll none, or the
-        glider is light and is to dive, or heavy and is to climb.
+        The angle cannot be flown (the message names the smallest possible), angle or roll is not that of a glide, or
+        the glider is light in a dive or heavy in a climb.
     """
     buoyancy = _buoyancy(card, path_angle_rad, buoyancy_kg)
     _check(path_angle_rad, roll_rad)
@@ -168,19 +168,19 @@ def steady_glide(
             f"{math.degrees(path_angle_rad):g} deg cannot be flown{with_roll}: the drag is too large for the lift",
             f"the smallest that can is {math.degrees(least):.3f} deg",
         )
-    own = card.glider
+    section = card.glider
     tau = math.tan(steep) * math.cos(roll_rad)
-    slope = own.lift_slope * tau
-    under = slope**2 - 4 * (own.drag_quadratic - own.lift_quadratic * tau) * own.drag_zero
+    slope = section.lift_slope * tau
+    under = slope**2 - 4 * (section.drag_quadratic - section.lift_quadratic * tau) * section.drag_zero
     # The small root, written so that nothing cancels and that it also holds where C_D = C_L tau.
-    size = 2 * own.drag_zero / (slope + math.sqrt(max(0.0, under)))
-    lift = lift_coefficient(size, own.lift_slope, own.lift_quadratic)
-    drag = drag_coefficient(size, own.drag_zero, own.drag_quadratic)
-    half = 0.5 * card.environment.water_density_kgpm3 * own.reference_area_m2
+    size = 2 * section.drag_zero / (slope + math.sqrt(max(0.0, under)))
+    lift = lift_coefficient(size, section.lift_slope, section.lift_quadratic)
+    drag = drag_coefficient(size, section.drag_zero, section.drag_quadratic)
+    half = 0.5 * card.environment.water_density_kgpm3 * section.reference_area_m2
     share = drag * math.sin(steep) + lift * math.cos(roll_rad) * math.cos(steep)
     speed = math.sqrt(abs(buoyancy) * card.environment.gravity_mps2 / (half * share))
     aside = half * lift * abs(math.sin(roll_rad))
-    radius = own.mass_kg * math.cos(steep) ** 2 / aside if aside else math.inf
+    radius = section.mass_kg * math.cos(steep) ** 2 / aside if aside else math.inf
     return _made(_Found(path_angle_rad, roll_rad, buoyancy, size, speed, radius, lift, drag), half)
 
 
@@ -207,7 +207,7 @@ def glide_at_pitch(
         raise InputError(
             card.source,
             "pitch",
-            f"at {math.degrees(pitch_rad):g} deg there is no glide of small incidence",
+            f"at {math.degrees(pitch_rad):g} deg no glide of small incidence exists",
             f"the smallest pitch is {math.degrees(smallest):.3f} deg, on a path of {math.degrees(least):.3f} deg",
         )
     if beyond(_STEEPEST) < 0:
@@ -221,23 +221,23 @@ def glide_as_printed(
 ) -> SteadyGlide:
     """The glide by (8), (10), (12) and (13) as the paper prints them, for comparison.
 
-    They balance a drag alpha (C_D0 + C_D alpha), which vanishes without incidence and is not that of (7); what comes
-    out lies near the large root of the corrected (8), a slow glide at ten times the incidence. Parameters and what is
-    raised as :func:`steady_glide`, but that the print knows no smallest angle above that of no incidence.
+    They balance a drag alpha (C_D0 + C_D alpha), which vanishes without incidence and is not that of (7); the result is
+    near the large root of the corrected (8), a slow glide at ten times the incidence. Parameters and exceptions as
+    :func:`steady_glide`, except that the print has no smallest angle above that of zero incidence.
     """
     buoyancy = _buoyancy(card, path_angle_rad, buoyancy_kg)
     _check(path_angle_rad, roll_rad)
-    own = card.glider
+    section = card.glider
     steep, upright = abs(path_angle_rad), math.cos(roll_rad)
     tau = math.tan(steep) * upright
-    under = own.drag_quadratic - own.lift_quadratic * tau
-    size = (own.lift_slope * tau - own.drag_zero) / under if under > 0 else -1.0
+    under = section.drag_quadratic - section.lift_quadratic * tau
+    size = (section.lift_slope * tau - section.drag_zero) / under if under > 0 else -1.0
     if size <= 0:
         problem = f"{math.degrees(path_angle_rad):g} deg gives no incidence by (8) as printed"
         raise InputError(card.source, "path angle", problem, "give another angle, or leave --as-printed out")
-    drag = size * (own.drag_zero + own.drag_quadratic * size)
-    lift = lift_coefficient(size, own.lift_slope, own.lift_quadratic)
-    half = 0.5 * card.environment.water_density_kgpm3 * own.reference_area_m2
+    drag = size * (section.drag_zero + section.drag_quadratic * size)
+    lift = lift_coefficient(size, section.lift_slope, section.lift_quadratic)
+    half = 0.5 * card.environment.water_density_kgpm3 * section.reference_area_m2
     share = drag * math.sin(steep) + lift * upright * math.cos(steep)
     speed = math.sqrt(abs(buoyancy) * card.environment.gravity_mps2 / (half * share))
     radius = radius_as_printed(card, lift, path_angle_rad, roll_rad)
@@ -253,14 +253,14 @@ def radius_as_printed(card: GliderCard, lift: float, path_angle_rad: float, roll
 
 
 def force_residual(card: GliderCard, glide: SteadyGlide) -> tuple[float, float, float]:
-    """What is left of the forces along the course, to starboard and up, less the centripetal force, N: 0 in balance.
+    """Residual of the forces along the course, to starboard and up, less the centripetal force, N: 0 in balance.
 
-    Lift and drag are those of (6) and (7) at the glide's incidence and speed, whatever equations gave the glide.
+    Lift and drag are those of (6) and (7) at the glide's incidence and speed, for a glide by any equations.
     """
-    own = card.glider
-    pressure = 0.5 * card.environment.water_density_kgpm3 * own.reference_area_m2 * glide.speed_mps**2
-    lift = pressure * lift_coefficient(glide.incidence_rad, own.lift_slope, own.lift_quadratic)
-    drag = pressure * drag_coefficient(glide.incidence_rad, own.drag_zero, own.drag_quadratic)
+    section = card.glider
+    pressure = 0.5 * card.environment.water_density_kgpm3 * section.reference_area_m2 * glide.speed_mps**2
+    lift = pressure * lift_coefficient(glide.incidence_rad, section.lift_slope, section.lift_quadratic)
+    drag = pressure * drag_coefficient(glide.incidence_rad, section.drag_zero, section.drag_quadratic)
     along, up = math.cos(glide.path_angle_rad), math.sin(glide.path_angle_rad)
     upright, aside = math.cos(glide.roll_rad), math.sin(glide.roll_rad)
     centripetal = card.glider.mass_kg * glide.horizontal_speed_mps * glide.turn_rate_radps
@@ -273,7 +273,7 @@ def force_residual(card: GliderCard, glide: SteadyGlide) -> tuple[float, float, 
 
 @dataclass(frozen=True)
 class _Found:
-    """What the equations give; sizes without sign."""
+    """Solution of the equations; magnitudes without sign."""
 
     path_angle: float
     roll: float
@@ -311,9 +311,11 @@ def _made(found: _Found, half: float, *, as_printed: bool = False) -> SteadyGlid
 def _check(angle: float, roll: float) -> None:
     if not 0 < abs(angle) < math.pi / 2:
         remedy = "an angle between 0 and 90 deg was expected, + to climb and - to dive"
-        raise InputError("glide", "path angle", f"{math.degrees(angle):g} deg is no glide", remedy)
+        raise InputError("glide", "path angle", f"{math.degrees(angle):g} deg is not a glide", remedy)
     if not abs(roll) < math.pi / 2:
-        raise InputError("glide", "roll", f"{math.degrees(roll):g} deg is no roll to fly with", "give less than 90 deg")
+        raise InputError(
+            "glide", "roll", f"{math.degrees(roll):g} deg is not a roll of flight", "give less than 90 deg"
+        )
 
 
 def _buoyancy(card: GliderCard, path_angle: float, given: float | None) -> float:
@@ -324,5 +326,5 @@ def _buoyancy(card: GliderCard, path_angle: float, given: float | None) -> float
         problem = f"{given:+g} kg is {light}, and the glider is to {goes} at {math.degrees(path_angle):g} deg"
         raise InputError(card.source, "buoyancy", problem, "a light glider climbs (+), a heavy one dives (-)")
     if not math.isfinite(given):
-        raise InputError(card.source, "buoyancy", f"{given} kg is no number", "give kilograms")
+        raise InputError(card.source, "buoyancy", f"{given} kg is not a number", "give kilograms")
     return given

@@ -1,4 +1,4 @@
-"""All that is asked of a glider at once: steady glides, paths, what is best, and the transient model next to them."""
+"""Study of a glider: steady glides, paths, best glides, and comparison with the transient model."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tank2sim.simulation.integrator import NO_COMPILER, Integrator
 
 @dataclass(frozen=True, kw_only=True)
 class GlideQuestion:
-    """What is asked.
+    """Settings of the study.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ class GlideQuestion:
     programme : GlideProgramme, optional
         To be flown, by the steady glides and by the transient model.
     as_printed : bool
-        True for the paper's own equations next to the corrected ones.
+        True for the paper's equations in addition to the corrected ones.
     budget_kg, depth_m : float, optional
-        Ballast that can be pushed out, and the depth from which: how far does it carry? Both or neither.
+        Ballast that can be expelled, and the depth of the dives, for the range. Both or neither.
     views : bool
         True for the polar and the error of the quasi-steady assumption against the speed of a programme.
     """
@@ -55,23 +55,23 @@ class GlideQuestion:
 
 @dataclass(frozen=True, kw_only=True)
 class GlideStudy:
-    """What was found; tuples next to `glides` are parallel to it.
+    """Result of a study; tuples parallel to `glides` have its length.
 
     Parameters
     ----------
     best, fastest : SteadyGlide
-        Dives with the card's buoyancy: the shallowest, and the one with the greatest speed over the ground.
+        Dives with the card's buoyancy: the shallowest, and that of greatest speed over the ground.
     glides, printed : tuples of SteadyGlide
-        At the angles asked for; `printed` is empty unless asked for.
+        At the requested angles; `printed` only on request.
     radii_m : tuple of float
         Turning radius of the transient model, which has the added mass.
     path, printed_path, compared
         Of the programme; None without.
     ranges : tuple of Range
-        Of best and fastest glide and the glides asked for that do not turn.
+        Of the best and the fastest glide and the requested glides that do not turn.
     polar : tuple of SteadyGlide
     errors, swings
-        Empty unless views were asked for.
+        Empty unless views were requested.
     """
 
     card: GliderCard
@@ -91,11 +91,11 @@ class GlideStudy:
 
     @property
     def smallest_angle_rad(self) -> float:
-        """The smallest angle that can be flown without roll."""
+        """The smallest angle of flight without roll."""
         return abs(self.best.path_angle_rad)
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it. ``states`` has the glides at the angles asked for, then those of the programme's steps."""
+        """The JSON form. ``states`` has the glides at the requested angles, then those of the programme's steps."""
         states = [
             {**glide.as_json(), "turning_radius_with_added_mass_m": radius if math.isfinite(radius) else None}
             | {"ballast_kg": ballast_kg(self.card, glide.buoyancy_kg)}
@@ -112,11 +112,11 @@ class GlideStudy:
             "smallest_angle_deg": math.degrees(self.smallest_angle_rad),
             "best_glide": self.best.as_json(),
             "fastest_glide": self.fastest.as_json(),
-            "ranges": [one.as_json() for one in self.ranges],
+            "ranges": [row.as_json() for row in self.ranges],
         }
         names = ("path_angle_deg", "horizontal_speed_mps", "climb_mps")
-        polar = [one.as_json() for one in self.polar]
-        result["polar"] = {name: [one[name] for one in polar] for name in names}
+        polar = [row.as_json() for row in self.polar]
+        result["polar"] = {name: [row[name] for row in polar] for name in names}
         if self.printed:
             result["as_printed"] = [
                 {**glide.as_json(), "force_residual_N": force_residual(self.card, glide)} for glide in self.printed
@@ -131,13 +131,13 @@ class GlideStudy:
         if self.compared:
             result["transient"] = self.compared.as_json()
         if self.errors:
-            steps, swings = ([one.as_json() for one in found] for found in (self.errors, self.swings))
+            steps, swings = ([row.as_json() for row in found] for found in (self.errors, self.swings))
             result["quasi_steady_error"] = {"steps": steps, "swings": swings}
         return result | {"notices": list(self.notices)}
 
 
-def study(card: GliderCard, asked: GlideQuestion) -> GlideStudy:
-    """Answer what is asked.
+def study(card: GliderCard, question: GlideQuestion) -> GlideStudy:
+    """Run the study.
 
     Raises
     ------
@@ -145,11 +145,13 @@ def study(card: GliderCard, asked: GlideQuestion) -> GlideStudy:
         An angle or a step cannot be flown, or budget and depth are not both given.
     """
     model = build(card)
-    glides = tuple(_glides(card, asked))
-    printed = tuple(_glides(card, asked, as_printed=True)) if asked.as_printed else ()
-    path = fly(card, asked.programme) if asked.programme else None
-    printed_path = fly(card, asked.programme, as_printed=True) if asked.programme and asked.as_printed else None
-    integrator = Integrator(model) if path or asked.views else None
+    glides = tuple(_glides(card, question))
+    printed = tuple(_glides(card, question, as_printed=True)) if question.as_printed else ()
+    path = fly(card, question.programme) if question.programme else None
+    printed_path = (
+        fly(card, question.programme, as_printed=True) if question.programme and question.as_printed else None
+    )
+    integrator = Integrator(model) if path or question.views else None
     best, fastest = best_glide(card), fastest_glide(card)
     return GlideStudy(
         card=card,
@@ -161,21 +163,21 @@ def study(card: GliderCard, asked: GlideQuestion) -> GlideStudy:
         path=path,
         printed_path=printed_path,
         compared=compare_with_steady(integrator, path) if path and integrator else None,
-        ranges=tuple(_ranges(card, asked, (best, fastest, *glides))),
+        ranges=tuple(_ranges(card, question, (best, fastest, *glides))),
         polar=glide_polar(card),
-        errors=quasi_steady_error(card, integrator) if asked.views and integrator else (),
-        swings=swing_errors(card, integrator) if asked.views and integrator else (),
+        errors=quasi_steady_error(card, integrator) if question.views and integrator else (),
+        swings=swing_errors(card, integrator) if question.views and integrator else (),
         notices=(*model.notices, *([NO_COMPILER] if integrator and not integrator.compiled else [])),
     )
 
 
-def _glides(card: GliderCard, asked: GlideQuestion, *, as_printed: bool = False) -> list[SteadyGlide]:
+def _glides(card: GliderCard, question: GlideQuestion, *, as_printed: bool = False) -> list[SteadyGlide]:
     equations = glide_as_printed if as_printed else steady_glide
     found = []
-    for angle in asked.angles_rad:
-        size = asked.buoyancy_kg
+    for angle in question.angles_rad:
+        size = question.buoyancy_kg
         buoyancy = None if size is None else math.copysign(size, angle)
-        found.append(equations(card, angle, roll_rad=asked.roll_rad, buoyancy_kg=buoyancy))
+        found.append(equations(card, angle, roll_rad=question.roll_rad, buoyancy_kg=buoyancy))
     return found
 
 
@@ -184,8 +186,8 @@ def _radius(model: Model, glide: SteadyGlide) -> float:
     return equilibrium(model, glide).turning_radius_m if glide.turn_rate_radps else math.inf
 
 
-def _ranges(card: GliderCard, asked: GlideQuestion, glides: tuple[SteadyGlide, ...]) -> list[Range]:
-    budget, depth = asked.budget_kg, asked.depth_m
+def _ranges(card: GliderCard, question: GlideQuestion, glides: tuple[SteadyGlide, ...]) -> list[Range]:
+    budget, depth = question.budget_kg, question.depth_m
     if budget is None and depth is None:
         return []
     if budget is None or depth is None:

@@ -1,4 +1,4 @@
-"""What the steady glides of paper 5 leave out: the model's own equilibria, and the path while it goes between them."""
+"""Transient effects that the steady glides of paper 5 neglect: equilibria of the full model, and paths between them."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class GlideEquilibrium:
     Parameters
     ----------
     point : OperatingPoint
-        Where it is, for :func:`tank2sim.analysis.linearisation.state_space`.
+        Operating point, for :func:`tank2sim.analysis.linearisation.state_space`.
     speed_mps, path_angle_rad, incidence_rad, turn_rate_radps : float
         As in :class:`tank2sim.analysis.glide.steady.SteadyGlide`.
     turning_radius_m : float
-        Without sign; inf where it does not turn.
+        Without sign; inf without a turn.
     """
 
     point: OperatingPoint
@@ -52,13 +52,13 @@ class GlideEquilibrium:
 def equilibrium(model: Model, glide: SteadyGlide) -> GlideEquilibrium:
     """The equilibrium of the transient model under the pitch, roll and buoyancy of a glide, by CasADi's Newton solver.
 
-    `glide` is the first guess. Its u and w come to rest; on a straight path it is the same glide, in a turn the added
-    mass, which the closed form has not, changes it.
+    `glide` is the first guess. Its u and w are constant; on a straight path it is the same glide, in a turn it includes
+    the added mass, which the closed form neglects.
 
     Raises
     ------
     InputError
-        There is no equilibrium near the glide.
+        No equilibrium exists near the glide.
     """
     p = model.parameter_values()
     u = model.input_values(
@@ -80,13 +80,13 @@ def equilibrium(model: Model, glide: SteadyGlide) -> GlideEquilibrium:
         x[names.index(name)] = value
     places = [names.index("motion.u"), names.index("motion.w")]
     residual = ca.substitute(ca.substitute(model.rates[places], model.u, ca.DM(u)), model.p, ca.DM(p))
-    others = [place for place in range(len(names)) if place not in places]
-    residual = ca.substitute(residual, model.x[others], ca.DM(x[others]))
+    given = [place for place in range(len(names)) if place not in places]
+    residual = ca.substitute(residual, model.x[given], ca.DM(x[given]))
     problem = {"x": model.x[places], "g": residual}
     solver = ca.rootfinder("equilibrium", "newton", problem, {"abstol": _ACCURACY, "error_on_fail": False})
     x[places] = np.array(solver(x[places], [])).ravel()
-    left = np.abs(np.array(model.rhs(x, u, p)).ravel()[places])
-    if not np.all(left < 1e3 * _ACCURACY):
+    rates = np.abs(np.array(model.rhs(x, u, p)).ravel()[places])
+    if not np.all(rates < 1e3 * _ACCURACY):
         raise InputError(
             model.origin, "", "the transient model has no equilibrium near this glide", "give another angle"
         )
@@ -101,7 +101,7 @@ def equilibrium(model: Model, glide: SteadyGlide) -> GlideEquilibrium:
 
 @dataclass(frozen=True)
 class Compared:
-    """A path of steady glides, the motion of the transient model under the same orders, and what is between them.
+    """A path of steady glides, the motion of the transient model under the same orders, and their distance.
 
     Parameters
     ----------
@@ -123,15 +123,15 @@ class Compared:
         return float(self.distance_m.max()) / self.path.length_m if self.path.length_m else math.nan
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it: the transient places at the ends of steps, and the distances."""
+        """The JSON form: the transient places at the ends of steps, and the distances."""
         times = [place.time_s for place in self.path.places]
         named = {"x_m": "motion.x", "y_m": "motion.y", "depth_m": "motion.z", "speed_mps": "motion.speed"}
         rows = [{"t_s": time} | {key: self.motion.at(name, time) for key, name in named.items()} for time in times]
-        told = {"path": rows, "distance_m": self.distance_m, "distance_by_length": self.share}
-        return told | {"histories": self._histories(), "orders": self._orders()}
+        result = {"path": rows, "distance_m": self.distance_m, "distance_by_length": self.share}
+        return result | {"histories": self._histories(), "orders": self._orders()}
 
     def _histories(self) -> dict[str, list[float]]:
-        """The transient motion, thinned to draw."""
+        """The transient motion, thinned for a chart."""
         run, degrees = self.motion, math.degrees(1.0)
         angles = {"pitch_deg": "pitch.angle", "roll_deg": "roll.angle", "incidence_deg": "motion.incidence"}
         columns = {"t_s": run.t, "x_m": run["motion.x"], "y_m": run["motion.y"], "height_m": -run["motion.z"]}
@@ -139,7 +139,7 @@ class Compared:
         return drawn_columns(columns | {"speed_mps": run["motion.speed"]})
 
     def _orders(self) -> dict[str, list[float]]:
-        """What is ordered and the steady glides of it, each held through its step."""
+        """The orders and their steady glides, each constant through its step."""
         ends = np.array([place.time_s for place in self.path.places])
         steps = [glide.as_json() for glide in self.path.glides]
         names = ("buoyancy_kg", "pitch_deg", "roll_deg", "incidence_deg", "speed_mps")
@@ -160,12 +160,12 @@ def compare_with_steady(integrator: Integrator, path: GlidePath) -> Compared:
 
 @dataclass(frozen=True)
 class ProgrammeError:
-    """The quasi-steady error of one kind of programme.
+    """The quasi-steady error of a kind of programme.
 
     Parameters
     ----------
     label : str
-        What the steps alternate between.
+        Name of the alternating orders.
     duration_s : array (n,)
         Of one step.
     distance_m, share : arrays (n,)
@@ -178,14 +178,14 @@ class ProgrammeError:
     share: Array
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         return dict(vars(self))
 
 
 def quasi_steady_error(
     card: GliderCard, integrator: Integrator, durations_s: Sequence[float] = SWEEP_DURATIONS_S
 ) -> tuple[ProgrammeError, ...]:
-    """How far the paper's assumption leads from the transient model, against the length of the steps.
+    """Distance of the quasi-steady path from the transient model, against the length of the steps.
 
     Four steps, from a steady glide, of three kinds (project choice): from dive to climb and back, from a shallow to a
     steep dive and back, and with roll to starboard and to port; all from 6 deg above the smallest angle.
@@ -201,6 +201,6 @@ def quasi_steady_error(
     for label, pair in kinds.items():
         glides = [steady_glide(card, angle, roll_rad=rolled) for angle, rolled in (*pair, *pair)]
         found = [compare_with_steady(integrator, path_of(glides, [duration] * len(glides))) for duration in durations_s]
-        distance = np.array([float(one.distance_m.max()) for one in found])
-        errors.append(ProgrammeError(label, np.array(durations_s), distance, np.array([one.share for one in found])))
+        distance = np.array([float(path.distance_m.max()) for path in found])
+        errors.append(ProgrammeError(label, np.array(durations_s), distance, np.array([path.share for path in found])))
     return tuple(errors)

@@ -1,1 +1,1 @@
-"""Heading and track controllers for a ship: design, judgement, trials on the nonlinear model."""
+"""Heading and track controllers for a ship: design, assessment, trials on the nonlinear model."""

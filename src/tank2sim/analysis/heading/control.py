@@ -16,10 +16,10 @@ SLOWNESS = 0.1
 """The pole of the integral over the natural frequency, so that it does not disturb a course change (Fossen, 12.2)."""
 
 INTEGRAL_BAND_RAD = math.radians(2.0)
-"""Beyond it a heading error is a change of course, no disturbance: project choice, twice what a helmsman corrects."""
+"""Heading error that counts as a change of course, not a disturbance: project choice, twice that of a helmsman."""
 
 LARGEST_RUDDER_RAD = math.radians(35.0)
-"""Limit where the card states none: the rudder angle that SOLAS II-1, regulation 29 asks a gear for."""
+"""Limit without one on the card: the rudder angle that SOLAS II-1, regulation 29 requires of a gear."""
 
 
 def heading_gains(nomoto: Nomoto, largest_rudder_rad: float = LARGEST_RUDDER_RAD) -> HeadingGains:
@@ -57,7 +57,7 @@ def heading_autopilot(ship: Model) -> Model:
     Raises
     ------
     InputError
-        The model is no ship, holds no straight course, or its rudder turns it the wrong way.
+        The model is not a ship, has no straight course, or its rudder turns it the wrong way.
     """
     limits = [parameter.start for parameter in ship.parameters if parameter.name == "steering.max_angle"]
     try:

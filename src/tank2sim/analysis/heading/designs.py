@@ -1,4 +1,4 @@
-"""Heading controllers for a ship by four ways of design, each a model that simulates, joins and becomes an FMU."""
+"""Heading controllers for a ship by four design methods, each a model for simulation, coupling and FMU export."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
 NOTCH_DAMPING = 0.1
-"""Share of waves at the frequency of a wave filter that passes: project choice, as narrow as their own band."""
+"""Share of waves at the frequency of a wave filter that passes: project choice, as narrow as the band of the waves."""
 
 DESIGNS = ("pd", "pid", "lqr", "robust")
-"""Ways of design, by the names of ``--design``."""
+"""Design methods, by the names of ``--design``."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LqrWeights:
-    """What the LQR weighs against each other (Bryson & Ho, 1975): errors that are equally bad, rad.
+    """Weights of the LQR (Bryson & Ho, 1975): errors of equal cost, rad.
 
-    Equal ones make a heading error worth as much rudder, as in the design by pole placement (project choice).
+    Equal weights give a heading error the same cost as the same rudder, as in pole placement (project choice).
     """
 
     heading_rad: float = math.radians(5.0)
@@ -56,7 +56,7 @@ class HeadingDesign:
     gains : mapping
         Figures of the controller by name with their unit; of the robust one, of its synthesis.
     source : str
-        How it was found, in a sentence.
+        Origin of the controller, in a sentence.
     autopilot : Model
         Inputs ``motion.psi``, ``motion.r``, ``heading.command``; outputs ``rudder.command``, ``heading.error``.
     """
@@ -70,13 +70,13 @@ class HeadingDesign:
 
 @dataclass(frozen=True, eq=False)
 class SteeringPlant:
-    """What is steered: the ship at the speed of design with its gear, and the limit of its rudder.
+    """Plant of the design: the ship at the design speed with its gear, and the limit of its rudder.
 
     Parameters
     ----------
     found : Stability
     frequency_radps : float
-        w = sqrt(K/T), the frequency of the design by pole placement, by which the others are scaled.
+        w = sqrt(K/T), the frequency of the design by pole placement, which scales the other designs.
     A, B : arrays (4, 4), (4, 1)
         Rates of sway velocity (m/s), yaw rate (rad/s), heading (rad) and rudder (rad), by these and by the order (rad).
     largest_rudder_rad, step_s : float
@@ -105,25 +105,25 @@ def design_heading(
     ship : Model
     kind : str
         ``pd`` and ``pid``: poles placed on Nomoto's model; ``lqr``: the linear quadratic regulator of sway, yaw,
-        heading, rudder and integral, the two that no compass shows observed; ``robust``: mixed sensitivity.
+        heading, rudder and integral, with an observer of sway and rudder; ``robust``: mixed sensitivity.
     speed_mps : float, optional
         Speed of the design; by default that of expansion.
     weights : LqrWeights, optional
         Of the LQR.
     wave_filter_radps : float, optional
-        Of the PID: frequency of encounter of waves at which the rudder shall rest (:func:`_filtered`).
+        Of the PID: frequency of encounter of waves to which the rudder does not respond (:func:`_filtered`).
 
     Raises
     ------
     InputError
-        The model is no ship or holds no straight course, the speed is outside the card's range, the rudder turns the
+        The model is not a ship or has no straight course, the speed is outside the card's range, the rudder turns the
         ship the wrong way or not at all, or the robust design lacks its library.
     """
     plant = steering_plant(ship, speed_mps)
     name = f"Autopilot of {ship.name}"
     if wave_filter_radps is not None:
         if kind != "pid":
-            raise InputError("--wave-filter", "", f"is no part of the design {kind!r}", "leave it out, or choose pid")
+            raise InputError("--wave-filter", "", f"is not part of the design {kind!r}", "leave it out, or choose pid")
         return _filtered(plant, name, wave_filter_radps)
     match kind:
         case "pd" | "pid":
@@ -135,7 +135,7 @@ def design_heading(
 
             return robust_design(plant, name, ship.origin)
         case _:
-            raise InputError("--design", "", f"there is no design {kind!r}", f"choose one of {', '.join(DESIGNS)}")
+            raise InputError("--design", "", f"{kind!r} is not a design", f"choose one of {', '.join(DESIGNS)}")
 
 
 def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant:
@@ -166,11 +166,11 @@ def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant
 
 def _placed(plant: SteeringPlant, name: str, *, integral: bool) -> HeadingDesign:
     gains = heading_gains(plant.found.nomoto, plant.largest_rudder_rad)
-    told = f"integral {SLOWNESS:g} of the natural frequency"
+    note = f"integral {SLOWNESS:g} of the natural frequency"
     if not integral:
-        gains, told = _without_integral(plant, gains), "no integral"
+        gains, note = _without_integral(plant, gains), "no integral"
     source = (
-        f"Pole placement (relative damping {DAMPING:g}, {told}) on Nomoto's model of {plant.found.name} at "
+        f"Pole placement (relative damping {DAMPING:g}, {note}) on Nomoto's model of {plant.found.name} at "
         f"{plant.found.speed_mps:.4g} m/s"
     )
     return HeadingDesign(
@@ -216,11 +216,11 @@ def _without_integral(plant: SteeringPlant, gains: HeadingGains) -> HeadingGains
 
 
 def _quadratic(plant: SteeringPlant, name: str, weights: LqrWeights) -> HeadingDesign:
-    """LQR of [sway, yaw rate, heading, rudder, integral of heading]; sway and rudder by a model that runs along.
+    """LQR of [sway, yaw rate, heading, rudder, integral of heading]; sway and rudder by an observer.
 
     Least integral of (psi/psi0)^2 + (r/(w psi0))^2 + (z/(psi0/(a w)))^2 + (order/delta0)^2, psi0 and delta0 the
     weights, z the integral of psi, a the :data:`SLOWNESS` of the integral. The observer is the ship's own sway equation
-    with the yaw rate as measured, and the gear's lag: both settle by themselves.
+    with the measured yaw rate, and the gear's lag: both are stable without correction.
     """
     w, bad = plant.frequency_radps, weights.heading_rad
     A = np.zeros((5, 5))

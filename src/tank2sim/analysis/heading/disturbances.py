@@ -1,4 +1,4 @@
-"""What a ship is steered in: current, wind, and waves that turn it to and fro at their own frequency."""
+"""Disturbances of a steered ship: current, wind, and waves that yaw it at their own frequency."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from tank2sim.dynamics.model import Model
 class Weather:
     """Current, wind and waves; speeds in m/s, directions in rad clockwise from north.
 
-    The defaults are choices of ours for a ship of 160 m that steers north: a fresh breeze (Beaufort 5) and its sea on
-    the bow, and a knot of current across.
+    The defaults are project choices for a ship of 160 m on a northerly course: a fresh breeze (Beaufort 5) and its sea
+    on the bow, and a knot of current across.
 
     Parameters
     ----------
@@ -45,7 +45,8 @@ class Weather:
 
 
 def weather_for(length_m: float, **given: float | None) -> Weather:
-    """The default weather for a ship of a length, by Froude's law, with what is given (not None) in its place."""
+    """The default weather for a ship of a length, by Froude's law, with given values (not None) in place of
+    defaults."""
     scale, usual = math.sqrt(length_m / 160.0), Weather()
     values: dict[str, float] = {
         "current_mps": usual.current_mps * scale,
@@ -59,7 +60,7 @@ def weather_for(length_m: float, **given: float | None) -> Weather:
 def in_weather(ship: Model, card: ManoeuvringCard, weather: Weather) -> tuple[Model, dict[str, float]]:
     """The ship with inputs for current, wind and waves, and the inputs of this weather by name.
 
-    Effects that the card has already are not put on again; their inputs take the weather's values all the same.
+    Effects that the card already has are not added; their inputs take the weather's values, too.
     """
     for effect in (CURRENT, WIND):
         if f"{effect.name}.speed" not in ship:
@@ -76,9 +77,9 @@ def in_weather(ship: Model, card: ManoeuvringCard, weather: Weather) -> tuple[Mo
 def wave_yaw_acceleration(weather: Weather, step_s: float, count: int) -> Array:
     """Yaw acceleration by waves (count,), rad/s2, each held for a step.
 
-    White noise through 2 z w s/(s^2 + 2 z w s + w^2) (Fossen 2011, 8.2), exact for noise held over a step, and from
-    the beginning as it is in the long run. Its standard deviation is w^2 times that of the heading: at wave frequency
-    a ship answers to a moment as its inertia alone.
+    White noise through 2 z w s/(s^2 + 2 z w s + w^2) (Fossen 2011, 8.2), exact for noise held over a step, and
+    stationary from the start. Its standard deviation is w^2 times that of the heading: at wave frequency a ship
+    responds to a moment by its inertia alone.
     """
     w, z = weather.wave_radps, weather.wave_damping
     A = np.array([[0.0, 1.0], [-(w**2), -2 * z * w]])

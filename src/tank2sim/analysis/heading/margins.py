@@ -1,4 +1,4 @@
-"""How much a heading loop bears: margins and poles of the ship with its gear and its autopilot, linearised."""
+"""Margins and poles of a heading loop: the ship with its gear and its autopilot, linearised."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.records.thinning import drawn_columns
 
 _HELD = ("motion.x", "motion.y", "motion.u")
-"""States that no course change of small size moves: position, and the speed to first order."""
+"""States that a small course change does not move: position, and to first order the speed."""
 
 _OFF_THE_KINK = 1e-6
 """rad: far below any rudder angle that matters."""
@@ -35,14 +35,14 @@ class LoopMargins:
     ----------
     speed_mps : float
     gain_margin_up, gain_margin_down : float
-        By how much the loop gain may grow, and to what share it may fall; inf and 0 if by any amount. A ship that is
-        unstable by itself has the second one above 0: it needs its helmsman.
+        Factor by which the loop gain may grow, and share to which it may fall; inf and 0 without a limit. For an
+        unstable ship the second is above 0: the ship needs its helmsman.
     phase_margin_deg : float
         The least of all crossovers.
     delay_margin_s : float
-        Delay in the loop that it bears.
+        Largest delay in the loop that keeps it stable.
     sensitivity_peak : float
-        Ms, the largest \\|1/(1 + L)\\|: 1/Ms is how near the Nyquist curve comes to -1.
+        Ms, the largest \\|1/(1 + L)\\|: 1/Ms is the least distance of the Nyquist curve from -1.
     crossover_radps, bandwidth_radps : float
         Last crossover of the loop gain; and where the heading answers its order by 3 dB less than slow ones.
     poles : tuple of complex
@@ -65,18 +65,18 @@ class LoopMargins:
         return all(pole.real < 0 for pole in self.poles)
 
     def as_json(self) -> dict[str, object]:
-        """The result as JSON has it; poles as [real, imaginary], what is unbounded as null."""
-        own = {key: value for key, value in vars(self).items() if key != "poles"}
+        """The result for JSON; poles as [real, imaginary], infinite values as null."""
+        values = {key: value for key, value in vars(self).items() if key != "poles"}
         decibel = 20 * math.log10(self.gain_margin_up) if math.isfinite(self.gain_margin_up) else None
         poles = [[pole.real, pole.imag] for pole in self.poles]
-        return {**own, "gain_margin_dB": decibel, "stable": self.stable, "poles": poles}
+        return {**values, "gain_margin_dB": decibel, "stable": self.stable, "poles": poles}
 
 
 @dataclass(frozen=True, kw_only=True)
 class LargestSteps:
     """Largest change of course that stays linear, rad: without the gear's rate limit, and without its angle limit.
 
-    inf where there is no such limit. The linear answer to a step in ``heading.command`` is scaled until it meets it.
+    inf without such a limit. The linear response to a step in ``heading.command`` is scaled until it meets it.
     """
 
     within_rate_rad: float
@@ -94,7 +94,7 @@ class LoopResponse:
     heading: NDArray[np.complex128]
 
     def as_json(self) -> dict[str, object]:
-        """The result as JSON has it, to seven digits; complex values as their two parts."""
+        """The result for JSON, to seven digits; complex values as their two parts."""
         parts = {"loop": self.loop, "heading": self.heading}
         columns = {"omega_radps": self.omega_radps}
         for name, values in parts.items():
@@ -103,7 +103,7 @@ class LoopResponse:
 
 
 _DECADES = (-2.0, 1.3)
-"""What frequencies are reported, in decades from the crossover (project choice)."""
+"""Reported frequencies, in decades from the crossover (project choice)."""
 _FREQUENCIES = 500
 
 
@@ -116,37 +116,39 @@ def loop_response(ship: Model, autopilot: Model, speed_mps: float, crossover_rad
 
 
 def loop_transfer(ship: Model, autopilot: Model, speed_mps: float | None = None) -> control.StateSpace:
-    """Loop L from the rudder order round to the rudder order, sign reversed: the closed loop has 1 + L."""
+    """Loop transfer L from rudder order to rudder order, sign reversed: the closed loop has 1 + L."""
     point = straight_course(ship, speed_mps)
     states = [name for name in ship.state_names if name not in _HELD]
     seen = ["motion.psi", "motion.r"]
     plant = state_space(ship, point, states=states, inputs=["rudder.command"], outputs=seen)
-    pilot = _at_rest(autopilot, seen)
+    pilot = _linearised_pilot(autopilot, seen)
     return -control.ss(pilot.A, pilot.B, pilot.C, pilot.D) * control.ss(plant.A, plant.B, plant.C, plant.D)
 
 
-def _at_rest(autopilot: Model, inputs: list[str]) -> control.StateSpace:
-    rest = OperatingPoint(_states(autopilot, 0.0), autopilot.input_values(), autopilot.parameter_values())
-    return state_space(autopilot, rest, inputs=inputs, outputs=["rudder.command"])
+def _linearised_pilot(autopilot: Model, inputs: list[str]) -> control.StateSpace:
+    point = OperatingPoint(_states(autopilot, 0.0), autopilot.input_values(), autopilot.parameter_values())
+    return state_space(autopilot, point, inputs=inputs, outputs=["rudder.command"])
 
 
 def _states(autopilot: Model, held: float) -> Array:
-    """States of an autopilot that holds a rudder (rad) by its integral."""
+    """States of an autopilot whose integral holds a rudder (rad)."""
     # At exactly 0 two limits of the anti-windup meet, and no slope is right.
     integral = held if abs(held) > _OFF_THE_KINK else _OFF_THE_KINK
     return np.array([integral if name == "autopilot.integral" else 0.0 for name in autopilot.state_names])
 
 
 def closed_loop_transfer(ship: Model, autopilot: Model, speed_mps: float | None = None) -> control.StateSpace:
-    """From the ordered heading to heading, rudder order and rudder rate, of the two models joined."""
+    """Transfer from the ordered heading to heading, rudder order and rudder rate of the closed loop."""
     course = straight_course(ship, speed_mps)
     joint = closed_loop_model(ship, autopilot)
     held = float(course.x[ship.state_names.index("rudder.angle")])
-    own = _states(autopilot, held)
+    autopilot_states = _states(autopilot, held)
     u = joint.input_values()
     if "autopilot.integral" not in autopilot:  # a heading error holds the rudder that keeps the course
-        u[joint.input_names.index("heading.command")] = held / float(_at_rest(autopilot, ["heading.command"]).D.item())
-    point = OperatingPoint(np.concatenate([course.x, own]), u, joint.parameter_values())
+        u[joint.input_names.index("heading.command")] = held / float(
+            _linearised_pilot(autopilot, ["heading.command"]).D.item()
+        )
+    point = OperatingPoint(np.concatenate([course.x, autopilot_states]), u, joint.parameter_values())
     states = [name for name in joint.state_names if name not in _HELD]
     outputs = ["motion.psi", "rudder.command", "rudder.rate"]
     return state_space(joint, point, states=states, inputs=["heading.command"], outputs=outputs)
@@ -158,7 +160,7 @@ def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) 
     Raises
     ------
     InputError
-        The model is no ship, or holds no straight course.
+        The model is not a ship, or has no straight course.
     """
     loop = loop_transfer(ship, autopilot, speed_mps)
     whole = closed_loop_transfer(ship, autopilot, speed_mps)
@@ -188,23 +190,25 @@ def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) 
 def growing_effects(ship: Model, speed_mps: float | None = None) -> tuple[str, ...]:
     """States of the ship's effects (roll, memory of the flow) whose own modes grow with the rudder fixed.
 
-    A design on sway and yaw takes such states as settled, and does not see them. A mode is theirs if their
+    A design on sway and yaw assumes such states as settled and ignores them. A mode belongs to them if their
     participation in it is more than half: \\|w_i v_i\\|, w and v its left and right eigenvectors (Perez-Arriaga,
     Verghese and Schweppe 1982).
     """
-    own = settled_states(ship)
+    effect_states = settled_states(ship)
     states = [name for name in ship.state_names if name not in (*_HELD, "motion.psi")]
     found = state_space(ship, straight_course(ship, speed_mps), states=states, inputs=["rudder.command"])
     modes, right = np.linalg.eig(found.A)
     shares = np.abs(right * np.linalg.inv(right).T)  # (states, modes)
     shares /= shares.sum(axis=0)
-    theirs = [states.index(name) for name in own]
+    theirs = [states.index(name) for name in effect_states]
     growing = (modes.real > 0) & (shares[theirs].sum(axis=0) > 0.5)
-    return tuple(name for name, place in zip(own, theirs, strict=True) if np.any(shares[place, growing] > _TAKES_PART))
+    return tuple(
+        name for name, place in zip(effect_states, theirs, strict=True) if np.any(shares[place, growing] > _TAKES_PART)
+    )
 
 
 def margin_frequencies(loop: control.StateSpace) -> Array:
-    """Frequencies (4000,) in rad/s that show all of a loop: two decades beyond its crossover either way."""
+    """Frequencies (4000,) in rad/s that cover a loop: two decades beyond its crossover either way."""
     coarse = np.logspace(-6, 3, 2000)
     above = np.flatnonzero(np.abs(loop(1j * coarse)) > 1)
     middle = coarse[above[-1]] if above.size else 1.0
@@ -212,7 +216,7 @@ def margin_frequencies(loop: control.StateSpace) -> Array:
 
 
 def largest_steps(ship: Model, autopilot: Model, speed_mps: float | None = None) -> LargestSteps:
-    """Largest change of course whose linear answer keeps to the limits of the gear."""
+    """Largest change of course whose linear response stays within the limits of the gear."""
     values = dict(zip(ship.parameter_names, ship.parameter_values().tolist(), strict=True))
     limits = dict(zip(autopilot.parameter_names, autopilot.parameter_values().tolist(), strict=True))
     rate = values.get(acting_variable(ship, "steering.max_rate"), math.inf)

@@ -1,12 +1,12 @@
 """A robust heading controller: mixed sensitivity, H-infinity (extra ``robust``: slycot).
 
-Least largest gain of [W1 S; W2 K S], S = 1/(1 + G K): W1 asks for a fast loop with a low peak of S, W2 for little
-rudder at high frequency (waves, gear): Skogestad & Postlethwaite (2005), Multivariable Feedback Control, 9.3.
+Least largest gain of [W1 S; W2 K S], S = 1/(1 + G K): W1 requires a fast loop with a low peak of S, W2 little rudder at
+high frequency (waves, gear): Skogestad & Postlethwaite (2005), Multivariable Feedback Control, 9.3.
 
-All on an axis of frequency shifted by a: G(s - a) is designed for, and the controller shifted back. Then every mode of
-the loop decays faster than a, and the controller cannot cancel the slow mode of the hull, which would leave the ship
-slow to come back from a gust: Chiang & Safonov (1992), J. Guidance, Control, and Dynamics 15. The integral is put
-before the ship as (s + b)/s and belongs to the controller afterwards.
+The design uses a frequency axis shifted by a: the controller of G(s - a) is shifted back. Then every mode of the loop
+decays faster than a, and the controller cannot cancel the slow mode of the hull, which would make the ship slow to
+recover from a gust: Chiang & Safonov (1992), J. Guidance, Control, and Dynamics 15. The integral precedes the ship as
+(s + b)/s in the design and is part of the controller afterwards.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from tank2sim.analysis.heading.designs import HeadingDesign, SteeringPlant
 from tank2sim.dynamics.autopilot_linear import LinearLaw, linear_autopilot_model
 from tank2sim.errors import InputError
 
-# All in w = sqrt(K/T) of the ship: choices of ours, tried on stable and unstable ships (Ms 1.4 to 1.7).
+# All in w = sqrt(K/T) of the ship: project choices, tested on stable and unstable ships (Ms 1.4 to 1.7).
 POLE_SHIFT = 0.2
 """Every mode of the loop decays faster."""
 INTEGRAL = 0.3
 """Zero b of the integral; above the shift, so that it can be moved."""
 _BANDWIDTH = 0.8
-"""Where W1 wants the sensitivity below 1."""
+"""Frequency below which W1 requires a sensitivity below 1."""
 PEAK = 1.5
-"""What W1 allows as its peak."""
+"""Largest peak of the sensitivity that W1 allows."""
 RUDDER_FREQUENCY = 20.0
-"""Above it W2 allows the rudder less than the heading error; far below 5 times as much."""
+"""Frequency above which W2 allows less rudder than heading error; far below it 5 times as much."""
 LEAST_ERROR = 0.01
-"""Share of BANDWIDTH at which W1 becomes flat: its pole has to be stable."""
+"""Share of BANDWIDTH at which W1 becomes flat, because its pole must be stable."""
 
 
 def robust_design(plant: SteeringPlant, name: str, origin: str) -> HeadingDesign:
@@ -51,7 +51,7 @@ def robust_design(plant: SteeringPlant, name: str, origin: str) -> HeadingDesign
     Raises
     ------
     InputError
-        slycot is not installed, or there is no such controller.
+        slycot is not installed, or the controller does not exist.
     """
     if importlib.util.find_spec("slycot") is None:
         raise InputError("--design", "robust", "needs slycot", "pip install 'tank2sim[robust]'")
@@ -104,7 +104,7 @@ def _synthesis(plant: SteeringPlant, origin: str) -> tuple[control.StateSpace, f
 
 
 def _without_fast_modes(system: control.StateSpace, fastest: float) -> control.StateSpace:
-    """Modes that decay faster than the integration can follow, replaced by what they settle at."""
+    """Modes that decay faster than the integration resolves, replaced by their steady values."""
     modal, _ = control.modal_form(system)
     fast = [place for place in range(modal.nstates) if -modal.A[place, place] > fastest]
     return control.model_reduction(modal, elim_states=fast, method="matchdc") if fast else modal

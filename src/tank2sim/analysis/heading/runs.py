@@ -19,7 +19,7 @@ from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.trajectory import Trajectory
 
 _SETTLED = 0.02
-"""Share of a course change within which it is settled, as in textbooks."""
+"""Share of a course change within which it counts as settled, as in textbooks."""
 
 
 class HeadingLoop:
@@ -44,7 +44,8 @@ class HeadingLoop:
     def advance(
         self, state: Array, inputs: Mapping[str, float | Array], steps: int, parameters: Mapping[str, float] | None
     ) -> tuple[Array, Array]:
-        """States (steps + 1, nx) and inputs (steps, nu); an input is held, or (steps,) gives one for each step."""
+        """States (steps + 1, nx) and inputs (steps, nu); an input is constant, or has a value for each step
+        (steps,)."""
         u = np.tile(self.model.input_values(), (steps, 1))
         for name, values in inputs.items():
             u[:, self.model.input_names.index(name)] = values
@@ -73,9 +74,9 @@ class HeadingLoop:
     def kept_course(
         self, inputs: Mapping[str, float | Array], duration_s: float, parameters: Mapping[str, float] | None = None
     ) -> Array:
-        """State (nx,) of a ship that has kept the course 0 for a time, at the speed and place of the model's start.
+        """State (nx,) of a ship that has kept course 0 for a time, at the speed and position of the model's start.
 
-        An asymmetric ship needs rudder for it, which the controller has found by then: it is no part of what follows.
+        The controller has then found the rudder that an asymmetric ship needs, so that it is not part of a later run.
         """
         start = self.start(parameters)
         x, _ = self.advance(
@@ -106,13 +107,13 @@ class CourseChange:
     ----------
     ordered_deg : float
     rise_time_s : float or None
-        From 10 to 90 % of the change; None if it does not come so far.
+        From 10 to 90 % of the change; None if not reached.
     overshoot_deg : float
     settling_time_s : float or None
-        After which it stays within :data:`_SETTLED` of the change; None if it does not.
+        Time after which it stays within :data:`_SETTLED` of the change; None if it does not.
     largest_rudder_deg : float
     rate_limited_s : float
-        Time that the rudder moves as fast as it can.
+        Time of rudder motion at the largest rate.
     """
 
     ordered_deg: float
@@ -133,11 +134,11 @@ class CourseKeeping:
     heading_error_deg2s, rudder_deg2s : float
         Integrals of the square of the heading error and of the rudder angle about its mean.
     heading_error_rms_deg, heading_error_mean_deg, rudder_rms_deg : float
-        The same as root mean squares (the rudder about its mean), and what error stays.
+        The same as root mean squares (the rudder about its mean), and the remaining mean error.
     rudder_travel_degps : float
-        Mean of the size of the rudder's rate: the wear of the gear.
+        Mean absolute rudder rate: the wear of the gear.
     rate_limited_percent : float
-        Share of the time that the rudder moves as fast as it can.
+        Share of the time of rudder motion at the largest rate.
     """
 
     duration_s: float
@@ -151,7 +152,8 @@ class CourseKeeping:
 
 
 def without_anti_windup(autopilot: Model) -> dict[str, float]:
-    """Parameters with which the integral goes on at the limit, and takes the whole of a course change; none of a PD."""
+    """Parameters without anti-windup: the integral continues at the limit and includes a whole course change; none for
+    a PD."""
     starts = {parameter.name: parameter.start for parameter in autopilot.parameters}
     if "autopilot.anti_windup_time" not in starts:
         return {}
@@ -179,7 +181,7 @@ def course_change(run: Trajectory, ordered_rad: float) -> CourseChange:
 
 
 def course_keeping(run: Trajectory, course_rad: float, from_s: float) -> CourseKeeping:
-    """Figures of a run on a constant course, of its part after `from_s`, when what the start did has decayed."""
+    """Figures of a run on a constant course after `from_s`, when transients of the start have decayed."""
     part = run.t >= from_s
     error = np.degrees(run["motion.psi"][part] - course_rad)
     rudder = np.degrees(run["rudder.angle"][part])
@@ -209,7 +211,7 @@ def _reached(time: Array, values: Array, level: float) -> float | None:
 
 
 def _rate_limited(run: Trajectory) -> Array:
-    """For each step (n - 1,), whether the rudder moved at its largest rate."""
+    """True for each step (n - 1,) in which the rudder moved at its largest rate."""
     limit = acting_variable(run.model, "steering.max_rate")
     largest = next((known.start for known in run.model.parameters if known.name == limit), math.inf)
     moved = np.abs(np.diff(run["rudder.angle"])) / run.model.step_s

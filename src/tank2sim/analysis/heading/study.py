@@ -1,4 +1,4 @@
-"""All that is asked of a heading controller of a ship: gains, margins at several speeds, course changes, weather."""
+"""Study of a ship's heading controller: gains, margins at several speeds, course changes, weather."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ INTEGRAL_SHARE = 0.25
 """Of the integral line of sight: critically damped (:class:`tank2sim.analysis.heading.track_keeping.Guidance`)."""
 
 _CHANGE_TIMES = 60
-"""Length of a course change in 1/w, w = sqrt(K/T): six times the slowest mode that is placed.
+"""Length of a course change in 1/w, w = sqrt(K/T): six times the slowest placed mode.
 
 Project choice: the change has settled then.
 """
@@ -50,13 +50,13 @@ _KEEPING_TIMES = 120
 """Length of course keeping in 1/w; figures are those of its later half."""
 
 LARGEST_CHANGE_DEG = 170.0
-"""Of a change of course. Project choice: well below 180 deg, where port and starboard are the same way."""
+"""Largest change of course. Project choice: well below 180 deg, where port and starboard are equivalent."""
 
 _WAVES_SHOWN = 40
-"""Of course keeping, in the histories. Project choice: single waves are seen."""
+"""Interval of the histories of course keeping. Project choice: it shows single waves."""
 
 _BUSY_PERCENT = 10.0
-"""Share of the time at full rate from which a gear is said to be overworked by waves.
+"""Share of the time at full rate from which a notice reports that waves overload the gear.
 
 Project choice: well above what a calm sea needs.
 """
@@ -64,7 +64,7 @@ Project choice: well above what a calm sea needs.
 
 @dataclass(frozen=True, kw_only=True)
 class StudySettings:
-    """What is asked.
+    """Settings of the study.
 
     Parameters
     ----------
@@ -77,11 +77,11 @@ class StudySettings:
     wave_filter_radps : float, optional
         Of the PID.
     course_change_rad : float
-        Of the ordinary change of course, to starboard if positive.
+        The ordinary change of course, positive to starboard.
     large_change_rad : float
-        Of the one that takes the rudder to its limit, with which anti-windup is shown.
+        A change of course that takes the rudder to its limit, to show the anti-windup.
     weather : mapping
-        Fields of :class:`Weather` in place of the defaults; None: the default.
+        Fields of :class:`Weather` that replace the defaults; None: the defaults.
     waypoints : array (n, 2), optional
         A track to keep, m.
     """
@@ -98,7 +98,7 @@ class StudySettings:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AutopilotStudy:
-    """What was found.
+    """Result of the study.
 
     Parameters
     ----------
@@ -111,12 +111,12 @@ class AutopilotStudy:
         At the speed of the design.
     weather : Weather
     runs : mapping
-        Name to motion: ``change``, ``large``, ``large without anti-windup`` (if there is an integral), ``keeping``.
+        Name to motion: ``change``, ``large``, ``large without anti-windup`` (with an integral), ``keeping``.
     changes : mapping
         Figures of the changes of course, by the same names.
     keeping : CourseKeeping
     tracks : mapping
-        ``line of sight`` and ``with integral``, if a track was given.
+        ``line of sight`` and ``with integral``, for a given track.
     waypoints : array (n, 2), optional
     notices : tuple of str
     """
@@ -135,8 +135,8 @@ class AutopilotStudy:
 
     @property
     def limits(self) -> dict[str, float]:
-        """What bounds the controller: ``largest_rudder_deg``, and of one with an integral ``anti_windup_time_s`` and
-        ``integral_band_deg`` (of those with states of their own ``integral_limit_radps``, the band times its gain)."""
+        """Limits of the controller: ``largest_rudder_deg``, and with an integral ``anti_windup_time_s`` and
+        ``integral_band_deg`` (for designs with their own states ``integral_limit_radps``, the band times its gain)."""
         names = {
             "autopilot.max_rudder": "largest_rudder_rad",
             "autopilot.anti_windup_time": "anti_windup_time_s",
@@ -153,7 +153,7 @@ class AutopilotStudy:
         return _in_degrees(found)
 
     def as_json(self) -> dict[str, object]:
-        """The result as JSON has it; responses and histories are thinned to draw."""
+        """The result for JSON; responses and histories are thinned for a chart."""
         first, found = self.margins[0], self.design.found
         alone = {"speed_mps": found.speed_mps, "stable": found.stable, "rudder_deg": found.rudder_deg}
         alone |= {"K_per_s": found.nomoto.K_per_s, "T_s": found.nomoto.T_s}
@@ -183,13 +183,13 @@ class AutopilotStudy:
         }
 
     def _histories(self) -> dict[str, dict[str, list[float]]]:
-        """Of the runs by name; of course keeping the last waves, for more are a smear."""
+        """Histories of the runs by name; of course keeping only the last waves, so that single ones remain visible."""
         last = self.runs["keeping"].t[-1] - _WAVES_SHOWN * 2 * math.pi / self.weather.wave_radps
         return {name: histories(run, last if name == "keeping" else 0.0) for name, run in self.runs.items()}
 
 
 def check_settings(settings: StudySettings) -> None:
-    """Refuse values that are out of bounds.
+    """Refuse values outside their bounds.
 
     Raises
     ------
@@ -213,7 +213,7 @@ def check_settings(settings: StudySettings) -> None:
 
 
 def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings) -> AutopilotStudy:
-    """Design a heading controller and try it.
+    """Design a heading controller and test it.
 
     Parameters
     ----------
@@ -227,9 +227,9 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
         As :func:`design_heading`, :func:`keep_track` and :meth:`HeadingLoop.run`; or the loop is not stable.
     """
     only = card.model.kind == "linear"
-    _refuse_other_speed(card, settings.speed_mps if only else None)
+    _refuse_fixed_speed(card, settings.speed_mps if only else None)
     design = _design(ship, settings)
-    margins, notices = _margins(ship, design, settings.speed_mps, only_own=only)
+    margins, notices = _margins(ship, design, settings.speed_mps, design_speed_only=only)
     if not margins[0].stable:
         raise _not_stable(ship, design, settings.speed_mps)
     values = {parameter.name: parameter.start for parameter in ship.parameters}
@@ -268,18 +268,18 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
 
 
 def _tracks(loop: HeadingLoop, waypoints: Array | None, inputs: Mapping[str, float]) -> dict[str, TrackRun]:
-    """Runs along waypoints by guidance without and with an integral; none without waypoints."""
+    """Runs along waypoints by guidance without and with an integral; empty without waypoints."""
     if waypoints is None:
         return {}
     shares = {"line of sight": 0.0, "with integral": INTEGRAL_SHARE}
     return {name: keep_track(loop, waypoints, Guidance(integral_share=share), inputs) for name, share in shares.items()}
 
 
-def _refuse_other_speed(card: ManoeuvringCard, speed: float | None) -> None:
-    own = card.model.speed_mps
-    if speed is not None and abs(speed / own - 1) > 1e-6:
+def _refuse_fixed_speed(card: ManoeuvringCard, speed: float | None) -> None:
+    card_speed = card.model.speed_mps
+    if speed is not None and abs(speed / card_speed - 1) > 1e-6:
         problem = f"{speed:g} m/s is not the speed of {card.ship.name}, whose forces are linear"
-        raise InputError("--speed", "", problem, f"leave it out: a linear card holds at {own:g} m/s alone")
+        raise InputError("--speed", "", problem, f"leave it out: a linear card holds at {card_speed:g} m/s alone")
 
 
 def _not_stable(ship: Model, design: HeadingDesign, speed: float | None) -> InputError:
@@ -301,24 +301,24 @@ def _design(ship: Model, settings: StudySettings) -> HeadingDesign:
 
 
 def _margins(
-    ship: Model, design: HeadingDesign, speed: float | None, *, only_own: bool
+    ship: Model, design: HeadingDesign, speed: float | None, *, design_speed_only: bool
 ) -> tuple[tuple[LoopMargins, ...], list[str]]:
-    """At the speed of the design and at five across the card's range; and notices of those without.
+    """Margins at the speed of the design and at five across the card's range, and notices of speeds without any.
 
-    The forces of a linear card are those at its own speed by definition: others would repeat its margins.
+    The forces of a linear card are defined at its own speed: other speeds would repeat its margins.
     """
     values = {parameter.name: parameter.start for parameter in ship.parameters}
-    own = values["ship.speed"] if speed is None else speed
-    found, notices = [loop_margins(ship, design.autopilot, own)], []
-    if only_own:
-        return tuple(found), [f"margins at {own:.4g} m/s alone: a linear card does not hold at other speeds"]
-    for other in np.linspace(values["ship.slowest"], values["ship.fastest"], 5).tolist():
-        if abs(other / own - 1) < 1e-6:
+    design_speed = values["ship.speed"] if speed is None else speed
+    found, notices = [loop_margins(ship, design.autopilot, design_speed)], []
+    if design_speed_only:
+        return tuple(found), [f"margins at {design_speed:.4g} m/s alone: a linear card does not hold at other speeds"]
+    for card_speed in np.linspace(values["ship.slowest"], values["ship.fastest"], 5).tolist():
+        if abs(card_speed / design_speed - 1) < 1e-6:
             continue
         try:
-            found.append(loop_margins(ship, design.autopilot, other))
+            found.append(loop_margins(ship, design.autopilot, card_speed))
         except InputError as error:  # the polynomial of a card may lose its rudder at an end of its range
-            notices.append(f"no margins at {other:.4g} m/s: {error.problem}")
+            notices.append(f"no margins at {card_speed:.4g} m/s: {error.problem}")
     return tuple(found), notices
 
 
@@ -336,15 +336,15 @@ def _changes(
     start: Mapping[str, float],
     duration: float,
 ) -> tuple[dict[str, Trajectory], dict[str, CourseChange]]:
-    asked = {"change": (settings.course_change_rad, dict(start)), "large": (settings.large_change_rad, dict(start))}
+    courses = {"change": (settings.course_change_rad, dict(start)), "large": (settings.large_change_rad, dict(start))}
     if bare := without_anti_windup(design.autopilot):
-        asked["large without anti-windup"] = (settings.large_change_rad, {**start, **bare})
+        courses["large without anti-windup"] = (settings.large_change_rad, {**start, **bare})
     begin = loop.kept_course(inputs, duration, start)
     runs = {
         name: loop.run({**inputs, "heading.command": order}, duration, parameters=values, begin=begin)
-        for name, (order, values) in asked.items()
+        for name, (order, values) in courses.items()
     }
-    return runs, {name: course_change(run, asked[name][0]) for name, run in runs.items()}
+    return runs, {name: course_change(run, courses[name][0]) for name, run in runs.items()}
 
 
 def _notices(
@@ -365,7 +365,7 @@ def _notices(
 
 
 def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weather: Weather) -> list[str]:
-    """What is asked of the gear in waves, and where the autopilot stops short of it."""
+    """Notices on the load of the gear in waves, and on limits of the autopilot below those of the gear."""
     notices = []
     if kept.rate_limited_percent > _BUSY_PERCENT:
         remedy = f"--wave-filter {weather.wave_radps:.3g}" if design.kind == "pid" else "--design pid --wave-filter"
@@ -378,7 +378,7 @@ def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weathe
     if limit > LARGEST_RUDDER_RAD * (1 + 1e-9):
         notices.append(
             f"the autopilot orders no more than {math.degrees(LARGEST_RUDDER_RAD):.0f} deg of rudder, the angle that "
-            f"SOLAS II-1, regulation 29, asks a gear for; this gear goes to {math.degrees(limit):.3g} deg"
+            f"SOLAS II-1, regulation 29, requires of a gear; this gear goes to {math.degrees(limit):.3g} deg"
         )
     return notices
 

@@ -4,8 +4,8 @@
 
 a is the direction of the leg, e the cross-track error (positive to its right), D the lookahead distance, z the integral
 with its gain s: with s = 0 the lookahead-based line of sight of Fossen (2011), Handbook of Marine Craft Hydrodynamics
-and Motion Control, 10.3.2; with it the integral one of Borhaug, Pavlov & Pettersen (2008), 47th IEEE CDC, by
-which a current leaves no error. A leg ends within the circle of acceptance about its waypoint, or abeam of it.
+and Motion Control, 10.3.2; otherwise that with integral action of Borhaug, Pavlov & Pettersen (2008), 47th IEEE CDC,
+which removes the error by a current. A leg ends within the circle of acceptance about its waypoint, or abeam of it.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.trajectory import Trajectory
 
 GUIDANCE_STEP_S = 1.0
-"""Interval at which a new heading is ordered: as often as a receiver of satellite navigation gives positions."""
+"""Interval of heading orders: that of positions from satellite navigation."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Guidance:
-    """How a track is steered for, in lengths of the ship.
+    """Settings of the guidance, in lengths of the ship.
 
     Parameters
     ----------
     lookahead_lengths : float
-        D. Project choice: shorter ones come to the track sooner, and swing across it.
+        D. Project choice: shorter distances reach the track sooner, but oscillate about it.
     acceptance_lengths : float
         Radius about a waypoint in which the next leg begins; 2 by Fossen (2011), 10.3.2.
     integral_share : float
@@ -62,9 +62,9 @@ class TrackKeeping:
     largest_error_m, rms_error_m : float
         Cross-track errors, corners in between.
     largest_error_on_legs_m : float
-        The largest after half of each leg: what is left when the corner is behind.
+        The largest error after half of each leg, without the effect of the corner.
     mean_error_at_end_m : float
-        Mean over the last quarter of the last leg sailed, positive to starboard of the track: what stays.
+        Mean over the last quarter of the last leg sailed, positive to starboard of the track: the remaining error.
     """
 
     length_m: float
@@ -77,12 +77,12 @@ class TrackKeeping:
 
 
 LONGEST_TRACK_M = 1e6
-"""Longest track, m. Project choice: a day and a half at 15 kn; longer ones are mistakes in units, and take minutes."""
+"""Longest track, m. Project choice: a day and a half at 15 kn; longer tracks are errors of units, and take minutes."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrackRun:
-    """A track as it was sailed: the motion, and at each guidance step (n,) the leg (from 0) and cross-track error."""
+    """A sailed track: the motion, and at each guidance step (n,) the leg (from 0) and cross-track error."""
 
     trajectory: Trajectory
     time_s: Array
@@ -92,7 +92,7 @@ class TrackRun:
     figures: TrackKeeping
 
     def as_json(self) -> dict[str, list[float]]:
-        """Place and error over time, thinned to draw; the error positive to starboard of the track."""
+        """Position and error over time, thinned for a chart; the error positive to starboard of the track."""
         run = self.trajectory
         x_m, y_m = (np.interp(self.time_s, run.t, run[name]) for name in ("motion.x", "motion.y"))
         return drawn_columns({"t_s": self.time_s, "x_m": x_m, "y_m": y_m, "cross_track_error_m": self.error_m})
@@ -104,7 +104,7 @@ def read_waypoints(path: Path | str) -> Array:
     Raises
     ------
     InputError
-        The file is not such a table, a cell is empty, there are fewer than two, two that follow are one place, or the
+        The file is not such a table, a cell is empty, it has fewer than two, two consecutive points coincide, or the
         track is longer than :data:`LONGEST_TRACK_M`.
     """
     table = read_table(path)
@@ -118,12 +118,12 @@ def read_waypoints(path: Path | str) -> Array:
 
 
 def check_waypoints(points: Array, source: Path | str, place: Callable[[int], str]) -> None:
-    """Refuse waypoints (n, 2) that make no track; `place` says where one of a number, from 0, is.
+    """Refuse waypoints (n, 2) that do not form a track; `place` gives the location of a waypoint by its number, from 0.
 
     Raises
     ------
     InputError
-        One is not finite, there are fewer than two, two that follow are one place, or the track is longer than
+        One is not finite, it has fewer than two, two consecutive points coincide, or the track is longer than
         :data:`LONGEST_TRACK_M`.
     """
     if len(points) < 2:
@@ -139,7 +139,7 @@ def check_waypoints(points: Array, source: Path | str, place: Callable[[int], st
     same = np.flatnonzero(lengths < 1e-6)
     if same.size:
         problem = "is the same place as the waypoint before"
-        raise InputError(source, place(int(same[0]) + 1), problem, "delete one of them")
+        raise InputError(source, place(int(same[0]) + 1), problem, "delete one of the two")
 
 
 def line_of_sight(error: float, integral: float, lookahead: float, gain: float = 0.0) -> tuple[float, float]:
@@ -208,7 +208,7 @@ def _refuse_short_legs(waypoints: Array, radius: float) -> None:
 
 
 class _Sailed:
-    """A track on the way: which leg, the integral, and what was met at each guidance step."""
+    """State of a track: the leg, the integral, and the record of each guidance step."""
 
     def __init__(self, waypoints: Array, guidance: Guidance, length: float, speed: float):
         self._points = waypoints
@@ -244,7 +244,7 @@ class _Sailed:
         return along, -north * math.sin(course) + east * math.cos(course), size, course
 
     def run(self, trajectory: Trajectory, total: float) -> TrackRun:
-        """What was sailed, with its figures."""
+        """The sailed track, with its figures."""
         time, leg, along, error = np.array(self._met).T
         later = np.abs(error[along > 0.5]) if (along > 0.5).any() else np.abs(error)
         last = (leg == leg[-1]) & (along > along[-1] - 0.25)

@@ -1,1 +1,1 @@
-"""Influence coefficients: how much each number on a card moves a manoeuvring figure."""
+"""Influence coefficients: effect of each number on a card on a manoeuvring figure."""

@@ -1,8 +1,7 @@
 """Influence coefficients of a ship's card: K % of every number on the card on any manoeuvring figure.
 
-By exact slopes, K = 10 c/F dF/dc, and by the 10 % difference of the paper
-(:mod:`tank2sim.analysis.influence.percent`), side by side; and what the standard errors of the card, and
-their covariance where there is one next to it, make of each figure.
+By exact slopes, K = 10 c/F dF/dc, and by the 10 % difference of the paper (:mod:`tank2sim.analysis.influence.percent`),
+side by side; and the standard error of each figure from those of the card, with their covariance if the card has one.
 """
 
 from __future__ import annotations
@@ -22,16 +21,17 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 
 CURVED = 1.5
-"""Factor between slope and 10 % difference that is reported. Project choice: the figure bends or jumps there."""
+"""Reported factor between slope and 10 % difference. Project choice: the figure bends or jumps there."""
 
 REPORTED_FROM = 0.5
-"""... where either is at least this percentage of the figure. Project choice: smaller ones move no decision."""
+"""... where either is at least this percentage of the figure. Project choice: smaller differences do not change a
+decision."""
 
 
 @dataclass(frozen=True)
 class Agreed:
-    """An agreed variation: Kc % by parameter, and for each figure what the sum of Kc K / 10 predicts, by exact slopes
-    and by 10 % differences, and what computing it directly gives; per cent of the figure."""
+    """An agreed variation: Kc % by parameter, and for each figure the prediction by the sum of Kc K / 10, with exact
+    slopes and with 10 % differences, and the direct result; per cent of the figure."""
 
     percent: Mapping[str, float]
     predicted: tuple[float, ...]
@@ -88,12 +88,11 @@ class CardInfluence:
 
     @property
     def shares(self) -> Array:
-        """Share (nf, k) of the variance of each figure that would go if a parameter were known exactly; 0 where that is
-        zero.
+        """Share (nf, k) of the variance of each figure that an exact parameter would remove; 0 without variance.
 
         (J C e_k)^2 / (C_kk J C J^T), the squared correlation of figure and parameter: the first-order index of Sobol
-        (1993) of normal errors. Of independent ones it is (J_k s_k)^2 over their sum, and all shares make one; of
-        those that go together each has what it shares with the others, too.
+        (1993) of normal errors. For independent parameters it is (J_k s_k)^2 over their sum, and the shares add to one;
+        the share of a correlated parameter includes its common part.
         """
         C = self.errors.covariance
         size = self._variances[:, None] * np.diag(C)
@@ -101,12 +100,12 @@ class CardInfluence:
 
     @property
     def of_errors(self) -> str:
-        """Which standard errors those of the figures are from."""
+        """Text on the origin of the figures' standard errors."""
         if not self.errors.together:
             return "standard errors of figures are from those of the card's numbers, as if these were independent"
-        others = "" if len(self.errors.together) == len(self.parameters) else ", others as if independent"
+        remainder = "" if len(self.errors.together) == len(self.parameters) else ", others as if independent"
         count = len(self.errors.together)
-        return f"standard errors of figures are from the covariance next to the card ({count} numbers{others})"
+        return f"standard errors of figures are from the covariance next to the card ({count} numbers{remainder})"
 
     @property
     def _variances(self) -> Array:
@@ -117,7 +116,7 @@ class CardInfluence:
     def as_json(self) -> dict[str, object]:
         """``influence_percent``: {figure: {parameter: {exact, difference}}}; ``figures`` with standard errors.
 
-        Parameters have their dotted keys in the card's file, and their values as they stand there.
+        Parameters have their dotted keys and values in the card's file.
         """
         exact, errors, shares = self.exact, self.standard_errors, self.shares
         names = [parameter.key for parameter in self.parameters]
@@ -178,7 +177,7 @@ def influence(study: Study, agreed: Mapping[str, float] | None = None) -> CardIn
     Raises
     ------
     InputError
-        `agreed` has a name that is none of the card's parameters.
+        `agreed` has a name that is not a parameter of the card.
     """
     values, slopes = study.slopes_at(study.values)
     difference = _differences(study)
@@ -224,9 +223,9 @@ def _agreed(study: Study, found: CardInfluence, percent: Mapping[str, float]) ->
 
 
 def _differing(study: Study, sloped: Array) -> Iterable[str]:
-    """A word where the slopes are those of another value than the figure's: the event behind it is not the same."""
-    for figure, one, other in zip(study.figures, study.base, sloped, strict=True):
-        if not abs(one - other) <= 1e-4 * max(abs(one), 1e-3):
+    """Notices on figures whose slopes belong to a different event, with another value than the figure's."""
+    for figure, value, sloped_value in zip(study.figures, study.base, sloped, strict=True):
+        if not abs(value - sloped_value) <= 1e-4 * max(abs(value), 1e-3):
             yield f"{figure.text}: its slopes are not to be trusted, the manoeuvre has no clean event there"
 
 

@@ -1,10 +1,10 @@
 """Figures of straight courses and steady turns with their exact slopes by the parameters of a model.
 
-A state of rest z solves f(z, p) = 0, and a figure there is g(z, p). By the implicit function theorem
+An equilibrium z solves f(z, p) = 0, and a figure is g(z, p). By the implicit function theorem
 
     dg/dp = g_p - g_z f_z^-1 f_p
 
-which is what CasADi derives through its ``rootfinder``.
+which CasADi derives through its ``rootfinder``.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 
 _ACCURACY = 1e-9
-"""Residuals, scaled to about one, at which a state of rest is found; Newton's last step is far below it."""
+"""Residuals, scaled to about one, of an accepted equilibrium; Newton's last step is far below it."""
 
 
 @dataclass(frozen=True)
 class _Problem:
-    """f(z, p) = 0 in scaled unknowns z (nz, 1), and what is read off there."""
+    """f(z, p) = 0 in scaled unknowns z (nz, 1), and the values there."""
 
     unknown: ca.SX
     residual: ca.SX
@@ -36,13 +36,13 @@ class _Problem:
 
 
 class EquilibriumFigures:
-    """A state of rest of a model and what is read off it.
+    """An equilibrium of a model and its values.
 
     Parameters
     ----------
     model : Model
     problem : _Problem
-        Of expressions that hold its unknowns, the inputs and the parameters of the model.
+        Expressions in its unknowns, the inputs and the parameters of the model.
     names : sequence of str
         What is shown.
     """
@@ -64,27 +64,27 @@ class EquilibriumFigures:
         self._slopes = ca.Function("slopes", [z, u, p], [ca.jacobian(values, p)])
 
     def at(self, near: Array, inputs: Mapping[str, float], p: Array) -> tuple[Array, Array] | None:
-        """Unknowns (nz,) and values (n,) at the state of rest next to `near`; None if there is none."""
+        """Unknowns (nz,) and values (n,) at the equilibrium near `near`; None if there is none."""
         u = self._model.input_values(inputs)
-        z, values = (np.array(one).ravel() for one in self._values(near, u, p))
-        left = np.array(self._residual(z, u, p))
-        return (z, values) if np.all(np.abs(left) < _ACCURACY) and np.isfinite(values).all() else None
+        z, values = (np.array(value).ravel() for value in self._values(near, u, p))
+        residual = np.array(self._residual(z, u, p))
+        return (z, values) if np.all(np.abs(residual) < _ACCURACY) and np.isfinite(values).all() else None
 
     def slopes(self, z: Array, inputs: Mapping[str, float], p: Array) -> Array:
-        """Slopes (n, np) of the values by all parameters, at a state of rest."""
+        """Slopes (n, np) of the values by all parameters, at an equilibrium."""
         return np.array(self._slopes(z, self._model.input_values(inputs), p))
 
 
 def turning_states(model: Model) -> tuple[str, ...]:
-    """States that come to rest in a steady turn: those that move with the hull, and those before the steering gear."""
+    """States that are constant in a steady turn: those of the hull, and those of the steering gear."""
     return tuple(dict.fromkeys((*hull_states(model), *(state.name for state in model.states if state.steady))))
 
 
 def steady_turns(model: Model) -> EquilibriumFigures:
     """Steady turns of a ship: unknowns are its :func:`turning_states` over their nominal sizes.
 
-    Shown are ``u``, ``v`` and ``r`` as functions of rudder order (the input) and parameters, and by ``place`` how much
-    the turn feels where the ship is and heads: not at all in calm and open water.
+    Shown are ``u``, ``v`` and ``r`` as functions of rudder order (the input) and parameters, and ``place``, the effect
+    of position and heading on the turn: zero in calm and open water.
     """
     names = turning_states(model)
     scale = np.array([model[name].nominal for name in names])
@@ -133,15 +133,15 @@ def turn_figures(u: float, v: float, r: float, side: float, approach: float) -> 
 
 
 def straight_courses(model: Model) -> tuple[EquilibriumFigures, Array]:
-    """The straight course at the speed of expansion with Nomoto's coefficients and the criterion, and where it is.
+    """The straight course at the speed of expansion with Nomoto's coefficients, the criterion and its state.
 
-    Unknowns are v/u0 and the rudder angle. What is shown has the names of
+    Unknowns are v/u0 and the rudder angle. The values have the names of
     :mod:`tank2sim.analysis.stability.straight_line`.
     """
     unknown = ca.SX.sym("z", 2)
     speed0 = model.symbol("ship.speed")
-    own = {"motion.v": unknown[0] * speed0, "rudder.angle": unknown[1]}
-    x = ca.vcat([own.get(state.name, ca.SX(state.start)) for state in model.states])
+    nominal = {"motion.v": unknown[0] * speed0, "rudder.angle": unknown[1]}
+    x = ca.vcat([nominal.get(state.name, ca.SX(state.start)) for state in model.states])
     time = model.symbol("ship.length") / speed0
     motion = model.expand(ca.vcat([model.symbol("motion.vdot") * time / speed0, model.symbol("motion.rdot") * time**2]))
     shown = _linear_figures(model)
@@ -180,7 +180,9 @@ def _reduced(model: Model, values: Sequence[str]) -> tuple[ca.SX, ca.SX]:
     """Slopes (n, 2) by v and r and (n, 1) by the rudder, with :func:`settled_states` eliminated."""
     settled = settled_states(model)
     derivative = {state.name: state.derivative for state in model.states}
-    rows = model.expand(ca.vcat([model.symbol(name) for name in (*values, *(derivative[one] for one in settled))]))
+    rows = model.expand(
+        ca.vcat([model.symbol(name) for name in (*values, *(derivative[settled_state] for settled_state in settled))])
+    )
     columns = ca.vcat([model.symbol(name) for name in ("motion.v", "motion.r", *settled, "rudder.angle")])
     whole = ca.jacobian(rows, columns)
     n = len(values)

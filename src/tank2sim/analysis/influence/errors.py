@@ -1,4 +1,4 @@
-"""How the errors of a card's numbers go together: the covariance of its parameters, as the model has them."""
+"""Joint errors of a card's numbers: the covariance of its parameters in the model's units."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class JointErrors:
     covariance : array (k, k)
         In the units of the parameters' values.
     together : frozenset of str
-        Keys of those in the covariance next to the card; all others are independent. Empty where the card has none.
+        Keys of the parameters in the card's covariance; all others are independent. Empty without a covariance.
     """
 
     parameters: tuple[CardParameter, ...]
@@ -32,33 +32,33 @@ class JointErrors:
 
     @property
     def in_words(self) -> list[str]:
-        """What a user should know of them."""
-        told = standard_errors_in_words(self.parameters, self.together)
-        return [self.together_in_words, *told] if self.together else told
+        """Notices on the standard errors."""
+        words = standard_errors_in_words(self.parameters, self.together)
+        return [self.together_in_words, *words] if self.together else words
 
     @property
     def together_in_words(self) -> str:
-        """Which of them go together."""
+        """Text on the correlated parameters."""
         return f"errors of {len(self.together)} numbers go together, as the covariance next to the card says"
 
 
 def joint_errors(card: ManoeuvringCard, parameters: Sequence[CardParameter]) -> JointErrors:
-    """The errors of parameters of a card: those in its covariance go together as it says, all others are independent.
+    """The errors of parameters of a card: correlated if in its covariance, else independent.
 
     Raises
     ------
     InputError
-        The covariance to which the card refers is at fault.
+        The covariance to which the card refers has an error.
     """
     known = read_covariance(card)
-    own = np.array([parameter.standard_error for parameter in parameters])
-    covariance = np.diag(own**2)
+    standard_errors = np.array([parameter.standard_error for parameter in parameters])
+    covariance = np.diag(standard_errors**2)
     if known is None:
         return JointErrors(tuple(parameters), covariance, frozenset())
     places = {parameter.key: place for place, parameter in enumerate(parameters)}
     names = [name for name in known.names if name in places]
     rows = [places[name] for name in names]
-    here = [known.names.index(name) for name in names]
+    columns = [known.names.index(name) for name in names]
     factors = np.array([parameters[row].factor for row in rows])
-    covariance[np.ix_(rows, rows)] = known.matrix[np.ix_(here, here)] / np.outer(factors, factors)
+    covariance[np.ix_(rows, rows)] = known.matrix[np.ix_(columns, columns)] / np.outer(factors, factors)
     return JointErrors(tuple(parameters), covariance, frozenset(names))

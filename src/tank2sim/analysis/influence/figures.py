@@ -1,4 +1,4 @@
-"""The figures whose influence coefficients can be asked, and how a user writes them: ``FIGURE@ARGUMENT``."""
+"""Figures with influence coefficients, and their text form: ``FIGURE@ARGUMENT``."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 
 STRAIGHT, STEADY, TURN, ZIGZAG = "straight course", "steady turn", "turning circle", "zigzag"
-"""Where a figure is read off: a linearised straight course, an equilibrium, or a simulated manoeuvre."""
+"""Origin of a figure: a linearised straight course, an equilibrium, or a simulated manoeuvre."""
 
 FIGURE_OPTION = "--figure"
 
 
 @dataclass(frozen=True)
 class FigureKind:
-    """A kind of figure: its name with the unit at its end, where it is read off, and what it is."""
+    """A kind of figure: its name with the unit at its end, its origin, and its description."""
 
     name: str
     family: str
@@ -63,7 +63,7 @@ ARGUMENTS = {
     TURN: ("@35", "the rudder in deg, positive to starboard"),
     ZIGZAG: ("@20/20", "rudder/heading in deg"),
 }
-"""Family to an example of its argument, and what that is."""
+"""Family to an example of its argument, and the meaning of the argument."""
 
 
 def forms() -> str:
@@ -77,7 +77,7 @@ def forms() -> str:
 
 @dataclass(frozen=True)
 class InfluenceFigure:
-    """A figure of a ship: what kind, at which rudder (and heading) in rad, and how the user wrote it."""
+    """A figure of a ship: its kind, rudder (and heading) in rad, and the user's text."""
 
     text: str
     kind: FigureKind
@@ -85,26 +85,26 @@ class InfluenceFigure:
 
     @property
     def manoeuvre(self) -> Turn | Zigzag | None:
-        """What is simulated for it: for a steady turn that which leads there; None on a straight course."""
+        """The simulated manoeuvre: for a steady turn the turning circle to it; None on a straight course."""
         if self.kind.family == STRAIGHT:
             return None
         return Zigzag(*self.angles) if self.kind.family == ZIGZAG else Turn(*self.angles)
 
 
 def parse_figure(text: str, option: str = FIGURE_OPTION) -> InfluenceFigure:
-    """The figure that a command line means: ``criterion_C``, ``steady_radius_m@20``, ``overshoot1_deg@20/20``.
+    """Parse a figure of a command line: ``criterion_C``, ``steady_radius_m@20``, ``overshoot1_deg@20/20``.
 
     Raises
     ------
     InputError
-        There is no such figure, or its argument is missing, too much or out of bounds.
+        The figure does not exist, or its argument is missing, not allowed or out of bounds.
     """
     name, at, argument = text.strip().partition("@")
     kind = FIGURE_KINDS.get(name)
     if kind is None:
         close = difflib.get_close_matches(name, FIGURE_KINDS, n=1)
         remedy = f"did you mean {close[0]}?" if close else f"there are: {forms()}"
-        raise InputError(option, text, "is no figure", remedy)
+        raise InputError(option, text, "is not a figure", remedy)
     example, words = ARGUMENTS[kind.family]
     number = r"([+-]?\d+(?:\.\d+)?)"
     pattern = {STRAIGHT: "", ZIGZAG: f"{number}/{number}"}.get(kind.family, number)

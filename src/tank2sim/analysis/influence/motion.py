@@ -1,14 +1,14 @@
 """Figures of simulated manoeuvres with their exact slopes by the parameters, through events.
 
-Between events the slopes S = dx/dp of the states go forward with the derivative of each Runge-Kutta step
+Between events the slopes S = dx/dp of the states are integrated by the derivative of each Runge-Kutta step
 (:class:`tank2sim.simulation.sensitivity.Sensitivity`). An event at which a state c crosses a level moves in time by
 
     dt/dp = -S_c / f_c,
 
 so that a state at the event changes by S + f dt/dp; and where a rudder order is given at an event, the motion after it
-begins with S + (f_before - f_after) dt/dp (Rozenwasser and Yusupov 2000, Sensitivity of Automatic Control Systems).
-At kinks of the right-hand side (a rate limit is reached) f is continuous and S goes on; steps end there, as one across
-a kink would mix the slopes of both sides.
+begins with S + (f_before - f_after) dt/dp (Rozenwasser and Yusupov 2000, Sensitivity of Automatic Control Systems). At
+kinks of the right-hand side (a rate limit is reached) f and S are continuous; steps end there, because a step across a
+kink would mix the slopes of both sides.
 """
 
 from __future__ import annotations
@@ -34,24 +34,24 @@ from tank2sim.simulation.trajectory import Trajectory
 Sloped = tuple[float, Array]
 """A value and its slopes (k,) by the parameters."""
 
-BESIDE_KINK = 1e-4
-"""Steps end this share of a step before a kink and begin as far behind it, so that no stage of a step falls on it:
-there the slopes would be those of one side or the other, as rounding has it."""
+KINK_MARGIN = 1e-4
+"""Steps end this share of a step before a kink and begin the same distance behind it, so that no stage of a step is at
+the kink, where rounding would determine the side of its slopes."""
 
 HALF_TURN = ("tactical", "time_180")
-"""Beginnings of names of figures of a turn that are read off at 180 deg; the others are at 90 deg."""
+"""Beginnings of names of figures of a turn at 180 deg; all other figures are at 90 deg."""
 
 _CHUNK = 1000  # steps whose tangents are held at a time
 
 
 def overshoots_in(names: Collection[str]) -> int:
-    """Number of the last overshoot that is named (``overshoot2_deg``); 0 if none is."""
+    """Number of the last named overshoot (``overshoot2_deg``); 0 without any."""
     return max((int(name.removeprefix("overshoot")[0]) for name in names if name.startswith("overshoot")), default=0)
 
 
 @dataclass(frozen=True)
 class Event:
-    """What happens when a state crosses a level: time (s) and states (nx,), and their slopes (k,) and (nx, k)."""
+    """Event of a state that crosses a level: time (s) and states (nx,), and their slopes (k,) and (nx, k)."""
 
     time: float
     x: Array
@@ -65,7 +65,7 @@ class MotionSlopes:
     Parameters
     ----------
     integrator : Integrator
-        Of the model with which the manoeuvres were simulated.
+        Integrator of the model of the simulations.
     free : sequence of str
         Names of the k parameters.
     """
@@ -87,7 +87,7 @@ class MotionSlopes:
     ) -> dict[str, Sloped]:
         """Figures by their names in :mod:`tank2sim.analysis.influence.figures`, as far as the run shows them.
 
-        What happens after the last event of those in `names` is not gone through.
+        The run is not evaluated after the last event of the figures in `names`.
         """
         side = math.copysign(1.0, manoeuvre.rudder)
         axes = _Axes(run.x[0], self.model, side, length)
@@ -114,8 +114,8 @@ class MotionSlopes:
         executes = run.t[_orders(run)]
         turns = run.crossings("motion.r", "motion.rdot", 0.0)
         peaks = [float(later[0]) for time in executes[:overshoots] if len(later := turns[turns > time])]
-        asked = [*(("motion.psi", float(time)) for time in executes[:1]), *(("motion.r", time) for time in peaks)]
-        events = self.events(run, asked, p)
+        crossings = [*(("motion.psi", float(time)) for time in executes[:1]), *(("motion.r", time) for time in peaks)]
+        events = self.events(run, crossings, p)
         if not events:
             return {}
         first = events[0]
@@ -133,15 +133,15 @@ class MotionSlopes:
         return found
 
     def events(self, run: Trajectory, places: Sequence[tuple[str, float]], p: Array) -> list[Event]:
-        """Events of a run, each given by the state whose crossing of a level it is, and its time."""
+        """Events of a run, each given by the crossing state and its time."""
         if not places:
             return []
         last = max(time for _, time in places)
         rows = int(np.searchsorted(run.t, last)) + 2
         course = _Course(run.t[:rows], run.x[:rows], run.u[:rows])
         times = [time for _, time in places]
-        beside = BESIDE_KINK * self.model.step_s
-        sides = [time + step for time in self._kink_times(course, p) for step in (-beside, beside)]
+        margin = KINK_MARGIN * self.model.step_s
+        sides = [time + step for time in self._kink_times(course, p) for step in (-margin, margin)]
         course = self._with_samples(course, [*times, *(time for time in sides if 0 < time < last)], p)
         wanted = {int(np.argmin(np.abs(course.t - time))): None for time in times}
         slopes = self._forward(course, wanted, p)
@@ -156,7 +156,7 @@ class MotionSlopes:
         return found
 
     def _forward(self, course: _Course, wanted: dict[int, None], p: Array) -> dict[int, Array]:
-        """S (nx, k) at wanted rows, before what is ordered there."""
+        """S (nx, k) at the given rows, before the orders there."""
         nx = self.model.x.numel()
         psi = self.model.state_names.index("motion.psi")
         S = np.array(self._start(p))
@@ -182,7 +182,7 @@ class MotionSlopes:
         return np.array(self.model.rhs(x, u, p)).ravel()
 
     def _with_samples(self, course: _Course, times: Sequence[float], p: Array) -> _Course:
-        """The course with samples at more times, each one step from the sample before it."""
+        """The course with samples at further times, each one step from the previous sample."""
         near = 1e-7 * self.model.step_s
         new = [time for time in sorted(set(times)) if np.min(np.abs(course.t - time)) > near]
         before = np.searchsorted(course.t, new) - 1
@@ -202,10 +202,10 @@ class MotionSlopes:
         """Times at which the right-hand side has a kink, within steps."""
         if self._kinks is None:
             return []
-        (left,) = self._kinks(course.x[:-1], course.u[:-1], p)
+        (before,) = self._kinks(course.x[:-1], course.u[:-1], p)
         (right,) = self._kinks(course.x[1:], course.u[:-1], p)
         found = []
-        for row, column in np.argwhere((left < 0) != (right < 0)):
+        for row, column in np.argwhere((before < 0) != (right < 0)):
             gap = float(course.t[row + 1] - course.t[row])
             indicator = self._indicator(course, int(row), int(column), p)
             if (indicator(0.0) < 0) != (indicator(gap) < 0):  # not where rounding alone has changed the sign

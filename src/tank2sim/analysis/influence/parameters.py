@@ -1,4 +1,4 @@
-"""What of a ship's card has an influence: its numbers as parameters of the model, their errors, their keys in the file.
+"""Numbers of a ship's card with influence: parameters of the model, with their errors and keys in the file.
 
 These are the derivatives, the rigid body, the steering gear, the effect of revolutions and the parameters of the card's
 effects. Particulars (length, speed of expansion, density) only scale them, and sensors do not move the ship.
@@ -30,17 +30,17 @@ class CardParameter:
     name : str
         Of the model's parameter, ``derivatives.Yv``.
     value : float
-        As the model has it: prime or SI, rudder positive to starboard.
+        In the model's unit: prime or SI, rudder positive to starboard.
     standard_error : float
-        In the same unit; 0 where the number is taken as exact.
+        In the same unit; 0 for an exact number.
     assumed : bool
         The card states no standard error: :data:`DEFAULT_RELATIVE_ERROR` of the value is taken.
     key : str
         Dotted key in the card's file.
     factor : float
-        What the value is multiplied by to stand in the file.
+        Factor from the value to the number in the file.
     bounds : tuple
-        Values that the number cannot leave, in the unit of `value`; None is no bound.
+        Bounds of the number, in the unit of `value`; None without a bound.
     """
 
     name: str
@@ -53,12 +53,12 @@ class CardParameter:
 
     @property
     def short(self) -> str:
-        """The name as the card has it: ``Yv``, ``mass``, ``current.speed``."""
+        """The name in the card: ``Yv``, ``mass``, ``current.speed``."""
         return self.name.removeprefix("derivatives.").removeprefix("ship.")
 
 
 def study_model(card: ManoeuvringCard) -> Model:
-    """The model of a card in which what its effects take as inputs (a current) are constants, which can be varied."""
+    """The model of a card with the inputs of its effects (a current) as constants, which can be varied."""
     model = build(card)
     names = [name for entry in card.effects for name in EFFECTS[entry.name].model_names().values()]
     return model.with_constant_inputs(names)
@@ -68,16 +68,20 @@ def card_parameters(card: ManoeuvringCard, model: Model) -> tuple[CardParameter,
     """Parameters of a card that are in its model, except for those that are zero without a standard error."""
     found = (*_derivatives(card, model), *_rigid_body(card), *_gear(card), *_propulsion(card), *_effects(card, model))
     known = set(model.parameter_names)
-    return tuple(one for one in found if one.name in known and (one.value != 0 or one.standard_error > 0))
+    return tuple(
+        parameter
+        for parameter in found
+        if parameter.name in known and (parameter.value != 0 or parameter.standard_error > 0)
+    )
 
 
 def find_parameter(parameters: Sequence[CardParameter], name: str, option: str) -> CardParameter:
-    """The parameter that a user means, by its whole name or by that in the card.
+    """The parameter of a user's name, either its full name or that in the card.
 
     Raises
     ------
     InputError
-        The card has no such parameter, or it is zero and known to be so.
+        The parameter does not exist on the card, or is exactly zero.
     """
     by_name = {key: parameter for parameter in parameters for key in (parameter.key, parameter.short, parameter.name)}
     if name in by_name:
@@ -86,7 +90,7 @@ def find_parameter(parameters: Sequence[CardParameter], name: str, option: str) 
     remedy = (
         f"did you mean {close[0]}?" if close else f"there are: {', '.join(parameter.short for parameter in parameters)}"
     )
-    raise InputError(option, name, "is no parameter of this card that is not zero", remedy)
+    raise InputError(option, name, "is not a non-zero parameter of this card", remedy)
 
 
 def _derivatives(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
@@ -139,7 +143,7 @@ def _exact(card: ManoeuvringCard, name: str, place: str, value: float) -> CardPa
 
 
 def _propulsion(card: ManoeuvringCard) -> list[CardParameter]:
-    """Xnn; the nominal revolutions are those of the order, too, and without influence."""
+    """Xnn; the nominal revolutions are also those of the order, and have no influence."""
     if card.propulsion is None:
         return []
     factor = float(card.scales.force) if card.model.scaling == "dimensional" else 1.0
@@ -170,17 +174,17 @@ def _effects(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
 
 
 def standard_errors_in_words(parameters: Sequence[CardParameter], known: Collection[str] = frozenset()) -> list[str]:
-    """What a user should know of the standard errors that are taken; those of the keys `known` stand elsewhere."""
-    others = [parameter for parameter in parameters if parameter.key not in known]
-    assumed = [other.short for other in others if other.assumed and other.standard_error > 0]
-    exact = [other.short for other in others if other.standard_error == 0]
+    """Notices on assumed standard errors, except for those of the keys `known`."""
+    remaining = [parameter for parameter in parameters if parameter.key not in known]
+    assumed = [unlisted.short for unlisted in remaining if unlisted.assumed and unlisted.standard_error > 0]
+    exact = [unlisted.short for unlisted in remaining if unlisted.standard_error == 0]
     messages = []
     if assumed:
         every = len(assumed) + len(exact) == len(parameters)
-        which = "any number" if every else ", ".join(assumed)
+        subject = "any number" if every else ", ".join(assumed)
         mark = f"{ASSUMED}, not measured ones: " if every else ""
         share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of the value is taken"
-        messages.append(f"{mark}the card states no standard error of {which}: {share}")
+        messages.append(f"{mark}the card states no standard error of {subject}: {share}")
     if exact:
         messages.append(f"taken as exact, for a card states no standard error of them: {', '.join(exact)}")
     return messages
@@ -194,12 +198,12 @@ def agreed_by_name(
     Raises
     ------
     InputError
-        A name is none of the card's, or stands twice.
+        A name is not on the card, or is repeated.
     """
     found: dict[str, float] = {}
     for name, percent in agreed.items():
-        own = find_parameter(parameters, name, option).name
-        if own in found:
+        parameter = find_parameter(parameters, name, option).name
+        if parameter in found:
             raise InputError(option, name, "is given twice", "give each parameter once")
-        found[own] = percent
+        found[parameter] = percent
     return found

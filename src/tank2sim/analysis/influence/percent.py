@@ -1,7 +1,7 @@
-"""Influence coefficients as Poznyakov and Yudin have them: K % by a difference of 10 %, and agreed variations.
+"""Influence coefficients of Poznyakov and Yudin: K % by a difference of 10 %, and agreed variations.
 
 K = 100 (F(1.1 c)/F(c) - 1) is the change of a figure F in per cent when one coefficient c grows by 10 %. An agreed
-variation is a change of all coefficients together, by Kc per cent each, as by another draught; to first order it
+variation is a change of all coefficients together, by Kc per cent each, for example with the draught; to first order it
 changes the figure by the sum of Kc K / 10 per cent.
 """
 
@@ -22,7 +22,7 @@ def difference_percent(
     Parameters
     ----------
     figure : callable
-        ``figure(values) -> float``; it may give nan where there is no such figure.
+        ``figure(values) -> float``; nan where the figure does not exist.
     values : mapping
         Coefficients by name.
     step_percent : float
@@ -39,7 +39,7 @@ def difference_percent(
 
 
 def change_percent(value: float, base: float) -> float:
-    """Change from `base` to `value` in per cent of `base`; nan if that is zero or not known."""
+    """Change from `base` to `value` in per cent of `base`; nan if that is zero or unknown."""
     return 100 * (value / base - 1) if base else math.nan
 
 
@@ -51,7 +51,7 @@ def combined_percent(influence: Mapping[str, float], agreed: Mapping[str, float]
     influence : mapping
         K % by name, for 10 % of each coefficient.
     agreed : mapping
-        Kc % by name: by how much each coefficient changes with the others; those that are absent do not.
+        Kc % by name: change of each coefficient; absent coefficients do not change.
 
     Raises
     ------

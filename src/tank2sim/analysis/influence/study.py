@@ -27,33 +27,34 @@ from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import Run, simulate
 
 NO_TURN = 1e-4
-"""A ship whose steady yaw rate is less than this share of u0/L goes straight.
+"""Share of u0/L below which a steady yaw rate counts as a straight course.
 
 Project choice: a circle of 10 000 lengths.
 """
 
 PLACE_FELT = 1e-20
-"""Squared slopes of the scaled accelerations by place and heading from which no turn is steady: rounding is below."""
+"""Squared slopes of the scaled accelerations by position and heading above which turns are not steady: rounding is
+below."""
 
 SPARE = 1.5
-"""A manoeuvre is run this many times as long as the ship of the card needs for its figures, and whole where that is too
+"""Duration of a manoeuvre over that which the card's ship needs for its figures; the full duration if that is too
 short."""
 
 
 class Study:
-    """A ship with figures asked of it: their values and exact slopes at any values of its parameters.
+    """Figures of a ship: their values and exact slopes at any values of its parameters.
 
     Parameters
     ----------
     card : ManoeuvringCard
         The ship.
     figures : sequence of InfluenceFigure
-        What is asked.
+        Figures to compute.
 
     Raises
     ------
     InputError
-        The card is at fault, or does not show one of the figures.
+        The card has an error, or its ship does not show one of the figures.
     """
 
     def __init__(self, card: ManoeuvringCard, figures: Sequence[InfluenceFigure]):
@@ -62,12 +63,12 @@ class Study:
         self.parameters: tuple[CardParameter, ...] = card_parameters(card, self.model)
         self.values: Array = np.array([parameter.value for parameter in self.parameters])
         self._integrator = Integrator(self.model)
-        own = dict(zip(self.model.parameter_names, self.model.parameter_values().tolist(), strict=True))
-        self._length, self._speed = own["ship.length"], own["ship.speed"]
+        card_values = dict(zip(self.model.parameter_names, self.model.parameter_values().tolist(), strict=True))
+        self._length, self._speed = card_values["ship.length"], card_values["ship.speed"]
         self._places = [self.model.parameter_names.index(parameter.name) for parameter in self.parameters]
-        self._rest_near: dict[float, Array] = {}
+        self._equilibria: dict[float, Array] = {}
         self._long_enough: dict[Turn | Zigzag, float] = {}
-        self._told: dict[str, None] = dict.fromkeys(self.model.notices)
+        self._notices: dict[str, None] = dict.fromkeys(self.model.notices)
         self._known = False  # whether the figures of the card itself have been found: others say nothing of it
         self.base: Array = self.figures_at(self.values)
         self._known = True
@@ -92,11 +93,11 @@ class Study:
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What limits the ship of the card and its manoeuvres."""
-        return tuple(self._told)
+        """Notices on the limits of the card's ship and its manoeuvres."""
+        return tuple(self._notices)
 
     def figures_at(self, values: Array) -> Array:
-        """Figures (nf,) of the ship with parameters `values` (k,); nan for those that it does not show."""
+        """Figures (nf,) of the ship with parameters `values` (k,); nan for figures that it does not show."""
         return self._evaluated(values, sloped=False)[0]
 
     def slopes_at(self, values: Array) -> tuple[Array, Array]:
@@ -117,7 +118,7 @@ class Study:
         return found, slopes
 
     def _family(self, figure: InfluenceFigure, values: Array, sloped: bool) -> dict[str, tuple[float, Array | None]]:
-        """All figures that are read off where this one is, with their slopes if asked."""
+        """All figures of the same evaluation as this one, on request with their slopes."""
         p = self.model.parameter_values()
         p[self._places] = values
         if figure.kind.family == STRAIGHT:
@@ -139,11 +140,11 @@ class Study:
         return {name: (float(v), by) for name, v, by in zip(course.names, shown, slopes, strict=True)}
 
     def _steady(self, turn: Turn, text: str, p: Array, sloped: bool) -> dict[str, tuple[float, Array | None]]:
-        if turn.rudder not in self._rest_near:
-            self._rest_near[turn.rudder] = self._first_turn(turn, text, p)
+        if turn.rudder not in self._equilibria:
+            self._equilibria[turn.rudder] = self._first_turn(turn, text, p)
         side = math.copysign(1.0, turn.rudder)
         order = {"rudder.command": turn.rudder}
-        found = self._turning.at(self._rest_near[turn.rudder], order, p)
+        found = self._turning.at(self._equilibria[turn.rudder], order, p)
         if found is None:
             return {}
         z, (u, v, r, _) = found
@@ -156,7 +157,7 @@ class Study:
         return {name: (value, by) for (name, value), by in zip(named.items(), slopes, strict=True)}
 
     def _first_turn(self, turn: Turn, text: str, p: Array) -> Array:
-        """The steady turn to which a turning circle leads, which is refined and followed from there on."""
+        """The steady turn at the end of a turning circle, refined and then followed."""
         run = self._run(turn, p).trajectory
         names = turning_states(self.model)
         scale = np.array([self.model[name].nominal for name in names])
@@ -198,12 +199,12 @@ class Study:
             angles = [manoeuvre.rudder, *([manoeuvre.heading] if isinstance(manoeuvre, Zigzag) else [])]
             words = f"{type(manoeuvre).__name__.lower()} {'/'.join(f'{math.degrees(angle):.4g}' for angle in angles)}"
             marked = {f"{words}: {run.reading.message}": None} if run.reading.message else {}
-            self._told |= marked | dict.fromkeys(notice for notice in run.notices if notice != run.reading.message)
+            self._notices |= marked | dict.fromkeys(notice for notice in run.notices if notice != run.reading.message)
         return run
 
 
 def named_figures(given: Figures) -> dict[str, float]:
-    """Figures of a manoeuvre by the names of :mod:`tank2sim.analysis.influence.figures`, as far as it shows them."""
+    """Figures of a manoeuvre by the names of :mod:`tank2sim.analysis.influence.figures`, where the run shows them."""
     overshoots = given.get("overshoots_deg", [])
     assert isinstance(overshoots, list)
     spelt = {
@@ -215,7 +216,7 @@ def named_figures(given: Figures) -> dict[str, float]:
 
 
 def last_event(given: Figures, names: Collection[str]) -> float:
-    """Time (s) at which the last of the named figures has been shown."""
+    """Time (s) at which the last of the named figures is known."""
     if "time_90_s" in given:
         half = any(name.startswith(HALF_TURN) for name in names)
         return float(str(given["time_180_s" if half else "time_90_s"]))

@@ -1,4 +1,4 @@
-"""The manoeuvring criteria of IMO resolution MSC.137(76), from simulated trials, with the margin that is left."""
+"""The manoeuvring criteria of IMO resolution MSC.137(76), from simulated trials, with their margins."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from tank2sim.simulation.run import simulate
 from tank2sim.simulation.trajectory import Trajectory
 
 TRIAL_RUDDER = math.radians(35.0)
-"""Rudder of the turning circle trials: 35 deg, or the largest the gear allows."""
+"""Rudder of the turning circle trials: 35 deg, or the largest of the gear."""
 
 STOPPING, STOPPING_OF_LARGE_SHIPS = 15.0, 20.0
 """Track reach of full astern stopping, L: 15, and up to 20 where the Administration finds that impracticable for a ship
 of large displacement (5.3.4)."""
 
 SHORTEST_SHIP_M = 100.0
-"""Ships to which the standards apply are 100 m long or longer (and chemical tankers and gas carriers of any length)."""
+"""Least length of ships to which the standards apply: 100 m (and chemical tankers and gas carriers of any length)."""
 
 _SCALE = (
     "MSC.137(76) is for ships of 100 m and more: its limits of the 10/10 overshoots go with L/V in seconds, which a "
-    "model does not keep, and the card tells no scale: judge the overshoots of the ship it stands for"
+    "model does not keep, and the card states no scale: judge the overshoots at full scale"
 )
 
 _TURNED = math.radians(90.0)
-"""A ship that has turned so far against its rudder does not answer late, but the wrong way. Project choice."""
+"""Turn against the rudder from which a ship responds the wrong way, not late. Project choice."""
 
 
 @dataclass(frozen=True)
 class ImoCriterion:
-    """One criterion: what was found, what is allowed, in `unit`; `found` is None where the trial did not show it.
+    """A criterion: value and limit in `unit`; `found` is None where the trial did not show it.
 
-    `remark` says why nothing was found, or what the reader of the verdict should know; `beyond_card` is true if a trial
-    left what the card holds for, so that the verdict is an extrapolation.
+    `remark` states why it has no value, or a reservation on the verdict; `beyond_card` is True if a trial left the
+    card's range, so that the verdict is an extrapolation.
     """
 
     name: str
@@ -52,17 +52,17 @@ class ImoCriterion:
 
     @property
     def passed(self) -> bool | None:
-        """True if met; None if the trial did not show it, or only outside what the card was measured in."""
+        """True if met; None if the trial did not show it, or only outside the card's range."""
         return None if self.found is None or self.beyond_card else self.found <= self.allowed
 
     @property
     def margin(self) -> float | None:
-        """What is left to the limit, in `unit`; negative if the criterion is not met."""
+        """Margin to the limit, in `unit`; negative if the criterion is not met."""
         return None if self.found is None else self.allowed - self.found
 
     @property
     def margin_percent(self) -> float | None:
-        """The margin in per cent of what is allowed."""
+        """The margin in per cent of the limit."""
         return None if self.margin is None else 100 * self.margin / self.allowed
 
     def as_json(self) -> dict[str, object]:
@@ -72,25 +72,25 @@ class ImoCriterion:
 
 @dataclass(frozen=True)
 class _Trials:
-    """What runs the trials of one ship in calm water."""
+    """Trials of a ship in calm water."""
 
     model: Model
     integrator: Integrator
     parameters: Mapping[str, float]
 
     def run(self, manoeuvre: Manoeuvre) -> _Trial:
-        """A trial, or why there is none."""
-        # MSC.137(76) asks for calm water: a current on the card is part of one place, not of the ship.
+        """A trial, or the reason for its absence."""
+        # MSC.137(76) requires calm water: a current on the card belongs to a location, not to the ship.
         calm = undisturbed_inputs(self.model)
-        own, integrator = self.parameters, self.integrator
+        defaults, integrator = self.parameters, self.integrator
         try:
-            run = simulate(self.model, manoeuvre, inputs=calm, parameters=own, integrator=integrator)
+            run = simulate(self.model, manoeuvre, inputs=calm, parameters=defaults, integrator=integrator)
         except InputError as error:
             return _Trial({}, f"{error.place}: {error.problem}" if error.place else error.problem)
         return _Trial(run.figures, _wrong_way(manoeuvre, run.trajectory), run.reading)
 
     def worst(self, manoeuvres: Sequence[Manoeuvre], *places: tuple[str, int | None]) -> list[_Worse]:
-        """The larger of each figure over the trials, and why there is none or what to know of it."""
+        """The larger of each figure over the trials, with a remark on its absence or validity."""
         runs = [self.run(manoeuvre) for manoeuvre in manoeuvres]
         trouble = next((run.trouble for run in runs if run.trouble), "")
         found: list[_Worse] = []
@@ -109,7 +109,7 @@ class _Trials:
 
 @dataclass(frozen=True)
 class _Trial:
-    """Figures of a trial, why there are none, and which were settled outside what the card was measured in."""
+    """Figures of a trial, the reason without any, and the names of those outside the card's range."""
 
     figures: Figures
     trouble: str
@@ -118,26 +118,26 @@ class _Trial:
 
 @dataclass(frozen=True)
 class _Worse:
-    """The worse figure of trials, None if they do not show it; a remark, and whether they left the card's range first.
+    """The worse figure of trials, None if they do not show it; a remark, and True if they left the card's range first.
 
-    A figure that is there has a remark only if it was settled outside the card's range.
+    An existing figure has a remark only if it is outside the card's range.
     """
 
     value: float | None
     remark: str
-    left_range: bool = False
+    beyond_range: bool = False
 
     @property
     def beyond(self) -> bool:
-        return self.left_range or (self.value is not None and bool(self.remark))
+        return self.beyond_range or (self.value is not None and bool(self.remark))
 
 
 def _wrong_way(manoeuvre: Manoeuvre, run: Trajectory) -> str:
-    """A cause that shows nothing else: a ship that turns against its rudder."""
+    """Cause of missing figures: a ship that turns against its rudder."""
     if not isinstance(manoeuvre, Turn | Zigzag):
         return ""
     turned = float(run["motion.psi"][-1] - run["motion.psi"][0])
-    # A zigzag that is carried out ends on either side, yet never goes far.
+    # A complete zigzag reaches both sides, but only small headings.
     against = turned * manoeuvre.rudder < 0 and abs(turned) > _TURNED
     return "the ship turns against its rudder: see the signs of Yd and Nd and the card's rudder_sign" if against else ""
 
@@ -147,7 +147,7 @@ def imo_criteria(
 ) -> tuple[ImoCriterion, ...]:
     """Turning, initial turning, yaw checking and stopping of a ship at its speed of expansion (5.3.1 to 5.3.4).
 
-    The worse of starboard and port is taken. A trial that cannot be run leaves its criteria open, with the reason.
+    The worse of starboard and port counts. A trial that cannot be run leaves its criteria open, with the reason.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def imo_criteria(
     changed : mapping, optional
         Parameters in place of the model's, by name.
     integrator : Integrator, optional
-        One made earlier for this model, to save its preparation.
+        An existing integrator of this model, to save its preparation.
     """
     trials = _Trials(model, integrator or Integrator(model), changed or {})
     parameters = dict(zip(model.parameter_names, model.parameter_values(changed).tolist(), strict=True))
@@ -176,7 +176,7 @@ def imo_criteria(
     (of_twenty,) = trials.worst([Zigzag(twenty, twenty), Zigzag(-twenty, twenty)], ("overshoots_deg", 0))
 
     def criterion(name: str, found: _Worse, allowed: float, unit: str, remark: str = "") -> ImoCriterion:
-        text = "; ".join(one for one in (found.remark, remark) if one)
+        text = "; ".join(text_part for text_part in (found.remark, remark) if text_part)
         return ImoCriterion(name, found.value, allowed, unit, text, found.beyond)
 
     return (
@@ -191,7 +191,7 @@ def imo_criteria(
 
 
 def _stopping(trials: _Trials) -> ImoCriterion:
-    """Track reach of full astern stopping, as far as the card has propulsion."""
+    """Track reach of full astern stopping, for a card with propulsion."""
     name = "stopping, full astern, track reach"
     if "propeller.speed" not in trials.model.input_names:
         remark = "the card has no [propulsion]: its engine cannot be reversed"
@@ -201,7 +201,7 @@ def _stopping(trials: _Trials) -> ImoCriterion:
     remark = f"at {FULL_ASTERN:.0%} of the nominal revolutions astern, reached at once: an assumption of the simulation"
     if found is not None and STOPPING < found <= STOPPING_OF_LARGE_SHIPS:
         remark += "; up to 20 L may be allowed to a ship of large displacement"
-    remark = "; ".join(one for one in (worse.remark, remark if found is not None else "") if one)
+    remark = "; ".join(text_part for text_part in (worse.remark, remark if found is not None else "") if text_part)
     return ImoCriterion(name, found, STOPPING, "L", remark, worse.beyond)
 
 

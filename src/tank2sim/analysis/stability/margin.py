@@ -1,11 +1,10 @@
-"""How far a ship is from neutral straight-line stability, and what moves it: derivatives, speed, trim.
+"""Margin of straight-line stability, and its sensitivity to derivatives, speed and trim.
 
     C' = Y'_v (N'_r - m' x'_G u') - N'_v (Y'_r - m' u')
 
-of :mod:`tank2sim.analysis.stability.straight_line`. The same as a distance: the yaw damping lever
-(N_r - m x_G u)/(Y_r - m u) lies ahead of the sway lever N_v/Y_v by the margin (in L) if C' > 0. Sensitivities are exact
-(CasADi): that by a derivative is the total one: the straight course (drift and rudder of an asymmetric ship) goes with
-it.
+of :mod:`tank2sim.analysis.stability.straight_line`. The same as a distance: the yaw damping lever (N_r - m x_G u)/(Y_r
+- m u) lies ahead of the sway lever N_v/Y_v by the margin (in L) if C' > 0. Sensitivities are exact (CasADi): that by a
+derivative is the total one, including the change of the straight course (drift and rudder of an asymmetric ship).
 """
 
 from __future__ import annotations
@@ -26,31 +25,31 @@ SPEEDS = 25
 """Speeds at which C' is reported, evenly over the card's range."""
 
 CHANGE = 0.1
-"""Change of a derivative whose effect is reported: 10 %, as influence coefficients are (Poznyakov and Yudin, paper
+"""Change of a derivative whose effect is reported: 10 %, as for influence coefficients (Poznyakov and Yudin, paper
 4)."""
 
 _NOTHING = 0.1
-"""Per cent of C' below which an influence is none: what an asymmetry of the straight course leaves."""
+"""Per cent of C' below which an influence counts as none: the effect of an asymmetric straight course."""
 
 _BODY = ("ship.mass", "ship.x_G")
 
 
 @dataclass(frozen=True)
 class MarginInfluence:
-    """What one coefficient does to C'.
+    """Influence of a coefficient on C'.
 
     Parameters
     ----------
     name : str
         Parameter of the model: ``derivatives.Nr``.
     value : float
-        As the model has it (prime for derivatives, SI for ``ship.*``).
+        In the model's unit (prime for derivatives, SI for ``ship.*``).
     slope : float
         dC'/d(value).
     percent : float
         Change of C' when the value is multiplied by 1.1 (its magnitude grows by 10 %), in per cent of |C'|.
     neutral_value : float or None
-        The value at which C' = 0, all else unchanged; None if there is none within ten times its magnitude.
+        The value at which C' = 0, all else unchanged; None without one within ten times its magnitude.
     """
 
     name: str
@@ -70,13 +69,13 @@ class MarginInfluence:
         return None if self.neutral_value is None else 100 * (self.neutral_value / self.value - 1)
 
     def as_json(self) -> dict[str, object]:
-        """All of it."""
+        """All values."""
         return {**vars(self), "neutral_percent": self.neutral_percent}
 
 
 @dataclass(frozen=True)
 class Margin:
-    """The criterion of straight-line stability and its margin, by what they move.
+    """The criterion of straight-line stability, its margin and their sensitivities.
 
     Parameters
     ----------
@@ -91,8 +90,8 @@ class Margin:
     influences : tuple of MarginInfluence
         The strongest first.
     speeds_mps, criteria, speed_slopes : arrays (k,)
-        C' over speed and dC'/du (s/m); nan where there is no straight course. Without elements where forces do not
-        change with speed: a linear card is that of its own speed.
+        C' over speed and dC'/du (s/m); nan without a straight course. Empty where forces do not change with speed, as
+        for a linear card.
     """
 
     criterion: float
@@ -158,12 +157,12 @@ class StabilityCriterion:
     def moved(
         self, point: OperatingPoint, *, speed: float | None = None, p: Array | None = None
     ) -> OperatingPoint | None:
-        """The straight course near another one, at another speed or with other parameters; None if there is none."""
+        """The straight course near a given one, at a new speed or with new parameters; None if there is none."""
         x, p = point.x.copy(), point.p if p is None else p
         if speed is not None:
             x[self._speed] = speed
         for _ in range(20):
-            residual, jacobian = (np.array(one) for one in self._course(x, point.u, p))
+            residual, jacobian = (np.array(value) for value in self._course(x, point.u, p))
             if not np.isfinite(jacobian).all() or np.linalg.matrix_rank(jacobian) < 2:
                 return None
             change = np.linalg.solve(jacobian, -residual.ravel())
@@ -181,10 +180,10 @@ def _prime_slopes(model: Model, by_speed: bool) -> ca.SX:
     derivative = {state.name: state.derivative for state in model.states}
     settled = [name for name in hull_states(model) if name not in ("motion.u", "motion.v", "motion.r")]
     if settled:
-        own = ca.vcat([model.symbol(name) for name in settled])
+        effect_states = ca.vcat([model.symbol(name) for name in settled])
         rates = model.expand(ca.vcat([model.symbol(derivative[name]) for name in settled]))
-        follow = ca.solve(ca.densify(ca.jacobian(rates, own)), ca.densify(ca.jacobian(rates, motion)))
-        slopes -= ca.jacobian(forces, own) @ follow
+        follow = ca.solve(ca.densify(ca.jacobian(rates, effect_states)), ca.densify(ca.jacobian(rates, motion)))
+        slopes -= ca.jacobian(forces, effect_states) @ follow
     length, density = model.symbol("ship.length"), model.symbol("ship.water_density")
     speed = model.symbol("ship.speed")
     if by_speed:
@@ -195,12 +194,12 @@ def _prime_slopes(model: Model, by_speed: bool) -> ca.SX:
 
 
 def stability_margin(model: Model, speed_mps: float | None = None) -> Margin:
-    """Margin of straight-line stability and all that moves it, by default at the speed of expansion.
+    """Margin of straight-line stability and its sensitivities, by default at the speed of expansion.
 
     Raises
     ------
     InputError
-        The model is no ship, or holds no straight course.
+        The model is not a ship, or has no straight course.
     """
     point = straight_course(model, speed_mps)
     criterion = StabilityCriterion(model)
@@ -223,7 +222,7 @@ def stability_margin(model: Model, speed_mps: float | None = None) -> Margin:
         sway_lever=_ratio(slopes[1, 0], slopes[0, 0]),
         percent=100 * _ratio(value, abs(slopes[0, 0] * slopes[1, 1])),
         slopes=slopes,
-        influences=tuple(sorted(moving, key=lambda one: -abs(one.percent))),
+        influences=tuple(sorted(moving, key=lambda item: -abs(item.percent))),
         speeds_mps=speeds,
         criteria=criteria,
         speed_slopes=by_speed,
@@ -245,20 +244,20 @@ def _influence(criterion: StabilityCriterion, point: OperatingPoint, name: str, 
 def _neutral(criterion: StabilityCriterion, point: OperatingPoint, place: int) -> float | None:
     """The value of a parameter at which C' = 0, by Newton's method along the straight course."""
     value = float(point.p[place])
-    size, now = abs(value), point
+    size, current = abs(value), point
     for _ in range(30):
-        found, total, _ = criterion.at(now)
+        found, total, _ = criterion.at(current)
         if not total[place]:
             return None
         change = -found / total[place]
-        p = now.p.copy()
+        p = current.p.copy()
         p[place] += change
         if not abs(p[place] - value) < 10 * size:
             return None
-        following = criterion.moved(now, p=p)
+        following = criterion.moved(current, p=p)
         if following is None:
             return None
-        now = following
+        current = following
         if abs(change) < 1e-12 * size:
             return float(p[place])
     return None
@@ -272,11 +271,11 @@ def _over_speed(criterion: StabilityCriterion, point: OperatingPoint) -> tuple[A
     speeds = np.linspace(start["ship.slowest"], start["ship.fastest"], SPEEDS)
     rows = []
     for speed in speeds:
-        there = criterion.moved(point, speed=float(speed))
-        if there is None:
+        shifted = criterion.moved(point, speed=float(speed))
+        if shifted is None:
             rows.append((np.nan, np.nan))
             continue
-        value, total, _ = criterion.at(there)
+        value, total, _ = criterion.at(shifted)
         rows.append((value, float(total[-1])))
     criteria, slopes = np.array(rows).T
     return speeds, criteria, slopes

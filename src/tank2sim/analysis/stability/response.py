@@ -1,8 +1,8 @@
-"""The linear response of the yaw rate to the rudder about the straight course: poles, zeros, Bode, step.
+"""Linear response of the yaw rate to the rudder about the straight course: poles, zeros, Bode, step.
 
 Of three systems, all by python-control: sway and yaw (with the states of effects that act on them: roll, the memory of
 the flow) with the rudder angle as input, the same behind the steering gear (input the order; its rate limit is not
-linear and left out), and Nomoto's first-order model K/(1 + T s), that of slow motion.
+linear and neglected), and Nomoto's first-order model K/(1 + T s), that of slow motion.
 """
 
 from __future__ import annotations
@@ -22,9 +22,11 @@ HULL, GEAR, FIRST_ORDER = "rudder angle to yaw rate", "rudder order to yaw rate"
 
 _FREQUENCIES = 121
 _FEWEST, _MOST, _IN_A_PERIOD = 201, 1601, 16
-"""Times of a step response: in each period of the fastest mode that oscillates, within a fewest and a most."""
+"""Number of times of a step response in each period of the fastest oscillating mode, with its least and its largest
+total."""
 _STABLE_STEP, _UNSTABLE_STEP = 5.0, 2.5
-"""Length of the step response in slowest time constants: to 99 % of the end, or to twelve times the beginning."""
+"""Length of the step response in slowest time constants: to 99 % of the final value, or to twelve times the
+beginning."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class SteeringResponse:
     poles, zeros : arrays of complex
         1/s.
     gain_per_s : float
-        r/delta at rest, 1/s; of an unstable ship it is that of a steady turn that does not last.
+        r/delta at rest, 1/s; for an unstable ship that of an unstable steady turn.
     omega_radps, response : arrays (n,)
         Frequency, and r/delta (complex, 1/s).
     time_s, step_per_s : arrays (m,)
@@ -71,7 +73,7 @@ class SteeringResponse:
 
 
 def steering_responses(model: Model, point: OperatingPoint, nomoto: Nomoto) -> tuple[SteeringResponse, ...]:
-    """The three systems about a straight course; those that do not respond at all (a play that is not taken up) not."""
+    """The systems about a straight course that respond to the rudder (without one in the play of its gear)."""
     steering = steering_states(model)
     hull = state_space(model, point, states=steering, inputs=["rudder.angle"], outputs=["motion.r"])
     systems = {HULL: hull}
@@ -89,7 +91,7 @@ def steering_responses(model: Model, point: OperatingPoint, nomoto: Nomoto) -> t
     omega = np.geomspace(slowest / 20, fastest * 20, _FREQUENCIES)
     time = _times(hull.poles(), slowest)
     found = [_response(label, system, omega, time) for label, system in systems.items()]
-    return tuple(one for one in found if np.all(np.abs(one.response) > 0))
+    return tuple(candidate for candidate in found if np.all(np.abs(candidate.response) > 0))
 
 
 def _times(poles: NDArray[np.complex128], slowest: float) -> NDArray[np.float64]:

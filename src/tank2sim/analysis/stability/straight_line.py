@@ -16,16 +16,16 @@ from tank2sim.analysis.turning.diagram import hull_states
 from tank2sim.dynamics.model import Model
 
 _ROUNDING = 1e-9
-"""Relative size of what rounding leaves of a mode that is neutral, or of slopes that are equal."""
+"""Relative size, by rounding, of a neutral mode or of the difference of equal slopes."""
 
 
 @dataclass(frozen=True)
 class Nomoto:
     """Yaw rate by rudder angle, r/delta = K (1 + T3 s) / ((1 + T1 s)(1 + T2 s)), and T = T1 + T2 - T3.
 
-    Nomoto, Taguchi, Honda and Hirano (1957). K in 1/s, positive if the ship follows its rudder; T's in s. Of an
-    unstable ship T1 (and with it T and K) is negative. T1 is the slower mode. Of a pair that oscillates only
-    the sum and product of T1 and T2 are real: both are then None.
+    Nomoto, Taguchi, Honda and Hirano (1957). K in 1/s, positive if the ship follows its rudder; T's in s. For an
+    unstable ship T1 (and with it T and K) is negative. T1 is the slower mode. For an oscillating pair only the sum and
+    product of T1 and T2 are real: both are then None.
     """
 
     K_per_s: float
@@ -35,7 +35,7 @@ class Nomoto:
     T3_s: float
 
     def prime_json(self) -> dict[str, float | None]:
-        """Of the prime system: without units."""
+        """The coefficients in the prime system, without units."""
         return {f"{name.partition('_')[0]}_prime": value for name, value in vars(self).items()}
 
 
@@ -53,7 +53,7 @@ class Stability:
         Of surge, sway and yaw with the states of effects that act on the hull (roll, the memory of the flow), rudder
         and heading held, 1/s, least damped first.
     criterion : float
-        C' = Y'_v (N'_r - m' x'_G u') - N'_v (Y'_r - m' u'): a ship that is stable on a straight course has it positive.
+        C' = Y'_v (N'_r - m' x'_G u') - N'_v (Y'_r - m' u'): positive for a ship that is stable on a straight course.
         Prime system; the slopes are those of the full forces at the operating point, in slow motion: states of effects
         follow at once (:func:`settled_states`).
     steering_modes : tuple of complex
@@ -61,7 +61,8 @@ class Stability:
     nomoto, nomoto_prime : Nomoto
         In SI; and with K L/U, T U/L. Of slow motion, as C' is.
     effect_states : tuple of str
-        States of effects that answer to sway and yaw and act on them: C' and Nomoto's models know them at rest alone.
+        States of effects that respond to sway and yaw and act on them: C' and Nomoto's models include them only at
+        rest.
     """
 
     name: str
@@ -82,20 +83,20 @@ class Stability:
 
     @property
     def stable(self) -> bool:
-        """True if the ship holds a straight course with the rudder fixed: all modes of steering decay, and none grows.
+        """True if the straight course is stable with the rudder fixed: all modes of steering decay, and none grows.
 
-        C' > 0 alone is not enough: two modes that both grow have it, too, and so has a roll that grows.
+        C' > 0 alone is not sufficient: it also holds with two growing modes, and with a growing roll.
         """
         nothing = _ROUNDING * max(abs(mode) for mode in self.eigenvalues)
         return all(mode.real < 0 for mode in self.steering_modes) and self.growth_per_s <= nothing
 
     @property
     def criterion_decides(self) -> bool:
-        """True if the sign of C' tells what the modes do; if not, it is no margin of stability."""
+        """True if the sign of C' agrees with the modes; else it is not a margin of stability."""
         return self.stable == (self.criterion > 0)
 
     def as_json(self) -> dict[str, object]:
-        """The result as JSON has it; eigenvalues as [real, imaginary]."""
+        """The result for JSON; eigenvalues as [real, imaginary]."""
         return {
             "ship": self.name,
             "operating_point": {
@@ -121,7 +122,7 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
     Raises
     ------
     InputError
-        The model is no ship, or holds no straight course.
+        The model is not a ship, or has no straight course.
     """
     point = straight_course(model, speed_mps)
     values = dict(zip(model.parameter_names, point.p.tolist(), strict=True))
@@ -138,7 +139,7 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
     steering = state_space(
         model, point, states=["motion.v", "motion.r"], inputs=["rudder.angle"], outputs=["motion.r"], settled=settled
     )
-    own = nomoto(steering)
+    models = nomoto(steering)
     time = length / scaling
     return Stability(
         name=model.name,
@@ -148,13 +149,13 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
         eigenvalues=tuple(eigenvalues),
         criterion=criterion,
         steering_modes=_modes(model, point, steering_states(model)),
-        nomoto=own,
+        nomoto=models,
         nomoto_prime=Nomoto(
-            own.K_per_s * time,
-            own.T_s / time,
-            own.T1_s and own.T1_s / time,
-            own.T2_s and own.T2_s / time,
-            own.T3_s / time,
+            models.K_per_s * time,
+            models.T_s / time,
+            models.T1_s and models.T1_s / time,
+            models.T2_s and models.T2_s / time,
+            models.T3_s / time,
         ),
         effect_states=answering_states(model),
     )
@@ -170,29 +171,29 @@ def steering_states(model: Model) -> tuple[str, ...]:
 
 
 def answering_states(model: Model) -> tuple[str, ...]:
-    """The steering states of effects that answer to sway, yaw or each other: not the lag of an engine."""
+    """The steering states of effects that respond to sway, yaw or each other: not the lag of an engine."""
     derivative = {state.name: state.derivative for state in model.states}
     states = steering_states(model)
 
     def answers(name: str) -> bool:
         rate = model.expand(model.symbol(derivative[name]))
-        return any(ca.depends_on(rate, model.symbol(other)) for other in states if other != name)
+        return any(ca.depends_on(rate, model.symbol(state_name)) for state_name in states if state_name != name)
 
     return tuple(name for name in states[2:] if answers(name))
 
 
 def speed_acts(model: Model, point: OperatingPoint) -> bool:
-    """Do the slopes of Y and N change with speed? Not of a linear card, whose forces are those at u0: (3.5).
+    """True if the slopes of Y and N change with speed; False for a linear card, whose forces are those at u0: (3.5).
 
-    There V = u0 by definition, and C' and prime numbers are made with it, whatever the speed asked for.
+    There V = u0 by definition, and C' and prime numbers use it at any speed.
     """
     motion = ["motion.v", "motion.r", "rudder.angle"]
     place = model.state_names.index("motion.u")
-    own = float(point.p[model.parameter_names.index("ship.speed")])
+    design_speed = float(point.p[model.parameter_names.index("ship.speed")])
     fastest = float(point.p[model.parameter_names.index("ship.fastest")])
     found = []
     # both where the card holds: below its slowest speed a linear card, too, goes over to the forces at low speed
-    for speed in (own, 0.5 * (own + fastest) if fastest > own else 1.01 * own):
+    for speed in (design_speed, 0.5 * (design_speed + fastest) if fastest > design_speed else 1.01 * design_speed):
         x = point.x.copy()
         x[place] = speed
         found.append(jacobians(model, OperatingPoint(x, point.u, point.p), ["force.Y", "force.N"], motion, [])[0])
@@ -201,8 +202,8 @@ def speed_acts(model: Model, point: OperatingPoint) -> bool:
 
 def settled_states(model: Model) -> list[str]:
     """States of effects (the memory of the flow, roll) that follow at once in the slow motions of C' and Nomoto."""
-    own = {f"motion.{name}" for name in ("u", "v", "r", "psi", "x", "y")}
-    return [name for name in model.state_names if name not in own and not name.startswith("rudder.")]
+    rigid_body = {f"motion.{name}" for name in ("u", "v", "r", "psi", "x", "y")}
+    return [name for name in model.state_names if name not in rigid_body and not name.startswith("rudder.")]
 
 
 def nomoto(steering: control.StateSpace) -> Nomoto:
@@ -211,7 +212,7 @@ def nomoto(steering: control.StateSpace) -> Nomoto:
     From A (2, 2), B (2, 1), C (1, 2): 1/(T1 T2) = det A, T1 + T2 = -tr A / det A, T3 from the zero.
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # a ship that is neutral has K and T without end
-        K, total, product, T3 = (float(one) for one in steering_constants(steering.A, steering.B, steering.C))
+        K, total, product, T3 = (float(constant) for constant in steering_constants(steering.A, steering.B, steering.C))
     # T1 and T2 are the roots of T^2 - (T1 + T2) T + T1 T2; those of a pair that oscillates are not real.
     discriminant = total**2 - 4 * product
     T1 = 0.5 * (total + math.copysign(math.sqrt(discriminant), total)) if discriminant >= 0 else None

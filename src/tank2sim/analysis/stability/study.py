@@ -1,4 +1,4 @@
-"""All of a ship's stability and manoeuvrability in one result: what ``tank2sim stability`` tells."""
+"""Stability and manoeuvrability of a ship in one result: that of ``tank2sim stability``."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
 _FAR = 0.05
-"""A steady point of a spiral that lies further from the diagram than this share of its largest yaw rate is reported."""
+"""Distance from the diagram, as a share of the largest yaw rate, from which a steady point of a spiral is reported."""
 
 _SAME_SPEED = 0.01
-"""Speeds that differ by less than this share are one (project choice)."""
+"""Speeds that differ by less than this share count as equal (project choice)."""
 
 
 @dataclass(frozen=True)
@@ -33,15 +33,15 @@ class StabilityStudy:
     Parameters
     ----------
     stability, margin, trim, responses
-        Of the straight course at the speed asked for.
+        Of the straight course at the requested speed.
     turning, characteristic : optional
-        At the speed of expansion; None where the ship has no steady motion, which `notices` tell.
+        At the speed of expansion; None without a steady motion, which `notices` state.
     direct, reverse : SpiralPoints, optional
-        Simulated spirals; None if not asked for or not possible.
+        Simulated spirals; None if not requested or not possible.
     imo : tuple of ImoCriterion
         At the speed of expansion.
     notices : tuple of str
-        What the reader should know.
+        Messages for the user.
     """
 
     stability: Stability
@@ -56,7 +56,7 @@ class StabilityStudy:
     notices: tuple[str, ...]
 
     def as_json(self) -> dict[str, object]:
-        """The result as JSON has it."""
+        """The result for JSON."""
         return {
             **self.stability.as_json(),
             "margins": self.margin.as_json(),
@@ -68,7 +68,7 @@ class StabilityStudy:
                 "direct": self.direct and self.direct.as_json(),
                 "reverse": self.reverse and self.reverse.as_json(),
             },
-            "imo": [one.as_json() for one in self.imo],
+            "imo": [criterion.as_json() for criterion in self.imo],
             "notices": list(self.notices),
         }
 
@@ -76,12 +76,13 @@ class StabilityStudy:
 def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bool = True) -> StabilityStudy:
     """Stability and manoeuvrability of a ship, the straight course by default at its speed of expansion.
 
-    What a ship does not have (a steady turn, a trial that ends) is left out and told; only a straight course is needed.
+    Missing results (a steady turn, a trial that does not end) are reported in notices; only a straight course is
+    necessary.
 
     Raises
     ------
     InputError
-        The model is no ship, or holds no straight course.
+        The model is not a ship, or has no straight course.
     """
     found = stability(model, speed_mps)
     margin = stability_margin(model, speed_mps)
@@ -97,8 +98,8 @@ def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bo
     except InputError as error:
         notices.append(f"no steady-turning diagram: {_reason(error)}")
     if turning is not None and spirals:
-        direct, reverse, told = _spirals(model, turning)
-        notices += told
+        direct, reverse, spiral_notes = _spirals(model, turning)
+        notices += spiral_notes
     return StabilityStudy(
         stability=found,
         margin=margin,
@@ -119,22 +120,24 @@ def _reason(error: InputError) -> str:
 
 def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[str]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-    slowest, fastest, own = values["ship.slowest"], values["ship.fastest"], values["ship.speed"]
+    slowest, fastest, card_speed = values["ship.slowest"], values["ship.fastest"], values["ship.speed"]
     messages = []
     if not by_speed:
         messages.append(
-            f"the forces of this card do not change with speed: a linear card is that of {own:.4g} m/s alone, C' and "
-            "the prime numbers are made with that speed, and there is no curve over speed"
+            f"the forces of this card do not change with speed: a linear card is that of {card_speed:.4g} m/s alone, "
+            "C' and the prime numbers are made with that speed, and there is no curve over speed"
         )
     if not slowest <= found.speed_mps <= fastest:
         messages.append(f"{found.speed_mps:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
-    if abs(found.speed_mps / own - 1) > _SAME_SPEED:
-        messages.append(f"steady turns, spirals and the IMO criteria are those at the card's speed, {own:.4g} m/s")
+    if abs(found.speed_mps / card_speed - 1) > _SAME_SPEED:
+        messages.append(
+            f"steady turns, spirals and the IMO criteria are those at the card's speed, {card_speed:.4g} m/s"
+        )
     return messages
 
 
 def _about_effects(found: Stability) -> list[str]:
-    """What C' and Nomoto's models leave out, and where the modes say something else."""
+    """Notices on effects that C' and Nomoto's models neglect, and on modes that contradict them."""
     messages = []
     if found.effect_states:
         messages.append(
@@ -162,7 +165,7 @@ def _about_weather(model: Model) -> list[str]:
 
 
 def _spirals(model: Model, turning: SteadyTurning) -> tuple[SpiralPoints | None, SpiralPoints | None, list[str]]:
-    """The two spirals, and messages about them."""
+    """The two spirals, with notices."""
     messages: list[str] = []
     direct = reverse = None
     try:

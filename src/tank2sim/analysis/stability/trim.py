@@ -1,18 +1,17 @@
-"""What trim does to straight-line stability: an estimate, for a card holds for one trim and says nothing of another.
+"""Effect of trim on straight-line stability: an estimate, because a card holds for a single trim.
 
-Two sources, side by side. Both speak of the hydrodynamic derivatives, without the inertia of (3.1).
+Two sources, side by side. Both give the hydrodynamic derivatives, without the inertia of (3.1).
 
 Paper 2 (Krezelewski and Misiag, section 5): a change of trim of 1 % changes one of the two most significant
-coefficients by 7.5 %; the print is damaged, and which of Y_r and N_r it is cannot be decided. Both readings are
-reported.
+coefficients by 7.5 %; the print is damaged and leaves open whether it is Y_r or N_r. Both readings are reported.
 
 Inoue, Hirano and Kijima (1981), Hydrodynamic derivatives on ship manoeuvring, Int. Shipbuilding Progress 28(321), from
-tests of models on even keel and trimmed, with tau the trim by the stern and d the mean draught (factors as they are
-quoted in later literature):
+tests of models on even keel and trimmed, with tau the trim by the stern and d the mean draught (factors as quoted in
+later literature):
 
     Y_v (1 + 0.67 tau/d)   Y_r (1 + 0.80 tau/d)   N_v (1 - 0.27 (Y_v/N_v) tau/d)   N_r (1 + 0.30 tau/d)
 
-The mass, its place and the rudder are left as they are.
+The mass, its centre and the rudder do not change.
 """
 
 from __future__ import annotations
@@ -73,7 +72,7 @@ class TrimEffect:
 
 
 def trim_effect(model: Model, margin: Margin) -> TrimEffect:
-    """C' by trim, from the slopes at which the margin was found."""
+    """C' by trim, from the slopes of the margin."""
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     length = values["ship.length"]
     mass = values["ship.mass"] / (0.5 * values["ship.water_density"] * length**3)
@@ -82,8 +81,8 @@ def trim_effect(model: Model, margin: Margin) -> TrimEffect:
     bare = {"Yv": Yv, "Yr": Yr + inertia["Yr"], "Nv": Nv, "Nr": Nr + inertia["Nr"]}
 
     def criterion(factors: Mapping[str, float]) -> float:
-        now = {name: value * factors.get(name, 1.0) for name, value in bare.items()}
-        return float(now["Yv"] * (now["Nr"] - inertia["Nr"]) - now["Nv"] * (now["Yr"] - inertia["Yr"]))
+        trimmed = {name: value * factors.get(name, 1.0) for name, value in bare.items()}
+        return float(trimmed["Yv"] * (trimmed["Nr"] - inertia["Nr"]) - trimmed["Nv"] * (trimmed["Yr"] - inertia["Yr"]))
 
     draught = values["ship.draught"]
     lever = Nv / Yv if Yv and Nv else np.inf

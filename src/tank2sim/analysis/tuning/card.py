@@ -1,4 +1,4 @@
-"""The card that was tuned, written in the conventions of its own text."""
+"""The tuned card, in the conventions of its text."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from tank2sim.cards.reading import changed_text, parse_card
 from tank2sim.files import BYTE_ORDER_MARK
 
 _DIGITS = 10
-"""Significant digits of a tuned number: what is rounded away moves no figure that is printed."""
+"""Significant digits of a tuned number: rounding does not change a printed figure."""
 
 
 def tuned_text(card: ManoeuvringCard, tuned: Tuned) -> str:
-    """Text of a card with the moves made: each key that changed has its old value as a comment."""
+    """Text of a card with the moves made: each changed key has its old value as a comment."""
     targets = ", ".join(target.text for target in tuned.targets)
     how = f"tuned by tank2sim influence to {targets}"
     text = card.text
@@ -39,7 +39,7 @@ def _comment(card: ManoeuvringCard, move: Move) -> str:
 
 
 def _found(card: ManoeuvringCard, key: str) -> Any:
-    """What the card's text has at a dotted key; None if it has nothing."""
+    """Value at a dotted key of the card's text; None if absent."""
     content: Any = tomlkit.parse(card.text.removeprefix(BYTE_ORDER_MARK))
     for part in key.split("."):
         if isinstance(content, list) and part.isdigit():

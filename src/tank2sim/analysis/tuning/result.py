@@ -1,4 +1,4 @@
-"""How a card may be tuned, and what came of it."""
+"""Options and result of the tuning of a card."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ WITHIN = 3.0
 
 @dataclass(frozen=True)
 class Means:
-    """How a card may be changed.
+    """Options of the change of a card.
 
     Parameters
     ----------
     by : str
         :data:`FEWEST` or :data:`UNCERTAIN`.
     within : float
-        Bounds of each move, standard errors; the agreed variation may go as many times either way.
+        Bounds of each move, standard errors; the agreed variation has the same bounds on its multiple.
     hold : sequence of str
-        Parameters that stay, by names as a user writes them.
+        Parameters that do not change, by names as a user writes them.
     bounds : mapping
-        Name to lowest and highest value as they stand in the card's file; they take the place of `within`.
+        Name to lowest and highest value in the unit of the card's file, instead of `within`.
     agreed : mapping
-        Kc % by name of parameters that move together only.
+        Kc % by name, for parameters that move only together.
 
     Raises
     ------
@@ -55,7 +55,7 @@ class Means:
 
 @dataclass(frozen=True)
 class Move:
-    """A parameter that changed: values as the model has them."""
+    """A parameter that changed: values in the model's unit."""
 
     parameter: CardParameter
     before: float
@@ -63,14 +63,14 @@ class Move:
 
     @property
     def in_standard_errors(self) -> float | None:
-        """The move over the standard error of the card, with the sign that it has in the file; None if exact."""
+        """The move over the standard error of the card, with its sign in the file; None for an exact parameter."""
         error, sign = self.parameter.standard_error, math.copysign(1.0, self.parameter.factor)
         return sign * (self.after - self.before) / error if error > 0 else None
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """A card tuned to targets, or how near it came.
+    """A card tuned to targets, or as near to them as possible.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Tuned:
     moves : tuple of Move
         Parameters that changed, the largest move first.
     agreed_times : float or None
-        How many times the agreed variation was taken.
+        Multiple of the agreed variation.
     contradiction : tuple of Target
         Targets that contradict each other within the bounds (one alone cannot be reached); empty if all are reached.
     """
@@ -103,12 +103,12 @@ class Tuned:
         return not self.contradiction
 
     def as_json(self, figures: Mapping[str, float] | None = None) -> dict[str, object]:
-        """``tuned`` of the command: targets before and after, moves, and the contradiction if there is one.
+        """``tuned`` of the command: targets before and after, moves, and a contradiction, if any.
 
         Parameters
         ----------
         figures : mapping, optional
-            All figures that were asked for, of the tuned card.
+            All requested figures of the tuned card.
         """
         pairs = zip(self.targets, self.before, self.after, strict=True)
         return {

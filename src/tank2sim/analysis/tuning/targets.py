@@ -1,4 +1,4 @@
-"""What a ship shall do: figures with wanted values, as a user writes them."""
+"""Targets of a ship: figures with values, as a user writes them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ TARGET_OPTION = "--tune"
 
 EQUAL, AT_MOST, AT_LEAST = "=", "<=", ">="
 
-_WISH = re.compile(r"(?P<name>[^@<>=]+)(?P<at>@[^<>=]+)?(?P<relation><=|>=|=)(?P<value>[^@<>=]+)(?P<behind>@[^<>=]+)?")
+_TARGET = re.compile(
+    r"(?P<name>[^@<>=]+)(?P<at>@[^<>=]+)?(?P<relation><=|>=|=)(?P<value>[^@<>=]+)(?P<behind>@[^<>=]+)?"
+)
 
 
 @dataclass(frozen=True)
 class Target:
-    """A figure and the value that it shall have, at most or at least; in the unit in the figure's name."""
+    """A figure and its target value, an equality or a limit; in the unit of the figure's name."""
 
     figure: InfluenceFigure
     relation: str
@@ -26,19 +28,19 @@ class Target:
 
     @property
     def text(self) -> str:
-        """As the command takes it: ``steady_radius_m@20=424``."""
+        """In the form of the command line: ``steady_radius_m@20=424``."""
         return f"{self.figure.text}{self.relation}{self.value:g}"
 
 
 def parse_target(text: str) -> Target:
-    """The target that a command line means: ``steady_radius_m@20=424`` or ``steady_radius_m=424@20``, ``<=``, ``>=``.
+    """Parse a target of a command line: ``steady_radius_m@20=424`` or ``steady_radius_m=424@20``, ``<=``, ``>=``.
 
     Raises
     ------
     InputError
-        It is not a target, its figure does not exist, or its value is not finite or not possible of a ship.
+        The text is not a target, its figure does not exist, or its value is not finite or impossible for a ship.
     """
-    found = _WISH.fullmatch(text.strip())
+    found = _TARGET.fullmatch(text.strip())
     if found is None or (found["at"] and found["behind"]):
         remedy = "give FIGURE@ARGUMENT=VALUE, <= or >=, as steady_radius_m@20=424 or 'overshoot1_deg@20/20<=25'"
         raise InputError(TARGET_OPTION, text, "is not a target", remedy)
@@ -58,8 +60,8 @@ def parse_target(text: str) -> Target:
 
 
 def _possible(kind: FigureKind, value: float) -> bool:
-    """Whether a ship can have a figure: sizes, times and rates of a manoeuvre are positive; a ship that loses all of
-    its speed does not turn."""
+    """True for a possible value of a figure: sizes, times and rates of a manoeuvre are positive; a ship that loses all
+    of its speed does not turn."""
     if kind.family == STRAIGHT or kind.name == "transfer_m":
         return True
     if kind.name == "steady_drift_deg":

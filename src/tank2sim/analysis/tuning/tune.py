@@ -1,15 +1,15 @@
-"""Tuning a card to a trial or a standard: the fewest or the most uncertain numbers change until figures are reached.
+"""Tuning a card to a trial or a standard: change of the fewest or of the most uncertain numbers until figures reach
+their targets.
 
-Unknowns are the moves z of the card's parameters in standard errors, and as one more unknown the multiple of an agreed
-variation (Kc). Figures F are nonlinear in them with exact slopes (:mod:`tank2sim.analysis.influence.study`).
+Unknowns are the moves z of the card's parameters in standard errors, and the multiple of an agreed variation (Kc).
+Figures F are nonlinear in them with exact slopes (:mod:`tank2sim.analysis.influence.study`).
 
 - ``uncertain``: min sum z^2 with F(z) on target and |z| within bounds (sequential quadratic programming, SLSQP).
 - ``fewest``: the smallest set of unknowns that reaches the targets to first order, by mixed-integer programming
   (HiGHS), with least sum |z| among equals; then the nonlinear problem in that set, again from there if it fails.
 
-Targets that cannot all be reached: the smallest set of them that contradicts itself, found by leaving out one after the
-other (deletion filter, Chinneck and Dravnieks 1991), and the nearest that can be reached, in least squares; of all
-moves that come so near, the least.
+For targets that cannot all be reached: the smallest contradictory set, by a deletion filter (Chinneck and Dravnieks
+1991), and the nearest figures in least squares, by the smallest moves.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from tank2sim.errors import InputError
 Slice = NDArray[np.int64]
 
 _REACHED = 1e-5
-"""A target is reached to this share of its value: far below what a trial shows."""
+"""Relative tolerance of a target: far below the accuracy of a trial."""
 
 _MOVED = 1e-6  # standard errors below which a parameter has not moved
 _NOT_SHOWN = 10.0  # what is missing, in shares of the target, where the ship does not show the figure any more
@@ -43,19 +43,19 @@ _LONGEST_SEARCH_S = 20.0  # of one set; the best so far is taken then
 
 
 def tune(study: Study, targets: Sequence[Target], means: Means) -> Tuned:
-    """Change a card until its figures are as targeted.
+    """Change a card until its figures reach their targets.
 
     Parameters
     ----------
     study : Study
-        Of the figures of the targets, at least.
+        Study with at least the figures of the targets.
     targets : sequence of Target
     means : Means
 
     Raises
     ------
     InputError
-        `means` names what is not a parameter, or leaves nothing to change.
+        `means` has an unknown parameter, or leaves no parameter free.
     """
     problem = _Problem(study, targets, means)
     z, contradiction = problem.start(), tuple[Target, ...]()
@@ -90,11 +90,11 @@ class _Problem:
         parameters, means = self.study.parameters, self.means
         held = {find_parameter(parameters, name, "--hold").name for name in means.hold}
         stated = {find_parameter(parameters, name, "--bound").name: pair for name, pair in means.bounds.items()}
-        for one in (
+        for change in (
             parameter for parameter in parameters if parameter.name in stated and parameter.name in self._agreed
         ):
             remedy = "leave out the bound, or take the parameter out of --agreed"
-            raise InputError("--bound", one.short, "moves with the agreed variation alone", remedy)
+            raise InputError("--bound", change.short, "moves with the agreed variation alone", remedy)
         columns, ends = [], []
         for place, parameter in enumerate(parameters):
             size = parameter.standard_error
@@ -123,7 +123,7 @@ class _Problem:
         return np.clip(np.zeros(len(self._lowest)), self._lowest, self._highest)
 
     def influential(self, z: Array) -> Slice:
-        """Unknowns that move a figure of the targets; all of them where one is not shown at `z`."""
+        """Unknowns that move a figure of the targets; all unknowns if the ship does not show a figure at `z`."""
         if not np.all(np.isfinite(self.figures(z))):
             return np.arange(len(z))
         return np.flatnonzero(np.any(self._slopes(z) != 0, axis=0))
@@ -133,7 +133,7 @@ class _Problem:
         return self.study.values + self._matrix @ z
 
     def figures(self, z: Array) -> Array:
-        """Figures (n,) of the targets after moves z; nan for those that the ship does not show then."""
+        """Figures (n,) of the targets after moves z; nan for figures that the ship does not show."""
         return self._figures(z.tobytes())
 
     def _computed_figures(self, z: bytes) -> Array:
@@ -143,12 +143,12 @@ class _Problem:
             return np.full(len(self._rows), np.nan)
 
     def _off(self, z: Array) -> Array:
-        """Figures less their targets (n,), in shares of these."""
+        """Figures less their targets (n,), relative to the targets."""
         off = (self.figures(z) - self._wanted) / self._scale
         return np.where(np.isfinite(off), off, _NOT_SHOWN)
 
     def _slopes(self, z: Array) -> Array:
-        """Slopes (n, m) of that by the moves."""
+        """Slopes (n, m) of :meth:`errors` by the moves."""
         return self._slopes_known(z.tobytes())
 
     def _computed_slopes(self, z: bytes) -> Array:
@@ -161,24 +161,24 @@ class _Problem:
         return np.where(np.abs(found) > _ROUNDING * np.max(np.abs(found), axis=1, keepdims=True), found, 0.0)
 
     def missing(self, z: Array) -> Array:
-        """What is missing (n,) to each target, in shares of it."""
+        """Relative violation (n,) of each target."""
         off = self._off(z)
         least = [0.0 if target.relation == AT_MOST else -np.inf for target in self.targets]
         most = [0.0 if target.relation == AT_LEAST else np.inf for target in self.targets]
         return np.clip(off, least, most)
 
     def largest(self, z: Array) -> float:
-        """The largest share of a target that is missing."""
+        """The largest relative violation of a target."""
         return float(np.max(np.abs(self.missing(z))))
 
     def nearest(self, z: Array, free: Slice, rows: Sequence[int] | None = None) -> Array:
-        """Moves that miss the targets (of `rows`) least, in least squares; only those of `free` change."""
+        """Moves with the least violation of the targets `rows`, in least squares; only those of `free` change."""
         kept = list(range(len(self.targets))) if rows is None else list(rows)
 
         def slopes(part: Array) -> Array:
-            own = _with(z, free, part)
-            unmet = (self.missing(own) != 0)[kept]
-            found: Array = self._slopes(own)[kept][:, free] * unmet[:, None]
+            moved = _with(z, free, part)
+            unmet = (self.missing(moved) != 0)[kept]
+            found: Array = self._slopes(moved)[kept][:, free] * unmet[:, None]
             return found
 
         inner = 1e-9 * (self._highest - self._lowest)
@@ -189,14 +189,14 @@ class _Problem:
             jac=slopes,
             bounds=(self._lowest[free], self._highest[free]),
             xtol=1e-10,
-            ftol=1e-6,  # of the squares: what is reached goes to zero, what is not comes to rest
+            ftol=1e-6,  # of the squares: they go to zero, or converge for unreachable targets
             gtol=1e-14,
             max_nfev=40,
         )
         return _with(z, free, solved.x)
 
     def least(self, z: Array, free: Slice) -> Array:
-        """The smallest moves (sum of squares) of `free` that reach the targets, from moves `z` that do."""
+        """The smallest moves (sum of squares) of `free` that reach the targets, from moves `z` that reach them."""
         constraints = []
         for row, target in enumerate(self.targets):
             sign = -1.0 if target.relation == AT_MOST else 1.0
@@ -225,15 +225,15 @@ class _Problem:
     def least_as_near(self, z: Array, free: Slice) -> Array:
         """The smallest moves of `free` that come as near to the targets as moves `z` do.
 
-        What is not reached is held at what is; of figures that hang together (a radius and its diameter, a target that
-        is given twice) one is enough, and more would leave the search without a solution.
+        Figures that miss their targets are held at their values; of dependent figures (a radius and its diameter, a
+        repeated target) only one is held, because more would make the search infeasible.
         """
         figures, missed = self.figures(z), np.abs(self.missing(z)) > _REACHED
         if not np.all(np.isfinite(figures)):
             return z
         loose = [row for row, target in enumerate(self.targets) if target.relation != EQUAL and not missed[row]]
         tight = [row for row in range(len(self.targets)) if row not in loose]
-        kept = [tight[one] for one in _independent(self._slopes(z)[tight][:, free])] if tight else []
+        kept = [tight[index] for index in _independent(self._slopes(z)[tight][:, free])] if tight else []
         held = [
             Target(self.targets[row].figure, EQUAL, float(figures[row] if missed[row] else self._wanted[row]))
             for row in kept
@@ -245,7 +245,7 @@ class _Problem:
         return refined if self.largest(refined) <= _REACHED else fallback
 
     def fewest(self, whole: Array) -> Array:
-        """Moves of as few unknowns as possible that reach the targets; `whole`, with all of them, if no set does."""
+        """Moves of the fewest unknowns that reach the targets; `whole`, with all unknowns, if no smaller set does."""
         at, tried = self.start(), list[Slice]()
         for _ in range(_ROUNDS):
             free = self._smallest_set(at, tried)
@@ -258,21 +258,21 @@ class _Problem:
         return whole
 
     def _smallest_set(self, at: Array, tried: Sequence[Slice]) -> Slice | None:
-        """The fewest unknowns, but not those `tried`, with which the targets are reached to first order about `at`."""
+        """The fewest unknowns, except the sets `tried`, that reach the targets to first order about `at`."""
         off, slopes = self._off(at), self._slopes(at)
         m = len(at)
         aim = slopes @ at - off
         lower, upper = aim - _REACHED, aim + _REACHED
         lower[[target.relation == AT_MOST for target in self.targets]] = -np.inf
         upper[[target.relation == AT_LEAST for target in self.targets]] = np.inf
-        one, none = np.eye(m), np.zeros((m, m))
+        unit, zero = np.eye(m), np.zeros((m, m))
         # unknowns: moves z, whether each is used b, and its size t >= |z|
         constraints = [
             LinearConstraint(np.hstack([slopes, np.zeros((len(off), 2 * m))]), lower, upper),
-            LinearConstraint(np.hstack([one, -np.diag(self._highest), none]), -np.inf, 0.0),
-            LinearConstraint(np.hstack([one, -np.diag(self._lowest), none]), 0.0, np.inf),
-            LinearConstraint(np.hstack([one, none, -one]), -np.inf, 0.0),
-            LinearConstraint(np.hstack([one, none, one]), 0.0, np.inf),
+            LinearConstraint(np.hstack([unit, -np.diag(self._highest), zero]), -np.inf, 0.0),
+            LinearConstraint(np.hstack([unit, -np.diag(self._lowest), zero]), 0.0, np.inf),
+            LinearConstraint(np.hstack([unit, zero, -unit]), -np.inf, 0.0),
+            LinearConstraint(np.hstack([unit, zero, unit]), 0.0, np.inf),
         ]
         for free in tried:
             row = -np.ones(m)
@@ -293,20 +293,20 @@ class _Problem:
         return None if solved.x is None else np.flatnonzero(solved.x[m : 2 * m] > 0.5)
 
     def contradiction(self) -> tuple[Target, ...]:
-        """Targets that cannot be reached together, none of which can be left out of that."""
+        """A minimal set of targets that cannot be reached together."""
         kept = list(range(len(self.targets)))
         everything = np.arange(len(self._lowest))
         for row in list(kept):
-            rest = [one for one in kept if one != row]
-            if not rest:
+            fewer = [kept_row for kept_row in kept if kept_row != row]
+            if not fewer:
                 break
-            z = self.nearest(self.start(), everything, rest)
-            if np.max(np.abs(self.missing(z)[rest])) > _REACHED:
-                kept = rest
+            z = self.nearest(self.start(), everything, fewer)
+            if np.max(np.abs(self.missing(z)[fewer])) > _REACHED:
+                kept = fewer
         return tuple(self.targets[row] for row in kept)
 
     def result(self, z: Array, contradiction: tuple[Target, ...]) -> Tuned:
-        """What came of moves `z`."""
+        """Result of moves `z`."""
         z = np.where(np.abs(z) < _MOVED, 0.0, z)
         values = self.values(z)
         moves = [
@@ -328,7 +328,7 @@ class _Problem:
 
 
 def _independent(slopes: Array) -> list[int]:
-    """Rows of slopes (n, m) of which none follows from the others."""
+    """Linearly independent rows of slopes (n, m)."""
     _, R, order = qr(slopes.T, mode="economic", pivoting=True)
     sizes = np.abs(np.diag(R))
     return sorted(int(row) for row in order[: len(sizes)][sizes > _DEPENDENT * sizes.max(initial=0.0)])
@@ -340,14 +340,16 @@ def _with(z: Array, free: Slice, part: Array) -> Array:
     return whole
 
 
-def _ends(one: CardParameter, size: float, within: float, stated: tuple[float, float] | None) -> tuple[float, float]:
-    """Lowest and highest move of a parameter: as stated in the file's unit, or `within` standard errors; and never
-    beyond what the parameter can be."""
-    low, high = one.value - within * size, one.value + within * size
+def _ends(
+    parameter: CardParameter, size: float, within: float, stated: tuple[float, float] | None
+) -> tuple[float, float]:
+    """Lowest and highest move of a parameter: as stated in the file's unit, or `within` standard errors; always within
+    the parameter's bounds."""
+    low, high = parameter.value - within * size, parameter.value + within * size
     if stated is not None:
-        low, high = sorted(end / one.factor for end in stated)
-    least, most = one.bounds
+        low, high = sorted(end / parameter.factor for end in stated)
+    least, most = parameter.bounds
     low, high = max(low, -np.inf if least is None else least), min(high, np.inf if most is None else most)
     if not low < high:
-        raise InputError("--bound", one.short, "leaves no room", "give LOW..HIGH with LOW below HIGH")
-    return (low - one.value) / size, (high - one.value) / size
+        raise InputError("--bound", parameter.short, "leaves no room", "give LOW..HIGH with LOW below HIGH")
+    return (low - parameter.value) / size, (high - parameter.value) / size

@@ -1,10 +1,10 @@
-"""The nonlinear steering characteristic of a ship, taken off its steady-turning diagram: Bech's and Norrbin's.
+"""The nonlinear steering characteristics of Bech and Norrbin, from a ship's steady-turning diagram.
 
-Bech and Wagner Smith (1969): T1 T2 r'' + (T1 + T2) r' + K H(r) = K (delta + T3 delta'), so that in a steady turn
-H(r) = delta: the diagram itself, and here the cubic b3 r^3 + b2 r^2 + b1 r + b0 that is nearest to it. Norrbin (1963):
-T r' + H_N(r) = K delta with H_N(r) = n3 r^3 + n2 r^2 + n1 r + n0, n1 = 1 of a ship that is stable on a straight course
-and -1 of one that is not: it keeps the place and slope of the diagram there (K = |dr/d(delta)|), and n2 and n3 are what
-is nearest to the rest. Nearest in delta, by least squares over evenly spaced yaw rates.
+Bech and Wagner Smith (1969): T1 T2 r'' + (T1 + T2) r' + K H(r) = K (delta + T3 delta'), so that in a steady turn H(r) =
+delta: the diagram, approximated by the nearest cubic b3 r^3 + b2 r^2 + b1 r + b0. Norrbin (1963): T r' + H_N(r) = K
+delta with H_N(r) = n3 r^3 + n2 r^2 + n1 r + n0, n1 = 1 of a ship that is stable on a straight course and -1 of one that
+is not: it keeps the position and slope of the diagram there (K = |dr/d(delta)|), and n2 and n3 are fitted. Nearest in
+delta, by least squares over evenly spaced yaw rates.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from tank2sim.analysis.turning.diagram import SteadyTurning
 from tank2sim.arrays import Array
 
 FITTED_RUDDER = math.radians(20.0)
-"""The cubics are fitted up to this rudder, that of a spiral: hard over no cubic follows a ship. Project choice."""
+"""Largest rudder of the fit of the cubics, that of a spiral: a cubic does not follow a ship hard over. Project
+choice."""
 
 _RATES = 201
 
@@ -29,8 +30,8 @@ _RATES = 201
 class CubicCharacteristic:
     """Rudder angle (rad) as a cubic in yaw rate (rad/s): coefficients (4,) from the constant up, and its error.
 
-    `rms_rad` and `largest_rad` are the root mean square and the largest error of the rudder angle where it was fitted,
-    `beyond_rad` the largest over the rest of the diagram, None if it has no rest that is single-valued.
+    `rms_rad` and `largest_rad` are the root mean square and the largest error of the rudder angle within the fit,
+    `beyond_rad` the largest in the single-valued part beyond it, None without such a part.
     """
 
     coefficients: Array
@@ -55,9 +56,9 @@ class SteeringCharacteristic:
     Parameters
     ----------
     yaw_rate_radps, rudder_rad : arrays (k,)
-        H(r) as the diagram has it.
+        H(r) of the diagram.
     bech, norrbin : CubicCharacteristic
-        The nearest cubic, and the nearest that keeps place and slope of the straight course.
+        The nearest cubic, and the nearest one with the position and slope of the straight course.
     slope_s : float
         dH/dr on the straight course, exact, s: the reciprocal of Nomoto's K if surge does not change with the rudder.
     fitted_rad : float
@@ -95,9 +96,9 @@ class SteeringCharacteristic:
 
 
 def steering_characteristic(turning: SteadyTurning) -> SteeringCharacteristic | None:
-    """Bech's and Norrbin's characteristic of a diagram; None if there are too few turns, or the ship is neutral.
+    """Bech's and Norrbin's characteristic of a diagram; None with too few turns, or for a neutral ship.
 
-    Where the diagram has two rudders for one yaw rate, the part around the straight course is taken.
+    If the diagram has two rudders for a yaw rate, only the part around the straight course is used.
     """
     first, last = _single_valued(turning)
     slope = turning.slope[turning.straight]
@@ -121,14 +122,14 @@ def steering_characteristic(turning: SteadyTurning) -> SteeringCharacteristic | 
 
 
 def _cubic(rate: Array, rudder: Array, inside: NDArray[np.bool_], kept: Array) -> CubicCharacteristic:
-    """The nearest cubic whose first coefficients are `kept`."""
+    """The nearest cubic with the first coefficients `kept`."""
     largest = float(np.max(np.abs(rate)))
     powers = np.vander(rate / largest, 4, increasing=True)
     scales = largest ** np.arange(4.0)
     n = len(kept)
-    left = rudder - powers[:, :n] @ (kept * scales[:n])
-    rest = np.linalg.lstsq(powers[inside, n:], left[inside], rcond=None)[0] / scales[n:]
-    coefficients = np.concatenate([kept, rest])
+    residual = rudder - powers[:, :n] @ (kept * scales[:n])
+    higher = np.linalg.lstsq(powers[inside, n:], residual[inside], rcond=None)[0] / scales[n:]
+    coefficients = np.concatenate([kept, higher])
     error = np.abs(powers @ (coefficients * scales) - rudder)
     beyond = float(error[~inside].max()) if not inside.all() else None
     return CubicCharacteristic(

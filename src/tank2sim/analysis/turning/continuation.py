@@ -1,9 +1,9 @@
-"""Following a curve of solutions of n equations in n + 1 unknowns, by pseudo-arclength, through its folds.
+"""Continuation of a curve of solutions of n equations in n + 1 unknowns, by pseudo-arclength, through its folds.
 
     F(y) = 0,   y = (z, lambda)
 
-Each step goes along the tangent and comes back to the curve at right angles to it (Keller 1977, Numerical solution of
-bifurcation and nonlinear eigenvalue problems), so that a fold, where lambda turns back, is a point like any other. The
+Each step follows the tangent and returns to the curve at right angles to it (Keller 1977, Numerical solution of
+bifurcation and nonlinear eigenvalue problems), so that a fold, where lambda turns back, is a regular point. The
 unknowns should be scaled to about one.
 """
 
@@ -20,11 +20,11 @@ ContinuationEquations = Callable[[Array], tuple[Array, Array]]
 """Residual (n,) and its Jacobian (n, n + 1) at a point (n + 1,)."""
 
 LARGEST_STEP = 0.04
-"""Arc length of a step, in the scaled unknowns. Project choice: half a turn of the diagram takes some fifty."""
+"""Arc length of a step, in the scaled unknowns. Project choice: half a diagram takes some fifty steps."""
 
 LEAST_STEP = 1e-7
 LARGEST_BEND = 0.1
-"""Largest angle between neighbouring tangents, rad: what keeps the curve smooth in a chart. Project choice."""
+"""Largest angle between neighbouring tangents, rad: small enough for a smooth chart. Project choice."""
 
 _ACCURACY = 1e-11
 _ITERATIONS = 8
@@ -36,8 +36,8 @@ EDGE, OUTSIDE, STALLED, LONG = "edge", "outside", "stalled", "long"
 class Curve:
     """Points (k, n + 1) of a curve and its unit tangents (k, n + 1), in order.
 
-    `ended` says why it ends: `edge`, lambda reached its limit (the last point lies on it); `outside`, an unknown left
-    its bounds; `stalled`, no further point was found; `long`, the steps ran out.
+    `ended` states the reason of its end: `edge`, lambda reached its limit (at the last point); `outside`, an unknown
+    left its bounds; `stalled`, no further point was found; `long`, the limit of steps.
     """
 
     points: Array
@@ -47,7 +47,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Where a curve is followed: `least` and `most` (n + 1,), the last entry that of lambda, and a number of steps."""
+    """Bounds of a curve: `least` and `most` (n + 1,), the last entry that of lambda, and a number of steps."""
 
     least: Array
     most: Array
@@ -57,7 +57,7 @@ class Bounds:
 def corrector_step(equations: ContinuationEquations, guess: Array, row: Array) -> tuple[Array, Array, int] | None:
     """The solution near `guess` in the plane through it whose normal is `row` (n + 1,): point, Jacobian, iterations.
 
-    None if Newton's method does not come to one.
+    None if Newton's method does not converge.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def corrector_step(equations: ContinuationEquations, guess: Array, row: Array) -
 
 
 def tangent(jacobian: Array, along: Array) -> Array | None:
-    """Unit tangent (n + 1,) of the curve, to the side of `along`; None where the curve has none."""
+    """Unit tangent (n + 1,) of the curve, to the side of `along`; None at a singular point."""
     try:
         direction = np.linalg.solve(np.vstack([jacobian, along]), np.eye(len(along))[-1])
     except np.linalg.LinAlgError:
@@ -107,11 +107,11 @@ def follow_branch(equations: ContinuationEquations, start: Array, direction: Arr
     points, tangents, ended = [start], [found], LONG
     step = LARGEST_STEP / 8
     for _ in range(bounds.steps):
-        there, step = _next(equations, points[-1], tangents[-1], step)
-        if there is None:
+        solution, step = _next(equations, points[-1], tangents[-1], step)
+        if solution is None:
             ended = STALLED
             break
-        point, direction = there
+        point, direction = solution
         if not bounds.least[-1] < point[-1] < bounds.most[-1]:
             last = _on_edge(equations, points[-1], point, direction, bounds)
             points, tangents = points + last[:1], tangents + last[1:]
@@ -128,7 +128,7 @@ def follow_branch(equations: ContinuationEquations, start: Array, direction: Arr
 def _next(
     equations: ContinuationEquations, point: Array, direction: Array, step: float
 ) -> tuple[tuple[Array, Array] | None, float]:
-    """Point and tangent a step further, and the length of the step to try after it."""
+    """Point and tangent of the next step, and the trial length of the step after it."""
     while step > LEAST_STEP:
         found = corrector_step(equations, point + step * direction, direction)
         further = tangent(found[1], direction) if found else None
@@ -141,7 +141,7 @@ def _next(
 def _on_edge(
     equations: ContinuationEquations, before: Array, after: Array, direction: Array, bounds: Bounds
 ) -> list[Array]:
-    """Point and tangent where lambda is at its limit, between two points; nothing if there is none."""
+    """Point and tangent where lambda is at its limit, between two points; empty if there is none."""
     edge = bounds.most[-1] if after[-1] >= bounds.most[-1] else bounds.least[-1]
     share = (edge - before[-1]) / (after[-1] - before[-1])
     guess = before + share * (after - before)

@@ -1,13 +1,13 @@
-"""The steady-turning diagram of a ship: yaw rate, speed, drift and heel against the rudder angle, unstable turns too.
+"""The steady-turning diagram of a ship: yaw rate, speed, drift and heel over the rudder angle, with unstable turns.
 
 Every steady turn of the nonlinear model solves
 
     du/dt = dv/dt = dr/dt = 0   (and the states of effects that act on the hull: roll, the memory of the flow)
 
-at constant revolutions in calm water. From the straight course the curve of solutions is followed both ways by
-pseudo-arclength (:mod:`tank2sim.analysis.turning.continuation`) with the exact Jacobian, so that it goes on through
-the folds of a ship that is unstable on a straight course. A turn is stable if all eigenvalues of that Jacobian with the
-rudder held have a negative real part. Folds are solved for, not read off (Moore and Spence 1980): F = 0, F_z phi = 0.
+at constant revolutions in calm water. From the straight course the curve of solutions is followed in both directions by
+pseudo-arclength (:mod:`tank2sim.analysis.turning.continuation`) with the exact Jacobian, through the folds of a ship
+that is unstable on a straight course. A turn is stable if all eigenvalues of that Jacobian with the rudder held have a
+negative real part. Folds are solved exactly (Moore and Spence 1980): F = 0, F_z phi = 0.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.marks import EXTRAPOLATED
-from tank2sim.simulation.card_range import range_left
+from tank2sim.simulation.card_range import exceeded_range
 
 _LARGEST_RUDDER = math.radians(35.0)
-"""The diagram goes to 35 deg of rudder (MSC.137(76)), or as far as the gear allows."""
+"""Largest rudder of the diagram: 35 deg (MSC.137(76)), or that of the gear."""
 
 _REPORTED_RUDDERS_DEG = (-35, -20, -10, -5, 0, 5, 10, 20, 35)
 """Rudder angles whose steady turns a report lists. Project choice."""
@@ -41,13 +41,13 @@ _REPORTED_RUDDERS_DEG = (-35, -20, -10, -5, 0, 5, 10, 20, 35)
 _MOTION = ("motion.u", "motion.v", "motion.r")
 _PLACE = ("motion.x", "motion.y", "motion.psi")
 _FASTEST, _MOST_YAW, _MOST_ELSE = 2.5, 12.0, 50.0
-"""Bounds of u/u0 and v/u0, of r L/u0, and of other states over their nominal size. No ship turns in a circle of a
-sixth of its length: what goes beyond has left every ship's range. Project choice."""
+"""Bounds of u/u0 and v/u0, of r L/u0, and of other states over their nominal size. No ship turns in a circle of a sixth
+of its length. Project choice."""
 
 
 @dataclass(frozen=True)
 class TurningFold:
-    """Where the diagram turns back: beyond this rudder (rad) the ship leaves the branch. `place` is its row."""
+    """Fold of the diagram: beyond this rudder (rad) the ship leaves the branch. `place` is its row."""
 
     place: int
     rudder_rad: float
@@ -87,7 +87,7 @@ class SteadyTurning:
     ended : pair of str
         Why the curve ends to port and to starboard (:class:`tank2sim.analysis.turning.continuation.Curve`).
     notices : tuple of str
-        What the reader should know.
+        Messages for the user.
     """
 
     rudder_rad: Array
@@ -126,7 +126,7 @@ class SteadyTurning:
         ]
 
     def as_json(self) -> dict[str, object]:
-        """The diagram in SI and in degrees, as JSON has it."""
+        """The diagram in SI and in degrees, for JSON."""
         points: dict[str, object] = {
             "rudder_deg": np.degrees(self.rudder_rad),
             "yaw_rate_degps": np.degrees(self.yaw_rate_radps),
@@ -162,7 +162,7 @@ class SteadyTurning:
 def hull_states(model: Model, motion: Sequence[str] = _MOTION) -> tuple[str, ...]:
     """States that move with the hull at a held rudder: u, v, r, and those of effects on which their rates depend.
 
-    Of `motion` alone, if less is asked for; the rest of u, v, r is held.
+    With fewer names in `motion`, the remaining ones of u, v, r are constant.
     """
     derivative = {state.name: state.derivative for state in model.states}
     found = list(motion)
@@ -187,8 +187,8 @@ class TurningEquations:
         values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
         speed = float(values["ship.speed"])
         self.ship_time = float(values["ship.length"]) / speed
-        own = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
-        self.scale: Array = np.array([*(own.get(name, nominal[name]) for name in self.names), 1.0])
+        sizes = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
+        self.scale: Array = np.array([*(sizes.get(name, nominal[name]) for name in self.names), 1.0])
         self._symbol = ca.SX.sym("y", len(self.scale))
         self._rates = self._scaled_rates()
         # what stays where it is: inputs and parameters are numbers here, and the functions short
@@ -218,7 +218,7 @@ class TurningEquations:
         return float(np.linalg.eigvals(self(y)[1][:, :-1]).real.max()) / self.ship_time
 
     def fold(self, near: Array, direction: Array) -> Array | None:
-        """The fold next to a point with its tangent: F = 0, F_z phi = 0, c phi = 1; None if Newton finds none."""
+        """The fold near a point with its tangent: F = 0, F_z phi = 0, c phi = 1; None if Newton finds none."""
         n = len(self.names)
         null = direction[:n] / np.linalg.norm(direction[:n])
         phi = ca.SX.sym("phi", n)
@@ -228,7 +228,7 @@ class TurningEquations:
         newton = ca.Function("fold", [unknown], [system, ca.densify(ca.jacobian(system, unknown))], {"cse": True})
         value = np.concatenate([near, null])
         for _ in range(12):
-            residual, jacobian = (np.array(one) for one in newton(value))
+            residual, jacobian = (np.array(part) for part in newton(value))
             if not np.isfinite(jacobian).all() or np.linalg.cond(jacobian) > 1e14:
                 return None
             change = np.linalg.solve(jacobian, -residual.ravel())
@@ -245,7 +245,7 @@ def steady_turning(model: Model) -> SteadyTurning:
     Raises
     ------
     InputError
-        The model is no ship, holds no straight course, or keeps no steady speed on it.
+        The model is not a ship, has no straight course, or no steady speed on it.
     """
     point = straight_course(model)
     equations = TurningEquations(model)
@@ -269,7 +269,7 @@ def steady_turning(model: Model) -> SteadyTurning:
 
 
 def largest_rudder(model: Model) -> float:
-    """:data:`_LARGEST_RUDDER`, or the largest that the gear allows, rad."""
+    """:data:`_LARGEST_RUDDER`, or the largest angle of the gear, rad."""
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     return min(_LARGEST_RUDDER, float(values.get("steering.max_angle", _LARGEST_RUDDER)))
 
@@ -283,7 +283,7 @@ def _diagram(equations: TurningEquations, port: Curve, starboard: Curve) -> Stea
     states = dict(zip((*equations.names, "rudder.angle"), (y * equations.scale).T, strict=True))
     slopes = dict(zip((*equations.names, "rudder.angle"), (tangents * equations.scale).T, strict=True))
     speed = np.hypot(states["motion.u"], states["motion.v"])
-    growth = np.array([equations.growth(one) for one in y])
+    growth = np.array([equations.growth(point) for point in y])
     growth[places] = 0.0
     rudder, rate = states["rudder.angle"], states["motion.r"]
     heel = next((values for name, values in states.items() if name.endswith(".phi")), None)
@@ -309,7 +309,7 @@ def _diagram(equations: TurningEquations, port: Curve, starboard: Curve) -> Stea
 def _with_folds(
     equations: TurningEquations, y: Array, tangents: Array, straight: int
 ) -> tuple[Array, Array, int, list[int]]:
-    """The curve with its folds put in, the row of the straight course, and the rows of the folds."""
+    """The curve with its folds inserted, the row of the straight course, and the rows of the folds."""
     turns = np.flatnonzero(np.diff(np.sign(tangents[:, -1])) != 0)
     places: list[int] = []
     for turn in turns.tolist():
@@ -329,7 +329,7 @@ def _with_folds(
 
 
 def _judged(model: Model, found: SteadyTurning) -> SteadyTurning:
-    """With its loop and messages about it."""
+    """The diagram with its loop and notices."""
     before = [fold for fold in found.folds if fold.place <= found.straight]
     after = [fold for fold in found.folds if fold.place > found.straight]
     loop = None
@@ -338,10 +338,10 @@ def _judged(model: Model, found: SteadyTurning) -> SteadyTurning:
         rates = [rate for rate, stable in found.turns_at(float(found.rudder_rad[found.straight])) if stable]
         height = max(rates) - min(rates) if len(rates) > 1 else None
         loop = HysteresisLoop(abs(before[-1].rudder_rad - after[0].rudder_rad), height)
-    return replace(found, loop=loop, notices=(*_how_it_ends(found), *_out_of_range(model, found)))
+    return replace(found, loop=loop, notices=(*_end_notices(found), *_out_of_range(model, found)))
 
 
-def _how_it_ends(found: SteadyTurning) -> list[str]:
+def _end_notices(found: SteadyTurning) -> list[str]:
     words = {
         continuation.OUTSIDE: "runs away: the polynomial holds no steady turn beyond",
         continuation.STALLED: "breaks off: no steady turn was found beyond",
@@ -360,5 +360,5 @@ def _how_it_ends(found: SteadyTurning) -> list[str]:
 def _out_of_range(model: Model, found: SteadyTurning) -> list[str]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     rate = found.yaw_rate_radps * values["ship.length"] / found.speed_mps
-    left = range_left(values, found.speed_mps, rate, found.drift_rad, found.rudder_rad)
-    return [f"{EXTRAPOLATED} what the card was measured in: steady turns have {left}"] if left else []
+    outside = exceeded_range(values, found.speed_mps, rate, found.drift_rad, found.rudder_rad)
+    return [f"{EXTRAPOLATED} what the card was measured in: steady turns have {outside}"] if outside else []

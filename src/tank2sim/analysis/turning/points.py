@@ -1,8 +1,8 @@
 """Single points of the steering diagram: the steady turn at a rudder angle, of a ship or of a steering model.
 
 The turn is the end of the smooth branch of steady turns that starts on the straight course and is followed towards the
-side of the turn (:mod:`tank2sim.analysis.turning.continuation`), through the folds of a ship that is unstable there. So
-the physical root is found where the equations have others.
+side of the turn (:mod:`tank2sim.analysis.turning.continuation`), through the folds of a ship that is unstable there.
+This selects the physical root among several.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _MOST, _MOST_YAW = 10.0, 12.0
 """Bounds of the scaled unknowns, and of r L/u0: no ship turns in a circle of a sixth of its length. Project choice."""
 
 _LEAST_YAW = 1e-6
-"""r L/u0 below which a ship goes straight. Project choice."""
+"""r L/u0 below which a course counts as straight. Project choice."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ class TurningPoints:
         start = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
         speed = start["ship.speed"]
         self.ship_time = start["ship.length"] / speed
-        own = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
-        self.scale: Array = np.array([*(own.get(name, nominal[name]) for name in self.names), 1.0])
+        sizes = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
+        self.scale: Array = np.array([*(sizes.get(name, nominal[name]) for name in self.names), 1.0])
         self.yaw: Array = np.eye(len(self.scale))[self.names.index("motion.r")]
         self.y = ca.SX.sym("y", len(self.scale))
         self.rates, self.shown = self._expressions()
@@ -76,7 +76,7 @@ class TurningPoints:
         self._shown = ca.Function("shown", [self.y, model.p], [self.shown], {"cse": True})
 
     def _expressions(self) -> tuple[ca.SX, ca.SX]:
-        """Scaled rates (n, 1) and what is shown, yaw rate, speed and drift, of y and p."""
+        """Scaled rates (n, 1) and yaw rate, speed and drift, of y and p."""
         model = self.model
         derivative = {state.name: state.derivative for state in model.states}
         places = [model.state_names.index(name) for name in (*self.names, "rudder.angle")]
@@ -93,7 +93,7 @@ class TurningPoints:
     def turn_at(self, rudder_rad: float, parameters: Mapping[str, float] | None = None) -> tuple[SteadyTurn, Array]:
         """The steady turn to the side of a rudder angle, and its unknowns y (n + 1,).
 
-        With the rudder amidships it is the turn to starboard that an unstable ship makes by itself.
+        With the rudder amidships it is the turn of an unstable ship to starboard.
 
         Parameters
         ----------
@@ -126,13 +126,13 @@ class TurningPoints:
         return self._turn(last, p), last
 
     def near(self, y: Array, parameters: Mapping[str, float]) -> SteadyTurn | None:
-        """The steady turn next to one with unknowns y, at the same rudder and other parameters, or None."""
+        """The steady turn near the one with unknowns y, at the same rudder and other parameters, or None."""
         p = self.model.parameter_values(parameters)
         found = corrector_step(self._equations(p), y, np.eye(len(y))[-1])
         return None if found is None else self._turn(found[0], p)
 
     def diagram(self, largest_rad: float, parameters: Mapping[str, float] | None = None) -> list[SteadyTurn]:
-        """The branch from the straight course to a rudder angle, as :meth:`turn_at` follows it (without its start)."""
+        """The branch from the straight course to a rudder angle, as followed by :meth:`turn_at` (without its start)."""
         p = self.model.parameter_values(parameters)
         side = -1.0 if largest_rad < 0 else 1.0
         most = np.full(len(self.scale), _MOST)
@@ -170,7 +170,7 @@ class TurningPoints:
 
 @dataclass(frozen=True)
 class _At:
-    """The equations at given parameters, as the continuation takes them."""
+    """The equations at given parameters, in the form of the continuation."""
 
     function: ca.Function
     p: Array

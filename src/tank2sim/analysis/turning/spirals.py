@@ -1,8 +1,8 @@
-"""Simulated spirals on the steady-turning diagram: the direct one on its stable branches, the reverse one on all.
+"""Simulated spirals on the steady-turning diagram: the direct spiral on its stable branches, the reverse spiral on all.
 
 Direct (Dieudonne): a series of rudder angles, each held until the turn is steady. Reverse (Bech): a series of yaw
-rates, each held by a controller of the rudder until the rudder is steady; it reaches the turns that are unstable with
-the rudder held, too (ITTC 7.5-04-02-01). Both run on the nonlinear model with its steering gear, in calm water.
+rates, each held by a controller of the rudder until the rudder is steady; it also reaches the turns that are unstable
+with the rudder held (ITTC 7.5-04-02-01). Both run on the nonlinear model with its steering gear, in calm water.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ _BANDWIDTH = 1.0
 growth. Project choice."""
 
 STEADY_RUDDER = math.radians(0.002)
-"""Steady: over two ship lengths the rudder moves by less, and the yaw rate is within :data:`_HELD` of its order. A
-choice of ours, far less than a dial shows."""
+"""Largest rudder motion over two ship lengths of a steady point, whose yaw rate is within :data:`_HELD` of its order.
+Project choice: far less than the resolution of a dial."""
 
 _HELD = 1e-3
-"""Share of the largest yaw rate by which the one held may miss its order."""
+"""Largest error of a held yaw rate, as a share of the largest yaw rate."""
 
 _LONGEST = 60.0
-"""A yaw rate is held at most so many L/u0."""
+"""Longest time at a yaw rate, L/u0."""
 
 
 @dataclass(frozen=True)
 class SpiralPoints:
-    """Points of a simulated spiral in the order they were run.
+    """Points of a simulated spiral in the order of the run.
 
     Parameters
     ----------
@@ -82,8 +82,8 @@ def direct_spiral(model: Model, turning: SteadyTurning, integrator: Integrator |
         The motion leaves all bounds.
     """
     largest = float(np.min(np.abs(turning.rudder_rad[[0, -1]])))
-    there = [math.radians(angle) for angle in SPIRAL_RUDDERS_DEG if abs(math.radians(angle)) <= largest * (1 + 1e-9)]
-    rudders = (*there, *there[-2::-1])
+    orders = [math.radians(angle) for angle in SPIRAL_RUDDERS_DEG if abs(math.radians(angle)) <= largest * (1 + 1e-9)]
+    rudders = (*orders, *orders[-2::-1])
     calm = undisturbed_inputs(model)
     trajectory = simulate(model, SpiralManoeuvre(rudders), inputs=calm, integrator=integrator).trajectory
     changes = np.flatnonzero(np.diff(trajectory["rudder.command"]) != 0)
@@ -97,7 +97,7 @@ def direct_spiral(model: Model, turning: SteadyTurning, integrator: Integrator |
 
 
 def reverse_spiral(model: Model, turning: SteadyTurning, nomoto: Nomoto) -> SpiralPoints | None:
-    """The reverse spiral of a ship over the yaw rates of the diagram; None if its rudder has no linear hold on it.
+    """The reverse spiral of a ship over the yaw rates of the diagram; None if its rudder has no linear effect.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def with_rate_controller(model: Model, nomoto: Nomoto) -> Model:
 
 
 def _held(running: Running, rates: Sequence[float] | Array, ship_time: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Rudder angle (n,) at which each yaw rate (n,) is held, and whether it had come to rest."""
+    """Rudder angle (n,) at which each yaw rate (n,) is held, and True where the rudder was steady."""
     rudders, steady = [], []
     nearly = _HELD * float(np.max(np.abs(rates)))
     for rate in rates:
@@ -156,9 +156,9 @@ def _held(running: Running, rates: Sequence[float] | Array, ship_time: float) ->
         end, before, calm = running.time + _LONGEST * ship_time, math.inf, False
         while end - running.time > ship_time and not calm:
             running.run(2 * ship_time)
-            now = running.state("rudder.angle")
-            calm = abs(now - before) < STEADY_RUDDER and abs(running.state("motion.r") - rate) < nearly
-            before = now
+            angle = running.state("rudder.angle")
+            calm = abs(angle - before) < STEADY_RUDDER and abs(running.state("motion.r") - rate) < nearly
+            before = angle
         rudders.append(before)
         steady.append(calm)
     return np.array(rudders), np.array(steady)

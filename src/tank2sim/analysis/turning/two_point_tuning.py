@@ -1,23 +1,22 @@
-"""Two points of the steering diagram met by two characteristics of the ship: section 4 of paper 4, on any card.
+"""Two-point tuning: two characteristics of a ship fitted to two points of the steering diagram (paper 4, section 4).
 
-Melkozerova and Pershits (1975; after Poznyakov and Yudin 2007) hold that a model is steered through two
-characteristics of the ship: the reduced fullness of the submerged profile, which counts the areas at the stern
-(deadwood, skegs, a cut-up) by what they do against drift and turn, and the effectiveness of the rudder. They find both
-by making two points of the steering diagram equal to the measured ones: the greatest yaw rate, with the rudder hard
-over, and the yaw rate with the rudder amidships, which an unstable ship has; of a stable ship any other point that is
-far enough from the first.
+Melkozerova and Pershits (1975; after Poznyakov and Yudin 2007) state that two characteristics of the ship determine the
+steering of a model: the reduced fullness of the submerged profile, which weighs the areas at the stern (deadwood,
+skegs, a cut-up) by their effect against drift and turn, and the effectiveness of the rudder. Both follow from two
+measured points of the steering diagram: the greatest yaw rate, with the rudder hard over, and the yaw rate of an
+unstable ship with the rudder amidships, or for a stable ship any other point far enough from the first.
 
-The paper prints no formula by which the fullness enters the coefficients. It names what moves: C_m^beta and C_m^omega,
-the strongest influences of the hull, and C_y^delta, C_m^delta of the rudder (curve 3 of its Fig. 1). So, a choice of
-ours: a fuller stern makes the static moment smaller and the damping greater, both by one factor h,
+The paper prints no formula by which the fullness enters the coefficients. It names the affected coefficients: C_m^beta
+and C_m^omega, the strongest influences of the hull, and C_y^delta, C_m^delta of the rudder (curve 3 of its Fig. 1).
+Project choice: a fuller stern reduces the static moment and increases the damping, both by the same factor h,
 
     N_v / h,   N_r h,   all terms of the rudder times e
 
 with h above 1 for the steadier ship; Taylor terms of N_v and N_r in the speed go with them. N_r is the hydrodynamic
-one: where a card's N_r holds -m x_G, that part stays. The other terms are left as they are.
+one: the part -m x_G in a card's N_r does not change. Other terms do not change.
 
-One after the other, as in 1975, and both at once have the same solution; here both are solved at once, by Newton's
-method along the way from the points that the model has to those that are wanted.
+The sequential method of 1975 and the joint solution agree; this module solves both jointly, by Newton's method with
+continuation from the model's points to the measured ones.
 """
 
 from __future__ import annotations
@@ -47,20 +46,20 @@ _ACCURACY = 1e-10
 _ITERATIONS = 12
 _SINGULAR = 1e13
 _ALIKE = 20.0
-"""Condition of the two factors against the two measures above which the points ask the same thing of them. Project
+"""Condition of the two factors against the two measures above which the points do not determine both. Project
 choice."""
 
 
 @dataclass(frozen=True)
 class Levers:
-    """What the two characteristics of a model move: names of its parameters.
+    """Parameters of a model that the two characteristics scale.
 
     Parameters
     ----------
     static_moment : tuple of str
         Divided by the hull's factor.
     damping : mapping
-        Name to the inertial part that the parameter holds and that is not scaled (0 if none): multiplied by it.
+        Name to the inertial part of the parameter that is not scaled (0 if none): multiplied by the hull's factor.
     rudder : tuple of str
         Multiplied by the rudder's factor.
     """
@@ -98,7 +97,7 @@ def levers_of_ship(card: ManoeuvringCard, model: Model) -> Levers:
 
 
 def levers_of_form(form: SteeringForm) -> Levers:
-    """The levers of a steering model, as the form names them."""
+    """The levers of a steering model, by the names of its form."""
 
     def named(names: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(f"coefficients.{name}" for name in names)
@@ -122,7 +121,7 @@ class WantedTurn:
             raise ValueError("a point has a yaw rate or a radius")
 
     def measure(self, turn: SteadyTurn) -> float:
-        """Of a turn what this point is about: its yaw rate or its radius."""
+        """The measured quantity of a turn: its yaw rate or its radius."""
         return turn.radius_m if self.yaw_rate_radps is None else turn.yaw_rate_radps
 
     @property
@@ -142,9 +141,9 @@ class TwoPointTuning:
     parameters : mapping
         Values of the scaled parameters of the model, by name.
     before, after : pairs of SteadyTurn
-        At the two rudder angles with the model as it was, and as it is now.
+        At the two rudder angles, with the model before and after.
     stable_before, stable_after : bool
-        Whether the ship holds a straight course with the rudder held.
+        True if the straight course is stable with the rudder held.
     """
 
     hull: float
@@ -169,7 +168,7 @@ class TwoPointTuning:
 
 
 def tune_to_two_points(model: Model, levers: Levers, first: WantedTurn, second: WantedTurn) -> TwoPointTuning:
-    """The factors of hull and rudder with which the steady turns of a model meet two measured points.
+    """Find the factors of hull and rudder with which the steady turns of a model agree with two measured points.
 
     Parameters
     ----------
@@ -183,8 +182,8 @@ def tune_to_two_points(model: Model, levers: Levers, first: WantedTurn, second: 
     Raises
     ------
     InputError
-        The model does not turn at one of the angles, or no factors between 1/5 and 5 meet both points; the message says
-        how far it came.
+        The model does not turn at one of the angles, or no factors between 1/5 and 5 fit both points; the message
+        states the progress.
     """
     points = TurningPoints(model)
     found = [points.turn_at(wanted.rudder_rad) for wanted in (first, second)]
@@ -215,15 +214,15 @@ def tune_to_two_points(model: Model, levers: Levers, first: WantedTurn, second: 
 def _refuse_opposed(model: Model, wanted: tuple[WantedTurn, WantedTurn], *turns: SteadyTurn) -> None:
     if abs(wanted[0].rudder_rad - wanted[1].rudder_rad) < 1e-6:
         raise InputError(model.origin, "two points", "have one rudder angle", "give two that are far from each other")
-    for one, turn in zip(wanted, turns, strict=True):
-        if one.yaw_rate_radps is not None and one.yaw_rate_radps * turn.yaw_rate_radps <= 0:
-            place = f"rudder {math.degrees(one.rudder_rad):.4g} deg"
-            problem = f"a yaw rate of {60 * math.degrees(one.yaw_rate_radps):.4g} deg/min is not to its side"
+    for target, turn in zip(wanted, turns, strict=True):
+        if target.yaw_rate_radps is not None and target.yaw_rate_radps * turn.yaw_rate_radps <= 0:
+            place = f"rudder {math.degrees(target.rudder_rad):.4g} deg"
+            problem = f"a yaw rate of {60 * math.degrees(target.yaw_rate_radps):.4g} deg/min is not to its side"
             raise InputError(model.origin, place, problem, "rudder and yaw rate are positive to starboard")
 
 
 class _System:
-    """Steady turns at both rudders with the wanted measures: unknowns (y1, y2, ln h, ln e)."""
+    """Steady turns at both rudders with the target measures: unknowns (y1, y2, ln h, ln e)."""
 
     def __init__(self, points: TurningPoints, levers: Levers, wanted: tuple[WantedTurn, WantedTurn]):
         self._model = model = points.model
@@ -237,20 +236,20 @@ class _System:
         scaled = levers.scaled(numbers, ca.exp(self.unknown[-2]), ca.exp(self.unknown[-1]))
         p = ca.vcat([ca.SX(scaled.get(name, numbers[name])) for name in model.parameter_names])
         rows: list[ca.SX] = []
-        for place, one in enumerate(wanted):
+        for place, target in enumerate(wanted):
             y = self.unknown[place * n : (place + 1) * n]
             rates, shown = ca.substitute([points.rates, points.shown], [points.y, model.p], [y, p])
-            measure = ca.fabs(shown[0]) if one.radius_m is None else shown[1] / ca.fabs(shown[0])
-            rows += [rates, y[-1] - one.rudder_rad, ca.log(measure) - goal[place]]
+            measure = ca.fabs(shown[0]) if target.radius_m is None else shown[1] / ca.fabs(shown[0])
+            rows += [rates, y[-1] - target.rudder_rad, ca.log(measure) - goal[place]]
         equations = ca.vcat(rows)
         slopes = ca.densify(ca.jacobian(equations, self.unknown))
         self._newton = ca.Function("tuning", [self.unknown, goal], [equations, slopes], {"cse": True})
 
     def solved(self, near: Array, goal: Array) -> Array | None:
-        """The unknowns next to `near` that meet the logarithms of the measures; None if Newton's method fails."""
+        """The unknowns near `near` that fit the logarithms of the measures; None if Newton's method fails."""
         value = near.copy()
         for _ in range(_ITERATIONS):
-            residual, slopes = (np.array(one) for one in self._newton(value, goal))
+            residual, slopes = (np.array(part) for part in self._newton(value, goal))
             if not (np.isfinite(slopes).all() and np.isfinite(residual).all()):
                 return None
             # Least squares: of a linear ship, whose turns are in proportion to the rudder, hull and rudder act alike.
@@ -262,8 +261,8 @@ class _System:
         return None
 
     def act_alike(self, near: Array, goal: Array) -> bool:
-        """True if hull and rudder move both measures nearly in one proportion."""
-        residual, slopes = (np.array(one) for one in self._newton(near, goal))
+        """True if hull and rudder move both measures nearly in the same proportion."""
+        residual, slopes = (np.array(part) for part in self._newton(near, goal))
         n = len(residual) // 2
         if np.linalg.cond(slopes) > _SINGULAR:
             return True
@@ -272,11 +271,11 @@ class _System:
 
     def fault(self, problem: str) -> InputError:
         """An error about the two points."""
-        text = " and ".join(_told(one) for one in self.wanted)
+        text = " and ".join(_target_text(target) for target in self.wanted)
         return InputError(self._model.origin, text, problem, "check both points, or change other coefficients first")
 
 
-def _told(wanted: WantedTurn) -> str:
+def _target_text(wanted: WantedTurn) -> str:
     at = f"at {_to_a_side(math.degrees(wanted.rudder_rad), 'deg')}"
     if wanted.yaw_rate_radps is None:
         return f"{wanted.radius_m:.5g} m {at}"
@@ -288,7 +287,7 @@ def _to_a_side(value: float, unit: str) -> str:
 
 
 def _followed(system: _System, unknown: Array, have: Array, want: Array) -> Array:
-    """The unknowns at the wanted measures, from those at the measures that the model has."""
+    """The unknowns at the target measures, from those at the model's measures."""
     done, step = 0.0, 0.25
     while done < 1.0:
         share = min(1.0, done + step)

@@ -1,1 +1,1 @@
-"""What practice asks of a card: comparison with other cards, validation, and the data for the bridge."""
+"""Validation of a card, comparison with other cards, and data for the bridge."""

@@ -1,7 +1,7 @@
-"""What a bridge wants to know of a ship (IMO A.601(15)): circles, stops, speeds by revolutions, zigzags, from its card.
+"""Manoeuvring data for the bridge (IMO A.601(15)) from a ship's card: circles, stops, speeds by revolutions, zigzags.
 
-Only what the card tells is here; what it does not tell is None, and stays a blank on the pilot card and the poster. So
-does a figure whose manoeuvre had left what the card holds for: it is marked here, and no bridge document prints it.
+Data that the card does not state are None, and blank on the pilot card and the poster. A figure outside the card's
+range is marked, and not printed in bridge documents.
 """
 
 from __future__ import annotations
@@ -28,26 +28,26 @@ SHALLOW = 1.2
 """Depth over draught in shallow water (A.601(15), appendix 2)."""
 
 DEEP = 20.0
-"""Depth over draught in deep water: project choice, far beyond the 4 that MSC.137(76) asks for."""
+"""Depth over draught in deep water: project choice, far above the 4 that MSC.137(76) requires."""
 
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
-"""Revolutions over nominal ones at which speeds are reported where no telegraph orders are given: project choice."""
+"""Revolutions over nominal ones of the reported speeds without given telegraph orders: project choice."""
 
 ORDERS_AHEAD = ("Full sea speed", "Full ahead", "Half ahead", "Slow ahead", "Dead slow ahead")
 """Orders ahead of the wheelhouse poster's form (A.601(15), appendix 2)."""
 
 _LARGEST_SHARE = 2.0
-"""Revolutions of an order over the nominal ones beyond which it is a slip: engines trip far below. Project choice."""
+"""Largest revolutions of an order over the nominal ones: engines trip far below. Project choice."""
 
 LARGEST_RPM = 10_000.0
-"""The same where the card tells no nominal revolutions: propellers of the smallest models turn slower."""
+"""The same without nominal revolutions on the card: propellers of the smallest models turn slower."""
 
 _RADIANS_PER_S = 2 * math.pi / 60
 
 
 @dataclass(frozen=True)
 class Telegraph:
-    """One order: its name (empty if it has none), revolutions, steady speed straight ahead (None if not known).
+    """An order: its name (may be empty), revolutions, steady speed straight ahead (None if unknown).
 
     `within` is False where that speed is outside the card's range.
     """
@@ -74,27 +74,27 @@ class StopFrom:
 
 @dataclass(frozen=True, eq=False)
 class Bridge:
-    """One loading condition of a ship, as far as its card tells it.
+    """Data of a ship in the loading condition of its card.
 
     Parameters
     ----------
     card : ManoeuvringCard
     rudder_deg : float
-        Of the turning circles: the largest that the gear allows (A.601(15)), or 35 deg where the card tells no largest.
+        Of the turning circles: the largest that the gear allows (A.601(15)), or 35 deg without one on the card.
     deep, shallow : tuple of ShipTrack
         Circles to starboard and port; `shallow` at :data:`SHALLOW` times the draught, empty without the effect.
     stops : tuple of ShipTrack
         Full astern, and the engine stopped; empty without propulsion.
     zigzags : mapping
-        Name to figures; what could not be run has none.
+        Name to figures; empty for a zigzag that could not be run.
     telegraph : tuple of Telegraph
-        Empty without propulsion, unless orders were given.
+        Empty without propulsion and without given orders.
     stops_from : tuple of StopFrom
         Full astern from each speed of the telegraph.
     hard_over_s : float or None
         From hard over to hard over, by the gear's rate.
     neutral_deg : float or None
-        Rudder that keeps a straight course, + to starboard; None where none does.
+        Rudder that keeps a straight course, + to starboard; None without one.
     notices : tuple of str
     """
 
@@ -111,17 +111,17 @@ class Bridge:
     notices: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, object]:
-        """All of it, tracks thinned to 200 points."""
+        """All values, tracks thinned to 200 points."""
         return {
             "ship": self.card.ship.name,
             "source": self.card.ship.source,
             "rudder_deg": self.rudder_deg,
-            "turning_circles_deep": [one.as_json() for one in self.deep],
-            "turning_circles_shallow": [one.as_json() for one in self.shallow],
+            "turning_circles_deep": [row.as_json() for row in self.deep],
+            "turning_circles_shallow": [row.as_json() for row in self.shallow],
             "stops": [stop.as_json() for stop in self.stops],
             "zigzags": {name: {"figures": zigzag.figures, **zigzag.as_json()} for name, zigzag in self.zigzags.items()},
-            "telegraph": [vars(one) for one in self.telegraph],
-            "full_astern_from": [vars(one) for one in self.stops_from],
+            "telegraph": [vars(row) for row in self.telegraph],
+            "full_astern_from": [vars(row) for row in self.stops_from],
             "hard_over_to_hard_over_s": self.hard_over_s,
             "rudder_neutral_deg": self.neutral_deg,
             "notices": list(self.notices),
@@ -129,13 +129,13 @@ class Bridge:
 
 
 def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) -> Bridge:
-    """Run what a bridge wants to know.
+    """Run the manoeuvres of the bridge data.
 
     Parameters
     ----------
     card : ManoeuvringCard
     orders : mapping, optional
-        Order of the telegraph to its revolutions, rpm; by default some shares of the nominal ones, without names.
+        Order of the telegraph to its revolutions, rpm; by default shares of the nominal ones, without names.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) 
     ship = ship_of(card)
     depths = _depths(ship)
     rudder = _rudder(card)
-    circles, told = _circles(ship, rudder, depths)
+    circles, circle_notes = _circles(ship, rudder, depths)
     deep = depths["deep"]
     stops, troubles = _stops(ship, deep)
     telegraph = _telegraph(ship, orders)
@@ -163,7 +163,7 @@ def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) 
         stops_from=_stops_from(ship, telegraph, deep),
         hard_over_s=2 * largest / rate if largest and rate else None,
         neutral_deg=_neutral(ship),
-        notices=tuple(dict.fromkeys((*told, *troubles))),
+        notices=tuple(dict.fromkeys((*circle_notes, *troubles))),
     )
 
 
@@ -184,10 +184,10 @@ def _rudder(card: ManoeuvringCard) -> float:
 
 
 def steady_speed(ship: TrialShip, revolutions_radps: float) -> float | None:
-    """Speed (m/s) that the ship keeps straight ahead at these revolutions; None if there is none.
+    """Steady speed (m/s) straight ahead at these revolutions; None if there is none.
 
-    The highest at which the surge acceleration without drift, turn and rudder falls through zero. A ship that is
-    unstable on its course, or asymmetric, is held on it by a rudder whose drag is left out.
+    The highest at which the surge acceleration without drift, turn and rudder falls through zero. The drag of the
+    rudder that keeps an unstable or asymmetric ship on its course is neglected.
     """
     model = ship.model
     p, x0 = model.parameter_values(), np.array(model.initial(model.parameter_values())).ravel()
@@ -213,10 +213,10 @@ def _telegraph(ship: TrialShip, orders: Mapping[str, float] | None) -> tuple[Tel
     if ship.card.propulsion is None:
         return tuple(Telegraph(order, rpm, None) for order, rpm in (orders or {}).items())
     nominal = ship.card.propulsion.nominal_radps / _RADIANS_PER_S
-    asked = list(orders.items()) if orders else [("", share * nominal) for share in SHARES]
+    orders_and_rpm = list(orders.items()) if orders else [("", share * nominal) for share in SHARES]
     slowest, fastest = ship.card.model.speed_range_mps
     rows = []
-    for order, rpm in asked:
+    for order, rpm in orders_and_rpm:
         speed = steady_speed(ship, rpm * _RADIANS_PER_S) if rpm > 0 else None
         rows.append(Telegraph(order, rpm, speed, speed is None or slowest <= speed <= fastest))
     return tuple(rows)
@@ -233,7 +233,7 @@ def _depths(ship: TrialShip) -> dict[str, dict[str, float]]:
 def _circles(
     ship: TrialShip, rudder: float, depths: Mapping[str, Mapping[str, float]]
 ) -> tuple[dict[str, list[ShipTrack]], list[str]]:
-    """Circles by depth, to starboard and port, and messages about them."""
+    """Circles by depth, to starboard and port, with notices."""
     found: dict[str, list[ShipTrack]] = {}
     messages = []
     if rudder > TRIAL_RUDDER * (1 + 1e-9):
@@ -248,48 +248,48 @@ def _circles(
                 continue
             track = circle_track(side, run)
             found.setdefault(where, []).append(track)
-            messages += _left(name, track.left)
+            messages += _range_exit_notice(name, track.range_exit)
     return found, messages
 
 
-def _left(name: str, left: TrackMark | None) -> list[str]:
-    """Where a run leaves the card's range, in words."""
-    if left is None:
+def _range_exit_notice(name: str, exit_mark: TrackMark | None) -> list[str]:
+    """Notice on the point where a run leaves the card's range."""
+    if exit_mark is None:
         return []
-    turned = f" and {left.heading_change_deg:.0f}° of heading" if abs(left.heading_change_deg) >= 1 else ""
-    place = f"after {left.time_s:.0f} s{turned}, at {left.speed_mps:.3g} m/s"
-    return [f"{name}: leaves the card's range {place}: what follows is not told"]
+    turned = f" and {exit_mark.heading_change_deg:.0f}° of heading" if abs(exit_mark.heading_change_deg) >= 1 else ""
+    place = f"after {exit_mark.time_s:.0f} s{turned}, at {exit_mark.speed_mps:.3g} m/s"
+    return [f"{name}: leaves the card's range {place}: later values are omitted"]
 
 
 def _stops(ship: TrialShip, inputs: Mapping[str, float]) -> tuple[tuple[ShipTrack, ...], list[str]]:
     if not ship.has_engine:
         return (), []
-    found, told = [], []
+    found, messages = [], []
     for name, manoeuvre in (
         (f"full astern ({FULL_ASTERN:.0%} of nominal)", Stop()),
         (f"engine stopped, to {COASTING_END:.0%} of speed", Stop(0.0)),
     ):
         run = ship.run(manoeuvre, inputs=inputs)
         if isinstance(run, str):
-            told.append(f"{name}: {run}")
+            messages.append(f"{name}: {run}")
             continue
-        told += [f"{name}: {notice}" for notice in run.notices if "not show" in notice]
+        messages += [f"{name}: {notice}" for notice in run.notices if "not show" in notice]
         track = stop_track(name, run)
         found.append(track)
-        told += _left(name, track.left)
-    return tuple(found), told
+        messages += _range_exit_notice(name, track.range_exit)
+    return tuple(found), messages
 
 
 def _stops_from(ship: TrialShip, telegraph: Sequence[Telegraph], inputs: Mapping[str, float]) -> tuple[StopFrom, ...]:
     found = []
-    for one in telegraph:
-        if one.speed_mps is None or not one.within:
+    for entry in telegraph:
+        if entry.speed_mps is None or not entry.within:
             continue
-        run = ship.run(Stop(), {"initial.u": one.speed_mps}, inputs)
+        run = ship.run(Stop(), {"initial.u": entry.speed_mps}, inputs)
         read = _read(run)
         reach, time = (read.figures.get(name) for name in ("track_reach_m", "time_to_stop_s"))
-        order = one.order or f"{one.rpm:.4g} rpm"
-        found.append(StopFrom(order, one.speed_mps, reach, time, not read.outside("track_reach_m")))
+        order = entry.order or f"{entry.rpm:.4g} rpm"
+        found.append(StopFrom(order, entry.speed_mps, reach, time, not read.outside("track_reach_m")))
     return tuple(found)
 
 

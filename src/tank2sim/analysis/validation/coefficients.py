@@ -1,8 +1,8 @@
-"""Cards coefficient by coefficient: brought to one convention and one speed, and compared in standard errors.
+"""Comparison of cards by coefficient, in a common convention and speed, in units of standard errors.
 
-A polynomial in v', r', delta and Du' is another one when it is expanded about another speed, in primes by another
-speed, or with the inertial terms of (3.8) inside or outside. With V the speed of the scaling of the reference, in the
-units of the card's own u0 and of the length (k is the ratio of the Froude numbers),
+A polynomial in v', r', delta and Du' depends on the speed of its expansion, on the speed of its primes, and on whether
+it includes the inertial terms of (3.8). With V the speed of the scaling of the reference, in the units of the card's
+own u0 and of the length (k is the ratio of the Froude numbers),
 
     V = k                            (nominal)
     V = k/(sqrt(1 - v'^2) - Du')     (instantaneous, from V^2 = (k + Du' V)^2 + (v' V)^2)
@@ -30,10 +30,10 @@ from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertial_forces
 
 _SAME_SPEED = 1e-3
-"""Froude numbers that differ by less than this share are one."""
+"""Froude numbers that differ by less than this share count as equal."""
 
 BEYOND_STANDARD_ERRORS = 2.0
-"""Differences of more standard errors than this are reported as such: 5 % of those by chance alone."""
+"""Standard errors from which a difference is reported: chance alone exceeds it in 5 % of the cases."""
 
 _ABSENT = 1e-12
 _RIGID_BODY = ("mass", "yaw_inertia", "x_G")
@@ -41,10 +41,10 @@ _RIGID_BODY = ("mass", "yaw_inertia", "x_G")
 
 @dataclass(frozen=True)
 class CardCoefficient:
-    """A coefficient of one card in the reference's convention, prime; in rows with the rudder's sign of the reference.
+    """A coefficient of a card in the reference's convention, prime; in rows with the rudder's sign of the reference.
 
-    `value` is None where the card's model has no such term, `standard_error` where none is known; `stated` is False
-    where it rests on the default share of the value.
+    `value` is None if the card's model lacks the term, `standard_error` if it is unknown; `stated` is False for a
+    standard error by the default share of the value.
     """
 
     value: float | None
@@ -53,13 +53,13 @@ class CardCoefficient:
 
 
 SAME = "the reference's own number"
-"""Why a number that is the reference's to the last digit has no difference: one of the cards took it over, or both from
-a third. Their errors are one and the same, and 0 standard errors would pass for the agreement of two."""
+"""Reason for a missing difference of identical numbers: one card copied it from the other, or both from a third. Their
+errors are identical, and 0 standard errors would look like an independent agreement."""
 
 
 @dataclass(frozen=True)
 class Difference:
-    """A card less the reference: in standard errors, in per cent of the reference, or why there is none."""
+    """A card less the reference: in standard errors, in per cent of the reference, or the reason without either."""
 
     standard_errors: float | None = None
     percent: float | None = None
@@ -68,14 +68,14 @@ class Difference:
 
 @dataclass(frozen=True)
 class CoefficientRow:
-    """One coefficient of all cards, the reference first, and the others' differences from it."""
+    """A coefficient of all cards, the reference first, and the differences from the reference."""
 
     name: str
     cards: tuple[CardCoefficient, ...]
     differences: tuple[Difference, ...]
 
     def as_json(self) -> dict[str, object]:
-        """As JSON has it."""
+        """The JSON form."""
         return {
             "name": self.name,
             "cards": [vars(card) for card in self.cards],
@@ -90,9 +90,9 @@ class Expansion:
     Parameters
     ----------
     coefficients : mapping
-        Name to coefficient; what the model has not is left out.
+        Name to coefficient; terms that the model lacks are absent.
     refused : mapping
-        Name to why it cannot be compared.
+        Name to the reason that prevents a comparison.
     notes : tuple of str
         What was converted.
     """
@@ -103,7 +103,7 @@ class Expansion:
 
 
 def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[CoefficientRow, ...], tuple[str, ...]]:
-    """All coefficients of cards (the first is the reference) that any of them has, and notes on what was converted."""
+    """All coefficients of the cards (the first is the reference), with notes on conversions."""
     reference = cards[0]
     expansions = [expanded_as(card, reference) for card in cards]
     rows = []
@@ -112,8 +112,10 @@ def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[Coeffi
             continue
         found = tuple(_in_sign_of(reference, name, expansion.coefficients.get(name)) for expansion in expansions)
         differences = tuple(
-            Difference(why=expansion.refused[name]) if name in expansion.refused else _difference(found[0], own)
-            for expansion, own in zip(expansions[1:], found[1:], strict=True)
+            Difference(why=expansion.refused[name])
+            if name in expansion.refused
+            else _difference(found[0], expansion_row)
+            for expansion, expansion_row in zip(expansions[1:], found[1:], strict=True)
         )
         rows.append(CoefficientRow(name, found, differences))
     return tuple(rows), tuple(note for expansion in expansions[1:] for note in expansion.notes)
@@ -129,51 +131,53 @@ def _in_sign_of(reference: ManoeuvringCard, name: str, found: CardCoefficient | 
     return replace(found, value=factor * found.value)
 
 
-def _difference(first: CardCoefficient, other: CardCoefficient) -> Difference:
-    if first.value is None or other.value is None:
+def _difference(first: CardCoefficient, second: CardCoefficient) -> Difference:
+    if first.value is None or second.value is None:
         return Difference(why="not in the reference's model" if first.value is None else "not in this model")
-    apart = other.value - first.value
+    apart = second.value - first.value
     percent = 100 * apart / abs(first.value) if first.value else None
-    if first.standard_error and other.standard_error and _same(first.value, other.value):
+    if first.standard_error and second.standard_error and _same(first.value, second.value):
         return Difference(None, percent, SAME)
-    if first.standard_error is None or other.standard_error is None:
+    if first.standard_error is None or second.standard_error is None:
         return Difference(None, percent, "" if apart == 0 else "no standard error")
-    both = math.hypot(first.standard_error, other.standard_error)
+    both = math.hypot(first.standard_error, second.standard_error)
     if both == 0:
         return Difference(0.0 if apart == 0 else None, percent, "" if apart == 0 else "both are stated as certain")
     return Difference(apart / both, percent)
 
 
 def compare_effects(cards: Sequence[ManoeuvringCard], models: Sequence[Model]) -> tuple[CoefficientRow, ...]:
-    """All parameters of effects that any card has, in SI, as their models have them; `models` are those of the cards.
+    """All parameters of effects of the cards, in SI, in the units of their models; `models` are those of the cards.
 
-    What has a unit (a wind speed, a time) is compared between ships of one size alone.
+    Values with a unit (a wind speed, a time) are compared only between ships of the same size.
     """
     found = [_of_effects(card, model) for card, model in zip(cards, models, strict=True)]
     rows = []
-    for name in dict.fromkeys(name for own in found for name in own):
-        row = tuple(own.get(name, CardCoefficient(None)) for own in found)
+    for name in dict.fromkeys(name for effects in found for name in effects):
+        row = tuple(effects.get(name, CardCoefficient(None)) for effects in found)
         differences = []
-        for card, model, one in zip(cards[1:], models[1:], row[1:], strict=True):
+        for card, model, coefficient in zip(cards[1:], models[1:], row[1:], strict=True):
             of_size = name in model and model[name].unit not in ("1", "rad")
-            other_size = not math.isclose(card.ship.length_m, cards[0].ship.length_m, rel_tol=1e-6)
-            refused = of_size and other_size
-            differences.append(Difference(why="of a ship of another size") if refused else _difference(row[0], one))
+            sizes_differ = not math.isclose(card.ship.length_m, cards[0].ship.length_m, rel_tol=1e-6)
+            refused = of_size and sizes_differ
+            differences.append(
+                Difference(why="of a ship of another size") if refused else _difference(row[0], coefficient)
+            )
         rows.append(CoefficientRow(name, row, tuple(differences)))
     return tuple(rows)
 
 
 def _of_effects(card: ManoeuvringCard, model: Model) -> dict[str, CardCoefficient]:
     return {
-        one.name: CardCoefficient(one.value, one.standard_error, not one.assumed)
-        for one in card_parameters(card, model)
-        if one.key.startswith("effects.")
+        parameter.name: CardCoefficient(parameter.value, parameter.standard_error, not parameter.assumed)
+        for parameter in card_parameters(card, model)
+        if parameter.key.startswith("effects.")
     }
 
 
-def _same(one: float, other: float) -> bool:
-    """One number except for rounding, as it is left by a change of convention."""
-    return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-15)
+def _same(first: float, second: float) -> bool:
+    """True for numbers that are equal except for rounding by a change of convention."""
+    return math.isclose(first, second, rel_tol=1e-9, abs_tol=1e-15)
 
 
 def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
@@ -185,7 +189,7 @@ def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
     names, matrix, constant = _conversion(card, reference, ratio)
     sources = [name for name in card.derivatives if name in names]
     columns = [names.index(name) for name in sources]
-    own = np.array([card.derivatives[name] for name in sources])
+    values = np.array([card.derivatives[name] for name in sources])
     errors = np.array([card.standard_error(name) for name in sources])
     stated = {name for name in sources if name in card.uncertainty}
     found: dict[str, CardCoefficient] = {name: CardCoefficient(getattr(card.rigid_body, name)) for name in _RIGID_BODY}
@@ -199,7 +203,7 @@ def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
             continue
         known = {source for source, weight in zip(sources, weights, strict=True) if abs(weight) > _ABSENT}
         error = float(np.linalg.norm(weights * errors))
-        value = float(weights @ own + constant[row])
+        value = float(weights @ values + constant[row])
         if outside and (known != {name} or abs(value - card.derivatives[name]) > _ABSENT):
             refused.setdefault(name, "the reference's speed is outside the range in which this card holds")
         found[name] = CardCoefficient(value, error if known else None, bool(known) and known <= stated)
@@ -242,25 +246,30 @@ def _d(name: str) -> int:
 def _notes(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float) -> tuple[str, ...]:
     messages = []
     if ratio != 1:
-        messages.append(f"re-expanded about {ratio:.4g} times its own Froude number, to the third order")
-    own, other = card.model, reference.model
-    if own.speed_scale != other.speed_scale:
-        messages.append(f"primes by the {own.speed_scale} speed converted to the {other.speed_scale} one")
-    if own.yaw_rate_terms != other.yaw_rate_terms:
-        messages.append(f"yaw rate terms converted from {own.yaw_rate_terms} to {other.yaw_rate_terms}")
+        messages.append(f"re-expanded about {ratio:.4g} times its card_model Froude number, to the third order")
+    card_model, reference_model = card.model, reference.model
+    if card_model.speed_scale != reference_model.speed_scale:
+        messages.append(
+            f"primes by the {card_model.speed_scale} speed converted to the {reference_model.speed_scale} one"
+        )
+    if card_model.yaw_rate_terms != reference_model.yaw_rate_terms:
+        messages.append(
+            f"yaw rate terms converted from {card_model.yaw_rate_terms} to {reference_model.yaw_rate_terms}"
+        )
     return tuple(f"{card.ship.name} ({card.source}): {message}" for message in messages)
 
 
 def _conversion(
     card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float
 ) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Names of the velocity and rudder terms, the matrix from the card's to the reference's, and what is added."""
+    """Names of the velocity and rudder terms, the matrix from the card's to the reference's coefficients, and the
+    constant term."""
     names = [*ABKOWITZ_TERMS["X"], *ABKOWITZ_TERMS["Y"], *ABKOWITZ_TERMS["N"]]
-    own = ca.SX.sym("own", len(names))
+    coefficients = ca.SX.sym("own", len(names))
     at = ca.SX.sym("v"), ca.SX.sym("r"), ca.SX.sym("d"), ca.SX.sym("du")
-    forces = _forces_in_primes(card, reference, ratio, dict(zip(names, ca.vertsplit(own), strict=True)), at)
+    forces = _forces_in_primes(card, reference, ratio, dict(zip(names, ca.vertsplit(coefficients), strict=True)), at)
     series = _taylor(forces, at, names)
-    both = ca.Function("conversion", [*at, own], [ca.jacobian(series, own), series])
+    both = ca.Function("conversion", [*at, coefficients], [ca.jacobian(series, coefficients), series])
     matrix, constant = both(0, 0, 0, 0, np.zeros(len(names)))
     return names, np.array(matrix), np.array(constant).ravel()
 
@@ -269,7 +278,7 @@ def _forces_in_primes(
     card: ManoeuvringCard,
     reference: ManoeuvringCard,
     ratio: float,
-    own: Mapping[str, ca.SX],
+    coefficients: Mapping[str, ca.SX],
     at: tuple[ca.SX, ca.SX, ca.SX, ca.SX],
 ) -> ca.SX:
     """X', Y', N' of the card's model in the reference's convention, at a motion in the reference's primes."""
@@ -277,12 +286,12 @@ def _forces_in_primes(
     nominal = _nominal(reference)
     scale = ca.SX(ratio) if nominal else ratio / (ca.sqrt(1 - v**2) - du)
     u, sway, yaw = ratio + du * scale, v * scale, r * scale
-    own_scale = ca.SX(1) if _nominal(card) else ca.sqrt(u**2 + sway**2)
-    primes = sway / own_scale, yaw / own_scale, d, (u - 1) / own_scale
-    X, Y, N = (own_scale**2 * polynomial(ABKOWITZ_TERMS[name], own, *primes) for name in "XYN")
-    # What each convention leaves to the equations: (3.8) with u, or nothing, for V stands in the coefficients already.
-    for one, sign in ((card, 1), (reference, -1)):
-        if one.model.yaw_rate_terms == "hydrodynamic":
+    card_scale = ca.SX(1) if _nominal(card) else ca.sqrt(u**2 + sway**2)
+    primes = sway / card_scale, yaw / card_scale, d, (u - 1) / card_scale
+    X, Y, N = (card_scale**2 * polynomial(ABKOWITZ_TERMS[name], coefficients, *primes) for name in "XYN")
+    # Terms that each convention leaves to the equations: (3.8) with u, or none, because the coefficients include V.
+    for each_card, sign in ((card, 1), (reference, -1)):
+        if each_card.model.yaw_rate_terms == "hydrodynamic":
             inertia = inertial_forces(card.rigid_body.mass, card.rigid_body.x_G, u, sway, yaw)
             X, Y, N = X + sign * inertia[0], Y + sign * inertia[1], N + sign * inertia[2]
     if ratio != 1 and card.propulsion and reference.propulsion:
@@ -298,7 +307,7 @@ def _nominal(card: ManoeuvringCard) -> bool:
 
 
 def _taylor(forces: ca.SX, at: tuple[ca.SX, ...], names: Sequence[str]) -> ca.SX:
-    """Coefficients of the Taylor series, before 0 is put in: each derivative over its factorials."""
+    """Coefficients of the Taylor series before evaluation at 0: each derivative over its factorials."""
     known: dict[tuple[int, ...], ca.SX] = {(0, 0, 0, 0): forces}
 
     def derivative(powers: tuple[int, ...]) -> ca.SX:

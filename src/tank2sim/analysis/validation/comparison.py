@@ -1,4 +1,4 @@
-"""Cards of one ship compared: coefficient by coefficient, and by what they do in the standard trials."""
+"""Comparison of cards of a ship: by coefficient, and by their figures in the standard trials."""
 
 from __future__ import annotations
 
@@ -35,13 +35,12 @@ from tank2sim.simulation.run import Run
 from tank2sim.simulation.trajectory import Trajectory
 
 SAME_SIZE = 0.03
-"""Lengths and breadths that differ by less than this share are those of one ship: not all count them alike. Project
-choice."""
+"""Lengths and breadths that differ by less than this share are of the same ship: definitions differ. Project choice."""
 
 
 @dataclass(frozen=True, eq=False)
 class CardTrack:
-    """The path of one card's ship in a trial, at the reference's size: s, m."""
+    """The path of a card's ship in a trial, at the reference's size: s, m."""
 
     label: str
     time_s: Array
@@ -51,16 +50,16 @@ class CardTrack:
 
 @dataclass(frozen=True)
 class FigureRow:
-    """One figure by all cards at the reference's size.
+    """A figure by all cards at the reference's size.
 
     Parameters
     ----------
     name : str
         With its unit.
     values, deviations : tuple of float or None
-        Of each card, the reference first; None where the run did not show it, or nothing is known of its error.
+        Of each card, the reference first; None where the run did not show it, or its error is unknown.
     outside : tuple of bool
-        True where the run had left what the card was measured in before the figure was settled.
+        True where the run had left the card's range before the figure was reached.
     """
 
     name: str
@@ -70,20 +69,20 @@ class FigureRow:
 
     def difference(self, place: int) -> float | None:
         """A card's figure less the reference's."""
-        own, first = self.values[place], self.values[0]
-        return None if own is None or first is None else own - first
+        value, first = self.values[place], self.values[0]
+        return None if value is None or first is None else value - first
 
     def in_errors(self, place: int) -> float | None:
         """The difference over the root of both variances."""
-        apart, own, first = self.difference(place), self.deviations[place], self.deviations[0]
-        if apart is None or own is None or first is None or not math.hypot(own, first):
+        apart, deviation, first = self.difference(place), self.deviations[place], self.deviations[0]
+        if apart is None or deviation is None or first is None or not math.hypot(deviation, first):
             return None
-        return apart / math.hypot(own, first)
+        return apart / math.hypot(deviation, first)
 
 
 @dataclass(frozen=True, eq=False)
 class TrialComparison:
-    """One standard trial by all cards: figures, tracks, and what went wrong."""
+    """A standard trial by all cards: figures, tracks, and errors."""
 
     name: str
     figures: tuple[FigureRow, ...]
@@ -92,12 +91,12 @@ class TrialComparison:
 
 @dataclass(frozen=True, eq=False)
 class CardComparison:
-    """Cards compared; the first is the reference.
+    """Comparison of cards; the first is the reference.
 
     Parameters
     ----------
     labels, ships, sources : tuple of str
-        What each card is called here, its ship, and where its numbers come from.
+        Label of each card, its ship, and the source of its numbers.
     coefficients, effects : tuple of CoefficientRow
         Coefficients in the reference's convention, and parameters of the effects, SI.
     trials : tuple
@@ -124,24 +123,24 @@ class CardComparison:
         """All differences of a card (1 is the first after the reference) in standard errors, except for
         :data:`.SAME`."""
         found = [row.differences[place - 1].standard_errors for row in self.rows]
-        return tuple(one for one in found if one is not None)
+        return tuple(difference for difference in found if difference is not None)
 
     def same(self, place: int) -> int:
-        """How many numbers of a card are the reference's own."""
+        """Number of coefficients of a card that are identical to the reference's."""
         return sum(row.differences[place - 1].why == SAME for row in self.rows)
 
     def beyond(self, place: int) -> int:
-        """How many coefficients differ by more than :data:`.BEYOND` standard errors."""
-        return sum(abs(one) > BEYOND_STANDARD_ERRORS for one in self.in_errors(place))
+        """Number of coefficients that differ by more than :data:`.BEYOND` standard errors."""
+        return sum(abs(difference) > BEYOND_STANDARD_ERRORS for difference in self.in_errors(place))
 
     def rms(self, place: int) -> float | None:
         """Root mean square of the differences in standard errors: 1 if they are by chance."""
         found = self.in_errors(place)
-        return math.sqrt(sum(one**2 for one in found) / len(found)) if found else None
+        return math.sqrt(sum(difference**2 for difference in found) / len(found)) if found else None
 
     def as_json(self) -> dict[str, object]:
-        """All of it; tracks thinned to 200 points."""
-        others = range(1, len(self.labels))
+        """All values; tracks thinned to 200 points."""
+        columns = range(1, len(self.labels))
         return {
             "kind": "compare",
             "cards": [
@@ -156,7 +155,7 @@ class CardComparison:
                     "beyond_two_standard_errors": self.beyond(place),
                     "rms_standard_errors": self.rms(place),
                 }
-                for place in others
+                for place in columns
             ],
             "coefficients": [row.as_json() for row in self.coefficients],
             "effects": [row.as_json() for row in self.effects],
@@ -166,7 +165,7 @@ class CardComparison:
         }
 
     def _trial_json(self, trial: TrialComparison) -> dict[str, object]:
-        others = range(1, len(self.labels))
+        columns = range(1, len(self.labels))
         return {
             "name": trial.name,
             "figures": {
@@ -174,8 +173,8 @@ class CardComparison:
                     "values": list(row.values),
                     "standard_deviations": list(row.deviations),
                     "outside_card_range": list(row.outside),
-                    "differences": [row.difference(place) for place in others],
-                    "differences_standard_errors": [row.in_errors(place) for place in others],
+                    "differences": [row.difference(place) for place in columns],
+                    "differences_standard_errors": [row.in_errors(place) for place in columns],
                 }
                 for row in trial.figures
             },
@@ -193,7 +192,7 @@ class CardComparison:
 
 
 def compare_cards(cards: Sequence[ManoeuvringCard], count: int = MEMBERS) -> CardComparison:
-    """Compare cards of one ship, or of ships and models of one form: the first is the reference, whose size is taken.
+    """Compare cards of a ship, or of ships and models of the same form, at the size of the first, the reference.
 
     Parameters
     ----------
@@ -213,10 +212,14 @@ def compare_cards(cards: Sequence[ManoeuvringCard], count: int = MEMBERS) -> Car
     ships = [ship_of(card) for card in cards]
     rows, notes = compare_coefficients(cards)
     drawn = [members(ship.card, ship.model, count) for ship in ships]
-    messages = [f"{label}: {one}" for label, (_, those) in zip(labels, drawn, strict=True) for one in those]
+    messages = [
+        f"{label}: {message}"
+        for label, (_, card_messages) in zip(labels, drawn, strict=True)
+        for message in card_messages
+    ]
     notices, trials = [*_notices(cards, labels), *messages, *notes], []
     for name, manoeuvre in standard_trials(ships).items():
-        trial, trouble = _trial(name, manoeuvre, ships, labels, [those for those, _ in drawn])
+        trial, trouble = _trial(name, manoeuvre, ships, labels, [card_messages for card_messages, _ in drawn])
         trials.append(trial)
         notices += trouble
     names = tuple(card.ship.name for card in cards)
@@ -227,7 +230,7 @@ def compare_cards(cards: Sequence[ManoeuvringCard], count: int = MEMBERS) -> Car
 
 
 def labels_of(cards: Sequence[ManoeuvringCard]) -> tuple[str, ...]:
-    """What each card is called: its file's stem, that of its folder for a bundled one, with a number where doubled."""
+    """Label of each card: its file's stem, or that of its folder for a bundled one, with a number for duplicates."""
     stems = []
     for card in cards:
         path = Path(card.source)
@@ -236,15 +239,20 @@ def labels_of(cards: Sequence[ManoeuvringCard]) -> tuple[str, ...]:
     return tuple(f"{stem} ({place + 1})" if stem in doubled else stem for place, stem in enumerate(stems))
 
 
-def differences_of_size(one: ManoeuvringCard, other: ManoeuvringCard, scale: float = 1.0) -> list[str]:
-    """Length and breadth of two ships that differ by :data:`SAME_SIZE` or more, in words; `scale` is that of `one`."""
+def differences_of_size(first: ManoeuvringCard, second: ManoeuvringCard, scale: float = 1.0) -> list[str]:
+    """Length and breadth of two ships that differ by :data:`SAME_SIZE` or more, in words; `scale` is that of
+    `first`."""
     found = []
-    for what, own, others in (
-        ("length", one.ship.length_m, other.ship.length_m),
-        ("breadth", one.ship.beam_m, other.ship.beam_m),
+    for what, first_size, second_size in (
+        ("length", first.ship.length_m, second.ship.length_m),
+        ("breadth", first.ship.beam_m, second.ship.beam_m),
     ):
-        if own is not None and others is not None and not math.isclose(own * scale, others, rel_tol=SAME_SIZE):
-            found.append(f"{what} {others:.4g} m, and not {own * scale:.4g} m")
+        if (
+            first_size is not None
+            and second_size is not None
+            and not math.isclose(first_size * scale, second_size, rel_tol=SAME_SIZE)
+        ):
+            found.append(f"{what} {second_size:.4g} m, and not {first_size * scale:.4g} m")
     return found
 
 
@@ -265,25 +273,25 @@ def _trial(
     found: list[Numbers] = []
     deviations: list[Numbers] = []
     outside: list[set[str]] = []
-    tracks, told = [], []
-    for ship, label, own in zip(ships, labels, drawn, strict=True):
+    tracks, messages = [], []
+    for ship, label, draws in zip(ships, labels, drawn, strict=True):
         ratio = reference.ship.length_m / ship.card.ship.length_m
         start = {"initial.u": _approach(reference, ship.card)}
         run = ship.run(manoeuvre, start)
         if isinstance(run, str):
-            told.append(f"{label}: {name}: {run}")
+            messages.append(f"{label}: {name}: {run}")
             found.append({})
             deviations.append({})
             outside.append(set())
             continue
-        told += [
+        messages += [
             f"{label}: {name}: {notice}" for notice in run.notices if EXTRAPOLATED in notice or "not show" in notice
         ]
         outside.append(set(run.reading.outside_names))
         found.append(_scaled(figure_numbers(run.figures), ratio))
         # Of each member the numbers alone are kept: the motions of a thousand would fill gigabytes.
-        those = member_spread([_numbers(ship.run(manoeuvre, {**start, **member})) for member in own])
-        deviations.append(_scaled(those, ratio))
+        spread = member_spread([_numbers(ship.run(manoeuvre, {**start, **member})) for member in draws])
+        deviations.append(_scaled(spread, ratio))
         tracks.append(_track(label, run.trajectory, ratio))
     names = dict.fromkeys(figure for figures in found for figure in figures)
     rows = tuple(
@@ -295,16 +303,17 @@ def _trial(
         )
         for name in names
     )
-    return TrialComparison(name, rows, tuple(tracks)), told
+    return TrialComparison(name, rows, tuple(tracks)), messages
 
 
 def _numbers(run: Run | str) -> Numbers:
-    """Figures of a run; none of one that could not be run."""
+    """Figures of a run; empty for one that could not be run."""
     return {} if isinstance(run, str) else figure_numbers(run.figures)
 
 
 def _approach(reference: ManoeuvringCard, card: ManoeuvringCard) -> float:
-    """The reference's speed at the size of the card's ship, m/s; its own where the two are one except for rounding."""
+    """The reference's speed at the size of the card's ship, m/s; its own speed if both are equal except for
+    rounding."""
     speed = reference.model.speed_mps * math.sqrt(card.ship.length_m / reference.ship.length_m)
     return card.model.speed_mps if math.isclose(speed, card.model.speed_mps, rel_tol=1e-6) else speed
 
@@ -342,8 +351,13 @@ def _notices(cards: Sequence[ManoeuvringCard], labels: Sequence[str]) -> list[st
         if not math.isclose(speed, card.model.speed_mps, rel_tol=1e-3):
             messages.append(f"{label}: its trials begin at the reference's speed, {speed:.4g} m/s at its own size")
         if _effects(card) != _effects(reference):
-            own, other = (", ".join(_effects(one)) or "none" for one in (card, reference))
-            messages.append(f"{label}: its effects ({own}) are not the reference's ({other}); the trials have them")
+            card_effects, reference_effects = (
+                ", ".join(_effects(each_card)) or "none" for each_card in (card, reference)
+            )
+            messages.append(
+                f"{label}: its effects ({card_effects}) are not the reference's ({reference_effects}); the trials "
+                "have them"
+            )
         if (card.propulsion is None) != (reference.propulsion is None):
             messages.append(f"{label}: only one of it and the reference has propulsion: no stop is compared")
     return messages

@@ -1,4 +1,4 @@
-"""Tracks of a ship from an order on, with marks, figures, and the place where the card's range ends."""
+"""Tracks of a ship from an order, with marks, figures, and the end of the card's range."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from tank2sim.analysis.validation.standard_trials import figure_numbers
 from tank2sim.arrays import Array
-from tank2sim.simulation.card_range import CardRangeReading, Numbers, left_at
+from tank2sim.simulation.card_range import CardRangeReading, Numbers, range_exit_row
 from tank2sim.simulation.run import Run
 from tank2sim.simulation.trajectory import Trajectory
 
@@ -27,7 +27,7 @@ class TrackMark:
 
 @dataclass(frozen=True, eq=False)
 class ShipTrack:
-    """A track from the order on, in axes of the first course: ahead and to starboard, m.
+    """A track from the order, in axes of the first course: ahead and to starboard, m.
 
     Parameters
     ----------
@@ -36,13 +36,13 @@ class ShipTrack:
     marks : tuple of TrackMark
         At each quarter of a turn (turns), or at equal times (stops).
     figures : mapping
-        Figures, also those that were settled outside what the card was measured in.
+        Figures, including those outside the card's range.
     reading : CardRangeReading
-        Which those are.
+        Figures outside the card's range.
     inside : int
         Points of the track until it leaves the card's range.
-    left : TrackMark, optional
-        Where it does; None if it does not.
+    range_exit : TrackMark, optional
+        The first point outside the card's range; None if there is none.
     """
 
     name: str
@@ -52,20 +52,20 @@ class ShipTrack:
     figures: Numbers
     reading: CardRangeReading
     inside: int
-    left: TrackMark | None = None
+    range_exit: TrackMark | None = None
 
     def outside(self, mark: TrackMark) -> bool:
-        """True if the run has left the card's range at a mark."""
-        return self.left is not None and mark.time_s >= self.left.time_s
+        """True if a mark is outside the card's range."""
+        return self.range_exit is not None and mark.time_s >= self.range_exit.time_s
 
     def as_json(self) -> dict[str, object]:
-        """All of it, the track thinned to 200 points."""
+        """All values, the track thinned to 200 points."""
         every = max(1, len(self.ahead_m) // 200)
         return {
             "name": self.name,
             "figures": self.figures,
             **self.reading.as_json(),
-            "left_card_range_at": vars(self.left) if self.left else None,
+            "left_card_range_at": vars(self.range_exit) if self.range_exit else None,
             "marks": [vars(mark) for mark in self.marks],
             "ahead_m": self.ahead_m[::every],
             "starboard_m": self.starboard_m[::every],
@@ -92,12 +92,19 @@ def _track(name: str, run: Run, change: Array, rows: list[int], end: int) -> Shi
     path = run.trajectory
     ahead, starboard = _in_first_axes(path)
     marks = tuple(_mark(path, change, row) for row in rows)
-    row, figures = left_at(path), figure_numbers(run.figures)
+    row, figures = range_exit_row(path), figure_numbers(run.figures)
     if row is None:
         return ShipTrack(name, ahead[:end], starboard[:end], marks, figures, run.reading, end)
-    left = _mark(path, change, row)
+    exit_mark = _mark(path, change, row)
     return ShipTrack(
-        name, ahead[:end], starboard[:end], marks, figure_numbers(run.figures), run.reading, min(row + 1, end), left
+        name,
+        ahead[:end],
+        starboard[:end],
+        marks,
+        figure_numbers(run.figures),
+        run.reading,
+        min(row + 1, end),
+        exit_mark,
     )
 
 

@@ -1,4 +1,4 @@
-"""The standard trials of a ship in calm water, and what the errors of its card make of their figures."""
+"""The standard trials of a ship in calm water, and the deviations of their figures by the errors of its card."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.run import Run, simulate
 
 MEMBERS = 40
-"""Members of an ensemble: the deviation that they give is itself uncertain by 15 % or so. Project choice."""
+"""Members of an ensemble: their deviation has an uncertainty of about 15 %. Project choice."""
 
 SEED = 601
-"""Where the members' random numbers start; any number does."""
+"""Seed of the members' random numbers; any number is valid."""
 
 LEAST_SHARE = 0.9
-"""A figure that fewer of the members reach than this share has no spread: those that are left are a choice."""
+"""Least share of the members that reach a figure with a spread: fewer are a biased selection."""
 
 _OVERSHOOTS = 2
-"""Overshoots that are looked at: those of IMO MSC.137(76)."""
+"""Number of evaluated overshoots: those of IMO MSC.137(76)."""
 
-_ONE_SIGMA = (0.158655, 0.841345)
+_SIGMA_QUANTILES = (0.158655, 0.841345)
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class TrialShip:
 
     @property
     def largest_rudder(self) -> float:
-        """Rudder of the turning circles, rad: 35 deg, or the largest that the gear allows."""
+        """Rudder of the turning circles, rad: 35 deg, or the largest of the gear."""
         gear = self.card.steering_gear
         return min(TRIAL_RUDDER, gear.max_angle_rad if gear and gear.max_angle_rad else TRIAL_RUDDER)
 
@@ -71,7 +71,7 @@ class TrialShip:
         parameters: Mapping[str, float] | None = None,
         inputs: Mapping[str, float] | None = None,
     ) -> Run | str:
-        """The trial in calm water, or why it cannot be run.
+        """The trial in calm water, or the reason that it cannot be run.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ def ship_of(card: ManoeuvringCard) -> TrialShip:
 
 
 def standard_trials(ships: Sequence[TrialShip]) -> dict[str, Manoeuvre]:
-    """Name to trial: turns at the largest rudder, zigzags 10/10 and 20/20, and the stop where all have an engine."""
+    """Name to trial: turns at the largest rudder, zigzags 10/10 and 20/20, and the stop if all have an engine."""
     rudder = min(ship.largest_rudder for ship in ships)
     shown = f"{math.degrees(rudder):.3g}"
     ten, twenty = math.radians(10.0), math.radians(20.0)
@@ -116,52 +116,52 @@ def standard_trials(ships: Sequence[TrialShip]) -> dict[str, Manoeuvre]:
 
 
 def figure_numbers(figures: Figures) -> Numbers:
-    """The figures of a run that are single numbers, with the first overshoots; what it did not show is left out."""
+    """The figures of a run that are single numbers, with the first overshoots; figures that it did not show are
+    absent."""
     overshoots = {entry_name("overshoots_deg", place) for place in range(_OVERSHOOTS)}
-    left_out = {"stopped_at_mps", *(name for name in figures if name.endswith("_lengths"))}
+    excluded = {"stopped_at_mps", *(name for name in figures if name.endswith("_lengths"))}
     single = single_figures(figures).items()
-    return {name: value for name, value in single if (name in figures or name in overshoots) and name not in left_out}
+    return {name: value for name, value in single if (name in figures or name in overshoots) and name not in excluded}
 
 
 def members(
     card: ManoeuvringCard, model: Model, count: int, seed: int = SEED
 ) -> tuple[tuple[dict[str, float], ...], tuple[str, ...]]:
-    """Parameters of `count` ships such as the card may mean, drawn within its errors; and messages about
-    them.
+    """Parameters of `count` ships drawn within the errors of the card, with notices.
 
-    Errors of all numbers are normal, and go together as the covariance next to the card says; without one they are
-    independent. Each member has a random number generator of its own, so that it does not depend on how many there are.
-    What is no parameter of the `model` but an input (a current) is calm in the trials, and not drawn.
+    Errors of all numbers are normal, correlated by the card's covariance, or independent without one. Each member has
+    its own random number generator, so that it does not depend on their number. Inputs of the `model` (a current) are
+    zero in the trials, and not drawn.
 
     Raises
     ------
     InputError
-        The covariance to which the card refers is at fault.
+        The covariance to which the card refers has an error.
     """
     if not count:
         return (), ()
     errors = joint_errors(card, card_parameters(card, study_model(card)))
     draws, known = draws_with(errors, seed), set(model.parameter_names)
     found = [draws.drawn(number) for number in range(count)]
-    told = Redrawn.of([one.beyond for one in found]).in_words(count)
-    drawn = tuple({name: value for name, value in one.values.items() if name in known} for one in found)
+    words = Redrawn.of([draw.beyond for draw in found]).in_words(count)
+    drawn = tuple({name: value for name, value in draw.values.items() if name in known} for draw in found)
     if errors.together:
-        return drawn, (errors.together_in_words, *told)
+        return drawn, (errors.together_in_words, *words)
     alone = "no covariance is next to the card: errors are taken as independent, and deviations of figures may be too"
-    return drawn, (f"{alone} large where errors go together", *told)
+    return drawn, (f"{alone} large where errors go together", *words)
 
 
 def member_spread(runs: Sequence[Mapping[str, float]]) -> Numbers:
     """Standard deviation of each figure over the members' runs (empty where one could not be run).
 
-    Half the distance between the quantiles of 15.87 and 84.13 %, which is that of normal figures, and which a few
-    members that run away do not move. Figures that fewer than :data:`LEAST_SHARE` of them reach have none.
+    Half the distance between the quantiles of 15.87 and 84.13 %, which equals that of normal figures and is robust to a
+    few diverging members. Figures that fewer than :data:`LEAST_SHARE` of them reach have none.
     """
     names = dict.fromkeys(name for run in runs for name in run)
     found = {name: [run[name] for run in runs if name in run] for name in names}
     enough = max(2.0, LEAST_SHARE * len(runs))
     return {
-        name: float(np.diff(np.quantile(values, _ONE_SIGMA))[0] / 2)
+        name: float(np.diff(np.quantile(values, _SIGMA_QUANTILES))[0] / 2)
         for name, values in found.items()
         if len(values) >= enough
     }

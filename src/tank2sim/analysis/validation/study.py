@@ -1,20 +1,20 @@
-"""Validation of a manoeuvring simulation against trials, figure by figure, in the manner of ITTC and ASME.
+"""Validation of a manoeuvring simulation against trials, figure by figure, by the procedures of ITTC and ASME.
 
     E = S - D,   u_val^2 = u_num^2 + u_input^2 + u_D^2,   U_val = 2 u_val
 
-with the figure S of the simulation and D of the trial. If |E| <= U_val, the error of the model cannot be
-distinguished from the uncertainties, and the figure is validated at the level U_val; if not, the model errs by about
-E. A large U_val is no merit, for what is not known well cannot be refuted: beyond a level that is required, U_reqd,
-the figure counts as too uncertain. ASME V&V 20-2009 (where E is S - D); ITTC 7.5-03-01-01 (E = D - S, and
-likewise U_V); Stern, Wilson, Coleman and Paterson (2001), J. Fluids Engineering 123. The factor of 2 is for 95 %.
+with the figure S of the simulation and D of the trial. If |E| <= U_val, the error of the model cannot be distinguished
+from the uncertainties, and the figure is validated at the level U_val; if not, the model errs by about E. A large U_val
+is not an advantage, because uncertain data cannot refute a model: above a required level, U_reqd, the figure counts as
+too uncertain. ASME V&V 20-2009 (where E is S - D); ITTC 7.5-03-01-01 (E = D - S, and likewise U_V); Stern, Wilson,
+Coleman and Paterson (2001), J. Fluids Engineering 123. The factor of 2 is for 95 %.
 
 - u_num: the simulation is repeated with half the step. U_num = 3 |S(h) - S(h/2)|, the grid convergence index of two
-  grids with its factor of safety of 3 (Roache 1998), taken of the first order, which limits and switches of the rudder
-  leave of Runge-Kutta's fourth. u_num is half of it.
+  grids with its factor of safety of 3 (Roache 1998), of first order, to which limits and switches of the rudder reduce
+  Runge-Kutta's fourth. u_num is half of it.
 - u_input: deviation of an ensemble with the errors of all numbers on the card, and their covariance if it has one.
-- u_D: the trial's figures are read off again with the noise of its signals added once more, and, where a manoeuvre was
-  run several times, the deviation between its runs; times are known to a sample (over sqrt 12). Weather, and what all
-  runs have in common, it does not know.
+- u_D: the trial's figures are evaluated again with added noise of its signals, and, where a manoeuvre was
+  run several times, the deviation between its runs; times are known to a sample (over sqrt 12). It does not include
+  weather and errors common to all runs.
 """
 
 from __future__ import annotations
@@ -57,21 +57,21 @@ SAFETY = 3.0
 """Factor of safety of a convergence index from two grids (Roache 1998)."""
 
 REQUIRED = 20.0
-"""U_reqd in per cent of the measured figure, where none is asked for: project choice."""
+"""Default U_reqd in per cent of the measured figure: project choice."""
 
 READINGS = 12
-"""Times that a trial's figures are read off with noise: enough to see whether that matters. Project choice."""
+"""Number of evaluations of a trial's figures with added noise: enough to show its effect. Project choice."""
 
 TURN_FIGURES = ("advance_m", "transfer_m", "tactical_diameter_m", "time_90_s", "time_180_s")
 ZIGZAG_FIGURES = ("overshoot_1_deg", "overshoot_2_deg", "initial_turning_time_s", "reach_s")
-"""Figures of IMO MSC.137(76) and ITTC 7.5-04-02-01 that are compared; later ones repeat their errors."""
+"""Compared figures, of IMO MSC.137(76) and ITTC 7.5-04-02-01; later ones repeat their errors."""
 
 _IDENTIFIED = r"identified by tank2sim \([^)]*\) from ([^;:]*)"
-"""What ``identify`` writes into the source of its card."""
+"""Text that ``identify`` writes into the source of its card."""
 
 
 class ComparisonOutcome(StrEnum):
-    """What a comparison of a figure ends with."""
+    """Outcome of the comparison of a figure."""
 
     VALIDATED = "validated"
     UNCERTAIN = "too uncertain"
@@ -82,12 +82,12 @@ class ComparisonOutcome(StrEnum):
 
 @dataclass(frozen=True)
 class Validated:
-    """One figure of one trial.
+    """A figure of a trial.
 
     Parameters
     ----------
     trial, manoeuvre, name : str
-        File, what it was, and the figure with its unit.
+        File, kind of manoeuvre, and the figure with its unit.
     measured : float
         D.
     simulated : float or None
@@ -95,11 +95,11 @@ class Validated:
     numerical, data : float
         u_num and u_D, standard.
     inputs : float or None
-        u_input, standard; None where the ensemble does not tell it.
+        u_input, standard; None where the ensemble does not determine it.
     required_percent : float
         U_reqd in per cent of D.
     made_card : bool
-        True if the trial is one of those that the card was identified from.
+        True if the card was identified from the trial.
     """
 
     trial: str
@@ -120,7 +120,7 @@ class Validated:
 
     @property
     def uncertainty(self) -> float | None:
-        """U_val, expanded; None where u_input is not known."""
+        """U_val, expanded; None where u_input is unknown."""
         if self.inputs is None:
             return None
         return COVERAGE * math.sqrt(self.numerical**2 + self.inputs**2 + self.data**2)
@@ -134,9 +134,9 @@ class Validated:
 
     @property
     def outcome(self) -> ComparisonOutcome:
-        """Open where U_val is not known; a figure that the simulation does not reach is not validated.
+        """Outcome: open where U_val is unknown, not validated where the simulation does not reach the figure.
 
-        One of a trial that made the card cannot be validated by it: at best it is fitted.
+        A figure of a trial that the card was identified from is at best fitted, not validated.
         """
         if self.error is None:
             return ComparisonOutcome.REFUTED
@@ -151,8 +151,8 @@ class Validated:
 
     def as_json(self) -> dict[str, object]:
         """With E, U_val and outcome."""
-        own = {"error": self.error, "uncertainty": self.uncertainty, "level_percent": self.level_percent}
-        return {**vars(self), **own, "outcome": str(self.outcome)}
+        result = {"error": self.error, "uncertainty": self.uncertainty, "level_percent": self.level_percent}
+        return {**vars(self), **result, "outcome": str(self.outcome)}
 
 
 @dataclass(frozen=True)
@@ -173,29 +173,29 @@ class Verified:
 
 @dataclass(frozen=True)
 class Validation:
-    """All figures of all trials, and what could not be compared."""
+    """All figures of all trials, and notices on trials that could not be compared."""
 
     figures: tuple[Validated, ...]
     members: int
     notices: tuple[str, ...] = ()
 
     def count(self, outcome: ComparisonOutcome) -> int:
-        """How many figures end so."""
+        """Number of figures with an outcome."""
         return sum(figure.outcome is outcome for figure in self.figures)
 
     @property
     def verdict(self) -> str:
-        """In words."""
+        """Summary in words."""
         if not self.figures:
-            return "not validated: there is no trial to compare with"
-        messages = [f"{self.count(one)} {one}" for one in ComparisonOutcome if self.count(one)]
+            return "not validated: no trial can be compared"
+        messages = [f"{self.count(outcome)} {outcome}" for outcome in ComparisonOutcome if self.count(outcome)]
         return f"of {len(self.figures)} figures {', '.join(messages)}"
 
     def as_json(self) -> dict[str, object]:
-        """All of it."""
+        """All values."""
         return {
             "verdict": self.verdict,
-            "counts": {str(one): self.count(one) for one in ComparisonOutcome},
+            "counts": {str(outcome): self.count(outcome) for outcome in ComparisonOutcome},
             "figures": [figure.as_json() for figure in self.figures],
             "members": self.members,
         }
@@ -213,7 +213,7 @@ def validate_card(
     trials : sequence of Trial
         At the ship's size.
     count : int
-        Members of the ensemble for u_input; 0 for none (u_input is then not known, and every figure is open).
+        Members of the ensemble for u_input; 0 for none (u_input is then unknown, and every figure is open).
     required_percent : float
         U_reqd in per cent of each measured figure.
     """
@@ -236,10 +236,10 @@ def validate_card(
             continue
         found, trouble = _validated(what, engines, drawn, between)
         copied = fitted_as(card, trial)
-        own = copied is not None or made_card(card, trial.name)
-        figures += [replace(one, required_percent=required_percent, made_card=own) for one in found]
+        fitted = copied is not None or made_card(card, trial.name)
+        figures += [replace(figure, required_percent=required_percent, made_card=fitted) for figure in found]
         messages += trouble
-        if own:
+        if fitted:
             named = f" (as {copied})" if copied not in (None, trial.name) else ""
             messages.append(
                 f"{trial.name}: the card was identified from this trial{named}: its figures are only fitted"
@@ -254,10 +254,10 @@ def validate_card(
 
 
 def made_card(card: ManoeuvringCard, trial: str) -> bool:
-    """True if the source of a card tells that a trial, by the name of its file, was one of those that made it.
+    """True if the source of a card names the file of a trial.
 
-    What ``identify`` writes is looked through for any name; the rest of the source for names with a digit or an
-    underscore, which are no words.
+    The text of ``identify`` is searched for any name; the remaining source only for names with a digit or an
+    underscore, which are not words.
     """
     text = f"{card.ship.source}; {card.ship.notes or ''}"
     looked = text if re.search(r"[\d_]", trial) else "; ".join(re.findall(_IDENTIFIED, text))
@@ -265,7 +265,8 @@ def made_card(card: ManoeuvringCard, trial: str) -> bool:
 
 
 def verify(ship: TrialShip, count: int = MEMBERS) -> tuple[tuple[Verified, ...], tuple[str, ...]]:
-    """The standard trials with the model's step, with half of it, and by an ensemble; and what could not be run."""
+    """The standard trials with the model's step, with half of it, and by an ensemble; and notices on trials that could
+    not be run."""
     model = replace(ship.model, step_s=ship.model.step_s / 2)
     finer = TrialShip(ship.card, model, Integrator(model))
     drawn, _ = members(ship.card, ship.model, count)
@@ -278,7 +279,9 @@ def verify(ship: TrialShip, count: int = MEMBERS) -> tuple[tuple[Verified, ...],
             continue
         messages += [f"{trial}: {notice}" for notice in run.notices if EXTRAPOLATED in notice or "not show" in notice]
         many = [ship.run(manoeuvre, member) for member in drawn]
-        deviation = member_spread([{} if isinstance(one, str) else figure_numbers(one.figures) for one in many])
+        deviation = member_spread(
+            [{} if isinstance(repeat, str) else figure_numbers(repeat.figures) for repeat in many]
+        )
         halved = figure_numbers(fine.figures)
         for name, value in figure_numbers(run.figures).items():
             halving = halved[name] - value if name in halved else None
@@ -297,7 +300,7 @@ def _validated(
     ensemble = [_repeated(what, engines[0], member)[0] for member in drawn]
     inputs, data = member_spread(ensemble), _read_again(what, engines[0].model)
     messages = [
-        f"{what.trial.name}: {name}: too few members of the ensemble reach it to tell u_input"
+        f"{what.trial.name}: {name}: too few members of the ensemble reach it to determine u_input"
         for name in measured
         if drawn and name in coarse and name not in inputs
     ]
@@ -316,14 +319,14 @@ def _validated(
 
 
 def compare_figures(what: Recorded) -> Numbers:
-    """The figures of a recorded manoeuvre that are compared."""
+    """The compared figures of a recorded manoeuvre."""
     names = TURN_FIGURES if isinstance(what.manoeuvre, Turn) else ZIGZAG_FIGURES
-    own = figure_numbers(what.figures)
-    return {name: own[name] for name in names if name in own}
+    measured = figure_numbers(what.figures)
+    return {name: measured[name] for name in names if name in measured}
 
 
 def kind(what: Recorded) -> str:
-    """What two repeats have in common: manoeuvre and side, to whole degrees, and approach speed to 5 %."""
+    """Key of repeats: manoeuvre and side, to whole degrees, and approach speed to 5 %."""
     speed = round(20 * math.log(max(what.start["initial.u"], 1e-9)))
     angle = round(math.degrees(what.manoeuvre.rudder))
     if isinstance(what.manoeuvre, Turn):
@@ -334,7 +337,7 @@ def kind(what: Recorded) -> str:
 def _repeated(
     what: Recorded, engine: Integrator, member: dict[str, float] | None = None
 ) -> tuple[Numbers, CardRangeReading]:
-    """The figures of a recorded manoeuvre as simulated, and which of them are settled outside the card's range."""
+    """Simulated figures of a recorded manoeuvre, and the names of those outside the card's range."""
     try:
         run = repeat(what, engine, member)
     except InputError:  # the motion left all bounds: none of its figures is reached
@@ -343,7 +346,7 @@ def _repeated(
 
 
 def _between_repeats(whats: Sequence[Recorded]) -> dict[tuple[str, str], float]:
-    """Standard deviation of one run of a manoeuvre, by (kind, figure), where there are two or more."""
+    """Standard deviation of a single run of a manoeuvre, by (kind, figure), from two or more repeats."""
     groups: dict[str, list[Numbers]] = {}
     for what in whats:
         groups.setdefault(kind(what), []).append(compare_figures(what))
@@ -357,7 +360,7 @@ def _between_repeats(whats: Sequence[Recorded]) -> dict[tuple[str, str], float]:
 
 
 def _read_again(what: Recorded, model: Model) -> Numbers:
-    """Standard deviation of each figure when the noise of the trial's signals is added once more."""
+    """Standard deviation of each figure with added noise of the trial's signals."""
     noise = record_noise(what.trial)
     readings = []
     for number in range(READINGS):

@@ -259,7 +259,7 @@ def _notes(study: TowStudy) -> Iterator[str]:
     if span is not None:
         low, high = span
         yield (
-            f"These tows determine M only to {low:.0f} to {high:.0f} kg (added mass {low - result.mass_kg:.0f} to "
+            f"These tows determine M only within {low:.0f} to {high:.0f} kg (added mass {low - result.mass_kg:.0f} to "
             f"{high - result.mass_kg:.0f} kg): 95 % intervals of the plausible models that they determine."
         )
     best = min(study.models, key=lambda fitted: fitted.fit.aic, default=None)

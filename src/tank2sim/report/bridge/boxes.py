@@ -203,7 +203,7 @@ def _told(one: CardRangeReading, name: str, words: Callable[[float], str]) -> _V
 def _time_to(circle: ShipTrack, heading_deg: float) -> _Value:
     mark = quarter(circle, heading_deg)
     if mark is None:
-        return OUTSIDE if circle.left else None
+        return OUTSIDE if circle.range_exit else None
     return OUTSIDE if circle.outside(mark) else clock(mark.time_s)
 
 

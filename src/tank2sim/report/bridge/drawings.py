@@ -173,10 +173,10 @@ def circles_drawing(
                 dots.append(at)
                 if mark.heading_change_deg < _FULL_TURN_DEG:
                     told.append((at, _told(mark), "word"))
-        if path.left and path.inside < len(path.ahead_m):
-            at = frame.place(path.left.starboard_m, path.left.ahead_m)
+        if path.range_exit and path.inside < len(path.ahead_m):
+            at = frame.place(path.range_exit.starboard_m, path.range_exit.ahead_m)
             dots.append(at)
-            told.append((at, ["range of the card ends", *_told(path.left)], "warn"))
+            told.append((at, ["range of the card ends", *_told(path.range_exit)], "warn"))
     labels = _Labels(_Block(0, 0, width, height), _sampled(frame, circles), _blocks(numbers, dots))
     words = [*numbers, *(word for at, texts, style in told for word in labels.place(at, texts, style))]
     if beam_m:
@@ -260,7 +260,7 @@ def stops_drawing(stops: Sequence[ShipTrack], *, width: float, height: float) ->
         lines.append(Line(" ".join(f"{zero + scale * a:.2f},{base - scale * b:.2f}" for a, b in pairs), "track stop"))
         last = -math.inf
         # The marks crowd together where the ship is slow: the last one counts, so they are reported from the end.
-        ends = [(path.left, "warn")] if path.left else []
+        ends = [(path.range_exit, "warn")] if path.range_exit else []
         within = [(mark, "word") for mark in reversed(path.marks) if not path.outside(mark)]
         for mark, style in (*ends, *within):
             x, y = zero + scale * mark.starboard_m, base - scale * mark.ahead_m
