@@ -132,7 +132,7 @@ def follow_programme(
     Raises
     ------
     InputError
-        There is no steady glide near the start, or the motion leaves all bounds.
+        No steady glide exists near the start, or the motion leaves all bounds.
     """
     first = {f"initial.{name}": orders[0][f"{name}.command"] for name in ("buoyancy", "pitch", "roll")}
     # Newton's first guess: some incidence of the right sign.

@@ -88,7 +88,7 @@ class Turn:
 
     @property
     def words(self) -> str:
-        """As :func:`parse_manoeuvre` reads it, in deg."""
+        """The text form of :func:`parse_manoeuvre`, in deg."""
         return f"turn:{_degrees(self.rudder)}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
@@ -129,7 +129,7 @@ class Zigzag:
 
     @property
     def words(self) -> str:
-        """As :func:`parse_manoeuvre` reads it, in deg."""
+        """The text form of :func:`parse_manoeuvre`, in deg."""
         return f"zigzag:{_degrees(self.rudder)}/{_degrees(self.heading)}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
@@ -169,7 +169,7 @@ class PullOut:
 
     @property
     def words(self) -> str:
-        """As :func:`parse_manoeuvre` reads it, in deg."""
+        """The text form of :func:`parse_manoeuvre`, in deg."""
         return f"pullout:{_degrees(self.rudder)}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
@@ -189,7 +189,7 @@ class SpiralManoeuvre:
 
     @property
     def words(self) -> str:
-        """As :func:`parse_manoeuvre` reads it, in deg."""
+        """The text form of :func:`parse_manoeuvre`, in deg."""
         return f"spiral:{_degrees(self.rudders[0])}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
@@ -214,7 +214,7 @@ class Stop:
 
     @property
     def words(self) -> str:
-        """As :func:`parse_manoeuvre` reads it, in rpm."""
+        """The text form of :func:`parse_manoeuvre`, in rpm."""
         return "stop" if self.revolutions is None else f"stop:{self.revolutions * 60 / math.tau:.10g}"
 
     def final_speed(self, approach: float) -> float:
@@ -264,7 +264,7 @@ class Orders:
 
     @property
     def words(self) -> str:
-        """As :func:`parse_manoeuvre` reads it."""
+        """The text form of :func:`parse_manoeuvre`."""
         return f"file:{self.source}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
@@ -272,7 +272,7 @@ class Orders:
         for name in self.inputs:
             if name not in running.model.input_names:
                 remedy = "add [propulsion] to the card, or leave the column out"
-                raise InputError(self.source, name, "is no input of this ship", remedy)
+                raise InputError(self.source, name, "is not an input of this ship", remedy)
         end = float(self.times[-1]) if duration is None else duration
         if end <= 0:
             raise InputError(self.source, "column t_s", "ends at 0 s", "add the time to which to run, or --duration")
@@ -352,7 +352,7 @@ def orders_from_columns(columns: Mapping[str, Array], source: Path | str) -> Ord
     names = {"delta_order_rad": "rudder.command", "delta_rad": "rudder.command", "n_radps": "propeller.speed"}
     for name in columns:
         if name not in {"t_s", *names}:
-            raise InputError(source, f"column {name}", "is no order", "orders are t_s, delta_order_deg and n_rpm")
+            raise InputError(source, f"column {name}", "is not an order", "orders are t_s, delta_order_deg and n_rpm")
     rudders = {"delta_order_rad", "delta_rad"} & set(columns)
     if "t_s" not in columns or not rudders:
         raise InputError(source, "header", "lacks t_s or delta_order_deg", "orders are t_s, delta_order_deg and n_rpm")

@@ -44,7 +44,7 @@ class YawEstimate:
     by_hump_kgm2: tuple[float, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
-        """As plain data; the unit of a number is in its key."""
+        """The estimate as plain data; the unit of a number is in its key."""
         result: dict[str, Any] = {
             "total_inertia_kgm2": self.total_inertia_kgm2,
             "total_inertia_standard_error_kgm2": self.inertia_error_kgm2,
