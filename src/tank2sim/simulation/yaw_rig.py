@@ -102,7 +102,7 @@ def run_yaw_rig(
     *,
     allow_saturation: bool = False,
 ) -> YawRun:
-    """Simulate a programme on the rig, from rest.
+    """Simulate a programme on the rig under a controller, from rest.
 
     Raises
     ------

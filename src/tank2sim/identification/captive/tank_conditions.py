@@ -11,7 +11,33 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from tank2sim.identification.captive.physics_warning import Caution, lacking
+
+@dataclass(frozen=True)
+class Caution:
+    """A warning.
+
+    Parameters
+    ----------
+    kind : str
+        Subject, such as ``"frequency parameter"``.
+    message : str
+        One sentence, with figures and source.
+    runs : tuple of str
+        The runs concerned; empty for the whole campaign.
+    missing : str
+        The missing key that prevents the check; empty if the check was made.
+    """
+
+    kind: str
+    message: str
+    runs: tuple[str, ...] = ()
+    missing: str = ""
+
+
+def lacking(kind: str, what: str, key: str) -> Caution:
+    """A caution of a `kind` on a check that lacks a key: `what` is unknown, and the key."""
+    return Caution(kind, f"Not known: {what}; give {key}.", missing=key)
+
 
 SHORTEST_MODEL_M = 4.0
 """Paper 2: between models of 4 m and 2 m most coefficients differ by about 10 %."""

@@ -20,8 +20,7 @@ from tank2sim.cards.form import YawRig
 from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import column_norms
-from tank2sim.identification.yaw.energy import estimate_from
-from tank2sim.identification.yaw.estimate import YawEstimate
+from tank2sim.identification.yaw.energy import YawEstimate, estimate_from
 from tank2sim.identification.yaw.intervals import Interval, smooth_angle
 from tank2sim.records.yaw import YawRecord
 from tank2sim.simulation.scheme import runge_kutta_step
