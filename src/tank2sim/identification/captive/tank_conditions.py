@@ -286,19 +286,15 @@ def tank_resonance(runs: tuple[OscillationMotion, ...], tank: Tank, gravity_mps2
         return
     depth = math.inf if tank.depth_m is None else tank.depth_m
     for mode in (1, 3, 5):
-        standing_wave = standing_wave_frequency(mode, tank.breadth_m, depth, gravity_mps2)
+        wave = standing_wave_frequency(mode, tank.breadth_m, depth, gravity_mps2)
         for harmonic in (1, 3):
-            near = tuple(
-                run.run
-                for run in runs
-                if abs(harmonic * run.frequency_radps - standing_wave) <= NEAR_RESONANCE * standing_wave
-            )
+            near = tuple(run.run for run in runs if abs(harmonic * run.frequency_radps - wave) <= NEAR_RESONANCE * wave)
             if near:
                 what = "the motion" if harmonic == 1 else "the third harmonic of the motion"
                 yield Caution(
                     "tank resonance",
                     f"The frequency of {what} is within {100 * NEAR_RESONANCE:.0f} % of standing wave {mode} across "
-                    f"the tank ({standing_wave:.3g} rad/s, {tank.breadth_m:g} m wide): its waves add to the forces.",
+                    f"the tank ({wave:.3g} rad/s, {tank.breadth_m:g} m wide): its waves add to the forces.",
                     near,
                 )
 
