@@ -101,8 +101,7 @@ def _known(trial: Trial, name: str) -> tuple[Array, Array] | None:
 
 def _held_order(time: Array, known: Array, values: Array) -> Array:
     """An order (n,) that holds until the next."""
-    held: Array = values[np.clip(np.searchsorted(known, time, side="right") - 1, 0, None)]
-    return held
+    return values[np.clip(np.searchsorted(known, time, side="right") - 1, 0, None)]
 
 
 def _of_angle(trial: Trial) -> list[HeldAngle]:

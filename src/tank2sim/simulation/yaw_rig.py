@@ -90,8 +90,7 @@ class YawRun:
     @property
     def error_rad(self) -> Array:
         """Tracking error e = phi_ref - phi of the true angle."""
-        error: Array = self.reference.angle_rad - self.true_angle_rad
-        return error
+        return self.reference.angle_rad - self.true_angle_rad
 
 
 def run_yaw_rig(

@@ -176,8 +176,7 @@ def _inverse(rows: Array, instruments: Array) -> Array:
     """(Z'X)^-1 Z'; with Z = X that of least squares."""
     norms, instrument_norms = column_norms(rows), column_norms(instruments)
     scaled = (instruments / instrument_norms).T
-    inverse: Array = np.linalg.solve(scaled @ (rows / norms), scaled) / norms[:, None]
-    return inverse
+    return np.linalg.solve(scaled @ (rows / norms), scaled) / norms[:, None]
 
 
 def _clustered(inverse: Array, residuals: Array, balance: Balance) -> Array:

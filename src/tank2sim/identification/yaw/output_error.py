@@ -179,8 +179,7 @@ def _covariance(residuals: Array, design: Array, humps: list[_Hump], gain: tuple
         few = float(student.ppf(_SIGMA_LEVEL, len(humps) - 1)) ** 2
         variances.append(few * len(humps) / (len(humps) - 1) * np.sum(draws**2, axis=1))
     wider = np.sqrt(np.max(variances, axis=0) / np.diag(alone))
-    widened: Array = alone * np.outer(wider, wider)
-    return widened
+    return alone * np.outer(wider, wider)
 
 
 def _newey_west(scores: Array, lags: int) -> Array:
