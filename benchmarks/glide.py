@@ -11,7 +11,6 @@ import time
 
 from paper_numbers import PaperNumbers
 
-from tank2sim.analysis.glide.design import best_glide, fastest_glide
 from tank2sim.analysis.glide.path import GlidePath, fly
 from tank2sim.analysis.glide.quasi_steady_error import swing_errors
 from tank2sim.analysis.glide.steady import (
@@ -22,6 +21,7 @@ from tank2sim.analysis.glide.steady import (
     smallest_angle,
     steady_glide,
 )
+from tank2sim.analysis.glide.study import best_glide, fastest_glide
 from tank2sim.analysis.glide.transient import compare_with_steady, equilibrium, quasi_steady_error
 from tank2sim.bundled import bundled
 from tank2sim.cards import GliderCard, read_card

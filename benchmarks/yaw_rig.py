@@ -28,8 +28,7 @@ from tank2sim.identification.yaw.energy import energy_balance, fit_energy
 from tank2sim.identification.yaw.identify import GRAVITY, WATER_TERMS, YawIdentification, YawOptions, identify_yaw
 from tank2sim.identification.yaw.intervals import Speeds, intervals
 from tank2sim.records.yaw import Medium, YawRecord, read_yaw_record, yaw_record_text
-from tank2sim.simulation.yaw_record import simulated_record, yaw_record
-from tank2sim.simulation.yaw_rig import Measuring, YawRun, run_yaw_rig
+from tank2sim.simulation.yaw_rig import Measuring, YawRun, run_yaw_rig, simulated_record, yaw_record
 from tank2sim.simulation.yaw_rig_control import AdaptiveController, Controller, TunedController
 
 TOP = PAPER_PROGRAMME.max_rate_radps

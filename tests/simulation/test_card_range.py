@@ -26,7 +26,7 @@ def turned(changes, manoeuvre="turn:35"):
 
 def test_a_ship_inside_the_range_of_its_card_has_no_marks() -> None:
     run = turned({})
-    assert run.reading.left_s is None and run.reading.outside_names == () and run.reading.message == ""
+    assert run.reading.exit_s is None and run.reading.outside_names == () and run.reading.message == ""
     assert np.all(run.trajectory["validity"] == 1.0)
 
 
@@ -44,7 +44,7 @@ def test_the_range_is_left_when_a_signal_passes_the_limit_of_the_card(key, limit
     run = turned({f"model.{key}": limit})
     beyond = signal(run.trajectory) > (-limit[0] if isinstance(limit, list) else limit)
     first = run.trajectory.t[int(np.argmax(beyond))]
-    assert run.reading.left_s == pytest.approx(first, abs=2.0)
+    assert run.reading.exit_s == pytest.approx(first, abs=2.0)
     validity = run.trajectory["validity"]
     assert validity.min() < 0.999 and np.all(validity[~beyond] == 1.0)
 
@@ -53,7 +53,7 @@ def test_only_figures_settled_after_the_range_is_left_are_marked() -> None:
     whole = turned({})
     speeds = whole.trajectory["motion.speed"][whole.trajectory.t > whole.figures["time_90_s"]]
     run = turned({"model.valid_speed_mps": [float(speeds[0]) - 0.05, 9.3]})
-    left, outside = run.reading.left_s, set(run.reading.outside_names)
+    left, outside = run.reading.exit_s, set(run.reading.outside_names)
     assert run.figures["time_90_s"] < left < run.figures["time_180_s"]  # or the test shows nothing
     assert {"tactical_diameter_m", "tactical_diameter_lengths", "time_180_s", "steady_diameter_m"} <= outside
     assert not {"advance_m", "advance_lengths", "transfer_m", "time_90_s"} & outside

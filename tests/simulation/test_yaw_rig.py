@@ -81,7 +81,7 @@ def test_turning_to_port_is_the_mirror_image(ellipsoid):
 
 def test_a_rig_that_saturates_the_motor_says_when():
     weak = ELLIPSOID_T1.model_copy(update={"max_current_A": 0.1})
-    with pytest.raises(InputError, match=r"saturates the motor, first at \d+\.\d{3} s .* 0\.1 A can be had"):
+    with pytest.raises(InputError, match=r"saturates the motor, first at \d+\.\d{3} s .* 0\.1 A is available"):
         run_yaw_rig(weak, PAPER_PROGRAMME, START, EXACT)
     run = run_yaw_rig(weak, PAPER_PROGRAMME, START, EXACT, allow_saturation=True)
     assert run.saturation and 0.5 < run.saturation.first_s < 4.5

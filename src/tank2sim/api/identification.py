@@ -23,10 +23,11 @@ from tank2sim.identification.trials.as_json import (
     following_rows,
     identification_as_json,
     identified_card_text,
+    replays,
+    replays_as_json,
     structure_rows,
 )
 from tank2sim.identification.trials.assessment.notices import remarks
-from tank2sim.identification.trials.assessment.replays import replays, replays_as_json
 from tank2sim.identification.trials.identify import (
     TRIAL_METHODS,
     Identification,

@@ -13,8 +13,7 @@ from tank2sim.analysis.ensemble.results import EnsembleRequest, FigureBands, nam
 from tank2sim.analysis.influence.card_influence import CardInfluence, influence
 from tank2sim.analysis.influence.figures import parse_figure
 from tank2sim.analysis.influence.study import Study
-from tank2sim.analysis.tuning.card import tuned_text
-from tank2sim.analysis.tuning.result import Means, Tuned
+from tank2sim.analysis.tuning.result import Means, Tuned, tuned_text
 from tank2sim.analysis.tuning.targets import TARGET_OPTION, Target, parse_target
 from tank2sim.analysis.tuning.tune import tune
 from tank2sim.api.ensemble import EnsembleOptions, band_table

@@ -13,10 +13,9 @@ from tank2sim.api.result import Result, ResultTable, cell_text, section_charts
 from tank2sim.api.ship import Ship
 from tank2sim.cards import Card, parse_card
 from tank2sim.errors import InputError
-from tank2sim.identification.tow.card import tow_card_text
 from tank2sim.identification.tow.fit import TowFit
 from tank2sim.identification.tow.force import force_words
-from tank2sim.identification.tow.identify import TOW_METHODS, identify_tow, parse_terms
+from tank2sim.identification.tow.identify import TOW_METHODS, identify_tow, parse_terms, tow_card_text
 from tank2sim.identification.tow.output_error import TowOptions
 from tank2sim.identification.tow.study import TowStudy, study_tows, towed_body
 from tank2sim.records.tows import read_tows

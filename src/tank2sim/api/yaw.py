@@ -308,7 +308,7 @@ def simulate_yaw(
     InputError
         The file exists, the card is not one of a yaw rig, or the motor saturates.
     """
-    from tank2sim.simulation.yaw_record import simulated_record
+    from tank2sim.simulation.yaw_rig import simulated_record
 
     path = Path(path)
     if path.exists():

@@ -16,8 +16,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.replay import replay
-from tank2sim.identification.tow.card import tow_card_text
-from tank2sim.identification.tow.identify import TowIdentification, identify_tow
+from tank2sim.identification.tow.identify import TowIdentification, identify_tow, tow_card_text
 from tank2sim.records.tows import Tows, read_tows
 from tank2sim.report.kit.charts import Tow, chart_png, tow_chart
 from tank2sim.report.kit.page import Column, Illustration, KeyFigure, PageSection, PageTable, Verdict

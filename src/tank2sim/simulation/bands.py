@@ -1,4 +1,4 @@
-"""Bands of an ensemble: between which values nine of ten members lie, of figures, histories and tracks."""
+"""Bands of an ensemble: intervals of nine of ten members, for figures, histories and tracks."""
 
 from __future__ import annotations
 
@@ -16,23 +16,22 @@ QUANTILES = (0.05, 0.50, 0.95)
 """Lower end, middle and upper end of a band."""
 
 STILL_RUNNING = 0.99
-"""A band over time ends where fewer than this share of the members still run: those that have ended are the quick ones,
-all on one side of the band, and with each of them its edge jumps. Of the 5 % beyond an edge this is a fifth (project
-choice)."""
+"""Share of running members below which a band over time ends: fast members end first, all on the same side of the band,
+and each moves its edge. Of the 5 % beyond an edge this is a fifth (project choice)."""
 
 
 FOLLOWED = 10.0
-"""Steps of the leading track within which a member next to it is to pass the next normal: it does within one, longer or
-shorter by its distance over the radius of the track; a lap, which is not to be left out, has more (project choice)."""
+"""Steps of the leading track within which a member must pass the next normal: it needs about one, longer or shorter by
+its distance over the radius of the track; a whole lap, which must not be skipped, has more (project choice)."""
 
 _ROUNDED = 0.001
-"""Part of a step by which a track may fall short of a normal or pass it backwards: positions are kept in single
-precision (project choice)."""
+"""Share of a step by which a track may fall short of a normal or pass it backwards: positions have single precision
+(project choice)."""
 
 
 @dataclass(frozen=True)
 class Band:
-    """A band of a figure: its 5, 50 and 95 % quantiles over the members that show it, and how many these are."""
+    """A band of a figure: its 5, 50 and 95 % quantiles over the members that show it, and their number."""
 
     low: float
     median: float
@@ -40,7 +39,7 @@ class Band:
     shown: int
 
     def as_json(self) -> dict[str, object]:
-        """By the names of the quantiles."""
+        """The band by the names of the quantiles."""
         return {"p5": self.low, "p50": self.median, "p95": self.high, "shown_by": self.shown}
 
 
@@ -53,22 +52,22 @@ class BandOverTime:
     high: Array
 
     def as_json(self) -> dict[str, object]:
-        """By the names of the quantiles."""
+        """The band by the names of the quantiles."""
         return {"p5": self.low, "p50": self.median, "p95": self.high}
 
 
 @dataclass(frozen=True, eq=False)
 class TrackBand:
-    """Between which lines nine of ten members' tracks lie, whenever each member is there.
+    """Lines between which nine of ten members' tracks lie, independent of time.
 
-    One member's track leads: that which keeps nearest to the median of x and y at equal time. Where it is at the times
-    of the bands stands a normal to it, at which each member's track passes at some distance to starboard; low, middle
-    and high are the quantiles of these distances. So a member that is ahead or astern on the same track is not next to
-    it, and on a second lap each passes on its second lap.
+    The leading track is that of the member nearest to the median of x and y at equal time. At each time of the bands it
+    has a normal, which each member's track passes at some distance to starboard; low, middle and high are the quantiles
+    of these distances. A member that is ahead or astern on the same track thus has distance zero, and on a second lap
+    each member passes on its second lap.
 
-    It ends (nan from there on) where fewer than :data:`STILL_RUNNING` of the members have come to the normal: they lag
-    behind at the end of the run, or are as far apart as the track is curved and would pass it backwards. Up to there
-    the few others keep the distance at which they were last.
+    It ends (nan afterwards) where fewer than :data:`STILL_RUNNING` of the members reach the normal: they lag behind at
+    the end of the run, or their distance equals the radius of the track and they would pass it backwards. Until then
+    the few missing members keep their last distance.
 
     Parameters
     ----------
@@ -86,14 +85,14 @@ class TrackBand:
         return int(np.isfinite(self.middle[:, 0]).sum())
 
     def as_json(self) -> dict[str, object]:
-        """Three lines of points."""
+        """The three lines as points."""
         return {"middle_m": self.middle, "low_m": self.low, "high_m": self.high}
 
 
 def small_edge_first(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
-    """The edges of a track's band so that the first goes with the 5 % quantile of figures such as the advance.
+    """The edges of a track's band, first the one of the 5 % quantile of figures such as the advance.
 
-    On a turn that is the inner edge, whatever its side; where the middle turns by less than 90 deg, the left one.
+    On a turn to either side it is the inner edge; where the middle turns by less than 90 deg, the left one.
 
     Parameters
     ----------
@@ -112,7 +111,7 @@ def figure_bands(found: Ensemble) -> dict[str, Band]:
     for name, values in found.figures.items():
         shown = values[np.isfinite(values)]
         if len(shown):
-            low, median, high = (float(one) for one in np.quantile(shown, QUANTILES))
+            low, median, high = (float(value) for value in np.quantile(shown, QUANTILES))
             bands[name] = Band(low, median, high, len(shown))
     return bands
 
@@ -144,7 +143,7 @@ def history_bands(
 
 def _quantiles(values: NDArray[np.floating]) -> Array:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # a time at which no member runs any more has none
+        warnings.simplefilter("ignore", RuntimeWarning)  # a time without running members has no quantile
         found: Array = np.nanquantile(values.astype(float), QUANTILES, axis=0)
     return found
 
@@ -155,15 +154,15 @@ def track_band(tracks: Array, count: int) -> TrackBand:
     normals, off = _passed(tracks, leading)
     come = np.isfinite(off).sum(axis=0) >= STILL_RUNNING * len(tracks)
     end = count if come.all() else int(np.argmin(come))
-    # The few that do not come keep their last distance: without them, most on one side, an edge would jump.
+    # The few missing members keep their last distance: without them, most on the same side, an edge would jump.
     known = np.maximum.accumulate(np.where(np.isfinite(off), np.arange(count), 0), axis=1)
-    beside = _quantiles(np.where(np.arange(count) < end, np.take_along_axis(off, known, axis=1), np.nan))
-    low, middle, high = (leading + one[:, None] * normals for one in beside)
+    quantiles = _quantiles(np.where(np.arange(count) < end, np.take_along_axis(off, known, axis=1), np.nan))
+    low, middle, high = (leading + quantile[:, None] * normals for quantile in quantiles)
     return TrackBand(middle, low, high)
 
 
 def _leading(tracks: Array) -> Array:
-    """The track (n, 2) that keeps nearest to the median, of those that run to the end."""
+    """The track (n, 2) nearest to the median, of those that run to the end."""
     whole = np.isfinite(tracks[:, :, 0]).all(axis=1)
     ran = tracks[whole] if whole.any() else tracks
     apart = np.nanmean(np.sum((ran - np.nanmedian(tracks, axis=0)) ** 2, axis=2), axis=1)
@@ -172,48 +171,48 @@ def _leading(tracks: Array) -> Array:
 
 
 def _passed(tracks: Array, leading: Array) -> tuple[Array, Array]:
-    """Unit normals (n, 2) to starboard of the leading track, and at what distance (members, n) each track passes there.
+    """Unit normals (n, 2) to starboard of the leading track, and the distance (members, n) of each track along them.
 
-    Each member is followed from normal to normal: it passes one after the last, in the course of the leading track,
-    and within :data:`FOLLOWED` of its steps. What does not is lost from there on (nan).
+    Each member is followed from normal to normal: it must pass each after the previous one, in the direction of the
+    leading track, and within :data:`FOLLOWED` of its steps. Otherwise it is lost (nan).
     """
     along = np.gradient(leading, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1), 1e-12)[:, None]
     normals = np.column_stack([-along[:, 1], along[:, 0]])
     steps = np.linalg.norm(np.diff(leading, axis=0, append=2 * leading[-1:] - leading[-2:-1]), axis=1)
     off = np.full((len(tracks), len(leading)), np.nan)
-    at, here = np.zeros(len(tracks), dtype=int), tracks[:, 0].copy()
+    at, places = np.zeros(len(tracks), dtype=int), tracks[:, 0].copy()
     for k, point in enumerate(leading):
-        here, at = _followed(tracks, (here, at), (point, along[k]), steps[max(k - 1, 0)])
-        off[:, k] = (here - point) @ normals[k]
+        places, at = _followed(tracks, (places, at), (point, along[k]), steps[max(k - 1, 0)])
+        off[:, k] = (places - point) @ normals[k]
     return normals, off
 
 
 def _followed(
     tracks: Array, last: tuple[Array, NDArray[np.intp]], normal: tuple[Array, Array], step: float
 ) -> tuple[Array, NDArray[np.intp]]:
-    """Where each track passes the normal to a course at a point next, and which of its times is the one before.
+    """Positions where each track next passes the normal to a course at a point, and the preceding time index.
 
-    `last` is where they passed the last one, nan of those that are lost."""
-    here, at = last[0].copy(), last[1].copy()
+    `last` has the same for the previous normal, nan for lost members."""
+    places, at = last[0].copy(), last[1].copy()
     point, along = normal
-    ahead = (here - point) @ along
+    ahead = (places - point) @ along
     rounded = _ROUNDED * step
-    here[ahead > rounded] = np.nan
+    places[ahead > rounded] = np.nan
     going = np.flatnonzero(ahead < -rounded)
-    left = np.full(len(tracks), FOLLOWED * step)
+    remaining = np.full(len(tracks), FOLLOWED * step)
     while len(going):
         beyond = at[going] + 1 >= tracks.shape[1]
-        here[going[beyond]] = np.nan
+        places[going[beyond]] = np.nan
         going = going[~beyond]
         to = tracks[going, at[going] + 1]
-        before, after = (here[going] - point) @ along, (to - point) @ along
+        before, after = (places[going] - point) @ along, (to - point) @ along
         passes = after >= -rounded
         share = np.where(passes, np.minimum(before / np.where(passes, before - after, 1.0), 1.0), 1.0)
-        moved = share[:, None] * (to - here[going])
-        here[going] += moved
-        left[going] -= np.linalg.norm(moved, axis=1)
-        here[going[left[going] < 0]] = np.nan
+        moved = share[:, None] * (to - places[going])
+        places[going] += moved
+        remaining[going] -= np.linalg.norm(moved, axis=1)
+        places[going[remaining[going] < 0]] = np.nan
         at[going[~passes]] += 1
-        going = going[~passes & np.isfinite(here[going, 0])]
-    return here, at
+        going = going[~passes & np.isfinite(places[going, 0])]
+    return places, at

@@ -1,6 +1,6 @@
 """The root of a function in an interval, by the method of Ridders (1979, IEEE Trans. Circuits Syst. 26, 979).
 
-``scipy.optimize`` has it, too, and takes a third of a second to import, which is half of a short simulation.
+``scipy.optimize.ridder`` is equivalent, but its import takes a third of a second, half of a short simulation.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from itertools import pairwise
 
 _MOST_STEPS = 200
-"""Each step at least halves the interval; 200 are more than doubles have bits. Project choice."""
+"""Each step at least halves the interval; 200 steps exceed the number of bits of a double. Project choice."""
 
 
 def bracketed_root(function: Callable[[float], float], low: float, high: float, tolerance: float = 1e-13) -> float:

@@ -1,4 +1,4 @@
-"""Where a run leaves what its card was measured in, and which of its figures were settled before that."""
+"""Exit of a run from its card's range, and the figures before it."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.trajectory import Trajectory
 
 INSIDE = 1 - 1e-6
-"""``validity`` below this has left 1: above what rounding leaves."""
+"""Value of ``validity`` below which it counts as less than 1: above rounding."""
 
 _STILL = 0.05
-"""Share of u0 below which drift and yaw rate over speed are not reported: a ship at rest has none. Project choice."""
+"""Share of u0 below which drift and yaw rate over speed are not reported: they are undefined at rest. Project
+choice."""
 
 Numbers = dict[str, float]
 """Figure by name with unit."""
@@ -29,58 +30,58 @@ _FIRST_HEADING = ("initial_turning_time_s", "initial_turning_distance_m", "initi
 
 @dataclass(frozen=True)
 class CardRangeReading:
-    """Figures of a run, and which of them were settled inside the range that the card was measured in.
+    """Figures of a run, with their times and the exit from the card's range.
 
     Parameters
     ----------
     figures : mapping
-        Figure by name with unit; entries of a list have names of their own (``overshoot_1_deg``).
+        Figure by name with unit; entries of a list have separate names (``overshoot_1_deg``).
     read_s : mapping
-        When each is settled, s from the order; the end of the run for those that are not in it.
-    left_s : float or None
-        When the output ``validity`` first leaves 1; None if it never does.
+        Time at which each is known, s from the order; the end of the run for absent names.
+    exit_s : float or None
+        Time at which the output ``validity`` first falls below 1; None if it does not.
     how : str
-        What leaves the range, and by how much; empty if nothing does.
+        The quantities that leave the range, with both ranges; empty if none does.
     """
 
     figures: Numbers
     read_s: Numbers
-    left_s: float | None = None
+    exit_s: float | None = None
     how: str = ""
 
     def outside(self, name: str) -> bool:
-        """True if the run had left the card's range before this figure was settled."""
-        return self.left_s is not None and self.read_s.get(name, math.inf) >= self.left_s
+        """True if the run had left the card's range before this figure was known."""
+        return self.exit_s is not None and self.read_s.get(name, math.inf) >= self.exit_s
 
     @property
     def outside_names(self) -> tuple[str, ...]:
-        """Names of the figures that were settled outside the card's range."""
+        """Names of the figures outside the card's range."""
         return tuple(name for name in self.figures if self.outside(name))
 
     @property
     def message(self) -> str:
-        """How the run leaves the card's range, in a line; empty if no figure is settled outside it."""
-        if self.left_s is None or not self.outside_names:
+        """Notice on the exit from the card's range, in a line; empty if no figure is outside it."""
+        if self.exit_s is None or not self.outside_names:
             return ""
-        return f"{EXTRAPOLATED} what the card was measured in, from {self.left_s:.3g} s on: {self.how}"
+        return f"{EXTRAPOLATED} what the card was measured in, from {self.exit_s:.3g} s on: {self.how}"
 
     def as_json(self) -> dict[str, object]:
-        """When and by what the run left the card's range, and the names of the figures settled outside it."""
+        """Time and cause of the exit from the card's range, and the names of the figures outside it."""
         return {
-            "left_card_range_s": self.left_s,
+            "left_card_range_s": self.exit_s,
             "left_card_range_by": self.how,
             "outside_card_range": list(self.outside_names),
         }
 
 
 NOTHING_READ = CardRangeReading({}, {})
-"""That of a run that could not be made."""
+"""The reading of a run that failed."""
 
 
 def reading(figures: Figures, run: Trajectory, parameters: Mapping[str, float]) -> CardRangeReading:
-    """The figures of a run with the times at which they are settled; `parameters` are all of the model, by name."""
+    """The figures of a run with their times; `parameters` are all of the model, by name."""
     row = range_exit_row(run)
-    left = None if row is None else float(run.t[row])
+    exit_s = None if row is None else float(run.t[row])
     settled: Numbers = {}
     for names, last in ((_QUARTER, "time_90_s"), (_HALF, "time_180_s"), (_FIRST_HEADING, "initial_turning_time_s")):
         if isinstance(time := figures.get(last), float):
@@ -90,11 +91,11 @@ def reading(figures: Figures, run: Trajectory, parameters: Mapping[str, float]) 
         for place, (begun, later) in enumerate(zip(executes, waits, strict=False), start=1):
             settled[f"overshoot_{place}_deg"] = settled[f"overshoot_time_{place}_s"] = begun + later
         settled |= {f"execute_time_{place}_s": time for place, time in enumerate(executes, start=1)}
-    return CardRangeReading(single_figures(figures), settled, left, "" if left is None else _how(run, parameters))
+    return CardRangeReading(single_figures(figures), settled, exit_s, "" if exit_s is None else _how(run, parameters))
 
 
 def single_figures(figures: Figures) -> Numbers:
-    """The figures of a run as single numbers: entries of lists by ``overshoot_1_deg``; what is None is left out."""
+    """The figures of a run as single numbers: entries of lists as ``overshoot_1_deg``; None is omitted."""
     found: Numbers = {}
     for name, value in figures.items():
         if isinstance(value, float):
@@ -111,7 +112,7 @@ def entry_name(name: str, place: int) -> str:
 
 
 def range_exit_row(run: Trajectory) -> int | None:
-    """Row at which ``validity`` first leaves 1; None if it never does, or the model does not state it."""
+    """Row at which ``validity`` first falls below 1; None if it does not, or if the model lacks it."""
     if "validity" not in run.model.outputs:
         return None
     rows = np.flatnonzero(run["validity"] < INSIDE)
@@ -126,7 +127,7 @@ def _how(run: Trajectory, values: Mapping[str, float]) -> str:
 
 
 def exceeded_range(values: Mapping[str, float], speed: Array, rate: Array, drift: Array, rudder: Array) -> str:
-    """What of a motion leaves the range of the card, with both ranges, in words; empty if nothing does.
+    """Text on the quantities of a motion that leave the card's range, with both ranges; empty if none does.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""An ensemble: one question asked of many ships, each with parameters drawn from what is uncertain.
+"""An ensemble: the same question for many ships, each with parameters drawn from their uncertainty.
 
-Each member draws from a stream of its own, made of the seed and its number alone, so that an ensemble is the same
-to the bit whoever computes it, in whatever batches and order. Batches are handed to any executor.
+Each member has its own random stream, from the seed and its number alone, so that an ensemble is identical to the bit
+for any executor, batches and order.
 """
 
 from __future__ import annotations
@@ -22,34 +22,34 @@ from tank2sim.arrays import Array
 Histories = NDArray[np.float32]
 
 BATCH = 32
-"""Members of a batch: long against what handing one over takes, short against the whole (project choice)."""
+"""Members of a batch: large against the cost of its transfer, small against the whole (project choice)."""
 
 KEPT = 10_000
-"""Members whose histories are kept for the bands of tracks, 4 bytes a sample: the first ones. The share below a
-quantile is known from them to 0.2 %; figures are those of all members (project choice)."""
+"""Number of members, the first, whose histories are kept for bands of tracks, 4 bytes a sample. The share below a
+quantile is known to 0.2 %; figures are those of all members (project choice)."""
 
 
 DRAWS = 1000
-"""Times that a member is drawn until it is within all bounds (project choice). Nearly all are at once; of parameters
-on their bound every other draw is, of ten such still one of a thousand."""
+"""Most draws of a member until it is within all bounds (project choice). Nearly all members need one; with a parameter
+at its bound every other draw is within, with ten such parameters one in a thousand."""
 
 NOT_WITHIN = f"not one of {DRAWS} draws is within the bounds of all parameters"
 
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """How the parameters of members are drawn: normal, about the card's values.
+    """Normal distribution of the members' parameters about the card's values.
 
     Parameters
     ----------
     names : tuple of str
-        The k parameters of the model that are uncertain.
+        The k uncertain parameters of the model.
     mean : array (k,)
     root : array (k, k)
         A root of their covariance: root @ root.T.
     lowest, highest : array (k,)
-        Values that the parameters cannot leave. What is drawn beyond is drawn again as a whole, from the same stream:
-        the normal distribution cut off there, in which numbers still go together. Put at the bound they would not.
+        Bounds of the parameters. A member beyond them is drawn again as a whole, from the same stream: this is the
+        truncated normal distribution, which preserves correlations. Clipping at the bounds would not.
     seed : int
     """
 
@@ -69,7 +69,7 @@ class Draws:
         stream = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(number,)))
         beyond: tuple[str, ...] = ()
         for draw in range(DRAWS):
-            # Summed by NumPy, row by row: a library of linear algebra sums in an order of each processor's own.
+            # Summed by NumPy, row by row: the order of sums in a linear algebra library depends on the processor.
             values = self.mean + (self.root * stream.standard_normal(len(self.names))).sum(axis=1)
             outside = (values < self.lowest) | (values > self.highest)
             if not outside.any():
@@ -81,8 +81,8 @@ class Draws:
 
 
 class Drawn(NamedTuple):
-    """Parameters of a member by name; those that were beyond a bound in the first draw; and, if every draw was, why it
-    cannot be used (the values then are those of the last, at the bounds)."""
+    """Parameters of a member by name; names beyond a bound in the first draw; and, if every draw was beyond, the reason
+    that it is unusable (with the values of the last draw, clipped)."""
 
     values: dict[str, float]
     beyond: tuple[str, ...] = ()
@@ -90,8 +90,8 @@ class Drawn(NamedTuple):
 
 
 class MemberResult(NamedTuple):
-    """What one member answers: figures by name, histories (signals, times), nan where it shows none; why a member
-    cannot be used, if so; and, put in by :func:`ensemble`, the parameters for which it was drawn again."""
+    """Result of a member: figures by name, histories (signals, times), nan where absent; the reason of an unusable
+    member; and, set by :func:`ensemble`, the parameters for which it was drawn again."""
 
     figures: Mapping[str, float]
     histories: Histories | None = None
@@ -100,54 +100,55 @@ class MemberResult(NamedTuple):
 
 
 Ask = Callable[[Sequence[Mapping[str, float]]], Sequence[MemberResult]]
-"""From the parameters of members, all of the same names, to the answer of each, which does not depend on the others."""
+"""Function from the parameters of members, all with the same names, to the result of each, independent of the
+others."""
 
 
 class Question(Protocol):
-    """What is asked of every member; it is sent to other processes."""
+    """Evaluation of every member; it is sent to other processes."""
 
     def prepared(self) -> Ask:
-        """What answers it, made once in each process."""
+        """Return the evaluating function, once in each process."""
 
 
 @dataclass(frozen=True)
 class Redrawn:
-    """How many members were drawn again, and the parameters that had been beyond their bounds, to how many times."""
+    """Number of members drawn again, and the number of times that each parameter was beyond its bounds."""
 
     members: int
     beyond: Mapping[str, int]
 
     @staticmethod
     def of(beyond: Sequence[tuple[str, ...]]) -> Redrawn:
-        """From the parameters that were beyond in the first draw of each member."""
+        """Counts from the names beyond their bounds in the first draw of each member."""
         counted = Counter(name for names in beyond for name in names)
         return Redrawn(sum(map(bool, beyond)), dict(counted.most_common()))
 
     def in_words(self, members: int) -> list[str]:
-        """What the user should know of it, of so many members."""
+        """Notices for an ensemble of `members`."""
         if not self.members:
             return []
-        which = ", ".join(f"{name} {count}" for name, count in self.beyond.items())
+        counts = ", ".join(f"{name} {count}" for name, count in self.beyond.items())
         share = 100 * self.members / members
         return [
             f"{self.members} of {members} members ({share:.2g} %) were drawn again, being beyond what numbers can be "
-            f"({which}): their distribution is normal, cut off there"
+            f"({counts}): their distribution is normal, cut off there"
         ]
 
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """What the members of an ensemble answer.
+    """Results of the members of an ensemble.
 
     Parameters
     ----------
     members, seed : int
     figures : mapping
-        Name to the figures of all members (members,); nan where one does not show it.
+        Name to the figures of all members (members,); nan where a member does not show it.
     histories : array (kept, signals, times), or None
         Of the first members, at most :data:`KEPT`.
     unusable : mapping
-        Why members cannot be used, to how many.
+        Reason of unusable members, to their number.
     redrawn : Redrawn
     """
 
@@ -160,12 +161,12 @@ class Ensemble:
 
     @property
     def usable(self) -> int:
-        """Members that can be used."""
+        """Number of usable members."""
         return self.members - sum(self.unusable.values())
 
     @property
     def notices(self) -> list[str]:
-        """What the user should know: members that were drawn again, or that cannot be used."""
+        """Notices on members that were drawn again, or that are unusable."""
         messages = [f"{count} of {self.members} members cannot be used: {why}" for why, count in self.unusable.items()]
         return [*self.redrawn.in_words(self.members), *messages]
 
@@ -173,7 +174,7 @@ class Ensemble:
 def ensemble(
     question: Question, draws: Draws, members: int, executor: Executor | None = None, *, batch: int = BATCH
 ) -> Ensemble:
-    """Ask `members` ships, in batches of `batch`, here or by an executor; the result depends on neither."""
+    """Evaluate `members` ships in batches of `batch`, in this process or by an executor, with the same result."""
     sent = pickle.dumps(question)
     tasks = [_Task(sent, draws, first, min(batch, members - first)) for first in range(0, members, batch)]
     figures: dict[str, Array] = {}
@@ -197,7 +198,7 @@ def ensemble(
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """A batch of members, and what another process needs to know of them."""
+    """A batch of members, with the data for another process."""
 
     question: bytes
     draws: Draws
@@ -216,10 +217,10 @@ def _answers(task: _Task) -> list[MemberResult]:
     numbers = range(task.first, task.first + task.count)
     drawn = [task.draws.drawn(number) for number in numbers]
     found = []
-    for number, one, answer in zip(numbers, drawn, ask([one.values for one in drawn]), strict=True):
-        told = MemberResult({}, trouble=one.trouble) if one.trouble else answer
-        histories = told.histories if number < KEPT else None
-        found.append(told._replace(histories=histories, beyond=one.beyond))
+    for number, draw, answer in zip(numbers, drawn, ask([draw.values for draw in drawn]), strict=True):
+        result = MemberResult({}, trouble=draw.trouble) if draw.trouble else answer
+        histories = result.histories if number < KEPT else None
+        found.append(result._replace(histories=histories, beyond=draw.beyond))
     return found
 
 

@@ -1,7 +1,7 @@
-"""Manoeuvring figures read off a trajectory, as in ITTC 7.5-04-02-01 and IMO MSC.137(76).
+"""Manoeuvring figures of a trajectory, as in ITTC 7.5-04-02-01 and IMO MSC.137(76).
 
 Distances are in axes fixed at the execute: advance along the initial heading, transfer at right angles to it, positive
-to the side of the turn. Between samples signals are interpolated, so that figures do not depend on where samples fall.
+to the side of the turn. Between samples signals are interpolated, so that figures do not depend on the sampling.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from tank2sim.simulation.trajectory import Trajectory
 Figures = dict[str, object]
 
 LOOP_HEIGHT = 0.05
-"""Two yaw rates at one rudder angle of a spiral are two steady turns if they differ by this share of the largest rate;
-less is what waiting for the steady state leaves."""
+"""Difference of two yaw rates at a rudder angle of a spiral, as a share of the largest rate, from which they are two
+steady turns; smaller ones are residuals of the waiting time."""
 
-AT_REST = 1e-6
-"""A speed that is less than this share of the run's largest is none: project choice, above rounding."""
+REST_SPEED = 1e-6
+"""Share of the run's largest speed below which a speed counts as zero: project choice, above rounding."""
 
 
 def figures_of(manoeuvre: object, trajectory: Trajectory, length: float) -> Figures:
-    """Figures of a manoeuvre; None for those that the run was too short to show.
+    """Figures of a manoeuvre; None for figures that the run was too short to show.
 
     Parameters
     ----------
@@ -171,12 +171,12 @@ def _spiral(run: Trajectory, rudders: tuple[float, ...]) -> Figures:
     rates = np.degrees(run["motion.r"][ends])
     angles = np.degrees(rudders)
     half = len(angles) // 2
-    there, back = rates[: half + 1], rates[half:][::-1]
+    outward, back = rates[: half + 1], rates[half:][::-1]
     # Where the two ways give different rates at one rudder angle, the ship has two steady turns there: a loop, as wide
     # as the rudder has to go beyond one crossing of zero rate to reach the other.
-    height = float(np.max(np.abs(there - back)))
+    height = float(np.max(np.abs(outward - back)))
     loop = height > LOOP_HEIGHT * np.max(np.abs(rates))
-    crossings = [np.interp(0.0, way[::-1], angles[: half + 1][::-1]) for way in (there, back)]
+    crossings = [np.interp(0.0, way[::-1], angles[: half + 1][::-1]) for way in (outward, back)]
     return {
         "rudder_deg": [float(angle) for angle in np.round(angles, 9)],
         "rate_degps": [float(rate) for rate in rates],
@@ -187,12 +187,12 @@ def _spiral(run: Trajectory, rudders: tuple[float, ...]) -> Figures:
 
 def _stop(run: Trajectory, stop: Stop, length: float) -> Figures:
     """Track reach along the path, head reach along the initial course, side reach across it, to starboard: all of the
-    origin from the order until the ship is dead in the water (IMO MSC.137(76), ITTC 7.5-04-02-01), or coasts at the
-    speed that is reported."""
+    origin, from the order until the ship is dead in the water (IMO MSC.137(76), ITTC 7.5-04-02-01), or coasts at the
+    reported speed."""
     final = stop.final_speed(float(run["motion.u"][0]))
     time = _first(run.crossings("motion.u", "motion.udot", final))
-    if time is None and run["motion.u"][-1] <= final + AT_REST * run["motion.speed"][0]:
-        time = float(run.t[-1])  # the run ends on the event itself
+    if time is None and run["motion.u"][-1] <= final + REST_SPEED * run["motion.speed"][0]:
+        time = float(run.t[-1])  # the run ends at the event
     ahead, side = _Execute(run, 1.0).place(time) if time else (None, None)
     way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(run["motion.x"]), np.diff(run["motion.y"])))])
     track = float(np.interp(time, run.t, way)) if time else None
@@ -211,4 +211,4 @@ def _stop(run: Trajectory, stop: Stop, length: float) -> Figures:
 def _speed_loss(run: Trajectory, speed: float) -> float | None:
     """Per cent of the speed at the execute; None for a ship that started at rest."""
     before, largest = float(run["motion.speed"][0]), float(run["motion.speed"].max())
-    return 100 * (1 - speed / before) if before > AT_REST * largest else None
+    return 100 * (1 - speed / before) if before > REST_SPEED * largest else None

@@ -1,11 +1,11 @@
-"""Programmes of a glider: its angle, roll and buoyancy in steps of time, and the transient model that follows them.
+"""Programmes of a glider: its angle, roll and buoyancy in steps of time, and their simulation by the transient model.
 
-A programme is a CSV, one row a step, with the columns
+A programme is a CSV with a row for each step and the columns
 
-    duration_s                            how long the step lasts
+    duration_s                            duration of the step
     path_angle_deg or pitch_deg           angle of the path, or pitch of the hull, + up (also _rad)
-    roll_deg                              + starboard side down; 0 where it is left out (also _rad)
-    buoyancy_kg                           net buoyancy, + light; left out or empty: the card's, by the sign of the angle
+    roll_deg                              + starboard side down; 0 if absent (also _rad)
+    buoyancy_kg                           net buoyancy, + light; absent or empty: the card's, by the sign of the angle
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from tank2sim.simulation.running import Running
 from tank2sim.simulation.trajectory import Trajectory
 
 LARGEST_BUOYANCY_KG = 1e6
-"""Largest net buoyancy of a step, kg: a thousand times the ballast of any glider, against slips of the pen."""
+"""Largest net buoyancy of a step, kg: a thousand times the ballast of any glider, against typing errors."""
 LONGEST_PROGRAMME_S = 1e6
-"""The longest programme, s, 12 days: a bound of ours against slips of the pen."""
+"""The longest programme, s, 12 days: project choice, against typing errors."""
 
 _COLUMNS = ("duration_s", "path_angle_rad", "pitch_rad", "roll_rad", "buoyancy_kg")
 
@@ -35,7 +35,7 @@ _COLUMNS = ("duration_s", "path_angle_rad", "pitch_rad", "roll_rad", "buoyancy_k
 class ProgrammeStep:
     """One step: `duration_s`; `angle_rad` of the path, or of the hull where `is_pitch`; roll; net buoyancy, if given.
 
-    `place` says where the step stands, for messages.
+    `place` is the location of the step, for messages.
     """
 
     duration_s: float
@@ -48,7 +48,7 @@ class ProgrammeStep:
 
 @dataclass(frozen=True)
 class GlideProgramme:
-    """Steps one after the other, and the file or name they come from."""
+    """Steps in sequence, and their file or name."""
 
     source: str
     steps: tuple[ProgrammeStep, ...]
@@ -65,7 +65,7 @@ def read_programme(path: Path | str) -> GlideProgramme:
     Raises
     ------
     InputError
-        The table is at fault, a column is unknown or missing, both angles are given, a cell is empty, a duration is
+        The table has an error, a column is unknown or missing, both angles are given, a cell is empty, a duration is
         not positive, or the programme is too long.
     """
     table = read_table(path).si()
@@ -73,7 +73,7 @@ def read_programme(path: Path | str) -> GlideProgramme:
         if name not in _COLUMNS:
             known = "duration_s, path_angle_deg or pitch_deg, roll_deg, buoyancy_kg"
             raise InputError(
-                table.path, f"column {table.heading(name)}", "is nothing of a programme", f"known: {known}"
+                table.path, f"column {table.heading(name)}", "is not a column of a programme", f"known: {known}"
             )
     angles = [name for name in ("path_angle_rad", "pitch_rad") if name in table.columns]
     if len(angles) != 1:
@@ -132,7 +132,7 @@ def follow_programme(
     Raises
     ------
     InputError
-        There is no steady glide near the start, or the motion leaves all bounds.
+        No steady glide exists near the start, or the motion leaves all bounds.
     """
     first = {f"initial.{name}": orders[0][f"{name}.command"] for name in ("buoyancy", "pitch", "roll")}
     # Newton's first guess: some incidence of the right sign.

@@ -1,7 +1,7 @@
-"""Integration at machine speed: many steps in one call, never a Python loop over right-hand sides.
+"""Integration in machine code: many steps in a call, without a Python loop over right-hand sides.
 
-Where there is a C compiler, the step is compiled together with a loop over it; elsewhere CasADi evaluates the same step
-in loops of its own. Both take the same steps of :func:`tank2sim.simulation.scheme.runge_kutta_step`.
+With a C compiler, the step is compiled together with a loop over it; otherwise CasADi evaluates the same step in its
+own loops. Both take the steps of :func:`tank2sim.simulation.scheme.runge_kutta_step`.
 """
 
 from __future__ import annotations
@@ -18,16 +18,12 @@ from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
 from tank2sim.native.generate import generate_c
 from tank2sim.native.library import cached_library
+from tank2sim.simulation.rows import EXPORT
 from tank2sim.simulation.scheme import runge_kutta_step, step_and_constants
 
-# The loop around the generated step. Work arrays are on the stack: their sizes are known when this text is made.
+# The loop around the generated step. Work arrays are on the stack, with sizes known at generation.
 _LOOP = """
-#ifdef _WIN32
-__declspec(dllexport)
-#else
-__attribute__((visibility("default")))
-#endif
-void rollout(long n, long every, double h, const double* u, const double* p, double* x) {{
+{export}void rollout(long n, long every, double h, const double* u, const double* p, double* x) {{
   const double* arg[{sz_arg}];
   double* res[{sz_res}];
   casadi_int iw[{sz_iw}];
@@ -49,22 +45,12 @@ void rollout(long n, long every, double h, const double* u, const double* p, dou
     }}
   }}
 }}
-#ifdef _WIN32
-__declspec(dllexport)
-#else
-__attribute__((visibility("default")))
-#endif
-void rollouts(long members, long n, long every, double h, const double* u, const double* p, double* x) {{
+{export}void rollouts(long members, long n, long every, double h, const double* u, const double* p, double* x) {{
   const long rows = (n + every - 1) / every + 1;
   long k;
   for (k = 0; k < members; ++k, p += {np}, x += rows * {nx}) rollout(n, every, h, u, p, x);
 }}
-#ifdef _WIN32
-__declspec(dllexport)
-#else
-__attribute__((visibility("default")))
-#endif
-void outputs(long n, const double* u, const double* p, const double* x, double* y) {{
+{export}void outputs(long n, const double* u, const double* p, const double* x, double* y) {{
   const double* arg[{sz_arg}];
   double* res[{sz_res}];
   casadi_int iw[{sz_iw}];
@@ -80,7 +66,7 @@ void outputs(long n, const double* u, const double* p, const double* x, double* 
 
 Loop = Callable[..., None]
 
-NO_COMPILER = "no C compiler that works was found: CasADi evaluates the model itself, many times slower"
+NO_COMPILER = "no working C compiler was found: CasADi evaluates the model, many times slower"
 
 
 class Integrator:
@@ -89,13 +75,12 @@ class Integrator:
     Parameters
     ----------
     model : Model
-        What to integrate.
+        The integrated model.
     compiled : bool, optional
-        True or False to ask for machine code or for CasADi's own evaluation; by default machine code where a C compiler
-        is found and works.
+        True for machine code, False for CasADi's evaluation; by default machine code with a working C compiler.
     every : int
-        Of how many steps one is kept in a trajectory. What is read off it is interpolated to the third order: the ten
-        of an ensemble, a twentieth of a ship length, move no figure by more than 2e-4 of itself.
+        Number of steps between kept samples of a trajectory. Figures use interpolation of third order: with ten steps,
+        as in an ensemble (a twentieth of a ship length), no figure changes by more than 2e-4 of itself.
     """
 
     def __init__(self, model: Model, compiled: bool | None = None, every: int = 1):
@@ -112,9 +97,9 @@ class Integrator:
         self._rollout, self._rollouts, self._outputs = self._in_casadi()
 
     def rollout(self, x: Array, u: Array, p: Array, h: float, n: int, *, every: int = 1) -> Array:
-        """States (ceil(n / every) + 1, nx) at the beginning `x` (nx,), then after each `every` steps, and the last.
+        """States (ceil(n / every) + 1, nx) at the start `x` (nx,), then after each `every` steps, and at the end.
 
-        `n` steps of `h` s with the inputs `u` (nu,) held.
+        `n` steps of `h` s with constant inputs `u` (nu,).
         """
         states = np.empty((-(-n // every) + 1, len(x)))
         states[0] = x
@@ -124,7 +109,8 @@ class Integrator:
     def rollouts(self, starts: Array, u: Array, p: Array, steps: tuple[float, int]) -> Array:
         """States (m, ceil(n / every) + 1, nx) of m ships from `starts` (m, nx), each with its parameters `p` (m, np).
 
-        `steps` are their length, s, and their number n; the inputs `u` (nu,) are held. Each is as in :meth:`rollout`.
+        `steps` are their length, s, and their number n; the inputs `u` (nu,) are constant. Each result is as in
+        :meth:`rollout`.
         """
         h, n = steps
         states = np.empty((len(starts), -(-n // self.every) + 1, starts.shape[1]))
@@ -156,7 +142,7 @@ class Integrator:
             "nc": max(1, constants.size1_out(0)),
             "ny": self.model.output.size1_out(0),
         }
-        source = generate_c(functions, "model") + _LOOP.format(**sizes, **lengths)
+        source = generate_c(functions, "model") + _LOOP.format(export=EXPORT, **sizes, **lengths)
         library = ctypes.CDLL(str(cached_library({"model.c": source})))
         array = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
         library.rollout.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_double, array, array, array]
@@ -172,7 +158,7 @@ class Integrator:
         def rollout(n: int, every: int, h: float, u: Array, p: Array, kept: Array) -> None:
             done, x = 0, np.empty((n + 1, kept.shape[1]))
             x[0] = kept[0]
-            while done < n:  # loops of 1, 2, 4, ... steps, so that few different ones are ever made
+            while done < n:  # loops of 1, 2, 4, ... steps, so that few different ones are necessary
                 length = 1 << ((n - done).bit_length() - 1)
                 if length not in loops:
                     loops[length] = step.mapaccum(length)

@@ -1,7 +1,7 @@
-"""Standard manoeuvres (ITTC 7.5-04-02-01, IMO MSC.137(76)): how the rudder is ordered, and when.
+"""Standard manoeuvres (ITTC 7.5-04-02-01, IMO MSC.137(76)): rudder orders and their times.
 
 Each manoeuvre drives a :class:`Running` simulation; the order is executed at t = 0. Angles are in rad, rudder and turns
-positive to starboard. What is read off the result is in :mod:`tank2sim.simulation.figures`.
+positive to starboard. Figures of the result are in :mod:`tank2sim.simulation.figures`.
 """
 
 from __future__ import annotations
@@ -27,28 +27,30 @@ MANOEUVRE_FORMS = (
 )
 
 TURN_HEADING = math.radians(540.0)
-"""A turning circle is held for one and a half turns, so that its last half turn is steady (ITTC 7.5-04-02-01)."""
+"""Heading change of a turning circle: one and a half turns, so that its last half turn is steady (ITTC
+7.5-04-02-01)."""
 
 ZIGZAG_EXECUTES = 5
-"""A zigzag ends after its fifth execute (ITTC 7.5-04-02-01): four overshoots."""
+"""Number of executes of a zigzag (ITTC 7.5-04-02-01), for four overshoots."""
 
 SPIRAL_RUDDERS_DEG = (20, 15, 10, 7, 5, 4, 3, 2, 1, 0, -1, -2, -3, -4, -5, -7, -10, -15, -20)
-"""Rudder angles of a direct spiral on its way to port, deg; it comes back through the same ones."""
+"""Rudder angles of a direct spiral on its way to port, deg; it returns through the same angles."""
 
 FULL_ASTERN = 0.7
 """Full astern, as a share of the nominal revolutions: about what a diesel reaches against the stream. Project choice;
 ``stop:RPM`` states another."""
 
 COASTING_END = 0.2
-"""A ship whose engine is stopped coasts on without end: its run counts as ended at this share of the approach speed,
-where the rudder has lost most of its hold. Project choice."""
+"""Share of the approach speed at which the run of a coasting ship ends, because coasting has no end: the rudder has
+then lost most of its effect. Project choice."""
 
 STEADY_CHANGE = 1e-3
-"""Steady: over two ship lengths the yaw rate changes by less than this share of itself, or of 0.01 u0/L if less."""
+"""Largest relative change of a steady yaw rate over two ship lengths, relative to itself or to 0.01 u0/L if that is
+larger."""
 
 
 def _degrees(angle: float) -> str:
-    """An angle (rad) in deg, without what rounding to radians leaves."""
+    """An angle (rad) in deg, without rounding errors of the conversion."""
     return f"{math.degrees(angle):.10g}"
 
 
@@ -86,7 +88,7 @@ class Turn:
 
     @property
     def words(self) -> str:
-        """As :func:`parse_manoeuvre` reads it, in deg."""
+        """The text form of :func:`parse_manoeuvre`, in deg."""
         return f"turn:{_degrees(self.rudder)}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
@@ -127,7 +129,7 @@ class Zigzag:
 
     @property
     def words(self) -> str:
-        """As :func:`parse_manoeuvre` reads it, in deg."""
+        """The text form of :func:`parse_manoeuvre`, in deg."""
         return f"zigzag:{_degrees(self.rudder)}/{_degrees(self.heading)}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
@@ -148,7 +150,7 @@ class Zigzag:
 
 @dataclass(frozen=True)
 class PullOut:
-    """Pull-out: a steady turn, then the neutral rudder; a stable ship comes back to a straight course.
+    """Pull-out: a steady turn, then the neutral rudder; a stable ship returns to a straight course.
 
     The neutral rudder is the angle that holds a straight course at the speed of the approach: not zero on an asymmetric
     ship (ITTC 7.5-04-02-01), which with the rudder at zero would keep a yaw rate that says nothing of its stability.
@@ -167,7 +169,7 @@ class PullOut:
 
     @property
     def words(self) -> str:
-        """As :func:`parse_manoeuvre` reads it, in deg."""
+        """The text form of :func:`parse_manoeuvre`, in deg."""
         return f"pullout:{_degrees(self.rudder)}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
@@ -187,7 +189,7 @@ class SpiralManoeuvre:
 
     @property
     def words(self) -> str:
-        """As :func:`parse_manoeuvre` reads it, in deg."""
+        """The text form of :func:`parse_manoeuvre`, in deg."""
         return f"spiral:{_degrees(self.rudders[0])}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
@@ -212,7 +214,7 @@ class Stop:
 
     @property
     def words(self) -> str:
-        """As :func:`parse_manoeuvre` reads it, in rpm."""
+        """The text form of :func:`parse_manoeuvre`, in rpm."""
         return "stop" if self.revolutions is None else f"stop:{self.revolutions * 60 / math.tau:.10g}"
 
     def final_speed(self, approach: float) -> float:
@@ -262,7 +264,7 @@ class Orders:
 
     @property
     def words(self) -> str:
-        """As :func:`parse_manoeuvre` reads it."""
+        """The text form of :func:`parse_manoeuvre`."""
         return f"file:{self.source}"
 
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
@@ -270,11 +272,11 @@ class Orders:
         for name in self.inputs:
             if name not in running.model.input_names:
                 remedy = "add [propulsion] to the card, or leave the column out"
-                raise InputError(self.source, name, "is no input of this ship", remedy)
+                raise InputError(self.source, name, "is not an input of this ship", remedy)
         end = float(self.times[-1]) if duration is None else duration
         if end <= 0:
             raise InputError(self.source, "column t_s", "ends at 0 s", "add the time to which to run, or --duration")
-        # A file that repeats an order at every sample is one order: fewer, longer calls into machine code.
+        # Repeated equal orders are merged: fewer, longer calls into machine code.
         table = np.column_stack(list(self.inputs.values()))
         new = np.concatenate([[True], np.any(np.diff(table, axis=0) != 0, axis=1)])
         for row in np.flatnonzero(new):
@@ -296,9 +298,9 @@ def parse_manoeuvre(text: str) -> Manoeuvre:
     InputError
         It is none of them, or an angle or a number of revolutions is out of bounds.
     """
-    kind, _, rest = text.partition(":")
-    if kind == "file" and rest:
-        return read_orders(Path(rest))
+    kind, _, argument = text.partition(":")
+    if kind == "file" and argument:
+        return read_orders(Path(argument))
     if kind == "stop":
         return _parse_stop(text)
     number = r"([+-]?\d+(?:\.\d+)?)"
@@ -308,11 +310,11 @@ def parse_manoeuvre(text: str) -> Manoeuvre:
         "pullout": (number, lambda a: PullOut(math.radians(a[0]))),
         "spiral": (f"(?:{number})?", lambda a: SpiralManoeuvre(_spiral_rudders(a[0] if a else SPIRAL_RUDDERS_DEG[0]))),
     }
-    found = re.fullmatch(makers[kind][0], rest) if kind in makers else None
+    found = re.fullmatch(makers[kind][0], argument) if kind in makers else None
     if found is None:
         close = difflib.get_close_matches(kind, [*makers, "stop", "file"], n=1)
         hint = f"did you mean {close[0]}? " if close and close[0] != kind else ""
-        raise InputError("--manoeuvre", "", f"{text!r} is no manoeuvre", f"{hint}one of: {MANOEUVRE_FORMS}")
+        raise InputError("--manoeuvre", "", f"{text!r} is not a manoeuvre", f"{hint}one of: {MANOEUVRE_FORMS}")
     angles = [float(group) for group in found.groups() if group is not None]
     if any(not 0 < abs(angle) < 90 for angle in angles) or (kind == "zigzag" and angles[1] < 0):
         remedy = (
@@ -350,7 +352,7 @@ def orders_from_columns(columns: Mapping[str, Array], source: Path | str) -> Ord
     names = {"delta_order_rad": "rudder.command", "delta_rad": "rudder.command", "n_radps": "propeller.speed"}
     for name in columns:
         if name not in {"t_s", *names}:
-            raise InputError(source, f"column {name}", "is no order", "orders are t_s, delta_order_deg and n_rpm")
+            raise InputError(source, f"column {name}", "is not an order", "orders are t_s, delta_order_deg and n_rpm")
     rudders = {"delta_order_rad", "delta_rad"} & set(columns)
     if "t_s" not in columns or not rudders:
         raise InputError(source, "header", "lacks t_s or delta_order_deg", "orders are t_s, delta_order_deg and n_rpm")
@@ -370,7 +372,7 @@ def orders_from_columns(columns: Mapping[str, Array], source: Path | str) -> Ord
 
 
 def _rudder_sign(path: Path, comments: Mapping[str, str]) -> str:
-    """``port`` or ``starboard``, as the file's comment says; starboard if it says nothing."""
+    """``port`` or ``starboard``, by the file's comment; starboard without one."""
     signs = [text.strip().lower() for key, text in comments.items() if key.strip().lower() == "rudder_sign"]
     sign = signs[0] if signs else "starboard"
     if sign not in ("port", "starboard"):
@@ -381,7 +383,7 @@ def _rudder_sign(path: Path, comments: Mapping[str, str]) -> str:
 def _parse_stop(text: str) -> Stop:
     found = re.fullmatch(r"stop(?::([+-]?\d+(?:\.\d+)?))?", text)
     if found is None:
-        raise InputError("--manoeuvre", "", f"{text!r} is no manoeuvre", f"one of: {MANOEUVRE_FORMS}")
+        raise InputError("--manoeuvre", "", f"{text!r} is not a manoeuvre", f"one of: {MANOEUVRE_FORMS}")
     if found[1] is None:
         return Stop()
     revolutions = float(found[1]) * math.tau / 60
@@ -392,19 +394,20 @@ def _parse_stop(text: str) -> Stop:
 
 
 def _spiral_rudders(largest: float) -> tuple[float, ...]:
-    """There and back again, from `largest` (deg) by the steps of :data:`SPIRAL_RUDDERS_DEG`."""
+    """Rudder angles of a spiral to the opposite side and back, from `largest` (deg) by the steps of
+    :data:`SPIRAL_RUDDERS_DEG`."""
     inner = [angle for angle in SPIRAL_RUDDERS_DEG if abs(angle) < abs(largest)]
-    there = [largest, *(math.copysign(1.0, largest) * angle for angle in inner), -largest]
-    return tuple(math.radians(angle) for angle in (*there, *there[-2::-1]))
+    outward = [largest, *(math.copysign(1.0, largest) * angle for angle in inner), -largest]
+    return tuple(math.radians(angle) for angle in (*outward, *outward[-2::-1]))
 
 
 def _until_steady(running: Running, ship_time: float, at_most: float) -> None:
     """Run until the yaw rate has not changed over two ship lengths (:data:`STEADY_CHANGE`)."""
     end = running.time + at_most
     before = math.inf
-    while end - running.time > 1e-6 * ship_time:  # what rounding leaves is no time to run
+    while end - running.time > 1e-6 * ship_time:  # ignore a remainder by rounding
         running.run(min(2 * ship_time, end - running.time))
-        now = running.state("motion.r")
-        if abs(now - before) < STEADY_CHANGE * max(abs(now), 0.01 / ship_time):
+        rate = running.state("motion.r")
+        if abs(rate - before) < STEADY_CHANGE * max(abs(rate), 0.01 / ship_time):
             return
-        before = now
+        before = rate

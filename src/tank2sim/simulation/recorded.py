@@ -1,8 +1,8 @@
-"""A recorded trial as a manoeuvre: which one it was, how it was steered, and the figures it shows.
+"""Recognition of the manoeuvre in a recorded trial, its steering, and its figures.
 
-So that the same manoeuvre can be simulated in closed loop, from the measured state at the execute, and its figures be
-compared with the measured ones: a zigzag's rudder turns when the *simulated* heading tells it to, with the delay that
-the controller of the trial had.
+The same manoeuvre can then be simulated in closed loop, from the measured state at the execute, and its figures
+compared with the measured ones: a zigzag's rudder is reversed at the *simulated* heading, with the delay of the trial's
+controller.
 """
 
 from __future__ import annotations
@@ -51,48 +51,49 @@ FED = {
     "wind_speed_mps": "wind.speed",
     "wind_direction_rad": "wind.direction",
 }
-"""Signal of a trial to the input of a model that it gives, next to the rudder."""
+"""Signal of a trial to the input of a model, in addition to the rudder."""
 
 SMOOTHING = 0.3
-"""Recorded signals are smoothed over this many L/u0 before figures are read off (ours: below the time of any peak)."""
+"""Smoothing time of recorded signals in L/u0, before figures are computed (project choice: below the time of any
+peak)."""
 
 COURSE_ERROR = math.radians(0.25)
-"""Standard error of a zigzag's course as the heading of the approach shows it, next to what the heading wanders there:
-the courses of MARIN's zigzags lie 0.1 to 0.2 deg off the headings with which their records begin (project choice)."""
+"""Standard error of a zigzag's course from the heading of its approach, in addition to the scatter of that heading: the
+courses of MARIN's zigzags differ by 0.1 to 0.2 deg from the first headings of their records (project choice)."""
 
 LAG = 0.1
-"""Scale of the lags of helmsmen and controllers, in L/u0, known before the record: HSVA's are 0.06, MARIN's 0.02, those
-of the 3 m Esso Osaka 0.03. It decides only where the reversals are too few to show the lag (project choice)."""
+"""Prior scale of the lags of helmsmen and controllers, in L/u0: HSVA's are 0.06, MARIN's 0.02, those
+of the 3 m Esso Osaka 0.03. It matters only with too few reversals for the lag (project choice)."""
 
 CONFIDENT = 0.975
-"""A nominal heading agrees with the reversals if it lies in their two-sided interval of 95 %."""
+"""Level of agreement of a nominal heading with the reversals: their two-sided interval of 95 %."""
 
 NO_LAG = 1e-6
-"""A lag below this share of its scale is what a search that ends at its bound leaves of none."""
+"""Share of its scale below which a lag counts as zero: the residual of a search that ends at its bound."""
 
 ASTRAY = 0.2
-"""Reversals whose headings scatter by more than this share of their nominal one are of no zigzag: helmsmen keep to
-some 10 % of it in the 3 m Esso Osaka, in a wind (project choice)."""
+"""Largest scatter of the reversal headings of a zigzag, as a share of the nominal heading: some 10 % by helmsmen of the
+3 m Esso Osaka in wind (project choice)."""
 
 HALF_TURNS = 2.0
-"""A turn is repeated for this many times as long as the measured one took to turn through 180 deg."""
+"""Duration of a simulated turn over the time of the measured one to 180 deg."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """What a trial was.
+    """The manoeuvre of a trial.
 
     Parameters
     ----------
     trial : Trial
         The record, at the scale of the model that simulates it.
     manoeuvre : Turn or Zigzag
-        With the rudder as it was reached, and the controller's lag.
+        With the reached rudder angle, and the controller's lag.
     begin_s, end_s : float
-        Execute (the step of the order where the record has it, else the rudder's first movement), and end of what
-        belongs to the manoeuvre (a turn ends when its rudder is taken back), s.
+        Execute (the step of the order where the record has it, else the rudder's first movement), and end of the
+        manoeuvre (a turn ends when its rudder is reduced), s.
     rudder_rate_radps : float or None
-        Rate at which the rudder went over; None where only its order is known, which the gear of the ship follows.
+        Rate of the rudder; None where only its order is known, which the gear of the ship follows.
     start : dict
         ``initial.*`` parameters of a model for the state at the execute.
     inputs : dict
@@ -100,7 +101,7 @@ class Recorded:
     figures : Figures
         As measured.
     errors : dict
-        Standard errors of what the reversals of a zigzag show together: ``heading_rad``, ``course_rad``, ``lag_s``.
+        Standard errors of the joint fit of a zigzag's reversals: ``heading_rad``, ``course_rad``, ``lag_s``.
     """
 
     trial: Trial
@@ -115,7 +116,7 @@ class Recorded:
 
     @property
     def words(self) -> str:
-        """What it was, for people: ``zigzag 20/10, reversed 2.4 s late (± 0.1 s)``."""
+        """Description of the manoeuvre: ``zigzag 20/10, reversed 2.4 s late (± 0.1 s)``."""
         rudder = math.degrees(self.manoeuvre.rudder)
         if isinstance(self.manoeuvre, Turn):
             return f"turn {rudder:.3g}"
@@ -131,8 +132,8 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
     Parameters
     ----------
     trial : Trial
-        With a rudder, heading and positions. Yaw rate and velocities through the water follow from them, less the
-        current of the model, where they were not measured.
+        With a rudder, heading and positions. Unmeasured yaw rate and velocities through the water are derived from
+        them, less the current of the model.
     model : Model
         Of a ship of the trial's size: for L/u0 and the names of its variables.
     """
@@ -147,7 +148,7 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
     inside = (trial.time_s >= first.execute_s) & (trial.time_s <= first.end_s)
     manoeuvre: Turn | Zigzag | None = None
     errors: dict[str, float] = {}
-    wait = float(np.median([one.moves_s - one.execute_s for one in held]))
+    wait = float(np.median([angle.moves_s - angle.execute_s for angle in held]))
     if len(held) >= 2 and all(a.angle * b.angle < 0 for a, b in pairwise(held)):
         found = _zigzag(trial.time_s, held, smooth, _heading_noise(trial, ship_time), ship_time)
         if found is not None:
@@ -166,7 +167,7 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
 
 
 def steerable(card: ManoeuvringCard) -> ManoeuvringCard:
-    """The card with limits of the gear where it states none, so wide that they limit nothing.
+    """The card with limits of the gear where it states none, too wide to have an effect.
 
     :func:`repeat` then has a rate to set in the model.
     """
@@ -176,7 +177,7 @@ def steerable(card: ManoeuvringCard) -> ManoeuvringCard:
     return revised(card, {}, {f"steering_gear.{key}": wide[key] for key, value in stated.items() if value is None})
 
 
-def repeat(what: Recorded, integrator: Integrator, parameters: dict[str, float] | None = None) -> Run:
+def repeat(record: Recorded, integrator: Integrator, parameters: dict[str, float] | None = None) -> Run:
     """Simulate a recorded manoeuvre in closed loop from its measured start.
 
     Parameters
@@ -195,25 +196,25 @@ def repeat(what: Recorded, integrator: Integrator, parameters: dict[str, float] 
     """
     model = integrator.model
     values = {}
-    if what.rudder_rate_radps is not None:  # the record shows what came of order and gear: a ramp, and nothing else
+    if record.rudder_rate_radps is not None:  # the record shows the result of order and gear: a ramp
         known = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
         lag = UNSTATED_LAG * known["ship.length"] / known["ship.speed"]
         gear = {
-            "steering.max_rate": what.rudder_rate_radps,
+            "steering.max_rate": record.rudder_rate_radps,
             "steering.max_angle": math.pi / 2,
             "steering.time_constant": lag,
         }
         values = {name: value for name, value in gear.items() if name in model.parameter_names}
-    start = {name: value for name, value in what.start.items() if name in model.parameter_names}
-    duration = what.end_s - what.begin_s
-    half = what.figures.get("time_180_s")
-    if isinstance(half, float):  # what comes long after says nothing of the figures, and may leave the model's range
+    start = {name: value for name, value in record.start.items() if name in model.parameter_names}
+    duration = record.end_s - record.begin_s
+    half = record.figures.get("time_180_s")
+    if isinstance(half, float):  # later motion does not affect the figures, and may leave the model's range
         duration = min(duration, HALF_TURNS * half)
     return simulate(
         model,
-        what.manoeuvre,
+        record.manoeuvre,
         duration_s=duration,
-        inputs=what.inputs,
+        inputs=record.inputs,
         parameters={**values, **start, **(parameters or {})},
         integrator=integrator,
     )
@@ -222,16 +223,16 @@ def repeat(what: Recorded, integrator: Integrator, parameters: dict[str, float] 
 def _zigzag(
     time: Array, held: list[HeldAngle], smooth: dict[str, Array], noise: float, ship_time: float
 ) -> tuple[Zigzag, dict[str, float]] | None:
-    """Rudder, nominal heading, course and lag of a zigzag, and their standard errors; None if it is none.
+    """Rudder, nominal heading, course and lag of a zigzag, and their standard errors; None if it is not a zigzag.
 
-    At each reversal k, ordered at t_k, the heading `lag` s before was that of the reversal:
-    psi(t_k - lag) = course + s_k nominal, s_k = 1 while the rudder was to starboard. Course, nominal heading and lag
-    are fitted to all reversals together by least squares, with the approach's heading as one more reading of the
-    course, and :data:`LAG` as what is known of lags. The nominal heading is then that of a usual zigzag, if one agrees.
-    `noise` is the standard deviation of the smoothed heading, rad.
+    At each reversal k, ordered at t_k, the heading `lag` s earlier was that of the reversal: psi(t_k - lag) = course +
+    s_k nominal, s_k = 1 while the rudder was to starboard. Course, nominal heading and lag are fitted to all reversals
+    together by least squares, with the approach's heading as another reading of the course, and :data:`LAG` as prior of
+    the lag. The nominal heading is then that of a usual zigzag, if one agrees. `noise` is the standard deviation of the
+    smoothed heading, rad.
     """
-    times = np.array([one.execute_s for one in held[1:]])
-    sides = np.array([math.copysign(1.0, one.angle) for one in held[:-1]])
+    times = np.array([each_angle.execute_s for each_angle in held[1:]])
+    sides = np.array([math.copysign(1.0, each_angle.angle) for each_angle in held[:-1]])
     if np.min(sides * np.interp(times, time, smooth["r_radps"])) <= 0:
         return None
     approach = _approach(time, held[0], smooth)
@@ -247,12 +248,12 @@ def _zigzag(
 
 def _degrees(held: list[HeldAngle]) -> float:
     """Rudder of a zigzag, deg."""
-    return math.degrees(float(np.median([abs(one.angle) for one in held])))
+    return math.degrees(float(np.median([abs(held_angle.angle) for held_angle in held])))
 
 
 @dataclass(frozen=True)
 class _Fit:
-    """Course, nominal heading and lag; their standard errors (without the nominal one where that was given); the
+    """Course, nominal heading and lag; their standard errors (without that of a given nominal heading); the
     weighted sum of squares, and the sum of squares of the reversals alone, rad2."""
 
     course: float
@@ -265,18 +266,18 @@ class _Fit:
 
 @dataclass(frozen=True, eq=False)
 class _Reversals:
-    """What the reversals of a zigzag are fitted to.
+    """Least-squares problem of the reversals of a zigzag.
 
     Parameters
     ----------
     time, heading : array (n,)
         s, rad.
     times, sides : array (k,)
-        When each reversal was ordered, and the side of the rudder until then.
+        Time of each reversal's order, and the side of the rudder before it.
     approach : (float, float)
-        Course as the approach shows it, and its standard error, rad.
+        Course by the approach, and its standard error, rad.
     lag_scale : float
-        Of lags before the record, s.
+        Prior scale of lags, s.
     """
 
     time: Array
@@ -287,8 +288,8 @@ class _Reversals:
     lag_scale: float
 
     def fit(self, noise: float, nominal: float | None = None) -> _Fit:
-        """The least-squares fit for a standard deviation of the headings at reversals, rad; for a `nominal` one if
-        it is given."""
+        """The least-squares fit for a standard deviation of the headings at reversals, rad; for a given `nominal`
+        heading, if any."""
         course, error = self.approach
 
         def off(at: Array, heading: float) -> Array:
@@ -313,11 +314,11 @@ class _Reversals:
 
 
 def _usual(reversals: _Reversals, noise: float, rudder_deg: int) -> tuple[_Fit, _Fit] | None:
-    """The fit as it comes out, and that with the nominal heading of a usual zigzag which agrees; None if it is none.
+    """The free fit, and that with the nominal heading of an agreeing usual zigzag; None if it is not a zigzag.
 
-    Tried are, in this order, the rudder's own angle (10/10, 20/20), the usual headings, and whole degrees; if none
-    agrees, it stays as it comes out. With more than three reversals their scatter shows how far they may be off
-    (Student's t); with three or fewer it is what the nominal heading itself leaves.
+    The candidates are, in this order, the rudder's angle (10/10, 20/20), the usual headings, and whole degrees; if none
+    agrees, the free fit is kept. With more than three reversals their scatter gives the tolerance (Student's t); with
+    three or fewer it is the residual with the nominal heading.
     """
     count = len(reversals.times)
     spare = count - 3
@@ -341,12 +342,12 @@ def _usual(reversals: _Reversals, noise: float, rudder_deg: int) -> tuple[_Fit, 
             if fitted.cost - free.cost <= limit and _keeps_to(reversals, fitted):
                 agreeing.append(fitted)
         if agreeing:
-            return free, min(agreeing, key=lambda one: one.cost)
+            return free, min(agreeing, key=lambda agreed: agreed.cost)
     return (free, free) if count > 1 and _keeps_to(reversals, free) else None
 
 
 def _keeps_to(reversals: _Reversals, fitted: _Fit) -> bool:
-    """True if the reversals are those of a zigzag (:data:`ASTRAY`); one alone needs a course to judge it by."""
+    """True if the reversals are those of a zigzag (:data:`ASTRAY`); a single one needs a known course."""
     scatter = math.sqrt(fitted.squares / len(reversals.times))
     if len(reversals.times) == 1:
         scatter = reversals.approach[1]
@@ -354,14 +355,14 @@ def _keeps_to(reversals: _Reversals, fitted: _Fit) -> bool:
 
 
 def _heading_noise(trial: Trial, ship_time: float) -> float:
-    """Standard deviation of what smoothing leaves of the heading's noise, rad."""
+    """Standard deviation of the heading's noise after smoothing, rad."""
     window = _window(trial.time_s, ship_time)
-    left = float(savgol_coeffs(window, 3)[window // 2]) if window >= 5 else 1.0
-    return math.sqrt(left) * trial.noise.get("psi_rad", white_noise(trial.signals["psi_rad"]))
+    gain = float(savgol_coeffs(window, 3)[window // 2]) if window >= 5 else 1.0
+    return math.sqrt(gain) * trial.noise.get("psi_rad", white_noise(trial.signals["psi_rad"]))
 
 
 def _approach(time: Array, first: HeldAngle, smooth: dict[str, Array]) -> tuple[float, float]:
-    """Mean heading before the first execute, and how well it tells the course, rad."""
+    """Mean heading before the first execute, and its standard error as the course, rad."""
     until = max(2, int(np.searchsorted(time, first.execute_s)))
     heading = smooth["psi_rad"][:until]
     wandered = max(float(np.std(heading)), 0.5 * abs(float(heading[-1] - heading[0])))
@@ -369,7 +370,7 @@ def _approach(time: Array, first: HeldAngle, smooth: dict[str, Array]) -> tuple[
 
 
 def _dating_noise(time: Array, times: Array, smooth: dict[str, Array]) -> float:
-    """Standard deviation of the headings at reversals because those are dated to a sample, rad."""
+    """Standard deviation of the headings at reversals because of their time resolution of a sample, rad."""
     rate = float(np.sqrt(np.mean(np.interp(times, time, smooth["r_radps"]) ** 2)))
     return rate * float(np.median(np.diff(time))) / math.sqrt(12)
 
@@ -381,17 +382,17 @@ def _trajectory(
     span: tuple[float, float],
     seen: tuple[list[HeldAngle], dict[str, Array]],
 ) -> Trajectory:
-    """The record between two times as a trajectory of the model: figures are read off it as off a simulation."""
+    """The record between two times as a trajectory of the model: for the same evaluation of figures as a simulation."""
     held, smooth = seen
     inside = (trial.time_s > span[0]) & (trial.time_s <= span[1])
     t = np.concatenate([[span[0]], trial.time_s[inside]])
     x = np.zeros((len(t), len(model.states)))
-    for name, there in STATES.items():
-        x[:, model.state_names.index(there)] = np.interp(t, trial.time_s, smooth[name])
+    for name, state in STATES.items():
+        x[:, model.state_names.index(state)] = np.interp(t, trial.time_s, smooth[name])
     u = np.tile(model.input_values(), (len(t), 1))
     command = model.input_names.index("rudder.command")
-    for one in held:
-        u[t >= one.moves_s, command] = one.angle
+    for held_angle in held:
+        u[t >= held_angle.moves_s, command] = held_angle.angle
     y = np.array(model.output(x.T, u.T, np.repeat(model.parameter_values()[:, None], len(t), axis=1))).T
     y[:, model.outputs.index("motion.rdot")] = np.gradient(x[:, model.state_names.index("motion.r")], t)
     return Trajectory(model, t - span[0], x, u, y)
@@ -417,7 +418,7 @@ def drift_over_ground(model: Model, inputs: Array, psi: Array) -> Array:
 
 
 def _motion(trial: Trial, model: Model, ship_time: float) -> dict[str, Array] | None:
-    """The signals of :data:`STATES` (n,), smooth; None if heading or positions were not measured.
+    """The smoothed signals of :data:`STATES` (n,); None if heading or positions were not measured.
 
     Yaw rate and velocities that were not measured are slopes of the smoothed heading and positions.
     """
@@ -444,14 +445,14 @@ def _motion(trial: Trial, model: Model, ship_time: float) -> dict[str, Array] | 
 def _fed(trial: Trial, model: Model) -> dict[str, float]:
     """Other inputs of the model at their mean in the trial."""
     return {
-        there: float(np.nanmean(trial.signals[name]))
-        for name, there in FED.items()
-        if name in trial.signals and there in model.input_names
+        variable: float(np.nanmean(trial.signals[name]))
+        for name, variable in FED.items()
+        if name in trial.signals and variable in model.input_names
     }
 
 
 def _window(time: Array, ship_time: float) -> int:
-    """Samples, odd, over which signals are smoothed."""
+    """Odd number of samples of the smoothing window."""
     return int(SMOOTHING * ship_time / float(np.median(np.diff(time)))) // 2 * 2 + 1
 
 
@@ -464,7 +465,8 @@ def _smoothed(time: Array, values: Array, ship_time: float) -> Array:
 
 
 def _slope(time: Array, values: Array, ship_time: float) -> Array:
-    """Time derivative by straight lines through windows: at the ends of a record a higher degree follows the noise."""
+    """Time derivative by straight lines through windows: a higher degree would follow the noise at the ends of a
+    record."""
     window = _window(time, ship_time)
     if window < 3 or window > len(values):
         return np.asarray(np.gradient(values, time), dtype=np.float64)

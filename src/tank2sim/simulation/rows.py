@@ -1,7 +1,9 @@
-"""A CasADi function over many rows of arguments, or over a chain of states, in machine code where there is a compiler.
+"""Evaluation of a CasADi function over many rows of arguments, or over a chain of states, in machine code with a
+compiler.
 
-:class:`RowFunction` evaluates ``f(a, b, ...) -> (y, ...)`` for each row of its arguments; :class:`Chain` feeds the one
-result back as the first argument, as integration does. Without a compiler CasADi's own loops do the same.
+:class:`RowFunction` evaluates ``f(a, b, ...) -> (y, ...)`` for each row of its arguments; :class:`Chain` passes the
+result of a step to the next step as its first argument, as in integration. Without a compiler CasADi's own loops do the
+same.
 """
 
 from __future__ import annotations
@@ -18,14 +20,17 @@ from tank2sim.native.compiler import find_compiler
 from tank2sim.native.generate import generate_c
 from tank2sim.native.library import cached_library
 
-# Work arrays are on the stack: their sizes are known when this text is made. A stride of 0 holds an argument.
-_LOOP = """
-#ifdef _WIN32
+EXPORT = """#ifdef _WIN32
 __declspec(dllexport)
 #else
 __attribute__((visibility("default")))
 #endif
-void loop(long n, const double** arguments, const long* strides, double** results, const long* lengths) {{
+"""
+"""Attribute of an exported function of a shared library, in C."""
+
+# Work arrays are on the stack, with sizes known at generation. A stride of 0 keeps an argument constant.
+_LOOP = """
+{export}void loop(long n, const double** arguments, const long* strides, double** results, const long* lengths) {{
   const double* arg[{sz_arg}];
   double* res[{sz_res}];
   casadi_int iw[{sz_iw}];
@@ -46,7 +51,7 @@ class RowFunction:
     Parameters
     ----------
     function : casadi.Function
-        Dense arguments and results; a matrix result comes back in CasADi's order, by columns.
+        Dense arguments and results; a matrix result is in CasADi's order, by columns.
     """
 
     def __init__(self, function: ca.Function):
@@ -59,7 +64,8 @@ class RowFunction:
                 self._library = None
 
     def __call__(self, *arguments: Array) -> tuple[Array, ...]:
-        """Results (n, elements) each; an argument (elements,) holds for every row, (n, elements) gives each its own."""
+        """Results (n, elements) each; an argument (elements,) is the same for every row, (n, elements) has a value for
+        each."""
         n = max(len(argument) for argument in arguments if argument.ndim == 2)
         arrays = [np.ascontiguousarray(argument, dtype=float) for argument in arguments]
         if self._library is None:
@@ -87,10 +93,10 @@ class RowFunction:
 
 
 class Chain(RowFunction):
-    """Evaluates a function whose one result is its next first argument."""
+    """Evaluates a function whose result is its first argument in the next step."""
 
     def run(self, start: Array, *arguments: Array) -> Array:
-        """States (n + 1, nx): `start` (nx,), then the result of each step with that row of the other arguments."""
+        """States (n + 1, nx): `start` (nx,), then the result of each step with its row of the other arguments."""
         n = max(len(argument) for argument in arguments if argument.ndim == 2)
         states = np.empty((n + 1, len(start)))
         states[0] = start
@@ -108,7 +114,7 @@ class Chain(RowFunction):
 def _compiled(function: ca.Function) -> ctypes.CDLL:
     sizes = {name: max(1, getattr(function, name)()) for name in ("sz_arg", "sz_res", "sz_iw", "sz_w")}
     counts = {"n_in": function.n_in(), "n_out": function.n_out(), "name": function.name()}
-    source = generate_c([function], "rows") + _LOOP.format(**sizes, **counts)
+    source = generate_c([function], "rows") + _LOOP.format(export=EXPORT, **sizes, **counts)
     library = ctypes.CDLL(str(cached_library({"model.c": source})))
     library.loop.restype = None
     return library

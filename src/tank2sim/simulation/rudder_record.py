@@ -1,4 +1,4 @@
-"""The rudder of a recorded manoeuvre: angles that were held, when each was ordered, and how the rudder got there."""
+"""The rudder of a recorded manoeuvre: held angles, with the time of their order and the rate of the rudder."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from tank2sim.records.trials import Trial
 Places = NDArray[np.int64]
 
 _LEAST_RUDDER = math.radians(2.0)
-"""A rudder that never exceeds this is no manoeuvre."""
+"""Least rudder angle of a manoeuvre."""
 
 _STEADY = 0.02
 _HELD = 0.05
 """A rudder is held when it stays within a share STEADY of an angle for a share HELD of the longest such time: project
-choices. In the approaches of the 3 m Esso Osaka it stays for 2 % of that at most, at the first angle of zigzags of the
-KVLCC2 for 13 % at least (35/5)."""
+choices. In the approaches of the 3 m Esso Osaka it stays for at most 2 % of that, at the first angle of zigzags of the
+KVLCC2 for at least 13 % (35/5)."""
 
 STEEPER = 3.0
-"""A rudder on its way does not speed up by this factor: gears have constant rates, or slow down (project choice)."""
+"""Factor by which a moving rudder does not accelerate: gears have constant or falling rates (project choice)."""
 
 _ROUNDS = 6
-"""Each halves what a record that begins with the rudder on its way leaves of its error: a project choice."""
+"""Iterations, each of which halves the error of a record that begins with a moving rudder: project choice."""
 
 _REACHED = 0.9
-"""Share of an angle at which the rudder counts as there: above the shares by which its rate is read off, below what the
-last part of a gear with a lag makes slow (project choice)."""
+"""Share of an angle at which the rudder counts as arrived: above the shares that determine its rate, below the slow
+last part of a gear with a lag (project choice)."""
 
-LEFT = 0.05
-"""An order has left the one before it when it has changed by this share of the change: a step does so at once, and an
-order that is ramped is dated near its beginning (project choice)."""
+LEAVING = 0.05
+"""Share of its change from which an order counts as changed: immediate for a step, near the beginning of a ramp
+(project choice)."""
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,15 @@ class HeldAngle:
     Parameters
     ----------
     angle : float
-        As it was reached, rad, positive to starboard.
+        The angle reached, rad, positive to starboard.
     execute_s : float
-        When it was ordered: the step of the order where the record has it, else when the rudder began to move.
+        Time of the order: its step where the record has it, else the start of the rudder's motion.
     moves_s : float
-        When the rudder began to move there; the execute where only the order is known.
+        Start of the rudder's motion; the execute where only the order is known.
     rate : float or None
-        Rate at which the rudder went over, rad/s; None where only the order is known.
+        Rate of the rudder, rad/s; None where only the order is known.
     end_s : float
-        Until when it was held.
+        Time until which it was held.
     """
 
     angle: float
@@ -64,10 +64,10 @@ class HeldAngle:
 
 
 def held_rudders(trial: Trial) -> list[HeldAngle]:
-    """Angles at which the rudder of a trial was held, one side after the other; none if it was not used.
+    """Angles at which the rudder of a trial was held, with alternating sides; empty if it was not used.
 
-    The rudder begins to move where the straight part of its way, drawn back, meets the angle that it left. If the
-    record has the order, too, its step is the execute; an order that does not show the same angles is passed over.
+    The start of the motion is where the straight part of its course, extrapolated back, meets the previous angle. If
+    the record has the order, too, its step is the execute; an order without the same angles is ignored.
     """
     moved, ordered = _of_angle(trial), _of_order(trial)
     if not moved or not ordered:
@@ -81,7 +81,7 @@ def held_rudders(trial: Trial) -> list[HeldAngle]:
 
 
 def rudder_of(trial: Trial) -> Array:
-    """The rudder's angle (n,), rad, without gaps; its order where that alone is known."""
+    """The rudder's angle (n,), rad, without gaps; its order if only that is known."""
     angle = _known(trial, "delta_rad")
     if angle is not None:
         return np.interp(trial.time_s, *angle)
@@ -101,8 +101,7 @@ def _known(trial: Trial, name: str) -> tuple[Array, Array] | None:
 
 def _held_order(time: Array, known: Array, values: Array) -> Array:
     """An order (n,) that holds until the next."""
-    held: Array = values[np.clip(np.searchsorted(known, time, side="right") - 1, 0, None)]
-    return held
+    return values[np.clip(np.searchsorted(known, time, side="right") - 1, 0, None)]
 
 
 def _of_angle(trial: Trial) -> list[HeldAngle]:
@@ -113,8 +112,8 @@ def _of_angle(trial: Trial) -> list[HeldAngle]:
     before = 0
     for group in _held(rudder):
         angle = float(np.median(rudder[group]))
-        there = group[np.abs(rudder[group]) >= _REACHED * abs(angle)]
-        stretch = slice(before, int(there[0] if len(there) else group[0]) + 1)
+        arrived = group[np.abs(rudder[group]) >= _REACHED * abs(angle)]
+        stretch = slice(before, int(arrived[0] if len(arrived) else group[0]) + 1)
         if found:
             moves, rate = _begins(time[stretch], rudder[stretch], found[-1].angle, angle)
         else:
@@ -133,9 +132,11 @@ def _of_order(trial: Trial) -> list[HeldAngle]:
     before = 0
     for group in _held(order):
         angle = float(np.median(order[group]))
-        left = found[-1].angle if found else float(np.median(order[before : int(group[0])] if group[0] else order[:1]))
-        way = math.copysign(1.0, angle - left) * (order[before : int(group[0]) + 1] - left)
-        still = np.flatnonzero(way < LEFT * abs(angle - left))
+        previous = (
+            found[-1].angle if found else float(np.median(order[before : int(group[0])] if group[0] else order[:1]))
+        )
+        way = math.copysign(1.0, angle - previous) * (order[before : int(group[0]) + 1] - previous)
+        still = np.flatnonzero(way < LEAVING * abs(angle - previous))
         execute = float(time[min(before + int(still[-1]) + 1, int(group[0]))] if len(still) else time[before])
         found.append(HeldAngle(angle, execute, execute, None, float(time[group[-1]])))
         before = int(group[-1])
@@ -143,7 +144,7 @@ def _of_order(trial: Trial) -> list[HeldAngle]:
 
 
 def _first_begins(time: Array, rudder: Array, angle: float) -> tuple[float, float]:
-    """The same from the approach, whose rudder is its median until the execute: the two are found in turn."""
+    """The same from the approach, whose rudder is its median until the execute: both are found iteratively."""
     origin = float(np.median(rudder))
     for _ in range(_ROUNDS):
         execute, _ = _begins(time, rudder, origin, angle)
@@ -152,23 +153,23 @@ def _first_begins(time: Array, rudder: Array, angle: float) -> tuple[float, floa
 
 
 def _begins(time: Array, rudder: Array, origin: float, angle: float) -> tuple[float, float]:
-    """When the rudder began to move from one angle to another, s, and its rate, rad/s, at the end of a stretch."""
+    """Start of the rudder's motion between two angles, s, and its rate, rad/s, at the end of a stretch."""
     sign = math.copysign(1.0, angle)
     course, whole = sign * (rudder - origin), sign * (angle - origin)
     if whole == 0:
         return float(time[0]), math.inf  # the record begins with the rudder there
-    quarter, most, more = (_last_crossing(time, course, share * whole) for share in (0.25, 0.7, 0.85))
-    rate, last = 0.45 * whole / max(most - quarter, 1e-9), 0.15 * whole / max(more - most, 1e-9)
-    if last > STEEPER * rate:  # it kept the course at more than a quarter of the angle, and left from there
+    quarter, most, late = (_last_crossing(time, course, share * whole) for share in (0.25, 0.7, 0.85))
+    rate, last = 0.45 * whole / max(most - quarter, 1e-9), 0.15 * whole / max(late - most, 1e-9)
+    if last > STEEPER * rate:  # the approach used more than a quarter of the angle, and the motion started there
         rate = last
     return most - 0.7 * whole / rate, rate
 
 
 def _held(rudder: Array) -> list[Places]:
-    """Samples of each angle that was held, one side after the other.
+    """Samples of each held angle, with alternating sides.
 
-    A rudder that keeps the course before the execute may go as far over as later for the manoeuvre, but stays nowhere:
-    what comes before the first angle that is held is of the approach.
+    The rudder of the approach may reach the angles of the manoeuvre, but is never constant: samples before the first
+    held angle belong to the approach.
     """
     size = float(np.percentile(np.abs(rudder), 95))
     if size < _LEAST_RUDDER:

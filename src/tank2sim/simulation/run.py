@@ -1,4 +1,4 @@
-"""One call from a model and a manoeuvre to trajectory, figures and what the user should know."""
+"""Simulation of a manoeuvre in a single call: trajectory, figures and notices."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class Run:
     trajectory : Trajectory
         The motion.
     figures : dict
-        Manoeuvring figures, units in their names; None where the run was too short.
+        Manoeuvring figures, units in their names; None for a figure that the run does not show.
     notices : tuple of str
-        What the user should know.
+        Messages for the user.
     reading : CardRangeReading
-        Which figures were settled outside the range that the card was measured in.
+        The figures outside the card's range.
     """
 
     trajectory: Trajectory
@@ -59,16 +59,16 @@ def simulate(
     manoeuvre : Manoeuvre
         See :mod:`tank2sim.simulation.manoeuvres`.
     duration_s : float, optional
-        By default as long as the manoeuvre needs.
+        By default that of the manoeuvre.
     inputs, parameters : mapping, optional
         Values in place of the model's, by name.
     integrator : Integrator, optional
-        One made earlier for this model, to save its preparation.
+        An existing integrator of this model, to save its preparation.
 
     Raises
     ------
     InputError
-        The model is no ship, the duration is not positive, or the motion leaves all bounds.
+        The model is not a ship, the duration is not positive, or the motion leaves all bounds.
     """
     if "rudder.command" not in model:
         raise InputError(
@@ -103,5 +103,5 @@ def _beyond_the_gear(trajectory: Trajectory, largest: float | None) -> list[str]
     if largest is None or ordered <= largest * (1 + 1e-9):
         return []
     return [
-        f"the rudder was ordered to {np.degrees(ordered):.4g} deg, and its gear stops at {np.degrees(largest):.4g} deg"
+        f"the rudder was ordered to {np.degrees(ordered):.4g} deg, but its gear stops at {np.degrees(largest):.4g} deg"
     ]

@@ -1,4 +1,4 @@
-"""A simulation that runs: the only place with state. Manoeuvres drive it, and take the trajectory at the end."""
+"""A running simulation, the only object with state. Manoeuvres drive it and take its trajectory at the end."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tank2sim.simulation.trajectory import Trajectory
 RUNAWAY = "the motion leaves all bounds"
 """The message about a motion that is not finite."""
 
-_CHUNK = 256  # steps taken between looks for an event: long enough for machine code to pay, short against a manoeuvre
+_CHUNK = 256  # steps between searches for an event: long enough for efficient machine code, short against a manoeuvre
 _TRIM_STEPS = 50
 _TRIM_ACCURACY = 1e-13  # of the change in a Newton step, relative to the nominal size of a state
 
@@ -25,20 +25,20 @@ _TRIM_ACCURACY = 1e-13  # of the change in a Newton step, relative to the nomina
 class Running:
     """A running simulation.
 
-    Samples lie on a grid of whole steps since the start; an event between two of them is one more sample, after which
-    the grid goes on where it was.
+    Samples are on a grid of whole steps from the start; an event between two of them is an additional sample, after
+    which the grid continues.
 
     Parameters
     ----------
     integrator : Integrator
-        Of the model to run.
+        Integrator of the model.
     inputs, parameters : mapping, optional
-        Values by name in place of the model's start values.
+        Values by name that replace the model's start values.
 
     Raises
     ------
     InputError
-        ``initial.trim`` is set and there is no steady motion near the start.
+        ``initial.trim`` is set and no steady motion exists near the start.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class Running:
 
     @property
     def _tolerance(self) -> float:
-        """Times that differ by less are one: rounding, far below a step."""
+        """Times that differ by less count as equal: rounding, far below a step."""
         return 1e-9 * self.model.step_s
 
     @property
@@ -76,7 +76,7 @@ class Running:
         return float(self._x[self.model.state_names.index(name)])
 
     def neutral_rudder(self) -> float:
-        """Rudder angle (rad) that holds a straight course at the present speed; 0 where none below 45 deg does."""
+        """Rudder angle (rad) of a straight course at the present speed; 0 without one below 45 deg."""
         speed = self.state("motion.u")
         try:
             course = straight_course(self.model, speed, inputs=self._u, parameters=self._p)
@@ -104,7 +104,7 @@ class Running:
     def run_until(self, state: str, level: float, *, rising: bool, at_most: float) -> bool:
         """Advance until a state crosses a level in the given direction, to the exact time of the crossing.
 
-        Returns False, after `at_most` s, if it does not. A state that is beyond the level already counts as crossed.
+        Returns False, after `at_most` s, if it does not. A state already beyond the level counts as crossed.
         """
         place = self.model.state_names.index(state)
         sign = 1.0 if rising else -1.0
@@ -124,7 +124,7 @@ class Running:
             if not len(over):
                 continue
             last = int(over[0]) - 1
-            if self._every > 1:  # to the last sample before it, and on from there step by step
+            if self._every > 1:  # to the last sample before the event, and then step by step
                 del self._t_parts[parts:], self._x_parts[parts:], self._u_parts[parts:]
                 self._time, self._x, self._steps_done = begin_time, begin_x, steps
                 self._advance_to(float(times[last]))
@@ -132,7 +132,7 @@ class Running:
                     return self.run_until(state, level, rising=rising, at_most=end - self._time)
             gap = float(times[last + 1] - times[last])
             h = bracketed_root(self._after_step_from(states[last], beyond), 0.0, gap)
-            # Take the chunk back, and go to the event instead.
+            # Discard the chunk, and advance to the event instead.
             del self._t_parts[parts:], self._x_parts[parts:], self._u_parts[parts:]
             self._time, self._x, self._steps_done = begin_time, begin_x, steps
             self._advance_to(float(times[last]))
@@ -141,7 +141,7 @@ class Running:
         return False
 
     def trajectory(self) -> Trajectory:
-        """Everything so far.
+        """The trajectory up to the present time.
 
         Raises
         ------
@@ -155,7 +155,7 @@ class Running:
         if not result.is_finite():
             bad = ~(np.isfinite(x).all(axis=1) & np.isfinite(result.y).all(axis=1))
             when = f"t = {t[int(np.argmax(bad))]:.1f} s"
-            remedy = "check the card's derivatives, or order less rudder: the model does not hold there"
+            remedy = "check the card's derivatives, or order less rudder: the model is not valid there"
             raise InputError(self.model.origin, when, RUNAWAY, remedy)
         return result
 
@@ -185,7 +185,7 @@ class Running:
 
     @contextmanager
     def _step_by_step(self) -> Iterator[None]:
-        """Keep each step for a while."""
+        """Keep each step within the context."""
         every, self._every = self._every, 1
         try:
             yield
@@ -193,7 +193,7 @@ class Running:
             self._every = every
 
     def _partial(self, h: float) -> None:
-        """One step of a length of its own."""
+        """Take a step of a given length."""
         if h <= 0.0:
             return
         self._keep(np.array([self._time]), self._x[None, :])
@@ -218,5 +218,5 @@ class Running:
                 break
         if not change < 1e-9:
             raise InputError(
-                self.model.origin, "initial.trim", "there is no steady motion near the start", "start without it"
+                self.model.origin, "initial.trim", "no steady motion exists near the start", "start without it"
             )

@@ -1,7 +1,7 @@
-"""The integration scheme: one classical Runge-Kutta step, written out as one expression.
+"""The integration scheme: a classical Runge-Kutta step as a single expression.
 
-The same function is integrated here, put into the FMU, and used as the reference of its check, so that the ship in the
-simulator takes the very steps of the ship on the desk.
+Simulation, FMU and the reference of the FMU's check use the same function, so that the ship in the simulator takes
+exactly the steps of the simulated ship.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from tank2sim.dynamics.model import Model
 
 
 def runge_kutta_step(model: Model) -> ca.Function:
-    """``step(x, u, p, h) -> x_next``: classical fourth-order Runge-Kutta over `h` seconds, inputs held.
+    """``step(x, u, p, h) -> x_next``: classical fourth-order Runge-Kutta over `h` seconds with constant inputs.
 
-    Written in SX as a whole: common parts of the four evaluations are then computed once, which makes generated code as
-    fast as code written by hand.
+    A single SX expression: common parts of the four evaluations are computed once, which makes generated code as fast
+    as hand-written code.
     """
     h = ca.SX.sym("h")
 
@@ -34,14 +34,14 @@ def runge_kutta_step(model: Model) -> ca.Function:
 def step_and_constants(model: Model) -> tuple[ca.Function, ca.Function]:
     """``step(x, u, p, c, h) -> x_next`` and ``constants(p) -> c``: :func:`runge_kutta_step` to the last bit.
 
-    Masses and their determinant, scales and the like, which depend on p alone, are then calculated when a parameter is
-    set and not in every step, by the same operations.
+    Terms that depend on p alone (masses and their determinant, scales) are computed when a parameter is set and not in
+    every step, by the same operations.
     """
     arguments = [model.x, model.u, model.p, ca.SX.sym("h")]
     shorter, symbols, values = ca.extract_parametric(runge_kutta_step(model)(*arguments), model.p)
     none = ca.SX(0, 1)
     x, u, p, h = arguments
     inputs = [x, u, p, ca.vertcat(none, *symbols), h]
-    # Dense results: loops in C read whole vectors, and an entry that is always zero must be written as such.
+    # Dense results: loops in C read whole vectors, including entries that are always zero.
     step = ca.Function("step", inputs, [ca.densify(shorter)], {"cse": True})
     return step, ca.Function("constants", [p], [ca.densify(ca.vertcat(none, *values))], {"cse": True})

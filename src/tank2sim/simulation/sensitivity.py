@@ -1,7 +1,7 @@
 """A model's motion under recorded inputs, with its exact derivatives by initial state and by parameters.
 
-The steps are those of :func:`tank2sim.simulation.scheme.runge_kutta_step`; their Jacobians come from CasADi. Many
-pieces of motion of one length are carried forward together: each step is one product of stacks of small matrices.
+The steps are those of :func:`tank2sim.simulation.scheme.runge_kutta_step`; their Jacobians are by CasADi. Many pieces
+of motion of the same length are integrated together: each step is a product of stacks of small matrices.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Sensitivity:
     model : Model
         nx states, nu inputs, np parameters.
     free : sequence of str
-        Names of the k parameters by which to derive.
+        Names of the k parameters of the derivatives.
     seen : sequence of str
         Names of the ny states and quantities to be compared with measurements.
     """
@@ -46,26 +46,26 @@ class Sensitivity:
         return self._steps.run(start, inputs, p, np.array([h]))
 
     def shown(self, states: Array, inputs: Array, p: Array) -> Array:
-        """What is seen (n, ny) at `states` (n, nx) with `inputs` (n, nu)."""
+        """Observed values (n, ny) at `states` (n, nx) with `inputs` (n, nu)."""
         return self._shown(states, inputs, p)[0]
 
     def derivatives(self, states: Array, inputs: Array, p: Array, h: float) -> tuple[Array, Array, Array]:
-        """States at the ends, and what is seen, derived by initial state and parameters.
+        """Observed values and final states, with their derivatives by initial state and parameters.
 
         Parameters
         ----------
         states : array (pieces, n + 1, nx)
             Motions from :meth:`motion`.
         inputs : array (pieces, n + 1, nu)
-            The last row of each is only for what is seen at its end.
+            The last row of each is only for the observed values at its end.
 
         Returns
         -------
         seen : array (pieces, n + 1, ny)
         by : array (pieces, n + 1, ny, nx + k)
-            Its derivatives by the initial state of its own piece, and by the free parameters.
+            Derivatives of `seen` by the initial state of its piece, and by the free parameters.
         end_by : array (pieces, nx, nx + k)
-            Derivatives of the state at the end.
+            Derivatives of the final state.
         """
         pieces, rows, nx = states.shape
         k = len(self.free)
@@ -85,12 +85,13 @@ class Sensitivity:
         return seen.reshape(pieces, rows, ny), by, S[:, -1]
 
     def tangents(self, states: Array, inputs: Array, p: Array, h: float | Array) -> Array:
-        """State after a step from each of `states` (n, nx), derived by it and by the parameters, (n, nx, nx + k).
+        """State after a step from each of `states` (n, nx), with derivatives by it and by the parameters, (n, nx, nx +
+        k).
 
-        Each step takes `h` s, or its own of `h` (n,).
+        The length of each step is `h` s, a number or (n,).
 
         The derivative of the Runge-Kutta step by the chain rule over its four slopes: their Jacobians are small
-        functions, which compile many times faster than that of the whole step.
+        functions, which compile many times faster than the Jacobian of the whole step.
         """
         n, nx = states.shape
         k = len(self.free)

@@ -1,4 +1,4 @@
-"""The straight course of a ship, and the neutral rudder angle that holds it."""
+"""The straight course of a ship, and its neutral rudder angle."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tank2sim.errors import InputError
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Where a model is linearised.
+    """Operating point of a linearisation.
 
     Parameters
     ----------
@@ -32,7 +32,8 @@ def straight_course(
 ) -> OperatingPoint:
     """Straight course of a ship at a speed: the sway velocity and the rudder at which Y and N vanish with r = 0.
 
-    On an asymmetric ship (Y0, N0) neither is zero: its neutral rudder angle. The speed is held, whatever the engine.
+    For an asymmetric ship (Y0, N0) neither is zero: the rudder angle is the neutral one. The speed is constant,
+    independent of the engine.
 
     Parameters
     ----------
@@ -41,12 +42,12 @@ def straight_course(
     speed_mps : float, optional
         Surge velocity; by default that at the start.
     inputs, parameters : arrays (nu,), (np,), optional
-        In place of the model's own.
+        Values that replace the model's.
 
     Raises
     ------
     InputError
-        The model is no ship, or there is no such course.
+        The model is not a ship, or the course does not exist.
     """
     if "rudder.angle" not in model:
         raise InputError(model.origin, "", "has no rudder", "this needs the card of a ship (kind linear or abkowitz)")
@@ -67,7 +68,7 @@ def straight_course(
         full[unknown] = values
         return full
 
-    from scipy.optimize import root  # slow to import, and most simulations do without
+    from scipy.optimize import root  # slow to import, and not needed in most simulations
 
     solution = root(
         lambda values: np.array(residual(with_unknown(values), u, p)).ravel(),
@@ -75,8 +76,8 @@ def straight_course(
         jac=lambda values: np.array(slope(with_unknown(values), u, p))[:, unknown],
         tol=1e-14,
     )
-    left = np.abs(np.array(residual(with_unknown(solution.x), u, p)).ravel())
-    if not np.all(left < 1e-9) or abs(solution.x[1]) > np.pi / 4:
+    residuals = np.abs(np.array(residual(with_unknown(solution.x), u, p)).ravel())
+    if not np.all(residuals < 1e-9) or abs(solution.x[1]) > np.pi / 4:
         problem = "no rudder angle below 45 deg holds a straight course"
         raise InputError(model.origin, "", problem, _cause(np.array(slope(x, u, p))[:, unknown]))
     x = with_unknown(solution.x)
@@ -85,7 +86,8 @@ def straight_course(
 
 
 def _cause(slopes: Array) -> str:
-    """Why there is no straight course, from the slopes (2, 2) of sway and yaw acceleration by v and by the rudder."""
+    """Remedy for a missing straight course, from the slopes (2, 2) of sway and yaw acceleration by v and by the
+    rudder."""
     by_sway, by_rudder = np.abs(slopes).max(axis=0)
     if not by_sway:
         return "sway moves neither Y nor N: check Yv and Nv of the card"

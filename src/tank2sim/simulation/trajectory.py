@@ -1,4 +1,4 @@
-"""What a simulation gives: time, states, inputs and outputs, by the names of the model."""
+"""Result of a simulation: time, states, inputs and outputs, by the names of the model."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from tank2sim.simulation.bracketed_root import bracketed_root
 from tank2sim.units import UNITS
 
 TIMES_BEYOND = 10.0
-"""A state this many times beyond the extent of its unit has left all that the equations can mean. Project choice:
-no manoeuvre comes near a single time. FMUs are written with the same number."""
+"""Factor on the extent of a unit beyond which a state is meaningless. Project choice: no manoeuvre reaches the extent
+itself. FMUs use the same number."""
 
 
 @dataclass(frozen=True)
@@ -25,13 +25,13 @@ class Trajectory:
     Parameters
     ----------
     model : Model
-        What was simulated.
+        The simulated model.
     t : array (n,)
         Time, s, rising.
     x : array (n, nx)
         States.
     u : array (n, nu)
-        Inputs; a row holds from its time until the next.
+        Inputs; a row is valid from its time until the next.
     y : array (n, ny)
         Outputs.
     """
@@ -49,7 +49,7 @@ class Trajectory:
     @cached_property
     def _columns(self) -> dict[str, Array]:
         model = self.model
-        # Of one name an output comes before a state, and that before an input.
+        # For equal names an output has precedence over a state, and a state over an input.
         parts = (model.input_names, self.u), (model.state_names, self.x), (model.outputs, self.y)
         return {name: values[:, place] for names, values in parts for place, name in enumerate(names)}
 
@@ -62,7 +62,7 @@ class Trajectory:
     def crossings(self, name: str, rate: str, level: float) -> Array:
         """Times at which a signal crosses a level, from its values and those of its time derivative `rate`.
 
-        Between samples it is the cubic through both (Hermite), whose error is of the fourth order in their distance.
+        Between samples it is the Hermite cubic, whose error is of fourth order in their distance.
         """
         offset, slope = self[name] - level, self[rate]
         before = np.flatnonzero((offset[:-1] < 0) != (offset[1:] < 0))
@@ -77,17 +77,17 @@ class Trajectory:
     def columns(self) -> dict[str, Array]:
         """All signals by name, inputs first; time as ``time``."""
         names = (*self.model.input_names, *self.model.outputs)
-        rest = tuple(name for name in self.model.state_names if name not in names)
-        return {"time": self.t, **{name: self[name] for name in (*names, *rest)}}
+        states = tuple(name for name in self.model.state_names if name not in names)
+        return {"time": self.t, **{name: self[name] for name in (*names, *states)}}
 
     def is_finite(self) -> bool:
-        """True if every output is a number and every state one that a ship can have (:data:`TIMES_BEYOND`)."""
+        """True if every output is finite and every state is within its limit (:data:`TIMES_BEYOND`)."""
         largest = TIMES_BEYOND * np.array([UNITS[state.unit].extent for state in self.model.states])
         return bool(np.all(np.abs(self.x) <= largest) and np.isfinite(self.y).all())
 
 
 def _through(times: list[float], values: list[float], time: float) -> float:
-    """The polynomial through a few points, at a time (Neville)."""
+    """Value at a time of the polynomial through a few points (Neville)."""
     for order in range(1, len(times)):
         for k in range(len(times) - order):
             before, after = time - times[k], times[k + order] - time
@@ -104,7 +104,7 @@ def _hermite(times: list[float], values: list[float], slopes: list[float]) -> Ca
 
     def cubic(time: float) -> float:
         s = time - times[0]
-        # Exact at the far end, too: what is sought lies between values of different signs.
+        # Exact at the far end, too: a root lies between values of different signs.
         return values[1] if time == times[1] else values[0] + s * (slopes[0] + s * (square + s * cube))
 
     return cubic

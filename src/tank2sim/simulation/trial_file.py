@@ -1,4 +1,4 @@
-"""A simulated run as a trial: a file that can be read wherever a measured one can, and histories thinned to draw."""
+"""A simulated run in the format of a trial file, and its histories thinned for a chart."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import from_si
 
-# Column of the trial format to the signal of the model that it holds.
+# Column of the trial format to the signal of the model.
 _COLUMNS = {
     "delta_order_deg": "rudder.command",
     "delta_deg": "rudder.angle",
@@ -26,7 +26,7 @@ _COLUMNS = {
 
 
 def trial_columns(trajectory: Trajectory) -> dict[str, Array]:
-    """Columns (n,) of a run by their names in the trial format, ``t_s`` first, as far as the model has them."""
+    """Columns (n,) of a run by their names in the trial format, ``t_s`` first, for the signals of the model."""
     model = trajectory.model
     known = {*model.outputs, *model.state_names, *model.input_names}
     columns = {name: from_si(name, 1.0) * trajectory[signal] for name, signal in _COLUMNS.items() if signal in known}
@@ -34,7 +34,7 @@ def trial_columns(trajectory: Trajectory) -> dict[str, Array]:
 
 
 def trial_csv(trajectory: Trajectory, comment: str) -> str:
-    """Text of a trial CSV: a comment line, a header with units in its names, one row a sample; + is starboard."""
+    """Text of a trial CSV: a comment line, a header with units in its names, a row for each sample; + is starboard."""
     columns = trial_columns(trajectory)
     text = io.StringIO()
     text.write(f"# {' '.join(comment.split())}\n")
@@ -44,7 +44,7 @@ def trial_csv(trajectory: Trajectory, comment: str) -> str:
 
 
 def histories(trajectory: Trajectory, begin_s: float = 0.0) -> dict[str, list[float]]:
-    """The columns of :func:`trial_columns` from a time on, thinned to draw, for the JSON of a result."""
+    """The columns of :func:`trial_columns` from `begin_s`, thinned for a chart, for the JSON of a result."""
     columns = trial_columns(trajectory)
     shown = columns["t_s"] >= begin_s
     return drawn_columns({name: values[shown] for name, values in columns.items()})

@@ -1,36 +1,41 @@
-"""Runs of the yaw rig: body, motor and encoder under a sampled controller, hump after hump of a programme."""
+"""Runs of the yaw rig and their records: body, motor and encoder under a sampled controller, over the humps of a
+programme."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.cards.card import YawRigCard
 from tank2sim.cards.form import YawRig
 from tank2sim.dynamics.model import Model
-from tank2sim.dynamics.yaw_programme import Reference, YawProgramme
+from tank2sim.dynamics.yaw_programme import Reference, YawProgramme, programme_of
 from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.errors import InputError
+from tank2sim.records.yaw import Medium, YawRecord
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.yaw_rig_control import Controller, TunedController
 
 
 @dataclass(frozen=True, kw_only=True)
 class Measuring:
-    """How a rig measures.
+    """Measurement settings of a rig.
 
     Parameters
     ----------
     encoder : bool
-        The controller and the record get whole pulses; else the angle itself.
+        Controller and record use whole pulses; else the exact angle.
     current_noise_A : float
         Standard deviation of the recorded current.
     control_s : float
-        Sampling interval of the controller; a millisecond is our choice, the paper tells none.
+        Sampling interval of the controller; a millisecond is a project choice, the paper states none.
     record_every : int
         Samples of the controller per row of the record.
     seed : int
@@ -45,7 +50,7 @@ class Measuring:
 
 
 class Saturation(NamedTuple):
-    """When the controller first asked for more than the motor's largest current, and for how long in all, s."""
+    """First time of an ordered current above the motor's largest, and its total duration, s."""
 
     first_s: float
     total_s: float
@@ -53,20 +58,20 @@ class Saturation(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class YawRun:
-    """What a run gave; all arrays (rows,).
+    """Result of a run; all arrays (rows,).
 
     Parameters
     ----------
     programme : YawProgramme
-        What was to be run.
+        The programme of the run.
     time_s, angle_rad, current_A : array
         The record: angle as measured, current with noise.
     true_angle_rad, true_rate_radps, true_current_A : array
-        What no rig knows.
+        True values, which a rig does not measure.
     gains : tuple
-        Of each hump, by name; empty where the controller has none.
+        Gains of each hump, by name; empty for a controller without gains.
     memory : tuple of float
-        The controller's at the end.
+        States of the controller at the end.
     saturation : Saturation or None
     """
 
@@ -85,8 +90,7 @@ class YawRun:
     @property
     def error_rad(self) -> Array:
         """Tracking error e = phi_ref - phi of the true angle."""
-        error: Array = self.reference.angle_rad - self.true_angle_rad
-        return error
+        return self.reference.angle_rad - self.true_angle_rad
 
 
 def run_yaw_rig(
@@ -97,12 +101,12 @@ def run_yaw_rig(
     *,
     allow_saturation: bool = False,
 ) -> YawRun:
-    """Let the rig carry out a programme from rest.
+    """Simulate a programme on the rig under a controller, from rest.
 
     Raises
     ------
     InputError
-        The motor saturates, and that is not allowed: the message says when, and how strong a motor is needed.
+        The motor saturates without `allow_saturation`: the message states the time and the required current.
     """
     measuring = measuring or Measuring()
     h = measuring.control_s
@@ -119,15 +123,15 @@ def run_yaw_rig(
         used.append(dict(zip(law.gains, gains, strict=True)))
         driven = np.vstack([reference.angle_rad[begin:end], reference.rate_radps[begin:end]])
         given = np.vstack([driven, *(np.full(end - begin, gain) for gain in gains)])
-        after, asked = sample.mapaccum(end - begin)(states[-1][:, -1], given)
+        after, ordered = sample.mapaccum(end - begin)(states[-1][:, -1], given)
         states.append(np.asarray(after))
-        commands.append(np.asarray(asked).ravel())
+        commands.append(np.asarray(ordered).ravel())
         if isinstance(controller, TunedController) and controller.tune:
             gains = _tuned(controller, rig, programme, time[: end + 1], np.hstack(states)[2]) or gains
-    path, asked_A = np.hstack(states), np.concatenate(commands)
-    saturation = _saturation(time, asked_A, rig.max_current_A)
+    path, command_A = np.hstack(states), np.concatenate(commands)
+    saturation = _saturation(time, command_A, rig.max_current_A)
     if saturation and not allow_saturation:
-        _refuse(saturation, asked_A, rig)
+        _refuse(saturation, command_A, rig)
     return _recorded(rig, programme, measuring, _Path(time, path, reference, tuple(used), saturation))
 
 
@@ -174,7 +178,7 @@ def _closed_loop(model: Model, law: object, memories: int, gains: int, measuring
 
 
 def _humps(programme: YawProgramme, steps: int, h: float) -> list[tuple[int, int]]:
-    """First sample and the one after the last of each hump; the wait before the start belongs to the first."""
+    """First sample and the one after the last of each hump; the time before the start belongs to the first hump."""
     ends = [round((programme.start_s + (hump + 1) * programme.period_s) / h) for hump in range(programme.humps)]
     ends[-1] = steps
     return list(zip([0, *ends[:-1]], ends, strict=True))
@@ -183,9 +187,9 @@ def _humps(programme: YawProgramme, steps: int, h: float) -> list[tuple[int, int
 def _tuned(
     controller: TunedController, rig: YawRig, programme: YawProgramme, time: Array, current: Array
 ) -> tuple[float, float] | None:
-    """Gains from the last pair of intervals that has been run; None if there is none.
+    """Gains from the last completed pair of intervals; None without one.
 
-    As the paper allows where the tracking is close, the rates are those of the programme.
+    As in the paper for close tracking, the rates are those of the programme.
     """
     done = [pair for pair in programme.pairs() if max(pair.accelerating_s[1], pair.braking_s[1]) <= time[-1]]
     if not done:
@@ -196,24 +200,98 @@ def _tuned(
         t4 = braking[0] - programme.settle_s - programme.rise_s / 6
         braking = t4, t4 + programme.rise_s / 6
     for begin, end in (speeding, braking):
-        own = np.linspace(begin, end, 401)
-        rate = programme.at(own).rate_radps
-        works.append(float(np.trapezoid(rate * np.interp(own, time, current), own)))
-        square.append(float(np.trapezoid(rate**2, own)))
+        times = np.linspace(begin, end, 401)
+        rate = programme.at(times).rate_radps
+        works.append(float(np.trapezoid(rate * np.interp(times, time, current), times)))
+        square.append(float(np.trapezoid(rate**2, times)))
         rates.append((float(rate[0]), float(rate[-1])))
     return controller.tuned_gains((works[0], works[1]), (*rates[0], square[0]), rig.current_lag_s)
 
 
-def _saturation(time: Array, asked_A: Array, limit_A: float) -> Saturation | None:
-    beyond = np.flatnonzero(np.abs(asked_A) > limit_A)
+def _saturation(time: Array, command_A: Array, limit_A: float) -> Saturation | None:
+    beyond = np.flatnonzero(np.abs(command_A) > limit_A)
     if not beyond.size:
         return None
     return Saturation(float(time[beyond[0]]), float(beyond.size * (time[1] - time[0])))
 
 
-def _refuse(saturation: Saturation, asked_A: Array, rig: YawRig) -> None:
+def _refuse(saturation: Saturation, command_A: Array, rig: YawRig) -> None:
     problem = (
         f"saturates the motor, first at {saturation.first_s:.3f} s and for {saturation.total_s:.3g} s in all: "
-        f"up to {np.abs(asked_A).max():.3g} A is asked for, and {rig.max_current_A:g} A can be had"
+        f"up to {np.abs(command_A).max():.3g} A is ordered, and {rig.max_current_A:g} A is available"
     )
     raise InputError("yaw rig", "", problem, "take a slower programme, lower gains or a stronger motor")
+
+
+def yaw_record(
+    run: YawRun, rig: YawRig, path: Path, constants: Mapping[str, float] | None = None, *, medium: Medium = "water"
+) -> YawRecord:
+    """The record of a run; it states `constants` in addition to the torque constant and the largest current."""
+    return YawRecord(
+        path=path,
+        time_s=run.time_s,
+        angle_rad=run.angle_rad,
+        current_A=run.current_A,
+        medium=medium,
+        programme=run.programme,
+        stated=True,
+        constants={
+            "torque_constant_NmpA": rig.torque_constant_NmpA,
+            "max_current_A": rig.max_current_A,
+            **(constants or {}),
+        },
+    )
+
+
+def simulated_record(
+    card: YawRigCard,
+    path: Path,
+    current_noise_A: float = 0.0,
+    *,
+    medium: Medium = "water",
+    controller: Controller | None = None,
+    programme: YawProgramme | None = None,
+) -> YawRecord:
+    """Simulate the record of a programme on the card's rig, including its encoder.
+
+    Parameters
+    ----------
+    card : YawRigCard
+    path : Path
+        The file of the record.
+    current_noise_A : float
+        Standard deviation of the recorded current.
+    medium : str
+        In ``air`` the rig is that of :func:`rig_in_air`.
+    controller : optional
+        By default (4), with the true inertia.
+    programme : optional
+        By default the card's.
+
+    Raises
+    ------
+    InputError
+        The motor saturates, or the card lacks a rig or a programme.
+    """
+    wet, programme = card.yaw_rig, programme or programme_of(card)
+    rig = rig_in_air(wet) if medium == "air" else wet
+    controller = controller or TunedController(inertia_kgm2=rig.inertia_kgm2 + rig.added_inertia_kgm2)
+    run = run_yaw_rig(rig, programme, controller, Measuring(current_noise_A=current_noise_A))
+    constants = {}
+    if medium == "water":
+        constants = {"inertia_kgm2": rig.inertia_kgm2, "water_density_kgpm3": card.environment.water_density_kgpm3}
+        if error := card.uncertainty.get("inertia_kgm2"):
+            constants["inertia_error_kgm2"] = error
+    if card.ship.length_m is not None:
+        constants["length_m"] = card.ship.length_m
+    return yaw_record(run, rig, path, constants, medium=medium)
+
+
+def rig_in_air(rig: YawRig) -> YawRig:
+    """The rig with its body in air: no added inertia, no f_662, no walls.
+
+    Dry and viscous friction are those of the card, because it does not state the water's part of them. The inertia, the
+    purpose of a run in air, does not depend on it.
+    """
+    water = ("added_inertia_kgm2", "quadratic_Nms2", "inertia_accelerating_kgm2", "inertia_braking_kgm2")
+    return rig.model_copy(update={**dict.fromkeys(water, 0.0), "braking_quadratic_Nms2": None, "walls": None})

@@ -94,7 +94,7 @@ class AdaptiveController:
     """(5) and (6): u = d(kt xi)/dt + kt xi + gamma1 kt sgn w_ref + gamma2 kt w_ref |w_ref|.
 
     xi' = sigma0 kt^2 (e - xi), and kt' = lambda0 while |W_f e| > delta0, W_f = 1/(T_f p + 1). With both gammas 0 it is
-    (5). The paper does not say where kt starts; 20 is our choice, at which the loop is stable.
+    (5). The paper does not state the first kt; 20 is a project choice, with which the loop is stable.
     """
 
     sigma0: float = 0.008

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.influence.study import Study
-from tank2sim.analysis.tuning.card import tuned_text
-from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, Means, Tuned
+from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, Means, Tuned, tuned_text
 from tank2sim.analysis.tuning.targets import Target, parse_target
 from tank2sim.analysis.tuning.tune import tune
 from tank2sim.cards import linear_card, parse_card, read_card

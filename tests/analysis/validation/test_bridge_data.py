@@ -94,11 +94,11 @@ def test_what_is_read_off_before_the_range_ends_is_kept() -> None:
     run = ship.run(Turn(math.radians(10)))
     read, path = run.reading, run.trajectory
     row = int(np.argmax(path["motion.speed"] < 5.8))
-    assert read.left_s == pytest.approx(path.t[row], abs=1.0)
-    assert read.figures["time_90_s"] < read.left_s
+    assert read.exit_s == pytest.approx(path.t[row], abs=1.0)
+    assert read.figures["time_90_s"] < read.exit_s
     assert not read.outside("advance_m") and not read.outside("time_90_s")
     assert read.outside("steady_diameter_m")
-    assert read.outside("tactical_diameter_m") == (read.figures["time_180_s"] >= read.left_s)
+    assert read.outside("tactical_diameter_m") == (read.figures["time_180_s"] >= read.exit_s)
 
 
 def test_a_card_that_holds_throughout_has_all_its_figures(mariner_card) -> None:

@@ -13,10 +13,9 @@ from scipy.optimize import minimize_scalar
 
 from tank2sim.bundled import bundled
 from tank2sim.errors import InputError
-from tank2sim.identification.tow.card import tow_card_text
 from tank2sim.identification.tow.equation_error import covariance, discretise, fit_mean_speed, solve_by_qr
 from tank2sim.identification.tow.force import force_words, parse_force
-from tank2sim.identification.tow.identify import identify_tow
+from tank2sim.identification.tow.identify import identify_tow, tow_card_text
 from tank2sim.identification.tow.output_error import TowOptions, fit_speeds, speed_predictor
 from tank2sim.records.tows import Tows, read_tows
 

@@ -22,8 +22,7 @@ from tank2sim.identification.yaw.identify import (
 )
 from tank2sim.identification.yaw.intervals import intervals, known_work
 from tank2sim.records.yaw import read_yaw_record, yaw_record_text
-from tank2sim.simulation.yaw_record import yaw_record
-from tank2sim.simulation.yaw_rig import Measuring, run_yaw_rig
+from tank2sim.simulation.yaw_rig import Measuring, run_yaw_rig, yaw_record
 from tank2sim.simulation.yaw_rig_control import TunedController
 from tests.yaw_truth import Truth, mirrored, record, written
 

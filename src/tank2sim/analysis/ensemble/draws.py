@@ -6,8 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tank2sim.analysis.influence.errors import JointErrors, joint_errors
-from tank2sim.analysis.influence.parameters import CardParameter, card_parameters, study_model
+from tank2sim.analysis.influence.parameters import (
+    CardParameter,
+    JointErrors,
+    card_parameters,
+    joint_errors,
+    study_model,
+)
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.covariance import Covariance

@@ -121,11 +121,11 @@ def loop_transfer(ship: Model, autopilot: Model, speed_mps: float | None = None)
     states = [name for name in ship.state_names if name not in _HELD]
     seen = ["motion.psi", "motion.r"]
     plant = state_space(ship, point, states=states, inputs=["rudder.command"], outputs=seen)
-    pilot = _linearised_pilot(autopilot, seen)
+    pilot = _pilot_system(autopilot, seen)
     return -control.ss(pilot.A, pilot.B, pilot.C, pilot.D) * control.ss(plant.A, plant.B, plant.C, plant.D)
 
 
-def _linearised_pilot(autopilot: Model, inputs: list[str]) -> control.StateSpace:
+def _pilot_system(autopilot: Model, inputs: list[str]) -> control.StateSpace:
     point = OperatingPoint(_states(autopilot, 0.0), autopilot.input_values(), autopilot.parameter_values())
     return state_space(autopilot, point, inputs=inputs, outputs=["rudder.command"])
 
@@ -142,13 +142,13 @@ def closed_loop_transfer(ship: Model, autopilot: Model, speed_mps: float | None 
     course = straight_course(ship, speed_mps)
     joint = closed_loop_model(ship, autopilot)
     held = float(course.x[ship.state_names.index("rudder.angle")])
-    autopilot_states = _states(autopilot, held)
+    held_states = _states(autopilot, held)
     u = joint.input_values()
     if "autopilot.integral" not in autopilot:  # a heading error holds the rudder that keeps the course
         u[joint.input_names.index("heading.command")] = held / float(
-            _linearised_pilot(autopilot, ["heading.command"]).D.item()
+            _pilot_system(autopilot, ["heading.command"]).D.item()
         )
-    point = OperatingPoint(np.concatenate([course.x, autopilot_states]), u, joint.parameter_values())
+    point = OperatingPoint(np.concatenate([course.x, held_states]), u, joint.parameter_values())
     states = [name for name in joint.state_names if name not in _HELD]
     outputs = ["motion.psi", "rudder.command", "rudder.rate"]
     return state_space(joint, point, states=states, inputs=["heading.command"], outputs=outputs)
@@ -194,16 +194,16 @@ def growing_effects(ship: Model, speed_mps: float | None = None) -> tuple[str, .
     participation in it is more than half: \\|w_i v_i\\|, w and v its left and right eigenvectors (Perez-Arriaga,
     Verghese and Schweppe 1982).
     """
-    effect_states = settled_states(ship)
+    names = settled_states(ship)
     states = [name for name in ship.state_names if name not in (*_HELD, "motion.psi")]
     found = state_space(ship, straight_course(ship, speed_mps), states=states, inputs=["rudder.command"])
     modes, right = np.linalg.eig(found.A)
     shares = np.abs(right * np.linalg.inv(right).T)  # (states, modes)
     shares /= shares.sum(axis=0)
-    theirs = [states.index(name) for name in effect_states]
+    theirs = [states.index(name) for name in names]
     growing = (modes.real > 0) & (shares[theirs].sum(axis=0) > 0.5)
     return tuple(
-        name for name, place in zip(effect_states, theirs, strict=True) if np.any(shares[place, growing] > _TAKES_PART)
+        name for name, place in zip(names, theirs, strict=True) if np.any(shares[place, growing] > _TAKES_PART)
     )
 
 

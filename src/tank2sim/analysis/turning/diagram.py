@@ -234,8 +234,7 @@ class TurningEquations:
             change = np.linalg.solve(jacobian, -residual.ravel())
             value = value + change
             if np.max(np.abs(change)) < 1e-11:
-                found: Array = value[: n + 1]
-                return found
+                return value[: n + 1]
         return None
 
 

@@ -246,16 +246,12 @@ def _d(name: str) -> int:
 def _notes(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float) -> tuple[str, ...]:
     messages = []
     if ratio != 1:
-        messages.append(f"re-expanded about {ratio:.4g} times its card_model Froude number, to the third order")
-    card_model, reference_model = card.model, reference.model
-    if card_model.speed_scale != reference_model.speed_scale:
-        messages.append(
-            f"primes by the {card_model.speed_scale} speed converted to the {reference_model.speed_scale} one"
-        )
-    if card_model.yaw_rate_terms != reference_model.yaw_rate_terms:
-        messages.append(
-            f"yaw rate terms converted from {card_model.yaw_rate_terms} to {reference_model.yaw_rate_terms}"
-        )
+        messages.append(f"re-expanded about {ratio:.4g} times its form Froude number, to the third order")
+    form, target = card.model, reference.model
+    if form.speed_scale != target.speed_scale:
+        messages.append(f"primes by the {form.speed_scale} speed converted to the {target.speed_scale} one")
+    if form.yaw_rate_terms != target.yaw_rate_terms:
+        messages.append(f"yaw rate terms converted from {form.yaw_rate_terms} to {target.yaw_rate_terms}")
     return tuple(f"{card.ship.name} ({card.source}): {message}" for message in messages)
 
 

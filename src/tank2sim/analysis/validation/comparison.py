@@ -212,14 +212,10 @@ def compare_cards(cards: Sequence[ManoeuvringCard], count: int = MEMBERS) -> Car
     ships = [ship_of(card) for card in cards]
     rows, notes = compare_coefficients(cards)
     drawn = [members(ship.card, ship.model, count) for ship in ships]
-    messages = [
-        f"{label}: {message}"
-        for label, (_, card_messages) in zip(labels, drawn, strict=True)
-        for message in card_messages
-    ]
+    messages = [f"{label}: {message}" for label, (_, notes) in zip(labels, drawn, strict=True) for message in notes]
     notices, trials = [*_notices(cards, labels), *messages, *notes], []
     for name, manoeuvre in standard_trials(ships).items():
-        trial, trouble = _trial(name, manoeuvre, ships, labels, [card_messages for card_messages, _ in drawn])
+        trial, trouble = _trial(name, manoeuvre, ships, labels, [draws for draws, _ in drawn])
         trials.append(trial)
         notices += trouble
     names = tuple(card.ship.name for card in cards)
@@ -243,16 +239,12 @@ def differences_of_size(first: ManoeuvringCard, second: ManoeuvringCard, scale: 
     """Length and breadth of two ships that differ by :data:`SAME_SIZE` or more, in words; `scale` is that of
     `first`."""
     found = []
-    for what, first_size, second_size in (
+    for what, size, reference in (
         ("length", first.ship.length_m, second.ship.length_m),
         ("breadth", first.ship.beam_m, second.ship.beam_m),
     ):
-        if (
-            first_size is not None
-            and second_size is not None
-            and not math.isclose(first_size * scale, second_size, rel_tol=SAME_SIZE)
-        ):
-            found.append(f"{what} {second_size:.4g} m, and not {first_size * scale:.4g} m")
+        if size is not None and reference is not None and not math.isclose(size * scale, reference, rel_tol=SAME_SIZE):
+            found.append(f"{what} {reference:.4g} m, and not {size * scale:.4g} m")
     return found
 
 
@@ -351,12 +343,9 @@ def _notices(cards: Sequence[ManoeuvringCard], labels: Sequence[str]) -> list[st
         if not math.isclose(speed, card.model.speed_mps, rel_tol=1e-3):
             messages.append(f"{label}: its trials begin at the reference's speed, {speed:.4g} m/s at its own size")
         if _effects(card) != _effects(reference):
-            card_effects, reference_effects = (
-                ", ".join(_effects(each_card)) or "none" for each_card in (card, reference)
-            )
+            effects, expected = (", ".join(_effects(ship)) or "none" for ship in (card, reference))
             messages.append(
-                f"{label}: its effects ({card_effects}) are not the reference's ({reference_effects}); the trials "
-                "have them"
+                f"{label}: its effects ({effects}) are not the reference's ({expected}); the trials have them"
             )
         if (card.propulsion is None) != (reference.propulsion is None):
             messages.append(f"{label}: only one of it and the reference has propulsion: no stop is compared")

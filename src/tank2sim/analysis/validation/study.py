@@ -280,7 +280,7 @@ def verify(ship: TrialShip, count: int = MEMBERS) -> tuple[tuple[Verified, ...],
         messages += [f"{trial}: {notice}" for notice in run.notices if EXTRAPOLATED in notice or "not show" in notice]
         many = [ship.run(manoeuvre, member) for member in drawn]
         deviation = member_spread(
-            [{} if isinstance(repeat, str) else figure_numbers(repeat.figures) for repeat in many]
+            [{} if isinstance(result, str) else figure_numbers(result.figures) for result in many]
         )
         halved = figure_numbers(fine.figures)
         for name, value in figure_numbers(run.figures).items():

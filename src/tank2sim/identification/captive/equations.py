@@ -114,14 +114,12 @@ class CampaignEquations:
     @cached_property
     def first_rows(self) -> NDArray[np.int64]:
         """Row at which each run begins."""
-        starts: NDArray[np.int64] = np.searchsorted(self.run_of_row, np.arange(len(self.runs)))
-        return starts
+        return np.searchsorted(self.run_of_row, np.arange(len(self.runs)))
 
     @cached_property
     def zero_sizes(self) -> Array:
         """Squared norm of each run's rows of `zero`, (runs,)."""
-        sizes: Array = self.run_sums(self.zero**2)
-        return sizes
+        return self.run_sums(self.zero**2)
 
     def run_sums(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sum over the rows of each run, (runs, ...)."""
@@ -173,8 +171,7 @@ def campaign_equations(
 
 def axial_speed(motion: CaptiveMotion) -> Array:
     """u = U cos(beta), (rows,), m/s."""
-    axial: Array = np.sqrt(motion.speed_mps**2 - motion.v_mps**2)
-    return axial
+    return np.sqrt(motion.speed_mps**2 - motion.v_mps**2)
 
 
 def rigid_body_force(campaign: Campaign, motion: CaptiveMotion) -> Mapping[str, Array]:

@@ -169,8 +169,7 @@ def _derivative_basis(basis: Array, frequency: float) -> Array:
 
 def _fitted(values: Array, basis: Array) -> Array:
     # Over whole periods the columns are nearly orthogonal: the normal equations are accurate and fast.
-    solution: Array = np.asarray(np.linalg.solve(basis.T @ basis, basis.T @ values), dtype=np.float64)
-    return solution
+    return np.asarray(np.linalg.solve(basis.T @ basis, basis.T @ values), dtype=np.float64)
 
 
 def measured_frequency(run: CaptiveRun) -> float:

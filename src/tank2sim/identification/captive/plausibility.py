@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from tank2sim.identification.captive.physics_warning import Caution
+from tank2sim.identification.captive.tank_conditions import Caution
 
 ADDED_SHARE = (0.1, 3.0)
 """Range of added mass over mass, and of added yaw inertia over yaw inertia; about 0.9 and 0.7 are usual."""

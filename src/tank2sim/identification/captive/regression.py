@@ -142,14 +142,12 @@ class Solution:
     @property
     def standard_errors(self) -> Array:
         """Standard errors of the values, (terms,)."""
-        errors: Array = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-        return errors
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     @property
     def ratios(self) -> Array:
         """Value over standard error, (terms,)."""
-        ratios: Array = self.values / np.maximum(self.standard_errors, 1e-300)
-        return ratios
+        return self.values / np.maximum(self.standard_errors, 1e-300)
 
     def value(self, name: str) -> float:
         """Value of a term; 0 for an absent term."""
@@ -188,8 +186,7 @@ def run_covariance(equations: CampaignEquations, spread: Spread, place: int) -> 
         return np.eye(size)
     # Both are roots of covariances of the same coefficients, one of the weights and one of the spread.
     root = np.linalg.solve(spread.weights.run_root(equations, place), spread.run_root(equations, place))
-    covariance: Array = np.asarray(root @ root.T, dtype=np.float64)
-    return covariance
+    return np.asarray(root @ root.T, dtype=np.float64)
 
 
 def efficient_solution(equations: CampaignEquations, spread: Spread) -> Solution:

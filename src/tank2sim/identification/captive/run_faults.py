@@ -152,14 +152,12 @@ def _rates(reduced: ReducedRun) -> Iterator[InputError]:
     run, frequency = reduced.run, reduced.motion.frequency_radps
     if not run.oscillates:
         return
-    position_signal, name, column = (
-        (run.y_m, "y_m", "v_mps") if run.type == "pure_sway" else (run.psi_rad, "psi_rad", "r_radps")
-    )
-    if position_signal is None or np.ptp(position_signal) == 0.0:
+    path, name, column = (run.y_m, "y_m", "v_mps") if run.type == "pure_sway" else (run.psi_rad, "psi_rad", "r_radps")
+    if path is None or np.ptp(path) == 0.0:
         return
     wave = np.exp(-1j * frequency * run.time_s) * np.hanning(len(run.time_s))
     position, rate = (
-        np.sum(wave * (position_signal - position_signal.mean())),
+        np.sum(wave * (path - path.mean())),
         np.sum(wave * (leading(run) - leading(run).mean())),
     )
     factor = complex(rate / (1j * frequency * position))

@@ -118,8 +118,7 @@ def _joint_covariance(held: Array, inverse: Array, leaning: Array) -> Array:
     """Covariance of the held and the new terms, which depend on the held terms by -`leaning`."""
     across = -held @ leaning.T
     covariance = inverse @ inverse.T + leaning @ held @ leaning.T
-    joined: Array = np.block([[held, across], [across.T, covariance]])
-    return joined
+    return np.block([[held, across], [across.T, covariance]])
 
 
 def _new_terms(part: CampaignEquations, spread: Spread, found: set[str], motions: str) -> list[str]:

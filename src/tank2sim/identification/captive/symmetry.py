@@ -19,11 +19,8 @@ from tank2sim.identification.captive.selection import Selection
 from tank2sim.identification.conditioning import COLLINEAR
 from tank2sim.records.campaigns import Campaign
 
-_OPPOSITE_PARITY = {
-    "X": "v r d vvv rrr ddd".split(),
-    "Y": "vv rr dd vr vd rd".split(),
-    "N": "vv rr dd vr vd rd".split(),
-}
+_EVEN = "vv rr dd vr vd rd".split()
+_OPPOSITE_PARITY = {"X": "v r d vvv rrr ddd".split(), "Y": _EVEN, "N": _EVEN}
 
 
 @dataclass(frozen=True, kw_only=True)

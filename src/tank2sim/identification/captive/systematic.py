@@ -99,9 +99,7 @@ class SystematicError:
         """Change of each term of a force (prime) by a correction of the error."""
         if equations.force not in self.force:
             return {}
-        corrected = (
-            advance_forces(equations, self.size) if not self.runs else _correct_gain(equations, self.runs, self.size)
-        )
+        corrected = _correct_gain(equations, self.runs, self.size) if self.runs else correct_delay(equations, self.size)
         moved = solve(corrected, solution.spread).values - solution.values
         return {name: float(shift) for name, shift in zip(equations.names, moved, strict=True)}
 
@@ -181,7 +179,7 @@ def gauge_gains(
     return (found,), tuple(unknown)
 
 
-def advance_forces(equations: CampaignEquations, delay_s: float) -> CampaignEquations:
+def correct_delay(equations: CampaignEquations, delay_s: float) -> CampaignEquations:
     """The equations with the forces of the oscillating runs corrected for a delay."""
     change = np.zeros_like(equations.gauge)
     for rows, run, root in _oscillating(equations):
@@ -253,7 +251,7 @@ def _with_slopes(
 
 def _advance_kinds(equations: CampaignEquations, kinds: Sequence[str], delay_s: float) -> CampaignEquations:
     affected = np.array([run.run.type in kinds for run in equations.runs])[equations.run_of_row]
-    whole = advance_forces(equations, delay_s)
+    whole = correct_delay(equations, delay_s)
     return replace(
         equations,
         values=np.where(affected, whole.values, equations.values),

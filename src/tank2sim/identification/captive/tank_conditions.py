@@ -11,7 +11,33 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from tank2sim.identification.captive.physics_warning import Caution, lacking
+
+@dataclass(frozen=True)
+class Caution:
+    """A warning.
+
+    Parameters
+    ----------
+    kind : str
+        Subject, such as ``"frequency parameter"``.
+    message : str
+        One sentence, with figures and source.
+    runs : tuple of str
+        The runs concerned; empty for the whole campaign.
+    missing : str
+        The missing key that prevents the check; empty if the check was made.
+    """
+
+    kind: str
+    message: str
+    runs: tuple[str, ...] = ()
+    missing: str = ""
+
+
+def lacking(kind: str, what: str, key: str) -> Caution:
+    """A caution of a `kind` on a check that lacks a key: `what` is unknown, and the key."""
+    return Caution(kind, f"Not known: {what}; give {key}.", missing=key)
+
 
 SHORTEST_MODEL_M = 4.0
 """Paper 2: between models of 4 m and 2 m most coefficients differ by about 10 %."""
@@ -260,19 +286,15 @@ def tank_resonance(runs: tuple[OscillationMotion, ...], tank: Tank, gravity_mps2
         return
     depth = math.inf if tank.depth_m is None else tank.depth_m
     for mode in (1, 3, 5):
-        standing_wave = standing_wave_frequency(mode, tank.breadth_m, depth, gravity_mps2)
+        wave = standing_wave_frequency(mode, tank.breadth_m, depth, gravity_mps2)
         for harmonic in (1, 3):
-            near = tuple(
-                run.run
-                for run in runs
-                if abs(harmonic * run.frequency_radps - standing_wave) <= NEAR_RESONANCE * standing_wave
-            )
+            near = tuple(run.run for run in runs if abs(harmonic * run.frequency_radps - wave) <= NEAR_RESONANCE * wave)
             if near:
                 what = "the motion" if harmonic == 1 else "the third harmonic of the motion"
                 yield Caution(
                     "tank resonance",
                     f"The frequency of {what} is within {100 * NEAR_RESONANCE:.0f} % of standing wave {mode} across "
-                    f"the tank ({standing_wave:.3g} rad/s, {tank.breadth_m:g} m wide): its waves add to the forces.",
+                    f"the tank ({wave:.3g} rad/s, {tank.breadth_m:g} m wide): its waves add to the forces.",
                     near,
                 )
 

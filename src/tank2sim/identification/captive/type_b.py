@@ -16,7 +16,7 @@ from tank2sim.identification.captive.equations import CampaignEquations, campaig
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.motion import CaptiveMotion
 from tank2sim.identification.captive.regression import Solution, solve
-from tank2sim.identification.captive.systematic import advance_forces
+from tank2sim.identification.captive.systematic import correct_delay
 from tank2sim.records.campaigns import Campaign
 
 
@@ -39,7 +39,7 @@ def type_b_shifts(campaign: Campaign, used: CampaignEquations, solution: Solutio
 def _with_error(campaign: Campaign, used: CampaignEquations, source: str, size: float) -> CampaignEquations:
     """The equations with an error of one standard deviation."""
     if source == "force_delay_s":
-        return advance_forces(used, size)
+        return correct_delay(used, size)
     changed, altered = _with_altered_data(campaign, used.runs, source, size)
     return campaign_equations(changed, altered, used.force, used.names).held(used.prior)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from tank2sim.cards import ManoeuvringCard
-from tank2sim.identification.captive.physics_warning import Caution
 from tank2sim.identification.captive.plausibility import (
     ADDED_MASSES,
     added_masses,
@@ -17,6 +16,7 @@ from tank2sim.identification.captive.plausibility import (
 from tank2sim.identification.captive.tank_conditions import (
     LEAST_DEPTH_RATIO,
     CarriedBody,
+    Caution,
     OscillationMotion,
     Tank,
     blockage,

@@ -185,8 +185,7 @@ def solve_normal_equations(problem: EquationError) -> Array:
     known, products = problem.known, problem.inner_products
     first = len(known)
     right = problem.force_products[first:] - products[first:, :first] @ known
-    estimates: Array = np.concatenate([known, np.linalg.solve(products[first:, first:], right)])
-    return estimates
+    return np.concatenate([known, np.linalg.solve(products[first:, first:], right)])
 
 
 def solve_by_qr(problem: EquationError) -> Array:
@@ -195,8 +194,7 @@ def solve_by_qr(problem: EquationError) -> Array:
     norms = column_norms(problem.free_design)
     q, r = np.linalg.qr(problem.free_design / norms)
     right = problem.target - problem.design[:, : len(known)] @ known
-    estimates: Array = np.concatenate([known, np.linalg.solve(r, q.T @ right) / norms])
-    return estimates
+    return np.concatenate([known, np.linalg.solve(r, q.T @ right) / norms])
 
 
 def covariance(problem: EquationError, estimates: Array, speed: SpeedFit) -> Array:

@@ -65,10 +65,7 @@ def identifiable_terms(fits: Sequence[TowFit]) -> tuple[str, ...]:
             columns = [
                 [place for place, name in enumerate(fit.free) if name in chosen or name not in terms] for fit in fits
             ]
-            if all(
-                scaled_condition(fit.design[:, chosen_columns]) <= COLLINEAR
-                for fit, chosen_columns in zip(fits, columns, strict=True)
-            ):
+            if all(scaled_condition(fit.design[:, kept]) <= COLLINEAR for fit, kept in zip(fits, columns, strict=True)):
                 return chosen
     return ()
 

@@ -27,9 +27,7 @@ def parse_force(text: str) -> Polynomial:
     except ValueError:
         coefficients = [np.nan]
     if not np.isfinite(coefficients).all():
-        raise InputError(
-            "--force-polynomial", "", f"{text!r} is not a polynomial", "give numbers, as in 11.6,0.02,-1e-4"
-        )
+        raise InputError("--force-polynomial", "", f"{text!r} is not a polynomial", "give numbers: 11.6,0.02,-1e-4")
     return Polynomial(coefficients)
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from tank2sim.arrays import Array
+from tank2sim.cards.writing import SurgeResult, surge_card_text
 from tank2sim.dynamics.surge import DRAG_POWERS
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import SINGULAR_CONDITION, scaled_condition
@@ -260,3 +261,31 @@ def _check_solvable(tows: Tows, problem: equation_error.EquationError) -> None:
     if scaled_condition(problem.free_design) > SINGULAR_CONDITION:
         unknowns = ", ".join(("M", *problem.terms)[len(problem.known) :])
         raise InputError(tows.path, "", f"the equations for {unknowns} are singular", "take fewer terms (--terms B3)")
+
+
+def tow_card_text(
+    result: TowIdentification, fit: TowFit, *, name: str, source: str, length_m: float | None = None
+) -> str:
+    """TOML text of the card with the numbers of one method; its notes are the warnings of the result.
+
+    Parameters
+    ----------
+    fit : TowFit
+        One of ``result.fits``.
+    name, source : str
+        Name of the body, and source of the numbers.
+    length_m : float, optional
+        Length of the body, if known.
+    """
+    values = {key: value for key, value in fit.estimates.items() if key not in ("added_mass_kg", "start_delay_s")}
+    return surge_card_text(
+        SurgeResult(
+            name=name,
+            source=source,
+            values={**values, "force_N": result.force_N, "dry_mass_kg": result.mass_kg},
+            standard_errors={key: value for key, value in fit.standard_errors.items() if key in values},
+            top_speed_mps=result.tows.top_speed_mps,
+            length_m=length_m,
+            notes=" ".join(result.warnings),
+        )
+    )

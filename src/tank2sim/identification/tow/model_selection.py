@@ -212,7 +212,7 @@ def tow_by_tow(tows: Tows, force: Polynomial, terms: tuple[str, ...], speed_degr
         (
             f"paper: {', '.join(('M', *terms))}",
             ("M", *terms),
-            lambda single: _by_paper(single, force, terms, speed_degree),
+            lambda tow: _by_paper(tow, force, terms, speed_degree),
         )
     ]
     for model in (SIMPLE, SIMPLE_LATE):

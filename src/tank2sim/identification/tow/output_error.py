@@ -85,8 +85,7 @@ class OutputErrorFit:
         """Covariance of the estimates, for independent readings of equal variance and a true model."""
         norms = column_norms(self.design)
         inverse = np.linalg.pinv(self.design / norms) / norms[:, None]
-        covariance: Array = self.scatter_mps**2 * inverse @ inverse.T
-        return covariance
+        return self.scatter_mps**2 * inverse @ inverse.T
 
     @property
     def half_widths(self) -> Array:

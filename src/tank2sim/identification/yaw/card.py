@@ -15,7 +15,7 @@ from tank2sim.cards.writing import YawRigResult, yaw_rig_card_text
 from tank2sim.dynamics.yaw_rig import UNKNOWN_RIG
 from tank2sim.errors import InputError
 from tank2sim.files import BYTE_ORDER_MARK
-from tank2sim.identification.yaw.estimate import YawEstimate
+from tank2sim.identification.yaw.energy import YawEstimate
 from tank2sim.identification.yaw.identify import YAW_METHODS, YawIdentification
 
 TANK_WATER_KGPM3 = 1000.0

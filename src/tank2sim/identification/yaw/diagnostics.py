@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from tank2sim.errors import InputError
-from tank2sim.identification.yaw.energy import EnergyFit
-from tank2sim.identification.yaw.estimate import YawEstimate
+from tank2sim.identification.yaw.energy import EnergyFit, YawEstimate
 from tank2sim.identification.yaw.intervals import ENERGY_TERMS
 from tank2sim.records.yaw import YawRecord
 

@@ -23,13 +23,13 @@ from tank2sim.identification.yaw.diagnostics import (
 )
 from tank2sim.identification.yaw.energy import (
     EnergyFit,
+    YawEstimate,
     as_many_equations,
     energy_balance,
     fit_energy,
     least_squares_estimate,
     two_intervals,
 )
-from tank2sim.identification.yaw.estimate import YawEstimate
 from tank2sim.identification.yaw.intervals import ENERGY_TERMS, Interval, intervals, mirror_difference
 from tank2sim.identification.yaw.output_error import AngleFit, fit_angle
 from tank2sim.identification.yaw.plot_data import (

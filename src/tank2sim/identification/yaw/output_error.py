@@ -20,8 +20,7 @@ from tank2sim.cards.form import YawRig
 from tank2sim.dynamics.yaw_rig import yaw_rig_model
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import column_norms
-from tank2sim.identification.yaw.energy import estimate_from
-from tank2sim.identification.yaw.estimate import YawEstimate
+from tank2sim.identification.yaw.energy import YawEstimate, estimate_from
 from tank2sim.identification.yaw.intervals import Interval, smooth_angle
 from tank2sim.records.yaw import YawRecord
 from tank2sim.simulation.scheme import runge_kutta_step
@@ -180,8 +179,7 @@ def _covariance(residuals: Array, design: Array, humps: list[_Hump], gain: tuple
         few = float(student.ppf(_SIGMA_LEVEL, len(humps) - 1)) ** 2
         variances.append(few * len(humps) / (len(humps) - 1) * np.sum(draws**2, axis=1))
     wider = np.sqrt(np.max(variances, axis=0) / np.diag(alone))
-    widened: Array = alone * np.outer(wider, wider)
-    return widened
+    return alone * np.outer(wider, wider)
 
 
 def _newey_west(scores: Array, lags: int) -> Array:

@@ -8,10 +8,9 @@ import altair as alt
 import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.identification.trials.as_json import estimate_rows, figure_rows, following_rows, structure_rows
+from tank2sim.identification.trials.as_json import estimate_rows, figure_rows, following_rows, replays, structure_rows
 from tank2sim.identification.trials.assessment.comparison import Comparison
 from tank2sim.identification.trials.assessment.evaluation import TURN_FIGURE_NAMES, pooled
-from tank2sim.identification.trials.assessment.replays import replays
 from tank2sim.identification.trials.identify import Identification
 from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.problem.prepare_trials import Measured

@@ -48,8 +48,7 @@ class Disturbances:
     @property
     def deviations(self) -> Array:
         """Standard deviations of X, Y, N (3,)."""
-        deviations: Array = np.sqrt(np.diag(self.covariance))
-        return deviations
+        return np.sqrt(np.diag(self.covariance))
 
 
 def disturbances_of(problem: Problem, values: Array) -> Disturbances:

@@ -16,7 +16,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, estimate_coloured_noise, white
-from tank2sim.identification.trials.methods.gauss_newton import SearchLimits, damped_gauss_newton
+from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton
 from tank2sim.identification.trials.methods.posterior import BLOCK, evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.weak_form import WEAK_EQUATIONS, WIDTH, WeakForm, WeakWindows
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
@@ -224,14 +224,11 @@ def _minimise(
         values = np.clip(start.values - step, *problem.bounds)
         return point(values, form.at(values))
 
-    found = damped_gauss_newton(
-        point(values, windows),
-        linearise,
-        move,
-        SearchLimits(steps=20, attempts=10),
-        lambda gain, cost: gain < 1e-6 * max(1.0, cost),
-        lambda better: progress("equation error", better.values, better.cost),
-    )
+    def report(better: _Point, gain: float) -> bool:
+        progress("equation error", better.values, better.cost)
+        return gain < 1e-6 * max(1.0, better.cost)
+
+    found = damped_gauss_newton(point(values, windows), linearise, move, report, steps=20)
     (*_, best), last = found
     return best.values, best.windows, last or linearise(best)
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol, TypeVar
+
+MOST_ATTEMPTS = 10
+"""Most attempts of a step, each with ten times the damping of the previous one: the last steps are negligible."""
 
 
 class _WithCost(Protocol):
@@ -16,33 +18,13 @@ Point = TypeVar("Point", bound=_WithCost)
 System = TypeVar("System")
 
 
-@dataclass(frozen=True)
-class SearchLimits:
-    """Limits of a search.
-
-    Parameters
-    ----------
-    steps, attempts : int
-        Most steps, and most attempts of each with ten times the damping of the previous one.
-    first_damping : float
-        Least damping after a failed attempt.
-    last_damping : float
-        A damping up to this value falls to 0 after a step, a larger one to a tenth.
-    """
-
-    steps: int
-    attempts: int
-    first_damping: float = 1e-3
-    last_damping: float = 1e-6
-
-
 def damped_gauss_newton(
     start: Point,
     linearise: Callable[[Point], System],
     move: Callable[[Point, System, float], Point],
-    limits: SearchLimits,
-    is_last: Callable[[float, float], bool],
-    report: Callable[[Point], None],
+    report: Callable[[Point, float], bool],
+    steps: int,
+    damping_range: tuple[float, float] = (1e-6, 1e-3),
 ) -> tuple[list[Point], System | None]:
     """Steps that each lower the cost, until none does.
 
@@ -54,11 +36,12 @@ def damped_gauss_newton(
         Normal equations at a point.
     move : callable
         ``move(point, system, damping) -> point``.
-    limits : SearchLimits
-    is_last : callable
-        ``is_last(gain, cost)``: True ends the search after a step.
     report : callable
-        Called with each better point.
+        ``report(point, gain) -> bool``, called with each better point: True ends the search.
+    steps : int
+        Most steps.
+    damping_range : (float, float)
+        A damping up to the first falls to 0 after a step; the second is the least after a failed attempt.
 
     Returns
     -------
@@ -68,19 +51,18 @@ def damped_gauss_newton(
         Normal equations at the last point; None where they were not computed.
     """
     path, damping = [start], 0.0
-    for _ in range(limits.steps):
+    for _ in range(steps):
         point = path[-1]
         system = linearise(point)
-        for _attempt in range(limits.attempts):
+        for _attempt in range(MOST_ATTEMPTS):
             moved = move(point, system, damping)
             if moved.cost < point.cost:
                 break
-            damping = max(10 * damping, limits.first_damping)
+            damping = max(10 * damping, damping_range[1])
         else:
             return path, system
         path.append(moved)
-        damping = damping / 10 if damping > limits.last_damping else 0.0
-        report(moved)
-        if is_last(point.cost - moved.cost, moved.cost):
+        damping = damping / 10 if damping > damping_range[0] else 0.0
+        if report(moved, point.cost - moved.cost):
             break
     return path, None

@@ -165,8 +165,7 @@ def kalman(
 
 def _information(task: SearchTask, point: SearchPoint) -> Array:
     """Information of the trials alone (k, k)."""
-    information: Array = normal(task, point)[0] - np.diag(1 / task.problem.prior_error**2)
-    return information
+    return normal(task, point)[0] - np.diag(1 / task.problem.prior_error**2)
 
 
 def _estimate(task: SearchTask, path: list[SearchPoint], scale: Mapping[str, float]) -> KalmanEstimate:

@@ -17,7 +17,7 @@ from tank2sim.identification.trials.methods.process_noise import Tangents
 
 @dataclass(frozen=True, eq=False)
 class Variances:
-    """Of the process and of the measurements.
+    """Variances of the process and of the measurements.
 
     Parameters
     ----------

@@ -95,8 +95,7 @@ class Levels:
     def vector(self) -> Array:
         """All finite levels."""
         times = self.time[np.isfinite(self.time)]
-        whole: Array = np.concatenate([self.process, times, self.measurement])
-        return whole
+        return np.concatenate([self.process, times, self.measurement])
 
     def at(self, vector: Array) -> Levels:
         """Levels with the values of `vector`."""
@@ -148,8 +147,7 @@ class FilterPass:
     @property
     def white(self) -> Array:
         """Whitened innovations (runs, n, ny)."""
-        white: Array = (self.gains.whitener @ self.innovations[..., None])[..., 0]
-        return white
+        return (self.gains.whitener @ self.innovations[..., None])[..., 0]
 
 
 def filter_pass(disturbed: Disturbed, batch: Batch, p: Array, levels: Levels, along: tuple[Array, Array]) -> FilterPass:

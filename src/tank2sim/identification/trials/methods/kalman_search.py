@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.identification.trials.methods.gauss_newton import SearchLimits, damped_gauss_newton
+from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton
 from tank2sim.identification.trials.methods.kalman_gains import Variances, innovation_tangents, variant_likelihoods
 from tank2sim.identification.trials.methods.kalman_pass import (
     Batch,
@@ -169,8 +169,11 @@ def maximise(
         with np.errstate(all="ignore"):  # too long a step may leave all bounds
             return task.point(np.clip(values, *task.problem.bounds), levels, along)
 
-    limits = SearchLimits(iterations, attempts=8, first_damping=1e-2, last_damping=1e-3)
-    return damped_gauss_newton(start, linearise, move, limits, lambda gain, _: gain < ENOUGH, report)[0]
+    def is_last(better: SearchPoint, gain: float) -> bool:
+        report(better)
+        return gain < ENOUGH
+
+    return damped_gauss_newton(start, linearise, move, is_last, iterations, damping_range=(1e-3, 1e-2))[0]
 
 
 def normal(task: SearchTask, point: SearchPoint) -> tuple[Array, Array]:

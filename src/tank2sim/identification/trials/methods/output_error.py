@@ -15,7 +15,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, estimate_coloured_noise, white
-from tank2sim.identification.trials.methods.gauss_newton import SearchLimits, damped_gauss_newton
+from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton
 from tank2sim.identification.trials.methods.posterior import evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.shooting import Normal, Pieces, Shooting, cut
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
@@ -165,19 +165,13 @@ def _minimise(work: _Work, search: _Search, tolerance: float) -> list[Normal]:
         ]
         return point(start.values + step, starts)
 
-    def report(better: _Point) -> None:
+    def report(better: _Point, gain: float) -> bool:
         search.values, search.starts = better.values, better.starts
         search.costs.append(better.cost)
         work.progress("output error", better.values, better.cost)
+        return gain < tolerance * max(1.0, 1e-3 * better.cost)
 
-    found = damped_gauss_newton(
-        point(search.values, search.starts),
-        linearise,
-        move,
-        SearchLimits(steps=LONGEST_SEARCH, attempts=12),
-        lambda gain, cost: gain < tolerance * max(1.0, 1e-3 * cost),
-        report,
-    )
+    found = damped_gauss_newton(point(search.values, search.starts), linearise, move, report, LONGEST_SEARCH)
     (*_, best), last = found
     return last or linearise(best)
 

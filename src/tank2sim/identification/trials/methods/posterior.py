@@ -21,8 +21,7 @@ parameters, and the correction of their scatter would itself be scatter (project
 
 def scaled_prior(problem: Problem, scale: Mapping[str, float]) -> Array:
     """Standard errors before the trials (k,), those of :attr:`Problem.groups` times the scale of their group."""
-    errors: Array = np.array([scale.get(group, 1.0) for group in problem.groups]) * problem.prior_error
-    return errors
+    return np.array([scale.get(group, 1.0) for group in problem.groups]) * problem.prior_error
 
 
 def evidence_scale(problem: Problem, information: Array, values: Array, scale: Mapping[str, float]) -> dict[str, float]:
@@ -71,8 +70,7 @@ def sandwich(information: Array, prior_error: Array, scores: Sequence[Array]) ->
     bread = np.linalg.inv(scaled + identity)
     determined = len(prior_error) - float(np.trace(bread))
     spread = bread @ (_meat(scaled, [score * prior_error for score in scores], determined) + identity) @ bread
-    covariance: Array = spread * np.outer(prior_error, prior_error)
-    return covariance
+    return spread * np.outer(prior_error, prior_error)
 
 
 def _meat(information: Array, scores: Sequence[Array], determined: float) -> Array:

@@ -118,8 +118,7 @@ class RecursiveEstimate(Estimate):
         close = near & (self.path_errors <= LEARNED * self.prior_error)
         stays = np.logical_and.accumulate(close[::-1], axis=0)[::-1]
         first = np.where(stays.any(axis=0), self.times_s[np.argmax(stays, axis=0)], np.nan)
-        settled: Array = np.where(first <= LATEST * self.times_s[-1], first, np.nan)
-        return settled
+        return np.where(first <= LATEST * self.times_s[-1], first, np.nan)
 
 
 @dataclass(frozen=True, eq=False)

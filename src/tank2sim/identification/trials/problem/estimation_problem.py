@@ -125,8 +125,7 @@ class Estimate:
     @property
     def standard_errors(self) -> Array:
         """Standard errors of the estimates (k,)."""
-        errors: Array = np.sqrt(np.diag(self.covariance))
-        return errors
+        return np.sqrt(np.diag(self.covariance))
 
 
 SearchReport = Callable[[str, Array, float], None]

@@ -66,15 +66,13 @@ class SampledRun:
     @property
     def times(self) -> Array:
         """Instants in the trial's own time (n,), s."""
-        times: Array = self.begin_s + self.step_s * np.arange(len(self.measured), dtype=float)
-        return times
+        return self.begin_s + self.step_s * np.arange(len(self.measured), dtype=float)
 
     def column(self, name: str) -> Array:
         """Measured values of a variable (n,), nan where it was not measured."""
         if name not in self.seen:
             return np.full(len(self.measured), np.nan)
-        column: Array = self.measured[:, self.seen.index(name)]
-        return column
+        return self.measured[:, self.seen.index(name)]
 
     def part(self, begin: int, end: int) -> SampledRun:
         """The instants `begin` to `end` - 1."""
