@@ -165,7 +165,7 @@ def project_constants() -> list[ProjectConstant]:
                 continue
             target = node.targets[0] if isinstance(node, ast.Assign) else node.target
             reason = after.value.value if isinstance(after.value, ast.Constant) else None
-            if not isinstance(reason, str) or not re.search("project choice", reason, re.IGNORECASE):
+            if not isinstance(reason, str) or not re.search(r"project\s+choice", reason, re.IGNORECASE):
                 continue
             place = path.relative_to(SOURCES).with_suffix("").as_posix().replace("/", ".")
             value = " ".join(ast.unparse(node.value).split()) if node.value else ""

@@ -18,6 +18,7 @@ from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise,
 from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton
 from tank2sim.identification.trials.methods.posterior import evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.shooting import Normal, Pieces, Shooting, cut
+from tank2sim.identification.trials.problem.captive_tests import CaptiveTests
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 
 LONGEST_SEARCH = 25
@@ -64,6 +65,7 @@ class _Search:
     values: Array
     starts: list[Array]
     noise: tuple[ColouredNoise, ...]
+    captive: CaptiveTests | None
     scale: dict[str, float] = field(default_factory=dict)
     costs: list[float] = field(default_factory=list)
 
@@ -90,7 +92,9 @@ def output_error(
     shooting = Shooting(problem)
     pieces = [cut(problem, run, settings.piece_s) for run in problem.runs]
     values = problem.prior_mean if start is None else start
-    search = _Search(values.copy(), [piece.starts.copy() for piece in pieces], _first_noise(problem, pieces))
+    search = _Search(
+        values.copy(), [piece.starts.copy() for piece in pieces], _first_noise(problem, pieces), problem.captive
+    )
     notices = []
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as threads:
         work = _Work(problem, shooting, pieces, threads, progress)
@@ -100,8 +104,11 @@ def output_error(
                 normals = _minimise(work, search, tolerance=1e-4 if last else 1e-2)
                 if not last:
                     search.noise = _new_noise(problem, pieces, normals, settings)
+                    if search.captive is not None:
+                        search.captive = search.captive.with_noise_at(problem.parameters(search.values))
                     if settings.scale_prior:
                         information = np.asarray(sum(normal.matrix for normal in normals))
+                        information = information + _captive_normal(search, problem, search.values)[0]
                         search.scale = evidence_scale(problem, information, search.values, search.scale)
         except KeyboardInterrupt:
             notices.append(INTERRUPTED)
@@ -149,14 +156,16 @@ def _minimise(work: _Work, search: _Search, tolerance: float) -> list[Normal]:
 
     def point(values: Array, starts: list[Array]) -> _Point:
         penalty = float(np.sum(((values - problem.prior_mean) / prior) ** 2))
-        return _Point(values, starts, penalty + work.cost(values, starts, noise))
+        captive = _captive_normal(search, problem, values)[2]
+        return _Point(values, starts, penalty + captive + work.cost(values, starts, noise))
 
     def linearise(start: _Point) -> list[Normal]:
         return work.normals(start.values, start.starts, noise)
 
     def move(start: _Point, normals: list[Normal], damping: float) -> _Point:
-        H = sum(normal.matrix for normal in normals) + np.diag(1 / prior**2)
-        g = sum(normal.vector for normal in normals) + (start.values - problem.prior_mean) / prior**2
+        tank, pull, _ = _captive_normal(search, problem, start.values)
+        H = sum(normal.matrix for normal in normals) + tank + np.diag(1 / prior**2)
+        g = sum(normal.vector for normal in normals) + pull + (start.values - problem.prior_mean) / prior**2
         step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
         step = np.clip(start.values + step, *problem.bounds) - start.values
         starts = [
@@ -174,6 +183,13 @@ def _minimise(work: _Work, search: _Search, tolerance: float) -> list[Normal]:
     found = damped_gauss_newton(point(search.values, search.starts), linearise, move, report, LONGEST_SEARCH)
     (*_, best), last = found
     return last or linearise(best)
+
+
+def _captive_normal(search: _Search, problem: Problem, values: Array) -> tuple[Array, Array, float]:
+    """Information (k, k), gradient (k,) and cost of the captive tests at `values`; 0 without any."""
+    if search.captive is None:
+        return np.zeros((len(values), len(values))), np.zeros(len(values)), 0.0
+    return search.captive.normal(problem.parameters(values))
 
 
 def _new_noise(
@@ -196,7 +212,12 @@ def _estimate(problem: Problem, search: _Search, normals: list[Normal], notices:
         method="output_error",
         free=problem.free,
         values=search.values,
-        covariance=sandwich(information, prior, [normal.scores for normal in normals]),
+        covariance=sandwich(
+            information,
+            prior,
+            [normal.scores for normal in normals],
+            _captive_normal(search, problem, search.values)[0],
+        ),
         information=information,
         noise={name: noise.deviation for name, noise in zip(problem.seen, search.noise, strict=True)},
         cost=tuple(search.costs),

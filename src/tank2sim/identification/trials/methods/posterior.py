@@ -50,7 +50,7 @@ def evidence_scale(problem: Problem, information: Array, values: Array, scale: M
     }
 
 
-def sandwich(information: Array, prior_error: Array, scores: Sequence[Array]) -> Array:
+def sandwich(information: Array, prior_error: Array, scores: Sequence[Array], captive: Array | float = 0.0) -> Array:
     """Covariance (k, k) of estimates, robust to the true correlation of the residuals (Huber 1967; Newey and West
     1987).
 
@@ -62,14 +62,16 @@ def sandwich(information: Array, prior_error: Array, scores: Sequence[Array]) ->
         With its scale.
     scores : sequence of arrays (blocks, k)
         Gradient of each run by blocks of :data:`BLOCK` ship lengths, in the order of time.
+    captive : array (k, k), optional
+        Information of captive tests, which counts as that of a prior.
     """
     # In units of the prior's errors the matrices are well scaled: a parameter without trials has information 0 against
     # 1.
     scaled = information * np.outer(prior_error, prior_error)
-    identity = np.eye(len(prior_error))
-    bread = np.linalg.inv(scaled + identity)
-    determined = len(prior_error) - float(np.trace(bread))
-    spread = bread @ (_meat(scaled, [score * prior_error for score in scores], determined) + identity) @ bread
+    known = np.eye(len(prior_error)) + captive * np.outer(prior_error, prior_error)
+    bread = np.linalg.inv(scaled + known)
+    determined = float(np.trace(bread @ scaled))
+    spread = bread @ (_meat(scaled, [score * prior_error for score in scores], determined) + known) @ bread
     return spread * np.outer(prior_error, prior_error)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
+from tank2sim.identification.trials.problem.captive_tests import CaptiveTests
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
 LITTLE_KNOWN = 0.25
@@ -29,6 +30,8 @@ class Problem:
         Value and standard error before the trials, in the parameter's own unit; the error is positive.
     runs : tuple of SampledRun
         Each with the same `seen`.
+    captive : CaptiveTests, optional
+        Captive tests of the ship, which output error fits together with the runs.
     """
 
     model: Model
@@ -36,6 +39,7 @@ class Problem:
     prior_mean: Array
     prior_error: Array
     runs: tuple[SampledRun, ...]
+    captive: CaptiveTests | None = None
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -79,7 +83,9 @@ class Problem:
         """The problem with the free parameters in `names` held at their prior means."""
         kept = [place for place, name in enumerate(self.free) if name not in names]
         free = tuple(self.free[place] for place in kept)
-        return replace(self, free=free, prior_mean=self.prior_mean[kept], prior_error=self.prior_error[kept])
+        captive = self.captive and self.captive.of(kept)
+        mean, error = self.prior_mean[kept], self.prior_error[kept]
+        return replace(self, free=free, prior_mean=mean, prior_error=error, captive=captive)
 
     def with_runs(self, runs: tuple[SampledRun, ...]) -> Problem:
         """The problem with other runs."""

@@ -1,0 +1,265 @@
+"""Captive tests of the same ship as equations in the free parameters of a model, to be fitted together with trials.
+
+Every run's means and harmonics of X, Y and N are compared with those of the model's forces along the measured motion,
+Froude-scaled and prime. A tank differs from a free-running ship: a gain of each force, an offset of X (propeller and
+friction are not those of the ship) and the place of the moment's reference point are uncertain parameters, eliminated
+by their priors (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63: model discrepancy, here of these few forms).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from tank2sim.arrays import Array
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.scaling import Scales
+from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.rigid_body import inertial_forces
+from tank2sim.errors import InputError
+from tank2sim.identification.captive.equations import axial_speed, rigid_body_force
+from tank2sim.identification.captive.harmonics import ReducedRun
+from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign
+
+GAIN_ERROR = 0.05
+"""Standard error of the gain of each force between tank and ship: Froude-scaled forces of one hull in different tanks
+differ by 5 to 10 % (SIMMAN 2008 and 2014, captive data of the KVLCC2). Project choice within that."""
+
+SURGE_OFFSET = 1e-3
+"""Standard error of a constant X' between tank and ship: resistance and thrust of a model are not those of the ship.
+Project choice: as large as the resistance itself."""
+
+REFERENCE_ERROR = 0.01
+"""Standard error of the reference point of the moment, in ship lengths. Project choice: 7 cm of a 7 m model."""
+
+SAME_FORM = 0.05
+"""Relative difference of L/B and L/T from which a campaign is of another ship. Project choice: models are built to
+1 mm, draughts are set to 1 %."""
+
+ROWS_A_PERIOD = 48
+"""Instants of a period at which the model's forces are evaluated: the third harmonic, of cubic products, is resolved
+eight times."""
+
+
+@dataclass(frozen=True, eq=False)
+class CaptiveTests:
+    """Equations of a campaign in the k free parameters of a model.
+
+    Parameters
+    ----------
+    forces : casadi.Function
+        ``forces(motion, p) -> (F, J)``: the water's X, Y, N (N and N m) and their slopes by the free parameters, at
+        one instant.
+    motion : array (9, instants)
+        u, v, r, rudder angle, dv/dt, dr/dt, propeller speed over its nominal one, and the run's scales of force and
+        moment (N, N m); ship size, SI.
+    projection : tuple of array
+        For each run (coefficients, instants): histories to mean and harmonics.
+    measured : array (m,)
+        Coefficients of X', Y', N' of all runs, run by run, force by force.
+    force : array of int (m,)
+        0, 1, 2 for X, Y, N.
+    mean : array of bool (m,)
+        True for a mean, False for a harmonic.
+    noise : array (3,)
+        Standard deviation of the residual of each force, prime.
+    columns : array of int (k,)
+        Columns of J that belong to the free parameters.
+    """
+
+    forces: ca.Function
+    motion: Array
+    projection: tuple[Array, ...]
+    measured: Array
+    force: NDArray[np.int64]
+    mean: NDArray[np.bool_]
+    noise: Array
+    columns: NDArray[np.int64]
+
+    @cached_property
+    def nuisance(self) -> Array:
+        """Effects (m, 5) of the uncertain parameters between tank and ship, each times its standard error."""
+        columns = [np.where(self.force == place, GAIN_ERROR * self.measured, 0.0) for place in range(3)]
+        columns.append(np.where((self.force == 0) & self.mean, SURGE_OFFSET, 0.0))
+        sway = np.zeros(len(self.measured))
+        sway[self.force == 2] = self.measured[self.force == 1]  # the same coefficients of each run, in the same order
+        columns.append(REFERENCE_ERROR * sway)
+        return np.column_stack(columns)
+
+    def residuals(self, p: Array) -> tuple[Array, Array]:
+        """Residuals (m,), model less measured, and their slopes (m, k), prime, at the model's parameters `p`."""
+        instants = self.motion.shape[1]
+        values, slopes = map(np.array, self.forces.map(instants)(self.motion, p))
+        slopes = slopes.reshape(3, instants, -1)[:, :, self.columns]
+        predicted, jacobian, first = [], [], 0
+        for projection in self.projection:
+            rows = slice(first, first + projection.shape[1])
+            first = rows.stop
+            for place in range(3):
+                predicted.append(projection @ values[place, rows])
+                jacobian.append(projection @ slopes[place, rows])
+        return np.concatenate(predicted) - self.measured, np.vstack(jacobian)
+
+    def of(self, places: Sequence[int]) -> CaptiveTests:
+        """The same equations in some of the free parameters."""
+        return replace(self, columns=self.columns[list(places)])
+
+    def normal(self, p: Array) -> tuple[Array, Array, float]:
+        """Information (k, k), gradient (k,) and cost, the uncertain parameters between tank and ship eliminated."""
+        residual, jacobian = self.residuals(p)
+        weight = 1 / self.noise[self.force]
+        whole = np.column_stack([residual, jacobian]) * weight[:, None]
+        between = self.nuisance * weight[:, None]
+        inner = np.eye(between.shape[1]) + between.T @ between
+        across = between.T @ whole
+        gram = whole.T @ whole - across.T @ np.linalg.solve(inner, across)
+        return gram[1:, 1:], gram[1:, 0], float(gram[0, 0])
+
+    def with_noise_at(self, p: Array, least: float = 1e-6) -> CaptiveTests:
+        """The same with the noise of each force as it is left at `p`, the uncertain parameters at their best."""
+        residual, jacobian = self.residuals(p)
+        weight = 1 / self.noise[self.force]
+        between = self.nuisance * weight[:, None]
+        inner = np.eye(between.shape[1]) + between.T @ between
+        best = np.linalg.solve(inner, between.T @ (residual * weight))
+        left = residual - self.nuisance @ best
+        noise = []
+        for place in range(3):
+            rows = self.force == place
+            used = min(jacobian[rows].any(axis=0).sum(), rows.sum() // 2)
+            noise.append(max(least, float(np.sqrt(np.sum(left[rows] ** 2) / max(rows.sum() - used, 1)))))
+        return replace(self, noise=np.array(noise))
+
+
+def captive_tests(
+    card: ManoeuvringCard, model: Model, free: Sequence[str], campaign: Campaign, runs: Sequence[ReducedRun]
+) -> CaptiveTests:
+    """The equations of a campaign's runs in the free parameters of a model.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+        Of the ship, at the size of `model`.
+    model : Model
+        Driven by the rudder's angle or order.
+    free : sequence of str
+        Names of the k free parameters.
+    campaign : Campaign
+    runs : sequence of ReducedRun
+        Of the campaign.
+
+    Raises
+    ------
+    InputError
+        The campaign is of a ship of other proportions.
+    """
+    _refuse_other_form(card, campaign)
+    ratio = card.ship.length_m / campaign.model.length_m
+    motions, projections, measured, force, mean = [], [], [], [], []
+    for run in runs:
+        kept, projection = _thinned(run)
+        motions.append(_motion(card, campaign, run, ratio)[:, kept])
+        projections.append(projection)
+        inertial = rigid_body_force(campaign, run.motion)
+        for place, name in enumerate(FORCE_COLUMNS):
+            values = run.fits[name].coefficients[: run.regressed] + run.projected(inertial[name][:, None])[:, 0]
+            scales = Scales(campaign.test.water_density_kgpm3, campaign.model.length_m, run.motion.mean_speed_mps)
+            measured.append(values / (scales.force * (scales.length if name == "N" else 1.0)))
+            force.append(np.full(run.regressed, place))
+            mean.append(np.arange(run.regressed) == 0)
+    tests = CaptiveTests(
+        forces=_water_forces(model, free),
+        motion=np.hstack(motions),
+        projection=tuple(projections),
+        measured=np.concatenate(measured),
+        force=np.concatenate(force),
+        mean=np.concatenate(mean),
+        noise=np.ones(3),
+        columns=np.arange(len(free)),
+    )
+    spread = [float(np.std(tests.measured[tests.force == place])) for place in range(3)]
+    return replace(tests, noise=np.maximum(0.1 * np.array(spread), 1e-6))
+
+
+def _refuse_other_form(card: ManoeuvringCard, campaign: Campaign) -> None:
+    for key in ("beam_m", "draught_m"):
+        ours, theirs = getattr(card.ship, key), getattr(campaign.model, key)
+        if not ours or not theirs:
+            continue
+        of_card, of_model = card.ship.length_m / ours, campaign.model.length_m / theirs
+        if abs(of_model / of_card - 1) > SAME_FORM:
+            problem = f"length over {key.removesuffix('_m')} is {of_model:.4g}, and {of_card:.4g} on {card.source}"
+            raise InputError(campaign.path, f"model.{key}", problem, "give the campaign of a model of this ship")
+
+
+def _thinned(run: ReducedRun) -> tuple[NDArray[np.int64], Array]:
+    """Rows of a run at which its motion is evaluated, and the projection of histories there to mean and harmonics."""
+    rows = len(run.motion.time_s)
+    stride = max(1, rows // (ROWS_A_PERIOD * max(run.motion.periods, 1))) if run.run.oscillates else rows
+    kept = np.arange(0, rows, stride, dtype=np.int64)
+    basis = run.basis[kept] if run.run.oscillates else np.ones((len(kept), 1))
+    projection = np.asarray(np.linalg.pinv(basis)[: run.regressed], dtype=np.float64)
+    return kept, projection
+
+
+def _motion(card: ManoeuvringCard, campaign: Campaign, run: ReducedRun, ratio: float) -> Array:
+    """Motion (9, rows) at the ship's size by Froude's law, see :class:`CaptiveTests`."""
+    motion, root = run.motion, np.sqrt(ratio)
+    ones = np.ones(len(motion.time_s))
+    turning = 1.0
+    if run.run.propeller_radps and campaign.test.propeller_radps:
+        turning = run.run.propeller_radps / campaign.test.propeller_radps
+    revolutions = turning * campaign.test.speed_mps * root / card.model.speed_mps
+    scales = Scales(card.environment.water_density_kgpm3, card.ship.length_m, motion.mean_speed_mps * root)
+    return np.vstack(
+        [
+            axial_speed(motion) * root * ones,
+            motion.v_mps * root,
+            motion.r_radps / root,
+            motion.delta_rad * ones,
+            motion.vdot_mps2,
+            motion.rdot_radps2 / ratio,
+            revolutions * ones,
+            scales.force * ones,
+            scales.force * scales.length * ones,
+        ]
+    )
+
+
+def _water_forces(model: Model, free: Sequence[str]) -> ca.Function:
+    """The water's X', Y', N' at one instant of a captive run, with slopes by the free parameters."""
+    names = ("u", "v", "r", "delta", "vdot", "rdot", "revolutions", "force_scale", "moment_scale")
+    motion = ca.SX.sym("motion", len(names))
+    u, v, r, delta, vdot, rdot, revolutions, force_scale, moment_scale = ca.vertsplit(motion)
+    mass, x_G = model.symbol("ship.mass"), model.symbol("ship.x_G")
+    surge, sway, yaw = inertial_forces(mass, x_G, u, v, r)
+    added = {name: model.symbol(f"inertia.{name}") for name in ("sway", "sway_yaw", "yaw_sway", "yaw")}
+    lever = mass * x_G
+    X = model.symbol("force.X") - surge
+    Y = model.symbol("force.Y") - sway - (added["sway"] - mass) * vdot - (added["sway_yaw"] - lever) * rdot
+    inertia = model.symbol("ship.yaw_inertia")
+    N = model.symbol("force.N") - yaw - (added["yaw_sway"] - lever) * vdot - (added["yaw"] - inertia) * rdot
+    forces = model.expand(ca.vertcat(X / force_scale, Y / force_scale, N / moment_scale))
+    forces = ca.substitute(forces, model.x, _states(model, u, v, r, delta, revolutions))
+    inputs = [ca.SX(variable.start) for variable in model.inputs]
+    for place, name in enumerate(model.input_names):
+        if name == "rudder.command":
+            inputs[place] = delta
+        elif name == "propeller.speed":
+            inputs[place] = revolutions * model.symbol("propulsion.nominal_speed")
+    forces = ca.substitute(forces, model.u, ca.vcat(inputs))
+    slopes = ca.jacobian(forces, ca.vcat([model.symbol(name) for name in free]))
+    return ca.Function("captive", [motion, model.p], [forces, slopes], {"cse": True})
+
+
+def _states(model: Model, u: ca.SX, v: ca.SX, r: ca.SX, delta: ca.SX, revolutions: ca.SX) -> ca.SX:
+    """State vector of the model on the carriage; states that are no motion are as they are at the start."""
+    driven = {"motion.u": u, "motion.v": v, "motion.r": r, "rudder.angle": delta}
+    if "propulsion.nominal_speed" in model:
+        driven["propeller.speed_actual"] = revolutions * model.symbol("propulsion.nominal_speed")
+    return ca.vcat([driven.get(state.name, ca.SX(state.start)) for state in model.states])
