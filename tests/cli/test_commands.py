@@ -30,7 +30,7 @@ def test_simulate_writes_what_is_asked(tmp_path) -> None:
     assert len(figures["overshoots_deg"]) == 4
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
     again = tank2sim("simulate", "mariner", "--manoeuvre", "file:run.csv", cwd=tmp_path)
-    refused(again, "run.csv", "no order")  # a trial has more than orders, and says which column
+    refused(again, "run.csv", "not an order")  # a trial has more than orders, and says which column
 
 
 def test_stability_gives_json(tmp_path) -> None:

@@ -144,7 +144,7 @@ def test_a_port_positive_orders_file_is_converted(tmp_path, comment: str) -> Non
         ("t_s\n0\n", "lacks"),
         ("t_s,delta_order_deg\n5,1\n6,2\n", "rise from 0"),
         ("t_s,delta_order_deg\n0,1\n0,2\n", "rise from 0"),
-        ("t_s,delta_order_deg,sail_deg\n0,1,2\n", "no order"),
+        ("t_s,delta_order_deg,sail_deg\n0,1,2\n", "not an order"),
         ("t_s,delta_order_deg\n0,\n1,2\n", "empty"),
         ("t_s,delta_order_deg\n0,hard over\n", "hard over"),
         ("# rudder_sign: prot\nt_s,delta_order_deg\n0,1\n5,2\n", "rudder_sign"),

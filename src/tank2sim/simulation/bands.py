@@ -25,8 +25,7 @@ FOLLOWED = 10.0
 its distance over the radius of the track; a whole lap, which must not be skipped, has more (project choice)."""
 
 _ROUNDED = 0.001
-"""Share of a step by which a track may fall short of a normal or pass it backwards: positions have single precision
-(project choice)."""
+"""Tolerance, in steps, of a track at a normal: positions have single precision (project choice)."""
 
 
 @dataclass(frozen=True)

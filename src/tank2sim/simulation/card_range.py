@@ -17,8 +17,7 @@ INSIDE = 1 - 1e-6
 """Value of ``validity`` below which it counts as less than 1: above rounding."""
 
 _STILL = 0.05
-"""Share of u0 below which drift and yaw rate over speed are not reported: they are undefined at rest. Project
-choice."""
+"""Share of u0 below which drift and r L/U are not reported: they are undefined at rest. Project choice."""
 
 Numbers = dict[str, float]
 """Figure by name with unit."""

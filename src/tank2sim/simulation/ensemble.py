@@ -100,8 +100,7 @@ class MemberResult(NamedTuple):
 
 
 Ask = Callable[[Sequence[Mapping[str, float]]], Sequence[MemberResult]]
-"""Function from the parameters of members, all with the same names, to the result of each, independent of the
-others."""
+"""Function from the parameters of members, with the same names, to the independent result of each."""
 
 
 class Question(Protocol):

@@ -27,8 +27,7 @@ MANOEUVRE_FORMS = (
 )
 
 TURN_HEADING = math.radians(540.0)
-"""Heading change of a turning circle: one and a half turns, so that its last half turn is steady (ITTC
-7.5-04-02-01)."""
+"""Heading change of a turning circle: 1.5 turns, so that its last half turn is steady (ITTC 7.5-04-02-01)."""
 
 ZIGZAG_EXECUTES = 5
 """Number of executes of a zigzag (ITTC 7.5-04-02-01), for four overshoots."""
@@ -45,8 +44,7 @@ COASTING_END = 0.2
 then lost most of its effect. Project choice."""
 
 STEADY_CHANGE = 1e-3
-"""Largest relative change of a steady yaw rate over two ship lengths, relative to itself or to 0.01 u0/L if that is
-larger."""
+"""Largest change of a steady yaw rate over two ship lengths, relative to itself, or to 0.01 u0/L if larger."""
 
 
 def _degrees(angle: float) -> str:

@@ -54,8 +54,7 @@ FED = {
 """Signal of a trial to the input of a model, in addition to the rudder."""
 
 SMOOTHING = 0.3
-"""Smoothing time of recorded signals in L/u0, before figures are computed (project choice: below the time of any
-peak)."""
+"""Smoothing time of recorded signals for figures, L/u0 (project choice: below the time of any peak)."""
 
 COURSE_ERROR = math.radians(0.25)
 """Standard error of a zigzag's course from the heading of its approach, in addition to the scatter of that heading: the
@@ -288,8 +287,7 @@ class _Reversals:
     lag_scale: float
 
     def fit(self, noise: float, nominal: float | None = None) -> _Fit:
-        """The least-squares fit for a standard deviation of the headings at reversals, rad; for a given `nominal`
-        heading, if any."""
+        """The least-squares fit for a standard deviation of the reversal headings, rad; with a given `nominal` one."""
         course, error = self.approach
 
         def off(at: Array, heading: float) -> Array:
@@ -465,8 +463,7 @@ def _smoothed(time: Array, values: Array, ship_time: float) -> Array:
 
 
 def _slope(time: Array, values: Array, ship_time: float) -> Array:
-    """Time derivative by straight lines through windows: a higher degree would follow the noise at the ends of a
-    record."""
+    """Time derivative by straight lines through windows: a higher degree would follow noise at a record's ends."""
     window = _window(time, ship_time)
     if window < 3 or window > len(values):
         return np.asarray(np.gradient(values, time), dtype=np.float64)

@@ -64,8 +64,7 @@ class RowFunction:
                 self._library = None
 
     def __call__(self, *arguments: Array) -> tuple[Array, ...]:
-        """Results (n, elements) each; an argument (elements,) is the same for every row, (n, elements) has a value for
-        each."""
+        """Results (n, elements) each; an argument is (elements,), the same for every row, or (n, elements)."""
         n = max(len(argument) for argument in arguments if argument.ndim == 2)
         arrays = [np.ascontiguousarray(argument, dtype=float) for argument in arguments]
         if self._library is None:

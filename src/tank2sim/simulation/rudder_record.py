@@ -34,8 +34,7 @@ _REACHED = 0.9
 last part of a gear with a lag (project choice)."""
 
 LEAVING = 0.05
-"""Share of its change from which an order counts as changed: immediate for a step, near the beginning of a ramp
-(project choice)."""
+"""Share of its change from which an order counts as changed: at once for a step, early in a ramp (project choice)."""
 
 
 @dataclass(frozen=True)

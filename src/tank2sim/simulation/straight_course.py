@@ -86,8 +86,7 @@ def straight_course(
 
 
 def _cause(slopes: Array) -> str:
-    """Remedy for a missing straight course, from the slopes (2, 2) of sway and yaw acceleration by v and by the
-    rudder."""
+    """Remedy for a missing straight course, by the slopes (2, 2) of sway and yaw acceleration by v and rudder."""
     by_sway, by_rudder = np.abs(slopes).max(axis=0)
     if not by_sway:
         return "sway moves neither Y nor N: check Yv and Nv of the card"

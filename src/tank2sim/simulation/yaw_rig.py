@@ -1,5 +1,4 @@
-"""Runs of the yaw rig and their records: body, motor and encoder under a sampled controller, over the humps of a
-programme."""
+"""Runs of the yaw rig and their records: body, motor and encoder under a sampled controller and a programme."""
 
 from __future__ import annotations
 

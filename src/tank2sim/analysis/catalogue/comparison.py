@@ -218,8 +218,7 @@ def missing_of(card: SteeringCard) -> dict[str, tuple[str, ...]]:
 
 
 def tuned(card: SteeringCard, name: str) -> TwoPointTuning | str | None:
-    """A model of the card tuned to its first two measured points; the reason of a failure, or None without two
-    points."""
+    """A model of the card tuned to its first two measured points; the reason of a failure, or None without points."""
     measured = [point for point in card.points if point.measured][:2]
     if len(measured) < 2:
         return None

@@ -217,8 +217,7 @@ def combined_prediction(card: SteeringCard, changed: str) -> CombinedPrediction:
 
 
 def _direct_misread(card: SteeringCard, printed: PrintedInfluence, target: str, agreed: Mapping[str, float]) -> float:
-    """Radius of the target model with the larger of two confused variations applied to the wrong coefficient as
-    well."""
+    """Radius of the target model with the larger of two confused variations also on the wrong coefficient."""
     values = card.models[printed.model].coefficients
     largest = max(printed.misread_as, key=lambda name: abs(agreed.get(name, 0.0)), default=None)
     if largest is None:

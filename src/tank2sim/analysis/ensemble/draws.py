@@ -49,8 +49,7 @@ def draws_with(errors: JointErrors, seed: int) -> Draws:
 
 
 def by_file_name(card: ManoeuvringCard, names: Sequence[str], matrix: Array) -> Covariance:
-    """A covariance by the names of the card's file instead of the model's; numbers that are not on the card are
-    omitted."""
+    """A covariance by the names of the card's file instead of the model's, without numbers that are not on the card."""
     found = {parameter.name: parameter for parameter in card_parameters(card, study_model(card))}
     rows = [place for place, name in enumerate(names) if name in found]
     chosen: list[CardParameter] = [found[names[place]] for place in rows]

@@ -128,8 +128,7 @@ class Chance:
 
 @dataclass(frozen=True, eq=False)
 class StabilityBands:
-    """Bands of the straight course at the card's speed, the probability of stability there, and of meeting each
-    criterion."""
+    """Bands of the straight course at the card's speed, and the probabilities of stability and of each criterion."""
 
     asked: Members
     figures: Mapping[str, Band]
@@ -185,7 +184,7 @@ def manoeuvre_bands(
     if track is not None and track.count < len(shown):
         last = shown[track.count - 1]
         share = f"{100 * STILL_RUNNING:g} % of the members"
-        notices.append(f"the band of the track ends at {last:.4g} s, as far as {share} come while they run")
+        notices.append(f"the band of the track ends at {last:.4g} s, where fewer than {share} reach it")
     return ManoeuvreBands(_members(found, notices), figure_bands(found), shown, histories, track)
 
 

@@ -45,8 +45,7 @@ class Weather:
 
 
 def weather_for(length_m: float, **given: float | None) -> Weather:
-    """The default weather for a ship of a length, by Froude's law, with given values (not None) in place of
-    defaults."""
+    """The default weather for a ship of a length, by Froude's law; given values (not None) replace defaults."""
     scale, usual = math.sqrt(length_m / 160.0), Weather()
     values: dict[str, float] = {
         "current_mps": usual.current_mps * scale,

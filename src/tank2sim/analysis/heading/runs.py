@@ -44,8 +44,7 @@ class HeadingLoop:
     def advance(
         self, state: Array, inputs: Mapping[str, float | Array], steps: int, parameters: Mapping[str, float] | None
     ) -> tuple[Array, Array]:
-        """States (steps + 1, nx) and inputs (steps, nu); an input is constant, or has a value for each step
-        (steps,)."""
+        """States (steps + 1, nx) and inputs (steps, nu); an input is constant, or an array (steps,)."""
         u = np.tile(self.model.input_values(), (steps, 1))
         for name, values in inputs.items():
             u[:, self.model.input_names.index(name)] = values
@@ -152,8 +151,7 @@ class CourseKeeping:
 
 
 def without_anti_windup(autopilot: Model) -> dict[str, float]:
-    """Parameters without anti-windup: the integral continues at the limit and includes a whole course change; none for
-    a PD."""
+    """Parameters without anti-windup: the integral continues at the limit and over a course change; none for a PD."""
     starts = {parameter.name: parameter.start for parameter in autopilot.parameters}
     if "autopilot.anti_windup_time" not in starts:
         return {}

@@ -23,8 +23,7 @@ CURVED = 1.5
 """Reported factor between slope and 10 % difference. Project choice: the figure bends or jumps there."""
 
 REPORTED_FROM = 0.5
-"""... where either is at least this percentage of the figure. Project choice: smaller differences do not change a
-decision."""
+"""... where either is at least this percentage of the figure. Project choice: less does not change a decision."""
 
 
 @dataclass(frozen=True)

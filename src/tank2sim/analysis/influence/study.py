@@ -33,12 +33,10 @@ Project choice: a circle of 10 000 lengths.
 """
 
 PLACE_FELT = 1e-20
-"""Squared slopes of the scaled accelerations by position and heading above which turns are not steady: rounding is
-below."""
+"""Squared slopes of the scaled accelerations by position and heading of an unsteady turn: rounding is below."""
 
 SPARE = 1.5
-"""Duration of a manoeuvre over that which the card's ship needs for its figures; the full duration if that is too
-short."""
+"""Duration of a manoeuvre over that of the card's ship for its figures; the full one if that is too short."""
 
 
 class Study:

@@ -25,8 +25,7 @@ SPEEDS = 25
 """Speeds at which C' is reported, evenly over the card's range."""
 
 CHANGE = 0.1
-"""Change of a derivative whose effect is reported: 10 %, as for influence coefficients (Poznyakov and Yudin, paper
-4)."""
+"""Reported change of a derivative: 10 %, as for influence coefficients (Poznyakov and Yudin, paper 4)."""
 
 _NOTHING = 0.1
 """Per cent of C' below which an influence counts as none: the effect of an asymmetric straight course."""

@@ -22,11 +22,9 @@ HULL, GEAR, FIRST_ORDER = "rudder angle to yaw rate", "rudder order to yaw rate"
 
 _FREQUENCIES = 121
 _FEWEST, _MOST, _IN_A_PERIOD = 201, 1601, 16
-"""Number of times of a step response in each period of the fastest oscillating mode, with its least and its largest
-total."""
+"""Times of a step response in each period of the fastest oscillating mode, with least and largest total."""
 _STABLE_STEP, _UNSTABLE_STEP = 5.0, 2.5
-"""Length of the step response in slowest time constants: to 99 % of the final value, or to twelve times the
-beginning."""
+"""Length of the step response in slowest time constants: to 99 % of the end, or to twelve times the beginning."""
 
 
 @dataclass(frozen=True)

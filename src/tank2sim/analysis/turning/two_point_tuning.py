@@ -38,16 +38,14 @@ from tank2sim.dynamics.steering_models import SteeringForm
 from tank2sim.errors import InputError
 
 LARGEST_FACTOR = 5.0
-"""Beyond this factor (or below its inverse) a scaled hull or rudder is no longer the ship of the card. Project
-choice."""
+"""Largest factor, and inverse of the least, of a hull or rudder that is still the card's ship. Project choice."""
 
 _LEAST_STEP = 1e-3
 _ACCURACY = 1e-10
 _ITERATIONS = 12
 _SINGULAR = 1e13
 _ALIKE = 20.0
-"""Condition of the two factors against the two measures above which the points do not determine both. Project
-choice."""
+"""Condition of the factors against the measures above which the points do not determine both. Project choice."""
 
 
 @dataclass(frozen=True)

@@ -258,8 +258,7 @@ def _notes(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float) -> t
 def _conversion(
     card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float
 ) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Names of the velocity and rudder terms, the matrix from the card's to the reference's coefficients, and the
-    constant term."""
+    """Names of the velocity and rudder terms, matrix from the card's to the reference's, and constant term."""
     names = [*ABKOWITZ_TERMS["X"], *ABKOWITZ_TERMS["Y"], *ABKOWITZ_TERMS["N"]]
     coefficients = ca.SX.sym("own", len(names))
     at = ca.SX.sym("v"), ca.SX.sym("r"), ca.SX.sym("d"), ca.SX.sym("du")

@@ -120,8 +120,7 @@ class CardComparison:
         return (*self.coefficients, *self.effects)
 
     def in_errors(self, place: int) -> tuple[float, ...]:
-        """All differences of a card (1 is the first after the reference) in standard errors, except for
-        :data:`.SAME`."""
+        """Differences of a card (1 is the first after the reference) in standard errors, except for :data:`.SAME`."""
         found = [row.differences[place - 1].standard_errors for row in self.rows]
         return tuple(difference for difference in found if difference is not None)
 
@@ -236,8 +235,7 @@ def labels_of(cards: Sequence[ManoeuvringCard]) -> tuple[str, ...]:
 
 
 def differences_of_size(first: ManoeuvringCard, second: ManoeuvringCard, scale: float = 1.0) -> list[str]:
-    """Length and breadth of two ships that differ by :data:`SAME_SIZE` or more, in words; `scale` is that of
-    `first`."""
+    """Length and breadth of two ships that differ by :data:`SAME_SIZE` or more; `scale` is that of `first`."""
     found = []
     for what, size, reference in (
         ("length", first.ship.length_m, second.ship.length_m),
@@ -304,8 +302,7 @@ def _numbers(run: Run | str) -> Numbers:
 
 
 def _approach(reference: ManoeuvringCard, card: ManoeuvringCard) -> float:
-    """The reference's speed at the size of the card's ship, m/s; its own speed if both are equal except for
-    rounding."""
+    """The reference's speed at the size of the card's ship, m/s; the card's if both are equal except for rounding."""
     speed = reference.model.speed_mps * math.sqrt(card.ship.length_m / reference.ship.length_m)
     return card.model.speed_mps if math.isclose(speed, card.model.speed_mps, rel_tol=1e-6) else speed
 

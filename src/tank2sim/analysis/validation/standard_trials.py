@@ -115,8 +115,7 @@ def standard_trials(ships: Sequence[TrialShip]) -> dict[str, Manoeuvre]:
 
 
 def figure_numbers(figures: Figures) -> Numbers:
-    """The figures of a run that are single numbers, with the first overshoots; figures that it did not show are
-    absent."""
+    """The figures of a run that are single numbers, with the first overshoots, without missing ones."""
     overshoots = {entry_name("overshoots_deg", place) for place in range(_OVERSHOOTS)}
     excluded = {"stopped_at_mps", *(name for name in figures if name.endswith("_lengths"))}
     single = single_figures(figures).items()

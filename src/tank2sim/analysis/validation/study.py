@@ -265,8 +265,7 @@ def made_card(card: ManoeuvringCard, trial: str) -> bool:
 
 
 def verify(ship: TrialShip, count: int = MEMBERS) -> tuple[tuple[Verified, ...], tuple[str, ...]]:
-    """The standard trials with the model's step, with half of it, and by an ensemble; and notices on trials that could
-    not be run."""
+    """The standard trials with the model's step, with half of it, and by an ensemble; and notices on failed ones."""
     model = replace(ship.model, step_s=ship.model.step_s / 2)
     finer = TrialShip(ship.card, model, Integrator(model))
     drawn, _ = members(ship.card, ship.model, count)

@@ -182,8 +182,7 @@ def _inverse_trigamma(value: float) -> float:
 
 
 def _densities(residual: Array, columns: int, periods: int) -> tuple[Array, Array]:
-    """Spectral density of the residual at the frequency of each column, (columns,), as a variance; and its degrees of
-    freedom."""
+    """Spectral density of the residual at each column's frequency, (columns,), as a variance; degrees of freedom."""
     count = len(residual)
     if count <= columns + 2:
         freedom = max(1, count - columns)

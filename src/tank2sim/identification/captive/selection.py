@@ -117,8 +117,7 @@ def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_te
 def distinguishable_equations(
     campaign: Campaign, runs: Sequence[ReducedRun], force: str, choices: dict[str, Choice]
 ) -> CampaignEquations:
-    """The equations of all terms that the runs excite and can distinguish; the decisions on other terms are added to
-    `choices`."""
+    """The equations of all distinguishable excited terms; decisions on other terms are added to `choices`."""
     active = []
     for term in candidate_terms(force):
         if excited(campaign, runs, term):
@@ -157,8 +156,7 @@ def _order(term: Term) -> int:
 
 
 def _keep_distinguishable(full: CampaignEquations, choices: dict[str, Choice]) -> list[str]:
-    """Terms that the campaign can distinguish, from the simplest to the most mixed: each must keep the condition number
-    within its limit."""
+    """Distinguishable terms, the simplest first: each must keep the condition number within its limit."""
     kept: list[str] = []
     conditions = _conditions(full)
     for name in sorted(full.names, key=_simplicity):

@@ -23,8 +23,7 @@ from tank2sim.identification.captive.regression import Solution, Spread, fitted_
 from tank2sim.identification.conditioning import SINGULAR_CONDITION
 
 _SHOWN = 4.0
-"""Standard errors from which such an error is reported: with some 20 possible errors, chance exceeds it in one of 800
-campaigns."""
+"""Standard errors of a reported error: with some 20 possible errors, chance exceeds it in one of 800 campaigns."""
 LEAST_PHASE_RAD = 0.003
 """Least reported phase of a delay at the fastest oscillation. A project choice: 0.003 of the damping
 force is then in the added mass, a third of a percent."""
@@ -196,8 +195,7 @@ def _correct_gain(equations: CampaignEquations, kind: str, gain: float) -> Campa
 
 
 def _common_delay(delays: Sequence[tuple[float, float]], fastest_radps: float) -> tuple[float, float] | None:
-    """The common value of several delays (value, standard error) and its standard error, s; None without a significant
-    delay."""
+    """The common value of delays (value, standard error) and its standard error, s; None if it is not significant."""
     if not delays:
         return None
     values, weights = np.array([value for value, _ in delays]), np.array([error**-2.0 for _, error in delays])
@@ -287,8 +285,7 @@ def _rate(count: int, frequency_radps: float) -> Array:
 
 
 def _phase_shift(count: int, phase_rad: float) -> Array:
-    """Matrix from mean and harmonics (count,) of a force to those a phase later: harmonic k turns by k times the
-    phase."""
+    """Matrix from mean and harmonics (count,) of a force to those a phase later; harmonic k turns by k phases."""
     matrix = np.eye(count)
     for place in range(1, count, 2):
         angle = (place + 1) // 2 * phase_rad

@@ -225,8 +225,7 @@ def fit_speeds(
 
 
 def _search(tows: Tows, force_N: float, terms: tuple[str, ...], options: TowOptions) -> tuple[Array, Array, Array]:
-    """Scale of each unknown, and start and upper bound in that scale; the lower bound is 0 where an upper bound
-    exists."""
+    """Scale of each unknown, and start and upper bound in that scale; the lower bound of a bounded unknown is 0."""
     # The mass that gives the last mean speed without drag, and drag terms as large as the force at the top speed.
     mass = force_N * tows.time_s[-1] / max(tows.mean_speed_mps[-1], 1e-3 * tows.top_speed_mps)
     drags = [force_N / tows.top_speed_mps ** DRAG_POWERS[term] for term in terms]

@@ -223,8 +223,7 @@ def speed_polynomials(tows: Tows, degrees: Sequence[int] = _DEGREES) -> Iterator
 
 
 def confidence_ellipse(fitted: FittedModel, points: int = 121) -> Ellipse:
-    """Joint 95 % region of M and B3 of a model whose first unknowns they are, from the linearised covariance and
-    Fisher's F."""
+    """Joint 95 % region of M and B3, the first unknowns of a model, by the linearised covariance and Fisher's F."""
     fit = fitted.fit
     radius = np.sqrt(2 * stats.f.ppf(_LEVEL, 2, fit.freedom))
     angle = np.linspace(0, 2 * np.pi, points)

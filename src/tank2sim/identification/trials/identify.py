@@ -51,8 +51,7 @@ LEAST_PIECE = 0.5
 """Shortest piece, in L/u0: in less the state hardly responds to the rudder, and initial states outnumber the data."""
 
 WHOLE_RUN_MISFIT = 3.0
-"""Whole runs are fitted, too, when the model follows them to this many times the noise in every signal (project
-choice)."""
+"""Largest error, over the noise of every signal, of a model that is fitted to whole runs, too (project choice)."""
 
 _NO_UNCERTAINTY = "the card states no uncertainty: 2 % of each derivative is taken, and widened as the trials demand"
 

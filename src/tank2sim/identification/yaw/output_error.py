@@ -119,8 +119,7 @@ def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, i
 
 
 def _search(evaluate: Callable[[Array], tuple[Array, Array]], begin: Array, count: int) -> OptimizeResult | None:
-    """The search from `begin`; if the integration diverges with negative friction, a second search from zero
-    friction."""
+    """The search from `begin`; if the integration diverges with negative friction, a second one from zero friction."""
     upright = begin.copy()
     upright[1:count] = np.maximum(upright[1:count], 0.0)
     for start in (begin, upright):

@@ -23,12 +23,10 @@ from tank2sim.identification.trials.problem.measured_motion import MEASURED_STAT
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
 CLOSE_CORRELATION = 0.95
-"""Correlation from which two parameters are reported as a pair: their difference has 39 times the variance of their
-sum."""
+"""Correlation of a reported pair of parameters: their difference has 39 times the variance of their sum."""
 
 WEAK = 0.1
-"""A direction in which the trials give less than this share of the prior's information counts as unseen (project
-choice)."""
+"""Share of the prior's information below which the trials do not see a direction (project choice)."""
 
 PART = 0.3
 """Least component of a direction for its parameter to be named (project choice)."""

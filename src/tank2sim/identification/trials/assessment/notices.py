@@ -17,8 +17,7 @@ HARD_TURN = math.radians(35.0)
 """Rudder angle of the turn in which a card is tested (IMO MSC.137(76)); the gear's largest angle if that is less."""
 
 STOPPED = 0.15
-"""A ship that keeps less than this share of its speed in a turn has stopped: full hulls keep a third (project
-choice)."""
+"""Share of its speed below which a ship in a turn has stopped: full hulls keep a third (project choice)."""
 
 WORSE = 1.05
 """An error that grew by less than this factor counts as unchanged (project choice)."""

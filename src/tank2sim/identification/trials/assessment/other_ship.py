@@ -57,8 +57,7 @@ def _ratio_text(name: str, ratio: tuple[float, float]) -> str:
 
 
 def _mean(ratios: list[tuple[float, float]]) -> tuple[float, float]:
-    """Weighted mean of values with standard errors, and its standard error with Birge's ratio for excess scatter
-    (Birge 1932)."""
+    """Weighted mean of values with standard errors, and its standard error widened by excess scatter (Birge 1932)."""
     values, errors = np.array(ratios).T
     weights = 1 / errors**2
     mean = float(np.sum(weights * values) / np.sum(weights))
@@ -72,8 +71,7 @@ def _beyond(value: float, error: float, factor: float) -> bool:
 
 
 def _ratio(problem: Problem, runs: Sequence[SampledRun]) -> tuple[float, float] | None:
-    """The rudder's yaw moment by runs over that of the card, and its standard error; None for runs that are too
-    short."""
+    """The rudder's yaw moment by runs over that of the card, and its standard error; None for short runs."""
     means = dict(zip(problem.free, problem.prior_mean, strict=True))
     linear = tuple(name for name in _LINEAR if means.get(name))
     mean = np.array([means[name] for name in linear])

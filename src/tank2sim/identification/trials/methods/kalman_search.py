@@ -34,8 +34,7 @@ USUAL_PUSH = 0.2
 choice: rather large, because the problem is then nearly linear)."""
 
 RANGE = 1e5
-"""Factor by which process noise may leave the level at which the search begins, to either side: practically none, or
-all."""
+"""Factor on the first process noise within which the search stays: practically none, or all."""
 
 _FINEST = 0.1
 """A measurement's noise is at least this share of the value from its third differences (project choice: a smoothed
@@ -84,8 +83,7 @@ class SearchTask:
         return self.point(point.values, point.levels, (point.filtered.before, point.filtered.after))
 
     def first_point(self, values: Array) -> SearchPoint:
-        """First point of a search, linearised along the trajectory of a pass that is linearised along the
-        measurements."""
+        """First point, linearised along the trajectory of a pass that is linearised along the measurements."""
         first = self.point(values, self.first, measured_trajectory(self.problem, self.batch))
         return self.relinearise(first)
 
@@ -120,16 +118,14 @@ class SearchPoint:
 
 
 def task_of(problem: Problem, *, white: bool = False, drifting: bool = False) -> SearchTask:
-    """The search task of a problem, with `white` or time-correlated random accelerations, and with sensors that
-    drift."""
+    """The search task of a problem, with `white` or correlated random accelerations, and with drifting sensors."""
     disturbed = Disturbed(problem.model, problem.free, problem.seen, drifting=drifting)
     batch = batch_of(problem, disturbed.correlated)
     return SearchTask(problem, disturbed, batch, _first_levels(problem, disturbed, batch, white))
 
 
 def _first_levels(problem: Problem, disturbed: Disturbed, batch: Batch, white: bool) -> Levels:
-    """Measurement noise from third differences (their variance is 20 times that of white noise), and usual
-    accelerations."""
+    """Measurement noise from third differences (their variance is 20 times that of white noise); usual pushes."""
     roughness = []
     for column in np.moveaxis(np.where(batch.known, batch.measured, np.nan), 2, 0):
         known = column[~np.isnan(column)]
@@ -199,8 +195,7 @@ def scores(task: SearchTask, filtered: FilterPass) -> list[Array]:
 
 
 def whitened_innovations(filtered: FilterPass) -> tuple[Array, Array]:
-    """Derivatives (runs, n, ny, k) of the whitened innovations by the parameters, with the gains held, and the
-    innovations."""
+    """Whitened innovations, after their derivatives (runs, n, ny, k) by the parameters with the gains held."""
     J, _ = innovation_tangents(filtered.tangents, filtered.gains)
     return J, filtered.white
 

@@ -125,8 +125,7 @@ def _first_noise(problem: Problem, pieces: list[Pieces]) -> tuple[ColouredNoise,
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """Constants of a search. Runs are independent and machine code releases the lock, so that threads run in
-    parallel."""
+    """Constants of a search. Runs are independent, and machine code lets threads run in parallel."""
 
     problem: Problem
     shooting: Shooting

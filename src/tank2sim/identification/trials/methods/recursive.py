@@ -31,15 +31,13 @@ from tank2sim.identification.trials.methods.posterior import BLOCK, sandwich
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 
 _SETTLED = 2.0
-"""A coefficient has settled when it stays within this many of its last standard errors of its last value (project
-choice)."""
+"""Last standard errors about its last value within which a coefficient has settled (project choice)."""
 
 LEARNED = 0.5
 """... and its standard error is below this share of the prior's (project choice)."""
 
 LATEST = 0.75
-"""A coefficient that settles after this share of the time counts as unsettled: at the end all settle (project
-choice)."""
+"""Share of the time until which a coefficient must settle: at the end all do (project choice)."""
 
 LEVEL_ITERATIONS = 15
 """Most steps of the noise levels before each pass."""
@@ -209,8 +207,7 @@ def _block(
     where: tuple[int, int, int],
     carried: tuple[Array, Array | None, Array | None],
 ) -> tuple[FilterPass, Array, tuple[Array, Array | None, Array | None]]:
-    """The filter over one block: pass, derivatives, and the start of the next block (state, covariance,
-    derivatives)."""
+    """The filter over a block: pass, derivatives, and start of the next block (state, covariance, derivatives)."""
     run, begin, end = where
     state, spread, tangent = carried
     batch = task.batch.part(run, begin, end, state, spread)

@@ -26,8 +26,7 @@ from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.sensitivity import Sensitivity
 
 WIDTH = 0.7
-"""Width of a window in L/u0 (project choice): short against a manoeuvre, long against noise and the smoothing of
-regressors."""
+"""Width of a window in L/u0 (project choice): short against a manoeuvre, long against noise and smoothing."""
 
 WEAK_EQUATIONS = ("motion.udot", "motion.vdot", "motion.rdot")
 

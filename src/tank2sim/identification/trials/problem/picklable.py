@@ -1,5 +1,4 @@
-"""Problems that can be sent to another process: a model cannot, because of its symbols, and is rebuilt from its
-card."""
+"""Problems for other processes: a model cannot be sent, because of its symbols, and is rebuilt from its card."""
 
 from __future__ import annotations
 

@@ -145,8 +145,7 @@ def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
 
 
 def _at_length(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
-    """The same for a trial whose format states the length of the ship or model: it must be that of the card or its
-    model."""
+    """The same for a trial with a stated length of the ship or model: it must be that of the card or its model."""
     assert trial.length_m is not None
     ratio, scale = card.ship.length_m / trial.length_m, trial.scale or 1.0
     factor = min((1.0, scale, 1 / scale), key=lambda candidate: abs(math.log(ratio / candidate)))

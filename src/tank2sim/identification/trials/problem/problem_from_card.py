@@ -28,8 +28,7 @@ LEAST_PART = 2.0
 
 REVOLUTIONS = "propulsion.Xnn"
 REVOLUTIONS_ERROR = 0.2
-"""Standard error before the trials of the effect of revolutions, as a share of it: a card states none (project
-choice)."""
+"""Relative standard error before the trials of the effect of revolutions: a card states none (project choice)."""
 
 REVOLUTIONS_VARY = 0.01
 """Revolutions that vary by less than this share of their nominal number show nothing of their effect."""

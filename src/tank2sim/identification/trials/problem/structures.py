@@ -32,8 +32,7 @@ Project choice: of 0, 0.1 and 0.3, 0.1 is closest to KVLCC2's 35 deg turn at MAR
 after fits of HSVA's zigzags, which do not distinguish the three."""
 
 SHARE_OF_ASYMMETRY = 0.02
-"""The same for terms of asymmetry (Y0, N0, Y0u, N0u): the lateral force of a single screw is a few percent (project
-choice)."""
+"""The same for asymmetry (Y0, N0, Y0u, N0u): the lateral force of a single screw is a few percent (project choice)."""
 
 CUBIC_HULL = {force: tuple(f"{force}{powers}" for powers in ("vvv", "vvr", "vrr", "rrr")) for force in "YN"}
 ASYMMETRY = ("Y0", "N0", "Y0u", "N0u")
@@ -109,8 +108,7 @@ STRUCTURES: Registry[ModelStructure] = Registry(
     ModelStructure,
     reserved=(AUTO,),
 )
-"""From the fewest to the most parameters, then those of installed packages: of two that predict alike the first is
-taken."""
+"""By rising number of parameters, then those of installed packages: the first of equal predictions is taken."""
 
 
 def prior_of_absent(card: ManoeuvringCard, name: str, share: float = SHARE_OF_LINEAR) -> tuple[float, float]:
