@@ -85,8 +85,8 @@ def put(files: Mapping[Path, str | bytes], folder: Path, inputs: Sequence[Path])
 def _of_earlier_run(folder: Path) -> set[Path]:
     """What of orders, corrected trials and covariance an earlier run says in its ``gap.json`` that it wrote."""
     try:
-        told = json.loads((folder / GAP).read_text(encoding="utf-8"))
-        names = [*told.get("files", ()), (told.get("next_test") or {}).get("orders", "")]
+        earlier = json.loads((folder / GAP).read_text(encoding="utf-8"))
+        names = [*earlier.get("files", ()), (earlier.get("next_test") or {}).get("orders", "")]
         paths = [PurePosixPath(name) for name in names]
     except (OSError, ValueError, AttributeError, TypeError):
         return set()  # none, or another program's

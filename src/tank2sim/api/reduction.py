@@ -101,8 +101,8 @@ class ReductionResult(Result):
         rows: list[list[object]] = []
         for row in derivative_rows(self.reduction, self.contents):
             value, stepped = f"{row.value:.5g} ± {row.standard_error:.2g}", row.stepped
-            other = f"{stepped.value:.5g} ± {stepped.standard_error:.2g} ({stepped.found_in})" if stepped else "-"
-            rows.append([row.name, value, other, row.origin])
+            stepwise = f"{stepped.value:.5g} ± {stepped.standard_error:.2g} ({stepped.found_in})" if stepped else "-"
+            rows.append([row.name, value, stepwise, row.origin])
         name, count = self.reduction.campaign.model.name, len(self.reduction.runs)
         tables = [
             ResultTable(

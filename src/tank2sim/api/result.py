@@ -61,8 +61,8 @@ class ResultTable:
 
         cells = [[cell_text(cell) for cell in row] for row in self.rows[:REPR_ROWS]]
         lines = [self.title, pd.DataFrame(cells, columns=list(self.columns)).to_string(index=False)]
-        left = len(self.rows) - REPR_ROWS
-        return "\n".join(lines + ([f"... {left} more rows in .tables"] if left > 0 else []))
+        omitted = len(self.rows) - REPR_ROWS
+        return "\n".join(lines + ([f"... {omitted} more rows in .tables"] if omitted > 0 else []))
 
 
 def cell_text(value: object) -> str:

@@ -66,7 +66,17 @@ class StabilityResult(PagedResult):
         """The IMO criteria (MSC.137(76)), worse side: found, allowed, unit, met, margin (%)."""
         import pandas as pd
 
-        rows = [(one.name, one.found, one.allowed, one.unit, one.passed, one.margin_percent) for one in self.study.imo]
+        rows = [
+            (
+                criterion.name,
+                criterion.found,
+                criterion.allowed,
+                criterion.unit,
+                criterion.passed,
+                criterion.margin_percent,
+            )
+            for criterion in self.study.imo
+        ]
         columns = ["criterion", "found", "allowed", "unit", "met", "margin_percent"]
         return pd.DataFrame(rows, columns=columns).set_index("criterion")
 

@@ -55,10 +55,10 @@ def reduction_page(
 def _derivatives(reduction: Reduction, card: Contents) -> PageTable:
     rows: list[list[Cell]] = []
     for row in derivative_rows(reduction, card):
-        other: list[Cell] = [None, None, ""]
+        stepwise: list[Cell] = [None, None, ""]
         if steps := row.stepped:
-            other = [1e5 * steps.value, 1e5 * steps.standard_error, steps.found_in.replace("_", " ")]
-        rows.append([row.name, 1e5 * row.value, 1e5 * row.standard_error, *other, row.origin])
+            stepwise = [1e5 * steps.value, 1e5 * steps.standard_error, steps.found_in.replace("_", " ")]
+        rows.append([row.name, 1e5 * row.value, 1e5 * row.standard_error, *stepwise, row.origin])
     heads = ("", "regression", "±", "paper's order", "±", "from tests", "origin")
     return PageTable(caption="Prime system, times 10⁵", columns=[Column(title=head) for head in heads], rows=rows)
 

@@ -61,10 +61,10 @@ def reduction_charts(reduction: Reduction) -> dict[str, alt.TopLevelMixin]:
 def _angle_chart(reduction: Reduction, force: str, kind: str, words: str) -> alt.LayerChart | None:
     """Force coefficient of the steady runs at the test speed against the angle that they vary."""
     runs = [run for run in reduction.runs if run.run.type == kind]
-    others = [run for run in reduction.runs if _varies_alone(run, kind) and run not in runs]
+    straight_runs = [run for run in reduction.runs if _varies_alone(run, kind) and run not in runs]
     if len(runs) < 2:
         return None
-    found = [(_angle(run, kind), *_coefficient(reduction, force, run)) for run in (*runs, *others)]
+    found = [(_angle(run, kind), *_coefficient(reduction, force, run)) for run in (*runs, *straight_runs)]
     angle, value, error = (np.array(column) for column in zip(*found, strict=True))
     across = np.linspace(angle.min(), angle.max(), _SAMPLES)
     v, rudder = (-np.sin(across), 0 * across) if kind == "static_drift" else (0 * across, across)
@@ -146,13 +146,13 @@ def _amplitude_chart(reduction: Reduction, force: str, kind: str, words: str) ->
         ForceSeries(label="fit", x=[], value=[], fit_x=amplitude, fit_value=fit, fit_half_width=width),
     ]
     for frequency in sorted({round(row.frequency_radps, 2) for row in rows}):
-        own = [row for row in rows if round(row.frequency_radps, 2) == frequency]
+        at_frequency = [row for row in rows if round(row.frequency_radps, 2) == frequency]
         series.append(
             ForceSeries(
                 label=f"{frequency:g} rad/s",
-                x=[abs(row.amplitude) for row in own],
-                value=[row.values[force + letter] for row in own],
-                half_width=[_NORMAL * row.standard_errors[force + letter] for row in own],
+                x=[abs(row.amplitude) for row in at_frequency],
+                value=[row.values[force + letter] for row in at_frequency],
+                half_width=[_NORMAL * row.standard_errors[force + letter] for row in at_frequency],
             )
         )
     title = f"{force}{letter} of single runs by (4.4) against the amplitude"
@@ -206,15 +206,15 @@ def _velocity(run: ReducedRun) -> Array:
 
 
 def _loop(reduction: Reduction, run: ReducedRun) -> ForceLoop:
-    own: Mapping[str, Array] = rigid_body_force(reduction.campaign, run.motion)
+    inertia: Mapping[str, Array] = rigid_body_force(reduction.campaign, run.motion)
     kept = run.motion.kept
     forces: dict[str, Sequence[float] | Array] = {}
     fitted: dict[str, Sequence[float] | Array] = {}
     one_period = slice(0, len(run.motion.time_s) // run.motion.periods + 1)
     for force in "YN":
         fit = run.fits[force]
-        forces[force] = run.run.force(force)[kept] + own[force]
-        fitted[force] = (run.basis @ fit.coefficients + own[force])[one_period]
+        forces[force] = run.run.force(force)[kept] + inertia[force]
+        fitted[force] = (run.basis @ fit.coefficients + inertia[force])[one_period]
     return ForceLoop(
         label=run.run.name,
         motion=_velocity(run),

@@ -142,7 +142,7 @@ def extent(values: Array) -> tuple[float, float]:
     return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
 
 
-def axis_above(title: str, **more: Any) -> alt.Axis:
+def axis_above(title: str, **options: Any) -> alt.Axis:
     """A vertical axis whose title stands level above it: read without turning the head."""
     return alt.Axis(
         title=title,
@@ -152,7 +152,7 @@ def axis_above(title: str, **more: Any) -> alt.Axis:
         titleBaseline="bottom",
         titleX=0,
         titleY=-6,
-        **more,
+        **options,
     )
 
 

@@ -71,10 +71,10 @@ def _scientific(value: float, digits: int) -> str:
 def _grouped(text: str) -> str:
     if not text.strip("-0."):
         text = text.lstrip("-")  # -0.00 is 0.00
-    whole, point, rest = text.partition(".")
+    whole, point, decimals = text.partition(".")
     if len(whole.lstrip("-")) > 4:
         whole = f"{int(whole):,}".replace(",", _THIN_SPACE)
-    return _signed(f"{whole}{point}{rest}")
+    return _signed(f"{whole}{point}{decimals}")
 
 
 def _signed(text: str) -> str:

@@ -157,8 +157,8 @@ def render_page(page: Page) -> str:
         figures=[(figure, _shown(figure.value)) for figure in page.figures],
         sections=sections,
         version=__version__,
-        style=Markup(beside("kit/page.css")),
-        script=Markup(beside("kit/page.js")),
+        style=Markup(resource_text("kit/page.css")),
+        script=Markup(resource_text("kit/page.js")),
         library=Markup(_vega()) if specifications else None,
         drawings=json_in_html({"light": LIGHT, "dark": DARK, "locale": LOCALE, "charts": specifications}),
     )
@@ -266,8 +266,8 @@ def json_in_html(value: object) -> Markup:
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
 
 
-def beside(name: str) -> str:
-    """Text of a file that lies next to this one."""
+def resource_text(name: str) -> str:
+    """Return the text of a file of the package ``tank2sim.report``."""
     return importlib.resources.files("tank2sim.report").joinpath(name).read_text(encoding="utf-8")
 
 

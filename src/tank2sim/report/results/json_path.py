@@ -46,7 +46,7 @@ def _watched(value: Json, path: str, place: _Place) -> Json:
     if isinstance(value, dict):
         return _Watched(value, path, place)
     if isinstance(value, list) and value and isinstance(value[0], dict | list):
-        return [_watched(one, f"{path}[{number}]", place) for number, one in enumerate(value)]
+        return [_watched(item, f"{path}[{number}]", place) for number, item in enumerate(value)]
     return value
 
 
