@@ -297,7 +297,7 @@ def find_gap(
     card : Ship, Card, str or path
         The ship as it is known (an ``abkowitz`` card).
     trials, holdout : path or sequence of paths
-        Trials that name the effect, and trials that only prove it; a folder stands for the trials in it.
+        Trials that name the effect, and trials that only prove it; a folder means the trials in it.
     effects, without : sequence of str
         Look for these alone; do not look for these. By default the whole library.
     max_effects : int

@@ -145,6 +145,7 @@ class ReduceKeys(_Keys):
     oscillations: list[dict[str, Any]]
     third_order: list[dict[str, Any]]
     runs: list[dict[str, Any]]
+    plots: dict[str, dict[str, Any]]
     not_used: dict[str, Any]
     faults: list[Any]
     repeats: dict[str, Any]
@@ -483,7 +484,7 @@ def json_schema(command: str) -> dict[str, Any]:
     Raises
     ------
     KeyError
-        There is no schema of this command.
+        The command has no schema.
 
     Examples
     --------

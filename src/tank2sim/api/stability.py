@@ -53,7 +53,7 @@ class StabilityResult(PagedResult):
 
     @property
     def stable(self) -> bool:
-        """True if the ship holds a straight course with the rudder fixed: no eigenvalue grows."""
+        """True if the ship holds a straight course with the rudder fixed: no eigenvalue has a positive real part."""
         return self.study.stability.stable
 
     @property
@@ -118,7 +118,7 @@ class StabilityResult(PagedResult):
             _rounded([["1/s and s", *vars(found.nomoto).values()], ["prime", *vars(found.nomoto_prime).values()]]),
         )
         influences = ResultTable(
-            "What moves C' most",
+            "Largest influences on C'",
             ("coefficient", "C' for 10 % more (%)", "change to neutral (%)"),
             _rounded(
                 [influence.short_name, influence.percent, influence.neutral_percent]
@@ -186,8 +186,8 @@ def _margin_text(study: StabilityStudy) -> str:
     found, margin = study.stability, study.margin
     if not found.criterion_decides:
         return (
-            f"a mode grows at {found.growth_per_s:.3g} 1/s, which C' = {found.criterion:.4g} does not see, so there "
-            "is no margin"
+            f"a mode grows at {found.growth_per_s:.3g} 1/s, which C' = {found.criterion:.4g} does not show, so the "
+            "margin is not defined"
         )
     return f"C' = {found.criterion:.4g}, margin {margin.percent:.3g} %, levers {margin.lever:.3g} L apart"
 

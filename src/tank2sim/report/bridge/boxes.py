@@ -1,6 +1,6 @@
-"""What stands on the pilot card and the wheelhouse poster: boxes of labelled values, after IMO A.601(15).
+"""Content of the pilot card and the wheelhouse poster: boxes of labelled values, after IMO A.601(15).
 
-A value that the card does not tell is None: the page then has a line to be filled in by hand. A figure whose manoeuvre
+A value that the card does not state is None: the page then has a line to be filled in by hand. A figure whose manoeuvre
 leaves the card's range is OUTSIDE, and not printed: on a bridge a wrong number is worse than a blank.
 """
 
@@ -26,7 +26,7 @@ ORDERS_ASTERN = ("Dead slow astern", "Slow astern", "Half astern", "Full astern"
 
 
 class Blank(Enum):
-    """What stands in place of a value."""
+    """The mark in place of a value."""
 
     OUTSIDE = "outside the range of the card"
 

@@ -121,7 +121,7 @@ class _Labels:
     taken: list[_Block]
 
     def place(self, at: tuple[float, float], texts: Sequence[str], style: str = "word") -> list[Word]:
-        """The lines of a label near a point; none where there is no room, for the table has the numbers."""
+        """The lines of a label near a point; none without room, for the table has the numbers."""
         width, height = _CHARACTER_MM * max(map(len, texts)), _LINE_MM * len(texts)
         best: tuple[float, _Block] | None = None
         for distance in _OFFSETS_MM:

@@ -61,7 +61,7 @@ class Panel:
 def poster_page(bridge: Bridge, ballast: Bridge | None = None) -> str:
     """The wheelhouse poster; with `ballast` the first card is the loaded condition.
 
-    What the cards do not tell is left blank, and marked as a blank.
+    Values that the cards do not state are left blank, and marked as blanks.
     """
     left_column = (
         boxes.draughts(bridge, ballast),
@@ -159,14 +159,14 @@ def _circles_title(bridge: Bridge) -> str:
     gear = bridge.card.steering_gear
     if gear and gear.max_angle_rad:
         return "Turning circles at maximum rudder angle"
-    return f"Turning circles at {bridge.rudder_deg:.3g}° rudder: the card tells no maximum angle"
+    return f"Turning circles at {bridge.rudder_deg:.3g}° rudder: the card states no maximum angle"
 
 
 def _notices(*bridges: Bridge | None) -> list[str]:
-    """As many as one sheet has room for: the command tells them all."""
+    """As many notices as a sheet has room for; the command prints all."""
     texts = list(dict.fromkeys(_cut(text, _NOTICE) for bridge in bridges if bridge for text in bridge.notices))
     omitted = len(texts) - _NOTICES
-    return texts if omitted <= 0 else [*texts[:_NOTICES], f"and {omitted} more, which the command tells"]
+    return texts if omitted <= 0 else [*texts[:_NOTICES], f"and {omitted} more, which the command prints"]
 
 
 def _cut(text: str, length: int) -> str:

@@ -204,7 +204,7 @@ def harmonic_chart(
     Parameters
     ----------
     runs : sequence of Harmonics
-        In the order in which they stand.
+        In their order in the chart.
     up : str
         Title of the force with its unit.
     title : str
@@ -242,7 +242,7 @@ def residual_chart(
     Parameters
     ----------
     residuals : sequence of Residual
-        Runs stand in the order of their first appearance.
+        Runs are in the order of their first appearance.
     title : str
         Of the chart.
     width_px, height_px : int

@@ -30,8 +30,8 @@ MOST_RIVALS = 12
 NORMAL = 1.959964
 """Half a 95 % interval in standard errors."""
 
-TELLS_LITTLE = 10.0
-"""A trial whose standard error is this many times the smallest tells so little that its bar may leave the picture."""
+UNINFORMATIVE = 10.0
+"""Standard error over the smallest from which the bar of a trial may leave the picture."""
 
 STATE_UNITS = {"rudder": "rad", "drift": "rad", "yaw rate": "rad/s", "speed": "m/s", "heading": "rad"}
 _STATE_WORDS = {"rudder": "rudder angle", "drift": "drift angle"}
@@ -283,7 +283,7 @@ def _agreement_panel(
     band = NORMAL * in_file_units(parameter, whole.standard_errors.get(parameter, 0.0))[1] if whole else 0.0
     messages = [row for row in rows if row["low"] is not None and row["high"] is not None]
     least = min((row["high"] - row["low"] for row in messages), default=0.0)
-    telling = [row for row in messages if row["high"] - row["low"] <= TELLS_LITTLE * least] or messages
+    telling = [row for row in messages if row["high"] - row["low"] <= UNINFORMATIVE * least] or messages
     ends = [row[key] for row in telling for key in ("low", "high")]
     ends += [] if middle is None else [middle - band, middle + band]
     low, high = extent(np.array(ends, dtype=float))

@@ -26,7 +26,7 @@ _BEFORE, _AFTER = "card as given", "card found"
 
 
 def fleet_page(fleet: FleetTold) -> Page:
-    """The page; it stands in the folder in which each ship has one of its own."""
+    """Return the page, for the folder in which each ship has a page of its own."""
     found = [ship for ship in fleet.ships if not ship.fault]
     sections = []
     if found:

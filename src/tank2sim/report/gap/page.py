@@ -1,4 +1,4 @@
-"""The page of a gap: what the model lacks, how sure that is, what it changes, and which test would tell more."""
+"""The page of a gap: the missing effect, its probability, its consequences, and the next test."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def gap_charts(gap: Gap) -> dict[str, alt.TopLevelMixin]:
             for sheet, chart in enumerate(gap_histories(gap, held_out=held, title=f"Motions, trials {_ON[word]}"))
         },
         "agreement": agreement_chart(gap, title="What each trial alone would have"),
-        "expected": expected_chart(test, title="What other manoeuvres would tell") if test else None,
+        "expected": expected_chart(test, title="Information of other manoeuvres") if test else None,
     }
     return {stem: chart for stem, chart in made.items() if chart is not None}
 
@@ -129,10 +129,10 @@ _BEFORE_AND_AFTER = (
     "mean square of simulated less measured, in standard deviations of the measurement noise: 1 is the noise floor, "
     "which no model gets below but by chance. Trials held out took no part in naming the effect."
 )
-_UNCHANGED = " Nothing was added to the card: there is no after."
+_UNCHANGED = " Nothing was added to the card, so that no model after it is shown."
 _BLACK_BOX = (
-    " Beside it stands a linear black box: the card with as many of its linear coefficients refitted as the effect has "
-    "parameters, whatever the cause."
+    " The chart also shows a linear black box: the card with as many of its linear coefficients refitted as the effect "
+    "has parameters, whatever the cause."
 )
 _FIGURES = (
     "Advance, transfer, diameters and overshoots are of turns and zigzags simulated in closed loop, the others of the "
@@ -173,7 +173,7 @@ _CAPTIONS = {
     "signal": f"{_MEANS} What is constant goes with every state.",
     "force": f"The force that the given card needs in addition to follow the measurements. {_MEANS}",
     "agreement": "Points: each trial's own estimate; bars: 95 % intervals. Grey: all fitting trials together. Trials "
-    "that tell little may leave the picture.",
+    "that determine little may leave the picture.",
     "expected": "The larger, the clearer the manoeuvre would decide; the difference is beyond what uncertain "
     "parameters can make up for.",
 }
@@ -228,7 +228,7 @@ def _candidates(gap: Gap) -> list[PageTable]:
 
 
 def _explanations(gap: Gap) -> list[PageTable]:
-    """What each effect does that is no more than possible."""
+    """The consequences of each effect that is only possible."""
     named = [effect.name for effect in gap.effects] if gap.verdict == AMBIGUOUS else []
     possible = dict.fromkeys([*named, *(name for alternative in gap.alternatives for name in alternative)])
     rows: list[list[Cell]] = [
@@ -285,7 +285,7 @@ def _cell(misfit: float | None) -> float | None:
 
 def _place_text(gap: Gap) -> str:
     if not gap.where:
-        return "No part of any trial stands out of the noise. The largest misfits are shown all the same."
+        return "No part of any trial exceeds the noise. The largest misfits are shown all the same."
     first, name = gap.where[0], signal_display_name(gap.where[0].signal)
     return (
         f"The largest part of the misfit beyond the noise, {100 * first.share:.0f} %, arises in {name.words} "
@@ -299,7 +299,7 @@ def _acting_text(gap: Gap) -> str:
     found = acting(gap)
     without = _NO_FORCE if earth_bound(gap) and missing_force_intervals(gap) is None else ""
     if not found:
-        none = "the records do not contradict each other" if earth_bound(gap) else "no force stands out of its error"
+        none = "the records do not contradict each other" if earth_bound(gap) else "no force exceeds its error"
         return f"At what moments the cause acts cannot be said: {none}." + without
     first = found[0]
     text = (
@@ -404,11 +404,11 @@ def _could_hide(gap: Gap) -> PageTable | None:
 def _next_test(gap: Gap) -> str:
     test = gap.next_test
     if test is None:
-        return "" if gap.verdict in (MISSING, NO_EFFECT_MISSING) else "No manoeuvre was found that would tell more."
-    # The command stands alone: in a line with others it is broken at its hyphens.
+        return "" if gap.verdict in (MISSING, NO_EFFECT_MISSING) else "No manoeuvre was found that would decide more."
+    # The command has a line of its own: among other words it is broken at its hyphens.
     command = f"tank2sim simulate improved.toml --manoeuvre {test.manoeuvre}"
     why = f"{test.why[0].upper()}{test.why[1:].rstrip('.')}."
-    return f"{why}\n\nIts orders stand in {NEXT_TEST_FILE}. To see it beforehand:\n\n{command}"
+    return f"{why}\n\nIts orders are in {NEXT_TEST_FILE}. To see it beforehand:\n\n{command}"
 
 
 def _noise(gap: Gap) -> PageTable:

@@ -78,7 +78,7 @@ def _found(gap: Gap) -> str:
             [*([tuple(effect.name for effect in gap.effects)] if gap.effects else []), *gap.alternatives]
         )
         names = ", or ".join(" with ".join(map(effect_in_words, candidate)) for candidate in candidates)
-        return f"Something is missing, but these data cannot tell which of several effects it is: {names}."
+        return f"Something is missing, but these data do not distinguish several effects: {names}."
     if gap.verdict == NO_EFFECT_MISSING:
         good = after is None or after <= GOOD
         remainder = "" if good else ", which is more than noise, but no effect explains the rest better than none"

@@ -161,7 +161,7 @@ def _histories(pair: BeforeAfter, signals: Mapping[str, tuple[str, str]]) -> tup
 
 
 def _whole(rows: Sequence[ChartRecord], field: str) -> alt.Scale:
-    # Told, that it stays when the switch takes a line away.
+    # Given explicitly, so that it stays when the switch takes a line away.
     values = np.array([row[field] for row in rows if row.get(field) is not None], dtype=float)
     return alt.Scale(domain=list(extent(values)), nice=True, zero=False)
 
@@ -227,7 +227,7 @@ def _window_map(results: Sequence[Following], signals: Sequence[str], title: str
 def figure_chart(
     sets: Mapping[str, tuple[Sequence[FigureComparison], Sequence[FigureComparison]]], *, title: str = ""
 ) -> alt.VConcatChart | None:
-    """Figures of turns and zigzags, predicted against measured, and their errors; None if there is no figure.
+    """Figures of turns and zigzags, predicted against measured, and their errors; None without a figure.
 
     Parameters
     ----------
@@ -352,12 +352,12 @@ def _simulated_part(pair: BeforeAfter, time: Array) -> slice:
 
 
 def _thinned(label: str, columns: Sequence[Array]) -> Indices:
-    # Several signals stand on one set of samples: evenly spread ones, and the extremes of each.
+    # Several signals share one set of samples: evenly spread ones, and the extremes of each.
     return thin_points(columns, MEASURED_SAMPLES if label == MEASURED else MODEL_SAMPLES)
 
 
 def _marks(position: Position, tooltip: Sequence[alt.Tooltip]) -> list[alt.Chart]:
-    # The data stand once for all panels of a trial: the series determines what is a line and what a point.
+    # All panels of a trial share their data: the series determines what is a line and what a point.
     # Encodings are handed over as dictionaries: Altair copies its own objects, with all they leave open, at every
     # level.
     place = {name: channel.to_dict() for name, channel in position.items()}
@@ -386,7 +386,7 @@ def _grid(
 
 
 def _with_rows(chart: alt.ConcatChart, rows: Mapping[str, list[ChartRecord]]) -> alt.ConcatChart:
-    # Data by name, put in at last: Altair copies those that stand in a panel whenever the panel is put into another.
+    # Data by name, put in at last: Altair copies those of a panel whenever the panel is put into another.
     chart["datasets"] = dict(rows)
     return chart
 

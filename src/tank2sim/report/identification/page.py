@@ -81,7 +81,7 @@ def identification_charts(
     )
     charts["parameters"] = parameter_chart(parameters, title="Parameters: estimate and prior with 95 % intervals")
     charts["correlation"] = correlation_chart(known, title="Correlation of the parameters, by the trials alone")
-    charts["singular_values"] = singular_value_chart(known, title="What the trials tell: singular values")
+    charts["singular_values"] = singular_value_chart(known, title="Information of the trials: singular values")
     return charts
 
 
@@ -158,8 +158,8 @@ _CAPTIONS = {
     "histories": "Turns and zigzags in closed loop, others with the recorded rudder. Drift angle positive when the "
     "water comes from port.",
     "parameters": "In standard errors of the prior, as the fit took it.",
-    "singular": "Sensitivities of all that was measured, in units of the prior. Below the red line the prior tells "
-    "more than the trials.",
+    "singular": "Sensitivities of all that was measured, in units of the prior. Below the red line the prior "
+    "determines more than the trials.",
 }
 
 

@@ -1,4 +1,4 @@
-"""Charts of estimated parameters: next to what was known of them, how they hang together, what the trials tell."""
+"""Charts of estimated parameters: values next to the prior, correlations, information of the trials."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def parameter_chart(parameters: Parameters, *, title: str = "") -> alt.HConcatCh
         alt.Tooltip("name:N", title="parameter"),
         alt.Tooltip("own:N", title="found"),
         alt.Tooltip("known:N", title="before"),
-        alt.Tooltip("told:N", title="from trials"),
+        alt.Tooltip("share_text:N", title="from trials"),
     ]
     look = series_look(["estimate", "prior"], as_points=["estimate", "prior"])
     bands = [row | {"run": "prior", "v": 0.0, "low": -_NORMAL, "high": _NORMAL} for row in rows]
@@ -76,7 +76,7 @@ def _parameter_row(parameters: Parameters, place: int) -> ChartRecord:
         "share": plain(100 * parameters.share[place]),
         "own": f"{parameters.values[place]:.5g} ± {parameters.errors[place]:.2g}",
         "known": f"{parameters.prior[place]:.5g} ± {unit:.2g}",
-        "told": f"{100 * parameters.share[place]:.0f} %",
+        "share_text": f"{100 * parameters.share[place]:.0f} %",
     }
 
 
@@ -116,11 +116,13 @@ def correlation_chart(known: Identifiability, *, title: str = "") -> alt.LayerCh
 
 
 def singular_value_chart(known: Identifiability, *, title: str = "") -> alt.LayerChart:
-    """Singular values of the sensitivities in units of the prior, falling; below 1 the prior tells more."""
+    """Singular values of the sensitivities in units of the prior, falling; below 1 the prior determines more."""
     rows = [
         {"order": place + 1, "v": plain(float(value))} for place, value in enumerate(known.singular_values) if value > 0
     ]
-    x = alt.X("order:Q", title="direction, by what the trials tell of it (-)", scale=alt.Scale(nice=False, padding=10))
+    x = alt.X(
+        "order:Q", title="direction, by the information of the trials (-)", scale=alt.Scale(nice=False, padding=10)
+    )
     x = x.axis(format="d", tickMinStep=1)
     y = alt.Y("v:Q", title="singular value (-)", scale=alt.Scale(type="log"), axis=alt.Axis(format="~g"))
     tooltip = [alt.Tooltip("order:Q", title="direction"), alt.Tooltip("v:Q", title="singular value", format=NUMBER)]

@@ -1,4 +1,4 @@
-"""What stands in the JSON of any result: words and units of its keys; tables, series and matrices in it."""
+"""The JSON of any result: words and units of its keys; tables, series and matrices in it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Json = Any
 """What JSON holds: numbers, text, truth values, None, lists and objects of these."""
 
 LONGEST_LIST = 12
-"""Numbers of a list that stand in one cell; longer ones are series. Project choice."""
+"""Largest number of items of a list in one cell; longer lists are series. Project choice."""
 
 _MOST_ROWS = 400
 """Rows of a table; what is beyond is left to the JSON. Project choice."""
@@ -111,7 +111,7 @@ def is_number_value(value: Json) -> TypeGuard[float]:
 
 
 def is_scalar(value: Json) -> bool:
-    """Whether this stands in one cell: a scalar, or a short list of them."""
+    """Return whether a value fits one cell: a scalar, or a short list of scalars."""
     if isinstance(value, list):
         return len(value) <= LONGEST_LIST and not any(isinstance(item, list | Mapping) for item in value)
     return not isinstance(value, Mapping)
@@ -137,7 +137,7 @@ def is_objects(value: Json) -> bool:
 
 
 def scalars(value: Mapping[str, Json]) -> dict[str, Json]:
-    """What of an object stands in cells."""
+    """Return the items of an object that fit one cell."""
     return {key: item for key, item in value.items() if is_scalar(item)}
 
 

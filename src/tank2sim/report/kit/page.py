@@ -1,6 +1,6 @@
 """One self-contained HTML page of a result: key figures, tables and charts, for the screen and for paper.
 
-The page fetches nothing: style, script and data stand in it, and its content security policy forbids the rest. The
+The page fetches nothing: style, script and data are in it, and its content security policy forbids everything else. The
 same content gives the same bytes.
 """
 
@@ -260,7 +260,7 @@ def _paragraphs(text: str) -> Iterable[str]:
 
 
 def json_in_html(value: object) -> Markup:
-    """JSON of a value, to stand in a script element of a page."""
+    """Return the JSON of a value, for a script element of a page."""
     # Inside <script> the reader of HTML looks for "</script" and "<!--" even within strings of JSON.
     text = json.dumps(value, allow_nan=False, sort_keys=True, separators=(",", ":"))
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))

@@ -1,4 +1,4 @@
-"""Tracks and time histories of the JSON of a result: what stands under ``histories``, by the names of the trial format.
+"""Tracks and time histories of the JSON of a result: ``histories``, by the names of the trial format.
 
 One table of columns is ``{"t_s": [...], "psi_deg": [...], ...}``; angles may be in degrees or radians.
 """

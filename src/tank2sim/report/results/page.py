@@ -58,7 +58,7 @@ def result_page(result: Json, source: str) -> Page:
     Parameters
     ----------
     result : dict
-        What stands in the file.
+        Content of the file.
     source : str
         Name of the file, for the head of the page and for messages.
 
@@ -113,7 +113,7 @@ def _section(key: str, value: Json) -> PageSection:
     title = words(key)[0]
     heading = "IMO criteria" if key == "imo" else title[:1].upper() + title[1:]
     _fill(parts, heading, key, value, 0)
-    notes = [f"{parts.left_out} longer or deeper parts stand in the JSON alone."] if parts.left_out else []
+    notes = [f"{parts.left_out} longer or deeper parts are in the JSON only."] if parts.left_out else []
     tables = [table for table in parts.tables if table.rows and [column.title for column in table.columns] != ["name"]]
     return PageSection(heading=heading, tables=tables, charts=parts.charts, notes=notes)
 
@@ -164,7 +164,7 @@ def _fill_object(parts: _Parts, caption: str, key: str, value: Mapping[str, Json
 
 
 def _deeper(parts: _Parts, caption: str, values: Mapping[str, Json], depth: int) -> None:
-    """What stands under names: objects of one kind in one table, all else one by one."""
+    """Add named values: objects of one kind in one table, all others one by one."""
     if alike(values):
         _fill_named(parts, caption, values, depth)
     else:

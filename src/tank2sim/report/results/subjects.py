@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from tank2sim.report.autopilot.page import autopilot_page
+from tank2sim.report.captive.page import reduction_page
 from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.glide.page import glide_page
@@ -105,6 +106,11 @@ _PAGES: Mapping[str, _Page] = {
         | {"imo": list, "replays": list, "notices": list},
     ),
     "Signals": _Page(signals_page, {"trials": list}),
+    "Captive tests": _Page(
+        reduction_page,
+        {"plots": dict, "leave_one_out": dict, "selection": dict, "prediction_errors": dict, "model": dict}
+        | {"runs": list, "not_used": object, "warnings": list},
+    ),
     "Fleet": _Page(fleet_page_of_json, {"fleet": str, "ships": list}),
     "Influence coefficients": _Page(
         influence_page, {"figures": dict, "parameters": dict, "influence_percent": dict, "notices": list}

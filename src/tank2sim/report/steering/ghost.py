@@ -15,7 +15,7 @@ from tank2sim.records.trials import Trial
 from tank2sim.units import KNOT_MPS
 
 APPROACH = 20
-"""The approach is taken as the first of so many parts of a track (project choice) where a trial tells no speed or
+"""The approach is taken as the first of so many parts of a track (project choice) where a trial states no speed or
 heading."""
 
 _START = (("x", "m"), ("y", "m"), ("v", "mps"), ("r", "radps"))

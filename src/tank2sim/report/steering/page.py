@@ -57,7 +57,7 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
         A ship; for a ghost with a measured rudder angle that of
         :func:`tank2sim.report.steering.ship.ship_following_angle`.
     library : str or None
-        Of :func:`tank2sim.report.steering.ship.ship_in_page`; None where it cannot be compiled, which the page tells
+        Of :func:`tank2sim.report.steering.ship.ship_in_page`; None where it cannot be compiled, which the page states
         before anything else.
     ghost : Ghost, optional
         A measured trial.
