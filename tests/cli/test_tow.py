@@ -21,7 +21,7 @@ def test_tow_by_tow_models_and_page(tmp_path) -> None:
     assert found["methods"]["output_error"]["estimates"]["start_delay_s"] == pytest.approx(2.13, abs=0.01)
     assert len(found["models"]) == 8 and found["warnings"]
     page = (tmp_path / "t.html").read_text()
-    assert "What these tows can tell" in page and "Drag coefficient" in page
+    assert "What these tows determine" in page and "Drag coefficient" in page
     assert "length_m = 3.8" in (tmp_path / "late.toml").read_text()
 
 

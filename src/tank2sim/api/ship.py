@@ -297,12 +297,12 @@ class Ship:
         InputError
             The ship holds no straight course, a signal is unknown, or a state that is left out comes to no rest.
         """
-        from tank2sim.analysis.linearisation import settled_states, state_space, straight_course
+        from tank2sim.analysis.linearisation import following_states, state_space, straight_course
 
         model = self.model
         point = straight_course(model, speed_mps)
         kept, given, shown = (None if names is None else list(names) for names in (states, inputs, outputs))
-        settled = () if kept is None else settled_states(model, point, kept, given or ())
+        settled = () if kept is None else following_states(model, point, kept, given or ())
         return state_space(model, point, states=kept, inputs=given, outputs=shown, settled=settled)
 
     def influence(
