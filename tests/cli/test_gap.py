@@ -270,7 +270,7 @@ def test_no_input_is_overwritten(folder: Path, tmp_path: Path, finding) -> None:
     refused(result, "improved.toml", "would be overwritten")
     assert (tmp_path / "improved.toml").read_text() == card and not (tmp_path / "gap.json").exists()
     result = tank2sim("gap", "mariner", "turn20.csv", "-o", "out", "--json", "no/g.json", cwd=tmp_path)
-    refused(result, "no/g.json", "no such folder")
+    refused(result, "no/g.json", "folder does not exist")
     assert not calls and not (tmp_path / "out").exists()
 
 

@@ -227,7 +227,7 @@ def test_a_folder_that_holds_a_card_is_one_ship(ships: Path, tmp_path: Path, fin
         (["ships/alpha/holdout", "-o", "out"], ["holds no ship"]),
         (["ships", "-o", "out", "--effects", "curent"], ["did you mean current"]),
         (["ships", "-o", "out", "--executor", "threads"], ["is not an executor"]),
-        (["ships", "-o", "out", "--json", "no/f.json"], ["no/f.json", "no such folder"]),
+        (["ships", "-o", "out", "--json", "no/f.json"], ["no/f.json", "folder does not exist"]),
         (["ships", "-o", "file"], ["file", "not a folder"]),
     ],
 )

@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from tank2sim.identification.captive.findings import reduction_findings
-from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
-from tank2sim.identification.captive.result_card import card_contents
-from tank2sim.records.campaigns import read_campaign
-from tank2sim.report.captive.page import reduction_page
-from tank2sim.report.captive.results import reduction_charts
+import tank2sim as t2s
 from tank2sim.report.kit.page import render_page
 
 
 @pytest.mark.slow
-def test_every_derivative_and_chart_of_a_campaign_is_on_its_page(data) -> None:
-    reduction = reduce_campaign(read_campaign(data / "data" / "pmm_synthetic_11" / "campaign.toml"), ReductionOptions())
-    card, charts = card_contents(reduction, None), reduction_charts(reduction)
-    page = reduction_page(reduction, card, reduction_findings(reduction), charts)
+def test_every_derivative_and_chart_of_a_campaign_is_on_its_page(data, tmp_path) -> None:
+    found = t2s.reduce(data / "data" / "pmm_synthetic_11" / "campaign.toml")
+    card, charts, page = found.contents, found.charts(), found.layout()
     (table,) = page.sections[0].tables
     shown = {row[0]: (row[1], row[2]) for row in table.rows}
     assert shown == {name: (1e5 * e.value, 1e5 * e.standard_error) for name, e in card.entries.items()}
@@ -26,3 +20,5 @@ def test_every_derivative_and_chart_of_a_campaign_is_on_its_page(data) -> None:
     assert against and all("shaded: its 95 % band" in one.caption for one in against)
     text = render_page(page)
     assert "Yvdot" in text and text.count("<script src") == 0
+    found.to_json(tmp_path / "reduced.json")
+    assert t2s.make_report(tmp_path / "reduced.json").page() == text

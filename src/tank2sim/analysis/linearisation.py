@@ -13,7 +13,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.straight_course import OperatingPoint, straight_course
 
-__all__ = ["OperatingPoint", "jacobians", "settled_states", "signal_name", "state_space", "straight_course"]
+__all__ = ["OperatingPoint", "following_states", "jacobians", "signal_name", "state_space", "straight_course"]
 
 
 def jacobians(
@@ -84,7 +84,7 @@ def state_space(
     )
 
 
-def settled_states(
+def following_states(
     model: Model, point: OperatingPoint, states: Sequence[str], inputs: Sequence[str]
 ) -> tuple[str, ...]:
     """Return the states left out of `states` and `inputs` that the rates of `states` depend on, directly or not.

@@ -125,7 +125,7 @@ class AutopilotResult(PagedResult):
         Raises
         ------
         InputError
-            There is no compiler.
+            No compiler is found.
         """
         from tank2sim.fmu.autopilot import make_autopilot_fmu, verify_together  # takes most of a second to import
 
@@ -147,7 +147,7 @@ class AutopilotResult(PagedResult):
         Raises
         ------
         InputError
-            There is no compiler, or the file cannot be written.
+            No compiler is found, or the file cannot be written.
         """
         found = self.make_fmu(path, fmi=fmi, verify=verify)
         write_together(found.files, inputs=[Path(self.ship.card.source)])

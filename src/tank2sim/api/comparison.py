@@ -109,11 +109,11 @@ class ComparisonResult(Result):
         found, lines = self.comparison, []
         for place, label in self._others():
             rms, same = found.rms(place), found.same(place)
-            more = "" if rms is None else f", rms {rms:.3g} (1 by chance)"
-            more += f"; {same} more are the reference's own numbers" if same else ""
+            rms_text = "" if rms is None else f", rms {rms:.3g} (1 by chance)"
+            rms_text += f"; {same} more are the reference's own numbers" if same else ""
             lines.append(
                 f"{label} against {self.labels[0]}: of {len(found.in_errors(place))} coefficients "
-                f"{found.beyond(place)} differ by more than {BEYOND_STANDARD_ERRORS:g} standard errors{more}"
+                f"{found.beyond(place)} differ by more than {BEYOND_STANDARD_ERRORS:g} standard errors{rms_text}"
             )
         return tuple(lines)
 

@@ -70,7 +70,7 @@ def run_demo(folder: str | Path = "demo", *, report: Callable[[str], None] = lam
     Raises
     ------
     InputError
-        There is no C compiler, or a file cannot be written.
+        No C compiler is found, or a file cannot be written.
     """
     require_compiler("the demo")
     written = writable_folder(Path(folder))

@@ -81,8 +81,8 @@ class GapResult(Result):
         rows = []
         for effect in self.gap.effects:
             for name, value in effect.parameters.items():
-                own, size = estimate_in_file(name, value)
-                rows.append((effect.name, own, size, _standard_error(effect, name), effect.confidence))
+                parameter, size = estimate_in_file(name, value)
+                rows.append((effect.name, parameter, size, _standard_error(effect, name), effect.confidence))
         return pd.DataFrame(rows, columns=["effect", "parameter", "value", "standard_error", "probability"])
 
     @property
@@ -148,10 +148,10 @@ class GapResult(Result):
         gap = self.gap
         columns = ("effect", "parameter", "value", "standard error", "unit")
         found = "What the best of the candidates would be" if gap.verdict == AMBIGUOUS else "What was found"
-        others = sizes_of_candidates(gap)
+        candidates = sizes_of_candidates(gap)
         tables = [
             ResultTable(title, columns, rows, wide=True)
-            for title, effects in ((found, gap.effects), ("What the others would be", others))
+            for title, effects in ((found, gap.effects), ("What the others would be", candidates))
             if (rows := [row for effect in effects for row in _parameter_rows(effect)])
         ]
         heads = ("trial", "set", "before", "after")
@@ -190,8 +190,8 @@ class GapResult(Result):
                     files[folder / CORRECTED / f"{trial.name}.csv"] = corrected
                 new = correct_sensor_faults(trial, self._found).notices[len(trial.notices) :]
                 notices += [f"{trial.path.name}: {text}" for text in new if text.startswith(REMAINING_FAULTS)]
-        own = sorted(path.relative_to(folder).as_posix() for path in (*files, folder / GAP))
-        files[folder / GAP] = self.to_json(files=own)
+        names = sorted(path.relative_to(folder).as_posix() for path in (*files, folder / GAP))
+        files[folder / GAP] = self.to_json(files=names)
         return files, notices
 
     def save(self, folder: str | Path) -> tuple[str, ...]:
@@ -229,13 +229,13 @@ class GapResult(Result):
             [
                 trial.name,
                 "held out" if trial.held_out else "fitted",
-                *(misfit_text(trial.misfit(which)) for which in ("before", "after")),
+                *(misfit_text(trial.misfit(model)) for model in ("before", "after")),
             ]
             for trial in gap.passed
             if measured_in(trial)
         ]
         for word, held in (("fitted", False), ("held out", True)):
-            before, after = (gap.misfit(which, held_out=held) for which in ("before", "after"))
+            before, after = (gap.misfit(model, held_out=held) for model in ("before", "after"))
             if before is not None and after is not None:
                 rows.append(["all", word, misfit_text(before), misfit_text(after)])
         return rows
@@ -261,9 +261,9 @@ def misfit_text(misfit: float) -> str:
 def _parameter_rows(effect: Named) -> list[list[object]]:
     rows: list[list[object]] = []
     for parameter, value in effect.parameters.items():
-        own, size = estimate_in_file(parameter, value)
+        key, size = estimate_in_file(parameter, value)
         error = _standard_error(effect, parameter)
-        words, unit = in_words(own)
+        words, unit = in_words(key)
         finite = math.isfinite(size), math.isfinite(error)
         rows.append(
             [effect.name, words, size if finite[0] else None, float(f"{error:.2g}") if finite[1] else None, unit or "-"]
@@ -297,7 +297,7 @@ def find_gap(
     card : Ship, Card, str or path
         The ship as it is known (an ``abkowitz`` card).
     trials, holdout : path or sequence of paths
-        Trials that name the effect, and trials that only prove it; a folder stands for the trials in it.
+        Trials that name the effect, and trials that only prove it; a folder means the trials in it.
     effects, without : sequence of str
         Look for these alone; do not look for these. By default the whole library.
     max_effects : int

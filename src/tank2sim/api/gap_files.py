@@ -1,4 +1,4 @@
-"""The files of a gap in a folder, and what becomes of those of an earlier run."""
+"""Files of a gap in a folder, and the removal of those of an earlier run."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ GapFiles = dict[Path, str | bytes]
 
 @contextmanager
 def folder_made(path: Path) -> Iterator[None]:
-    """A folder for outputs, made before the long work that fills it, and taken away again if that fails."""
+    """A folder for outputs, made before the long work that fills it, and removed if that fails."""
     made = not path.exists()
     writable_folder(path)
     try:
@@ -43,7 +43,7 @@ def folder_made(path: Path) -> Iterator[None]:
 
 
 def refuse_early(folder: Path, json_file: Path | None, inputs: Sequence[Path]) -> None:
-    """Refuse before the long work what would fail when files are written.
+    """Refuse, before the long work, files that could not be written.
 
     Parameters
     ----------
@@ -60,11 +60,11 @@ def refuse_early(folder: Path, json_file: Path | None, inputs: Sequence[Path]) -
                 remedy = "give another folder with -o"
                 raise InputError(folder / name, "", f"is an input ({path}), which would be overwritten", remedy)
     if json_file and not json_file.parent.is_dir():
-        raise InputError(json_file, "", "cannot be written: there is no such folder", "give one that exists")
+        raise InputError(json_file, "", "cannot be written: its folder does not exist", "give one that exists")
 
 
 def put(files: Mapping[Path, str | bytes], folder: Path, inputs: Sequence[Path]) -> list[str]:
-    """Write all files or none; report what became of those of an earlier run that have no successor.
+    """Write all files or none; return messages about files of an earlier run that this run does not replace.
 
     Parameters
     ----------
@@ -83,10 +83,10 @@ def put(files: Mapping[Path, str | bytes], folder: Path, inputs: Sequence[Path])
 
 
 def _of_earlier_run(folder: Path) -> set[Path]:
-    """What of orders, corrected trials and covariance an earlier run says in its ``gap.json`` that it wrote."""
+    """Orders, corrected trials and covariance that an earlier run lists in its ``gap.json``."""
     try:
-        told = json.loads((folder / GAP).read_text(encoding="utf-8"))
-        names = [*told.get("files", ()), (told.get("next_test") or {}).get("orders", "")]
+        earlier = json.loads((folder / GAP).read_text(encoding="utf-8"))
+        names = [*earlier.get("files", ()), (earlier.get("next_test") or {}).get("orders", "")]
         paths = [PurePosixPath(name) for name in names]
     except (OSError, ValueError, AttributeError, TypeError):
         return set()  # none, or another program's
@@ -95,7 +95,7 @@ def _of_earlier_run(folder: Path) -> set[Path]:
 
 
 def _tidied(folder: Path, earlier: set[Path], kept: set[Path]) -> list[str]:
-    """Take away what an earlier run wrote and this one has no successor of; tells of it, and of what is not known."""
+    """Remove files of an earlier run that this run does not replace; return messages, also about unknown files."""
     messages = []
     for path in (*(folder / name for name in SOMETIMES), *sorted((folder / CORRECTED).glob("*.csv"))):
         if path in kept or not path.exists():

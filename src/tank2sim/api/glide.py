@@ -182,15 +182,15 @@ def _printed_table(found: GlideStudy) -> ResultTable:
 
 def _unbalance_text(found: GlideStudy, glides: tuple[SteadyGlide, ...]) -> str:
     """The largest force that is left."""
-    left = max(abs(force) for glide in glides for force in force_residual(found.card, glide))
-    return f"up to {left:.2g} N" if left > _ROUNDING_N else "nothing"
+    residual = max(abs(force) for glide in glides for force in force_residual(found.card, glide))
+    return f"up to {residual:.2g} N" if residual > _ROUNDING_N else "nothing"
 
 
 def _row(glide: SteadyGlide) -> list[object]:
     angles = (math.degrees(angle) for angle in (glide.path_angle_rad, glide.incidence_rad, glide.pitch_rad))
     path, alpha, pitch = angles
-    others = (glide.speed_mps, glide.lift_coefficient, glide.drag_coefficient)
-    shown = [f"{path:.3f}", f"{alpha:.4f}", f"{pitch:.3f}", *(f"{value:.4f}" for value in others)]
+    coefficients = (glide.speed_mps, glide.lift_coefficient, glide.drag_coefficient)
+    shown = [f"{path:.3f}", f"{alpha:.4f}", f"{pitch:.3f}", *(f"{value:.4f}" for value in coefficients)]
     return [*shown, _radius_text(glide.turning_radius_m)]
 
 

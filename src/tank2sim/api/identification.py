@@ -102,12 +102,12 @@ class IdentificationResult(Result):
 
         found = self.identification
         rows = []
-        for word, before, now in (
+        for word, before, after in (
             ("fitted", found.before, found.fit),
             ("held out", found.before_holdout, found.holdout),
         ):
             earlier = {(figure.trial, figure.name): figure.predicted for figure in (before.figures if before else ())}
-            for figure in now.figures if now else ():
+            for figure in after.figures if after else ():
                 interval = figure.interval or (None, None)
                 known = earlier.get((figure.trial, figure.name))
                 rows.append((figure.trial, word, figure.name, figure.measured, known, figure.predicted, *interval))
@@ -156,7 +156,7 @@ class IdentificationResult(Result):
                     "Figures, simulated in closed loop from the measured start, with the rudder rate and lag of each "
                     "trial",
                     ("trial", "", "figure", "measured", "before", "now", "error", "95 %"),
-                    [[trial, word, ", ".join(in_words(str(name))), *rest] for trial, word, name, *rest in rows],
+                    [[trial, word, ", ".join(in_words(str(name))), *values] for trial, word, name, *values in rows],
                 )
             )
         return tuple(tables)
@@ -275,11 +275,11 @@ def _computing(
     options: IdentificationOptions, executor: str, workers: int | None, *, held: bool
 ) -> Iterator[Executor | None]:
     """For cross-validation and bootstrap; a cluster for the intervals of what is held out, too."""
-    here = check_executor(executor) == PROCESSES
-    if not here and not (options.structure == AUTO or options.bootstrap or (held and options.members)):
+    on_this_machine = check_executor(executor) == PROCESSES
+    if not on_this_machine and not (options.structure == AUTO or options.bootstrap or (held and options.members)):
         remedy = f"give --structure {AUTO}, --bootstrap N or --holdout TRIAL, too"
         raise InputError("--executor", "", "has nothing to do", remedy)
-    if here and options.structure != AUTO and not options.bootstrap:
+    if on_this_machine and options.structure != AUTO and not options.bootstrap:
         yield None
         return
     with executing(executor, workers) as pool:

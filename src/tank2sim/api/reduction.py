@@ -23,7 +23,13 @@ from tank2sim.identification.captive.result_card import (
     reduced_card_text,
     reynolds_ratio,
 )
-from tank2sim.identification.captive.tables import derivative_rows, prediction_rows, terms_left_out, terms_not_excited
+from tank2sim.identification.captive.tables import (
+    derivative_rows,
+    prediction_errors,
+    prediction_rows,
+    terms_left_out,
+    terms_not_excited,
+)
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, read_campaign
 
 if TYPE_CHECKING:
@@ -100,8 +106,8 @@ class ReductionResult(Result):
         rows: list[list[object]] = []
         for row in derivative_rows(self.reduction, self.contents):
             value, stepped = f"{row.value:.5g} ± {row.standard_error:.2g}", row.stepped
-            other = f"{stepped.value:.5g} ± {stepped.standard_error:.2g} ({stepped.found_in})" if stepped else "-"
-            rows.append([row.name, value, other, row.origin])
+            stepwise = f"{stepped.value:.5g} ± {stepped.standard_error:.2g} ({stepped.found_in})" if stepped else "-"
+            rows.append([row.name, value, stepwise, row.origin])
         name, count = self.reduction.campaign.model.name, len(self.reduction.runs)
         tables = [
             ResultTable(
@@ -112,7 +118,7 @@ class ReductionResult(Result):
         ]
         if left_out := [[choice.name, choice.reason, choice.explanation] for choice in terms_left_out(self.reduction)]:
             tables.append(ResultTable("Terms that the runs excite and that were left out", ("", "", "why"), left_out))
-        errors_by_type = prediction_rows(self.reduction)
+        errors_by_type = prediction_rows(prediction_errors(self.reduction))
         tables.append(
             ResultTable(
                 "Leave-one-out: root mean square error of each run predicted from the others, % of the range",
@@ -128,18 +134,9 @@ class ReductionResult(Result):
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
         """Force fits with bands, loops, harmonics and residuals, by file stem."""
-        from tank2sim.report.captive.results import reduction_charts
+        from tank2sim.report.captive.page import reduction_charts
 
-        return dict(reduction_charts(self.reduction))
-
-    def page(self) -> str:
-        """As :meth:`.Result.page`."""
-        from tank2sim.report.captive.page import reduction_page
-        from tank2sim.report.captive.results import reduction_charts
-        from tank2sim.report.kit.page import render_page
-
-        charts = reduction_charts(self.reduction)
-        return render_page(reduction_page(self.reduction, self.contents, self.notices, charts))
+        return dict(reduction_charts(self.to_dict()))
 
 
 def reduce(
@@ -209,7 +206,7 @@ def _ratio(campaign: Campaign, given: float | str | None) -> float | None:
     except ValueError:
         ratio = 0.0
     if not 1.0 <= ratio < 1e4:
-        raise InputError("--scale", "", f"{given} is no ratio of lengths", "give a number such as 46.4, or 'ship'")
+        raise InputError("--scale", "", f"{given} is not a ratio of lengths", "give a number such as 46.4, or 'ship'")
     return ratio
 
 

@@ -1,4 +1,4 @@
-"""What every result of the API can do: print itself, draw itself, and write itself as JSON, picture and page."""
+"""Base of the results of the API, which print, draw and write themselves as JSON, picture and page."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ class ResultTable:
 
         cells = [[cell_text(cell) for cell in row] for row in self.rows[:REPR_ROWS]]
         lines = [self.title, pd.DataFrame(cells, columns=list(self.columns)).to_string(index=False)]
-        left = len(self.rows) - REPR_ROWS
-        return "\n".join(lines + ([f"... {left} more rows in .tables"] if left > 0 else []))
+        omitted = len(self.rows) - REPR_ROWS
+        return "\n".join(lines + ([f"... {omitted} more rows in .tables"] if omitted > 0 else []))
 
 
 def cell_text(value: object) -> str:
@@ -81,13 +81,13 @@ def cell_text(value: object) -> str:
 
 
 class Result(ABC):
-    """What a call of the API returns; every command of the command line prints and writes one of these."""
+    """Result of a call of the API; every command of the command line prints and writes one."""
 
     command: ClassVar[str]
     """Command that gives the same result on the command line; its name is in :attr:`schema`."""
 
     notices: tuple[str, ...]
-    """What limits the result, one sentence each."""
+    """Limits of the result, one sentence each."""
 
     @abstractmethod
     def content(self) -> Mapping[str, object]:
@@ -144,7 +144,7 @@ class Result(ABC):
         InputError
             The file cannot be written.
         LookupError
-            There is no such chart.
+            The chart does not exist.
         """
         charts = self.charts()
         if not charts or (name is not None and name not in charts):

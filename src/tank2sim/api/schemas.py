@@ -22,21 +22,106 @@ FigureValues = dict[str, float | list[float] | None]
 """Manoeuvring figures by name with unit; null where the run was too short."""
 
 
-class _Keys(TypedDict):
-    """Base: no keys but those declared."""
+class _Part(TypedDict):
+    """Base of parts of results: no keys except those declared."""
 
     __pydantic_config__ = ConfigDict(extra="forbid")  # type: ignore[misc]
+
+
+class _Keys(_Part):
+    """Base of results."""
+
     schema: str
 
 
-class BandKeys(TypedDict):
+class BandKeys(_Part):
     """Quantiles over the members of an ensemble, and how many members show the figure."""
 
-    __pydantic_config__ = ConfigDict(extra="forbid")  # type: ignore[misc]
     p5: Number
     p50: Number
     p95: Number
     shown_by: int
+    standard_deviation: NotRequired[Number]
+
+
+class ImoKeys(_Part):
+    """A criterion of IMO MSC.137(76), the worse of starboard and port."""
+
+    name: str
+    found: Number
+    allowed: float
+    unit: str
+    remark: str
+    beyond_card: bool
+    passed: bool | None
+    margin: Number
+    margin_percent: Number
+
+
+class EnsembleKeys(_Part):
+    """Members of an ensemble, and the bands of figures over them."""
+
+    members: int
+    seed: int
+    usable: int
+    unusable: dict[str, int]
+    notices: list[str]
+    figures: dict[str, BandKeys]
+
+
+class ManoeuvreEnsembleKeys(EnsembleKeys):
+    """Bands of a manoeuvre: signal to quantile to values at ``t_s``, and the edges of the track."""
+
+    t_s: list[Number]
+    histories: dict[str, Columns]
+    track: dict[str, list[list[Number]]] | None
+
+
+class StabilityEnsembleKeys(EnsembleKeys):
+    """Bands of the straight course, and the probability of each IMO criterion."""
+
+    probability_stable: Number
+    imo: list[dict[str, Any]]
+    curves: dict[str, Any] | None
+
+
+class ComparedFigureKeys(_Part):
+    """A figure of a trial next to the simulated one: D, S, E, standard uncertainties, U_val and outcome."""
+
+    trial: str
+    manoeuvre: str
+    name: str
+    measured: float
+    simulated: Number
+    numerical: float
+    inputs: Number
+    data: float
+    required_percent: float
+    made_card: bool
+    error: Number
+    uncertainty: Number
+    level_percent: Number
+    outcome: str
+
+
+class VerifiedFigureKeys(_Part):
+    """A figure of a standard trial: change by half the step, deviation by the inputs, numerical uncertainty."""
+
+    trial: str
+    name: str
+    value: float
+    halving: Number
+    deviation: Number
+    U_num: Number
+
+
+class ReplayKeys(_Part):
+    """A trial replayed: errors by signal, and what was measured and simulated, thinned to draw."""
+
+    trial: str
+    errors: list[dict[str, str | float | None]]
+    measured: Columns
+    simulated: Columns
 
 
 class SimulateKeys(_Keys):
@@ -50,10 +135,10 @@ class SimulateKeys(_Keys):
     outside_card_range: list[str]
     notices: list[str]
     histories: Columns
-    ensemble: NotRequired[dict[str, Any]]
+    ensemble: NotRequired[ManoeuvreEnsembleKeys]
 
 
-class OperatingPointKeys(TypedDict):
+class OperatingPointKeys(_Part):
     """The straight course about which the ship is linearised."""
 
     speed_mps: float
@@ -75,9 +160,9 @@ class StabilityKeys(_Keys):
     steady_turning: dict[str, Any] | None
     characteristic: dict[str, Any] | None
     spirals: dict[str, dict[str, Any] | None]
-    imo: list[dict[str, str | float | bool | None]]
+    imo: list[ImoKeys]
     notices: list[str]
-    ensemble: NotRequired[dict[str, Any]]
+    ensemble: NotRequired[StabilityEnsembleKeys]
 
 
 class ExportKeys(_Keys):
@@ -111,7 +196,7 @@ class CheckKeys(_Keys):
     passed: bool
 
 
-class DerivativeKeys(TypedDict):
+class DerivativeKeys(_Part):
     """A derivative (prime) from captive tests."""
 
     value: float
@@ -145,13 +230,14 @@ class ReduceKeys(_Keys):
     oscillations: list[dict[str, Any]]
     third_order: list[dict[str, Any]]
     runs: list[dict[str, Any]]
+    plots: dict[str, dict[str, Any]]
     not_used: dict[str, Any]
     faults: list[Any]
     repeats: dict[str, Any]
     resistance: dict[str, Any] | None
 
 
-class EstimateKeys(TypedDict):
+class EstimateKeys(_Part):
     """A coefficient identified from trials, and what was known of it before."""
 
     value: float
@@ -287,7 +373,7 @@ class InfluenceKeys(_Keys):
     influence_percent: dict[str, dict[str, Any]]
     agreed: NotRequired[dict[str, Any]]
     tuned: NotRequired[dict[str, Any]]
-    ensemble: NotRequired[dict[str, Any]]
+    ensemble: NotRequired[EnsembleKeys]
     notices: list[str]
 
 
@@ -364,10 +450,9 @@ class SteerKeys(_Keys):
     notices: list[str]
 
 
-class TowMethodKeys(TypedDict):
+class TowMethodKeys(_Part):
     """Estimates of one method; ``estimated`` lists the unknowns that were free."""
 
-    __pydantic_config__ = ConfigDict(extra="forbid")  # type: ignore[misc]
     estimated: list[str]
     estimates: dict[str, Number]
     standard_errors: dict[str, Number]
@@ -416,11 +501,11 @@ class ValidateKeys(_Keys):
     propulsion: bool
     verdict: str
     counts: dict[str, int]
-    figures: list[dict[str, Any]]
+    figures: list[ComparedFigureKeys]
     members: int
-    verification: list[dict[str, Any]]
-    imo: list[dict[str, Any]]
-    replays: list[dict[str, Any]]
+    verification: list[VerifiedFigureKeys]
+    imo: list[ImoKeys]
+    replays: list[ReplayKeys]
     notices: list[str]
 
 
@@ -483,7 +568,7 @@ def json_schema(command: str) -> dict[str, Any]:
     Raises
     ------
     KeyError
-        There is no schema of this command.
+        The command has no schema.
 
     Examples
     --------

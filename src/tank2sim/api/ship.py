@@ -130,7 +130,7 @@ class Ship:
         Raises
         ------
         InputError
-            The card has no such key, or the value is out of its bounds.
+            The card does not have the key, or the value is out of its bounds.
         """
         return Ship(parse_card(changed_text(self.card.text, self.card.source, values), self.card.source))
 
@@ -297,12 +297,12 @@ class Ship:
         InputError
             The ship holds no straight course, a signal is unknown, or a state that is left out comes to no rest.
         """
-        from tank2sim.analysis.linearisation import settled_states, state_space, straight_course
+        from tank2sim.analysis.linearisation import following_states, state_space, straight_course
 
         model = self.model
         point = straight_course(model, speed_mps)
         kept, given, shown = (None if names is None else list(names) for names in (states, inputs, outputs))
-        settled = () if kept is None else settled_states(model, point, kept, given or ())
+        settled = () if kept is None else following_states(model, point, kept, given or ())
         return state_space(model, point, states=kept, inputs=given, outputs=shown, settled=settled)
 
     def influence(
@@ -585,7 +585,7 @@ class Ship:
         return self._written(make_steering_page(self, ghost), path, *([ghost] if ghost else []))
 
     def _written(self, result: AnyResult, path: str | Path | None, *inputs: str | Path) -> AnyResult:
-        """The result, after its page was written to a path, if there is one, that is no input."""
+        """Write the page of a result to a path that is not an input, if one is given; return the result."""
         if path is not None:
             write_together({Path(path): result.page()}, inputs=[Path(self.card.source), *map(Path, inputs)])
         return result
@@ -604,7 +604,7 @@ class Ship:
         Raises
         ------
         InputError
-            There is no compiler, or the file cannot be written.
+            No compiler is found, or the file cannot be written.
         """
         from tank2sim.api.fmu import make_fmu_file
 
@@ -636,7 +636,7 @@ def load(card: str | Path, values: Mapping[str, object] | None = None) -> Ship:
     Raises
     ------
     InputError
-        The file is missing or at fault, or the card has no such key.
+        The file is missing or at fault, or the card does not have a key.
 
     Examples
     --------

@@ -53,7 +53,7 @@ class StabilityResult(PagedResult):
 
     @property
     def stable(self) -> bool:
-        """True if the ship holds a straight course with the rudder fixed: no eigenvalue grows."""
+        """True if the ship holds a straight course with the rudder fixed: no eigenvalue has a positive real part."""
         return self.study.stability.stable
 
     @property
@@ -66,7 +66,17 @@ class StabilityResult(PagedResult):
         """The IMO criteria (MSC.137(76)), worse side: found, allowed, unit, met, margin (%)."""
         import pandas as pd
 
-        rows = [(one.name, one.found, one.allowed, one.unit, one.passed, one.margin_percent) for one in self.study.imo]
+        rows = [
+            (
+                criterion.name,
+                criterion.found,
+                criterion.allowed,
+                criterion.unit,
+                criterion.passed,
+                criterion.margin_percent,
+            )
+            for criterion in self.study.imo
+        ]
         columns = ["criterion", "found", "allowed", "unit", "met", "margin_percent"]
         return pd.DataFrame(rows, columns=columns).set_index("criterion")
 
@@ -108,7 +118,7 @@ class StabilityResult(PagedResult):
             _rounded([["1/s and s", *vars(found.nomoto).values()], ["prime", *vars(found.nomoto_prime).values()]]),
         )
         influences = ResultTable(
-            "What moves C' most",
+            "Largest influences on C'",
             ("coefficient", "C' for 10 % more (%)", "change to neutral (%)"),
             _rounded(
                 [influence.short_name, influence.percent, influence.neutral_percent]
@@ -176,8 +186,8 @@ def _margin_text(study: StabilityStudy) -> str:
     found, margin = study.stability, study.margin
     if not found.criterion_decides:
         return (
-            f"a mode grows at {found.growth_per_s:.3g} 1/s, which C' = {found.criterion:.4g} does not see, so there "
-            "is no margin"
+            f"a mode grows at {found.growth_per_s:.3g} 1/s, which C' = {found.criterion:.4g} does not show, so the "
+            "margin is not defined"
         )
     return f"C' = {found.criterion:.4g}, margin {margin.percent:.3g} %, levers {margin.lever:.3g} L apart"
 

@@ -61,7 +61,7 @@ class SteeringModelsResult(PagedResult):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """Name of the ship and number of models; why there is no tuning, or what it does to the ship's stability."""
+        """Name of the ship and number of models; why a tuning is absent, or its effect on the stability."""
         tuning = self.found.tuning
         lines = [f"{self.found.ship}: {len(self.card.models)} steering models"]
         if isinstance(tuning, str):

@@ -193,7 +193,7 @@ def fitted_and_held(trials: TrialPaths, holdout: TrialPaths, card: ManoeuvringCa
 
     fitted, held = measured(trials_of(trials), card), measured(trials_of(holdout), card)
     for trial in held.trials:
-        if trial.name in {other.name for other in fitted.trials}:
+        if trial.name in {trial_fitted.name for trial_fitted in fitted.trials}:
             raise InputError(trial.path, "", "is both fitted and held out", "hold out what is not fitted")
     refuse_copies(fitted.trials, held.trials)
     for trial in held.trials:

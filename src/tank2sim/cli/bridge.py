@@ -1,14 +1,15 @@
-"""What ``tank2sim poster`` and ``tank2sim pilotcard`` share: their options."""
+"""The commands of the sheets of the bridge, ``tank2sim poster`` and ``tank2sim pilotcard``."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import click
 
 from tank2sim.api.bridge import ORDER_OPTION, BridgeResult
+from tank2sim.api.ship import load
 from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.cli.console import json_option, show_result, write_result
 from tank2sim.cli.options import Command, plot_option, set_option
@@ -54,11 +55,26 @@ def _parsed_orders(context: click.Context, parameter: click.Parameter, given: Se
     return found
 
 
-def show_sheet(result: BridgeResult, page: Path, plot: Path | None, json_file: Path | None) -> None:
-    """Write a sheet and what else was asked for; print how many blanks it has."""
-    inputs = [bridge.card.source for bridge in (result.bridge, result.ballast) if bridge]
-    write_result(result, inputs, json_file=json_file, page=page, plot=plot)
-    show_result(result)
+def sheet_command(name: str, sheet: Callable[..., BridgeResult], text: str) -> click.Command:
+    """Return the command that draws a sheet with a method of a ship; `text` is its help."""
+
+    @click.command(name, help=text)
+    @bridge_options
+    def command(
+        card: str,
+        ballast: str | None,
+        orders: dict[str, float],
+        values: dict[str, object],
+        page: Path,
+        plot: Path | None,
+        json_file: Path | None,
+    ) -> None:
+        result = sheet(load(card, values), ballast=ballast, orders=orders)
+        inputs = [bridge.card.source for bridge in (result.bridge, result.ballast) if bridge]
+        write_result(result, inputs, json_file=json_file, page=page, plot=plot)
+        show_result(result)
+
+    return command
 
 
 def manoeuvring(card: Card, what: str) -> ManoeuvringCard:

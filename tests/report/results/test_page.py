@@ -10,8 +10,8 @@ from tank2sim.errors import InputError
 from tank2sim.report.kit.json_values import alike, quantities, rows_of, titled, words
 from tank2sim.report.kit.page import Verdict, render_page
 from tank2sim.report.results.page import result_page
-from tank2sim.report.results.renderers import needs_of
 from tank2sim.report.results.result_types import RESULT_TYPES, kind_of
+from tank2sim.report.results.subjects import needs_of
 from tests.report.opened_page import CHROMIUM, opened
 
 GAP = {
@@ -174,25 +174,12 @@ def test_the_tiles_of_a_zigzag_are_its_overshoots_and_those_of_captive_tests_the
     assert [(one.value, one.note) for one in page.figures] == [(2, ""), (50.0, "of the value, Yr")]
 
 
-def test_the_tiles_of_tows_are_what_they_found_and_not_what_was_given():
-    estimates = {"total_mass_kg": 2857.0, "B3_kgpm": 474.0}
-    method = {"estimates": estimates, "standard_errors": {"total_mass_kg": 96.0, "B3_kgpm": 96.0}}
-    result = {"tows": "t.csv", "mass_kg": 2243.0, "methods": {"paper": {"estimates": estimates}, "qr": method}}
-    page = result_page({**result, "mass_range_kg": [2546.9, 3399.05]}, "r.json")
-    assert [(one.value, one.unit) for one in page.figures] == [
-        ("2857 ± 96", "kg"),
-        ("474 ± 96", "kg/m"),
-        ("2547 to 3399", "kg"),
-    ]
-
-
 def test_a_unit_that_stands_in_the_key_above_is_that_of_each_value_below():
     values = {"energy_least_squares": 0.03022, "two_intervals": 0.027}
     method = {"added_inertia_kgm2": 0.03022, "added_inertia_standard_error_kgm2": 0.00016}
     result = {"records": ["rig.csv"], "added_inertia_kgm2": values, "methods": {"energy_least_squares": method}}
     page = result_page(result, "r.json")
     assert [row[-1] for row in section(page, "Added inertia").tables[0].rows] == ["kg m²", "kg m²"]
-    assert [(one.value, one.unit) for one in page.figures] == [("0.03022 ± 0.00016", "kg m²")]
 
 
 def test_few_rows_of_many_columns_are_turned_and_what_nobody_knows_is_left_out():

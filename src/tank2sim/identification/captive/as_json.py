@@ -9,6 +9,7 @@ import numpy as np
 
 from tank2sim.cards.scaling import Scales
 from tank2sim.identification.captive.harmonics import ReducedRun
+from tank2sim.identification.captive.plot_data import plots_as_json
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
 from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.result_card import Contents
@@ -52,6 +53,7 @@ def reduction_as_json(reduction: Reduction, card: Contents, warnings: tuple[str,
         "oscillations": [asdict(row) for row in reduction.oscillations],
         "third_order": [asdict(cubic) for cubic in reduction.cubics],
         "runs": [_run(campaign, run) for run in reduction.runs],
+        "plots": plots_as_json(reduction),
         "not_used": reduction.not_used,
         "faults": [str(fault) for fault in reduction.faults],
     }

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from tank2sim.identification.captive.reduction import Reduction
 from tank2sim.identification.captive.result_card import Contents
 from tank2sim.identification.captive.selection import Choice
+
+LEFT_OUT = ("collinear", "not determined")
+"""Reasons for which a term that the runs excite is not in the result."""
 
 _FEWEST_RUNS = 3
 """Least number of runs of a type whose range gives a scale for the error of their prediction."""
@@ -58,7 +62,7 @@ def by_the_papers_order(reduction: Reduction, name: str) -> Stepped | None:
 
 def terms_left_out(reduction: Reduction) -> list[Choice]:
     """Terms that the runs excite and that are not in the result."""
-    return [choice for choice in _choices(reduction) if choice.reason in ("collinear", "not determined")]
+    return [choice for choice in _choices(reduction) if choice.reason in LEFT_OUT]
 
 
 def terms_not_excited(reduction: Reduction) -> list[str]:
@@ -66,11 +70,17 @@ def terms_not_excited(reduction: Reduction) -> list[str]:
     return [choice.name for choice in _choices(reduction) if choice.reason == "not excited"]
 
 
-def prediction_rows(reduction: Reduction) -> dict[str, Mapping[str, float]]:
-    """Type of run to force to the root mean square error of its runs predicted from the others, % of their range."""
+def prediction_rows(errors: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, float]]:
+    """Root mean square error of runs predicted from the others, % of their range, by type of run and force.
+
+    Parameters
+    ----------
+    errors : mapping
+        As :func:`prediction_errors` or the JSON has it. Types with less than three runs have no range.
+    """
     return {
-        kind: {force: 100 * error["relative"] for force, error in forces.items()}
-        for kind, forces in prediction_errors(reduction).items()
+        kind: {force: 100 * error["relative"] for force, error in forces.items() if error["relative"] is not None}
+        for kind, forces in errors.items()
         if any(error["runs"] >= _FEWEST_RUNS for error in forces.values())
     }
 

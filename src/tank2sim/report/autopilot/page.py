@@ -144,8 +144,8 @@ def loop_charts(responses: Sequence[Mapping[str, Json]], first: Mapping[str, Jso
     ]
 
 
-def _complex(one: Mapping[str, Json], name: str) -> NDArray[np.complex128]:
-    parts = (np.array(one[f"{name}_{part}"], dtype=float) for part in ("real", "imaginary"))
+def _complex(response: Mapping[str, Json], name: str) -> NDArray[np.complex128]:
+    parts = (np.array(response[f"{name}_{part}"], dtype=float) for part in ("real", "imaginary"))
     real, imaginary = parts
     return np.asarray(real + 1j * imaginary)
 

@@ -1,6 +1,6 @@
-"""What stands on the pilot card and the wheelhouse poster: boxes of labelled values, after IMO A.601(15).
+"""Content of the pilot card and the wheelhouse poster: boxes of labelled values, after IMO A.601(15).
 
-A value that the card does not tell is None: the page then has a line to be filled in by hand. A figure whose manoeuvre
+A value that the card does not state is None: the page then has a line to be filled in by hand. A figure whose manoeuvre
 leaves the card's range is OUTSIDE, and not printed: on a bridge a wrong number is worse than a blank.
 """
 
@@ -26,7 +26,7 @@ ORDERS_ASTERN = ("Dead slow astern", "Slow astern", "Half astern", "Full astern"
 
 
 class Blank(Enum):
-    """What stands in place of a value."""
+    """The mark in place of a value."""
 
     OUTSIDE = "outside the range of the card"
 
@@ -66,14 +66,14 @@ def _number(value: float | None, unit: str, digits: int = 4) -> str | None:
     return None if value is None else f"{value:.{digits}g}{space}{unit}".strip()
 
 
-def conditions(bridge: Bridge, other: Bridge | None) -> tuple[str, str]:
+def conditions(bridge: Bridge, ballast: Bridge | None) -> tuple[str, str]:
     """Heads of the two loading conditions; which one the card is of it does not say, so it is ticked by hand."""
-    return ("Loaded", "Ballast") if other else ("☐ loaded  ☐ ballast", "other condition")
+    return ("Loaded", "Ballast") if ballast else ("☐ loaded  ☐ ballast", "other condition")
 
 
-def draughts(bridge: Bridge, other: Bridge | None) -> Box:
+def draughts(bridge: Bridge, ballast: Bridge | None) -> Box:
     """Draughts at which the data were obtained, and what else is of those draughts: a card has the mean one alone."""
-    ships = tuple(one.card.ship if one else None for one in (bridge, other))
+    ships = tuple(condition.card.ship if condition else None for condition in (bridge, ballast))
     rows = (
         Row("Forward", (None, None)),
         Row("Aft", (None, None)),
@@ -82,7 +82,7 @@ def draughts(bridge: Bridge, other: Bridge | None) -> Box:
         Row("Block coefficient", tuple(_number(ship.block_coefficient, "") if ship else None for ship in ships)),
         Row("Trial / estimated", tuple("estimated" if ship else None for ship in ships)),
     )
-    return Box("Draught of the manoeuvring data", rows, conditions(bridge, other))
+    return Box("Draught of the manoeuvring data", rows, conditions(bridge, ballast))
 
 
 def _tonnes(kilograms: float | None) -> str | None:
@@ -97,12 +97,12 @@ def present_condition() -> Box:
     return Box("Present draught", tuple(Row(label, (None,)) for label in ("Forward", "Aft", "Displacement")))
 
 
-def anchors(*more: str) -> Box:
+def anchors(*words: str) -> Box:
     """Anchor chain; `more` are heads next to the number of shackles."""
-    blanks = (None,) * (1 + len(more))
+    blanks = (None,) * (1 + len(words))
     rows = tuple(Row(where, blanks) for where in ("Port", "Starboard", "Stern"))
     last = Row("1 shackle, m", (None,))
-    return Box("Anchor chain", (*rows, last), ("shackles", *more))
+    return Box("Anchor chain", (*rows, last), ("shackles", *words))
 
 
 def steering(bridge: Bridge, *, units: bool = True) -> Box:
@@ -125,35 +125,35 @@ def steering(bridge: Bridge, *, units: bool = True) -> Box:
     return Box("Steering particulars", rows)
 
 
-def telegraph(bridge: Bridge, other: Bridge | None) -> Box:
+def telegraph(bridge: Bridge, ballast: Bridge | None) -> Box:
     """Engine orders with revolutions and steady speeds straight ahead; astern by hand."""
-    given = {one.order.casefold(): one for one in bridge.telegraph if one.order}
+    given = {entry.order.casefold(): entry for entry in bridge.telegraph if entry.order}
     known = {order.casefold(): order for order in ORDERS_AHEAD}
-    rows = [Row(None, _speeds(one, other)) for one in bridge.telegraph if not one.order]
+    rows = [Row(None, _speeds(entry, ballast)) for entry in bridge.telegraph if not entry.order]
     if not rows:
         blank = (None, None, None)
-        rows = [Row(name, _speeds(given[key], other) if key in given else blank) for key, name in known.items()]
-    rows += [Row(one.order, _speeds(one, other)) for key, one in given.items() if key not in known]
+        rows = [Row(name, _speeds(given[key], ballast) if key in given else blank) for key, name in known.items()]
+    rows += [Row(entry.order, _speeds(entry, ballast)) for key, entry in given.items() if key not in known]
     rows += [Row(order, (None, None, None)) for order in ORDERS_ASTERN]
-    first, second = conditions(bridge, other)
+    first, second = conditions(bridge, ballast)
     note = ""
-    if any(one.speed_mps is not None for one in bridge.telegraph):
+    if any(entry.speed_mps is not None for entry in bridge.telegraph):
         note = "Steady speed straight ahead in deep calm water."
         note += "" if given else " The ship's own names of these revolutions are to be filled in."
     return Box("Engine order", tuple(rows), ("Rpm / pitch", f"kn, {first}", f"kn, {second}"), note)
 
 
-def _speeds(one: Telegraph, other: Bridge | None) -> tuple[_Value, ...]:
+def _speeds(order: Telegraph, ballast: Bridge | None) -> tuple[_Value, ...]:
     """Revolutions, speed, and the other condition's speed at the same revolutions."""
-    same = (row for row in other.telegraph if math.isclose(row.rpm, one.rpm)) if other else ()
-    rpm = f"{one.rpm:.0f}" if one.rpm >= 100 else f"{one.rpm:.3g}"
-    return (rpm, _speed(one), _speed(next(iter(same), None)))
+    same = (row for row in ballast.telegraph if math.isclose(row.rpm, order.rpm)) if ballast else ()
+    rpm = f"{order.rpm:.0f}" if order.rpm >= 100 else f"{order.rpm:.3g}"
+    return (rpm, _speed(order), _speed(next(iter(same), None)))
 
 
-def _speed(one: Telegraph | None) -> _Value:
-    if one is None or one.speed_mps is None:
+def _speed(order: Telegraph | None) -> _Value:
+    if order is None or order.speed_mps is None:
         return None
-    return knots(one.speed_mps) if one.within else OUTSIDE
+    return knots(order.speed_mps) if order.within else OUTSIDE
 
 
 def engine(*, poster: bool) -> Box:
@@ -182,22 +182,27 @@ def turning(bridge: Bridge, circles: Sequence[ShipTrack]) -> Box:
     )
     length = bridge.card.ship.length_m
     rows = [
-        Row(label, tuple(_told(circle.reading, name, lambda value: _distance(value, length)) for circle in circles))
+        Row(
+            label,
+            tuple(_figure_value(circle.reading, name, lambda value: _distance(value, length)) for circle in circles),
+        )
         for label, name in names
     ]
     rows += [
         Row(f"Time to {heading}°", tuple(_time_to(circle, heading) for circle in circles)) for heading in (90, 180, 360)
     ]
-    speeds = (_told(circle.reading, "steady_speed_mps", lambda value: f"{knots(value)} kn") for circle in circles)
+    speeds = (
+        _figure_value(circle.reading, "steady_speed_mps", lambda value: f"{knots(value)} kn") for circle in circles
+    )
     rows.append(Row("Final speed", tuple(speeds)))
     return Box("", tuple(rows), tuple(circle.name for circle in circles))
 
 
-def _told(one: CardRangeReading, name: str, words: Callable[[float], str]) -> _Value:
+def _figure_value(reading: CardRangeReading, name: str, words: Callable[[float], str]) -> _Value:
     """A figure in words, if the card holds for it."""
-    if one.outside(name):
+    if reading.outside(name):
         return OUTSIDE
-    return words(one.figures[name]) if name in one.figures else None
+    return words(reading.figures[name]) if name in reading.figures else None
 
 
 def _time_to(circle: ShipTrack, heading_deg: float) -> _Value:
@@ -215,13 +220,13 @@ def stopping(bridge: Bridge) -> Box:
     """Full astern from the speeds of the telegraph."""
     known = {order.casefold(): order for order in ORDERS_AHEAD}
     given: dict[str, Row] = {}
-    for one in bridge.stops_from:
-        reach = None if one.track_reach_m is None else _distance(one.track_reach_m, bridge.card.ship.length_m)
-        time = None if one.time_s is None else clock(one.time_s)
-        values = (reach, time) if one.within else (OUTSIDE, OUTSIDE)
-        key = one.order.casefold()
-        given[key] = Row(f"{known.get(key, one.order)} ({knots(one.speed_mps)} kn)", values)
-    named = not given or any(one.order for one in bridge.telegraph)
+    for stop in bridge.stops_from:
+        reach = None if stop.track_reach_m is None else _distance(stop.track_reach_m, bridge.card.ship.length_m)
+        time = None if stop.time_s is None else clock(stop.time_s)
+        values = (reach, time) if stop.within else (OUTSIDE, OUTSIDE)
+        key = stop.order.casefold()
+        given[key] = Row(f"{known.get(key, stop.order)} ({knots(stop.speed_mps)} kn)", values)
+    named = not given or any(stop.order for stop in bridge.telegraph)
     rows = [given.pop(key, Row(order, (None, None))) for key, order in known.items()] if named else []
     rows += list(given.values())
     note = ""
@@ -243,8 +248,8 @@ def zigzags(bridge: Bridge) -> Box:
         Row(
             name,
             (
-                *(_told(zigzag, f"overshoot_{place}_deg", lambda value: f"{value:.3g}°") for place in (1, 2)),
-                _told(zigzag, "initial_turning_distance_m", lambda value: _distance(value, length)),
+                *(_figure_value(zigzag, f"overshoot_{place}_deg", lambda value: f"{value:.3g}°") for place in (1, 2)),
+                _figure_value(zigzag, "initial_turning_distance_m", lambda value: _distance(value, length)),
             ),
         )
         for name, zigzag in bridge.zigzags.items()
@@ -255,9 +260,9 @@ def zigzags(bridge: Bridge) -> Box:
 def draught_increase(bridge: Bridge) -> Box:
     """By heel B/2 sin(phi), the geometry of a section with square bilges."""
     beam = bridge.card.ship.beam_m
-    values = tuple(None if beam is None else f"{beam / 2 * math.sin(math.radians(one)):.3g} m" for one in HEELS_DEG)
+    values = tuple(None if beam is None else f"{beam / 2 * math.sin(math.radians(heel)):.3g} m" for heel in HEELS_DEG)
     note = "Half the beam times the sine of the heel (square bilges)." if beam else ""
-    return Box("Draught increase by heel", (Row("Heel", values),), tuple(f"{one}°" for one in HEELS_DEG), note)
+    return Box("Draught increase by heel", (Row("Heel", values),), tuple(f"{heel}°" for heel in HEELS_DEG), note)
 
 
 def squat() -> Box:

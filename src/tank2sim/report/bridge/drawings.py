@@ -102,10 +102,10 @@ class _Block:
     width: float
     height: float
 
-    def meets(self, other: _Block) -> bool:
+    def meets(self, block: _Block) -> bool:
         """True if both have paper in common."""
-        across = self.left < other.left + other.width and other.left < self.left + self.width
-        return across and self.top < other.top + other.height and other.top < self.top + self.height
+        across = self.left < block.left + block.width and block.left < self.left + self.width
+        return across and self.top < block.top + block.height and block.top < self.top + self.height
 
     def holds(self, x: float, y: float) -> bool:
         """True if the point lies in it."""
@@ -121,7 +121,7 @@ class _Labels:
     taken: list[_Block]
 
     def place(self, at: tuple[float, float], texts: Sequence[str], style: str = "word") -> list[Word]:
-        """The lines of a label near a point; none where there is no room, for the table has the numbers."""
+        """The lines of a label near a point; none without room, for the table has the numbers."""
         width, height = _CHARACTER_MM * max(map(len, texts)), _LINE_MM * len(texts)
         best: tuple[float, _Block] | None = None
         for distance in _OFFSETS_MM:
@@ -146,7 +146,7 @@ class _Labels:
         paper = self.paper
         across = paper.left <= block.left and block.left + block.width <= paper.left + paper.width
         within = across and paper.top <= block.top and block.top + block.height <= paper.top + paper.height
-        return within and not any(block.meets(other) for other in self.taken)
+        return within and not any(block.meets(block_taken) for block_taken in self.taken)
 
 
 def circles_drawing(
@@ -157,12 +157,12 @@ def circles_drawing(
     A track ends where it leaves the card's range, and says so. Its outline is to scale, and left out where the card has
     no beam.
     """
-    across = [float(one) for path in circles for one in path.starboard_m[: path.inside]]
-    up = [float(one) for path in circles for one in path.ahead_m[: path.inside]]
+    across = [float(distance) for path in circles for distance in path.starboard_m[: path.inside]]
+    up = [float(distance) for path in circles for distance in path.ahead_m[: path.inside]]
     frame = _Frame(width, height, (min(across), min(*up, -length_m / 2)), (max(across), max(*up, length_m / 2)))
     grid, numbers = _grid(frame)
     lines, dots = list(grid), []
-    told: list[tuple[tuple[float, float], list[str], str]] = []
+    captions: list[tuple[tuple[float, float], list[str], str]] = []
     for path in circles:
         ahead, starboard = path.ahead_m[: path.inside], path.starboard_m[: path.inside]
         kept = thin_line([ahead, starboard], _POINTS)
@@ -172,20 +172,20 @@ def circles_drawing(
                 at = frame.place(mark.starboard_m, mark.ahead_m)
                 dots.append(at)
                 if mark.heading_change_deg < _FULL_TURN_DEG:
-                    told.append((at, _told(mark), "word"))
+                    captions.append((at, _mark_lines(mark), "word"))
         if path.range_exit and path.inside < len(path.ahead_m):
             at = frame.place(path.range_exit.starboard_m, path.range_exit.ahead_m)
             dots.append(at)
-            told.append((at, ["range of the card ends", *_told(path.range_exit)], "warn"))
+            captions.append((at, ["range of the card ends", *_mark_lines(path.range_exit)], "warn"))
     labels = _Labels(_Block(0, 0, width, height), _sampled(frame, circles), _blocks(numbers, dots))
-    words = [*numbers, *(word for at, texts, style in told for word in labels.place(at, texts, style))]
+    words = [*numbers, *(word for at, texts, style in captions for word in labels.place(at, texts, style))]
     if beam_m:
         lines.append(Line(_outline(frame, length_m, beam_m), "ship"))
     sides = "; ".join(f"to {path.name}" for path in circles)
     return Drawing(width, height, tuple(lines), tuple(dots), tuple(words), f"Turning circles {sides}.")
 
 
-def _told(mark: TrackMark) -> list[str]:
+def _mark_lines(mark: TrackMark) -> list[str]:
     return [f"{round(mark.heading_change_deg)}°  {clock(mark.time_s)}", f"{knots(mark.speed_mps)} kn"]
 
 
@@ -204,8 +204,8 @@ def _blocks(words: Sequence[Word], dots: Sequence[tuple[float, float]]) -> list[
     found = [_Block(x - 1, y - 1, 2, 2) for x, y in dots]
     for word in words:
         width = _CHARACTER_MM * len(word.text)
-        left = word.x - {"start": 0.0, "middle": width / 2, "end": width}[word.anchor]
-        found.append(_Block(left, word.y - 2.2, width, _LINE_MM))
+        start = word.x - {"start": 0.0, "middle": width / 2, "end": width}[word.anchor]
+        found.append(_Block(start, word.y - 2.2, width, _LINE_MM))
     return found
 
 
@@ -237,7 +237,7 @@ def _grid(frame: _Frame) -> tuple[tuple[Line, ...], tuple[Word, ...]]:
 
 def _round_step(wanted: float) -> float:
     decade = 10.0 ** math.floor(math.log10(wanted))
-    return next(one * decade for one in (1, 2, 5, 10) if one * decade >= wanted * (1 - 1e-9))
+    return next(mantissa * decade for mantissa in (1, 2, 5, 10) if mantissa * decade >= wanted * (1 - 1e-9))
 
 
 def stops_drawing(stops: Sequence[ShipTrack], *, width: float, height: float) -> Drawing:

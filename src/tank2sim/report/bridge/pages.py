@@ -14,7 +14,7 @@ from tank2sim.analysis.validation.ship_track import ShipTrack
 from tank2sim.report.bridge import boxes
 from tank2sim.report.bridge.boxes import Box, Row
 from tank2sim.report.bridge.drawings import Drawing, circles_drawing, stops_drawing
-from tank2sim.report.kit.page import beside
+from tank2sim.report.kit.page import resource_text
 
 PANEL_MM = (88.0, 62.0)
 STOPS_MM = (113.0, 48.0)
@@ -61,9 +61,9 @@ class Panel:
 def poster_page(bridge: Bridge, ballast: Bridge | None = None) -> str:
     """The wheelhouse poster; with `ballast` the first card is the loaded condition.
 
-    What the cards do not tell is left blank, and marked as a blank.
+    Values that the cards do not state are left blank, and marked as blanks.
     """
-    left = (
+    left_column = (
         boxes.draughts(bridge, ballast),
         boxes.steering(bridge),
         boxes.anchors("heaving, min/shackle"),
@@ -83,7 +83,7 @@ def poster_page(bridge: Bridge, ballast: Bridge | None = None) -> str:
     return _rendered(
         "bridge/poster.html.j2",
         bridge,
-        left=left,
+        left=left_column,
         right=right,
         panels=_panels(bridge, ballast),
         particulars=boxes.particulars(bridge),
@@ -133,13 +133,15 @@ def _panels(bridge: Bridge, ballast: Bridge | None) -> tuple[Panel, ...]:
         (second, ballast, ballast.shallow if ballast else (), shallow),
     )
     panels = []
-    for condition, own, circles, where in wanted:
+    for condition, bridge_shown, circles, where in wanted:
         title = f"{condition}, {where}"
-        if own is None or not circles:
+        if bridge_shown is None or not circles:
             panels.append(Panel(title))
         else:
-            drawing = _circles(own, circles, PANEL_MM)
-            panels.append(Panel(f"{title}: {_turning_title(own, '')}", drawing, boxes.turning(own, circles)))
+            drawing = _circles(bridge_shown, circles, PANEL_MM)
+            panels.append(
+                Panel(f"{title}: {_turning_title(bridge_shown, '')}", drawing, boxes.turning(bridge_shown, circles))
+            )
     return tuple(panels)
 
 
@@ -157,14 +159,14 @@ def _circles_title(bridge: Bridge) -> str:
     gear = bridge.card.steering_gear
     if gear and gear.max_angle_rad:
         return "Turning circles at maximum rudder angle"
-    return f"Turning circles at {bridge.rudder_deg:.3g}° rudder: the card tells no maximum angle"
+    return f"Turning circles at {bridge.rudder_deg:.3g}° rudder: the card states no maximum angle"
 
 
 def _notices(*bridges: Bridge | None) -> list[str]:
-    """As many as one sheet has room for: the command tells them all."""
-    told = list(dict.fromkeys(_cut(text, _NOTICE) for bridge in bridges if bridge for text in bridge.notices))
-    rest = len(told) - _NOTICES
-    return told if rest <= 0 else [*told[:_NOTICES], f"and {rest} more, which the command tells"]
+    """As many notices as a sheet has room for; the command prints all."""
+    texts = list(dict.fromkeys(_cut(text, _NOTICE) for bridge in bridges if bridge for text in bridge.notices))
+    omitted = len(texts) - _NOTICES
+    return texts if omitted <= 0 else [*texts[:_NOTICES], f"and {omitted} more, which the command prints"]
 
 
 def _cut(text: str, length: int) -> str:
@@ -183,7 +185,7 @@ def _rendered(template: str, bridge: Bridge, **content: object) -> str:
     environment.trim_blocks = environment.lstrip_blocks = True
     return environment.get_template(template).render(
         version=__version__,
-        style=Markup(beside("bridge/sheet.css")),
+        style=Markup(resource_text("bridge/sheet.css")),
         name=_cut(bridge.card.ship.name, _NAME),
         source=_cut(bridge.card.ship.source, _SOURCE),
         warning=WARNING,

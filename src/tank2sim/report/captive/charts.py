@@ -130,7 +130,7 @@ def force_chart(
     """
     unit, factor = shown_unit(across.unit)
     name = with_unit(across.title, unit)
-    look = series_look([one.label for one in series], as_points=[one.label for one in series])
+    look = series_look([run.label for run in series], as_points=[run.label for run in series])
     x = alt.X("x:Q", title=name, scale=alt.Scale(zero=False, padding=10))
     y = alt.Y("v:Q", title=up, scale=alt.Scale(zero=False))
     points = _rows(series, factor, fit=False)
@@ -151,7 +151,7 @@ def force_chart(
     ]
     mark = alt.Chart(data(points), name="plot").mark_point(clip=True)
     layers.append(mark.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip))
-    labels = ", ".join(one.label for one in series)
+    labels = ", ".join(run.label for run in series)
     return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(
         title=title,
         width=size_px[0],
@@ -204,7 +204,7 @@ def harmonic_chart(
     Parameters
     ----------
     runs : sequence of Harmonics
-        In the order in which they stand.
+        In their order in the chart.
     up : str
         Title of the force with its unit.
     title : str
@@ -242,7 +242,7 @@ def residual_chart(
     Parameters
     ----------
     residuals : sequence of Residual
-        Runs stand in the order of their first appearance.
+        Runs are in the order of their first appearance.
     title : str
         Of the chart.
     width_px, height_px : int
@@ -276,14 +276,14 @@ def residual_chart(
 
 def _rows(series: Sequence[ForceSeries], factor: float, *, fit: bool) -> list[ChartRecord]:
     rows: list[ChartRecord] = []
-    for one in series:
-        x, value, half = (one.fit_x, one.fit_value, one.fit_half_width) if fit else (one.x, one.value, one.half_width)
+    for run in series:
+        x, value, half = (run.fit_x, run.fit_value, run.fit_half_width) if fit else (run.x, run.value, run.half_width)
         columns = {"x": factor * vector(x), "v": vector(value)}
         if half is not None:
             columns |= {"low": columns["v"] - vector(half), "high": columns["v"] + vector(half)}
         order = np.argsort(columns["x"], kind="stable") if fit else np.arange(len(columns["x"]))
         kept = order[thin_line([columns["v"][order]], LINE_SAMPLES)] if fit else order
-        rows += records(one.label, {name: column[kept] for name, column in columns.items()})
+        rows += records(run.label, {name: column[kept] for name, column in columns.items()})
     return rows
 
 

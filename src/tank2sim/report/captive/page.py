@@ -2,76 +2,136 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import altair as alt
 
-from tank2sim.identification.captive.reduction import Reduction
-from tank2sim.identification.captive.result_card import Contents
-from tank2sim.identification.captive.tables import derivative_rows, prediction_rows, terms_left_out
+from tank2sim.identification.captive.tables import LEFT_OUT, prediction_rows
+from tank2sim.report.captive.charts import (
+    Across,
+    ForceLoop,
+    ForceSeries,
+    Harmonics,
+    Residual,
+    force_chart,
+    harmonic_chart,
+    loop_chart,
+    residual_chart,
+)
+from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
 
 _FORCES = {"X": "surge force", "Y": "sway force", "N": "yaw moment"}
 
 
-def reduction_page(
-    reduction: Reduction, card: Contents, warnings: Sequence[str], charts: Mapping[str, alt.TopLevelMixin]
-) -> Page:
-    """The page; `charts` as :func:`tank2sim.report.captive.results.reduction_charts` gives them."""
-    model = reduction.campaign.model
-    measured = len(card.entries) - len(card.estimated)
+def reduction_page(found: Json) -> Page:
+    """Return the page of the JSON of ``tank2sim reduce``."""
+    derivatives = found["derivatives"]
+    estimated = [name for name, derivative in derivatives.items() if derivative["origin"] == "estimated"]
     figures = [
-        KeyFigure(label="Runs reduced", value=len(reduction.runs), note=f"{len(reduction.not_used)} left out"),
-        KeyFigure(label="Derivatives measured", value=measured, note="prime system, rudder to starboard"),
+        KeyFigure(label="Runs reduced", value=len(found["runs"]), note=f"{len(found['not_used'])} left out"),
+        KeyFigure(
+            label="Derivatives measured",
+            value=len(derivatives) - len(estimated),
+            note="prime system, rudder to starboard",
+        ),
         KeyFigure(
             label="Derivatives estimated",
-            value=len(card.estimated),
-            verdict=Verdict.CAUTION if card.estimated else Verdict.NONE,
-            note=", ".join(card.estimated) or "none",
+            value=len(estimated),
+            verdict=Verdict.CAUTION if estimated else Verdict.NONE,
+            note=", ".join(estimated) or "none",
         ),
     ]
     sections = [
         PageSection(
             heading="Derivatives",
             text="One weighted regression over the whole campaign, and next to it the paper's order of tests.",
-            tables=[_derivatives(reduction, card)],
-            notes=warnings,
+            tables=[_derivatives(derivatives)],
+            notes=found["warnings"],
         ),
         PageSection(
             heading="Which terms, and why",
             text="Terms that the runs excite and that are not in the card.",
-            tables=[_left_out(reduction)],
+            tables=[_left_out(found["selection"])],
         ),
         PageSection(
             heading="Leave one run out",
             text="How well each run is predicted from the others: root mean square error, % of the force's range.",
-            tables=[_predictions(reduction)],
+            tables=[_predictions(found["prediction_errors"])],
         ),
-        *_chart_sections(charts),
+        *_chart_sections(reduction_charts(found)),
     ]
-    return Page(title=model.name, subtitle="Captive model tests, reduced", figures=figures, sections=sections)
+    return Page(
+        title=found["model"]["name"], subtitle="Captive model tests, reduced", figures=figures, sections=sections
+    )
 
 
-def _derivatives(reduction: Reduction, card: Contents) -> PageTable:
+def reduction_charts(found: Json) -> dict[str, alt.TopLevelMixin]:
+    """Return the charts by file stem: fits with bands, harmonics, loops, residuals."""
+    charts: dict[str, alt.TopLevelMixin] = {stem: _plot_chart(plot) for stem, plot in found["plots"].items()}
+    residuals = [
+        Residual(
+            run=row["run"],
+            kind=row["type"].replace("_", " "),
+            force=force,
+            value=-row["error"] / row["standard_error"],
+        )
+        for force, rows in found["leave_one_out"].items()
+        for row in rows
+    ]
+    title = "Each run against its prediction from all the others"
+    return {**charts, "residuals": residual_chart(residuals, title=title)}
+
+
+def _plot_chart(plot: Json) -> alt.TopLevelMixin:
+    title = plot["title"]
+    if plot["kind"] == "harmonics":
+        return harmonic_chart([Harmonics(**run) for run in plot["runs"]], plot["up"], title=title)
+    across = Across(title=plot["across"], unit=plot["unit"])
+    if plot["kind"] == "force":
+        return force_chart([ForceSeries(**series) for series in plot["series"]], across, plot["up"], title=title)
+    loops = [
+        ForceLoop(
+            label=loop["label"],
+            motion=loop["measured"]["motion"],
+            forces={force: loop["measured"][force] for force in _LOOPS},
+            fitted_motion=loop["fitted"]["motion"],
+            fitted={force: loop["fitted"][force] for force in _LOOPS},
+        )
+        for loop in plot["loops"]
+    ]
+    return loop_chart(loops, across, _LOOPS, title=title)
+
+
+_LOOPS = {"Y": "Y of the water (N)", "N": "N of the water (N m)"}
+
+
+def _derivatives(derivatives: Json) -> PageTable:
     rows: list[list[Cell]] = []
-    for row in derivative_rows(reduction, card):
-        other: list[Cell] = [None, None, ""]
-        if steps := row.stepped:
-            other = [1e5 * steps.value, 1e5 * steps.standard_error, steps.found_in.replace("_", " ")]
-        rows.append([row.name, 1e5 * row.value, 1e5 * row.standard_error, *other, row.origin])
+    for name, derivative in derivatives.items():
+        stepwise: list[Cell] = [None, None, ""]
+        if steps := derivative.get("paper_order"):
+            stepwise = [1e5 * steps["value"], 1e5 * steps["standard_error"], steps["found_in"].replace("_", " ")]
+        regression = 1e5 * derivative["value"], 1e5 * derivative["standard_error"]
+        rows.append([name, *regression, *stepwise, derivative["origin"]])
     heads = ("", "regression", "±", "paper's order", "±", "from tests", "origin")
     return PageTable(caption="Prime system, times 10⁵", columns=[Column(title=head) for head in heads], rows=rows)
 
 
-def _left_out(reduction: Reduction) -> PageTable:
-    rows: list[list[Cell]] = [[choice.name, choice.reason, choice.explanation] for choice in terms_left_out(reduction)]
+def _left_out(selection: Json) -> PageTable:
+    rows: list[list[Cell]] = [
+        [choice["name"], choice["reason"], choice["told"]]
+        for choices in selection.values()
+        for choice in choices
+        if choice["reason"] in LEFT_OUT
+    ]
     return PageTable(caption="Left out", columns=[Column(title=head) for head in ("term", "reason", "why")], rows=rows)
 
 
-def _predictions(reduction: Reduction) -> PageTable:
+def _predictions(errors: Json) -> PageTable:
     rows: list[list[Cell]] = [
-        [kind.replace("_", " "), *(errors.get(force) for force in _FORCES)]
-        for kind, errors in prediction_rows(reduction).items()
+        [kind.replace("_", " "), *(percent.get(force) for force in _FORCES)]
+        for kind, percent in prediction_rows(errors).items()
     ]
     columns = [Column(title="runs of type"), *(Column(title=force, unit="%", digits=2) for force in _FORCES)]
     return PageTable(caption="Prediction errors", columns=columns, rows=rows)

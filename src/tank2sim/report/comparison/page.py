@@ -41,25 +41,25 @@ _TRIALS = (
 
 def compare_page(found: Json) -> Page:
     """Return the page of the JSON of ``tank2sim compare``."""
-    labels = [one["label"] for one in found["cards"]]
+    labels = [card["label"] for card in found["cards"]]
     sections = [_cards(found["cards"]), _coefficients(found["coefficients"], found.get("effects", []), labels)]
     sections += [_trial(trial, labels, first=place == 0) for place, trial in enumerate(found["trials"])]
     sections += notices_section(found["notices"])
     return Page(
         title=found["cards"][0]["ship"],
         subtitle=f"Comparison of cards: {', '.join(labels)}",
-        figures=[_figure(one) for one in found["summary"]],
+        figures=[_figure(card) for card in found["summary"]],
         sections=sections,
     )
 
 
-def _figure(one: Mapping[str, Json]) -> KeyFigure:
-    compared, beyond, rms = one["compared"], one["beyond_two_standard_errors"], one["rms_standard_errors"]
+def _figure(summary: Mapping[str, Json]) -> KeyFigure:
+    compared, beyond, rms = summary["compared"], summary["beyond_two_standard_errors"], summary["rms_standard_errors"]
     # One in twenty differs by more by chance alone.
     verdict = Verdict.PASSED if beyond <= 0.05 * compared + 1 else Verdict.CAUTION
     note = "no standard errors" if rms is None else f"rms {rms:.3g} standard errors"
-    note += f"; {same} more taken over" if (same := one.get("same_number")) else ""
-    label = f"{one['card']}: coefficients beyond {BEYOND_STANDARD_ERRORS:g}"
+    note += f"; {same} more taken over" if (same := summary.get("same_number")) else ""
+    label = f"{summary['card']}: coefficients beyond {BEYOND_STANDARD_ERRORS:g}"
     return KeyFigure(label=label, value=f"{beyond} of {compared}", verdict=verdict, note=note)
 
 
@@ -80,7 +80,7 @@ def _coefficients(
     if effects:
         tables.append(_coefficient_table("Parameters of effects, SI.", effects, labels, 1.0))
     charts, both = [], [*coefficients, *effects]
-    if any(one["standard_errors"] is not None for row in both for one in row["differences"]):
+    if any(difference["standard_errors"] is not None for row in both for difference in row["differences"]):
         caption = f"Lines at {BEYOND_STANDARD_ERRORS:g} standard errors."
         charts.append(Illustration(chart=_errors_chart(both, labels), caption=caption))
     return PageSection(heading="Coefficients", text=f"{_COEFFICIENTS}\n\n{_ASSUMED}", tables=tables, charts=charts)
@@ -100,13 +100,13 @@ def _coefficient_table(
 
 def _coefficient_row(row: Mapping[str, Json], factor: float) -> list[Cell]:
     cells: list[Cell] = [row["name"]]
-    for one in row["cards"]:
-        error = None if one["standard_error"] is None else factor * one["standard_error"]
-        shown: Cell = error if one["stated"] or error is None else f"{error:.3g}*"
-        cells += [None if one["value"] is None else factor * one["value"], shown]
+    for card in row["cards"]:
+        error = None if card["standard_error"] is None else factor * card["standard_error"]
+        shown: Cell = error if card["stated"] or error is None else f"{error:.3g}*"
+        cells += [None if card["value"] is None else factor * card["value"], shown]
     for difference in row["differences"]:
         cells += [difference["percent"], difference["standard_errors"]]
-    return [*cells, "; ".join(dict.fromkeys(one["why"] for one in row["differences"] if one["why"]))]
+    return [*cells, "; ".join(dict.fromkeys(card["why"] for card in row["differences"] if card["why"]))]
 
 
 def _errors_chart(coefficients: Sequence[Mapping[str, Json]], labels: Sequence[str]) -> alt.LayerChart:
@@ -163,7 +163,8 @@ def _trial(trial: Mapping[str, Json], labels: Sequence[str], *, first: bool) -> 
     name = trial["name"]
     if trial["tracks"]:
         tracks = [
-            TrackData(label=one["card"], x_m=one["x_m"], y_m=one["y_m"], time_s=one["t_s"]) for one in trial["tracks"]
+            TrackData(label=track["card"], x_m=track["x_m"], y_m=track["y_m"], time_s=track["t_s"])
+            for track in trial["tracks"]
         ]
         charts = [Illustration(chart=track_chart(tracks, title=f"Tracks: {name}"))]
     table = PageTable(caption=f"Figures of the {name}.", columns=columns, rows=rows)

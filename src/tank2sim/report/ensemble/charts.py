@@ -54,14 +54,18 @@ def turns_chart(turning: Json, *, title: str = "") -> alt.LayerChart:
     starboard, port = turning["yaw_rate_from_starboard_degps"], turning["yaw_rate_from_port_degps"]
     apart = np.zeros(len(rudder), dtype=bool)
     for key in ("p5", "p50", "p95", "own"):
-        one, other = vector(starboard[key]), vector(port[key])
-        apart |= np.abs(one - other) > _APART * np.nanmax(np.abs(one), initial=0.0)
+        from_starboard, from_port = vector(starboard[key]), vector(port[key])
+        apart |= np.abs(from_starboard - from_port) > _APART * np.nanmax(np.abs(from_starboard), initial=0.0)
     # With their neighbours, so that the branches meet.
     apart = apart | np.roll(apart, 1) | np.roll(apart, -1)
     names = {"from starboard turn": (starboard, np.ones(len(rudder), dtype=bool)), "from port turn": (port, apart)}
     if not apart.any():
         names = {"stable turns": names["from starboard turn"]}
-    rows = [row for label, (one, shown) in names.items() for row in _band_rows(label, rudder, one, shown)]
+    rows = [
+        row
+        for label, (from_starboard, shown) in names.items()
+        for row in _band_rows(label, rudder, from_starboard, shown)
+    ]
     y = alt.Axis(title="yaw rate (deg/s)")
     x = alt.X("x:Q", title="rudder angle, starboard positive (deg)", scale=alt.Scale(nice=False))
     chart = _panel(rows, series_look(list(names)), x, y, height=300)
@@ -103,7 +107,7 @@ def _band_rows(
         for shown_there in (kept & np.isfinite(columns["v"]), kept & np.isfinite(columns["low"]))
     )
     ends = zip(rows, parts, bands, kept, strict=True)
-    return [row | {"part": part, "band": number} for row, part, number, one in ends if one]
+    return [row | {"part": part, "band": number} for row, part, number, is_shown in ends if is_shown]
 
 
 def _panel(rows: list[ChartRecord], look: SeriesLook, x: alt.X, y: alt.Axis, *, height: int = 240) -> alt.LayerChart:

@@ -50,11 +50,11 @@ def banded_chart(label: str, run: Trajectory, bands: ManoeuvreBands) -> alt.VCon
     names = {variable: (name, factor) for name, (variable, factor) in ENSEMBLE_SIGNALS.items()}
     histories = [history_of(label, run, SHIP_SIGNALS)]
     for quantile, name in ((LOW, "low"), (MIDDLE, "median"), (HIGH, "high")):
-        own = {
+        quantile_values = {
             variable: getattr(bands.histories[names[variable][0]], name) / names[variable][1]
             for variable in SHIP_SIGNALS
         }
-        histories.append(History(label=quantile, time_s=bands.times_s, values=own))
+        histories.append(History(label=quantile, time_s=bands.times_s, values=quantile_values))
     return alt.vconcat(track, history_chart(histories, signals_of(run.model, SHIP_SIGNALS)))
 
 

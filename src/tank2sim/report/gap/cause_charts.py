@@ -30,8 +30,8 @@ MOST_RIVALS = 12
 NORMAL = 1.959964
 """Half a 95 % interval in standard errors."""
 
-TELLS_LITTLE = 10.0
-"""A trial whose standard error is this many times the smallest tells so little that its bar may leave the picture."""
+UNINFORMATIVE = 10.0
+"""Standard error over the smallest from which the bar of a trial may leave the picture."""
 
 STATE_UNITS = {"rudder": "rad", "drift": "rad", "yaw rate": "rad/s", "speed": "m/s", "heading": "rad"}
 _STATE_WORDS = {"rudder": "rudder angle", "drift": "drift angle"}
@@ -58,10 +58,10 @@ def _values(lacking: Lacking) -> tuple[Array, str, str]:
         what, unit = _FORCES[lacking.equation]
         prefix, scale = _prefix(lacking.force)
         return lacking.force / scale, what, prefix + unit
-    what, own = _SIGNALS[lacking.quantity]
-    if own != "rad/s":
-        return lacking.values, what, own
-    unit, factor = shown_unit(own)
+    what, variable = _SIGNALS[lacking.quantity]
+    if variable != "rad/s":
+        return lacking.values, what, variable
+    unit, factor = shown_unit(variable)
     return factor * lacking.values, what, unit
 
 
@@ -106,9 +106,9 @@ def when_chart(lacking: Lacking, *, title: str = "") -> alt.LayerChart:
     trials = np.array(lacking.trials)
     rows: list[ChartRecord] = []
     for trial in dict.fromkeys(lacking.trials):
-        there = np.flatnonzero((trials == trial) & np.isfinite(values))
-        for part in np.array_split(there, min(_STRIPS, len(there))):
-            begin, end = lacking.time_s[part[0]], lacking.time_s[min(part[-1] + 1, there[-1])]
+        known = np.flatnonzero((trials == trial) & np.isfinite(values))
+        for part in np.array_split(known, min(_STRIPS, len(known))):
+            begin, end = lacking.time_s[part[0]], lacking.time_s[min(part[-1] + 1, known[-1])]
             rows.append(
                 {"trial": trial, "f": plain(float(values[part].mean()))} | {"t": plain(begin), "to": plain(end)}
             )
@@ -143,13 +143,15 @@ def binned(state: Array, force: Array, trials: np.ndarray) -> list[ChartRecord]:
     edges = np.linspace(*extent(state), BINS + 1)
     place = np.clip(np.digitize(state, edges) - 1, 0, BINS - 1)
     rows: list[ChartRecord] = []
-    for one in np.unique(place).tolist():
-        inside = place == one
-        own = np.array([force[inside & (trials == trial)].mean() for trial in np.unique(trials[inside])])
+    for bin_number in np.unique(place).tolist():
+        inside = place == bin_number
+        trial_means = np.array([force[inside & (trials == trial)].mean() for trial in np.unique(trials[inside])])
         mean = float(force[inside].mean())
-        half = NORMAL * float(own.std(ddof=1)) / math.sqrt(len(own)) if len(own) > 1 else math.nan
+        half = (
+            NORMAL * float(trial_means.std(ddof=1)) / math.sqrt(len(trial_means)) if len(trial_means) > 1 else math.nan
+        )
         rows.append(
-            {"s": plain(float(state[inside].mean())), "f": plain(mean), "trials": len(own)}
+            {"s": plain(float(state[inside].mean())), "f": plain(mean), "trials": len(trial_means)}
             | {"low": plain(mean - half), "high": plain(mean + half)}
         )
     return rows
@@ -187,8 +189,8 @@ def _bars(
     farthest = max((row["v"] for row in rows if row["v"] is not None), default=0.0) or 1.0
     # Room on the right for the number at the end of the longest bar.
     ends = list(domain) if domain else [0, farthest * (12 if kind == "symlog" else 1.25)]
-    more = {"constant": 10} if kind == "symlog" else {}
-    x = alt.X("v:Q", title=across, scale=alt.Scale(type=kind, domain=ends, nice=False, **more))
+    scale_options = {"constant": 10} if kind == "symlog" else {}
+    x = alt.X("v:Q", title=across, scale=alt.Scale(type=kind, domain=ends, nice=False, **scale_options))
     ticks = [step for step in (0, 10, 100, 1e3, 1e4, 1e5, 1e6) if step <= ends[1]]
     x = x.axis(**({"values": ticks} if kind == "symlog" else {"tickCount": 4}))
     y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, labelLimit=260, ticks=False))
@@ -200,17 +202,17 @@ def _bars(
 
 def rival_chart(gap: Gap, *, title: str = "") -> alt.LayerChart | None:
     """Explanations that were compared, with their loss of score to the best; None without any."""
-    ranked = sorted(gap.rivals, key=lambda one: one.loss)
-    shown, none = ranked[:MOST_RIVALS], [one for one in ranked[MOST_RIVALS:] if not one.effects]
+    ranked = sorted(gap.rivals, key=lambda rival: rival.loss)
+    shown, none = ranked[:MOST_RIVALS], [rival for rival in ranked[MOST_RIVALS:] if not rival.effects]
     if not shown:
         return None
     rows: list[ChartRecord] = [
         {
-            "name": joined(one.effects).replace("_", " ") if one.effects else "none (the card as it is)",
-            "v": plain(one.loss),
-            "text": f"{format_number(one.loss, 3)}  ({as_percent(one.probability)})",
+            "name": joined(rival.effects).replace("_", " ") if rival.effects else "none (the card as it is)",
+            "v": plain(rival.loss),
+            "text": f"{format_number(rival.loss, 3)}  ({as_percent(rival.probability)})",
         }
-        for one in (*shown, *none)
+        for rival in (*shown, *none)
     ]
     across = "how much worse than the best explanation (-2 log likelihood, penalised)"
     kind = "symlog" if max(row["v"] or 0.0 for row in rows) > 100 else "linear"
@@ -244,7 +246,7 @@ def agreement_chart(gap: Gap, *, title: str = "") -> alt.HConcatChart | None:
     """
     panels = [
         _agreement_panel(gap, variable, trials, named=not place)
-        for place, (variable, trials) in enumerate(one for one in gap.agreement.items() if one[1])
+        for place, (variable, trials) in enumerate(item for item in gap.agreement.items() if item[1])
     ]
     if not panels:
         return None
@@ -259,22 +261,29 @@ def _agreement_panel(
 ) -> alt.LayerChart:
     effect, parameter = meant(variable)
     words, unit = in_words(in_file_units(parameter, 0.0)[0])
-    whole = next((one for one in gap.effects if one.name == effect and parameter in one.parameters), None)
+    whole = next(
+        (
+            effect_found
+            for effect_found in gap.effects
+            if effect_found.name == effect and parameter in effect_found.parameters
+        ),
+        None,
+    )
     middle = estimate_in_file(parameter, whole.parameters[parameter])[1] if whole else None
     held = {replay.name: replay.held_out for replay in gap.passed}
     rows: list[ChartRecord] = []
     for trial, (value, error) in trials.items():
-        own, half = estimate_in_file(parameter, value)[1], NORMAL * in_file_units(parameter, error)[1]
+        estimate, half = estimate_in_file(parameter, value)[1], NORMAL * in_file_units(parameter, error)[1]
         if parameter == "direction_rad" and middle is not None:
-            own += 360.0 * round((middle - own) / 360.0)
+            estimate += 360.0 * round((middle - estimate) / 360.0)
         rows.append(
             {"name": trial, "run": next(word for word, value in SETS.items() if value == held.get(trial, False))}
-            | {"v": plain(own), "low": plain(own - half), "high": plain(own + half)}
+            | {"v": plain(estimate), "low": plain(estimate - half), "high": plain(estimate + half)}
         )
     band = NORMAL * in_file_units(parameter, whole.standard_errors.get(parameter, 0.0))[1] if whole else 0.0
     messages = [row for row in rows if row["low"] is not None and row["high"] is not None]
     least = min((row["high"] - row["low"] for row in messages), default=0.0)
-    telling = [row for row in messages if row["high"] - row["low"] <= TELLS_LITTLE * least] or messages
+    telling = [row for row in messages if row["high"] - row["low"] <= UNINFORMATIVE * least] or messages
     ends = [row[key] for row in telling for key in ("low", "high")]
     ends += [] if middle is None else [middle - band, middle + band]
     low, high = extent(np.array(ends, dtype=float))
@@ -296,9 +305,11 @@ def _agreement_panel(
     ]
     if middle is not None:
         span = {"low": plain(middle - band), "high": plain(middle + band), "v": plain(middle)}
-        one = alt.Chart(data([span]))
-        shade = one.mark_rect(style="reference", opacity=0.25).encode(x=alt.X("low:Q", scale=scale), x2="high:Q")
-        layers = [shade, one.mark_rule(style="reference").encode(x=alt.X("v:Q", scale=scale)), *layers]
+        effect_found = alt.Chart(data([span]))
+        shade = effect_found.mark_rect(style="reference", opacity=0.25).encode(
+            x=alt.X("low:Q", scale=scale), x2="high:Q"
+        )
+        layers = [shade, effect_found.mark_rule(style="reference").encode(x=alt.X("v:Q", scale=scale)), *layers]
     title = small(f"{effect.replace('_', ' ')}: {words}")
     return alt.layer(*layers).properties(title=title, width=230, height=22 * len(names))
 

@@ -88,8 +88,8 @@ def gap_tracks(gap: Gap, *, held_out: bool, title: str = "") -> alt.ConcatChart 
     Of many trials those are shown whose misfit before was largest.
     """
     chosen = [replay for replay in gap.passed if replay.held_out == held_out]
-    worst = {one.name for one in sorted(chosen, key=lambda one: -one.misfit("before"))[:MOST_TRIALS_DRAWN]}
-    return track_grid([_pair(one) for one in chosen if one.name in worst], title=title)
+    worst = {trial.name for trial in sorted(chosen, key=lambda trial: -trial.misfit("before"))[:MOST_TRIALS_DRAWN]}
+    return track_grid([_pair(trial) for trial in chosen if trial.name in worst], title=title)
 
 
 def gap_histories(gap: Gap, *, held_out: bool, title: str = "") -> list[alt.ConcatChart]:
@@ -100,17 +100,19 @@ def gap_histories(gap: Gap, *, held_out: bool, title: str = "") -> list[alt.Conc
     chosen = [
         replay for replay in gap.passed if replay.held_out == held_out and set(HISTORIES) & set(measured_in(replay))
     ]
-    worst = {one.name for one in sorted(chosen, key=lambda one: -one.misfit("before"))[:MOST_TRIALS_DRAWN]}
-    pairs = [_pair(one) for one in chosen if one.name in worst]
+    worst = {trial.name for trial in sorted(chosen, key=lambda trial: -trial.misfit("before"))[:MOST_TRIALS_DRAWN]}
+    pairs = [_pair(trial) for trial in chosen if trial.name in worst]
     sheets = [pairs[first : first + _PER_SHEET] for first in range(0, len(pairs), _PER_SHEET)]
     return [history_grid(sheet, signals=HISTORIES, title=title) for sheet in sheets]
 
 
-def _pair(one: Passed) -> BeforeAfter:
-    measured = {name: one.measured[name] for name in measured_in(one)}
+def _pair(replay: Passed) -> BeforeAfter:
+    measured = {name: replay.measured[name] for name in measured_in(replay)}
     before, after = (
-        Passage(one.name, False, one.time_s, measured, one.time_s, {name: simulated[name] for name in measured})
-        for simulated in (one.before, one.after)
+        Passage(
+            replay.name, False, replay.time_s, measured, replay.time_s, {name: simulated[name] for name in measured}
+        )
+        for simulated in (replay.before, replay.after)
     )
     return BeforeAfter(before=before, after=after)
 
@@ -147,24 +149,24 @@ def place_chart(gap: Gap, *, title: str = "") -> alt.ConcatChart | None:
     )
 
 
-def _place_panels(one: Passed, place: MisfitPlace) -> alt.VConcatChart:
+def _place_panels(replay: Passed, place: MisfitPlace) -> alt.VConcatChart:
     name, look = signal_display_name(place.signal), series_look([AFTER, BEFORE, MEASURED], as_points=[MEASURED])
-    measured = name.factor * one.measured[place.signal]
-    models = {BEFORE: name.factor * one.before[place.signal], AFTER: name.factor * one.after[place.signal]}
-    there = np.flatnonzero(np.isfinite(measured))
-    points = there[thin_points([measured[there]], SHOWN_POINTS)]
-    rows = records(MEASURED, {"t": one.time_s[points], "v": measured[points]})
-    left: list[ChartRecord] = []
+    measured = name.factor * replay.measured[place.signal]
+    models = {BEFORE: name.factor * replay.before[place.signal], AFTER: name.factor * replay.after[place.signal]}
+    known = np.flatnonzero(np.isfinite(measured))
+    points = known[thin_points([measured[known]], SHOWN_POINTS)]
+    rows = records(MEASURED, {"t": replay.time_s[points], "v": measured[points]})
+    residuals: list[ChartRecord] = []
     for label, values in models.items():
         kept = thin_points([values], SHOWN_SAMPLES)
-        rows += records(label, {"t": one.time_s[kept], "v": values[kept]})
-        kept = there[thin_points([(values - measured)[there]], SHOWN_SAMPLES)]
-        left += records(label, {"t": one.time_s[kept], "v": (values - measured)[kept]})
-    band = NOISE_BAND * name.factor * one.noise[place.signal]
-    times = extent(one.time_s)
+        rows += records(label, {"t": replay.time_s[kept], "v": values[kept]})
+        kept = known[thin_points([(values - measured)[known]], SHOWN_SAMPLES)]
+        residuals += records(label, {"t": replay.time_s[kept], "v": (values - measured)[kept]})
+    band = NOISE_BAND * name.factor * replay.noise[place.signal]
+    times = extent(replay.time_s)
     above = _over_time(rows, times, with_unit(name.words, name.unit), look, labelled=False)
     below = _over_time(
-        left, times, with_unit("simulated − measured", name.unit), look, labelled=True, besides=(-band, band)
+        residuals, times, with_unit("simulated − measured", name.unit), look, labelled=True, included=(-band, band)
     )
     noise = alt.Chart(data([{"low": plain(-band), "high": plain(band)}])).mark_rect(style="reference", opacity=0.3)
     spans = alt.Chart(data([{"from": plain(place.t_start_s), "to": plain(place.t_end_s)}])).mark_rect(
@@ -186,12 +188,12 @@ def _over_time(
     look: SeriesLook,
     *,
     labelled: bool,
-    besides: Sequence[float] = (),
+    included: Sequence[float] = (),
 ) -> list[alt.Chart]:
     axis = alt.Axis(title="time (s)", tickCount=4) if labelled else alt.Axis(title=None, labels=False, ticks=False)
     x = alt.X("t:Q", scale=alt.Scale(domain=list(times), nice=False, zero=False), axis=axis)
     # The scale is reported: it stays when the switch takes a line away.
-    ends = [row["v"] for row in rows if row["v"] is not None] + list(besides)
+    ends = [row["v"] for row in rows if row["v"] is not None] + list(included)
     scale = alt.Scale(domain=list(extent(np.array(ends, dtype=float))), nice=True, zero=False)
     y = alt.Y("v:Q", scale=scale, axis=axis_above(up, tickCount=3))
     tooltip = [
@@ -210,20 +212,20 @@ def _over_time(
 
 def misfit_chart(gap: Gap, *, title: str = "") -> alt.VConcatChart:
     """Misfit of each signal in each trial in noise units, to switch between before, after and both side by side."""
-    there = {name for replay in gap.passed for name in measured_in(replay)}
-    signals = [name for name in OBSERVED_SIGNALS.values() if name in there] + sorted(
-        there - set(OBSERVED_SIGNALS.values())
+    measured = {name for replay in gap.passed for name in measured_in(replay)}
+    signals = [name for name in OBSERVED_SIGNALS.values() if name in measured] + sorted(
+        measured - set(OBSERVED_SIGNALS.values())
     )
     words = {name: signal_display_name(name).file.rpartition("_")[0].replace("_", " ") for name in signals}
     rows = [
-        {"group": f"{word} trials", "trial": replay.name, "signal": words[name], "model": which}
-        | {"misfit": replay.misfit(which, name)}
+        {"group": f"{word} trials", "trial": replay.name, "signal": words[name], "model": model}
+        | {"misfit": replay.misfit(model, name)}
         for word, held in SETS.items()
         for replay in gap.passed
         if replay.held_out == held
         for name in signals
         if name in measured_in(replay)
-        for which in shown_models(gap)
+        for model in shown_models(gap)
     ]
     return misfit_maps(rows, shown_models(gap), title=title)
 
@@ -233,10 +235,10 @@ def small(text: str) -> alt.Title:
     return alt.Title(text, fontSize=11, offset=22, limit=260)
 
 
-def signal_misfit(gap: Gap, which: str, variable: str, *, held_out: bool) -> float | None:
+def signal_misfit(gap: Gap, model: str, variable: str, *, held_out: bool) -> float | None:
     """Misfit of one signal over all trials of a set that measured it, in noise units; None without any."""
     trials = [replay for replay in gap.passed if replay.held_out == held_out and variable in measured_in(replay)]
-    if not trials or (which == "black_box" and not all(variable in trial.black_box for trial in trials)):
+    if not trials or (model == "black_box" and not all(variable in trial.black_box for trial in trials)):
         return None
-    squares: Array = np.array([trial.misfit(which, variable) ** 2 for trial in trials])
+    squares: Array = np.array([trial.misfit(model, variable) ** 2 for trial in trials])
     return float(np.sqrt(squares.mean()))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import altair as alt
@@ -12,6 +13,7 @@ from tank2sim.gap.fleet.summary import REPORT_FILE, FleetTold, ShipTold
 from tank2sim.gap.result import AMBIGUOUS, GAP_VERDICTS, MISSING
 from tank2sim.report.gap.text import effect_in_words, parameter_in_words, with_error
 from tank2sim.report.kit.chart_parts import NUMBER, data, series_look
+from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Link, Page, PageSection, PageTable, Verdict
 
 _SHIPS = (
@@ -23,9 +25,9 @@ _CHART = "The line is the noise; the scale is logarithmic. Where nothing was add
 _BEFORE, _AFTER = "card as given", "card found"
 
 
-def fleet_page(told: FleetTold) -> Page:
-    """The page; it stands in the folder in which each ship has one of its own."""
-    found = [ship for ship in told.ships if not ship.fault]
+def fleet_page(fleet: FleetTold) -> Page:
+    """Return the page, for the folder in which each ship has a page of its own."""
+    found = [ship for ship in fleet.ships if not ship.fault]
     sections = []
     if found:
         chart = _misfit_chart(found)
@@ -35,45 +37,45 @@ def fleet_page(told: FleetTold) -> Page:
                 heading="Ships", text=_SHIPS, tables=[_ships(found)], charts=charts if chart is not None else []
             )
         )
-    if told.faults:
-        rows: list[list[Cell]] = [[fault.folder, fault.fault] for fault in told.faults]
+    if fleet.faults:
+        rows: list[list[Cell]] = [[fault.folder, fault.fault] for fault in fleet.faults]
         columns = [Column(title="ship"), Column(title="why")]
         table = PageTable(caption="Ships that could not be judged", columns=columns, rows=rows)
         sections.append(PageSection(heading="Without a result", tables=[table]))
-    if told.notices:
-        sections.append(PageSection(heading="Notices", notes=told.notices))
+    if fleet.notices:
+        sections.append(PageSection(heading="Notices", notes=fleet.notices))
     return Page(
-        title=f"Fleet: {told.name}",
-        subtitle=f"What the models of {len(told.ships)} ships lack",
-        figures=_figures(told),
+        title=f"Fleet: {fleet.name}",
+        subtitle=f"What the models of {len(fleet.ships)} ships lack",
+        figures=_figures(fleet),
         sections=sections,
     )
 
 
-def _figures(told: FleetTold) -> list[KeyFigure]:
-    counts = told.verdicts
-    figures = [KeyFigure(label="Ships", value=str(len(told.ships)))]
+def _figures(fleet: FleetTold) -> list[KeyFigure]:
+    counts = fleet.verdicts
+    figures = [KeyFigure(label="Ships", value=str(len(fleet.ships)))]
     figures += [
         KeyFigure(label=f"{word[0].upper()}{word[1:]}", value=str(counts[word]))
         for word in GAP_VERDICTS
         if word in counts
     ]
-    if told.faults:
-        figures.append(KeyFigure(label="Without a result", value=str(len(told.faults)), verdict=Verdict.FAILED))
+    if fleet.faults:
+        figures.append(KeyFigure(label="Without a result", value=str(len(fleet.faults)), verdict=Verdict.FAILED))
     return figures
 
 
 def _ships(found: list[ShipTold]) -> PageTable:
     rows: list[list[Cell]] = [
         [
-            Link(text=one.folder, path=f"{one.folder}/{REPORT_FILE}"),
-            one.name,
-            one.verdict,
-            _effects(one),
-            *map(_hundredths, one.misfits()),
-            "held out" if one.judged_by == "holdout" else "fitted",
+            Link(text=ship.folder, path=f"{ship.folder}/{REPORT_FILE}"),
+            ship.name,
+            ship.verdict,
+            _effects(ship),
+            *map(_hundredths, ship.misfits()),
+            "held out" if ship.judged_by == "holdout" else "fitted",
         ]
-        for one in found
+        for ship in found
     ]
     heads = ("ship", "name", "verdict", "what is missing", "misfit before", "misfit after", "of trials")
     # Misfits are rounded to hundredths: nothing more is cut off.
@@ -88,14 +90,14 @@ def _effects(ship: ShipTold) -> str:
     return named if ship.verdict == MISSING else ""
 
 
-def _effect(one: Mapping[str, Any]) -> str:
+def _effect(effect: Mapping[str, Any]) -> str:
     values = []
-    for own, value in one["parameters"].items():
-        words, unit = parameter_in_words(one["name"], own)
-        error = one["standard_errors"].get(own)
+    for parameter, value in effect["parameters"].items():
+        words, unit = parameter_in_words(effect["name"], parameter)
+        error = effect["standard_errors"].get(parameter)
         shown = "?" if value is None else with_error(value, math.nan if error is None else error)
         values.append(f"{words} {shown}{f' {unit}' if unit else ''}")
-    return f"{effect_in_words(one['name'])} ({', '.join(values)})" if values else effect_in_words(one["name"])
+    return f"{effect_in_words(effect['name'])} ({', '.join(values)})" if values else effect_in_words(effect["name"])
 
 
 def _hundredths(misfit: float | None) -> float | None:
@@ -105,15 +107,15 @@ def _hundredths(misfit: float | None) -> float | None:
 def _misfit_chart(found: list[ShipTold]) -> alt.LayerChart | None:
     """Misfit of each ship before and after, a row each; None where no simulation came to its end."""
     rows = [
-        {"ship": one.folder, "run": label, "misfit": _hundredths(misfit)}
-        for one in found
-        for label, misfit in zip((_BEFORE, _AFTER), one.misfits(), strict=True)
+        {"ship": ship.folder, "run": label, "misfit": _hundredths(misfit)}
+        for ship in found
+        for label, misfit in zip((_BEFORE, _AFTER), ship.misfits(), strict=True)
         if misfit
     ]
     if not rows:
         return None
     look = series_look([_BEFORE, _AFTER], as_points=[_BEFORE, _AFTER])
-    y = alt.Y("ship:N", sort=[one.folder for one in found], title=None)
+    y = alt.Y("ship:N", sort=[ship.folder for ship in found], title=None)
     points = (
         alt.Chart(data(rows))
         .mark_point(filled=True, size=70)
@@ -137,3 +139,34 @@ def _misfit_chart(found: list[ShipTold]) -> alt.LayerChart | None:
         description=f"Misfit of {len(found)} ships by the cards as given and by those found.",
     )
     return chart
+
+
+_LINKS = f"Each ship has a page of its own, {REPORT_FILE}, in the folder of its name next to fleet.json."
+
+
+def fleet_page_of_json(found: Json) -> Page:
+    """Return the page of ``fleet.json`` alone: ships by the names of their folders, without links to their pages."""
+    names = ("name", "verdict", "misfit", "trials", "fault")
+    ships = tuple(
+        ShipTold(
+            folder=ship["folder"],
+            effects=tuple(ship.get("effects") or ()),
+            alternatives=tuple(ship.get("alternatives") or ()),
+            **{name: ship[name] for name in names if name in ship},
+        )
+        for ship in found["ships"]
+    )
+    page = fleet_page(FleetTold(name=str(found["fleet"]), ships=ships, notices=tuple(found.get("notices") or ())))
+    return replace(page, sections=[_without_links(section) for section in page.sections])
+
+
+def _without_links(section: PageSection) -> PageSection:
+    tables = [_plain(table) for table in section.tables]
+    linked = any(isinstance(cell, Link) for table in section.tables for row in table.rows for cell in row)
+    text = f"{section.text} {_LINKS}".strip() if linked else section.text
+    return replace(section, text=text, tables=tables)
+
+
+def _plain(table: PageTable) -> PageTable:
+    rows = [[cell.text if isinstance(cell, Link) else cell for cell in row] for row in table.rows]
+    return replace(table, rows=rows)

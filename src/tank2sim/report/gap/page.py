@@ -1,4 +1,4 @@
-"""The page of a gap: what the model lacks, how sure that is, what it changes, and which test would tell more."""
+"""The page of a gap: the missing effect, its probability, its consequences, and the next test."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ from tank2sim.report.gap.charts import (
 from tank2sim.report.gap.text import (
     GOOD,
     as_percent,
-    beside_verdict,
     effect_in_words,
     meaning,
     parameter_cells,
     sizes_of_candidates,
+    verdict_context,
     verdict_in_words,
 )
 from tank2sim.report.kit.numbers import format_number
@@ -58,8 +58,8 @@ def gap_charts(gap: Gap) -> dict[str, alt.TopLevelMixin]:
         "rivals": rival_chart(gap, title="Explanations compared"),
         "misfit": misfit_chart(gap, title="Misfit by signal and manoeuvre"),
         "places": place_chart(gap, title="Where the misfit is worst"),
-        **{f"when_{what}": when_chart(one, title=_WHEN[what]) for what, one in lacking.items() if one},
-        **{what: lacking_chart(one, title=_OVER[what]) for what, one in lacking.items() if one},
+        **{f"when_{what}": when_chart(values, title=_WHEN[what]) for what, values in lacking.items() if values},
+        **{what: lacking_chart(values, title=_OVER[what]) for what, values in lacking.items() if values},
         **{
             f"tracks_{word.replace(' ', '_')}": gap_tracks(gap, held_out=held, title=f"Tracks, trials {_ON[word]}")
             for word, held in SETS.items()
@@ -70,7 +70,7 @@ def gap_charts(gap: Gap) -> dict[str, alt.TopLevelMixin]:
             for sheet, chart in enumerate(gap_histories(gap, held_out=held, title=f"Motions, trials {_ON[word]}"))
         },
         "agreement": agreement_chart(gap, title="What each trial alone would have"),
-        "expected": expected_chart(test, title="What other manoeuvres would tell") if test else None,
+        "expected": expected_chart(test, title="Information of other manoeuvres") if test else None,
     }
     return {stem: chart for stem, chart in made.items() if chart is not None}
 
@@ -79,13 +79,13 @@ def gap_page(gap: Gap, charts: Mapping[str, alt.TopLevelMixin]) -> Page:
     """The page; `charts` as :func:`gap_charts` gives them."""
 
     def drawn(*stems: str) -> list[Illustration]:
-        there = [own for stem in stems for own in charts if own == stem or own.rpartition("_")[0] == stem]
-        return [Illustration(chart=charts[stem], caption=_CAPTIONS.get(stem, _RUN)) for stem in there]
+        names = [name for stem in stems for name in charts if name == stem or name.rpartition("_")[0] == stem]
+        return [Illustration(chart=charts[stem], caption=_CAPTIONS.get(stem, _RUN)) for stem in names]
 
     sections = [
         PageSection(
             heading="Verdict",
-            text="\n\n".join([verdict_in_words(gap), *beside_verdict(gap)]),
+            text="\n\n".join([verdict_in_words(gap), *verdict_context(gap)]),
             tables=[*_parameters(gap), *_candidates(gap), *_explanations(gap)],
             charts=drawn("rivals"),
         ),
@@ -129,10 +129,10 @@ _BEFORE_AND_AFTER = (
     "mean square of simulated less measured, in standard deviations of the measurement noise: 1 is the noise floor, "
     "which no model gets below but by chance. Trials held out took no part in naming the effect."
 )
-_UNCHANGED = " Nothing was added to the card: there is no after."
+_UNCHANGED = " Nothing was added to the card, so that no model after it is shown."
 _BLACK_BOX = (
-    " Beside it stands a linear black box: the card with as many of its linear coefficients refitted as the effect has "
-    "parameters, whatever the cause."
+    " The chart also shows a linear black box: the card with as many of its linear coefficients refitted as the effect "
+    "has parameters, whatever the cause."
 )
 _FIGURES = (
     "Advance, transfer, diameters and overshoots are of turns and zigzags simulated in closed loop, the others of the "
@@ -173,7 +173,7 @@ _CAPTIONS = {
     "signal": f"{_MEANS} What is constant goes with every state.",
     "force": f"The force that the given card needs in addition to follow the measurements. {_MEANS}",
     "agreement": "Points: each trial's own estimate; bars: 95 % intervals. Grey: all fitting trials together. Trials "
-    "that tell little may leave the picture.",
+    "that determine little may leave the picture.",
     "expected": "The larger, the clearer the manoeuvre would decide; the difference is beyond what uncertain "
     "parameters can make up for.",
 }
@@ -193,7 +193,7 @@ def _key_figures(gap: Gap) -> list[KeyFigure]:
             KeyFigure(label="Probability that it is there", value=as_percent(least), verdict=unsure, note=note)
         )
     for word, held in SETS.items():
-        before, after = (gap.misfit(which, held_out=held) for which in ("before", "after"))
+        before, after = (gap.misfit(model, held_out=held) for model in ("before", "after"))
         if before is not None and after is not None:
             worse = Verdict.CAUTION if after > max(before, GOOD) else Verdict.NONE
             note = f"noise units; before {format_number(before, 3)}" if changes_simulation(gap) else "noise units"
@@ -219,16 +219,16 @@ def _parameters(gap: Gap) -> list[PageTable]:
 def _candidates(gap: Gap) -> list[PageTable]:
     """The sizes of the other effects that it could be."""
     rows: list[list[Cell]] = [
-        [effect_in_words(one.name), *parameter_cells(one, name), as_percent(one.confidence)]
-        for one in sizes_of_candidates(gap)
-        for name in one.parameters
+        [effect_in_words(candidate.name), *parameter_cells(candidate, name), as_percent(candidate.confidence)]
+        for candidate in sizes_of_candidates(gap)
+        for name in candidate.parameters
     ]
     heads = ("effect", "parameter", "value", "unit", "meaning", "probability that it is there")
     return [_table("What the others would be, ± one standard error", heads, rows)] if rows else []
 
 
 def _explanations(gap: Gap) -> list[PageTable]:
-    """What each effect does that is no more than possible."""
+    """The consequences of each effect that is only possible."""
     named = [effect.name for effect in gap.effects] if gap.verdict == AMBIGUOUS else []
     possible = dict.fromkeys([*named, *(name for alternative in gap.alternatives for name in alternative)])
     rows: list[list[Cell]] = [
@@ -245,29 +245,29 @@ def _trials(gap: Gap) -> PageTable:
     rows: list[list[Cell]] = [
         [replay.name, word]
         + [
-            _cell(None if which == "black_box" and not replay.black_box else replay.misfit(which))
-            for which in _compared(gap)
+            _cell(None if model == "black_box" and not replay.black_box else replay.misfit(model))
+            for model in _compared(gap)
         ]
         for word, held in SETS.items()
         for replay in gap.passed
         if replay.held_out == held and measured_in(replay)
     ]
-    heads = ("trial", "set", *(which.replace("_", " ") for which in _compared(gap)))
+    heads = ("trial", "set", *(model.replace("_", " ") for model in _compared(gap)))
     return _table("Misfit of each trial, noise units", heads, rows, digits=_ALL)
 
 
 def _signals(gap: Gap) -> PageTable:
-    there = {name for replay in gap.passed for name in measured_in(replay)}
+    measured = {name for replay in gap.passed for name in measured_in(replay)}
     words = [word for word, held in SETS.items() if any(replay.held_out == held for replay in gap.passed)]
-    columns = [(word, which) for word in words for which in _compared(gap)]
+    columns = [(word, model) for word in words for model in _compared(gap)]
     rows: list[list[Cell]] = [
         [signal_display_name(name).words]
-        + [_cell(signal_misfit(gap, which, name, held_out=SETS[word])) for word, which in columns]
+        + [_cell(signal_misfit(gap, model, name, held_out=SETS[word])) for word, model in columns]
         for name in gap.noise
-        if name in there
+        if name in measured
     ]
-    rows.append(["all", *(_cell(gap.misfit(which, held_out=SETS[word])) for word, which in columns)])
-    heads = ("signal", *(f"{word}, {which.replace('_', ' ')}" for word, which in columns))
+    rows.append(["all", *(_cell(gap.misfit(model, held_out=SETS[word])) for word, model in columns)])
+    heads = ("signal", *(f"{word}, {model.replace('_', ' ')}" for word, model in columns))
     return _table("Misfit of each signal, noise units", heads, rows, digits=_ALL)
 
 
@@ -285,7 +285,7 @@ def _cell(misfit: float | None) -> float | None:
 
 def _place_text(gap: Gap) -> str:
     if not gap.where:
-        return "No part of any trial stands out of the noise. The largest misfits are shown all the same."
+        return "No part of any trial exceeds the noise. The largest misfits are shown all the same."
     first, name = gap.where[0], signal_display_name(gap.where[0].signal)
     return (
         f"The largest part of the misfit beyond the noise, {100 * first.share:.0f} %, arises in {name.words} "
@@ -299,7 +299,7 @@ def _acting_text(gap: Gap) -> str:
     found = acting(gap)
     without = _NO_FORCE if earth_bound(gap) and missing_force_intervals(gap) is None else ""
     if not found:
-        none = "the records do not contradict each other" if earth_bound(gap) else "no force stands out of its error"
+        none = "the records do not contradict each other" if earth_bound(gap) else "no force exceeds its error"
         return f"At what moments the cause acts cannot be said: {none}." + without
     first = found[0]
     text = (
@@ -311,8 +311,14 @@ def _acting_text(gap: Gap) -> str:
 
 def _passages(gap: Gap) -> list[PageTable]:
     rows: list[list[Cell]] = [
-        [one.trial, _ACTING.get(one.equation, one.equation), one.t_start_s, one.t_end_s, one.size]
-        for one in acting(gap)[:_MOST_PASSAGES]
+        [
+            passage.trial,
+            _ACTING.get(passage.equation, passage.equation),
+            passage.t_start_s,
+            passage.t_end_s,
+            passage.size,
+        ]
+        for passage in acting(gap)[:_MOST_PASSAGES]
     ]
     columns = [
         *(Column(title=head) for head in ("trial", "equation")),
@@ -340,8 +346,14 @@ _NO_FORCE = (
 
 def _places(gap: Gap) -> list[PageTable]:
     rows: list[list[Cell]] = [
-        [one.trial, signal_display_name(one.signal).words, one.t_start_s, one.t_end_s, 100 * one.share]
-        for one in gap.where
+        [
+            location.trial,
+            signal_display_name(location.signal).words,
+            location.t_start_s,
+            location.t_end_s,
+            100 * location.share,
+        ]
+        for location in gap.where
     ]
     columns = [
         *(Column(title=head) for head in ("trial", "signal")),
@@ -364,11 +376,11 @@ def _track_text(gap: Gap) -> str:
 def _figures(gap: Gap) -> list[PageTable]:
     held = {replay.name: replay.held_out for replay in gap.passed}
     groups: dict[str, list[list[Cell]]] = {}
-    for before, now in sorted(paired_figures(gap), key=lambda pair: not held.get(pair[1].trial)):
-        words, unit = in_words(now.name)
-        word = "held out" if held.get(now.trial) else "fitting"
-        simulated = [before.predicted if before else None, *([now.predicted] if changes_simulation(gap) else [])]
-        groups.setdefault(unit, []).append([now.trial, word, words, now.measured, *simulated])
+    for before, after in sorted(paired_figures(gap), key=lambda pair: not held.get(pair[1].trial)):
+        words, unit = in_words(after.name)
+        word = "held out" if held.get(after.trial) else "fitting"
+        simulated = [before.predicted if before else None, *([after.predicted] if changes_simulation(gap) else [])]
+        groups.setdefault(unit, []).append([after.trial, word, words, after.measured, *simulated])
     heads = ("trial", "set", "figure", "measured", *shown_models(gap))
     return [
         _table(f"Figures in {unit}" if unit else "Figures without unit", heads, rows, digits=4)
@@ -380,8 +392,8 @@ def _could_hide(gap: Gap) -> PageTable | None:
     rows: list[list[Cell]] = []
     for effect, sizes in hidden(gap).items():
         for name, size in sizes.items():
-            own, value = in_file_units(name, size)
-            words, unit = in_words(own)
+            parameter, value = in_file_units(name, size)
+            words, unit = in_words(parameter)
             shown = format_number(value, 2)
             shown = f"{shown} in place of the card's" if replaces(effect, name) else f"up to {shown}"
             rows.append([effect_in_words(effect), words, shown, unit or "-", meaning(effect, name)])
@@ -392,11 +404,11 @@ def _could_hide(gap: Gap) -> PageTable | None:
 def _next_test(gap: Gap) -> str:
     test = gap.next_test
     if test is None:
-        return "" if gap.verdict in (MISSING, NO_EFFECT_MISSING) else "No manoeuvre was found that would tell more."
-    # The command stands alone: in a line with others it is broken at its hyphens.
+        return "" if gap.verdict in (MISSING, NO_EFFECT_MISSING) else "No manoeuvre was found that would decide more."
+    # The command has a line of its own: among other words it is broken at its hyphens.
     command = f"tank2sim simulate improved.toml --manoeuvre {test.manoeuvre}"
     why = f"{test.why[0].upper()}{test.why[1:].rstrip('.')}."
-    return f"{why}\n\nIts orders stand in {NEXT_TEST_FILE}. To see it beforehand:\n\n{command}"
+    return f"{why}\n\nIts orders are in {NEXT_TEST_FILE}. To see it beforehand:\n\n{command}"
 
 
 def _noise(gap: Gap) -> PageTable:

@@ -24,7 +24,7 @@ def effect_in_words(name: str) -> str:
 
 def verdict_in_words(gap: Gap) -> str:
     """What was found, in a sentence or two, and what is to be said against it."""
-    return " ".join([_found(gap), *(f"Caution: {one}." for one in proof_cautions(gap))])
+    return " ".join([_found(gap), *(f"Caution: {caution}." for caution in proof_cautions(gap))])
 
 
 def probabilities_in_words(gap: Gap) -> list[str]:
@@ -48,8 +48,8 @@ def sizes_of_candidates(gap: Gap) -> list[Named]:
     """The effects of an ambiguous verdict next to the first explanation, of the size that each would have."""
     sizes = gap.next_test.sizes if gap.next_test is not None else {}
     known = {effect.name for effect in gap.effects}
-    others = dict.fromkeys(name for names in gap.alternatives for name in names if name not in known)
-    return [Named(name, *sizes[name], _sure(gap, name)) for name in others if name in sizes]
+    unknown = dict.fromkeys(name for names in gap.alternatives for name in names if name not in known)
+    return [Named(name, *sizes[name], _sure(gap, name)) for name in unknown if name in sizes]
 
 
 def _sure(gap: Gap, name: str) -> float:
@@ -78,28 +78,28 @@ def _found(gap: Gap) -> str:
             [*([tuple(effect.name for effect in gap.effects)] if gap.effects else []), *gap.alternatives]
         )
         names = ", or ".join(" with ".join(map(effect_in_words, candidate)) for candidate in candidates)
-        return f"Something is missing, but these data cannot tell which of several effects it is: {names}."
+        return f"Something is missing, but these data do not distinguish several effects: {names}."
     if gap.verdict == NO_EFFECT_MISSING:
         good = after is None or after <= GOOD
-        rest = "" if good else ", which is more than noise, but no effect explains the rest better than none"
-        return f"No missing effect shows in these data{': the card as given' + follows + rest if follows else ''}."
+        remainder = "" if good else ", which is more than noise, but no effect explains the rest better than none"
+        return f"No missing effect shows in these data{': the card as given' + follows + remainder if follows else ''}."
     return (
         "Something is missing that no effect of the library explains: what is left has a pattern of its own, "
         "and no name is given although some effect always fits a little."
     )
 
 
-def _with_values(one: Named) -> str:
+def _with_values(effect: Named) -> str:
     values = []
-    for name in one.parameters:
-        words, value, unit, _ = parameter_cells(one, name)
+    for name in effect.parameters:
+        words, value, unit, _ = parameter_cells(effect, name)
         values.append(f"{words} {value}{'' if unit == '-' else f' {unit}'}")
-    return f"{effect_in_words(one.name)} ({', '.join(values)})" if values else effect_in_words(one.name)
+    return f"{effect_in_words(effect.name)} ({', '.join(values)})" if values else effect_in_words(effect.name)
 
 
-def beside_verdict(gap: Gap) -> list[str]:
+def verdict_context(gap: Gap) -> list[str]:
     """Confidence, rivals and place, a paragraph each."""
-    messages = [f"{one[0].upper()}{one[1:]}." for one in probabilities_in_words(gap)]
+    messages = [f"{text[0].upper()}{text[1:]}." for text in probabilities_in_words(gap)]
     if gap.alternatives and gap.verdict != AMBIGUOUS:
         names = "; ".join(" with ".join(map(effect_in_words, alternative)) for alternative in gap.alternatives)
         messages.append(f"What else it could be: {names}. These data cannot distinguish them.")
@@ -120,20 +120,20 @@ _EQUATIONS = {
 }
 
 
-def parameter_cells(one: Named, name: str) -> list[Cell]:
+def parameter_cells(effect: Named, name: str) -> list[Cell]:
     """Words, value with its standard error, unit and meaning of a parameter."""
-    own, value = estimate_in_file(name, one.parameters[name])
-    words, unit = parameter_in_words(one.name, own)
-    error = in_file_units(name, one.standard_errors[name])[1] if name in one.standard_errors else math.nan
-    text = f"{meaning(one.name, name)}{'' if name in one.standard_errors else ' (held)'}"
+    key, value = estimate_in_file(name, effect.parameters[name])
+    words, unit = parameter_in_words(effect.name, key)
+    error = in_file_units(name, effect.standard_errors[name])[1] if name in effect.standard_errors else math.nan
+    text = f"{meaning(effect.name, name)}{'' if name in effect.standard_errors else ' (held)'}"
     return [words, with_error(value, error), unit or "-", text]
 
 
-def parameter_in_words(effect: str, own: str) -> tuple[str, str]:
+def parameter_in_words(effect: str, key: str) -> tuple[str, str]:
     """Words and unit of a parameter by its name in a file; a direction is reported to be that from or towards which."""
-    words, unit = in_words(own)
-    told = meaning(effect, to_si(own, 0.0)[0])
-    way = next((word for word in ("from", "towards") if f"direction {word} which" in told), "")
+    words, unit = in_words(key)
+    description = meaning(effect, to_si(key, 0.0)[0])
+    way = next((word for word in ("from", "towards") if f"direction {word} which" in description), "")
     return f"{words} {way}".strip(), unit
 
 
@@ -150,7 +150,7 @@ def with_error(value: float, error: float) -> str:
 def meaning(effect: str, parameter: str) -> str:
     """What a parameter of an effect is."""
     known = EFFECTS[effect].parameters if effect in EFFECTS else ()
-    return next((one.description for one in known if one.name == parameter), "")
+    return next((parameter_known.description for parameter_known in known if parameter_known.name == parameter), "")
 
 
 def noises(misfit: float) -> str:

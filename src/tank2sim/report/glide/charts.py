@@ -70,7 +70,7 @@ def isometric_chart(path: SpacePath, corners: SpacePath, *, title: str = "") -> 
     drawn = []
     for label, flat in ((path.label, False), ("seen from above", True)):
         drawn.append((label, *_projected(path.north_m, path.east_m, path.height_m, flat=flat)))
-    arms = _arms(0.25 * max(1.0, *(float(np.abs(vector(one)).max()) for one in (path.north_m, path.east_m))))
+    arms = _arms(0.25 * max(1.0, *(float(np.abs(vector(values)).max()) for values in (path.north_m, path.east_m))))
     ends = (corners.north_m, corners.east_m, corners.height_m)
     for place, points in enumerate(zip(_points(*ends, flat=True), _points(*ends, flat=False), strict=True)):
         arms += [{"axis": f"plumb {place}", "name": "", "a": a, "b": b, "i": i} for i, (a, b) in enumerate(points)]
@@ -93,7 +93,7 @@ def _arms(length: float) -> list[ChartRecord]:
     """The three axes, as arms from the origin."""
     rows: list[ChartRecord] = []
     for name, end in (("north", (length, 0, 0)), ("east", (0, length, 0)), ("up", (0, 0, length))):
-        points = [(0.0, 0.0), *_points(*([one] for one in end), flat=False)]
+        points = [(0.0, 0.0), *_points(*([point] for point in end), flat=False)]
         rows += [{"axis": name, "name": name if i else "", "a": a, "b": b, "i": i} for i, (a, b) in enumerate(points)]
     return rows
 
@@ -201,8 +201,8 @@ def _plane(
     arms: Sequence[ChartRecord] = (),
 ) -> alt.LayerChart:
     """Lines in a plane with one scale; with `arms`, lines of reference with a name at their end, there are no axes."""
-    across = np.concatenate([*(one[1] for one in drawn), vector([arm["a"] for arm in arms])])
-    up = np.concatenate([*(one[2] for one in drawn), vector([arm["b"] for arm in arms])])
+    across = np.concatenate([*(outline[1] for outline in drawn), vector([arm["a"] for arm in arms])])
+    up = np.concatenate([*(outline[2] for outline in drawn), vector([arm["b"] for arm in arms])])
     frame = equal_frame(across, up, width_px=680, height_px=height_px)
     position = frame.axes(across=("a:Q", titles[0]), up=("b:Q", titles[1]))
     if arms:

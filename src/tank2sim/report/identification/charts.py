@@ -161,7 +161,7 @@ def _histories(pair: BeforeAfter, signals: Mapping[str, tuple[str, str]]) -> tup
 
 
 def _whole(rows: Sequence[ChartRecord], field: str) -> alt.Scale:
-    # Told, that it stays when the switch takes a line away.
+    # Given explicitly, so that it stays when the switch takes a line away.
     values = np.array([row[field] for row in rows if row.get(field) is not None], dtype=float)
     return alt.Scale(domain=list(extent(values)), nice=True, zero=False)
 
@@ -179,7 +179,7 @@ def window_chart(
         Of the chart.
     """
     every = [result for pair in sets.values() for results in pair for result in results]
-    signals = [SYMBOLS[name][0] for name in SYMBOLS if any(name in one.windows for one in every)]
+    signals = [SYMBOLS[name][0] for name in SYMBOLS if any(name in comparison.windows for comparison in every)]
     rows = []
     for word, pair in sets.items():
         maps = [
@@ -227,7 +227,7 @@ def _window_map(results: Sequence[Following], signals: Sequence[str], title: str
 def figure_chart(
     sets: Mapping[str, tuple[Sequence[FigureComparison], Sequence[FigureComparison]]], *, title: str = ""
 ) -> alt.VConcatChart | None:
-    """Figures of turns and zigzags, predicted against measured, and their errors; None if there is no figure.
+    """Figures of turns and zigzags, predicted against measured, and their errors; None without a figure.
 
     Parameters
     ----------
@@ -258,17 +258,17 @@ def _figure_rows(
                     yield {"run": label, "set": word} | _figure_row(figure, ending)
 
 
-def _figure_row(one: FigureComparison, ending: str) -> ChartRecord:
-    predicted = math.nan if one.predicted is None else one.predicted
-    low, high = one.interval or (predicted, predicted)
+def _figure_row(figure: FigureComparison, ending: str) -> ChartRecord:
+    predicted = math.nan if figure.predicted is None else figure.predicted
+    low, high = figure.interval or (predicted, predicted)
 
     def error(value: float) -> float | None:
-        difference = value - one.measured
-        return plain(100 * difference / one.measured if ending == "_m" else difference)
+        difference = value - figure.measured
+        return plain(100 * difference / figure.measured if ending == "_m" else difference)
 
     return {
-        "name": f"{one.trial} · {one.name.removesuffix(ending).replace('_', ' ')}",
-        "measured": plain(one.measured),
+        "name": f"{figure.trial} · {figure.name.removesuffix(ending).replace('_', ' ')}",
+        "measured": plain(figure.measured),
         "predicted": plain(predicted),
         "low": plain(low),
         "high": plain(high),
@@ -334,17 +334,17 @@ def _series(pair: BeforeAfter, names: Sequence[str]) -> dict[str, dict[str, Arra
     }
     series = {}
     for label, (time, columns) in sources.items():
-        there = {name: columns[name] for name in names if name in columns}
-        if label == MEASURED and there:
+        known = {name: columns[name] for name in names if name in columns}
+        if label == MEASURED and known:
             inside = _simulated_part(pair, time)
-            series[label] = {name: values[inside] for name, values in {"time": time, **there}.items()}
-        elif there:
-            series[label] = {"time": time, **there}
+            series[label] = {name: values[inside] for name, values in {"time": time, **known}.items()}
+        elif known:
+            series[label] = {"time": time, **known}
     return series
 
 
 def _simulated_part(pair: BeforeAfter, time: Array) -> slice:
-    ends = [one.model_time_s[[0, -1]] for one in (pair.after, pair.before) if len(one.model_time_s)]
+    ends = [replay.model_time_s[[0, -1]] for replay in (pair.after, pair.before) if len(replay.model_time_s)]
     if not ends:
         return slice(None)
     first, last = np.searchsorted(time, [min(end[0] for end in ends), max(end[1] for end in ends)])
@@ -352,16 +352,16 @@ def _simulated_part(pair: BeforeAfter, time: Array) -> slice:
 
 
 def _thinned(label: str, columns: Sequence[Array]) -> Indices:
-    # Several signals stand on one set of samples: evenly spread ones, and the extremes of each.
+    # Several signals share one set of samples: evenly spread ones, and the extremes of each.
     return thin_points(columns, MEASURED_SAMPLES if label == MEASURED else MODEL_SAMPLES)
 
 
 def _marks(position: Position, tooltip: Sequence[alt.Tooltip]) -> list[alt.Chart]:
-    # The data stand once for all panels of a trial: the series determines what is a line and what a point.
+    # All panels of a trial share their data: the series determines what is a line and what a point.
     # Encodings are handed over as dictionaries: Altair copies its own objects, with all they leave open, at every
     # level.
     place = {name: channel.to_dict() for name, channel in position.items()}
-    messages = [one.to_dict() for one in tooltip]
+    messages = [shown.to_dict() for shown in tooltip]
     points = place | _POINT_LOOK | {"tooltip": messages}
     lines = place | _LINE_LOOK | {"order": {"field": "i", "type": "quantitative"}}
     return [_drawn("point", "==", points, size=14, strokeWidth=1), _drawn("line", "!=", lines, strokeWidth=1.5)]
@@ -376,14 +376,17 @@ def _drawn(kind: str, sign: str, encoding: ChartRecord, **mark: float) -> alt.Ch
 
 
 def _grid(
-    panels: Sequence[alt.LayerChart | alt.VConcatChart], title: str, told: str, columns: int = PANELS_PER_ROW
+    panels: Sequence[alt.LayerChart | alt.VConcatChart],
+    title: str,
+    alternative_text: str,
+    columns: int = PANELS_PER_ROW,
 ) -> alt.ConcatChart:
     chart = alt.concat(*panels, columns=columns, spacing=26, params=switch(list(MODEL_SERIES))).resolve_scale(**_SHARED)
-    return chart.properties(title=title, description=told)
+    return chart.properties(title=title, description=alternative_text)
 
 
 def _with_rows(chart: alt.ConcatChart, rows: Mapping[str, list[ChartRecord]]) -> alt.ConcatChart:
-    # Data by name, put in at last: Altair copies those that stand in a panel whenever the panel is put into another.
+    # Data by name, put in at last: Altair copies those of a panel whenever the panel is put into another.
     chart["datasets"] = dict(rows)
     return chart
 

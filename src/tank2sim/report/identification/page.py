@@ -50,10 +50,10 @@ def identification_charts(
     """File stem to chart; `fitted` and `held` as :func:`pairs_of` gives them."""
     charts: dict[str, alt.TopLevelMixin] = {}
     sets = _sets(result)
-    errors = {word: (before.following, now.following) for word, (before, now) in sets.items()}
+    errors = {word: (before.following, after.following) for word, (before, after) in sets.items()}
     charts["windows"] = window_chart(errors, title="Error over windows of five ship lengths, of each signal")
     if chart := figure_chart(
-        {word: (before.figures, now.figures) for word, (before, now) in sets.items()},
+        {word: (before.figures, after.figures) for word, (before, after) in sets.items()},
         title="Figures of turns and zigzags, in closed loop",
     ):
         charts["figures"] = chart
@@ -64,13 +64,13 @@ def identification_charts(
                 charts[f"tracks_{stem}"] = tracks
             for first in range(0, len(shown), _PER_SHEET):
                 part = f"_{first // _PER_SHEET + 1}" if first else ""
-                own = shown[first : first + _PER_SHEET]
-                charts[f"histories_{stem}{part}"] = history_grid(own, title=f"Motions of trials {word}")
+                sheet = shown[first : first + _PER_SHEET]
+                charts[f"histories_{stem}{part}"] = history_grid(sheet, title=f"Motions of trials {word}")
     known, estimate = result.identifiability, result.estimate
     names = [name.removeprefix("derivatives.") for name in estimate.free]
     # The prior as the fit took it: widened where the trials demanded.
     prior = scaled_prior(result.problem, estimate.prior_scale)
-    these = Parameters(
+    parameters = Parameters(
         names=names,
         values=estimate.values,
         errors=estimate.standard_errors,
@@ -78,9 +78,9 @@ def identification_charts(
         prior_errors=prior,
         share=known.share,
     )
-    charts["parameters"] = parameter_chart(these, title="Parameters: estimate and prior with 95 % intervals")
+    charts["parameters"] = parameter_chart(parameters, title="Parameters: estimate and prior with 95 % intervals")
     charts["correlation"] = correlation_chart(known, title="Correlation of the parameters, by the trials alone")
-    charts["singular_values"] = singular_value_chart(known, title="What the trials tell: singular values")
+    charts["singular_values"] = singular_value_chart(known, title="Information of the trials: singular values")
     return charts
 
 
@@ -157,8 +157,8 @@ _CAPTIONS = {
     "histories": "Turns and zigzags in closed loop, others with the recorded rudder. Drift angle positive when the "
     "water comes from port.",
     "parameters": "In standard errors of the prior, as the fit took it.",
-    "singular": "Sensitivities of all that was measured, in units of the prior. Below the red line the prior tells "
-    "more than the trials.",
+    "singular": "Sensitivities of all that was measured, in units of the prior. Below the red line the prior "
+    "determines more than the trials.",
 }
 
 
@@ -169,9 +169,11 @@ def _sets(result: Identification) -> dict[str, tuple[Comparison, Comparison]]:
     return sets
 
 
-def _worst(pairs: Sequence[BeforeAfter], now: Comparison) -> list[BeforeAfter]:
+def _worst(pairs: Sequence[BeforeAfter], comparison: Comparison) -> list[BeforeAfter]:
     """The trials with the largest error of yaw rate, in their own order, where there are too many for a picture."""
-    errors = {one.name: one.relative("motion.r") if "motion.r" in one.windows else 0.0 for one in now.following}
+    errors = {
+        trial.name: trial.relative("motion.r") if "motion.r" in trial.windows else 0.0 for trial in comparison.following
+    }
     kept = {pair.name for pair in sorted(pairs, key=lambda pair: -errors.get(pair.name, 0.0))[:MOST_TRIALS]}
     return [pair for pair in pairs if pair.name in kept]
 
@@ -179,27 +181,32 @@ def _worst(pairs: Sequence[BeforeAfter], now: Comparison) -> list[BeforeAfter]:
 def _key_figures(result: Identification) -> list[KeyFigure]:
     sets = _sets(result)
     word = HELD_OUT if HELD_OUT in sets else FITTED
-    before, now = sets[word]
+    before, after = sets[word]
     figures = [
         KeyFigure(label="Trials fitted", value=len(result.problem.runs)),
         KeyFigure(label="Trials held out", value=len(result.holdout.following) if result.holdout else 0),
         KeyFigure(label="Coefficients", value=len(result.estimate.free), note=f"{len(result.card.effects)} effects"),
-        _compared("Yaw-rate error", word, "%", *(100 * pooled(one.following, "motion.r") for one in (before, now))),
+        _compared(
+            "Yaw-rate error",
+            word,
+            "%",
+            *(100 * pooled(comparison.following, "motion.r") for comparison in (before, after)),
+        ),
     ]
     for label, unit, names in (
         ("Overshoot error", "deg", ("overshoot_1_deg", "overshoot_2_deg")),
         ("Advance error", "%", TURN_FIGURE_NAMES[:1]),
     ):
-        old, new = (_rms(one, names, 100 if unit == "%" else 1) for one in (before, now))
+        old, new = (_rms(comparison, names, 100 if unit == "%" else 1) for comparison in (before, after))
         if not np.isnan(new):
             figures.append(_compared(label, word, unit, old, new))
     return figures
 
 
-def _compared(label: str, word: str, unit: str, before: float, now: float) -> KeyFigure:
-    worse = Verdict.CAUTION if now > before else Verdict.NONE
+def _compared(label: str, word: str, unit: str, before: float, after: float) -> KeyFigure:
+    worse = Verdict.CAUTION if after > before else Verdict.NONE
     note = f"rms; before {before:.3g} {unit}" if np.isfinite(before) else "rms; before: not reached"
-    return KeyFigure(label=f"{label}, {word}", value=float(f"{now:.3g}"), unit=unit, verdict=worse, note=note)
+    return KeyFigure(label=f"{label}, {word}", value=float(f"{after:.3g}"), unit=unit, verdict=worse, note=note)
 
 
 def _rms(comparison: Comparison, names: Sequence[str], factor: float) -> float:
@@ -223,8 +230,8 @@ def _figure_tables(result: Identification) -> list[PageTable]:
         # Degrees and metres are not of one size: in one column the digits of the one would hide the other's errors.
         for ending, caption in (("_deg", "overshoots in deg"), ("_m", "distances in m, with their error in %")):
             rows = [
-                [trial, str(name).rpartition("_")[0].replace("_", " "), *rest]
-                for trial, group, name, *rest in figure_rows(result)
+                [trial, str(name).rpartition("_")[0].replace("_", " "), *cells]
+                for trial, group, name, *cells in figure_rows(result)
                 if group == word and str(name).endswith(ending)
             ]
             if rows:
@@ -233,5 +240,7 @@ def _figure_tables(result: Identification) -> list[PageTable]:
 
 
 def _table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[object]]) -> PageTable:
-    cells: list[list[Cell]] = [[one if isinstance(one, float | int | str) else None for one in row] for row in rows]
+    cells: list[list[Cell]] = [
+        [value if isinstance(value, float | int | str) else None for value in row] for row in rows
+    ]
     return PageTable(caption=caption, columns=[Column(title=head) for head in heads], rows=cells)

@@ -1,4 +1,4 @@
-"""Charts of estimated parameters: next to what was known of them, how they hang together, what the trials tell."""
+"""Charts of estimated parameters: values next to the prior, correlations, information of the trials."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ class Parameters:
     share: Array
 
 
-def parameter_chart(these: Parameters, *, title: str = "") -> alt.HConcatChart:
+def parameter_chart(parameters: Parameters, *, title: str = "") -> alt.HConcatChart:
     """Estimates with their 95 % intervals next to the priors', in standard errors of the prior; shares next to."""
-    rows = [_parameter_row(these, place) for place in range(len(these.names))]
+    rows = [_parameter_row(parameters, place) for place in range(len(parameters.names))]
     farthest = max((abs(row[key]) for row in rows for key in ("low", "high")), default=1.0)
     # A few derivatives may move by dozens of standard errors, where the others move by one.
     kind = {"type": "symlog", "constant": 2} if farthest > 12 else {}
     ticks = {"values": _symmetric_ticks(farthest)} if kind else {}
-    y = alt.Y("name:N", sort=list(these.names), axis=alt.Axis(title=None, grid=True, labelLimit=200))
+    y = alt.Y("name:N", sort=list(parameters.names), axis=alt.Axis(title=None, grid=True, labelLimit=200))
     x = alt.X("v:Q", scale=alt.Scale(**kind), title="value less prior, in standard errors of the prior (-)")
     x = x.axis(**ticks)
     tooltip = [
         alt.Tooltip("name:N", title="parameter"),
         alt.Tooltip("own:N", title="found"),
         alt.Tooltip("known:N", title="before"),
-        alt.Tooltip("told:N", title="from trials"),
+        alt.Tooltip("share_text:N", title="from trials"),
     ]
     look = series_look(["estimate", "prior"], as_points=["estimate", "prior"])
     bands = [row | {"run": "prior", "v": 0.0, "low": -_NORMAL, "high": _NORMAL} for row in rows]
@@ -52,7 +52,7 @@ def parameter_chart(these: Parameters, *, title: str = "") -> alt.HConcatChart:
         layers.append(base.mark_rule(strokeWidth=1.8, yOffset=offset).encode(x=alt.X("low:Q"), x2="high:Q"))
         layers.append(base.mark_point(size=34, yOffset=offset).encode(x=x, shape=look.shape))
     height = 21 * len(rows)
-    bare = alt.Y("name:N", sort=list(these.names), axis=alt.Axis(title=None, labels=False, ticks=False))
+    bare = alt.Y("name:N", sort=list(parameters.names), axis=alt.Axis(title=None, labels=False, ticks=False))
     shares = alt.X("share:Q", scale=alt.Scale(domain=[0, 100]), title="information from trials (%)")
     bars = alt.Chart(data(rows)).mark_bar(height=9, opacity=0.7).encode(x=shares, y=bare, tooltip=tooltip)
     intervals = alt.layer(*layers).properties(width=400, height=height)
@@ -62,18 +62,21 @@ def parameter_chart(these: Parameters, *, title: str = "") -> alt.HConcatChart:
     )
 
 
-def _parameter_row(these: Parameters, place: int) -> ChartRecord:
-    unit = these.prior_errors[place]
-    value, error = (these.values[place] - these.prior[place]) / unit, _NORMAL * these.errors[place] / unit
+def _parameter_row(parameters: Parameters, place: int) -> ChartRecord:
+    unit = parameters.prior_errors[place]
+    value, error = (
+        (parameters.values[place] - parameters.prior[place]) / unit,
+        _NORMAL * parameters.errors[place] / unit,
+    )
     return {
-        "name": these.names[place],
+        "name": parameters.names[place],
         "v": plain(value),
         "low": plain(value - error),
         "high": plain(value + error),
-        "share": plain(100 * these.share[place]),
-        "own": f"{these.values[place]:.5g} ± {these.errors[place]:.2g}",
-        "known": f"{these.prior[place]:.5g} ± {unit:.2g}",
-        "told": f"{100 * these.share[place]:.0f} %",
+        "share": plain(100 * parameters.share[place]),
+        "own": f"{parameters.values[place]:.5g} ± {parameters.errors[place]:.2g}",
+        "known": f"{parameters.prior[place]:.5g} ± {unit:.2g}",
+        "share_text": f"{100 * parameters.share[place]:.0f} %",
     }
 
 
@@ -88,9 +91,9 @@ def correlation_chart(known: Identifiability, *, title: str = "") -> alt.LayerCh
     names = [name.removeprefix("derivatives.") for name in known.free]
     step = max(8, min(24, 560 // len(names)))
     rows: list[ChartRecord] = [
-        {"one": name, "other": other, "c": plain(known.correlation[row, column])}
+        {"one": name, "other": column_name, "c": plain(known.correlation[row, column])}
         for row, name in enumerate(names)
-        for column, other in enumerate(names)
+        for column, column_name in enumerate(names)
     ]
     axis = alt.Axis(title=None, labelLimit=200, ticks=False)
     x = alt.X("other:N", sort=names, axis=axis)
@@ -113,11 +116,13 @@ def correlation_chart(known: Identifiability, *, title: str = "") -> alt.LayerCh
 
 
 def singular_value_chart(known: Identifiability, *, title: str = "") -> alt.LayerChart:
-    """Singular values of the sensitivities in units of the prior, falling; below 1 the prior tells more."""
+    """Singular values of the sensitivities in units of the prior, falling; below 1 the prior determines more."""
     rows = [
         {"order": place + 1, "v": plain(float(value))} for place, value in enumerate(known.singular_values) if value > 0
     ]
-    x = alt.X("order:Q", title="direction, by what the trials tell of it (-)", scale=alt.Scale(nice=False, padding=10))
+    x = alt.X(
+        "order:Q", title="direction, by the information of the trials (-)", scale=alt.Scale(nice=False, padding=10)
+    )
     x = x.axis(format="d", tickMinStep=1)
     y = alt.Y("v:Q", title="singular value (-)", scale=alt.Scale(type="log"), axis=alt.Axis(format="~g"))
     tooltip = [alt.Tooltip("order:Q", title="direction"), alt.Tooltip("v:Q", title="singular value", format=NUMBER)]

@@ -44,7 +44,7 @@ class InfluenceData:
             return np.array([[row.get(key) for key in parameters] for row in values.values()], dtype=float)
 
         def part(name: str) -> Array:
-            return table({text: {key: one[name] for key, one in row.items()} for text, row in figures.items()})
+            return table({text: {key: cell[name] for key, cell in row.items()} for text, row in figures.items()})
 
         shares = table({text: found["figures"][text]["share_of_variance"] for text in figures})
         names = tuple(short_name(key, parameter) for key, parameter in parameters.items())
@@ -160,11 +160,13 @@ def variance_chart(result: InfluenceData) -> alt.Chart:
 
 def moves_chart(tuned: Json, names: Mapping[str, str]) -> alt.LayerChart:
     """What tuning changed, in standard errors of the card, with the bounds; `names` are those of the keys."""
-    moves = {key: one for key, one in tuned["parameters"].items() if one["standard_errors"] is not None}
+    moves = {
+        key: parameter for key, parameter in tuned["parameters"].items() if parameter["standard_errors"] is not None
+    }
     rows: list[ChartRecord] = [
-        {"name": names.get(key, key), "z": plain(one["standard_errors"])}
-        | {"before": plain(one["before"]), "after": plain(one["after"])}
-        for key, one in list(moves.items())[:_MOST_ROWS]
+        {"name": names.get(key, key), "z": plain(parameter["standard_errors"])}
+        | {"before": plain(parameter["before"]), "after": plain(parameter["after"])}
+        for key, parameter in list(moves.items())[:_MOST_ROWS]
     ]
     shown = [row["name"] for row in rows]
     x = alt.X("z:Q", title="move (standard errors of the card)")

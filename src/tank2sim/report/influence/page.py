@@ -55,7 +55,7 @@ def influence_page(found: Json) -> Page:
     return Page(
         title=f"{found['ship']}: influence coefficients",
         subtitle=f"{len(coefficients.names)} parameters on {len(coefficients.figures)} figures",
-        figures=[_key_figure(text, one, tuned or {}) for text, one in found["figures"].items()],
+        figures=[_key_figure(text, figure, tuned or {}) for text, figure in found["figures"].items()],
         sections=sections,
     )
 
@@ -68,17 +68,17 @@ def _targets_of(tuned: Mapping[str, Json]) -> dict[str, tuple[Mapping[str, Json]
     }
 
 
-def _key_figure(text: str, one: Mapping[str, Json], tuned: Mapping[str, Json]) -> KeyFigure:
+def _key_figure(text: str, figure: Mapping[str, Json], tuned: Mapping[str, Json]) -> KeyFigure:
     kind, _, argument = text.partition("@")
     words, unit = in_words(kind)
     label = f"{words}, {argument} deg" if argument else words
     after, (target, verdict) = tuned.get("figures", {}).get(text), _targets_of(tuned).get(text, ({}, Verdict.NONE))
     if after is None:
-        note = f"standard error {one['standard_error']:.2g}"
-        return KeyFigure(label=label, value=one["value"], unit=unit, note=note)
-    note = f"was {one['value']:.5g} before tuning"
+        note = f"standard error {figure['standard_error']:.2g}"
+        return KeyFigure(label=label, value=figure["value"], unit=unit, note=note)
+    note = f"was {figure['value']:.5g} before tuning"
     if target:
-        note = f"was {one['value']:.5g}, target {target['relation']} {target['wanted']:g}"
+        note = f"was {figure['value']:.5g}, target {target['relation']} {target['wanted']:g}"
     return KeyFigure(label=label, value=after, unit=unit, verdict=verdict, note=note)
 
 
@@ -133,7 +133,7 @@ def _together(agreed: Mapping[str, Json]) -> PageSection:
         "direct": "direct",
     }
     figures: list[Sequence[Cell]] = [
-        [text, *(_cell(one[way]) for way in ways)] for text, one in agreed["figures"].items()
+        [text, *(_cell(figure[way]) for way in ways)] for text, figure in agreed["figures"].items()
     ]
     percent = [Column(title=title, unit="%") for title in ways.values()]
     return PageSection(
@@ -154,10 +154,10 @@ def _together(agreed: Mapping[str, Json]) -> PageSection:
 def _tuning(found: Json, tuned: Mapping[str, Json]) -> PageSection:
     targets = _targets_of(tuned)
     figures: list[Sequence[Cell]] = []
-    for text, one in found["figures"].items():
+    for text, figure in found["figures"].items():
         target, verdict = targets.get(text, ({}, None))
         wanted = f"{target['relation']} {target['wanted']:g}" if target else ""
-        figures.append([text, wanted, one["value"], tuned["figures"].get(text), verdict])
+        figures.append([text, wanted, figure["value"], tuned["figures"].get(text), verdict])
     heads = ("figure", "target", "before", "after", "")
     notes = []
     if contradiction := tuned["contradiction"]:
@@ -170,7 +170,7 @@ def _tuning(found: Json, tuned: Mapping[str, Json]) -> PageSection:
         notes.append(f"{what} within the bounds. What is shown is the nearest, in least squares of relative misses.")
     if tuned["agreed_times"] is not None:
         notes.append(f"The agreed variation was taken {tuned['agreed_times']:+.3g} times.")
-    names = {key: short_name(key, one) for key, one in found["parameters"].items()}
+    names = {key: short_name(key, figure) for key, figure in found["parameters"].items()}
     return PageSection(
         heading="Tuning",
         text=f"By the {'fewest' if tuned['by'] == 'fewest' else 'most uncertain'} parameters, each within "

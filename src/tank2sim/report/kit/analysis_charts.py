@@ -132,7 +132,7 @@ def pole_zero_chart(
 def error_chart(errors: Sequence[OutputError], *, title: str = "", width_px: int = 720) -> alt.FacetChart:
     """Largest error of every output on a logarithmic scale next to its limit, one panel a kind of check.
 
-    An error of exactly 0 (or one that is not finite) cannot stand on a logarithmic scale: it is drawn at the left
+    An error of exactly 0 (or one that is not finite) has no place on a logarithmic scale: it is drawn at the left
     (right) edge, and its tooltip says what it is.
     """
     kinds = list(dict.fromkeys(error.kind for error in errors))

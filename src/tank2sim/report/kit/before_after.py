@@ -11,7 +11,7 @@ import altair as alt
 from tank2sim.report.kit.chart_parts import ChartRecord, data
 
 BOTH, ALL = "both", "all"
-"""What a switch stands at first, and on paper: two series together, or more of them."""
+"""The first setting of a switch, and that on paper: two series together, or more of them."""
 
 MISFIT_SHOWN = 100.0
 """Misfit in noise units at which the darkest colour begins (project choice): far from any doubt."""
@@ -52,7 +52,7 @@ def misfit_maps(rows: Sequence[ChartRecord], models: Sequence[str], *, title: st
     rows : sequence of record
         ``group`` (words for a kind of trials, or nothing), ``trial``, ``signal``, ``model`` and ``misfit`` (-) each.
     models : sequence of str
-        What is to be switched between, in the order in which they stand next to each other.
+        Names to switch between, in their order from left to right.
     title : str
         Of the chart.
     """

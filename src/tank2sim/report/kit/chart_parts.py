@@ -88,7 +88,7 @@ def check_labels(labels: Sequence[str]) -> None:
 
 @dataclass(frozen=True)
 class SeriesLook:
-    """Encodings that tell the series of a chart apart; together they make one legend."""
+    """Encodings that distinguish the series of a chart; together they make one legend."""
 
     colour: alt.Color
     dash: alt.StrokeDash
@@ -118,7 +118,7 @@ def series_look(labels: Sequence[str], as_points: Collection[str] = ()) -> Serie
 def pan_zoom(*encodings: str, views: Sequence[str]) -> alt.TopLevelSelectionParameter:
     """Drag to pan, wheel with Ctrl to zoom, double click to go back, in all of the named `views` together.
 
-    Without Ctrl the wheel scrolls the page, as a reader expects. Views and parameter have names of ours: those that
+    Without Ctrl the wheel scrolls the page, as a reader expects. Views and parameter have fixed names: those that
     Altair finds may be counted up over the life of the process, and the same page would not be the same bytes.
     """
     wheel = "wheel![event.ctrlKey || event.metaKey]"
@@ -142,8 +142,8 @@ def extent(values: Array) -> tuple[float, float]:
     return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
 
 
-def axis_above(title: str, **more: Any) -> alt.Axis:
-    """A vertical axis whose title stands level above it: read without turning the head."""
+def axis_above(title: str, **options: Any) -> alt.Axis:
+    """Return a vertical axis with a horizontal title above it."""
     return alt.Axis(
         title=title,
         titleAngle=0,
@@ -152,7 +152,7 @@ def axis_above(title: str, **more: Any) -> alt.Axis:
         titleBaseline="bottom",
         titleX=0,
         titleY=-6,
-        **more,
+        **options,
     )
 
 

@@ -1,7 +1,7 @@
 """One plot function for each kind of thing, and the chart as a picture.
 
 A chart is defined once, in Altair, and is drawn the same in a picture (:func:`chart_png`) and in a page
-(:mod:`tank2sim.report.kit.page`). It says what is drawn; how it looks stands in :mod:`tank2sim.report.kit.theme`.
+(:mod:`tank2sim.report.kit.page`). It states what is drawn; the looks are defined in :mod:`tank2sim.report.kit.theme`.
 """
 
 from __future__ import annotations

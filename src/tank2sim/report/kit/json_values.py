@@ -1,4 +1,4 @@
-"""What stands in the JSON of any result: words and units of its keys; tables, series and matrices in it."""
+"""The JSON of any result: words and units of its keys; tables, series and matrices in it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Json = Any
 """What JSON holds: numbers, text, truth values, None, lists and objects of these."""
 
 LONGEST_LIST = 12
-"""Numbers of a list that stand in one cell; longer ones are series. Project choice."""
+"""Largest number of items of a list in one cell; longer lists are series. Project choice."""
 
 _MOST_ROWS = 400
 """Rows of a table; what is beyond is left to the JSON. Project choice."""
@@ -111,9 +111,9 @@ def is_number_value(value: Json) -> TypeGuard[float]:
 
 
 def is_scalar(value: Json) -> bool:
-    """Whether this stands in one cell: a scalar, or a short list of them."""
+    """Return whether a value fits one cell: a scalar, or a short list of scalars."""
     if isinstance(value, list):
-        return len(value) <= LONGEST_LIST and not any(isinstance(one, list | Mapping) for one in value)
+        return len(value) <= LONGEST_LIST and not any(isinstance(item, list | Mapping) for item in value)
     return not isinstance(value, Mapping)
 
 
@@ -126,17 +126,19 @@ def is_matrix(value: Json) -> bool:
     """Whether this is a list of lists of numbers, all of one length."""
     if not (isinstance(value, list) and value and all(isinstance(row, list) and row for row in value)):
         return False
-    return all(len(row) == len(value[0]) and all(is_number_value(one) or one is None for one in row) for row in value)
+    return all(
+        len(row) == len(value[0]) and all(is_number_value(number) or number is None for number in row) for row in value
+    )
 
 
 def is_objects(value: Json) -> bool:
     """Whether this is a list of objects."""
-    return isinstance(value, list) and bool(value) and all(isinstance(one, Mapping) for one in value)
+    return isinstance(value, list) and bool(value) and all(isinstance(item, Mapping) for item in value)
 
 
 def scalars(value: Mapping[str, Json]) -> dict[str, Json]:
-    """What of an object stands in cells."""
-    return {key: one for key, one in value.items() if is_scalar(one)}
+    """Return the items of an object that fit one cell."""
+    return {key: item for key, item in value.items() if is_scalar(item)}
 
 
 def cell(key: str, value: Json) -> Cell:
@@ -144,7 +146,7 @@ def cell(key: str, value: Json) -> Cell:
     if isinstance(value, bool) and key in VERDICT_TEXTS:
         return Verdict.PASSED if value else Verdict.FAILED
     if isinstance(value, list):
-        return ", ".join(f"{one:.4g}" if is_number_value(one) else str(one) for one in value) or None
+        return ", ".join(f"{item:.4g}" if is_number_value(item) else str(item) for item in value) or None
     if value is None or isinstance(value, int | float | bool):
         return value
     return str(value)
@@ -172,8 +174,8 @@ def _listed(caption: str, heads: Sequence[str], rows: Sequence[tuple[Json, ...]]
     units = [words(key)[1] or (unit if is_number_value(value) else "") for *_, key, value in rows]
     heads = [*heads, "value", *(["unit"] if any(units) else [])]
     cells = [
-        [*names, _digits(cell(key, value)), *([own] if any(units) else [])]
-        for (*names, key, value), own in zip(rows, units, strict=True)
+        [*names, _digits(cell(key, value)), *([unit_shown] if any(units) else [])]
+        for (*names, key, value), unit_shown in zip(rows, units, strict=True)
     ]
     return PageTable(caption=caption, columns=[Column(title=head) for head in heads], rows=cells)
 
@@ -184,21 +186,23 @@ def _digits(value: Cell) -> Cell:
 
 def rows_of(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], first: str) -> PageTable:
     """One row an object, one column a key that any of them has; `first` heads the names, empty where there are none."""
-    keys = [key for key in dict.fromkeys(key for _, one in named for key in scalars(one)) if _is_known(key, named)]
+    keys = [
+        key for key in dict.fromkeys(key for _, values in named for key in scalars(values)) if _is_known(key, named)
+    ]
     if len(keys) > MOST_COLUMNS and len(named) <= FEW_ROWS:
         return _turned(caption, named, keys)
     columns = [Column(title=words(key)[0], unit=words(key)[1]) for key in keys]
     wide = _wide(named, keys)
-    cells = [[_shown(key, one.get(key), key in wide) for key in keys] for _, one in named[:_MOST_ROWS]]
+    cells = [[_shown(key, values.get(key), key in wide) for key in keys] for _, values in named[:_MOST_ROWS]]
     if first:
         columns.insert(0, Column(title=first))
         cells = [[name, *row] for (name, _), row in zip(named, cells, strict=False)]
-    more = f" The first {_MOST_ROWS} of {len(named)} rows." if len(named) > _MOST_ROWS else ""
-    return PageTable(caption=f"{caption}.{more}" if more else caption, columns=columns, rows=cells)
+    note = f" The first {_MOST_ROWS} of {len(named)} rows." if len(named) > _MOST_ROWS else ""
+    return PageTable(caption=f"{caption}.{note}" if note else caption, columns=columns, rows=cells)
 
 
 def _is_known(key: str, named: Sequence[tuple[str, Mapping[str, Json]]]) -> bool:
-    return any(is_scalar(one.get(key)) and cell(key, one.get(key)) is not None for _, one in named)
+    return any(is_scalar(values.get(key)) and cell(key, values.get(key)) is not None for _, values in named)
 
 
 def _turned(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], keys: Sequence[str]) -> PageTable:
@@ -207,7 +211,7 @@ def _turned(caption: str, named: Sequence[tuple[str, Mapping[str, Json]]], keys:
     heads = [name or f"no. {place}" if len(named) > 1 else name or "value" for place, (name, _) in enumerate(named, 1)]
     messages = [Column(title=head) for head in ("quantity", *heads, *(["unit"] if any(units) else []))]
     rows = [
-        [words(key)[0], *(_shown(key, one.get(key), True) for _, one in named), *([unit] if any(units) else [])]
+        [words(key)[0], *(_shown(key, values.get(key), True) for _, values in named), *([unit] if any(units) else [])]
         for key, unit in zip(keys, units, strict=True)
     ]
     return PageTable(caption=caption, columns=messages, rows=rows)
@@ -217,7 +221,7 @@ def _wide(named: Sequence[tuple[str, Mapping[str, Json]]], keys: Sequence[str]) 
     """Columns of numbers so far apart that each needs its own digits."""
     found = set()
     for key in keys:
-        sizes = [abs(one[key]) for _, one in named if is_number_value(one.get(key)) and one[key] != 0]
+        sizes = [abs(values[key]) for _, values in named if is_number_value(values.get(key)) and values[key] != 0]
         if sizes and max(sizes) > _WIDE * min(sizes):
             found.add(key)
     return found
@@ -241,11 +245,11 @@ def short_columns(values: Mapping[str, Json]) -> list[str]:
     lists = {
         k: v for k, v in values.items() if isinstance(v, list) and v and all(map(is_number_value, v)) and is_scalar(v)
     }
-    return [key for key, one in lists.items() if len(one) > 1 and _as_long(one, lists.values())]
+    return [key for key, numbers in lists.items() if len(numbers) > 1 and _as_long(numbers, lists.values())]
 
 
-def _as_long(one: list[Json], all_of_them: Any) -> bool:
-    return sum(len(other) == len(one) for other in all_of_them) > 1
+def _as_long(column: list[Json], all_of_them: Any) -> bool:
+    return sum(len(numbers) == len(column) for numbers in all_of_them) > 1
 
 
 def numbered(caption: str, values: Mapping[str, list[Json]]) -> PageTable:

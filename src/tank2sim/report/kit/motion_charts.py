@@ -242,7 +242,7 @@ def spiral_chart(
 
 
 def _listed(series: Sequence[TrackData] | Sequence[History] | Sequence[Tow] | Sequence[SpiralData]) -> str:
-    return ", ".join(one.label for one in series)
+    return ", ".join(series_shown.label for series_shown in series)
 
 
 def _look(runs: Sequence[TrackData] | Sequence[History]) -> SeriesLook:

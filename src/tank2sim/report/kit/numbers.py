@@ -36,7 +36,7 @@ def format_number(value: float, digits: int = 4) -> str:
 
 
 def format_column(values: Sequence[float], digits: int = 4) -> list[str]:
-    """Numbers of one column, with one number of decimals so that their points stand under each other.
+    """Numbers of one column, with one number of decimals so that their points are aligned.
 
     The largest gets `digits` significant digits. A column whose numbers are too far apart for that (some would be
     shown as 0), or too large or small, shows each number for itself as :func:`format_number` does.
@@ -71,10 +71,10 @@ def _scientific(value: float, digits: int) -> str:
 def _grouped(text: str) -> str:
     if not text.strip("-0."):
         text = text.lstrip("-")  # -0.00 is 0.00
-    whole, point, rest = text.partition(".")
+    whole, point, decimals = text.partition(".")
     if len(whole.lstrip("-")) > 4:
         whole = f"{int(whole):,}".replace(",", _THIN_SPACE)
-    return _signed(f"{whole}{point}{rest}")
+    return _signed(f"{whole}{point}{decimals}")
 
 
 def _signed(text: str) -> str:

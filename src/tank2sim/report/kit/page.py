@@ -1,6 +1,6 @@
 """One self-contained HTML page of a result: key figures, tables and charts, for the screen and for paper.
 
-The page fetches nothing: style, script and data stand in it, and its content security policy forbids the rest. The
+The page fetches nothing: style, script and data are in it, and its content security policy forbids everything else. The
 same content gives the same bytes.
 """
 
@@ -157,8 +157,8 @@ def render_page(page: Page) -> str:
         figures=[(figure, _shown(figure.value)) for figure in page.figures],
         sections=sections,
         version=__version__,
-        style=Markup(beside("kit/page.css")),
-        script=Markup(beside("kit/page.js")),
+        style=Markup(resource_text("kit/page.css")),
+        script=Markup(resource_text("kit/page.js")),
         library=Markup(_vega()) if specifications else None,
         drawings=json_in_html({"light": LIGHT, "dark": DARK, "locale": LOCALE, "charts": specifications}),
     )
@@ -260,14 +260,14 @@ def _paragraphs(text: str) -> Iterable[str]:
 
 
 def json_in_html(value: object) -> Markup:
-    """JSON of a value, to stand in a script element of a page."""
+    """Return the JSON of a value, for a script element of a page."""
     # Inside <script> the reader of HTML looks for "</script" and "<!--" even within strings of JSON.
     text = json.dumps(value, allow_nan=False, sort_keys=True, separators=(",", ":"))
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
 
 
-def beside(name: str) -> str:
-    """Text of a file that lies next to this one."""
+def resource_text(name: str) -> str:
+    """Return the text of a file of the package ``tank2sim.report``."""
     return importlib.resources.files("tank2sim.report").joinpath(name).read_text(encoding="utf-8")
 
 

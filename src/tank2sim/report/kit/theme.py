@@ -66,8 +66,8 @@ DARK_TONE = Tone(
 def vega_config(tone: Tone) -> Config:
     """The Vega-Lite configuration of a tone; charts themselves say nothing of fonts and colours.
 
-    Marks name a style (``limit``, ``reference``, ``region``, ``start``, ``stem``) where they stand for something that
-    is no series.
+    Marks name a style (``limit``, ``reference``, ``region``, ``start``, ``stem``) where they show something that
+    is not a series.
     """
     return {
         "background": tone.paper,

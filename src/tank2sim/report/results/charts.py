@@ -58,8 +58,10 @@ def series_chart(heading: str, series: Mapping[str, Sequence[Json]]) -> Illustra
 
     A series of truth values divides the lines: dashed where it is false.
     """
-    truths = {key: one for key, one in series.items() if all(isinstance(value, bool) for value in one)}
-    numbers = {key: one for key, one in series.items() if any(is_number_value(v) for v in one) and key not in truths}
+    truths = {key: column for key, column in series.items() if all(isinstance(value, bool) for value in column)}
+    numbers = {
+        key: column for key, column in series.items() if any(is_number_value(v) for v in column) and key not in truths
+    }
     across = next((key for key in ACROSS if key in numbers), next((k for k, v in numbers.items() if rises(v)), None))
     up = [key for key in numbers if key != across][:_MOST_PANELS]
     if across is None or not up:
@@ -135,11 +137,11 @@ def heat_map(
         tooltip=["row:N", "column:N", alt.Tooltip("value:Q", format=NUMBER)],
     )
     dark = f"abs(datum.value) > {0.55 * largest:.6g}"
-    told = base.mark_text(fontSize=10).encode(
+    numbers = base.mark_text(fontSize=10).encode(
         text=alt.Text("value:Q", format=",.3~r"),
         color=alt.condition(dark, alt.value("#ffffff"), alt.value("#16212c")),
     )
-    layers = [cells, told] if len(across) <= 14 else [cells]
+    layers = [cells, numbers] if len(across) <= 14 else [cells]
     height = 26 * len(names)
     chart = alt.layer(*layers).properties(width=min(_WIDTH, 52 * len(across)), height=height, title=heading)
     return Illustration(
@@ -238,7 +240,7 @@ def bode(heading: str, label: str, value: Mapping[str, Json]) -> Illustration:
 
 def poles(heading: str, label: str, found: Json, zeros: Json = ()) -> Illustration:
     """Poles and zeros, [real, imaginary] each."""
-    both = [[complex(*one) for one in those or []] for those in (found, zeros)]
+    both = [[complex(*number) for number in numbers or []] for numbers in (found, zeros)]
     return Illustration(chart=pole_zero_chart([PolesZeros(label=label, poles=both[0], zeros=both[1])], title=heading))
 
 
@@ -264,8 +266,8 @@ def influences(heading: str, found: Mapping[str, Mapping[str, Json]]) -> Illustr
 
     strongest: dict[str, float] = {}
     for values in found.values():
-        for name, one in values.items():
-            strongest[name] = max(strongest.get(name, 0.0), abs(size(one) or 0.0))
+        for name, influence in values.items():
+            strongest[name] = max(strongest.get(name, 0.0), abs(size(influence) or 0.0))
     names = sorted(strongest, key=lambda name: -strongest[name])[:20]
     if not names:
         return None

@@ -1,4 +1,4 @@
-"""Where in a result a page was, so that a value it cannot draw is reported by its key."""
+"""The place in a result that was read last, so that a value that cannot be drawn is reported by its key."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def _watched(value: Json, path: str, place: _Place) -> Json:
     if isinstance(value, dict):
         return _Watched(value, path, place)
     if isinstance(value, list) and value and isinstance(value[0], dict | list):
-        return [_watched(one, f"{path}[{number}]", place) for number, one in enumerate(value)]
+        return [_watched(item, f"{path}[{number}]", place) for number, item in enumerate(value)]
     return value
 
 
@@ -66,6 +66,6 @@ def drawn_from(result: Json, source: str, draw: Callable[[Json], _T]) -> _T:
 
 
 def not_as_written(source: str, key: str) -> InputError:
-    """The error to raise where what stands under a key is not as the command wrote it."""
+    """Return the error for a key whose value is not as the command wrote it."""
     remedy = "give the file as the command wrote it, or let this version of tank2sim write it again"
     return InputError(source, key, "has not the form of a result of this command", remedy)

@@ -1,4 +1,4 @@
-"""Tracks and time histories of the JSON of a result: what stands under ``histories``, by the names of the trial format.
+"""Tracks and time histories of the JSON of a result: ``histories``, by the names of the trial format.
 
 One table of columns is ``{"t_s": [...], "psi_deg": [...], ...}``; angles may be in degrees or radians.
 """
@@ -67,7 +67,9 @@ def is_columns(value: Json) -> bool:
     """Whether this is a table of columns over time."""
     if not isinstance(value, Mapping) or not isinstance(value.get("t_s"), list) or len(value["t_s"]) < 2:
         return False
-    return len(value) > 1 and all(isinstance(one, list) and len(one) == len(value["t_s"]) for one in value.values())
+    return len(value) > 1 and all(
+        isinstance(column, list) and len(column) == len(value["t_s"]) for column in value.values()
+    )
 
 
 def motions(
@@ -121,10 +123,10 @@ def audit_sections(result: Json) -> list[PageSection]:
     """What each trial measured, with the places of the findings, below what was found."""
     sections = []
     # Trials with findings come first: of many records the page has as many as it can hold.
-    faulty = {one["file"] for one in result["findings"]}
-    trials = [one for one in result["trials"] if is_columns(one.get("histories"))]
-    for trial in sorted(trials, key=lambda one: one["file"] not in faulty)[:_MOST_RECORDS]:
-        found = [one for one in result["findings"] if one["file"] == trial["file"]]
+    faulty = {entry["file"] for entry in result["findings"]}
+    trials = [entry for entry in result["trials"] if is_columns(entry.get("histories"))]
+    for trial in sorted(trials, key=lambda entry: entry["file"] not in faulty)[:_MOST_RECORDS]:
+        found = [entry for entry in result["findings"] if entry["file"] == trial["file"]]
         name = str(trial["file"]).rpartition("/")[2]
         marks = _marks(found, trial)
         charts = motions(name, {"measured": trial["histories"]}, marks=marks)
@@ -140,9 +142,9 @@ def audit_sections(result: Json) -> list[PageSection]:
 def identified(result: Json) -> list[PageSection]:
     """Each trial as measured next to the card that was given and the card found, those held out first."""
     charts: list[Illustration] = []
-    for one in sorted(result["replays"], key=lambda one: not one["held_out"])[:_MOST_RECORDS]:
-        runs = {"measured": one["measured"], "card given": one["before"], "card found": one["found"]}
-        name = f"{one['trial']} ({'held out' if one['held_out'] else 'fitted'})"
+    for replay in sorted(result["replays"], key=lambda replay: not replay["held_out"])[:_MOST_RECORDS]:
+        runs = {"measured": replay["measured"], "card given": replay["before"], "card found": replay["found"]}
+        name = f"{replay['trial']} ({'held out' if replay['held_out'] else 'fitted'})"
         charts += motions(name, {label: run for label, run in runs.items() if is_columns(run)}, ["measured"])
     return [PageSection(heading="Trials", text=_REPLAYED, charts=charts)] if charts else []
 
@@ -163,7 +165,7 @@ def from_the_bridge(result: Json) -> list[PageSection]:
     """Turning circles and stops of a poster or a pilot card: the way ahead is up, starboard is right."""
     charts = []
     for key, title in _WAYS.items():
-        tracks = [TrackData(label=one["name"], x_m=one["ahead_m"], y_m=one["starboard_m"]) for one in result[key]]
+        tracks = [TrackData(label=path["name"], x_m=path["ahead_m"], y_m=path["starboard_m"]) for path in result[key]]
         if tracks:
             charts.append(Illustration(chart=track_chart(tracks, title=title), caption="The ship heads up the page."))
     return [PageSection(heading="Ways", charts=charts)] if charts else []
@@ -171,7 +173,7 @@ def from_the_bridge(result: Json) -> list[PageSection]:
 
 def _findings(found: Sequence[Mapping[str, Json]]) -> PageTable:
     heads = {"kind": "", "column": "column", "what": "what", "likely_truth": "likely truth", "mended": "mended"}
-    rows = [[one.get(key) for key in heads] for one in found]
+    rows = [[finding.get(key) for key in heads] for finding in found]
     return PageTable(caption="Findings", columns=[Column(title=head) for head in heads.values()], rows=rows)
 
 
@@ -180,10 +182,10 @@ def _marks(found: Sequence[Mapping[str, Json]], trial: Mapping[str, Json]) -> li
     _, *columns = trial["histories"]
     stems = dict(zip(trial["columns"], map(_stem, columns), strict=False))  # by what the file calls them
     marks = []
-    for one in found:
-        at = [stems[one["column"]]] if one["column"] in stems else list(stems.values())
-        for begin, end in one.get("places_s") or ():
-            marks += [TimeMark(signal=name, begin_s=begin, end_s=end, text=str(one["what"])) for name in at]
+    for finding in found:
+        at = [stems[finding["column"]]] if finding["column"] in stems else list(stems.values())
+        for begin, end in finding.get("places_s") or ():
+            marks += [TimeMark(signal=name, begin_s=begin, end_s=end, text=str(finding["what"])) for name in at]
     return marks
 
 
@@ -196,10 +198,10 @@ def _bands(ensemble: Mapping[str, Json]) -> dict[str, _Columns]:
     lines = [np.array(track.get(side) or [], dtype=float).reshape(-1, 2) for side in ("low_m", "middle_m", "high_m")]
     small, large = small_edge_first(*lines)
     for label, key, points in ((LOW, "p5", small), (MIDDLE, "p50", lines[1]), (HIGH, "p95", large)):
-        own = {name: one[key] for name, one in ensemble["histories"].items() if name not in _TRACK}
+        columns = {name: band[key] for name, band in ensemble["histories"].items() if name not in _TRACK}
         if len(points):
-            own |= {"x_m": points[:, 0].tolist(), "y_m": points[:, 1].tolist()}
-        runs[label] = {"t_s": ensemble["t_s"], **own}
+            columns |= {"x_m": points[:, 0].tolist(), "y_m": points[:, 1].tolist()}
+        runs[label] = {"t_s": ensemble["t_s"], **columns}
     return runs
 
 
@@ -230,7 +232,7 @@ def _signals(runs: Mapping[str, _Columns]) -> list[Signal]:
         title = _TITLES.get(_stem(name)) or (words(name)[0] if unit in _UNITS else titled(name))
         found.append(Signal(name=_stem(name), title=title, unit=known, display_unit=display))
     order = list(_TITLES)
-    return sorted(found, key=lambda one: order.index(one.name) if one.name in order else len(order))
+    return sorted(found, key=lambda signal: order.index(signal.name) if signal.name in order else len(order))
 
 
 def _moves(table: Mapping[str, Array]) -> bool:

@@ -30,8 +30,8 @@ from tank2sim.report.results import charts
 from tank2sim.report.results.headlines import headlines
 from tank2sim.report.results.json_path import drawn_from, not_as_written
 from tank2sim.report.results.motions import is_columns, motions
-from tank2sim.report.results.renderers import misshapen, render_charts, whole_page
 from tank2sim.report.results.result_types import ResultType, kind_of
+from tank2sim.report.results.subjects import misshapen, render_charts, whole_page
 
 _NOTES = ("notices", "warnings", "notes")
 _DEEPEST = 5
@@ -58,7 +58,7 @@ def result_page(result: Json, source: str) -> Page:
     Parameters
     ----------
     result : dict
-        What stands in the file.
+        Content of the file.
     source : str
         Name of the file, for the head of the page and for messages.
 
@@ -79,10 +79,10 @@ def _page(result: Mapping[str, Json], kind: ResultType, source: str) -> Page:
     notices = [str(note) for key in _NOTES for note in result.get(key) or []]
     name = next((result[key] for key in ("ship", "campaign", "glider", "path") if isinstance(result.get(key), str)), "")
     checked = charts.errors("Errors of the outputs", result.get("errors"), result.get("limits"))
-    own, rest = render_charts(kind.title, result)
+    drawn, remaining = render_charts(kind.title, result)
     if checked:  # all but the largest errors, which the table of all of them has again
-        rest = {key: value for key, value in rest.items() if key != "max_error"}
-    sections = [_section(key, value) for key, value in rest.items() if key not in _NOTES and not is_scalar(value)]
+        remaining = {key: value for key, value in remaining.items() if key != "max_error"}
+    sections = [_section(key, value) for key, value in remaining.items() if key not in _NOTES and not is_scalar(value)]
     overview = {key: value for key, value in scalars(result).items() if key not in (*_NOTES, "kind", "schema")}
     table = [quantities("The result", overview)] if overview else []
     first = [
@@ -96,7 +96,7 @@ def _page(result: Mapping[str, Json], kind: ResultType, source: str) -> Page:
         figures=headlines(result, kind),
         sections=[
             *(first if overview or notices or kind.note else []),
-            *own,
+            *drawn,
             *(section for section in sections if section.tables or section.charts),
         ],
     )
@@ -113,7 +113,7 @@ def _section(key: str, value: Json) -> PageSection:
     title = words(key)[0]
     heading = "IMO criteria" if key == "imo" else title[:1].upper() + title[1:]
     _fill(parts, heading, key, value, 0)
-    notes = [f"{parts.left_out} longer or deeper parts stand in the JSON alone."] if parts.left_out else []
+    notes = [f"{parts.left_out} longer or deeper parts are in the JSON only."] if parts.left_out else []
     tables = [table for table in parts.tables if table.rows and [column.title for column in table.columns] != ["name"]]
     return PageSection(heading=heading, tables=tables, charts=parts.charts, notes=notes)
 
@@ -131,10 +131,10 @@ def _fill(parts: _Parts, caption: str, key: str, value: Json, depth: int) -> Non
         if depth == 0:
             parts.charts.append(charts.poles(caption, caption, value))
     elif is_matrix(value) and len(value) * len(value[0]) <= LONGEST_LIST**2:
-        rows = [("", {str(place + 1): one for place, one in enumerate(row)}) for row in value]
+        rows = [("", {str(place + 1): item for place, item in enumerate(row)}) for row in value]
         parts.tables.append(rows_of(caption, rows, ""))
-    elif is_series(value) and all(isinstance(one, str) for one in value):
-        parts.tables.append(rows_of(caption, [("", {words(key)[0]: one}) for one in value], ""))
+    elif is_series(value) and all(isinstance(item, str) for item in value):
+        parts.tables.append(rows_of(caption, [("", {words(key)[0]: item}) for item in value], ""))
     elif value:
         parts.left_out += 1
 
@@ -150,21 +150,21 @@ def _fill_object(parts: _Parts, caption: str, key: str, value: Mapping[str, Json
         parts.draw(charts.bode(caption, caption, value))
         return
     columns = short_columns(value)
-    plain = {name: one for name, one in scalars(value).items() if name not in columns}
+    plain = {name: item for name, item in scalars(value).items() if name not in columns}
     if plain:
         parts.tables.append(quantities(caption, plain, words(key)[1]))
     if columns:
         parts.tables.append(numbered(caption, {name: value[name] for name in columns}))
-    _draw_series(parts, caption, {name: one for name, one in value.items() if is_series(one)})
-    rest = {name: one for name, one in value.items() if not is_scalar(one) and not is_series(one)}
+    _draw_series(parts, caption, {name: item for name, item in value.items() if is_series(item)})
+    remaining = {name: item for name, item in value.items() if not is_scalar(item) and not is_series(item)}
     parts.draw(charts.errors(f"{caption}: errors", value.get("errors"), value.get("limits")))
     if key == "influence_percent":
         parts.draw(charts.influences(f"{caption} (%)", value))
-    _deeper(parts, caption, rest, depth)
+    _deeper(parts, caption, remaining, depth)
 
 
 def _deeper(parts: _Parts, caption: str, values: Mapping[str, Json], depth: int) -> None:
-    """What stands under names: objects of one kind in one table, all else one by one."""
+    """Add named values: objects of one kind in one table, all others one by one."""
     if alike(values):
         _fill_named(parts, caption, values, depth)
     else:
@@ -174,23 +174,23 @@ def _deeper(parts: _Parts, caption: str, values: Mapping[str, Json], depth: int)
 def _fill_named(parts: _Parts, caption: str, objects: Mapping[str, Mapping[str, Json]], depth: int) -> None:
     """Objects of one kind under names: one table of what they have in cells, then what is deeper in each."""
     parts.draw(charts.error_bars(caption, objects))
-    if any(scalars(one) for one in objects.values()):
-        parts.tables.append(rows_of(caption, [(titled(name), one) for name, one in objects.items()], "name"))
+    if any(scalars(item) for item in objects.values()):
+        parts.tables.append(rows_of(caption, [(titled(name), item) for name, item in objects.items()], "name"))
     shared = _shared(objects)
     for key in shared:
-        rows = [(titled(name), one[key]) for name, one in objects.items() if one.get(key)]
+        rows = [(titled(name), item[key]) for name, item in objects.items() if item.get(key)]
         parts.tables.append(rows_of(f"{caption}: {titled(key)}", rows, "name"))
-    for name, one in objects.items():
-        deeper = {k: v for k, v in one.items() if not is_scalar(v) and k not in shared}
+    for name, item in objects.items():
+        deeper = {k: v for k, v in item.items() if not is_scalar(v) and k not in shared}
         _draw_series(parts, f"{caption}: {words(name)[0]}", {k: v for k, v in deeper.items() if is_series(v)})
         _deeper(parts, f"{caption}: {words(name)[0]}", {k: v for k, v in deeper.items() if not is_series(v)}, depth)
 
 
 def _shared(objects: Mapping[str, Mapping[str, Json]]) -> list[str]:
     """Keys under which two or more of the objects have a small object of one kind."""
-    keys = dict.fromkeys(key for one in objects.values() for key in one)
-    found = {key: {name: one[key] for name, one in objects.items() if one.get(key)} for key in keys}
-    return [key for key, those in found.items() if alike(those) and all(map(_is_small, those.values()))]
+    keys = dict.fromkeys(key for item in objects.values() for key in item)
+    found = {key: {name: item[key] for name, item in objects.items() if item.get(key)} for key in keys}
+    return [key for key, parts in found.items() if alike(parts) and all(map(_is_small, parts.values()))]
 
 
 def _is_small(value: Mapping[str, Json]) -> bool:
@@ -200,24 +200,24 @@ def _is_small(value: Mapping[str, Json]) -> bool:
 def _fill_objects(parts: _Parts, caption: str, key: str, value: list[Mapping[str, Json]], depth: int) -> None:
     drawn = charts.misfits(f"{caption}: misfit", value) if key == "trials" else None
     parts.draw(drawn)
-    if all("predicted" in one for one in value):
+    if all("predicted" in item for item in value):
         parts.draw(charts.force_fit(caption, value))
     elif len(value) > LONGEST_LIST:
-        keys = [name for name in value[0] if all(is_number_value(one.get(name)) for one in value)]
-        parts.draw(charts.series_chart(caption, {name: [one[name] for one in value] for name in keys}))
-    if any(scalars(one) for one in value):
-        parts.tables.append(rows_of(caption, [("", one) for one in value], ""))
+        keys = [name for name in value[0] if all(is_number_value(item.get(name)) for item in value)]
+        parts.draw(charts.series_chart(caption, {name: [item[name] for item in value] for name in keys}))
+    if any(scalars(item) for item in value):
+        parts.tables.append(rows_of(caption, [("", item) for item in value], ""))
     if drawn:
         return
-    deep = [one for one in value if any(not is_scalar(v) for v in one.values())]
+    deep = [item for item in value if any(not is_scalar(v) for v in item.values())]
     if len(deep) > _MOST_PARTS:
         parts.left_out += len(deep)
         return
-    for place, one in enumerate(deep, start=1):
-        label = _label(one) or f"no. {place}"
-        if "poles" in one and isinstance(one.get("zeros"), list):
-            parts.draw(charts.poles(f"{label}: poles and zeros", label, one["poles"], one["zeros"]))
-        deeper = {k: v for k, v in one.items() if not is_scalar(v) and k not in ("poles", "zeros")}
+    for place, item in enumerate(deep, start=1):
+        label = _label(item) or f"no. {place}"
+        if "poles" in item and isinstance(item.get("zeros"), list):
+            parts.draw(charts.poles(f"{label}: poles and zeros", label, item["poles"], item["zeros"]))
+        deeper = {k: v for k, v in item.items() if not is_scalar(v) and k not in ("poles", "zeros")}
         _draw_series(parts, f"{caption}: {label}", {k: v for k, v in deeper.items() if is_series(v)})
         _each(parts, f"{caption}: {label}", {k: v for k, v in deeper.items() if not is_series(v)}, depth)
 
@@ -233,13 +233,13 @@ def _each(parts: _Parts, caption: str, values: Mapping[str, Json], depth: int) -
 
 def _draw_series(parts: _Parts, caption: str, series: Mapping[str, list[Json]]) -> None:
     """A chart for the series of each length."""
-    for length in dict.fromkeys(len(one) for one in series.values()):
-        together = {name: one for name, one in series.items() if len(one) == length}
+    for length in dict.fromkeys(len(numbers) for numbers in series.values()):
+        together = {name: numbers for name, numbers in series.items() if len(numbers) == length}
         drawn = charts.series_chart(caption, together)
         parts.draw(drawn)
         parts.left_out += drawn is None
 
 
-def _label(one: Mapping[str, Json]) -> str:
+def _label(item: Mapping[str, Json]) -> str:
     named = ("name", "system", "trial", "record", "run", "label", "title", "path", "file", "figure")
-    return next((str(one[key]) for key in named if isinstance(one.get(key), str)), "")
+    return next((str(item[key]) for key in named if isinstance(item.get(key), str)), "")

@@ -50,12 +50,12 @@ def steering_diagram(turning: Json, spirals: Json, *, title: str = "") -> alt.VC
         "drift angle (deg)": ("drift_deg", 110),
         "heel (deg)": ("heel_deg", 110),
     }
-    shown = {name: one for name, one in shown.items() if one[0] in points}
+    shown = {name: panel_key for name, panel_key in shown.items() if panel_key[0] in points}
     panels = []
     for name, (key, height) in shown.items():
         last = name == list(shown)[-1]
-        own = run if name.startswith("yaw") else {}
-        panel = _turning_panel(_branches(turning, points[key]), own, look, (name, _RUDDER if last else None))
+        run_shown = run if name.startswith("yaw") else {}
+        panel = _turning_panel(_branches(turning, points[key]), run_shown, look, (name, _RUDDER if last else None))
         panels.append(panel.properties(width=_WIDTH, height=height))
     return stacked_panels(panels, title=title, description="Steady yaw rate, speed and drift against the rudder angle.")
 
@@ -63,12 +63,12 @@ def steering_diagram(turning: Json, spirals: Json, *, title: str = "") -> alt.VC
 def _branches(turning: Json, values: Sequence[float]) -> list[ChartRecord]:
     """Rows of the branches: between two folds (or changes of stability) one line."""
     points = turning["points"]
-    rudder, rate, column = (vector(one) for one in (points["rudder_deg"], points["yaw_rate_degps"], values))
+    rudder, rate, column = (vector(fold) for fold in (points["rudder_deg"], points["yaw_rate_degps"], values))
     stable = points["stable"]
     # A fold is one of the turns.
     folds = {
-        int(np.argmin(np.abs(rudder - one["rudder_deg"]) + np.abs(rate - one["yaw_rate_degps"])))
-        for one in turning["folds"]
+        int(np.argmin(np.abs(rudder - fold["rudder_deg"]) + np.abs(rate - fold["yaw_rate_degps"])))
+        for fold in turning["folds"]
     }
     ends, rows = [0], []
     for place in range(1, len(rudder) - 1):
@@ -165,10 +165,12 @@ def step_chart(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> a
 def steering_bode(responses: Sequence[Mapping[str, Json]], *, title: str = "") -> alt.VConcatChart:
     """Bode diagram of the yaw rate by the rudder."""
     drawn = []
-    for one in responses:
-        gain = 10 ** (vector(one["bode"]["magnitude_dB"]) / 20)
-        response = gain * np.exp(1j * np.radians(vector(one["bode"]["phase_deg"])))
-        drawn.append(FrequencyResponse(label=one["system"], omega_radps=one["bode"]["omega_radps"], response=response))
+    for system in responses:
+        gain = 10 ** (vector(system["bode"]["magnitude_dB"]) / 20)
+        response = gain * np.exp(1j * np.radians(vector(system["bode"]["phase_deg"])))
+        drawn.append(
+            FrequencyResponse(label=system["system"], omega_radps=system["bode"]["omega_radps"], response=response)
+        )
     return bode_chart(drawn, title=title)
 
 
@@ -177,11 +179,11 @@ def steering_poles(responses: Sequence[Mapping[str, Json]], *, title: str = "") 
     shown = [response for response in responses if response["system"] in (responses[0]["system"], FIRST_ORDER)]
     systems = [
         PolesZeros(
-            label=one["system"],
-            poles=[complex(*pole) for pole in one["poles"]],
-            zeros=[complex(*zero) for zero in one["zeros"]],
+            label=system["system"],
+            poles=[complex(*pole) for pole in system["poles"]],
+            zeros=[complex(*zero) for zero in system["zeros"]],
         )
-        for one in shown
+        for system in shown
     ]
     return pole_zero_chart(systems, title=title)
 
@@ -189,8 +191,11 @@ def steering_poles(responses: Sequence[Mapping[str, Json]], *, title: str = "") 
 def influence_chart(margins: Json, *, title: str = "") -> alt.LayerChart:
     """Change of C' by ten per cent more of each coefficient, as bars, the strongest at the top; from ``margins``."""
     strongest = margins["derivatives"][:_FEW]
-    names = [one["name"].rpartition(".")[2] for one in strongest]
-    rows = [{"name": name, "y": float(f"{one['percent']:.6g}")} for name, one in zip(names, strongest, strict=True)]
+    names = [influence["name"].rpartition(".")[2] for influence in strongest]
+    rows = [
+        {"name": name, "y": float(f"{influence['percent']:.6g}")}
+        for name, influence in zip(names, strongest, strict=True)
+    ]
     y = alt.Y("name:N", title=None, sort=names)
     x = alt.X("y:Q", title="change of C′ when the coefficient grows by 10 % (% of |C′|)")
     tooltip = [alt.Tooltip("name:N", title="coefficient"), alt.Tooltip("y:Q", title="change of C′ (%)", format=NUMBER)]
@@ -218,8 +223,8 @@ def trim_chart(trim: Json, *, title: str = "") -> alt.LayerChart:
     per_cent, criteria = 100 * vector(inoue["trim_by_stern_over_length"]), vector(inoue["C_prime"])
     base = float(criteria[len(criteria) // 2])
     series = {"Inoue et al. 1981": criteria}
-    for name, one in trim["paper_7_5_percent"].items():
-        series[f"paper 2, read as {name}: ±7.5 % for 1 %"] = base + per_cent * (one["more"] - one["less"]) / 2
+    for name, reading in trim["paper_7_5_percent"].items():
+        series[f"paper 2, read as {name}: ±7.5 % for 1 %"] = base + per_cent * (reading["more"] - reading["less"]) / 2
     rows = [row for label, values in series.items() for row in records(label, {"x": per_cent, "y": 1e5 * values})]
     across = "trim by the stern (% of length)"
     chart = _curves(rows, series_look(list(series)), across=across, up="C′ · 10⁵", marks=[_level(0.0)], height=220)

@@ -15,7 +15,7 @@ from tank2sim.records.trials import Trial
 from tank2sim.units import KNOT_MPS
 
 APPROACH = 20
-"""The approach is taken as the first of so many parts of a track (project choice) where a trial tells no speed or
+"""The approach is taken as the first of so many parts of a track (project choice) where a trial states no speed or
 heading."""
 
 _START = (("x", "m"), ("y", "m"), ("v", "mps"), ("r", "radps"))
@@ -63,11 +63,13 @@ def ghost_of(trial: Trial, model: Model) -> Ghost:
     start = {f"initial.{name}": _first(signals[key]) for name, unit in _START if (key := f"{name}_{unit}") in signals}
     course, way = _approach(trial.time_s, signals["x_m"], signals["y_m"])
     start["initial.psi"] = _first(signals["psi_rad"]) if "psi_rad" in signals else course
-    start["initial.u"], told = _speed(signals, way)
+    start["initial.u"], speed_notices = _speed(signals, way)
     by_angle = "delta_rad" in signals
     if by_angle:
         start["initial.rudder_angle"] = _first(signals["delta_rad"])
-        told.append("steered as in the trial, the rudder follows the measured angle: not through its steering gear")
+        speed_notices.append(
+            "steered as in the trial, the rudder follows the measured angle: not through its steering gear"
+        )
     held, wind = _wind(signals, model)
     return Ghost(
         label=trial.name,
@@ -80,7 +82,7 @@ def ghost_of(trial: Trial, model: Model) -> Ghost:
         by_angle=by_angle,
         start={name: value for name, value in start.items() if name in model},
         held=held,
-        notices=tuple(f"{trial.path.name}: {one}" for one in (*told, *wind)),
+        notices=tuple(f"{trial.path.name}: {text}" for text in (*speed_notices, *wind)),
     )
 
 

@@ -14,7 +14,7 @@ from tank2sim import __version__
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
 from tank2sim.fmu.interface import interface
-from tank2sim.report.kit.page import beside, json_in_html
+from tank2sim.report.kit.page import json_in_html, resource_text
 from tank2sim.report.steering.ghost import Ghost
 from tank2sim.report.steering.ship import NO_WASM_COMPILER, TOKEN, Control, controls, references, shown_in
 
@@ -57,7 +57,7 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
         A ship; for a ghost with a measured rudder angle that of
         :func:`tank2sim.report.steering.ship.ship_following_angle`.
     library : str or None
-        Of :func:`tank2sim.report.steering.ship.ship_in_page`; None where it cannot be compiled, which the page tells
+        Of :func:`tank2sim.report.steering.ship.ship_in_page`; None where it cannot be compiled, which the page states
         before anything else.
     ghost : Ghost, optional
         A measured trial.
@@ -76,9 +76,9 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("tank2sim", "report"), autoescape=True, undefined=jinja2.StrictUndefined
     )
-    rudder, *others = _controls(model, ghost)
-    engine = next((other for other in others if other.name == "propeller.speed"), None)
-    set_by_hand = [other for other in others if other is not engine]
+    rudder, *controls_left = _controls(model, ghost)
+    engine = next((control for control in controls_left if control.name == "propeller.speed"), None)
+    set_by_hand = [control for control in controls_left if control is not engine]
     environment.trim_blocks = environment.lstrip_blocks = True
     return environment.get_template("steering/page.html.j2").render(
         name=model.name,
@@ -94,8 +94,8 @@ def steering_page(model: Model, library: str | None, ghost: Ghost | None = None,
         windows=_windows(model),
         readouts=_readouts(model),
         fails="steering.failed" in model.input_names,
-        style=Markup(beside("kit/page.css") + beside("steering/page.css")),
-        script=Markup("\n".join(beside(f"steering/{name}") for name in _SCRIPTS)),
+        style=Markup(resource_text("kit/page.css") + resource_text("steering/page.css")),
+        script=Markup("\n".join(resource_text(f"steering/{name}") for name in _SCRIPTS)),
         data=json_in_html(_data(model, library, ghost)),
     )
 
@@ -124,15 +124,15 @@ def _data(model: Model, library: str | None, ghost: Ghost | None) -> dict[str, A
 def _controls(model: Model, ghost: Ghost | None) -> list[Control]:
     """What the user sets: at first as the card has it, or as the trial was."""
     held = ghost.held if ghost else {}
-    return [dataclasses.replace(one, start=held.get(one.name, one.start)) for one in controls(model)]
+    return [dataclasses.replace(control, start=held.get(control.name, control.start)) for control in controls(model)]
 
 
 def _windows(model: Model) -> tuple[list[tuple[int, str]], int]:
     """Stretches that the chart over time may show (s, in words), and the one at first, s."""
     wanted = HISTORY * _start(model, "ship.length") / _start(model, "ship.speed")
-    place = min(range(1, len(_WINDOWS) - 2), key=lambda one: abs(math.log(_WINDOWS[one] / wanted)))
+    place = min(range(1, len(_WINDOWS) - 2), key=lambda index: abs(math.log(_WINDOWS[index] / wanted)))
     shown = _WINDOWS[place - 1 : place + 3]
-    return [(one, f"{one} s" if one < 120 else f"{one / 60:g} min") for one in shown], _WINDOWS[place]
+    return [(index, f"{index} s" if index < 120 else f"{index / 60:g} min") for index in shown], _WINDOWS[place]
 
 
 def _series(ghost: Ghost) -> dict[str, list[float | None]]:

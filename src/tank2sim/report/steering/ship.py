@@ -117,9 +117,11 @@ def references(described: Interface) -> dict[str, int]:
 
 def controls(model: Model) -> list[Control]:
     """The inputs of a ship that a hand sets: rudder and engine first, then what the card's effects take."""
-    found = [_control(model, one) for one in model.inputs if not one.boolean and one.name != GHOST_RATE]
+    found = [
+        _control(model, variable) for variable in model.inputs if not variable.boolean and variable.name != GHOST_RATE
+    ]
     first = ("rudder.command", "propeller.speed")
-    return sorted(found, key=lambda one: first.index(one.name) if one.name in first else len(first))
+    return sorted(found, key=lambda variable: first.index(variable.name) if variable.name in first else len(first))
 
 
 def _control(model: Model, variable: Input) -> Control:

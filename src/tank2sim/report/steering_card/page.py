@@ -80,13 +80,17 @@ def steering_diagram_chart(diagrams: Json) -> alt.LayerChart:
     """Yaw rate (deg/min) against rudder (deg): the models as lines, the card's points on top, the tuned model too;
     from ``diagrams`` of the JSON."""
     lines: list[ChartRecord] = []
-    for label, one in diagrams["models"].items():
-        for place, (rudder, rate) in enumerate(zip(one["rudder_deg"], one["yaw_rate_degpmin"], strict=True)):
+    for label, series in diagrams["models"].items():
+        for place, (rudder, rate) in enumerate(zip(series["rudder_deg"], series["yaw_rate_degpmin"], strict=True)):
             lines.append({"run": label, "i": place, "d": plain(rudder), "r": plain(rate)})
     points: list[ChartRecord] = []
-    for place, one in enumerate(diagrams["points"]):
-        told = {"d": plain(one["rudder_deg"]), "r": plain(one["yaw_rate_degpmin"]), "source": one["source"]}
-        points.append({"run": one["label"], "i": place, **told})
+    for place, series in enumerate(diagrams["points"]):
+        place_shown = {
+            "d": plain(series["rudder_deg"]),
+            "r": plain(series["yaw_rate_degpmin"]),
+            "source": series["source"],
+        }
+        points.append({"run": series["label"], "i": place, **place_shown})
     return _diagram(lines, points)
 
 

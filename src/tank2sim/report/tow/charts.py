@@ -35,8 +35,8 @@ def tow_speed_chart(speeds: Json, *, title: str = "") -> alt.VConcatChart:
     runs = []
     for label, values in speeds["measured_mps"].items():
         speed = vector(values)
-        own = {"speed": speed, "left": speed - at_readings}
-        runs.append(History(label=label, time_s=time, values=own, measured=True))
+        signals = {"speed": speed, "left": speed - at_readings}
+        runs.append(History(label=label, time_s=time, values=signals, measured=True))
     for name, speed in simulated.items():
         runs.append(History(label=name, time_s=model_time, values={"speed": speed, "left": speed - reference}))
     return history_chart(runs, _SPEEDS, title=title, height_px=230)
@@ -48,14 +48,14 @@ def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_m
     look = series_look(list(drags))
     rows = [
         row
-        for name, own in drags.items()
+        for name, drag in drags.items()
         for row in records(
             name,
             {
                 "v": speeds,
                 "re": body.reynolds(speeds),
-                "c": own.at(speeds),
-                "cv": own.times(body.area_ratio).at(speeds),
+                "c": drag.at(speeds),
+                "cv": drag.times(body.area_ratio).at(speeds),
             },
         )
     ]
@@ -88,7 +88,7 @@ def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_m
 
 def _frame(drags: Mapping[str, DragPolynomial], speeds: Array, factor: float) -> list[float]:
     """From a little below 0 to above the highest C of the curves that stay above zero; of all, if none does."""
-    curves = [own.times(factor).at(speeds) for own in drags.values()]
+    curves = [drag.times(factor).at(speeds) for drag in drags.values()]
     kept = [curve for curve in curves if curve.min() >= 0] or curves
     low, high = min(0.0, *(float(curve.min()) for curve in kept)), max(float(curve.max()) for curve in kept)
     margin = 0.08 * (high - low)
@@ -101,15 +101,17 @@ def ellipse_chart(
     """Joint 95 % regions of M and B3 from all tows, and each tow by itself as a point; both as the JSON has them."""
     lines: list[ChartRecord] = []
     points: list[ChartRecord] = []
-    for own in ellipses:
-        lines += records(f"95 %: {own['label']}", {"m": vector(own["mass_kg"]), "b": vector(own["B3_kgpm"])})
+    for ellipse in ellipses:
+        lines += records(
+            f"95 %: {ellipse['label']}", {"m": vector(ellipse["mass_kg"]), "b": vector(ellipse["B3_kgpm"])}
+        )
     for name, way in by_tow.items():
         if way["unknowns"][:2] == ["M", "B3"] and name.startswith("output error"):
             for number, row in enumerate(way["alone"], start=1):
                 if None not in row[:2]:
                     label = f"each tow: {', '.join(way['unknowns'])}"
                     points.append({"run": label, "m": plain(row[0]), "b": plain(row[1]), "tow": number})
-    labels = [f"95 %: {own['label']}" for own in ellipses]
+    labels = [f"95 %: {ellipse['label']}" for ellipse in ellipses]
     dots = list(dict.fromkeys(str(row["run"]) for row in points))
     look = series_look([*labels, *dots], as_points=dots)
     x = alt.X("m:Q", title="M (kg)", scale=alt.Scale(zero=False))
@@ -174,5 +176,5 @@ def model_chart(models: Sequence[Mapping[str, Json]], *, width_px: int = 340) ->
     ).properties(title="Models of different size", description="Mass and AIC of each model fitted by output error.")
 
 
-def _verdict(one: Mapping[str, Json]) -> str:
-    return _VERDICTS[2] if not one["drag_nowhere_negative"] else _VERDICTS[0] if one["determined"] else _VERDICTS[1]
+def _verdict(model: Mapping[str, Json]) -> str:
+    return _VERDICTS[2] if not model["drag_nowhere_negative"] else _VERDICTS[0] if model["determined"] else _VERDICTS[1]

@@ -175,7 +175,7 @@ def _models(found: Json) -> PageSection:
 
 _MODELS = (
     "A lower AIC is a better fit for the number of unknowns; it counts readings as independent, and differences below "
-    "4 say little. A model whose unknowns cannot be distinguished, or whose drag pushes, is no more than a curve."
+    "4 say little. A model whose unknowns cannot be distinguished, or whose drag pushes, is only a curve."
 )
 _ELLIPSES = (
     "Regions are linearised and take the readings as independent; the points are the same models fitted to each tow by "

@@ -20,12 +20,12 @@ def comparison_error_chart(figures: Sequence[Mapping[str, Json]]) -> alt.LayerCh
     for figure in figures:
         if figure["error"] is None or not figure["measured"]:
             continue
-        own = {
+        content = {
             "name": f"{figure['trial']}: {in_words(figure['name'])[0]}",
             "e": 100 * figure["error"] / abs(figure["measured"]),
         }
         level = figure["level_percent"] or 0.0
-        rows.append({**own, "low": -level, "high": level, "run": str(figure["outcome"])})
+        rows.append({**content, "low": -level, "high": level, "run": str(figure["outcome"])})
     names = [str(row["name"]) for row in rows]
     y = alt.Y("name:N", sort=names, title=None, axis=alt.Axis(labelLimit=320))
     outcomes = list(dict.fromkeys(str(row["run"]) for row in rows))

@@ -22,8 +22,8 @@ def record_chart(name: str, columns: Mapping[str, Json]) -> alt.VConcatChart:
     """Rate where it is evaluated next to the programme's, tracking error, and current, over the whole record; from
     ``histories`` of the JSON."""
     time = columns["t_s"]
-    own = {"rate": "rate_radps", "error": "tracking_error_rad", "current": "current_A"}
-    values = {key: vector(columns[column]) for key, column in own.items()}
+    columns_shown = {"rate": "rate_radps", "error": "tracking_error_rad", "current": "current_A"}
+    values = {key: vector(columns[column]) for key, column in columns_shown.items()}
     programme = {"rate": vector(columns["programme_rate_radps"])}
     histories = [
         History(label=name, time_s=time, values=values),
@@ -140,7 +140,7 @@ def energy_residual_chart(residuals: Sequence[Mapping[str, Json]], *, width_px: 
 
 def angle_residual_chart(residual: Mapping[str, Json]) -> alt.VConcatChart:
     """What the integrated equation leaves of the angle, over time; from ``angle_residual`` of the JSON."""
-    left = vector(residual["residual_rad"])
-    history = History(label="integrated less measured", time_s=residual["t_s"], values={"left": left})
+    residual_rad = vector(residual["residual_rad"])
+    history = History(label="integrated less measured", time_s=residual["t_s"], values={"left": residual_rad})
     signal = Signal(name="left", title="angle, integrated less measured", unit="rad")
     return history_chart([history], [signal], title="Residuals of the nonlinear least squares")

@@ -1,11 +1,11 @@
-"""The charts of a reduced captive campaign: fits with their bands, loops, harmonics and residuals."""
+"""Data of the charts of a reduced captive campaign: fits with their bands, loops and harmonics."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
-import altair as alt
 import numpy as np
 
 from tank2sim.arrays import Array
@@ -15,70 +15,59 @@ from tank2sim.dynamics.abkowitz import polynomial
 from tank2sim.identification.captive.equations import rigid_body_force
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.reduction import ForceResult, Reduction
-from tank2sim.report.captive.charts import (
-    Across,
-    ForceLoop,
-    ForceSeries,
-    Harmonics,
-    Residual,
-    force_chart,
-    harmonic_chart,
-    loop_chart,
-    residual_chart,
-)
+from tank2sim.records.thinning import drawn_columns
 
 _NORMAL = 1.959964
 _SAMPLES = 81
 _LOOPS = 4
+_LOOP_SAMPLES = 200
+"""Loops of a chart, the largest of each frequency, and samples of each. Project choice: a panel is 560 pixels wide."""
 
 
-def reduction_charts(reduction: Reduction) -> dict[str, alt.TopLevelMixin]:
-    """File stem to chart: what the campaign has runs for."""
-    charts: dict[str, alt.TopLevelMixin] = {}
+Plot = dict[str, Any]
+"""A chart as JSON: ``kind``, ``title`` and what the kind needs (:mod:`tank2sim.report.captive.charts`)."""
+
+
+def plots_as_json(reduction: Reduction) -> dict[str, Plot]:
+    """Return the data of the charts of a reduction by file stem, as far as the campaign has runs for them."""
+    plots: dict[str, Plot] = {}
     for force in reduction.forces:
         for kind, words in (("static_drift", "drift angle"), ("static_rudder", "rudder angle")):
-            if chart := _angle_chart(reduction, force, kind, words):
-                charts[f"{kind}_{force}"] = chart
+            if plot := _angle_plot(reduction, force, kind, words):
+                plots[f"{kind}_{force}"] = plot
         for kind, words in (("pure_sway", "sway velocity amplitude v'"), ("pure_yaw", "yaw rate amplitude r'")):
-            if force != "X" and (chart := _amplitude_chart(reduction, force, kind, words)):
-                charts[f"{kind}_{force}"] = chart
-        if force != "X" and (chart := _harmonics(reduction, force)):
-            charts[f"harmonics_{force}"] = chart
+            if force != "X" and (plot := _amplitude_plot(reduction, force, kind, words)):
+                plots[f"{kind}_{force}"] = plot
+        if force != "X" and (plot := _harmonics(reduction, force)):
+            plots[f"harmonics_{force}"] = plot
     for kind in ("pure_sway", "pure_yaw", "yaw_with_drift"):
-        if loops := _loops(reduction, kind):
-            charts[f"loops_{kind}"] = loops
-    charts["residuals"] = residual_chart(
-        [
-            Residual(run=row.run, kind=row.type.replace("_", " "), force=force, value=-row.error / row.standard_error)
-            for force, result in reduction.forces.items()
-            for row in result.left_out
-        ],
-        title="Each run against its prediction from all the others",
-    )
-    return charts
+        if plot := _loops(reduction, kind):
+            plots[f"loops_{kind}"] = plot
+    return plots
 
 
-def _angle_chart(reduction: Reduction, force: str, kind: str, words: str) -> alt.LayerChart | None:
+def _angle_plot(reduction: Reduction, force: str, kind: str, words: str) -> Plot | None:
     """Force coefficient of the steady runs at the test speed against the angle that they vary."""
     runs = [run for run in reduction.runs if run.run.type == kind]
-    others = [run for run in reduction.runs if _varies_alone(run, kind) and run not in runs]
+    straight_runs = [run for run in reduction.runs if _varies_alone(run, kind) and run not in runs]
     if len(runs) < 2:
         return None
-    found = [(_angle(run, kind), *_coefficient(reduction, force, run)) for run in (*runs, *others)]
+    found = [(_angle(run, kind), *_coefficient(reduction, force, run)) for run in (*runs, *straight_runs)]
     angle, value, error = (np.array(column) for column in zip(*found, strict=True))
     across = np.linspace(angle.min(), angle.max(), _SAMPLES)
     v, rudder = (-np.sin(across), 0 * across) if kind == "static_drift" else (0 * across, across)
     fit, width = _fitted(reduction.forces[force], _regressors(reduction.forces[force], v, 0 * across, rudder))
-    series = ForceSeries(
-        label=kind.replace("_", " "),
-        x=angle,
-        value=value,
-        half_width=_NORMAL * error,
-        fit_x=across,
-        fit_value=fit,
-        fit_half_width=width,
-    )
-    return force_chart([series], Across(title=words, unit="rad"), f"{force}'", title=f"{force}' against {words}")
+    series = {
+        "label": kind.replace("_", " "),
+        "x": angle,
+        "value": value,
+        "half_width": _NORMAL * error,
+        "fit_x": across,
+        "fit_value": fit,
+        "fit_half_width": width,
+    }
+    title = f"{force}' against {words}"
+    return _force_plot([series], (words, "rad"), f"{force}'", title)
 
 
 def _varies_alone(run: ReducedRun, kind: str) -> bool:
@@ -128,7 +117,7 @@ def _fitted(result: ForceResult, regressors: Array) -> tuple[Array, Array]:
     return regressors @ solution.values, _NORMAL * np.sqrt(np.maximum(variance, 0.0))
 
 
-def _amplitude_chart(reduction: Reduction, force: str, kind: str, words: str) -> alt.LayerChart | None:
+def _amplitude_plot(reduction: Reduction, force: str, kind: str, words: str) -> Plot | None:
     """Damping of each run by (4.4) against its amplitude, a series a frequency; the third order bends the fit."""
     rows = [row for row in reduction.oscillations if row.type == kind and row.run not in reduction.not_used]
     if not rows:
@@ -142,24 +131,29 @@ def _amplitude_chart(reduction: Reduction, force: str, kind: str, words: str) ->
         if name in names:
             regressors[:, names.index(name)] = column
     fit, width = _fitted(result, regressors)
-    series = [
-        ForceSeries(label="fit", x=[], value=[], fit_x=amplitude, fit_value=fit, fit_half_width=width),
+    series: list[Plot] = [
+        {"label": "fit", "x": [], "value": [], "fit_x": amplitude, "fit_value": fit, "fit_half_width": width},
     ]
     for frequency in sorted({round(row.frequency_radps, 2) for row in rows}):
-        own = [row for row in rows if round(row.frequency_radps, 2) == frequency]
+        at_frequency = [row for row in rows if round(row.frequency_radps, 2) == frequency]
         series.append(
-            ForceSeries(
-                label=f"{frequency:g} rad/s",
-                x=[abs(row.amplitude) for row in own],
-                value=[row.values[force + letter] for row in own],
-                half_width=[_NORMAL * row.standard_errors[force + letter] for row in own],
-            )
+            {
+                "label": f"{frequency:g} rad/s",
+                "x": [abs(row.amplitude) for row in at_frequency],
+                "value": [row.values[force + letter] for row in at_frequency],
+                "half_width": [_NORMAL * row.standard_errors[force + letter] for row in at_frequency],
+            }
         )
     title = f"{force}{letter} of single runs by (4.4) against the amplitude"
-    return force_chart(series, Across(title=words), f"{force}{letter}", title=title)
+    return _force_plot(series, (words, "1"), f"{force}{letter}", title)
 
 
-def _harmonics(reduction: Reduction, force: str) -> alt.VConcatChart | None:
+def _force_plot(series: Sequence[Plot], across: tuple[str, str], up: str, title: str) -> Plot:
+    """A force, `up`, against the motion, `across` with its unit."""
+    return {"kind": "force", "title": title, "across": across[0], "unit": across[1], "up": up, "series": series}
+
+
+def _harmonics(reduction: Reduction, force: str) -> Plot | None:
     """Harmonics of the water's force in every oscillating run, and those that the derivatives give."""
     equations, solution = reduction.forces[force].selection.equations, reduction.forces[force].solution
     values = np.array([solution.value(name) for name in equations.names])
@@ -171,10 +165,11 @@ def _harmonics(reduction: Reduction, force: str) -> alt.VConcatChart | None:
         rows = slice(start, start + len(root))
         measured = root @ equations.values[rows]
         fitted = root @ (equations.design[rows] @ values)
-        bars.append(Harmonics(run=run.run.name, amplitude=_amplitudes(measured), fitted=_amplitudes(fitted)))
+        bars.append({"run": run.run.name, "amplitude": _amplitudes(measured), "fitted": _amplitudes(fitted)})
     if not bars:
         return None
-    return harmonic_chart(bars, f"{force}'", title=f"Harmonics of {force}', the body's inertia taken out")
+    title = f"Harmonics of {force}', without the body's inertia"
+    return {"kind": "harmonics", "title": title, "up": f"{force}'", "runs": bars}
 
 
 def _amplitudes(coefficients: Array) -> Array:
@@ -182,7 +177,7 @@ def _amplitudes(coefficients: Array) -> Array:
     return amplitudes
 
 
-def _loops(reduction: Reduction, kind: str) -> alt.VConcatChart | None:
+def _loops(reduction: Reduction, kind: str) -> Plot | None:
     """Y and N of the water over the velocity: the largest amplitude of each frequency."""
     runs: dict[float, ReducedRun] = {}
     for run in reduction.runs:
@@ -193,32 +188,25 @@ def _loops(reduction: Reduction, kind: str) -> alt.VConcatChart | None:
     if not runs:
         return None
     chosen = [runs[frequency] for frequency in sorted(runs)][:_LOOPS]
-    across = (
-        Across(title="sway velocity", unit="m/s") if kind == "pure_sway" else Across(title="yaw rate", unit="rad/s")
-    )
-    words = {"Y": "Y of the water (N)", "N": "N of the water (N m)"}
+    words, unit = ("sway velocity", "m/s") if kind == "pure_sway" else ("yaw rate", "rad/s")
     title = f"Loops of {kind.replace('_', ' ')}: the opening is the added mass"
-    return loop_chart([_loop(reduction, run) for run in chosen], across, words, title=title)
+    loops = [_loop(reduction, run) for run in chosen]
+    return {"kind": "loops", "title": title, "across": words, "unit": unit, "loops": loops}
 
 
 def _velocity(run: ReducedRun) -> Array:
     return run.motion.v_mps if run.run.type == "pure_sway" else run.motion.r_radps
 
 
-def _loop(reduction: Reduction, run: ReducedRun) -> ForceLoop:
-    own: Mapping[str, Array] = rigid_body_force(reduction.campaign, run.motion)
-    kept = run.motion.kept
-    forces: dict[str, Sequence[float] | Array] = {}
-    fitted: dict[str, Sequence[float] | Array] = {}
+def _loop(reduction: Reduction, run: ReducedRun) -> Plot:
+    """Motion, and Y and N of the water, over the whole run and one period of the fit; thinned to draw."""
+    inertia: Mapping[str, Array] = rigid_body_force(reduction.campaign, run.motion)
+    kept, velocity = run.motion.kept, _velocity(run)
     one_period = slice(0, len(run.motion.time_s) // run.motion.periods + 1)
-    for force in "YN":
-        fit = run.fits[force]
-        forces[force] = run.run.force(force)[kept] + own[force]
-        fitted[force] = (run.basis @ fit.coefficients + own[force])[one_period]
-    return ForceLoop(
-        label=run.run.name,
-        motion=_velocity(run),
-        forces=forces,
-        fitted_motion=_velocity(run)[one_period],
-        fitted=fitted,
-    )
+    measured = {force: run.run.force(force)[kept] + inertia[force] for force in "YN"}
+    fitted = {force: (run.basis @ run.fits[force].coefficients + inertia[force])[one_period] for force in "YN"}
+    return {
+        "label": run.run.name,
+        "measured": drawn_columns({"motion": velocity, **measured}, _LOOP_SAMPLES),
+        "fitted": drawn_columns({"motion": velocity[one_period], **fitted}, _LOOP_SAMPLES),
+    }

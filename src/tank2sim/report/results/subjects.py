@@ -1,4 +1,4 @@
-"""What is drawn of the results of each command next to their tables, by the functions of the command's own page."""
+"""Registry of the subjects: the page of the results of each command, or the sections that are drawn of them."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from tank2sim.report.autopilot.page import autopilot_page
+from tank2sim.report.captive.page import reduction_page
 from tank2sim.report.comparison.page import compare_page
+from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.glide.page import glide_page
 from tank2sim.report.influence.page import influence_page
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Page, PageSection
-from tank2sim.report.results.fleet import told_fleet_page
 from tank2sim.report.results.motions import audit_sections, from_the_bridge, identified, simulated
 from tank2sim.report.signals.page import signals_page
 from tank2sim.report.stability.page import stability_page
@@ -22,9 +23,9 @@ from tank2sim.report.yaw.page import yaw_page
 
 
 @dataclass(frozen=True)
-class _Drawer:
-    """The sections of a result; the keys that it `needs`, each with what stands under it (older versions wrote none of
-    them); and the paths of what is drawn (with dots between keys; * is any), which is then not told again in tables."""
+class _Sections:
+    """Sections of a page; the keys that they `need` with the type of each (older versions wrote none of them); and the
+    paths of what is `taken` by them (with dots between keys; * is any), which is not repeated in tables."""
 
     sections: Callable[[Json], list[PageSection]]
     needs: Mapping[str, type]
@@ -33,7 +34,7 @@ class _Drawer:
 
 @dataclass(frozen=True)
 class _Page:
-    """A whole page, and the keys that it `needs`, each with what stands under it."""
+    """A whole page, and the keys that it `needs` with the type of each."""
 
     make: Callable[[Json], Page]
     needs: Mapping[str, type]
@@ -41,8 +42,8 @@ class _Page:
 
 _WAY = ("ahead_m", "starboard_m")
 
-_DRAWERS: Mapping[str, _Drawer] = {
-    "Simulated manoeuvre": _Drawer(
+_SECTIONS: Mapping[str, _Sections] = {
+    "Simulated manoeuvre": _Sections(
         simulated,
         {"histories": dict, "figures": dict, "manoeuvre": str},
         (
@@ -54,12 +55,14 @@ _DRAWERS: Mapping[str, _Drawer] = {
             "ensemble.track",
         ),
     ),
-    "Audit of trials": _Drawer(audit_sections, {"findings": list, "trials": list}, ("trials.*.histories", "findings")),
-    "Coefficients from trials": _Drawer(identified, {"replays": list}, ("replays",)),
-    "Bridge": _Drawer(
+    "Audit of trials": _Sections(
+        audit_sections, {"findings": list, "trials": list}, ("trials.*.histories", "findings")
+    ),
+    "Coefficients from trials": _Sections(identified, {"replays": list}, ("replays",)),
+    "Bridge": _Sections(
         from_the_bridge,
         {"turning_circles_deep": list, "turning_circles_shallow": list, "stops": list},
-        tuple(f"{one}.*.{way}" for one in ("turning_circles_deep", "turning_circles_shallow", "stops") for way in _WAY),
+        tuple(f"{key}.*.{way}" for key in ("turning_circles_deep", "turning_circles_shallow", "stops") for way in _WAY),
     ),
 }
 
@@ -103,25 +106,30 @@ _PAGES: Mapping[str, _Page] = {
         | {"imo": list, "replays": list, "notices": list},
     ),
     "Signals": _Page(signals_page, {"trials": list}),
-    "Fleet": _Page(told_fleet_page, {"fleet": str, "ships": list}),
+    "Captive tests": _Page(
+        reduction_page,
+        {"plots": dict, "leave_one_out": dict, "selection": dict, "prediction_errors": dict, "model": dict}
+        | {"runs": list, "not_used": object, "warnings": list},
+    ),
+    "Fleet": _Page(fleet_page_of_json, {"fleet": str, "ships": list}),
     "Influence coefficients": _Page(
         influence_page, {"figures": dict, "parameters": dict, "influence_percent": dict, "notices": list}
     ),
 }
-"""Commands whose own page is made of their JSON."""
+"""Subjects whose whole page is made of their JSON."""
 
 
 _LISTS = {"notices": list, "warnings": list, "notes": list}
 
 
 def needs_of(kind: str) -> Mapping[str, type]:
-    """Keys that the charts of a kind need, each with what stands under it."""
-    own = _DRAWERS.get(kind) or _PAGES.get(kind)
-    return own.needs if own else {}
+    """Return the keys that the page of a kind needs, with the type of each."""
+    subject = _SECTIONS.get(kind) or _PAGES.get(kind)
+    return subject.needs if subject else {}
 
 
 def misshapen(kind: str, result: Mapping[str, Json]) -> str:
-    """The first key under which there is something else than the command writes; empty where there is none."""
+    """Return the first key whose value has another type than the command writes; empty without any."""
     forms = _LISTS | dict(needs_of(kind))
     notices = result.get("notices")
     if isinstance(notices, list) and not all(isinstance(text, str) for text in notices):
@@ -130,32 +138,32 @@ def misshapen(kind: str, result: Mapping[str, Json]) -> str:
 
 
 def whole_page(kind: str, result: Json) -> Page | None:
-    """The command's own page of a result, where it is made of the JSON alone."""
+    """Return the page of a result, where it is made as a whole; None for an older file, which lacks some keys."""
     page = _PAGES.get(kind)
     return page.make(result) if page and all(key in result for key in page.needs) else None
 
 
 def render_charts(kind: str, result: Mapping[str, Json]) -> tuple[list[PageSection], Json]:
-    """Sections with the charts of a result, and what is left of it for tables.
+    """Return the sections with the charts of a result, and its remaining parts for tables.
 
     `kind` is one of :data:`tank2sim.report.results.result_types.RESULT_TYPES`.
     """
-    drawer = _DRAWERS.get(kind)
-    if drawer is None or not all(key in result for key in drawer.needs):
+    subject = _SECTIONS.get(kind)
+    if subject is None or not all(key in result for key in subject.needs):
         return [], result
-    rest: Json = result
-    for path in drawer.taken:
-        rest = _without(rest, path.split("."))
-    return drawer.sections(result), rest
+    remaining: Json = result
+    for path in subject.taken:
+        remaining = _without(remaining, path.split("."))
+    return subject.sections(result), remaining
 
 
 def _without(value: Json, path: list[str]) -> Json:
     key, *deeper = path
     if isinstance(value, list):
-        return [_without(one, deeper) for one in value] if key == "*" and deeper else value
+        return [_without(item, deeper) for item in value] if key == "*" and deeper else value
     if not isinstance(value, Mapping):
         return value
     keys = [name for name in value if key in (name, "*")]
     if not deeper:
-        return {name: one for name, one in value.items() if name not in keys}
-    return {name: _without(one, deeper) if name in keys else one for name, one in value.items()}
+        return {name: item for name, item in value.items() if name not in keys}
+    return {name: _without(item, deeper) if name in keys else item for name, item in value.items()}
