@@ -8,7 +8,7 @@ from typing import Any
 
 import altair as alt
 
-from tank2sim.gap.fleet.summary import REPORT_FILE, FleetTold, ShipTold
+from tank2sim.gap.fleet.summary import REPORT_FILE, FleetSummary, ShipSummary
 from tank2sim.gap.result import AMBIGUOUS, GAP_VERDICTS, MISSING
 from tank2sim.report.gap.text import effect_in_words, parameter_in_words, with_error
 from tank2sim.report.kit.chart_parts import NUMBER, data, series_look
@@ -23,7 +23,7 @@ _CHART = "The line is the noise; the scale is logarithmic. Where nothing was add
 _BEFORE, _AFTER = "card as given", "card found"
 
 
-def fleet_page(told: FleetTold) -> Page:
+def fleet_page(told: FleetSummary) -> Page:
     """The page; it stands in the folder in which each ship has one of its own."""
     found = [ship for ship in told.ships if not ship.fault]
     sections = []
@@ -50,7 +50,7 @@ def fleet_page(told: FleetTold) -> Page:
     )
 
 
-def _figures(told: FleetTold) -> list[KeyFigure]:
+def _figures(told: FleetSummary) -> list[KeyFigure]:
     counts = told.verdicts
     figures = [KeyFigure(label="Ships", value=str(len(told.ships)))]
     figures += [
@@ -63,7 +63,7 @@ def _figures(told: FleetTold) -> list[KeyFigure]:
     return figures
 
 
-def _ships(found: list[ShipTold]) -> PageTable:
+def _ships(found: list[ShipSummary]) -> PageTable:
     rows: list[list[Cell]] = [
         [
             Link(text=one.folder, path=f"{one.folder}/{REPORT_FILE}"),
@@ -80,7 +80,7 @@ def _ships(found: list[ShipTold]) -> PageTable:
     return PageTable(caption="What was found", columns=[Column(title=head, digits=7) for head in heads], rows=rows)
 
 
-def _effects(ship: ShipTold) -> str:
+def _effects(ship: ShipSummary) -> str:
     """Effects with their parameters, ± one standard error; or all that it may be."""
     named = "; ".join(_effect(effect) for effect in ship.effects)
     if ship.verdict == AMBIGUOUS:
@@ -102,7 +102,7 @@ def _hundredths(misfit: float | None) -> float | None:
     return None if misfit is None else round(misfit, 2)
 
 
-def _misfit_chart(found: list[ShipTold]) -> alt.LayerChart | None:
+def _misfit_chart(found: list[ShipSummary]) -> alt.LayerChart | None:
     """Misfit of each ship before and after, a row each; None where no simulation came to its end."""
     rows = [
         {"ship": one.folder, "run": label, "misfit": _hundredths(misfit)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from tank2sim.gap.fleet.summary import REPORT_FILE, FleetTold, ShipTold
+from tank2sim.gap.fleet.summary import REPORT_FILE, FleetSummary, ShipSummary
 from tank2sim.report.gap.fleet_page import fleet_page
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Link, Page, PageSection, PageTable
@@ -16,7 +16,7 @@ def told_fleet_page(result: Json) -> Page:
     """The fleet's own page, the ships by the names of their folders without ways to their pages."""
     names = ("name", "verdict", "misfit", "trials", "fault")
     ships = tuple(
-        ShipTold(
+        ShipSummary(
             folder=one["folder"],
             effects=tuple(one.get("effects") or ()),
             alternatives=tuple(one.get("alternatives") or ()),
@@ -24,7 +24,7 @@ def told_fleet_page(result: Json) -> Page:
         )
         for one in result["ships"]
     )
-    page = fleet_page(FleetTold(name=str(result["fleet"]), ships=ships, notices=tuple(result.get("notices") or ())))
+    page = fleet_page(FleetSummary(name=str(result["fleet"]), ships=ships, notices=tuple(result.get("notices") or ())))
     return replace(page, sections=[_without_links(section) for section in page.sections])
 
 
