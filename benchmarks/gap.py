@@ -205,12 +205,12 @@ def _decided(group: str, made: Made, card: ManoeuvringCard, files: dict[str, lis
         truth=made.parameters,
         verdict=decision.verdict,
         named=[name for name, *_ in named],
-        alternatives=[list(fit.explained.effects) for fit in decision.alike] if named else [],
+        alternatives=[list(fit.hypothesis.effects) for fit in decision.alike] if named else [],
         confidence={name: decision.confidence(name) for name, *_ in named},
         found={name: _in_file(values) for name, values, _ in named},
         hides={name: _in_file(sizes) for name, sizes in hides.items()},
         seconds=seconds,
-        scores=[(list(fit.explained.effects), float(fit.score)) for fit in found.fits],
+        scores=[(list(fit.hypothesis.effects), float(fit.score)) for fit in found.fits],
         strange=[(one.what, one.trial, one.excess) for one in decision.strange],
     )
 

@@ -141,7 +141,9 @@ def _without_wind(windy: ManoeuvringCard, whole: Measured, workers: int) -> None
     gap = run_gap_workflow(calm, fitted, held, GapOptions(workers=workers))
     _show(gap, time.perf_counter() - begin)
     alone = next(
-        fit for fit in search(likelihood_from_card(calm, fitted), names=("wind",), most=1).fits if fit.explained.effects
+        fit
+        for fit in search(likelihood_from_card(calm, fitted), names=("wind",), most=1).fits
+        if fit.hypothesis.effects
     )
     found = estimates(alone)
     values = found[0][1]
@@ -243,7 +245,7 @@ def _named(gap: Gap, fitted: Measured) -> dict[str, tuple[ManoeuvringCard, list[
     if not names:
         return {}
     fits = search(likelihood_from_card(gap.card, fitted), names=names, most=len(names)).fits
-    best = estimates(next(fit for fit in fits if set(fit.explained.effects) == set(names)))
+    best = estimates(next(fit for fit in fits if set(fit.hypothesis.effects) == set(names)))
     for name, values, errors in best:
         print(f"   not named, though it fits best: {name}: {_in_short(name, values, errors)}")
     return {"what fits best, not named": (gap.card, best)}

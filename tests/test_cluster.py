@@ -18,7 +18,7 @@ from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cluster import Cluster, installed
 from tank2sim.errors import InputError
 from tank2sim.executors import executing, processes_to_begin
-from tank2sim.gap.inference.fit_all import Fitting, Known, Proposal
+from tank2sim.gap.inference.fit_all import Fitting, HypothesisCache, Proposal
 from tank2sim.gap.inference.prior import likelihood_from_card
 from tank2sim.identification.trials.assessment.model_selection import cross_validate, yaw_rate_error
 from tank2sim.identification.trials.assessment.prediction_intervals import PredictionSettings, bootstrap
@@ -101,11 +101,11 @@ def test_explanations_of_a_gap_are_the_local_ones_to_the_bit_when_a_worker_is_lo
     starts = {"gyro_bias": np.array([0.001]), "current": np.array([0.2, 1.0]), "rudder_bias": np.array([0.01])}
     proposals = [Proposal({name: starts[name]}, [likelihood.belief.logs], (0, 3)) for name in starts]
     proposals += [Proposal(starts, [likelihood.belief.logs], (0, 3)), Proposal({}, [likelihood.belief.logs], (0, 3))]
-    here = Fitting(likelihood, Known(likelihood.none), lambda text: None, None)
+    here = Fitting(likelihood, HypothesisCache(likelihood.none), lambda text: None, None)
     here.fit(proposals)
     with executing(two.option) as executor:
         killing = Killing(executor, two.workers[0], after=2)
-        there = Fitting(likelihood, Known(likelihood.none), lambda text: None, killing)
+        there = Fitting(likelihood, HypothesisCache(likelihood.none), lambda text: None, killing)
         there.fit(proposals)
     assert two.workers[0].wait(10) != 0, "the worker was killed"
     assert list(there.found) == list(here.found)

@@ -214,7 +214,8 @@ from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.prior import candidate_explanations
 card = read_card("mariner.toml")
 print(*candidate_explanations(card, "angle"))
-print([(asked.variable, asked.parameter.name) for asked in Hypothesis(card, "angle", ["bow_thruster"]).asked])
+estimated = Hypothesis(card, "angle", ["bow_thruster"]).estimated
+print([(estimate.variable, estimate.parameter.name) for estimate in estimated])
 """
     offered, asked = done(python(site, code, cwd=work)).splitlines()
     assert "bow_thruster" in offered.split()

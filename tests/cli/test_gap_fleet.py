@@ -179,7 +179,7 @@ def test_what_changed_is_computed_again_and_the_rest_is_not(ships: Path, tmp_pat
     result = tank2sim(*arguments, cwd=tmp_path)
     assert result.returncode == 0 and calls == ["beta"]
     assert "computed: the trials were changed" in result.stdout and "taken from the earlier run" in result.stdout
-    assert "ships/out/gamma ray #1 is of an earlier run: there is no such ship now" in result.stdout
+    assert "ships/out/gamma ray #1 is of an earlier run, and its ship is not in the fleet" in result.stdout
     calls.clear()
     assert tank2sim(*arguments, "--again", cwd=tmp_path).returncode == 0 and calls == ["alpha", "beta"]
     calls.clear()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
-from tank2sim.gap.proof.cross_check import black_box, closes, trial_consistency, worse
+from tank2sim.gap.proof.cross_check import black_box, closes_gap, trial_consistency, worse_trials
 from tank2sim.gap.result import Passed
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tests.gap.replay_noise import NOISE
@@ -43,8 +43,8 @@ def test_trials_that_got_worse_are_named() -> None:
         return Passed(name, False, np.arange(100.0), {"motion.x": 1.0}, measured, *columns)
 
     passed = [trial("better", 5, 1), trial("same", 1.0, 1.02), trial("worse", 1.0, 1.2), trial("far", 9.0, 9.3)]
-    assert worse([*passed, trial("lost", 1.0, np.nan)]) == ("worse", "lost")
-    assert worse(passed, tolerance=0.01) == ("same", "worse", "far")
+    assert worse_trials([*passed, trial("lost", 1.0, np.nan)]) == ("worse", "lost")
+    assert worse_trials(passed, tolerance=0.01) == ("same", "worse", "far")
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_a_name_that_brings_no_simulation_nearer_closes_nothing(sizes, closed: b
         )
         for number, pair in enumerate(sizes)
     ]
-    assert closes(passed) == closed
+    assert closes_gap(passed) == closed
 
 
 def test_a_linear_change_is_found_by_the_black_box_and_counts_no_more_terms_than_asked() -> None:

@@ -44,8 +44,8 @@ def none_of(likelihood: Likelihood) -> ExplanationFit:
 
 def sizes(likelihood: Likelihood, enough: float = 10.0, names=HIDDEN) -> dict[str, dict[str, float]]:
     none = likelihood.none
-    explained = [Hypothesis(none.card, none.driven_by, [name]) for name in names]
-    every = tuple(one for each in explained for one in variants(likelihood, each))
+    hypothesis = [Hypothesis(none.card, none.driven_by, [name]) for name in names]
+    every = tuple(one for each in hypothesis for one in variants(likelihood, each))
     best = none_of(likelihood)
     return could_hide(Search(likelihood, (best,), every), best, enough)
 
@@ -79,17 +79,17 @@ def test_what_could_hide_is_where_the_score_begins_to_tell(card) -> None:
     gains = []
     for share in (1 / 4, 3.0):
         likelihood = judged(card, bias=share * size)
-        explained = Hypothesis(card, "angle", ["gyro_bias"])
+        hypothesis = Hypothesis(card, "angle", ["gyro_bias"])
         none = none_of(likelihood)
-        one = likelihood.at_best(explained, np.array([share * size]), [none.logs, likelihood.belief.logs], [0, 6])
+        one = likelihood.at_best(hypothesis, np.array([share * size]), [none.logs, likelihood.belief.logs], [0, 6])
         gains.append(none.score - one.score)
     assert gains[0] < 10.0 < gains[1]
 
 
 def test_beside_what_is_named_it_is_not_told_again(card) -> None:
     likelihood = judged(card, bias=0.002)
-    explained = Hypothesis(card, "angle", ["gyro_bias"])
-    best = likelihood.at_best(explained, np.array([0.002]), [likelihood.belief.logs], [0, 6])
+    hypothesis = Hypothesis(card, "angle", ["gyro_bias"])
+    best = likelihood.at_best(hypothesis, np.array([0.002]), [likelihood.belief.logs], [0, 6])
     every = [one for name in HIDDEN for one in variants(likelihood, Hypothesis(card, "angle", [name]))]
     assert set(could_hide(Search(likelihood, (best,), tuple(every)), best, 10.0)) == set(HIDDEN) - {"gyro_bias"}
 
@@ -100,16 +100,16 @@ def test_of_an_effect_without_amplitude_a_value_is_told_that_does_not_show(card)
     trial.signals["delta_order_rad"] = trial.signals.pop("delta_rad")
     likelihood = likelihood_from_card(card, Measured((trial,), "order", ()))
     found = sizes(likelihood, names=("rudder_lag",))["rudder_lag"]
-    explained = Hypothesis(card, "order", ["rudder_lag"])
-    typical = explained.asked[0].parameter.typical_values(card)[0]
-    tried = sorted(share * typical for share in SIZES if share * typical >= explained.bounds[0][0])
+    hypothesis = Hypothesis(card, "order", ["rudder_lag"])
+    typical = hypothesis.estimated[0].parameter.typical_values(card)[0]
+    tried = sorted(share * typical for share in SIZES if share * typical >= hypothesis.bounds[0][0])
     (value,) = found.values()
     assert value == pytest.approx(min(tried, key=lambda one: abs(one - value)))
     best = none_of(likelihood)
 
     def cost(lag: float) -> float:
         """What the lag makes worse at the noise of none, nothing but the coefficients given way."""
-        held = replace(best, explained=explained, theta=np.array([lag]))
+        held = replace(best, hypothesis=hypothesis, theta=np.array([lag]))
         return likelihood._parameters(held, likelihood.base, likelihood.coefficient_columns, 1).score - best.score
 
     longer = [one for one in tried if one > value]

@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.outcome.export import estimate_in_file, gap_as_json, in_file_units, meant, signal_display_name
+from tank2sim.gap.outcome.export import (
+    effect_parameter_name,
+    estimate_in_file,
+    gap_as_json,
+    in_file_units,
+    signal_display_name,
+)
 from tank2sim.units import to_si
 from tests.gap import made_up
 
@@ -113,7 +119,7 @@ def test_every_parameter_of_the_library_is_read_back_as_it_was() -> None:
             own, value = in_file_units(parameter, 0.3)
             assert "rad" not in own.rpartition("_")[2]
             assert to_si(own, value) == (parameter, pytest.approx(0.3))
-            assert meant(variable) == (effect.name, parameter)
+            assert effect_parameter_name(variable) == (effect.name, parameter)
 
 
 def test_directions_alone_go_round_once() -> None:
@@ -158,4 +164,4 @@ def test_cautions_are_among_the_notices() -> None:
     first, second, *_ = written(poor)["notices"]
     assert "55 % of the gap of the fitting trials remains" in first and "black box" in second
     unsure = replace(gap, effects=(replace(gap.effects[0], confidence=0.11),))
-    assert "those without it are likelier together: its probability is 0.11" in written(unsure)["notices"][0]
+    assert "those without it are together likelier: its probability is 0.11" in written(unsure)["notices"][0]

@@ -11,7 +11,7 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.gap.inference.fit import ExplanationFit
-from tank2sim.gap.inference.fit_all import Fitting, Known, Proposal, thetas_of
+from tank2sim.gap.inference.fit_all import Fitting, HypothesisCache, Proposal, thetas_of
 from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.inference.prior import likelihood_from_card
@@ -46,7 +46,7 @@ EVERY = ((), ("gyro_bias",), ("current",), ("linear_yaw_damping",), ("current", 
 def fitted(
     likelihood: Likelihood, executor: Executor | None, *sets: tuple[str, ...]
 ) -> dict[tuple[str, ...], ExplanationFit]:
-    fitting = Fitting(likelihood, Known(likelihood.none), lambda text: None, executor)
+    fitting = Fitting(likelihood, HypothesisCache(likelihood.none), lambda text: None, executor)
     fitting.fit(proposals(likelihood, *sets))
     return fitting.found
 
@@ -60,7 +60,7 @@ def assert_same(found: dict[tuple[str, ...], ExplanationFit], expected: dict[tup
     """To the bit."""
     assert list(found) == list(expected)
     for effects, one in found.items():
-        assert one.explained.effects == effects and one.score == expected[effects].score
+        assert one.hypothesis.effects == effects and one.score == expected[effects].score
         for name in ("theta", "covariance", "logs", "change"):
             np.testing.assert_array_equal(getattr(one, name), getattr(expected[effects], name))
 
@@ -103,12 +103,12 @@ def test_the_order_of_effects_does_not_matter(likelihood, alone) -> None:
 
 
 def test_the_better_of_two_fits_is_kept(likelihood, alone) -> None:
-    fitting = Fitting(likelihood, Known(likelihood.none), lambda text: None, None)
+    fitting = Fitting(likelihood, HypothesisCache(likelihood.none), lambda text: None, None)
     worse = alone["current",].score + 3.0
     scores = iter([worse, alone["current",].score, worse])
-    explained = fitting.known("current")
+    hypothesis = fitting.hypotheses("current")
     for _ in range(3):
-        made = ExplanationFit(explained, np.zeros(2), np.eye(2), likelihood.belief.logs, next(scores), np.zeros(0))
+        made = ExplanationFit(hypothesis, np.zeros(2), np.eye(2), likelihood.belief.logs, next(scores), np.zeros(0))
         fitting._keep(Proposal({"current": np.zeros(2)}, [], ()), made)
     assert fitting.found["current",].score == alone["current",].score
     assert fitting.has(1) and not fitting.has(0) and not fitting.has(2)
@@ -119,13 +119,13 @@ def test_the_better_of_two_fits_is_kept(likelihood, alone) -> None:
 
 def test_what_is_being_fitted_is_told_in_order(likelihood, executor) -> None:
     told: list[str] = []
-    fitting = Fitting(likelihood, Known(likelihood.none), told.append, executor)
+    fitting = Fitting(likelihood, HypothesisCache(likelihood.none), told.append, executor)
     fitting.fit(proposals(likelihood, (), ("gyro_bias",), rounds=(0,)))
     assert told == ["the card as it is", "gyro_bias"]
 
 
 def test_explanations_are_made_once(card) -> None:
-    known = Known(Hypothesis(card, "angle"))
+    known = HypothesisCache(Hypothesis(card, "angle"))
     assert known("current") is known("current") and known() is known.none
     assert known("current").effects == ("current",) and known("current").driven_by == "angle"
 
@@ -133,7 +133,7 @@ def test_explanations_are_made_once(card) -> None:
 def test_a_hopeless_score_is_not_polished(likelihood, alone) -> None:
     starts = [likelihood.belief.logs]
     limit = alone[()].score - 1e6
-    fitting = Fitting(likelihood, Known(likelihood.none), lambda text: None, None)
+    fitting = Fitting(likelihood, HypothesisCache(likelihood.none), lambda text: None, None)
     fitting.fit([Proposal({}, starts, (0, 9), limit)])
     np.testing.assert_array_equal(fitting.found[()].logs, starts[0])
     assert fitting.found[()].score >= alone[()].score

@@ -14,7 +14,7 @@ import pytest
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.errors import InputError
 from tank2sim.gap.fleet.run_record import NEW, RUN, fleet_run_record, stale, with_results
-from tank2sim.gap.fleet.search import Fault, Sought, found_at_once, found_one_by_one
+from tank2sim.gap.fleet.search import Fault, ShipTask, find_at_once, find_in_turn
 from tank2sim.gap.fleet.ships import ShipFolder, fleet_in, ship_alone, ship_in
 from tank2sim.gap.workflow import GapOptions
 from tank2sim.identification.trials.problem.prepare_trials import Measured
@@ -79,7 +79,7 @@ def test_a_file_that_is_called_like_a_trial_and_is_none_is_a_fault(
     laid(tmp_path, "s/a.toml", *good, bad)
     (tmp_path / bad).write_text("ts,delta_deg,u_mps\n0,0,7\n")
     found = fleet_in(tmp_path, tmp_path / "out")
-    assert found.ships == () and found.faults["s"].startswith(f"{tmp_path / bad}: is no trial: {why};")
+    assert found.ships == () and found.faults["s"].startswith(f"{tmp_path / bad}: is not a trial: {why};")
 
 
 def test_results_are_no_ships(tmp_path: Path) -> None:
@@ -96,7 +96,7 @@ def test_results_are_no_ships(tmp_path: Path) -> None:
 def test_results_do_not_go_where_ships_lie(tmp_path: Path) -> None:
     laid(tmp_path, "a/c.toml", "a/t.csv")
     for output in (tmp_path, tmp_path / "a"):
-        with pytest.raises(InputError, match="where a ship's card and trials lie"):
+        with pytest.raises(InputError, match="folder of a ship's card and trials"):
             fleet_in(tmp_path, output)
 
 
@@ -176,10 +176,10 @@ def test_options_that_change_the_result_make_it_stale_and_others_do_not(
 # -- the work ------------------------------------------------------------------------------------------------------
 
 
-def sought(card: ManoeuvringCard, *names: str) -> list[Sought]:
+def sought(card: ManoeuvringCard, *names: str) -> list[ShipTask]:
     none = Measured((), "angle", ())
     return [
-        Sought(ShipFolder(name, Path(card.source), (), ()), replace(card, source=name), none, none) for name in names
+        ShipTask(ShipFolder(name, Path(card.source), (), ()), replace(card, source=name), none, none) for name in names
     ]
 
 
@@ -203,8 +203,8 @@ def test_a_bad_ship_does_not_stop_the_others(mariner_card: ManoeuvringCard, fail
     ships = sought(mariner_card, "a", "bad", "odd", "z")
     with ThreadPoolExecutor(2) as pool:
         for found in (
-            found_one_by_one(ships, GapOptions(), told.append),
-            found_at_once(iter(ships), GapOptions(), told.append, pool),
+            find_in_turn(ships, GapOptions(), told.append),
+            find_at_once(iter(ships), GapOptions(), told.append, pool),
         ):
             results = {ship.folder.name: result for ship, result in found}
             assert results["a"] == "gap of a" and results["z"] == "gap of z"
@@ -223,7 +223,7 @@ def test_a_lost_executor_ends_the_run_in_one_line(mariner_card: ManoeuvringCard)
             return future
 
     with Lost(1) as pool, pytest.raises(InputError, match=r"a worker was lost while a was sought .*goes on where"):
-        list(found_at_once(sought(mariner_card, "a"), GapOptions(), lambda stage: None, pool))
+        list(find_at_once(sought(mariner_card, "a"), GapOptions(), lambda stage: None, pool))
 
 
 def test_what_is_sent_to_a_worker_needs_no_file_of_this_machine(mariner_card: ManoeuvringCard) -> None:

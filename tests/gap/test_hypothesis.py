@@ -99,34 +99,34 @@ def test_fine_rates_are_the_derivatives_of_the_true_motion(card, by_angle, by_or
 
 
 def test_rates_are_the_equations_at_the_mean_states_of_a_block(card, by_angle) -> None:
-    explained = Hypothesis(card, "angle")
+    hypothesis = Hypothesis(card, "angle")
     x, rudder = by_angle.block_states, by_angle.block_inputs[..., 0]
     u, v, r, psi = (x[..., place] for place in range(4))
     by_hand = [*accelerations(u, v, r, rudder, TRUTH), r, u * np.cos(psi) - v * np.sin(psi)]
     by_hand.append(u * np.sin(psi) + v * np.cos(psi))
-    assert explained.rates(by_angle, NOTHING) == pytest.approx(np.stack(by_hand, axis=-1), rel=1e-9, abs=1e-12)
-    assert explained.own_states(by_angle, NOTHING).shape == (2, FINE * BLOCKS, 0)
+    assert hypothesis.rates(by_angle, NOTHING) == pytest.approx(np.stack(by_hand, axis=-1), rel=1e-9, abs=1e-12)
+    assert hypothesis.unmeasured_states(by_angle, NOTHING).shape == (2, FINE * BLOCKS, 0)
 
 
 def test_a_current_carries_the_ship(card) -> None:
     speed, direction = 0.7, 2.0
     motion = simulated(order, order, (speed * np.cos(direction), speed * np.sin(direction)))
-    explained = Hypothesis(card, "angle", ["current"])
-    assert [one.parameter.name for one in explained.asked] == ["speed_mps", "direction_rad"]
-    found = explained.fine_rates(motion, np.array([speed, direction]))
+    hypothesis = Hypothesis(card, "angle", ["current"])
+    assert [one.parameter.name for one in hypothesis.estimated] == ["speed_mps", "direction_rad"]
+    found = hypothesis.fine_rates(motion, np.array([speed, direction]))
     assert np.abs(found - true_rates(motion)).max(axis=(0, 1)) / SIZES == pytest.approx(0, abs=2e-4)
-    away = explained.fine_rates(motion, np.array([0.0, direction])) - true_rates(motion)
+    away = hypothesis.fine_rates(motion, np.array([0.0, direction])) - true_rates(motion)
     assert away[..., 4:] == pytest.approx(
         np.broadcast_to(-speed * np.array([np.cos(2), np.sin(2)]), (2, 39, 2)), abs=2e-3
     )
 
 
 def test_the_rudder_follows_its_order_as_the_gear_does(card, by_order) -> None:
-    explained = Hypothesis(card, "order")
+    hypothesis = Hypothesis(card, "order")
     t = STEP * np.arange(FINE * BLOCKS)
-    assert explained.own == ("rudder.angle",)
+    assert hypothesis.unmeasured == ("rudder.angle",)
     for run in range(2):
-        assert explained.own_states(by_order, NOTHING)[run, :, 0] == pytest.approx(behind(t), abs=1e-4)
+        assert hypothesis.unmeasured_states(by_order, NOTHING)[run, :, 0] == pytest.approx(behind(t), abs=1e-4)
 
 
 def stepped(motion: MeasuredBatch, at: float, size: float) -> MeasuredBatch:
@@ -139,9 +139,9 @@ def stepped(motion: MeasuredBatch, at: float, size: float) -> MeasuredBatch:
 def test_a_lag_and_a_limit_of_the_gear(card, by_order) -> None:
     t, kicked = STEP * np.arange(FINE * BLOCKS), stepped(by_order, 20.0, 0.3)
     after = np.maximum(t - 20.0, 0)
-    lagging = Hypothesis(card, "order", ["rudder_lag"]).own_states(kicked, np.array([3.0]))
+    lagging = Hypothesis(card, "order", ["rudder_lag"]).unmeasured_states(kicked, np.array([3.0]))
     assert lagging[0, :, 0] == pytest.approx(0.3 * (1 - np.exp(-after / 3.0)), abs=1e-5)
-    limited = Hypothesis(card, "order", ["rudder_rate_limit"]).own_states(kicked, np.array([0.05]))
+    limited = Hypothesis(card, "order", ["rudder_rate_limit"]).unmeasured_states(kicked, np.array([0.05]))
     running = 0.05 * after  # until the lag of the gear asks for less
     slow = running < 0.3 - 0.05 * LAG - 0.01
     assert limited[0, slow, 0] == pytest.approx(running[slow], abs=1e-6)
@@ -150,24 +150,24 @@ def test_a_lag_and_a_limit_of_the_gear(card, by_order) -> None:
 
 @pytest.mark.parametrize("delay", [1.3, 0.04, 2.0, -1.3])
 def test_a_time_offset_moves_the_rudder_by_the_delay(card, by_angle, by_order, delay: float) -> None:
-    explained = Hypothesis(card, "angle", ["rudder_time_offset"])
+    hypothesis = Hypothesis(card, "angle", ["rudder_time_offset"])
     middles = STEP * (np.arange(FINE * BLOCKS - 1) + 0.5)
     inside = (middles > 3) & (middles < middles[-1] - 3)
-    found = explained.inputs(by_angle, np.array([delay]))
+    found = hypothesis.inputs(by_angle, np.array([delay]))
     assert found[0, inside, 0] == pytest.approx(order(middles - delay)[inside], abs=1e-5)
     # an order reaches the ship through the gear: its angle is late
-    explained = Hypothesis(card, "order", ["rudder_time_offset"])
+    hypothesis = Hypothesis(card, "order", ["rudder_time_offset"])
     t = STEP * np.arange(FINE * BLOCKS)
     inside = (t > 6) & (t < t[-1] - 3)
-    own = explained.own_states(by_order, np.array([delay]))
+    own = hypothesis.unmeasured_states(by_order, np.array([delay]))
     assert own[1, inside, 0] == pytest.approx(behind(t - delay)[inside], abs=1e-4)
-    assert explained.inputs(by_order, np.array([delay]))[0, :, 0] == pytest.approx(by_order.inputs[0, :, 0])
+    assert hypothesis.inputs(by_order, np.array([delay]))[0, :, 0] == pytest.approx(by_order.inputs[0, :, 0])
 
 
 def test_a_late_step_of_the_order_keeps_its_shape(card, by_order) -> None:
     """An order at 20 s that acts 0.44 s later: nothing before 20.44 s, and the lag from there."""
     kicked, t = stepped(by_order, 20.0, 0.3), STEP * np.arange(FINE * BLOCKS)
-    own = Hypothesis(card, "order", ["rudder_time_offset"]).own_states(kicked, np.array([0.44]))
+    own = Hypothesis(card, "order", ["rudder_time_offset"]).unmeasured_states(kicked, np.array([0.44]))
     exact = 0.3 * (1 - np.exp(-np.maximum(t - 20.44, 0) / LAG))
     assert own[0, :, 0] == pytest.approx(exact, abs=0.3 * STEP / LAG * 0.3)
     assert np.all(own[0, t < 20.35, 0] == 0)
@@ -206,24 +206,24 @@ SENSORS = {
 @pytest.mark.parametrize("name", SENSORS)
 def test_readings_of_faulty_sensors(card, by_angle, name: str) -> None:
     theta = np.array(SENSORS[name])
-    explained = Hypothesis(card, "angle", [name])
+    hypothesis = Hypothesis(card, "angle", [name])
     means = by_angle.states.reshape(2, BLOCKS, FINE, 6).mean(axis=2)
-    assert explained.readings(by_angle, theta) == pytest.approx(by_hand(name, theta, means))
-    assert explained.readings(by_angle, 0 * theta) == pytest.approx(
+    assert hypothesis.readings(by_angle, theta) == pytest.approx(by_hand(name, theta, means))
+    assert hypothesis.readings(by_angle, 0 * theta) == pytest.approx(
         means[..., [MEASURED_STATES.index(one) for one in SEEN]]
     )
-    assert explained.rates(by_angle, theta) == pytest.approx(Hypothesis(card, "angle").rates(by_angle, NOTHING))
+    assert hypothesis.rates(by_angle, theta) == pytest.approx(Hypothesis(card, "angle").rates(by_angle, NOTHING))
 
 
 def test_slopes_are_difference_quotients(card, by_angle) -> None:
-    explained = Hypothesis(card, "angle", ["antenna_lever_arm", "log_misalignment"])
+    hypothesis = Hypothesis(card, "angle", ["antenna_lever_arm", "log_misalignment"])
     theta = np.array([-40.0, 7.0, 0.1])
-    by_state, seen = explained.slopes(by_angle, theta)
+    by_state, seen = hypothesis.slopes(by_angle, theta)
     for column, size in enumerate((1e-3, 1e-3, 1e-6, 1e-4, 1e-2, 1e-2)):
         there, back = (
             replace(by_angle, states=by_angle.states + sign * size * np.eye(6)[column]) for sign in (1.0, -1.0)
         )
-        for whole, of in ((by_state, explained.rates), (seen, explained.readings)):
+        for whole, of in ((by_state, hypothesis.rates), (seen, hypothesis.readings)):
             quotient = (of(there, theta) - of(back, theta)) / (2 * size)
             scale = np.abs(whole[..., column]).max() + 1e-9
             assert whole[..., column] / scale == pytest.approx(quotient / scale, abs=1e-5)
@@ -261,11 +261,13 @@ T_FINE = STEP * np.arange(FINE * BLOCKS)
 
 
 def test_own_states_at_other_parameters_of_the_ship(card, by_order) -> None:
-    explained = Hypothesis(card, "order")
-    p = explained.parameters(NOTHING)
-    p[explained.model.parameter_names.index("steering.time_constant")] = 3 * LAG
-    assert explained.own_states(by_order, NOTHING, p)[1, :, 0] == pytest.approx(behind(T_FINE, 3 * LAG), abs=1e-4)
-    assert explained.own_states(by_order, NOTHING)[1, :, 0] == pytest.approx(behind(T_FINE), abs=1e-4)
+    hypothesis = Hypothesis(card, "order")
+    p = hypothesis.parameters(NOTHING)
+    p[hypothesis.model.parameter_names.index("steering.time_constant")] = 3 * LAG
+    assert hypothesis.unmeasured_states(by_order, NOTHING, p)[1, :, 0] == pytest.approx(
+        behind(T_FINE, 3 * LAG), abs=1e-4
+    )
+    assert hypothesis.unmeasured_states(by_order, NOTHING)[1, :, 0] == pytest.approx(behind(T_FINE), abs=1e-4)
 
 
 def test_slopes_in_the_gear_s_time_constant_come_through_the_rudder(card, by_order) -> None:
@@ -281,9 +283,9 @@ def test_slopes_in_the_gear_s_time_constant_come_through_the_rudder(card, by_ord
 
 
 def test_slopes_in_the_gear_s_rate_are_the_time_for_which_it_runs(limited, by_order) -> None:
-    kicked, explained = stepped(by_order, 20.0, 0.3), Hypothesis(limited, "order")
+    kicked, hypothesis = stepped(by_order, 20.0, 0.3), Hypothesis(limited, "order")
     rate = np.deg2rad(3.0)
-    found = explained.coefficient_slopes(kicked, NOTHING, ("steering.max_rate",))
+    found = hypothesis.coefficient_slopes(kicked, NOTHING, ("steering.max_rate",))
     running = np.clip(T_FINE - 20.0, 0, None)
     by_hand = quotient(kicked, lambda h: (rate + h) * running, 1e-4)
     middles = STEP * FINE * (np.arange(BLOCKS - 1) + 1)
@@ -309,9 +311,9 @@ def test_slopes_in_the_clock_are_those_of_a_later_rudder(card, by_angle, by_orde
 
 
 def test_of_what_an_effect_replaced_nothing_is_asked(limited, by_order) -> None:
-    explained, kicked = Hypothesis(limited, "order", ["rudder_rate_limit"]), stepped(by_order, 20.0, 0.3)
+    hypothesis, kicked = Hypothesis(limited, "order", ["rudder_rate_limit"]), stepped(by_order, 20.0, 0.3)
     names = ("steering.max_rate", "derivatives.Yd")
-    found = explained.coefficient_slopes(kicked, np.array([0.03]), names)
+    found = hypothesis.coefficient_slopes(kicked, np.array([0.03]), names)
     assert np.all(found[..., 0] == 0) and np.abs(found[..., 1]).max() > 0
     assert np.abs(Hypothesis(limited, "order").coefficient_slopes(kicked, NOTHING, names)[..., 0]).max() > 0
 
@@ -327,8 +329,8 @@ def test_what_comes_from_the_compass_is_directed(mariner_card, name: str) -> Non
 def test_an_effect_at_nothing_is_the_ship_as_she_was(card, by_angle) -> None:
     plain = Hypothesis(card, "angle").rates(by_angle, NOTHING)
     for name in ("linear_yaw_damping", "cubic_yaw_damping", "rudder_bias", "gyro_bias", "current"):
-        explained = Hypothesis(card, "angle", [name])
-        assert explained.rates(by_angle, np.zeros(len(explained.asked))) == pytest.approx(plain)
+        hypothesis = Hypothesis(card, "angle", [name])
+        assert hypothesis.rates(by_angle, np.zeros(len(hypothesis.estimated))) == pytest.approx(plain)
 
 
 TOUCHED = {"gyro_bias": (False, False, True), "current": (False, True, True), "rudder_bias": (False, True, False)}
@@ -338,15 +340,19 @@ TOUCHED = {"gyro_bias": (False, False, True), "current": (False, True, True), "r
     "name", [*TOUCHED, "rudder_lag", "telemotor_lag", "rudder_time_offset", "flow_memory", "antenna_lever_arm"]
 )
 def test_what_an_effect_does_not_touch_is_as_without_it(card, by_order, name: str) -> None:
-    explained, plain = Hypothesis(card, "order", [name]), Hypothesis(card, "order")
-    states, rates_too, readings = explained.touches
-    assert TOUCHED.get(name, explained.touches) == explained.touches
-    theta = np.array([one.parameter.typical_values(card)[0] for one in explained.asked])
-    place = explained.own.index("rudder.angle")
+    hypothesis, plain = Hypothesis(card, "order", [name]), Hypothesis(card, "order")
+    states, rates_too, readings = hypothesis.influences
+    assert TOUCHED.get(name, hypothesis.influences) == hypothesis.influences
+    theta = np.array([one.parameter.typical_values(card)[0] for one in hypothesis.estimated])
+    place = hypothesis.unmeasured.index("rudder.angle")
     pairs = (
-        (states, explained.own_states(by_order, theta)[..., place], plain.own_states(by_order, NOTHING)[..., 0]),
-        (rates_too, explained.rates(by_order, theta), plain.rates(by_order, NOTHING)),
-        (readings, explained.readings(by_order, theta), plain.readings(by_order, NOTHING)),
+        (
+            states,
+            hypothesis.unmeasured_states(by_order, theta)[..., place],
+            plain.unmeasured_states(by_order, NOTHING)[..., 0],
+        ),
+        (rates_too, hypothesis.rates(by_order, theta), plain.rates(by_order, NOTHING)),
+        (readings, hypothesis.readings(by_order, theta), plain.readings(by_order, NOTHING)),
     )
     assert any(touched for touched, *_ in pairs)
     for touched, with_it, without in pairs:
@@ -354,37 +360,37 @@ def test_what_an_effect_does_not_touch_is_as_without_it(card, by_order, name: st
 
 
 def test_parameters_that_are_known_a_little_are_asked_for_with_what_is_known(card) -> None:
-    explained = Hypothesis(card, "angle", ["wave_drift", "rudder_bias"])
-    mean, precision = explained.prior
-    known = {one.parameter.name: place for place, one in enumerate(explained.asked)}
+    hypothesis = Hypothesis(card, "angle", ["wave_drift", "rudder_bias"])
+    mean, precision = hypothesis.prior
+    known = {one.parameter.name: place for place, one in enumerate(hypothesis.estimated)}
     assert (mean[known["surge_coefficient"]], precision[known["surge_coefficient"]]) == pytest.approx((2 / 3, 1 / 0.09))
     assert precision[known["height_m"]] == precision[known["angle_rad"]] == 0
-    low, high = explained.bounds
-    assert np.all(low < high) and np.all(explained.steps > 0)
-    assert explained.asked[known["angle_rad"]].effect == "rudder_bias"
+    low, high = hypothesis.bounds
+    assert np.all(low < high) and np.all(hypothesis.steps > 0)
+    assert hypothesis.estimated[known["angle_rad"]].effect == "rudder_bias"
 
 
 @pytest.mark.parametrize("name", ["rudder_lag", "telemotor_lag", "roll_coupling", "flow_memory"])
 def test_the_shortest_time_that_is_tried_is_integrated(card, by_order, name: str) -> None:
-    explained = Hypothesis(card, "order", [name])
-    theta = np.clip([0.1, 0.1, 0.0, 0.1][: len(explained.asked)], *explained.bounds)
-    for place, one in enumerate(explained.asked):
+    hypothesis = Hypothesis(card, "order", [name])
+    theta = np.clip([0.1, 0.1, 0.0, 0.1][: len(hypothesis.estimated)], *hypothesis.bounds)
+    for place, one in enumerate(hypothesis.estimated):
         if one.parameter.name.endswith("_s"):
-            theta[place] = explained.bounds[0][place]
+            theta[place] = hypothesis.bounds[0][place]
             assert 0 < theta[place] < 1.0
-    assert np.abs(explained.own_states(stepped(by_order, 20.0, 0.3), theta)).max() < 10.0
+    assert np.abs(hypothesis.unmeasured_states(stepped(by_order, 20.0, 0.3), theta)).max() < 10.0
     low, _ = Hypothesis(card, "order", ["rudder_time_offset"]).bounds
     assert low == [-60.0]
 
 
 def test_steps_of_two_motions_are_each_motion_s_own(card, by_order) -> None:
     """The same rudder over steps twice as long."""
-    explained = Hypothesis(card, "order")
-    fine = explained.own_states(by_order, NOTHING)
+    hypothesis = Hypothesis(card, "order")
+    fine = hypothesis.unmeasured_states(by_order, NOTHING)
     inputs = 0.5 * (by_order.inputs[:, :-1:2] + by_order.inputs[:, 1::2])
     states = by_order.states[:, : 2 * len(inputs[0]) + 1 : 2]
     coarse = replace(by_order, step_s=2 * STEP, states=states, inputs=inputs)
-    assert explained.own_states(coarse, NOTHING)[:, :, 0] == pytest.approx(
+    assert hypothesis.unmeasured_states(coarse, NOTHING)[:, :, 0] == pytest.approx(
         fine[:, : 2 * len(inputs[0]) + 1 : 2, 0], abs=2e-3
     )
 

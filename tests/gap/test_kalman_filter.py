@@ -150,9 +150,9 @@ def forecast(A: np.ndarray, noise: NoiseLevels, h: float) -> tuple[np.ndarray, n
     """
     seen = observer(still(A, h), noise)
     before, after = seen.filtered[0, 0], seen.filtered[0, 1]
-    H, R = np.hstack([seen.what.reading[0, 1], np.zeros((6, 3)), np.eye(6)]), np.diag(noise.white**2)
+    H, R = np.hstack([seen.linear.reading[0, 1], np.zeros((6, 3)), np.eye(6)]), np.diag(noise.white**2)
     F = np.diag(np.concatenate([np.zeros(6), seen.fading]))  # six sensors, one a state
-    F[:6, :9] = np.hstack([seen.what.transition[0, 0], seen.push[0, 0]])
+    F[:6, :9] = np.hstack([seen.linear.transition[0, 0], seen.push[0, 0]])
     S = np.linalg.inv(seen.white[0, 1].T @ seen.white[0, 1])
     # the filter's own identities give P beforehand: S = H P H' + R, gain = P H' inv(S), after = P - gain S gain'
     P = after + seen.gain[0, 1] @ S @ seen.gain[0, 1].T

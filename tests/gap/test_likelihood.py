@@ -147,12 +147,12 @@ def test_residuals_are_remembered_for_each_explanation_and_its_parameters(monkey
     one, other, both = Toy((None,)), Toy((None,), which=(1,)), Toy((None, None))
     fresh = Likelihood._residual
 
-    def counted(self, explained, theta):
+    def counted(self, hypothesis, theta):
         asked.append(theta)
-        return fresh(self, explained, theta)
+        return fresh(self, hypothesis, theta)
 
     monkeypatch.setattr(Likelihood, "_residual", counted)
-    for explained, theta in (
+    for hypothesis, theta in (
         (one, [0.5]),
         (other, [0.5]),
         (one, [0.6]),
@@ -160,8 +160,8 @@ def test_residuals_are_remembered_for_each_explanation_and_its_parameters(monkey
         (one, [0.5]),
         (both, [0.5, 0.1]),
     ):
-        exact = fresh(of, explained, np.array(theta))
-        for found, true in zip(of.residual(explained, np.array(theta)), exact, strict=True):
+        exact = fresh(of, hypothesis, np.array(theta))
+        for found, true in zip(of.residual(hypothesis, np.array(theta)), exact, strict=True):
             np.testing.assert_array_equal(found, true)
     assert len(asked) == 5
     for size in np.arange(3 * module.REMEMBERED):

@@ -19,14 +19,14 @@ from tank2sim.gap.search.explanations import Search
 from tank2sim.gap.search.model_choice import (
     ALIKE,
     EVIDENCE_NEEDED,
-    OF_ONE_KIND,
+    SAME_KIND_SHARE,
     STANDARD_ERRORS,
     SUREST,
     TEMPER,
     Strange,
     decide,
-    stands_out,
-    strangeness,
+    find_strangeness,
+    is_significant,
 )
 from tests.gap.toy import NAMES, Toy, toy_motion
 from tests.gap.toy_likelihood import LOGS, judge
@@ -56,12 +56,12 @@ def said(theta) -> module.Decision:
 )
 def test_what_is_hidden_in_the_toy_is_said(theta, verdict, effects) -> None:
     found = said(theta)
-    assert (found.verdict, found.best.explained.effects) == (verdict, effects)
+    assert (found.verdict, found.best.hypothesis.effects) == (verdict, effects)
     assert found.strange == () and found.alike == ()
     assert sum(found.probabilities.values()) == pytest.approx(1.0)
     for name, size in zip(NAMES, theta, strict=False):
         assert found.confidence(name) > 0.9 or size == 0
-    for value, one in zip(found.best.theta, found.best.explained.asked, strict=True):
+    for value, one in zip(found.best.theta, found.best.hypothesis.estimated, strict=True):
         assert value == pytest.approx(theta[NAMES.index(one.effect)], abs=0.3)
 
 
@@ -78,7 +78,7 @@ def fit(score: float, *which: int, sure: float = 10.0) -> ExplanationFit:
 
 @pytest.fixture
 def calm(monkeypatch) -> None:
-    monkeypatch.setattr(module, "strangeness", lambda likelihood, fit: ())
+    monkeypatch.setattr(module, "find_strangeness", lambda likelihood, fit: ())
 
 
 def of_scores(*fits: ExplanationFit) -> module.Decision:
@@ -121,8 +121,8 @@ def of_scores(*fits: ExplanationFit) -> module.Decision:
 )
 def test_verdicts_follow_the_scores(fits, verdict, effects, alike) -> None:
     found = of_scores(*fits)
-    assert (found.verdict, found.best.explained.effects) == (verdict, effects)
-    assert [one.explained.effects for one in found.alike] == alike
+    assert (found.verdict, found.best.hypothesis.effects) == (verdict, effects)
+    assert [one.hypothesis.effects for one in found.alike] == alike
 
 
 FORCE, DRAG, BIAS, LAG, LATE = range(2, 7)
@@ -132,9 +132,9 @@ FORCE, DRAG, BIAS, LAG, LATE = range(2, 7)
 @pytest.mark.parametrize(
     ("pair", "share"),
     [
-        ((FORCE, DRAG), OF_ONE_KIND["force"]),
-        ((DRAG, BIAS), OF_ONE_KIND["force"]),
-        ((LAG, LATE), OF_ONE_KIND["actuator"]),
+        ((FORCE, DRAG), SAME_KIND_SHARE["force"]),
+        ((DRAG, BIAS), SAME_KIND_SHARE["force"]),
+        ((LAG, LATE), SAME_KIND_SHARE["actuator"]),
         ((FORCE, LAG), 0.0),
         ((0, 1), 0.0),
     ],
@@ -144,7 +144,9 @@ def test_a_second_effect_of_the_same_kind_must_have_a_share_of_the_gain(pair, sh
     names = tuple(NAMES[place] for place in pair)
     for part in (share * 2000 - 1, share * 2000 + 1, EVIDENCE_NEEDED + 1):
         found = of_scores(fit(0), fit(-2000 + part, pair[0]), fit(-2000, *pair))
-        assert found.best.explained.effects == (names if part > max(share * 2000, EVIDENCE_NEEDED) else names[:1]), part
+        assert found.best.hypothesis.effects == (names if part > max(share * 2000, EVIDENCE_NEEDED) else names[:1]), (
+            part
+        )
 
 
 @pytest.mark.usefixtures("calm")
@@ -163,7 +165,7 @@ def test_probabilities_are_those_of_the_scores() -> None:
 def test_no_name_is_said_where_the_innovations_are_strange(monkeypatch, fits) -> None:
     odd = (Strange("period", "", 20.0, 20.0, 99.0),)
     asked = []
-    monkeypatch.setattr(module, "strangeness", lambda likelihood, fit: asked.append(fit) or odd)
+    monkeypatch.setattr(module, "find_strangeness", lambda likelihood, fit: asked.append(fit) or odd)
     found = of_scores(*fits)
     assert found.verdict == OUTSIDE_LIBRARY and found.strange == odd
     assert asked == [found.best] and found.best.score == min(one.score for one in fits)
@@ -175,27 +177,27 @@ def test_what_the_card_may_be_wrong_by_is_not_named(effect: str) -> None:
     card = parse_card(made_up_ship.CARD, "made_up.toml")
     assert isinstance(card, ManoeuvringCard)
     assert card.standard_error("Nr") == pytest.approx(0.02 * abs(card.derivatives["Nr"]))
-    explained = Hypothesis(card, "angle", [effect])
+    hypothesis = Hypothesis(card, "angle", [effect])
     for factor, named in ((0.05, False), (-0.05, False), (0.07, True), (-0.07, True)):
-        found = ExplanationFit(explained, np.array([factor]), np.array([[1e-8]]), LOGS, 0.0, np.zeros(0))
-        assert stands_out(found) == named, factor
+        found = ExplanationFit(hypothesis, np.array([factor]), np.array([[1e-8]]), LOGS, 0.0, np.zeros(0))
+        assert is_significant(found) == named, factor
         unsure = replace(found, covariance=np.array([[(abs(factor) / 2.9) ** 2]]))
-        assert not stands_out(unsure)
+        assert not is_significant(unsure)
 
 
 def test_a_rate_of_the_gear_that_the_card_may_be_wrong_by_is_not_named() -> None:
     """5 deg/s are stated, and known to 2 %: 4.8 deg/s are no slower gear, 4.6 deg/s are."""
     stated = made_up_ship.CARD.replace("[steering_gear]", "[steering_gear]\nmax_rate_degps = 5.0")
     for text, rate, named in ((stated, 4.8, False), (stated, 4.6, True), (made_up_ship.CARD, 4.8, True)):
-        explained = Hypothesis(parse_card(text, "made_up.toml"), "order", ["rudder_rate_limit"])
-        found = ExplanationFit(explained, np.array([np.radians(rate)]), np.array([[1e-12]]), LOGS, 0.0, np.zeros(0))
-        assert stands_out(found) == named, rate
+        hypothesis = Hypothesis(parse_card(text, "made_up.toml"), "order", ["rudder_rate_limit"])
+        found = ExplanationFit(hypothesis, np.array([np.radians(rate)]), np.array([[1e-12]]), LOGS, 0.0, np.zeros(0))
+        assert is_significant(found) == named, rate
 
 
 def test_an_effect_without_amplitude_stands_out_by_its_score_alone() -> None:
     card = parse_card(made_up_ship.CARD, "made_up.toml")
-    explained = Hypothesis(card, "order", ["rudder_lag"])
-    assert stands_out(ExplanationFit(explained, np.array([3.0]), np.array([[100.0]]), LOGS, 0.0, np.zeros(0)))
+    hypothesis = Hypothesis(card, "order", ["rudder_lag"])
+    assert is_significant(ExplanationFit(hypothesis, np.array([3.0]), np.array([[100.0]]), LOGS, 0.0, np.zeros(0)))
 
 
 # -- innovations that are made up ------------------------------------------------------------------------------------
@@ -246,7 +248,9 @@ def made_up(seed: int, *, added=0.0, theta=None, gaps: float = 0.05, pushed=0.0)
 
 
 def test_white_noise_is_not_strange() -> None:
-    strange = {seed: found for seed in range(200) if (found := strangeness(*made_up(seed, gaps=0.05 * (seed % 3))))}
+    strange = {
+        seed: found for seed in range(200) if (found := find_strangeness(*made_up(seed, gaps=0.05 * (seed % 3))))
+    }
     assert strange == {}
 
 
@@ -254,8 +258,8 @@ def test_white_noise_is_not_strange() -> None:
 def test_a_burst_is_a_passage_of_its_trial(run: int) -> None:
     added = np.zeros((RUNS, BLOCKS, NY))
     added[run, 60:75, 1:3] = 3.0
-    first, *_ = strangeness(*made_up(1, added=added))
-    assert (first.what, first.trial) == ("passage", "abcd"[run])
+    first, *_ = find_strangeness(*made_up(1, added=added))
+    assert (first.kind, first.trial) == ("passage", "abcd"[run])
     begin, end = 100.0 * run + BLOCK_S * np.array([60.5, 74.5])
     assert first.begin_s == pytest.approx(begin, abs=12 * BLOCK_S)
     assert first.end_s == pytest.approx(end, abs=12 * BLOCK_S)
@@ -264,7 +268,7 @@ def test_a_burst_is_a_passage_of_its_trial(run: int) -> None:
 def test_a_burst_at_the_end_of_a_short_run_ends_with_it() -> None:
     added = np.zeros((RUNS, BLOCKS, NY))
     added[3, 80:90] = 3.0
-    found = [one for one in strangeness(*made_up(2, added=added)) if one.what == "passage"]
+    found = [one for one in find_strangeness(*made_up(2, added=added)) if one.kind == "passage"]
     assert [one.trial for one in found] == ["d"]
     assert 300.0 + BLOCK_S * 65.5 < found[0].begin_s < found[0].end_s <= 300.0 + BLOCK_S * 89.5 + 1e-9
 
@@ -275,8 +279,8 @@ def test_a_line_in_all_trials_is_a_period(period: float) -> None:
     t = BLOCK_S * np.arange(BLOCKS)
     added = np.zeros((RUNS, BLOCKS, NY))
     added[..., 4] = np.sin(2 * np.pi * t / period + np.arange(RUNS)[:, None])
-    found = strangeness(*made_up(3, added=added, gaps=0.0))
-    assert [one.what for one in found] == ["period"]
+    found = find_strangeness(*made_up(3, added=added, gaps=0.0))
+    assert [one.kind for one in found] == ["period"]
     assert found[0].begin_s == found[0].end_s == pytest.approx(period, rel=0.05)
 
 
@@ -284,21 +288,21 @@ def test_a_line_in_all_trials_is_a_period(period: float) -> None:
 def test_a_force_that_pushes_once_is_strange_and_one_that_pushes_always_is_not(run: int, axis: int) -> None:
     pushed = np.zeros((RUNS, BLOCKS, 3))
     pushed[run, 70:95, axis] = 40.0
-    (first,) = strangeness(*made_up(6, pushed=pushed))
-    assert (first.what, first.trial) == ("push", "abcd"[run])
+    (first,) = find_strangeness(*made_up(6, pushed=pushed))
+    assert (first.kind, first.trial) == ("push", "abcd"[run])
     begin, end = 100.0 * run + BLOCK_S * np.array([70.5, 94.5])
     assert first.begin_s == pytest.approx(begin, abs=25 * BLOCK_S) and first.end_s == pytest.approx(
         end, abs=25 * BLOCK_S
     )
     pushed[...] = 40.0 * np.sin(np.arange(BLOCKS))[:, None]
-    assert strangeness(*made_up(6, pushed=pushed)) == ()
+    assert find_strangeness(*made_up(6, pushed=pushed)) == ()
 
 
 def test_a_trial_that_has_another_value_disagrees() -> None:
     theta = np.zeros((RUNS, 2))
     theta[2, 1] = 0.35  # some ten of its standard errors; in a trial's passages it drowns
-    found = strangeness(*made_up(4, theta=theta))
-    assert [(one.what, one.trial) for one in found] == [("trial", "c")]
+    found = find_strangeness(*made_up(4, theta=theta))
+    assert [(one.kind, one.trial) for one in found] == [("trial", "c")]
     assert (found[0].begin_s, found[0].end_s) == pytest.approx((200.0 + 0.5 * BLOCK_S, 200.0 + 149.5 * BLOCK_S))
 
 
@@ -306,8 +310,8 @@ def test_the_strangest_is_told_first() -> None:
     added, theta = np.zeros((RUNS, BLOCKS, NY)), np.zeros((RUNS, 2))
     added[0, 20:60] = 4.0
     theta[2, 1] = 0.35
-    found = strangeness(*made_up(5, added=added, theta=theta))
-    assert found[0].what == "passage" and {one.what for one in found} >= {"passage", "trial"}
+    found = find_strangeness(*made_up(5, added=added, theta=theta))
+    assert found[0].kind == "passage" and {one.kind for one in found} >= {"passage", "trial"}
     assert [one.excess for one in found] == sorted((one.excess for one in found), reverse=True)
     assert all(np.isfinite(one.excess) for one in found)
 

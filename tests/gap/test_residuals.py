@@ -27,7 +27,7 @@ from tests.gap.toy_likelihood import LOGS, NOISE, WIDTH, forms_of, judge
 
 def by_hand(of: Likelihood, fit: ExplanationFit, run: int, place: int) -> tuple[float, float]:
     """A parameter and its standard error by generalised least squares of one run as one Gaussian vector."""
-    toy, part = fit.explained, Dense(of.linear(fit.explained, fit.theta), NOISE, run)
+    toy, part = fit.hypothesis, Dense(of.linear(fit.hypothesis, fit.theta), NOISE, run)
 
     def error(theta):
         driving, shown = of.residual(toy, theta)
@@ -54,7 +54,7 @@ def test_each_trial_says_what_its_own_least_squares_say(theta) -> None:
     toy = Toy((None,) * len(theta))
     fit = of.at_best(toy, np.array(theta), [LOGS], [0])
     told = each_trial(of, fit)
-    assert list(told) == [one.variable for one in toy.asked]
+    assert list(told) == [one.variable for one in toy.estimated]
     for place, values in enumerate(told.values()):
         assert list(values) == ["a", "b"]
         for run, found in enumerate(values.values()):

@@ -62,9 +62,9 @@ def screened(damped) -> Screen:
 def least_squares(likelihood: Likelihood, base: ExplanationFit, chosen: list[Variant]) -> tuple[float, np.ndarray]:
     """Least cost over what is there, the coefficients and the amplitudes of `chosen`; and these."""
     seen = observer(
-        likelihood.linear(base.explained, base.theta) if base.explained.effects else likelihood.base, base.noise
+        likelihood.linear(base.hypothesis, base.theta) if base.hypothesis.effects else likelihood.base, base.noise
     )
-    own = likelihood.columns(base.explained, base.theta, likelihood.coefficient_columns).scaled(base.width)
+    own = likelihood.columns(base.hypothesis, base.theta, likelihood.coefficient_columns).scaled(base.width)
 
     def rows(driving, shown):
         white = seen.whitened(driving, shown)
@@ -75,10 +75,10 @@ def least_squares(likelihood: Likelihood, base: ExplanationFit, chosen: list[Var
     columns += [rows(one.driving, -one.shown) for one in chosen]
     residual, held = columns[0][:, :1], columns[0][:, 1:]
     design = np.hstack([held, *columns[1:]])
-    mean, precision = base.explained.prior
-    deviations = np.concatenate([np.sqrt(precision), np.ones(held.shape[1] - own.asked)])
+    mean, precision = base.hypothesis.prior
+    deviations = np.concatenate([np.sqrt(precision), np.ones(held.shape[1] - own.parameter_count)])
     known = np.hstack([np.diag(deviations), np.zeros((held.shape[1], design.shape[1] - held.shape[1]))])
-    away = np.concatenate([np.sqrt(precision) * (base.theta - mean), np.zeros(held.shape[1] - own.asked)])
+    away = np.concatenate([np.sqrt(precision) * (base.theta - mean), np.zeros(held.shape[1] - own.parameter_count)])
     whole, target = np.vstack([design, known]), -np.concatenate([residual[:, 0], away])
     scale = np.linalg.norm(whole, axis=0)
     scale[scale == 0] = 1.0
@@ -149,7 +149,7 @@ def test_singles_are_the_best_variant_of_each_effect(screened) -> None:
 
 def test_a_search_begins_at_something_and_within_the_bounds(screened) -> None:
     card = screened.likelihood.none.card
-    asked = {name: Hypothesis(card, "angle", [name]).asked for name in EFFECTS}
+    asked = {name: Hypothesis(card, "angle", [name]).estimated for name in EFFECTS}
     for one in (*screened.singles(), *screened.pairs()):
         for name, theta in one.thetas.items():
             for value, parameter in zip(theta, (each.parameter for each in asked[name]), strict=True):
@@ -179,7 +179,7 @@ def test_variants_are_all_typical_shapes_at_the_typical_size(card, damped) -> No
     (cubic,) = variants(damped, Hypothesis(card, "angle", ["cubic_yaw_damping"]))
     assert cubic.amplitudes == (0, 1) and cubic.driving.shape[-1] == 2
     # each amplitude alone; together they add, for both are linear
-    whole, _ = damped.added(cubic.explained, cubic.theta)
+    whole, _ = damped.added(cubic.hypothesis, cubic.theta)
     assert cubic.driving.sum(axis=-1) == pytest.approx(whole)
     assert cubic.start(np.array([2.0, -0.5])) == pytest.approx(cubic.theta * [2.0, -0.5])
     assert cubic.start(np.array([0.0, -0.001])) == pytest.approx(cubic.theta * [LEAST_AMPLITUDE, -LEAST_AMPLITUDE])

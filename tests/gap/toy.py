@@ -58,14 +58,14 @@ class Toy:
         return tuple(range(len(self.priors))) if self.which is None else self.which
 
     @property
-    def asked(self):
+    def estimated(self):
         size = EffectParameter("size", "size", -10.0, 10.0, absent=0.0, typical=(1.0,))
         return tuple(EstimatedParameter(name, size, f"{name}.size") for name in self.effects)
 
-    own = ()
+    unmeasured = ()
 
     @property
-    def touches(self):
+    def influences(self):
         return False, bool(self.priors), False
 
     @property
@@ -81,7 +81,7 @@ class Toy:
     def steps(self):
         return np.full(len(self.priors), 0.01)
 
-    def own_states(self, motion, theta, p=None):
+    def unmeasured_states(self, motion, theta, p=None):
         return np.zeros((*motion.states.shape[:2], 0))
 
     def rates_between(self, motion, theta):
@@ -94,10 +94,10 @@ class Toy:
     def fine_rates(self, motion, theta):
         return motion.over_blocks(self.rates_between(motion, theta))
 
-    def rates(self, motion, theta, own=None):
+    def rates(self, motion, theta, unmeasured=None):
         return self.fine_rates(motion, theta)  # linear: the mean of the rates is the rate at the mean
 
-    def readings(self, motion, theta, own=None):
+    def readings(self, motion, theta, unmeasured=None):
         return motion.in_blocks(motion.states)
 
     def slopes(self, motion, theta):

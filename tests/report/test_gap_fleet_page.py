@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from tank2sim.gap.fleet.summary import FleetTold, ShipTold
+from tank2sim.gap.fleet.summary import FleetSummary, ShipSummary
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING
 from tank2sim.report.gap.fleet_page import fleet_page
 from tank2sim.report.kit.page import Link, render_page
@@ -15,7 +15,7 @@ CURRENT = {
     "standard_errors": {"speed_mps": 0.0021},
     "confidence": 0.99,
 }
-ONE = ShipTold(
+ONE = ShipSummary(
     "gamma ray #1",
     "Mariner <b>",
     MISSING,
@@ -24,11 +24,11 @@ ONE = ShipTold(
     trials={"fit": 2, "holdout": 1},
 )
 LOST = replace(ONE, folder="beta", verdict=NO_EFFECT_MISSING, effects=(), trials={"fit": 2, "holdout": 0}, misfit={})
-BAD = ShipTold("bad", fault="bad/ship.toml: line 2: is torn; correct it")
+BAD = ShipSummary("bad", fault="bad/ship.toml: line 2: is torn; correct it")
 
 
 def test_ships_stand_in_a_table_with_what_they_lack() -> None:
-    page = fleet_page(FleetTold("ours", (BAD, LOST, ONE)))
+    page = fleet_page(FleetSummary("ours", (BAD, LOST, ONE)))
     ships, without = page.sections
     (table,) = ships.tables
     beta, gamma = table.rows
@@ -50,7 +50,7 @@ def test_ships_stand_in_a_table_with_what_they_lack() -> None:
 
 
 def test_the_chart_has_each_ship_before_and_after() -> None:
-    (chart,) = fleet_page(FleetTold("ours", (LOST, ONE))).sections[0].charts
+    (chart,) = fleet_page(FleetSummary("ours", (LOST, ONE))).sections[0].charts
     drawn = chart.chart.to_dict()
     rows = drawn["datasets"][drawn["layer"][1]["data"]["name"]]
     assert [(one["ship"], one["misfit"]) for one in rows] == [("gamma ray #1", 9.0), ("gamma ray #1", 1.23)]
@@ -60,12 +60,12 @@ def test_all_that_an_ambiguous_ship_may_lack_is_told() -> None:
     ship = replace(
         ONE, verdict=AMBIGUOUS, effects=({**CURRENT, "parameters": {}},), alternatives=("wind", "rudder_bias")
     )
-    (row,) = fleet_page(FleetTold("ours", (ship,))).sections[0].tables[0].rows
+    (row,) = fleet_page(FleetSummary("ours", (ship,))).sections[0].tables[0].rows
     assert row[3] == "current or wind or rudder bias"
 
 
 def test_a_link_leads_to_the_ship_whatever_her_folder_is_called() -> None:
-    text = render_page(fleet_page(FleetTold("ours", (replace(ONE, misfit={}),))))
+    text = render_page(fleet_page(FleetSummary("ours", (replace(ONE, misfit={}),))))
     assert '<a href="gamma%20ray%20%231/report.html">gamma ray #1</a>' in text
     assert "Mariner &lt;b&gt;" in text
     for name, address in (("javascript:alert(1)", "javascript%3Aalert%281%29"), ('a"b?', "a%22b%3F")):

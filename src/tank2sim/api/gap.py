@@ -22,7 +22,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
 from tank2sim.gap.diagnosis.error_intervals import acting
-from tank2sim.gap.fleet.search import can_lack
+from tank2sim.gap.fleet.search import nonlinear_card
 from tank2sim.gap.fleet.ships import GAP, IMPROVED
 from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.outcome.correct_sensors import REMAINING_FAULTS, correct_sensor_faults, corrected_text
@@ -314,7 +314,7 @@ def find_gap(
     InputError
         A file is at fault, a trial is too short, or an effect is not known or cannot be tried on this card.
     """
-    ship = can_lack(as_ship(card).card)
+    ship = nonlinear_card(as_ship(card).card)
     options = gap_options(effects, without, max_effects, workers)
     fitted, held = fitted_and_held(trials, holdout, ship)
     with _cluster(executor) as pool:

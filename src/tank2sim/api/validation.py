@@ -23,7 +23,7 @@ from tank2sim.cards import Card, ManoeuvringCard
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.errors import InputError
 from tank2sim.gap.outcome.export import signal_display_name
-from tank2sim.gap.proof.card_replay import replay_by_card
+from tank2sim.gap.proof.replay import replay_by_card
 from tank2sim.gap.result import Passed
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.records.thinning import drawn_columns

@@ -1,4 +1,4 @@
-"""``tank2sim gap FOLDER``: a fleet, ship by ship, which goes on where an earlier run was stopped."""
+"""``tank2sim gap FOLDER``: a fleet, ship by ship, which continues an interrupted run."""
 
 from __future__ import annotations
 
@@ -20,9 +20,16 @@ from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
 from tank2sim.files import json_text, writable_folder, write_together
 from tank2sim.gap.fleet.run_record import NEW, RUN, fleet_run_record, stale, with_results
-from tank2sim.gap.fleet.search import Fault, Sought, can_lack, fault_of_program, found_at_once, found_one_by_one
+from tank2sim.gap.fleet.search import (
+    Fault,
+    ShipTask,
+    fault_of_program,
+    find_at_once,
+    find_in_turn,
+    nonlinear_card,
+)
 from tank2sim.gap.fleet.ships import Fleet, ShipFolder, fleet_in
-from tank2sim.gap.fleet.summary import FleetTold, ShipTold, ship_told
+from tank2sim.gap.fleet.summary import FleetSummary, ShipSummary, ship_summary
 from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.result import Gap
 from tank2sim.gap.workflow import GapOptions
@@ -34,7 +41,7 @@ JSON, PAGE = "fleet.json", "fleet.html"
 
 @dataclass(frozen=True)
 class FleetRequest:
-    """What the command was given.
+    """Arguments of the command.
 
     Parameters
     ----------
@@ -42,7 +49,7 @@ class FleetRequest:
     options : GapOptions
     executor : str
     again : bool
-        Compute also what is there.
+        Compute also the ships that have results.
     json_file : Path or None
     """
 
@@ -56,16 +63,16 @@ class FleetRequest:
 
 @dataclass
 class _Course:
-    """How far a run is.
+    """Progress of a run.
 
     Parameters
     ----------
     wanted : dict
-        Ship's folder to (its record, why it is computed), of those that are to be computed.
+        Ship's folder to (its record, the reason), of the ships to be computed.
     done : dict
-        Ship's folder to how its results came about.
+        Ship's folder to the origin of its results.
     faults : dict
-        Ship's folder to why it has none.
+        Ship's folder to the reason why it has none.
     notices : list of str
     """
 
@@ -75,38 +82,38 @@ class _Course:
     notices: list[str] = field(default_factory=list)
 
 
-def run_fleet(asked: FleetRequest) -> int:
-    """Compute what is not computed yet, write it ship by ship, and show the fleet; 2 if a ship has no result."""
-    check_executor(asked.executor)
-    fleet = fleet_in(asked.folder, asked.output)
-    refuse_early(asked.output, asked.json_file, [])
-    with folder_made(asked.output), showing_stages("looking for what is computed") as progress:
-        course = _course(fleet, asked)
-        _compute(course, asked, progress)
+def run_fleet(request: FleetRequest) -> int:
+    """Compute the missing results, write them ship by ship, and show the fleet; 2 if a ship has no result."""
+    check_executor(request.executor)
+    fleet = fleet_in(request.folder, request.output)
+    refuse_early(request.output, request.json_file, [])
+    with folder_made(request.output), showing_stages("looking for what is computed") as progress:
+        course = _course(fleet, request)
+        _compute(course, request, progress)
         progress("writing the fleet's page")
-        told = _told(fleet, course, asked.output)
-        text = json_text(told.as_json())
-        files = {asked.output / JSON: text, asked.output / PAGE: render_page(fleet_page(told))}
-        files |= {asked.json_file: text} if asked.json_file else {}
+        summary = _summary(fleet, course, request.output)
+        text = json_text(summary.as_json())
+        files = {request.output / JSON: text, request.output / PAGE: render_page(fleet_page(summary))}
+        files |= {request.json_file: text} if request.json_file else {}
         write_together(files, inputs=[path for ship in fleet.ships for path in ship.inputs], outputs=[*files])
-    _show(told, course, asked.output)
-    return 2 if told.faults else 0
+    _show(summary, course, request.output)
+    return 2 if summary.faults else 0
 
 
-def _course(fleet: Fleet, asked: FleetRequest) -> _Course:
-    """What is computed already, and what is not."""
+def _course(fleet: Fleet, request: FleetRequest) -> _Course:
+    """Sort the ships into those that have results and those to be computed."""
     course = _Course(faults=dict(fleet.faults))
     for ship in fleet.ships:
-        output = asked.output / ship.name
+        output = request.output / ship.name
         try:
             refuse_early(output, None, ship.inputs)
             if output.exists() and not output.is_dir():
-                raise InputError(output, "", "is no folder, and its results belong there", "give another with -o")
-            record = fleet_run_record(ship, asked.options)
+                raise InputError(output, "", "is not a folder, and its results belong there", "give another with -o")
+            record = fleet_run_record(ship, request.options)
         except InputError as error:
             course.faults[ship.name] = str(error)
             continue
-        why = "asked for again" if asked.again else stale(record, output)
+        why = "asked for again" if request.again else stale(record, output)
         if why:
             course.wanted[ship] = record, why
         else:
@@ -114,49 +121,49 @@ def _course(fleet: Fleet, asked: FleetRequest) -> _Course:
     return course
 
 
-def _compute(course: _Course, asked: FleetRequest, progress: StageReport) -> None:
-    """Compute the ships that are wanted; each is written as soon as it is found."""
+def _compute(course: _Course, request: FleetRequest, progress: StageReport) -> None:
+    """Compute the ships; each is written as soon as it is found."""
     if not course.wanted:
         return
-    with _working(asked, len(course.wanted)) as (find, executor):
-        for ship, found in find(_read(course), asked.options, progress, executor):
+    with _working(request, len(course.wanted)) as (find, executor):
+        for ship, found in find(_read(course), request.options, progress, executor):
             progress(f"{ship.folder.name}: writing")
-            fault = found if isinstance(found, Fault) else _write(ship, found, course, asked.output)
+            fault = found if isinstance(found, Fault) else _write(ship, found, course, request.output)
             if fault:
                 course.faults[ship.folder.name] = fault.line
 
 
-Find = Callable[..., Iterator[tuple[Sought, Gap | Fault]]]
+Find = Callable[..., Iterator[tuple[ShipTask, Gap | Fault]]]
 
 
 @contextmanager
-def _working(asked: FleetRequest, count: int) -> Iterator[tuple[Find, Executor | None]]:
-    """How the ships are sought, and by whom.
+def _working(request: FleetRequest, count: int) -> Iterator[tuple[Find, Executor | None]]:
+    """Search function and executor for a number of ships.
 
-    One ship alone has the explanations of its search spread over the executor. Of several, each is one task: the
-    search of a ship has parts that nothing else can be done next to, and then one of several cores is busy.
+    For one ship the explanations of its search are distributed over the executor. Of several ships each is one task:
+    the search of a ship has sequential parts, during which only one core would be busy.
     """
-    here = asked.executor == PROCESSES
-    workers = asked.options.workers or os.cpu_count() or 1
-    if here and workers == 1:
-        yield found_one_by_one, None
+    local = request.executor == PROCESSES
+    workers = request.options.workers or os.cpu_count() or 1
+    if local and workers == 1:
+        yield find_in_turn, None
         return
-    with executing(asked.executor, min(workers, count) if count > 1 else workers) as executor:
-        yield (found_at_once if count > 1 else found_one_by_one), executor
+    with executing(request.executor, min(workers, count) if count > 1 else workers) as executor:
+        yield (find_at_once if count > 1 else find_in_turn), executor
 
 
-def _read(course: _Course) -> Iterator[Sought]:
-    """The ships that are wanted, one after the other."""
+def _read(course: _Course) -> Iterator[ShipTask]:
+    """Read the ships to be computed, one after the other."""
     for ship in course.wanted:
         try:
-            card = can_lack(read_card(ship.card))
-            yield Sought(ship, card, *fitted_and_held(ship.trials, ship.holdout, card))
+            card = nonlinear_card(read_card(ship.card))
+            yield ShipTask(ship, card, *fitted_and_held(ship.trials, ship.holdout, card))
         except InputError as error:
             course.faults[ship.name] = str(error)
 
 
-def _write(ship: Sought, gap: Gap, course: _Course, output: Path) -> Fault | None:
-    """Write a ship's results and their record, whole or not at all; tells why if there are none."""
+def _write(ship: ShipTask, gap: Gap, course: _Course, output: Path) -> Fault | None:
+    """Write a ship's results and their record, all or none; return the fault if there are none."""
     folder = output / ship.folder.name
     record, why = course.wanted[ship.folder]
     try:
@@ -167,7 +174,7 @@ def _write(ship: Sought, gap: Gap, course: _Course, output: Path) -> Fault | Non
         raise
     except Exception as error:
         return fault_of_program(error)
-    # The last to be written: what it tells of is there.
+    # Written last, after the files that it lists.
     files[folder / RUN] = json_text(with_results(record, files, folder))
     writable_folder(folder)
     tidied = put(files, folder, ship.folder.inputs)
@@ -176,36 +183,36 @@ def _write(ship: Sought, gap: Gap, course: _Course, output: Path) -> Fault | Non
     return None
 
 
-def _told(fleet: Fleet, course: _Course, output: Path) -> FleetTold:
-    ships = [ship_told(output / name) for name in course.done]
-    ships += [ShipTold(name, fault=told) for name, told in course.faults.items()]
+def _summary(fleet: Fleet, course: _Course, output: Path) -> FleetSummary:
+    ships = [ship_summary(output / name) for name in course.done]
+    ships += [ShipSummary(name, fault=fault) for name, fault in course.faults.items()]
     notices = [f"{path}: holds neither card nor trial, and was passed over" for path in fleet.passed_over]
-    ordered = tuple(sorted(ships, key=lambda one: one.folder))
-    return FleetTold(fleet.folder.resolve().name, ordered, tuple(notices))
+    ordered = tuple(sorted(ships, key=lambda ship: ship.folder))
+    return FleetSummary(fleet.folder.resolve().name, ordered, tuple(notices))
 
 
-def _show(told: FleetTold, course: _Course, output: Path) -> None:
+def _show(summary: FleetSummary, course: _Course, output: Path) -> None:
     rows: list[list[object]] = []
-    for ship in told.ships:
+    for ship in summary.ships:
         names = " + ".join(str(effect["name"]) for effect in ship.effects) or "-"
-        misfits = ["-" if one is None else misfit_text(one) for one in ship.misfits()]
+        misfits = ["-" if misfit is None else misfit_text(misfit) for misfit in ship.misfits()]
         rows.append([ship.folder, ship.verdict or "no result", names, *misfits, course.done.get(ship.folder, "-")])
     heads = ["ship", "verdict", "effect", "before", "after", "result"]
     title = "Misfit in units of the noise (1 is noise), of trials held out where there are some"
     show_table(title, heads, rows, wide=True)
-    show_notices([*told.notices, *course.notices, *_without_ship(told, output)])
-    written = f"{output}: {JSON}, {PAGE}, and the folders of {len(course.done)} of {len(told.ships)} ships"
+    show_notices([*summary.notices, *course.notices, *_without_ship(summary, output)])
+    written = f"{output}: {JSON}, {PAGE}, and the folders of {len(course.done)} of {len(summary.ships)} ships"
     screen.print(written, soft_wrap=True, markup=False)
-    for fault in dict.fromkeys(fault.fault for fault in told.faults):
-        names = ", ".join(one.folder for one in told.faults if one.fault == fault)
+    for fault in dict.fromkeys(fault.fault for fault in summary.faults):
+        names = ", ".join(ship.folder for ship in summary.faults if ship.fault == fault)
         print(f"tank2sim: {names}: {' '.join(fault.split())}", file=sys.stderr)
 
 
-def _without_ship(told: FleetTold, output: Path) -> list[str]:
-    """Results of a ship that is no longer in the fleet."""
-    ships = {ship.folder for ship in told.ships}
+def _without_ship(summary: FleetSummary, output: Path) -> list[str]:
+    """Notices of results of ships that are no longer in the fleet."""
+    ships = {ship.folder for ship in summary.ships}
     return [
-        f"{path.parent} is of an earlier run: there is no such ship now; it was left"
+        f"{path.parent} is of an earlier run, and its ship is not in the fleet; it was kept"
         for path in sorted(output.glob(f"*/{RUN}"))
         if path.parent.name not in ships
     ]

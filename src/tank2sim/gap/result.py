@@ -1,4 +1,4 @@
-"""What the gap workflow found: the values that the JSON, the screen and the page show."""
+"""Results of the gap workflow: the values that the JSON, the screen and the page show."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Named:
     name : str
         Key of :data:`tank2sim.dynamics.effects.EFFECTS`.
     parameters : mapping
-        What was found, by the names of the effect's parameters (SI).
+        Estimates by the names of the effect's parameters (SI).
     standard_errors : mapping
         Of those that were estimated, SI.
     confidence : float
-        Calibrated probability that this effect is there.
+        Calibrated probability that this effect is present.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Named:
 
 @dataclass(frozen=True)
 class Rival:
-    """One explanation among those that were compared.
+    """One of the compared explanations.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class Rival:
 
 @dataclass(frozen=True)
 class MisfitPlace:
-    """Where a part of the misfit is.
+    """Location of a part of the misfit.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class MisfitPlace:
 
 @dataclass(frozen=True)
 class Acting:
-    """When the model itself is wrong, and not only what sums up of it.
+    """An interval in which the model itself is wrong, and not only the integral of earlier errors.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Acting:
     t_start_s, t_end_s : float
         In the trial's own time, s.
     size : float
-        Root mean square of what is missing, in its own standard errors.
+        Root mean square of the missing quantity, in its standard errors.
     """
 
     trial: str
@@ -119,11 +119,11 @@ class Passed:
     noise : mapping
         Variable (``motion.u``, ``motion.psi``, ...) to the standard deviation of its measurement, SI.
     measured, before, after : mapping
-        Variable to what was measured (nan where nothing was), to what the given card's model makes of the trial, and
-        the improved one's; (n,) each, SI, rad. `after` is `before` where nothing was added; a simulation that left all
-        bounds is nan from there. Sensor faults that were found are in `after` as the sensor would show them.
+        Variable to the measurements (nan where nothing was measured), the simulation by the given card's model, and
+        that by the improved one's; (n,) each, SI, rad. `after` is `before` where no effect was added; a simulation out
+        of bounds is nan from there. Sensor faults that were found are in `after` as the sensor would show them.
     black_box : mapping
-        The same for a linear model with as many coefficients as the effect has parameters; may be empty.
+        The simulation by a linear model with as many coefficients as the effect has parameters; may be empty.
     """
 
     name: str
@@ -135,12 +135,12 @@ class Passed:
     after: Mapping[str, Array]
     black_box: Mapping[str, Array] = field(default_factory=dict)
 
-    def misfit(self, which: str, variable: str | None = None) -> float:
+    def misfit(self, version: str, variable: str | None = None) -> float:
         """Root mean square of (simulated - measured)/noise of one variable, or of all: 1 is noise.
 
-        `which` is ``before``, ``after`` or ``black_box``; inf where the simulation left all bounds.
+        `version` is ``before``, ``after`` or ``black_box``; inf where the simulation exceeded all bounds.
         """
-        simulated: Mapping[str, Array] = getattr(self, which)
+        simulated: Mapping[str, Array] = getattr(self, version)
         names = list(self.noise) if variable is None else [variable]
         squares = [
             ((simulated[name] - self.measured[name]) / self.noise[name])[np.isfinite(self.measured[name])] ** 2
@@ -152,7 +152,7 @@ class Passed:
 
 @dataclass(frozen=True, eq=False)
 class MissingForce:
-    """The force that the given card lacks, as the smoother needs it to follow the measurements.
+    """The force that the given card lacks: the smoother's, with which it follows the measurements.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ class MissingForce:
     explained : mapping
         Each of `states` to the share of the force's variance that its bins explain.
     passages : tuple of Acting
-        When the forces of all three equations are at work, the most telling first.
+        Intervals in which the forces of the three equations act, the most significant first.
     """
 
     equation: str
@@ -184,7 +184,7 @@ class MissingForce:
 
 @dataclass(frozen=True, eq=False)
 class MissingSignal:
-    """By how much records contradict each other, whatever the hull does: what a sensor or the water adds.
+    """Difference by which records contradict each other, independent of the hull: the part of a sensor or of the water.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ class MissingSignal:
     trials : tuple of str
         Name of the trial of each row.
     time_s, values, errors : array (n,)
-        Rows of all trials together: s, and what is missing with its standard error.
+        Rows of all trials together: s, and the difference with its standard error.
     states, explaining, explained
         As of :class:`MissingForce`; shares are of the mean square.
     """
@@ -220,9 +220,9 @@ class NextTest:
     orders : str
         CSV text ``t_s,delta_order_deg,n_rpm`` that `simulate --manoeuvre file:` runs.
     why : str
-        A sentence: what it would distinguish, and how clearly (expected gain of the score).
+        A sentence: the explanations that it would distinguish, and how clearly (expected gain of the score).
     expected : mapping
-        Each manoeuvre that was considered to the score by which it would tell the explanations apart.
+        Each manoeuvre that was compared to the score by which it would distinguish the explanations.
     sizes : mapping
         Each effect of the explanations that are to be distinguished to (parameters, standard errors), SI, as the first
         explanation that has it estimates it.
@@ -237,7 +237,7 @@ class NextTest:
 
 @dataclass(frozen=True, eq=False)
 class Gap:
-    """All that was found.
+    """All results of the workflow.
 
     Parameters
     ----------
@@ -249,24 +249,24 @@ class Gap:
         One of :data:`GAP_VERDICTS`.
     effects : tuple of Named
     alternatives : tuple of tuples of str
-        Explanations that these data cannot tell from the named one.
+        Explanations that these data cannot distinguish from the named one.
     rivals : tuple of Rival
         Best first; "none" is among them.
     where : tuple of MisfitPlace
         Largest first.
     equation : str
-        In which equation the gap is: surge, sway, yaw, actuator, kinematics or sensor.
+        Equation of the gap: surge, sway, yaw, actuator, kinematics or sensor.
     noise : mapping
         Variable to (standard deviation, ``stated`` or ``estimated``), SI.
     passed : tuple of Passed
-        Each trial.
+        Of all trials.
     figures_before, figures_after : tuple of FigureComparison
         Of turns and zigzags.
     missing_force : MissingForce or None
     could_hide : mapping
         Effect to {parameter: size (SI)} below which these data could not show it.
     agreement : mapping
-        Effect parameter's model name to {trial: (value, standard error)}: what each trial alone would have it.
+        Effect parameter's model name to {trial: (value, standard error)}: its estimate by each trial alone.
     next_test : NextTest or None
     notices : tuple of str
     """
@@ -289,9 +289,9 @@ class Gap:
     next_test: NextTest | None
     notices: tuple[str, ...] = ()
 
-    def misfit(self, which: str, *, held_out: bool) -> float | None:
+    def misfit(self, version: str, *, held_out: bool) -> float | None:
         """Root mean square over all fitting (or held-out) trials of (simulated - measured)/noise; None without any."""
         trials = [replay for replay in self.passed if replay.held_out == held_out]
-        if not trials or (which == "black_box" and not all(trial.black_box for trial in trials)):
+        if not trials or (version == "black_box" and not all(trial.black_box for trial in trials)):
             return None
-        return float(np.sqrt(np.mean([trial.misfit(which) ** 2 for trial in trials])))
+        return float(np.sqrt(np.mean([trial.misfit(version) ** 2 for trial in trials])))

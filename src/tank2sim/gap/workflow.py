@@ -1,4 +1,4 @@
-"""The gap workflow: locate the gap, screen and fit what could be missing, decide, add it, and prove it."""
+"""The gap workflow: locate the gap, screen and fit possible effects, decide, add the effect, and check it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from
 from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
 from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
 from tank2sim.gap.outcome.next_test import Explanation, next_test
-from tank2sim.gap.proof.cross_check import MUCH, black_box, closes, trial_consistency, worse
+from tank2sim.gap.proof.cross_check import MUCH, black_box, closes_gap, trial_consistency, worse_trials
 from tank2sim.gap.proof.replay import replay_trials, with_black_box
 from tank2sim.gap.result import (
     AMBIGUOUS,
@@ -52,14 +52,14 @@ DOUBT = 1e-3
 
 @dataclass(frozen=True)
 class GapOptions:
-    """How the missing effect is sought.
+    """Options of the search for the missing effect.
 
     Parameters
     ----------
     effects : tuple of str, optional
-        Only these; by default the whole library.
+        Effects to try; by default the whole library.
     without : tuple of str
-        Not these.
+        Effects not to try.
     max_effects : int
         1 or 2.
     workers : int, optional
@@ -80,7 +80,7 @@ def run_gap_workflow(
     progress: StageReport = lambda text: None,
     executor: Executor | None = None,
 ) -> Gap:
-    """Find where a card's model and trials differ, name what is missing, add it, and prove it.
+    """Find where a card's model and trials differ, name the missing effect, add it, and check it.
 
     Parameters
     ----------
@@ -90,14 +90,14 @@ def run_gap_workflow(
         Trials that name the effect, and trials that only prove it (may be none).
     options : GapOptions, optional
     progress : callable
-        Told what is being done.
+        Called with the name of each stage.
     executor : Executor, optional
         For fitting explanations; by default processes of this machine.
 
     Raises
     ------
     InputError
-        A trial is too short or tells too little, or an effect that was asked for cannot be tried on this card.
+        A trial is too short or measures too little, or a requested effect cannot be tried on this card.
     """
     options = options or GapOptions()
     names = _names(card, fitted, options)
@@ -106,7 +106,7 @@ def run_gap_workflow(
         found = search(likelihood, progress, pool, names, most=options.max_effects)
     decision = decide(found)
     progress("proving")
-    return _told(card, (fitted, held), found, decision, progress)
+    return _assemble_gap(card, (fitted, held), found, decision, progress)
 
 
 def _names(card: ManoeuvringCard, fitted: Measured, options: GapOptions) -> tuple[str, ...]:
@@ -132,33 +132,33 @@ def _processes(options: GapOptions, executor: Executor | None) -> Iterator[Execu
         yield pool
 
 
-def _told(
+def _assemble_gap(
     card: ManoeuvringCard, trials: tuple[Measured, Measured], found: Search, decision: Decision, progress: StageReport
 ) -> Gap:
-    """Everything that follows from the decision."""
+    """The results that follow from the decision."""
     fitted, held = trials
     estimated: list[Found] = []
     if decision.verdict in (MISSING, AMBIGUOUS):
         estimated = estimates(found.likelihood.by_formula(decision.best))
     noise = _noise(found, decision.best, fitted)
     sigmas = {name: sigma for name, (sigma, _) in noise.items()}
-    improved, results = _followed(card, trials, estimated, sigmas)
+    improved, results = _replay_all(card, trials, estimated, sigmas)
     withheld = ""
-    if estimated and not closes(results):
+    if estimated and not closes_gap(results):
         withheld = " and ".join(name for name, *_ in estimated)
         decision, estimated = replace(decision, verdict=OUTSIDE_LIBRARY), []
-        improved, results = _followed(card, trials, estimated, sigmas)
-    sensors = _of_sensors(estimated)
+        improved, results = _replay_all(card, trials, estimated, sigmas)
+    sensors = _sensor_faults(estimated)
     progress("where and how much")
     force = force_lacking(found.likelihood, found.none)
     every = (*fitted.trials, *held.trials)
-    told = each_trial(found.likelihood, decision.best) if estimated else {}
+    agreement = each_trial(found.likelihood, decision.best) if estimated else {}
     return Gap(
         card=card,
         improved=improved,
         verdict=decision.verdict,
-        effects=tuple(Named(*one, decision.confidence(one[0])) for one in estimated),
-        alternatives=tuple(fit.explained.effects for fit in decision.alike) if estimated else (),
+        effects=tuple(Named(*effect, decision.confidence(effect[0])) for effect in estimated),
+        alternatives=tuple(fit.hypothesis.effects for fit in decision.alike) if estimated else (),
         rivals=_rivals(found, decision),
         where=places(results),
         equation=equation_of([name for name, *_ in estimated], improved, force, results),
@@ -168,39 +168,40 @@ def _told(
         figures_after=figures(improved, _after(every, fitted, held, sensors), results, "after"),
         missing_force=force,
         could_hide=could_hide(found, decision.best, EVIDENCE_NEEDED),
-        agreement=told,
+        agreement=agreement,
         next_test=_next(card, found, decision, sigmas),
-        notices=_notices(card, decision, results, told, (fitted, held), withheld),
+        notices=_notices(card, decision, results, agreement, (fitted, held), withheld),
     )
 
 
-def _followed(
+def _replay_all(
     card: ManoeuvringCard, trials: tuple[Measured, Measured], estimated: list[Found], sigmas: Mapping[str, float]
 ) -> tuple[ManoeuvringCard, list[Passed]]:
-    """The card with what was estimated, and all trials as both cards and a black box follow them."""
+    """The card with the estimated effects, and all trials replayed by both cards and a black box."""
     improved = add_effects_to_card(card, estimated)
     count = sum(len(errors) for *_, errors in estimated)
     box = black_box(card, trials[0], sigmas, max(count, 1)) if estimated else None
     results: list[Passed] = []
     for group, held_out in zip(trials, (False, True), strict=True):
         if group.trials:
-            some = replay_trials(card, improved, group, sigmas, held_out, _mended(group, _of_sensors(estimated)))
-            results += with_black_box(some, box.card, group, sigmas) if box else some
+            corrected = _corrected(group, _sensor_faults(estimated))
+            replays = replay_trials(card, improved, group, sigmas, held_out, corrected)
+            results += with_black_box(replays, box.card, group, sigmas) if box else replays
     return improved, results
 
 
-def _of_sensors(estimated: Sequence[Found]) -> list[Found]:
-    return [one for one in estimated if EFFECTS[one[0]].acts_on == "sensor"]
+def _sensor_faults(estimated: Sequence[Found]) -> list[Found]:
+    return [effect for effect in estimated if EFFECTS[effect[0]].acts_on == "sensor"]
 
 
-def _mended(group: Measured, sensors: Sequence[Found]) -> Measured | None:
+def _corrected(group: Measured, sensors: Sequence[Found]) -> Measured | None:
     if not sensors:
         return None
     return replace(group, trials=tuple(correct_sensor_faults(trial, sensors) for trial in group.trials))
 
 
 def _after(every: Sequence[Trial], fitted: Measured, held: Measured, sensors: Sequence[Found]) -> Sequence[Trial]:
-    groups = (_mended(group, sensors) or group for group in (fitted, held))
+    groups = (_corrected(group, sensors) or group for group in (fitted, held))
     return [trial for group in groups for trial in group.trials] if sensors else every
 
 
@@ -222,15 +223,16 @@ def _noise(found: Search, best: ExplanationFit, fitted: Measured) -> dict[str, t
 
 def _rivals(found: Search, decision: Decision) -> tuple[Rival, ...]:
     least = found.fits[0].score
-    some = [*found.fits[:RIVALS]]
-    some += [found.none] if found.none not in some else []
+    shown = [*found.fits[:RIVALS]]
+    shown += [found.none] if found.none not in shown else []
     return tuple(
-        Rival(fit.explained.effects, fit.score - least, decision.probabilities[fit.explained.effects]) for fit in some
+        Rival(fit.hypothesis.effects, fit.score - least, decision.probabilities[fit.hypothesis.effects])
+        for fit in shown
     )
 
 
 def _next(card: ManoeuvringCard, found: Search, decision: Decision, noise: Mapping[str, float]) -> NextTest | None:
-    """The manoeuvre that would distinguish what these trials could not."""
+    """The manoeuvre that would distinguish the explanations that these trials could not."""
     if decision.verdict != AMBIGUOUS:
         return None
     rivals = [_explanation(card, found, fit) for fit in (decision.best, *decision.alike)]
@@ -238,58 +240,59 @@ def _next(card: ManoeuvringCard, found: Search, decision: Decision, noise: Mappi
 
 
 def _explanation(card: ManoeuvringCard, found: Search, fit: ExplanationFit) -> Explanation:
-    """A card with an explanation's effects, and what of it is not known exactly."""
+    """A card with an explanation's effects, and the covariance of its uncertain parameters."""
     entries = [
         EffectEntry(name=name, parameters=dict(values), uncertainty=dict(errors))
         for name, values, errors in estimates(fit)
     ]
     whole = replace(card, effects=(*card.effects, *entries))
     coefficients = found.likelihood.coefficients
-    names = (*(one.variable for one in fit.explained.asked), *(name for name in coefficients.names if name != CLOCK))
     kept = [place for place, name in enumerate(coefficients.names) if name != CLOCK]
+    variables = [estimate.variable for estimate in fit.hypothesis.estimated]
+    names = (*variables, *(coefficients.names[place] for place in kept))
     shared = fit.width * coefficients.mixing[kept]
     spread = np.zeros((len(names), len(names)))
     spread[len(fit.theta) :, len(fit.theta) :] = shared @ shared.T
     spread[: len(fit.theta), : len(fit.theta)] = fit.covariance
-    return Explanation(" and ".join(fit.explained.effects) or "none", whole, names, spread)
+    return Explanation(" and ".join(fit.hypothesis.effects) or "none", whole, names, spread)
 
 
 def _notices(
     card: ManoeuvringCard,
     decision: Decision,
     results: Sequence[Passed],
-    told: Mapping[str, Mapping[str, tuple[float, float]]],
+    agreement: Mapping[str, Mapping[str, tuple[float, float]]],
     trials: tuple[Measured, Measured],
     withheld: str,
 ) -> tuple[str, ...]:
     notices = [*trials[0].notices, *trials[1].notices]
-    notices += [_in_words(one) for one in decision.strange]
+    notices += [_in_words(strange) for strange in decision.strange]
     if withheld:
         notices.append(
-            f"{withheld}: fits best from instant to instant, but a simulation with it is no nearer: not named"
+            f"{withheld}: fits best from instant to instant, but a simulation with it is not closer: not named"
         )
     if card.effects:
         have = ", ".join(entry.name for entry in card.effects)
-        notices.append(f"{have}: held as the card has it, and not sought")
-    left = float(np.sqrt(np.mean([result.misfit("after") ** 2 for result in results])))
-    if decision.verdict != OUTSIDE_LIBRARY and left > MUCH:
+        notices.append(f"{have}: kept as on the card, and not sought")
+    remaining = float(np.sqrt(np.mean([result.misfit("after") ** 2 for result in results])))
+    if decision.verdict != OUTSIDE_LIBRARY and remaining > MUCH:
         notices.append(
-            f"the trials are still missed by {left:.3g} times the noise: forces that vary by chance (gusts, waves), "
+            f"the trials are still missed by {remaining:.3g} times the noise: random forces (gusts, waves), "
             "coefficients that are off, or something more that is missing; the standard errors do not cover it"
         )
     if decision.verdict in (MISSING, AMBIGUOUS):
-        notices += [f"{name}: the improved card follows it worse than the given one" for name in worse(results)]
-    for variable, values in told.items():
+        notices += [f"{name}: the improved card follows it worse than the given one" for name in worse_trials(results)]
+    for variable, values in agreement.items():
         if len(values) > 1 and (said := trial_consistency(values)).p < DOUBT:
             notices.append(f"the trials do not agree about {variable} (Cochran Q {said.q:.3g}, p {said.p:.1g})")
     return tuple(dict.fromkeys(notices))
 
 
-def _in_words(one: Strange) -> str:
-    when = f"from {one.begin_s:.0f} to {one.end_s:.0f} s"
-    if one.what == "period":
-        return f"all trials: an oscillation with a period of {one.begin_s:.3g} s that nothing in the library makes"
-    return f"{one.trial}: {when} the ship does what nothing in the library explains"
+def _in_words(strange: Strange) -> str:
+    when = f"from {strange.begin_s:.0f} to {strange.end_s:.0f} s"
+    if strange.kind == "period":
+        return f"all trials: an oscillation with a period of {strange.begin_s:.3g} s that nothing in the library causes"
+    return f"{strange.trial}: {when} a motion of the ship that nothing in the library explains"
 
 
 __all__ = ["AMBIGUOUS", "MISSING", "NO_EFFECT_MISSING", "OUTSIDE_LIBRARY", "GapOptions", "run_gap_workflow"]

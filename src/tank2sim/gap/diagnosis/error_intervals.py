@@ -1,4 +1,4 @@
-"""When the model itself is wrong: its forces, or how records of position, heading and velocity hang together."""
+"""Times of model errors: in its forces, or in the kinematics of position, heading and velocity."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from tank2sim.gap.diagnosis.misfit_location import CLEAR, STATE_BINS, most_telli
 from tank2sim.gap.result import Acting, Gap, MissingForce, MissingSignal, Passed
 
 SPAN = 84
-"""Instants over which changes of position and heading are compared with their rates: 2 L/u0 (ours: the noise of two
-readings of position is then a few hundredths of a m/s for a ship)."""
+"""Instants over which changes of position and heading are compared with their rates: 2 L/u0 (project choice: the
+noise of two readings of position is then a few hundredths of a m/s for a ship)."""
 
 TURNING, TRACK = ("turning",), ("north", "east", "ahead", "starboard")
 
@@ -30,10 +30,10 @@ _EARTH_BOUND = ("kinematics", "sensor")
 
 
 def acting(gap: Gap) -> tuple[Acting, ...]:
-    """When the model is wrong, the most telling first; nothing where nothing is.
+    """Times at which the model is wrong, the most significant first; empty if there are none.
 
-    What records contradict each other in comes before the forces, which the smoother makes up to follow them; where
-    nothing but kinematics or sensors is at fault there are no forces.
+    Contradictions of the records come before the forces, with which the smoother follows such records; where only
+    kinematics or sensors are at fault there are no forces.
     """
     signals = {signal.quantity: signal for signal in _lacking(gap.passed)}
     messages = [*_passages("heading", [signals[name] for name in TURNING if name in signals])]
@@ -60,41 +60,36 @@ def contradiction(gap: Gap) -> MissingSignal | None:
 
 
 def missing_signal(passed: Sequence[Passed]) -> MissingSignal | None:
-    """What the records lack to agree with each other, in the quantity in which it is simplest; None if they agree.
+    """The contradiction of the records, in the quantity in which it is simplest; None if they agree.
 
-    Of velocities to north and east, ahead and to starboard that one is reported which is largest and goes best with a
-    state of the ship: a current is constant in earth axes, a fault of the log is not.
+    Of velocities to north and east, ahead and to starboard the one is reported that is largest and correlates best
+    with a state of the ship: a current is constant in earth axes, a fault of the log is not.
     """
     found = _lacking(passed)
-    return max(found, key=_simply_told, default=None)
+    return max(found, key=_simplicity, default=None)
 
 
-def _simply_told(signal: MissingSignal) -> float:
+def _simplicity(signal: MissingSignal) -> float:
     known = {name: share for name, share in signal.explained.items() if name != "heading"}
     return max(known.values(), default=0.0) * float(np.sum((signal.values / signal.errors) ** 2))
 
 
 def _lacking(passed: Sequence[Passed]) -> list[MissingSignal]:
-    """Each quantity of the records that contradict each other by more than they may."""
+    """Each quantity in which the records contradict each other beyond :data:`CONTRADICTED`."""
     check = kinematic_consistency(passed)
     names = [*(TURNING if check.turning > CONTRADICTED else ()), *(TRACK if check.track > CONTRADICTED else ())]
     parts = [(replay, _series(replay)) for replay in passed]
-    made = []
-    for name in names:
-        there = [(one, own) for one, own in parts if name in own]
-        if there:
-            made.append(_joined(name, there))
-    return made
+    available = {name: [(replay, by_name) for replay, by_name in parts if name in by_name] for name in names}
+    return [_joined(name, found) for name, found in available.items() if found]
 
 
-def _series(one: Passed) -> dict[str, tuple[Array, float]]:
+def _series(replay: Passed) -> dict[str, tuple[Array, float]]:
     """Each quantity to its values (n,) around each instant, nan at the ends, and their standard error."""
-    seen = {name.removeprefix("motion."): values for name, values in readable(one).items()}
-    noise = {name.removeprefix("motion."): error for name, error in one.noise.items()}
-    if len(one.time_s) <= SPAN or "psi" not in seen:
+    seen, noise = readable(replay)
+    if len(replay.time_s) <= SPAN or "psi" not in seen:
         return {}
-    told: dict[str, tuple[Array, float]] = {}
-    span_s = SPAN * float(np.median(np.diff(one.time_s)))
+    series: dict[str, tuple[Array, float]] = {}
+    span_s = SPAN * float(np.median(np.diff(replay.time_s)))
 
     def rate(values: Array) -> Array:
         return (values[SPAN:] - values[:-SPAN]) / span_s
@@ -104,7 +99,7 @@ def _series(one: Passed) -> dict[str, tuple[Array, float]]:
 
     psi = seen["psi"]
     if "r" in seen:
-        told["turning"] = _middle(rate(psi) - _mean(seen["r"])), error(noise["psi"], noise["r"])
+        series["turning"] = _middle(rate(psi) - _mean(seen["r"])), error(noise["psi"], noise["r"])
     if {"x", "y", "u", "v"} <= seen.keys():
         north, east = (
             rate(seen[axis]) - _mean(over)
@@ -112,14 +107,15 @@ def _series(one: Passed) -> dict[str, tuple[Array, float]]:
         )
         # Turned into the ship's axes step by step: it may turn by much over the span.
         step, between = span_s / SPAN, 0.5 * (psi[1:] + psi[:-1])
-        made = recorded_earth_velocity(np.diff(seen["x"]) / step, np.diff(seen["y"]) / step, -between)
-        ahead, starboard = (_sliding(over) - _mean(seen[name]) for name, over in zip("uv", made, strict=True))
+        axial = recorded_earth_velocity(np.diff(seen["x"]) / step, np.diff(seen["y"]) / step, -between)
+        ahead, starboard = (_sliding(over) - _mean(seen[name]) for name, over in zip("uv", axial, strict=True))
         speed = float(np.max(np.hypot(seen["u"], seen["v"])))
-        own = error(
+        track_error = error(
             math.hypot(noise["x"], noise["y"]) / math.sqrt(2), math.hypot(noise["u"], noise["v"], speed * noise["psi"])
         )
-        told |= {name: (_middle(v), own) for name, v in zip(TRACK, (north, east, ahead, starboard), strict=True)}
-    return told
+        tracks = zip(TRACK, (north, east, ahead, starboard), strict=True)
+        series |= {name: (_middle(values), track_error) for name, values in tracks}
+    return series
 
 
 def _mean(values: Array) -> Array:
@@ -140,17 +136,17 @@ def _middle(values: Array) -> Array:
 
 
 def _joined(name: str, parts: Sequence[tuple[Passed, Mapping[str, tuple[Array, float]]]]) -> MissingSignal:
-    """All trials' rows of a quantity, and which state it goes with."""
+    """All trials' rows of a quantity, and the state that explains most of it."""
     trials, times, values, errors = [], [], [], []
     states: dict[str, list[Array]] = {}
-    for one, own in parts:
-        series, error = own[name]
+    for replay, by_name in parts:
+        series, error = by_name[name]
         rows = np.flatnonzero(np.isfinite(series))
-        trials += [one.name] * len(rows)
-        times.append(one.time_s[rows])
+        trials += [replay.name] * len(rows)
+        times.append(replay.time_s[rows])
         values.append(series[rows])
         errors.append(np.full(len(rows), error))
-        for state, column in _states(one).items():
+        for state, column in _states(replay).items():
             states.setdefault(state, []).append(column[rows])
     whole, every = np.concatenate(values), {state: np.concatenate(columns) for state, columns in states.items()}
     whole_states = {state: column for state, column in every.items() if len(column) == len(whole)}
@@ -169,15 +165,15 @@ def _joined(name: str, parts: Sequence[tuple[Passed, Mapping[str, tuple[Array, f
     )
 
 
-def _states(one: Passed) -> dict[str, Array]:
-    seen = {name.removeprefix("motion."): values for name, values in readable(one).items()}
-    told = {"heading": seen["psi"]}
+def _states(replay: Passed) -> dict[str, Array]:
+    seen, _ = readable(replay)
+    states = {"heading": seen["psi"]}
     if "r" in seen:
-        told["yaw rate"] = seen["r"]
+        states["yaw rate"] = seen["r"]
     if {"u", "v"} <= seen.keys():
-        told["speed"] = np.hypot(seen["u"], seen["v"])
-        told["drift"] = -np.arctan2(seen["v"], np.maximum(seen["u"], 1e-9))
-    return told
+        states["speed"] = np.hypot(seen["u"], seen["v"])
+        states["drift"] = -np.arctan2(seen["v"], np.maximum(seen["u"], 1e-9))
+    return states
 
 
 def _share(state: Array, values: Array) -> float:
@@ -202,7 +198,7 @@ def _passages(equation: str, signals: Sequence[MissingSignal]) -> list[Acting]:
         reach = SPAN / 2 * float(np.median(np.diff(of.time_s[rows]))) if len(rows) > 1 else 0.0
         for begin, end, excess in stretches(z[rows], limit=CLEAR):
             first, last = (float(of.time_s[rows[place]]) for place in (begin, end - 1))
-            # The first and the last value are of all that is before and after.
+            # The first and the last value are held before and after.
             first, last = round(first - reach * (begin == 0), 9) + 0.0, last + reach * (end == len(rows))
             found.append(Acting(trial, equation, first, last, math.sqrt(1 + excess / (end - begin))))
     return found

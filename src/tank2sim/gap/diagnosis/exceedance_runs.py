@@ -1,4 +1,4 @@
-"""Stretches of time in which something exceeds what noise does."""
+"""Intervals in which a residual exceeds the noise."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scipy.ndimage import uniform_filter1d
 from tank2sim.arrays import Array
 
 EXCEEDANCE_WINDOW = 21
-"""Instants over which the square of a residual is averaged to tell a stretch of misfit from noise: half of L/u0."""
+"""Instants over which the square of a residual is averaged to distinguish misfit from noise: half of L/u0."""
 
 BEYOND = 4.0
 """A mean square belongs to a stretch if it exceeds that of noise by this many of its own standard deviations (project
@@ -51,4 +51,4 @@ def stretches(z: Array, limit: float | None = None, width: int = EXCEEDANCE_WIND
         else:
             joined.append(pair)
     sums = [(begin, end, float(excess[begin:end].sum())) for begin, end in joined]
-    return [one for one in sums if one[2] > 0]
+    return [run for run in sums if run[2] > 0]

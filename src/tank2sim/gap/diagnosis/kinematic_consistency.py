@@ -21,7 +21,7 @@ CONTRADICTED = 4.0
 
 @dataclass(frozen=True)
 class Kinematics:
-    """How far records contradict themselves, in standard errors: root mean square over trials, about 1 is none.
+    """Contradictions of records in standard errors: root mean square over trials, about 1 if there is none.
 
     Parameters
     ----------
@@ -36,24 +36,21 @@ class Kinematics:
 
 
 def kinematic_consistency(passed: Sequence[Passed]) -> Kinematics:
-    """Whether dpsi/dt is r, and whether positions follow from u, v and psi: nothing of the hull is asked.
+    """Compare dpsi/dt with r, and positions with those from u, v and psi, without a model of the hull.
 
     Both sides are compared over the whole of each trial; the standard error is that of white noise of the sensors,
     integrated.
     """
     turning, track = [], []
     for replay in passed:
-        seen = readable(replay)
-        noise = {name.removeprefix("motion."): error for name, error in replay.noise.items()}
-        if {"motion.psi", "motion.r"} <= seen.keys():
-            turning.append(
-                _contradiction(replay.time_s, seen["motion.psi"], noise["psi"], seen["motion.r"], noise["r"])
-            )
-        if {f"motion.{name}" for name in ("psi", "u", "v", "x", "y")} <= seen.keys():
-            u, v, psi = (seen[f"motion.{name}"] for name in ("u", "v", "psi"))
+        seen, noise = readable(replay)
+        if {"psi", "r"} <= seen.keys():
+            turning.append(_contradiction(replay.time_s, seen["psi"], noise["psi"], seen["r"], noise["r"]))
+        if {"psi", "u", "v", "x", "y"} <= seen.keys():
+            u, v, psi = (seen[name] for name in ("u", "v", "psi"))
             over = math.hypot(noise["u"], noise["v"], float(np.max(np.hypot(u, v))) * noise["psi"])
             for axis, rate in zip("xy", recorded_earth_velocity(u, v, psi), strict=True):
-                track.append(_contradiction(replay.time_s, seen[f"motion.{axis}"], noise[axis], rate, over))
+                track.append(_contradiction(replay.time_s, seen[axis], noise[axis], rate, over))
     return Kinematics(*(float(np.sqrt(np.mean(np.square(z)))) if z else 0.0 for z in (turning, track)))
 
 
@@ -66,19 +63,23 @@ def recorded_earth_velocity(u: Array, v: Array, psi: Array) -> tuple[Array, Arra
 def _contradiction(time: Array, signal: Array, noise: float, rate: Array, rate_noise: float) -> float:
     """Change of a signal over a trial less the integral of its measured rate, in standard errors."""
     ends = min(ENDS, len(time) // 2)
-    left = signal - np.concatenate([[0.0], cumulative_trapezoid(rate, time)])
-    change = float(left[-ends:].mean()) - float(left[:ends].mean())
+    deviation = signal - np.concatenate([[0.0], cumulative_trapezoid(rate, time)])
+    change = float(deviation[-ends:].mean()) - float(deviation[:ends].mean())
     step = float(np.median(np.diff(time)))
     return change / math.hypot(noise * math.sqrt(2 / ends), rate_noise * step * math.sqrt(len(time)))
 
 
-def readable(one: Passed) -> dict[str, Array]:
-    """The signals of a trial of which there are readings, without gaps."""
-    return {name: filled(one.measured[name]) for name in one.noise if np.isfinite(one.measured[name]).any()}
+def readable(replay: Passed) -> tuple[dict[str, Array], dict[str, float]]:
+    """The measured signals of a trial, with gaps interpolated, and their noise; names without ``motion.``."""
+    names = {name.removeprefix("motion."): name for name in replay.noise if np.isfinite(replay.measured[name]).any()}
+    return (
+        {short: filled(replay.measured[name]) for short, name in names.items()},
+        {short: replay.noise[name] for short, name in names.items()},
+    )
 
 
 def filled(values: Array) -> Array:
-    """A signal (n,) with what was not measured put in between its neighbours, straight."""
+    """A signal (n,) with gaps interpolated linearly."""
     known = np.isfinite(values)
     places = np.arange(len(values), dtype=float)
     whole: Array = np.interp(places, places[known], values[known])

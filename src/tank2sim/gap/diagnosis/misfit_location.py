@@ -1,4 +1,4 @@
-"""Where the gap is: in which trial, signal and time, in which equation, and what the missing force follows."""
+"""Location of the misfit: trial, signal and time, equation, and the state that explains the missing force."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ from tank2sim.identification.trials.assessment.evaluation import FigureCompariso
 from tank2sim.records.trials import Trial
 
 NOISE_SURE = 1.1
-"""A signal of a trial whose misfit is below this has no stretches: its noise is not known better (project choice),
-and slow noise has stretches of its own."""
+"""A signal of a trial whose misfit is below this has no misfit intervals: its noise is not known better (project
+choice), and slow noise has such intervals, too."""
 
 GROWING = 8.0
 """A difference grows if the mean square of its growth is this much beyond that of white noise: three standard errors
@@ -48,7 +48,7 @@ _SHORT = 4
 """Blocks of the smoother over which that mean is taken: half of L/u0."""
 
 STATE_BINS = 12
-"""Bins of equal count, by which a state explains a force (ours: enough for any of the library's shapes)."""
+"""Bins of equal count, by which a state explains a force (project choice: enough for any of the library's shapes)."""
 
 EQUATIONS = {"X": "surge", "Y": "sway", "N": "yaw"}
 
@@ -56,7 +56,7 @@ TURNED = math.pi
 """A trial whose heading changes by more than this is a turn, of which the speed loss is a figure."""
 
 INTEGRATED = ("motion.x", "motion.y", "motion.psi")
-"""Signals that sum up what was wrong before: what counts is when the difference grows, not that it is there."""
+"""Signals that integrate earlier errors: the growth of the difference counts, not its size."""
 
 
 def places(passed: Sequence[Passed], limit: int = 12) -> tuple[MisfitPlace, ...]:
@@ -64,74 +64,74 @@ def places(passed: Sequence[Passed], limit: int = 12) -> tuple[MisfitPlace, ...]
 
     The excess of a stretch is the sum of z^2 - 1. Velocities and rates have z = (simulated - measured)/noise; positions
     and headings the growth of the difference over :data:`EXCEEDANCE_WINDOW` instants beyond what wrong velocities make
-    of it, where these are measured too, in its own noise: a track that was left once stays left, and only what leaves
-    it is a place. The whole is that of all stretches of all trials. Where the motion had left all bounds the residual
-    counts as the largest before it.
+    of it, where these are measured too, in its own noise: an offset of the track remains, and only its
+    growth is a place. The whole is that of all stretches of all trials. Where the motion exceeds all bounds the
+    residual counts as the largest before it.
     """
     found = [
         (excess, MisfitPlace(replay.name, signal, float(replay.time_s[begin]), float(replay.time_s[end - 1]), 0.0))
         for replay in passed
         for signal in replay.noise
         if replay.misfit("before", signal) > NOISE_SURE
-        for begin, end, excess in _where_it_arises(replay, signal)
+        for begin, end, excess in _misfit_runs(replay, signal)
     ]
     whole = sum(excess for excess, _ in found)
     found.sort(key=lambda pair: -pair[0])
     return tuple(replace(place, share=excess / whole) for excess, place in found[:limit])
 
 
-def _where_it_arises(one: Passed, signal: str) -> list[tuple[int, int, float]]:
-    z = _in_noise(one, signal)
+def _misfit_runs(replay: Passed, signal: str) -> list[tuple[int, int, float]]:
+    z = _in_noise(replay, signal)
     if signal not in INTEGRATED:
         return stretches(z)
-    known, half = np.isfinite(one.measured[signal]), EXCEEDANCE_WINDOW // 2
-    lost = known & np.isnan(one.before[signal])
-    left = np.where(known & ~lost, one.before[signal] - one.measured[signal], np.nan)
-    if np.count_nonzero(np.isfinite(left)) <= EXCEEDANCE_WINDOW:
+    known, half = np.isfinite(replay.measured[signal]), EXCEEDANCE_WINDOW // 2
+    lost = known & np.isnan(replay.before[signal])
+    residual = np.where(known & ~lost, replay.before[signal] - replay.measured[signal], np.nan)
+    if np.count_nonzero(np.isfinite(residual)) <= EXCEEDANCE_WINDOW:
         return stretches(np.where(lost, z, 0.0))
-    own = filled(left)
-    simulated, measured = _rates(one, one.before), _rates(one, one.measured)
+    difference = filled(residual)
+    simulated, measured = _rates(replay, replay.before), _rates(replay, replay.measured)
     rate_noise = 0.0
     if signal in simulated and signal in measured:
         wrong = filled(simulated[signal] - measured[signal])
-        own = own - cumulative_trapezoid(wrong, one.time_s, initial=0)
-        rate_noise = _rate_noise(one, signal) * float(np.median(np.diff(one.time_s)))
+        difference = difference - cumulative_trapezoid(wrong, replay.time_s, initial=0)
+        rate_noise = _rate_noise(replay, signal) * float(np.median(np.diff(replay.time_s)))
     # Means over half a window on both sides: their difference is as good as white over a window.
-    sums = np.concatenate([[0.0], np.cumsum(own)])
+    sums = np.concatenate([[0.0], np.cumsum(difference)])
     means = (sums[half:] - sums[:-half]) / half
-    error = math.sqrt(2 / half * one.noise[signal] ** 2 + half * rate_noise**2)
+    error = math.sqrt(2 / half * replay.noise[signal] ** 2 + half * rate_noise**2)
     growth = np.full(len(z), np.nan)
     growth[half : len(means)] = (means[half:] - means[:-half]) / error
     return stretches(np.where(lost, z, growth), limit=GROWING)
 
 
-def _rates(one: Passed, columns: Mapping[str, Array]) -> dict[str, Array]:
-    """The rates of positions and heading (n,) that follow from velocities and yaw rate, where all of them are there."""
-    there = {name for name in one.noise if np.isfinite(one.measured[name]).any()}
-    told = {"motion.psi": columns["motion.r"]} if "motion.r" in there else {}
-    if {"motion.u", "motion.v", "motion.psi"} <= there:
+def _rates(replay: Passed, columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Rates of positions and heading (n,) from velocities and yaw rate, where all of these are measured."""
+    measured_names = {name for name in replay.noise if np.isfinite(replay.measured[name]).any()}
+    rates = {"motion.psi": columns["motion.r"]} if "motion.r" in measured_names else {}
+    if {"motion.u", "motion.v", "motion.psi"} <= measured_names:
         velocity = recorded_earth_velocity(columns["motion.u"], columns["motion.v"], columns["motion.psi"])
-        told |= dict(zip(("motion.x", "motion.y"), velocity, strict=True))
-    return told
+        rates |= dict(zip(("motion.x", "motion.y"), velocity, strict=True))
+    return rates
 
 
-def _rate_noise(one: Passed, signal: str) -> float:
+def _rate_noise(replay: Passed, signal: str) -> float:
     """Standard deviation of a measured rate of :func:`_rates`."""
     if signal == "motion.psi":
-        return one.noise["motion.r"]
-    speed = float(np.nanmax(np.hypot(one.measured["motion.u"], one.measured["motion.v"])))
-    return math.hypot(one.noise["motion.u"], one.noise["motion.v"], speed * one.noise["motion.psi"])
+        return replay.noise["motion.r"]
+    speed = float(np.nanmax(np.hypot(replay.measured["motion.u"], replay.measured["motion.v"])))
+    return math.hypot(replay.noise["motion.u"], replay.noise["motion.v"], speed * replay.noise["motion.psi"])
 
 
-def _in_noise(one: Passed, signal: str) -> Array:
+def _in_noise(replay: Passed, signal: str) -> Array:
     """Residual over noise (n,), nan where nothing was measured."""
-    z: Array = (one.before[signal] - one.measured[signal]) / one.noise[signal]
-    lost = np.isnan(one.before[signal]) & np.isfinite(one.measured[signal])
+    z: Array = (replay.before[signal] - replay.measured[signal]) / replay.noise[signal]
+    lost = np.isnan(replay.before[signal]) & np.isfinite(replay.measured[signal])
     return np.where(lost, max(np.nanmax(np.abs(z), initial=0.0), 1e3), z)
 
 
 def figures(
-    card: ManoeuvringCard, trials: Sequence[Trial], passed: Sequence[Passed], which: str
+    card: ManoeuvringCard, trials: Sequence[Trial], passed: Sequence[Passed], version: str
 ) -> tuple[FigureComparison, ...]:
     """The mariner's figures, measured and by a card.
 
@@ -141,30 +141,30 @@ def figures(
     Parameters
     ----------
     card : ManoeuvringCard
-        The one that `which` of `passed` shows.
+        The card of `version` in `passed`.
     trials : sequence of Trial
     passed : sequence of Passed
         Of these trials.
-    which : str
+    version : str
         ``before`` or ``after``.
     """
-    own = [figure for replay in passed for figure in _ends(replay, which)]
+    end_figures = [figure for replay in passed for figure in _ends(replay, version)]
     steered = predicted_figures(card, trials)
     order = {trial.name: place for place, trial in enumerate(trials)}
-    return tuple(sorted((*steered, *own), key=lambda figure: order.get(figure.trial, len(order))))
+    return tuple(sorted((*steered, *end_figures), key=lambda figure: order.get(figure.trial, len(order))))
 
 
-def _ends(one: Passed, which: str) -> list[FigureComparison]:
-    simulated: Mapping[str, Array] = getattr(one, which)
-    measured, predicted = _end_figures(one.measured), _end_figures(simulated)
+def _ends(replay: Passed, version: str) -> list[FigureComparison]:
+    simulated: Mapping[str, Array] = getattr(replay, version)
+    measured, predicted = _end_figures(replay.measured), _end_figures(simulated)
     for name in measured.keys() & predicted.keys():
         if name.endswith("_deg"):  # the same side of north as the measured one
             predicted[name] = measured[name] + (predicted[name] - measured[name] + 180) % 360 - 180
-    return [FigureComparison(one.name, name, value, predicted.get(name)) for name, value in measured.items()]
+    return [FigureComparison(replay.name, name, value, predicted.get(name)) for name, value in measured.items()]
 
 
 def _end_figures(columns: Mapping[str, Array]) -> dict[str, float]:
-    """Figures of a replayed trial; those that its signals cannot tell are left out."""
+    """Figures of a replayed trial; those that its signals do not determine are omitted."""
 
     def end(name: str, side: int) -> float:
         values = columns.get(name, np.zeros(0))
@@ -174,20 +174,20 @@ def _end_figures(columns: Mapping[str, Array]) -> dict[str, float]:
 
     north, east = (end(f"motion.{axis}", 1) - end(f"motion.{axis}", -1) for axis in "xy")
     turned = end("motion.psi", 1) - end("motion.psi", -1)
-    told = {
+    end_values = {
         "final_heading_deg": math.degrees(end("motion.psi", 1)),
         "made_good_m": math.hypot(north, east),
         "course_made_good_deg": math.degrees(math.atan2(east, north)) % 360,
     }
     if abs(turned) > TURNED:
-        told["speed_loss_percent"] = 100 * (1 - end("motion.u", 1) / end("motion.u", -1))
-    return {name: value for name, value in told.items() if math.isfinite(value)}
+        end_values["speed_loss_percent"] = 100 * (1 - end("motion.u", 1) / end("motion.u", -1))
+    return {name: value for name, value in end_values.items() if math.isfinite(value)}
 
 
 def missing_force_by_state(
     trials: Sequence[str], time_s: Array, force: Array, errors: Array, states: Mapping[str, Array]
 ) -> MissingForce | None:
-    """What the smoother's force says: the equation that lacks most, and the state that explains most of it.
+    """The missing force from the smoother: the equation that lacks most, and the state that explains most of it.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def missing_force_by_state(
 
 
 def _at_work(trials: NDArray[np.object_], time_s: Array, force: Array, errors: Array) -> tuple[Acting, ...]:
-    """When each of the three forces (n, 3) is at work, the most telling first."""
+    """Intervals in which each of the three forces (n, 3) acts, the most significant first."""
     found = []
     z = np.divide(force, errors, out=np.full(force.shape, np.nan), where=errors > 0)
     usual = np.nanmean(force**2, axis=0)
@@ -235,8 +235,8 @@ def _at_work(trials: NDArray[np.object_], time_s: Array, force: Array, errors: A
         rows = np.flatnonzero(trials == trial)
         for axis, equation in enumerate(EQUATIONS.values()):
             mean = uniform_filter1d(np.nan_to_num(force[rows, axis]) ** 2, min(_SHORT, len(rows)))
-            own = np.where(mean > USUAL * usual[axis], z[rows, axis], 0.0)
-            for begin, end, excess in stretches(own, limit=CLEAR, width=_SHORT):
+            active = np.where(mean > USUAL * usual[axis], z[rows, axis], 0.0)
+            for begin, end, excess in stretches(active, limit=CLEAR, width=_SHORT):
                 size = math.sqrt(1 + excess / (end - begin))
                 times = time_s[rows[[begin, end - 1]]]
                 found.append(Acting(str(trial), equation, float(times[0]), float(times[1]), size))
@@ -245,11 +245,11 @@ def _at_work(trials: NDArray[np.object_], time_s: Array, force: Array, errors: A
 
 def most_telling(found: Sequence[Acting]) -> tuple[Acting, ...]:
     """Sorted by the sum of squares, the largest first."""
-    return tuple(sorted(found, key=lambda one: -(one.size**2) * (one.t_end_s - one.t_start_s)))
+    return tuple(sorted(found, key=lambda interval: -(interval.size**2) * (interval.t_end_s - interval.t_start_s)))
 
 
 def explained_share(state: Array, force: Array, weights: Array) -> float:
-    """Share of a force's weighted variance (n,) that means over :data:`STATE_BINS` bins of a state explain, 0 to 1.
+    """Share of a force's weighted variance (n,) explained by means over :data:`STATE_BINS` bins of a state, 0 to 1.
 
     Adjusted for the number of bins as a regression's R^2 is for its parameters.
     """
@@ -263,12 +263,12 @@ def explained_share(state: Array, force: Array, weights: Array) -> float:
     used = total > 0
     means = np.divide(sums, total, out=np.zeros_like(sums), where=used)
     mean = float(np.average(force, weights=weights))
-    left = float(weights @ (force - means[places]) ** 2)
+    unexplained = float(weights @ (force - means[places]) ** 2)
     whole = float(weights @ (force - mean) ** 2)
     if whole <= 0:
         return 0.0
     n, bins = len(force), int(used.sum())
-    return max(0.0, 1 - left / whole * (n - 1) / (n - bins))
+    return max(0.0, 1 - unexplained / whole * (n - 1) / (n - bins))
 
 
 def parity(state: Array, force: Array) -> float:
@@ -283,11 +283,11 @@ def parity(state: Array, force: Array) -> float:
     places = np.clip(np.searchsorted(edges, size, side="right") - 1, 0, len(edges) - 2)
     odd = even = 0.0
     for place in range(len(edges) - 1):
-        there = [force[(places == place) & (np.sign(state) == side)] for side in (1, -1)]
-        if min(map(len, there)) < 3:
+        sides = [force[(places == place) & (np.sign(state) == side)] for side in (1, -1)]
+        if min(map(len, sides)) < 3:
             continue
-        plus, minus = (float(values.mean()) for values in there)
-        share = min(map(len, there)) / len(force)
+        plus, minus = (float(values.mean()) for values in sides)
+        share = min(map(len, sides)) / len(force)
         odd, even = odd + share * (plus - minus) ** 2, even + share * (plus + minus) ** 2
     return (odd - even) / (odd + even) if odd + even > 0 else 0.0
 
@@ -298,7 +298,7 @@ OF_ACTION = {"kinematics": "kinematics", "sensor": "sensor", "actuator": "actuat
 def equation_of(
     names: Sequence[str], improved: ManoeuvringCard, force: MissingForce | None, passed: Sequence[Passed]
 ) -> str:
-    """The equation at fault: surge, sway, yaw, actuator, kinematics or sensor; "" where nothing points to any.
+    """The equation at fault: surge, sway, yaw, actuator, kinematics or sensor; "" if unknown.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ def equation_of(
         With those of them that act on the ship.
     force : MissingForce or None
     passed : sequence of Passed
-        Asked, with the force, where no effect was named.
+        Used, with the force, where no effect was named.
     """
     if names:
         action = EFFECTS[names[0]].acts_on
@@ -320,18 +320,18 @@ def equation_of(
 
 
 def _most_changed(card: ManoeuvringCard, name: str) -> str:
-    """Surge, sway or yaw: which acceleration an effect of the card changes most, as a share of its own size.
+    """Surge, sway or yaw: the acceleration that an effect of the card changes most, relative to its size.
 
     Over motions as they occur in manoeuvres: u 0.6 to 1 u0, v to 0.2 u0, r to 0.5 u0/L, rudder to 25 deg, any heading.
     """
     without = replace(card, effects=tuple(entry for entry in card.effects if entry.name != name))
-    there, here = _accelerations(build(card)), _accelerations(build(without))
-    shares = np.sqrt(np.mean((there - here) ** 2, axis=0) / np.mean(here**2, axis=0))
+    changed, unchanged = _accelerations(build(card)), _accelerations(build(without))
+    shares = np.sqrt(np.mean((changed - unchanged) ** 2, axis=0) / np.mean(unchanged**2, axis=0))
     return ("surge", "sway", "yaw")[int(np.argmax(shares))]
 
 
 def _accelerations(model: Model, count: int = 200) -> Array:
-    """du/dt, dv/dt, dr/dt (count, 3) at one and the same set of motions for any model."""
+    """du/dt, dv/dt, dr/dt (count, 3) at the same set of motions for any model."""
     p = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
     speed, length = p["ship.speed"], p["ship.length"]
     share = np.random.default_rng(0).uniform(-1, 1, (count, 5))
@@ -345,10 +345,10 @@ def _accelerations(model: Model, count: int = 200) -> Array:
     extra = np.random.default_rng(1)
     columns = []
     for state in model.states:
-        own = 0.3 * state.nominal * extra.standard_normal(count)
-        columns.append(values.get(state.name, np.zeros(count) if state.name in ("motion.x", "motion.y") else own))
+        typical = 0.3 * state.nominal * extra.standard_normal(count)
+        columns.append(values.get(state.name, np.zeros(count) if state.name in ("motion.x", "motion.y") else typical))
     wanted = ca.vcat([model.symbol(f"motion.{name}dot") for name in "uvr"])
     function = ca.Function("accelerations", [model.x, model.u, model.p], [model.expand(wanted)])
-    u, par = (np.repeat(one[:, None], count, axis=1) for one in (model.input_values(), model.parameter_values()))
+    u, par = (np.repeat(vector[:, None], count, axis=1) for vector in (model.input_values(), model.parameter_values()))
     rates: Array = np.array(function(np.array(columns), u, par)).T
     return rates

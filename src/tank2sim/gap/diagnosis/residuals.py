@@ -1,4 +1,4 @@
-"""What a fitted explanation leaves and tells: the missing force, and what each trial says."""
+"""Residuals of a fitted explanation: the missing force, and the estimates of each trial."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from tank2sim.gap.result import MissingForce
 
 def force_lacking(likelihood: Likelihood, fit: ExplanationFit) -> MissingForce | None:
     """The force that an explanation lacks, as the smoother needs it to follow the measurements."""
-    motion, explained = likelihood.motion, fit.explained
+    motion, hypothesis = likelihood.motion, fit.hypothesis
     states, spread = likelihood.smoothed(fit)
-    inertia = _inertia(explained)
+    inertia = _inertia(hypothesis)
     force = np.einsum("ij,rtj->rti", inertia, states[..., 6 : 6 + FORCE_STATES])
     errors = np.sqrt(np.einsum("ij,rtjk,ik->rti", inertia, spread, inertia))
     inside = motion.inside
     inside[:, -1] = False  # inputs and states between the blocks
     part = inside[:, :-1]
     u, v, r, psi, _, _ = np.moveaxis(motion.block_states, -1, 0)
-    rudder = motion.block_inputs[..., explained.model.input_names.index("rudder.command")]
+    rudder = motion.block_inputs[..., hypothesis.model.input_names.index("rudder.command")]
     columns = {
         "rudder": rudder,
         "drift": -np.arcsin(np.clip(v / np.maximum(np.hypot(u, v), 1e-9), -1, 1)),
@@ -48,11 +48,11 @@ def force_lacking(likelihood: Likelihood, fit: ExplanationFit) -> MissingForce |
     )
 
 
-def _inertia(explained: Hypothesis) -> Array:
+def _inertia(hypothesis: Hypothesis) -> Array:
     """Mass matrix (3, 3): forces X, Y (N) and N (N m) by accelerations of surge, sway and yaw at the design speed."""
     pushes = [Parameter(name=f"push.{axis}", unit="1", description="A force", start=0.0) for axis in "XYN"]
     X, Y, N = (push.symbol for push in pushes)
-    model = with_forces(explained.model.extend(*pushes), X=X, Y=Y, N=N)
+    model = with_forces(hypothesis.model.extend(*pushes), X=X, Y=Y, N=N)
     places = [model.state_names.index(name) for name in ("motion.u", "motion.v", "motion.r")]
     slope = ca.jacobian(model.rates[places], ca.vertcat(X, Y, N))
     mobility = ca.Function("mobility", [model.x, model.u, model.p], [slope])
@@ -61,42 +61,40 @@ def _inertia(explained: Hypothesis) -> Array:
 
 
 def each_trial(likelihood: Likelihood, fit: ExplanationFit) -> dict[str, dict[str, tuple[float, float]]]:
-    """What each trial alone would have each parameter of the effects: variable to {trial: (value, standard error)}.
+    """Estimates of the effects' parameters by each trial alone: variable to {trial: (value, standard error)}.
 
-    The others of the same effect are as uncertain as all trials together leave them; the card's coefficients and the
+    The other parameters have the covariance of the fit to all trials; the card's coefficients and the
     forms of the effects as before.
     """
     whitened, _ = likelihood.whitened(fit)
     k = len(fit.theta)
-    told: dict[str, dict[str, tuple[float, float]]] = {one.variable: {} for one in fit.explained.asked}
+    estimated = fit.hypothesis.estimated
+    by_trial: dict[str, dict[str, tuple[float, float]]] = {estimate.variable: {} for estimate in estimated}
     for run, name in enumerate(likelihood.motion.names):
         flat = whitened[run].reshape(-1, whitened.shape[-1])
         gram = flat.T @ flat
         held = gram[1 + k :, 1 + k :] + np.eye(len(gram) - 1 - k)
         mixed = gram[: 1 + k, 1 + k :]
-        own = gram[: 1 + k, : 1 + k] - mixed @ np.linalg.solve(held, mixed.T)
-        for place, one in enumerate(fit.explained.asked):
-            others = [other for other in range(k) if other != place]
-            prior = np.linalg.inv(fit.covariance[np.ix_(others, others)] + 1e-300 * np.eye(k - 1)) if others else None
-            information, pull = own[1 + place, 1 + place], -own[1 + place, 0]
-            if prior is not None:
-                rest = [1 + other for other in others]
-                solved = np.linalg.solve(own[np.ix_(rest, rest)] + prior, own[np.ix_(rest, [1 + place, 0])])
-                information -= own[1 + place, rest] @ solved[:, 0]
-                pull += own[1 + place, rest] @ solved[:, 1]
+        reduced = gram[: 1 + k, : 1 + k] - mixed @ np.linalg.solve(held, mixed.T)
+        for place, estimate in enumerate(estimated):
+            remaining = np.delete(np.arange(k), place)
+            prior = np.linalg.inv(fit.covariance[np.ix_(remaining, remaining)] + 1e-300 * np.eye(k - 1))
+            rows, columns = 1 + remaining, np.array([1 + place, 0])
+            solved = np.linalg.solve(reduced[np.ix_(rows, rows)] + prior, reduced[np.ix_(rows, columns)])
+            information, pull = reduced[1 + place, columns] - reduced[1 + place, rows] @ solved
             if information > 0:
-                value = float(fit.theta[place] + pull / information)
-                told[one.variable][name] = value, float(1 / np.sqrt(information))
-    return told
+                value = float(fit.theta[place] - pull / information)
+                by_trial[estimate.variable][name] = value, float(1 / np.sqrt(information))
+    return by_trial
 
 
 def estimates(fit: ExplanationFit) -> list[Found]:
     """Each effect of a fit with its parameters and their standard errors, SI, by the names of the parameters."""
     errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     found: list[Found] = []
-    for effect in fit.explained.effects:
-        places = [place for place, one in enumerate(fit.explained.asked) if one.effect == effect]
-        names: Sequence[str] = [fit.explained.asked[place].parameter.name for place in places]
+    for effect in fit.hypothesis.effects:
+        places = [place for place, estimate in enumerate(fit.hypothesis.estimated) if estimate.effect == effect]
+        names: Sequence[str] = [fit.hypothesis.estimated[place].parameter.name for place in places]
         values = {name: float(fit.theta[place]) for name, place in zip(names, places, strict=True)}
         found.append((effect, values, {name: float(errors[p]) for name, p in zip(names, places, strict=True)}))
     return found

@@ -1,4 +1,4 @@
-"""The record of what a result was computed from, by which it need not be computed again: ``run.json``."""
+"""The record of the inputs of a result, by which it need not be computed again: ``run.json``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _FORMAT = "tank2sim-run/1"
 def fleet_run_record(ship: ShipFolder, options: GapOptions) -> dict[str, object]:
     """All on which a result depends: files by the SHA-256 of their bytes, options, version of the program.
 
-    How many processes compute it, and where, is no part of it.
+    The number and place of the processes is not part of it.
 
     Raises
     ------
@@ -50,9 +50,9 @@ def with_results(record: Mapping[str, object], contents: Mapping[Path, str | byt
 
 
 def stale(record: Mapping[str, object], folder: Path) -> str:
-    """Why what lies in a folder is not the result of this record, in words; empty if it is.
+    """Reason why the files in a folder are not the results of this record; empty if they are.
 
-    The files of the result are looked at, too: a run that was killed between two of them leaves the record of the run
+    The files of the result are compared, too: a run that was killed between two of them leaves the record of the run
     before, and a user may have changed one. Without a record it is :data:`NEW`.
     """
     earlier = _read(folder / RUN)
@@ -64,9 +64,9 @@ def stale(record: Mapping[str, object], folder: Path) -> str:
     results = earlier.get("files")
     if not isinstance(results, dict) or not results:
         return _RESULTS
-    for name, told in results.items():
+    for name, digest in results.items():
         try:
-            if sum_of((folder / name).read_bytes()) != told:
+            if sum_of((folder / name).read_bytes()) != digest:
                 return _RESULTS
         except OSError:
             return _RESULTS
@@ -104,7 +104,7 @@ def _sums(paths: Iterable[Path]) -> dict[str, str]:
 
 def _read(path: Path) -> dict[str, Any] | None:
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return told if isinstance(told, dict) else None
+    return content if isinstance(content, dict) else None

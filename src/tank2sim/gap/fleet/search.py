@@ -1,7 +1,7 @@
-"""What the cards of several ships lack.
+"""The missing effects of several ships.
 
-Ships that are sought at once are handed to an executor, each as one task: what is sent to it is read here, for those
-who compute may see no file of this machine.
+For a parallel search each ship is one task of an executor. Its files are read here, for a worker may have no access to
+the files of this machine.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ AHEAD = 256
 """Ships that are read and handed out before the first of them is done: a bound on memory (project choice)."""
 
 
-def can_lack(card: Card) -> ManoeuvringCard:
-    """The card, if it is one of which a missing effect can be sought.
+def nonlinear_card(card: Card) -> ManoeuvringCard:
+    """Return the card, if a missing effect can be sought for it.
 
     Raises
     ------
     InputError
-        It is of no ship that manoeuvres, or its equations are linear.
+        It is not of a manoeuvring ship, or its equations are linear.
     """
     if not isinstance(card, ManoeuvringCard):
-        raise InputError(card.source, "model.kind", "is no ship that manoeuvres", "give an abkowitz card")
+        raise InputError(card.source, "model.kind", "is not a manoeuvring ship", "give an abkowitz card")
     if card.model.kind == "linear":
-        remedy = 'set kind = "abkowitz"; what it lacks of the third order is then zero'
-        raise InputError(card.source, "model.kind", "is linear, and most effects are no part of such a model", remedy)
+        remedy = 'set kind = "abkowitz"; its missing third-order terms are then zero'
+        raise InputError(card.source, "model.kind", "is linear, and most effects are not part of such a model", remedy)
     return card
 
 
 @dataclass(frozen=True, eq=False)
-class Sought:
-    """A ship as it was read, all that is needed to find what its card lacks.
+class ShipTask:
+    """A ship with its data read: the input of the search for its missing effect.
 
     Parameters
     ----------
@@ -59,15 +59,15 @@ class Sought:
 
 @dataclass(frozen=True)
 class Fault:
-    """Why a ship has no result, in one line."""
+    """Reason why a ship has no result, in one line."""
 
     line: str
 
 
-def found_one_by_one(
-    ships: Iterable[Sought], options: GapOptions, progress: StageReport, executor: Executor | None = None
-) -> Iterator[tuple[Sought, Gap | Fault]]:
-    """What each ship lacks, one after the other.
+def find_in_turn(
+    ships: Iterable[ShipTask], options: GapOptions, progress: StageReport, executor: Executor | None = None
+) -> Iterator[tuple[ShipTask, Gap | Fault]]:
+    """Find the missing effect of each ship, one after the other.
 
     Parameters
     ----------
@@ -87,18 +87,18 @@ def found_one_by_one(
     for ship in ships:
         name = ship.folder.name
 
-        def told(stage: str, name: str = name) -> None:
+        def report(stage: str, name: str = name) -> None:
             progress(f"{name}: {stage}")
 
         with _executor_kept(name):
-            found = _found(ship, options, told, executor)
+            found = _find(ship, options, report, executor)
         yield ship, found
 
 
-def found_at_once(
-    ships: Iterable[Sought], options: GapOptions, progress: StageReport, executor: Executor
-) -> Iterator[tuple[Sought, Gap | Fault]]:
-    """What each ship lacks, as of :func:`found_one_by_one`, in the order in which the executor has done with them.
+def find_at_once(
+    ships: Iterable[ShipTask], options: GapOptions, progress: StageReport, executor: Executor
+) -> Iterator[tuple[ShipTask, Gap | Fault]]:
+    """Find the missing effect of each ship as :func:`find_in_turn`, in the order in which the executor completes them.
 
     Each ship is one task of the executor.
 
@@ -107,9 +107,9 @@ def found_at_once(
     InputError
         The executor is lost.
     """
-    waiting: dict[Future[Gap | Fault], Sought] = {}
+    waiting: dict[Future[Gap | Fault], ShipTask] = {}
     for ship in ships:
-        waiting[executor.submit(_found_there, ship, options)] = ship
+        waiting[executor.submit(_find_in_worker, ship, options)] = ship
         yield from _done(waiting, None if len(waiting) >= AHEAD else 0.0)
         if waiting:
             progress(_awaited(waiting.values()))
@@ -118,12 +118,14 @@ def found_at_once(
         yield from _done(waiting, None)
 
 
-def _awaited(ships: Collection[Sought]) -> str:
-    some = [one.folder.name for one in islice(ships, 3)]
-    return f"{len(ships)} to go: {', '.join(some)}{' ...' if len(ships) > len(some) else ''}"
+def _awaited(ships: Collection[ShipTask]) -> str:
+    names = [ship.folder.name for ship in islice(ships, 3)]
+    return f"{len(ships)} to go: {', '.join(names)}{' ...' if len(ships) > len(names) else ''}"
 
 
-def _done(waiting: dict[Future[Gap | Fault], Sought], timeout_s: float | None) -> Iterator[tuple[Sought, Gap | Fault]]:
+def _done(
+    waiting: dict[Future[Gap | Fault], ShipTask], timeout_s: float | None
+) -> Iterator[tuple[ShipTask, Gap | Fault]]:
     for future in wait(waiting, timeout_s, FIRST_COMPLETED).done:
         ship = waiting.pop(future)
         with _executor_kept(ship.folder.name):
@@ -144,13 +146,13 @@ def _executor_kept(name: str) -> Iterator[None]:
         raise InputError("--executor", "", problem, remedy) from None
 
 
-def _found_there(ship: Sought, options: GapOptions) -> Gap | Fault:
-    """In another process, which has the whole search to itself."""
-    return _found(ship, replace(options, workers=1))
+def _find_in_worker(ship: ShipTask, options: GapOptions) -> Gap | Fault:
+    """Find a ship's missing effect in a worker, in one process."""
+    return _find(ship, replace(options, workers=1))
 
 
-def _found(
-    ship: Sought, options: GapOptions, progress: StageReport = lambda text: None, executor: Executor | None = None
+def _find(
+    ship: ShipTask, options: GapOptions, progress: StageReport = lambda text: None, executor: Executor | None = None
 ) -> Gap | Fault:
     try:
         return run_gap_workflow(ship.card, ship.fitted, ship.held, options, progress, executor)
@@ -158,12 +160,12 @@ def _found(
         return Fault(str(error))
     except (BrokenExecutor, CancelledError):
         raise
-    except Exception as error:  # one ship at which the program fails does not take the others with it
+    except Exception as error:  # a failure of the program at one ship does not stop the others
         return fault_of_program(error)
 
 
 def fault_of_program(error: Exception) -> Fault:
     """The message about an `error` that no check of the input foresaw."""
     words = " ".join(str(error).split())[:200]
-    remedy = "run 'tank2sim gap' with its card and trials alone, and report what it says"
+    remedy = "run 'tank2sim gap' with its card and trials alone, and report its message"
     return Fault(f"a fault of the program, not of yours: {type(error).__name__}: {words}; {remedy}")

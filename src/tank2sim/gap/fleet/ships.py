@@ -1,4 +1,4 @@
-"""A fleet: a folder with a sub-folder for each ship, in which lie its card and next to it its trials.
+"""A fleet: a folder with a sub-folder for each ship, which holds its card and its trials.
 
 ::
 
@@ -20,14 +20,14 @@ HOLDOUT = "holdout"
 """Sub-folder of a ship with the trials that are held out."""
 
 GAP, IMPROVED = "gap.json", "improved.toml"
-"""What the results of a ship hold: a folder with them and no other card is no ship."""
+"""Files of the results of a ship: a folder with them and without another card is not a ship."""
 
 _SHIP, _CAMPAIGN = "tank2sim-ship/", "tank2sim-campaign/"
 
 
 @dataclass(frozen=True)
 class ShipFolder:
-    """Where a ship's card and trials lie.
+    """Files of a ship's card and trials.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class ShipFolder:
         Of the folder.
     card : Path
     trials, holdout : tuple of Path
-        Fitted and held out, in the order of their names; none held out if there is no such sub-folder.
+        Fitted and held out, in the order of their names; none held out without that sub-folder.
     """
 
     name: str
@@ -58,7 +58,7 @@ class Fleet:
     folder : Path
     ships : tuple of ShipFolder
     faults : mapping
-        Folder's name to what is wrong with it, one line.
+        Folder's name to its fault, one line.
     passed_over : tuple of Path
         Sub-folders that hold neither card nor trial.
     """
@@ -70,7 +70,7 @@ class Fleet:
 
 
 def fleet_in(folder: Path, output: Path) -> Fleet:
-    """The ships in a folder; no ships are hidden folders, that of the results, and those without card and trials.
+    """The ships in a folder, without hidden folders, the folder of the results, and those without card and trials.
 
     Parameters
     ----------
@@ -81,10 +81,10 @@ def fleet_in(folder: Path, output: Path) -> Fleet:
     Raises
     ------
     InputError
-        There is no ship, or the results are to go to where the ships lie.
+        There is no ship, or the results would be written to the folder of the ships.
     """
     if output.exists() and (output.samefile(folder) or (output.parent.samefile(folder) and _cards(output))):
-        raise InputError(output, "", "is where a ship's card and trials lie", "give a folder of its own with -o")
+        raise InputError(output, "", "is the folder of a ship's card and trials", "give a folder of its own with -o")
     ships, faults, passed_over = [], {}, []
     for path in _folders_in(folder):
         if output.exists() and output.samefile(path):
@@ -105,15 +105,15 @@ def fleet_in(folder: Path, output: Path) -> Fleet:
 
 
 def ship_in(folder: Path) -> ShipFolder | None:
-    """The ship whose card and trials lie in a folder; None if it is of something else.
+    """The ship whose card and trials are in a folder; None if it has neither.
 
     Raises
     ------
     InputError
-        There is a card and no trial, a trial and no card, or more than one card; a file next to the card is called like
-        a trial and is none: without it, it would be judged by less than what was measured; or a file cannot be read.
+        There is a card and no trial, a trial and no card, or more than one card; a file next to the card is
+        named like a trial and is not one; or a file cannot be read.
     """
-    cards, (trials, others) = _cards(folder), _trials(folder)
+    cards, (trials, rejected) = _cards(folder), _trials(folder)
     if not cards:
         if not trials:
             return None
@@ -121,25 +121,25 @@ def ship_in(folder: Path) -> ShipFolder | None:
     if len(cards) > 1:
         names = ", ".join(path.name for path in cards)
         raise InputError(folder, "", f"holds {len(cards)} cards ({names})", "leave one of them there")
-    _refuse(others)
+    _refuse(rejected)
     if not trials:
         raise InputError(folder, "", "holds a card and no trial", "put its trials (.csv or .dat) next to the card")
     held: tuple[Path, ...] = ()
     if (folder / HOLDOUT).is_dir():
-        held, others = _trials(folder / HOLDOUT)
-        _refuse(others)
+        held, rejected = _trials(folder / HOLDOUT)
+        _refuse(rejected)
         if not held:
             raise InputError(folder / HOLDOUT, "", "holds no trial", "put one there, or take the folder away")
     return ShipFolder(folder.name, cards[0], trials, held)
 
 
 def ship_alone(folder: Path) -> ShipFolder | None:
-    """The ship whose card lies in a folder itself, which then is no fleet; None if no card lies there.
+    """The ship whose card is in a folder itself, which then is not a fleet; None if the folder has no card.
 
     Raises
     ------
     InputError
-        As :func:`ship_in`; or cards lie in its sub-folders, too.
+        As :func:`ship_in`; or its sub-folders hold cards, too.
     """
     if not _cards(folder):
         return None
@@ -167,30 +167,30 @@ def _visible(folder: Path) -> list[Path]:
 
 
 def _cards(folder: Path) -> list[Path]:
-    """The cards in a folder. A campaign of captive tests has a TOML file as well, and CSV files that are no trials."""
+    """The cards in a folder. A campaign of captive tests has a TOML file as well, and CSV files of other tests."""
     found = [path for path in sorted(_visible(folder)) if path.suffix.lower() == ".toml" and path.is_file()]
     texts = {path: read_exact_text(path) for path in found}
     named = [path for path, text in texts.items() if _SHIP in text]
-    # What says neither may be a card with a fault, which its reader tells of.
+    # A file that is neither may be a card with a fault, which its reader reports.
     return named or ([] if any(_CAMPAIGN in text for text in texts.values()) else found)
 
 
 def _trials(folder: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
-    """Trials, and files that are called like one and are none."""
-    called = [one for one in sorted(_visible(folder)) if called_like_a_trial(one) and one.is_file()]
+    """Trials, and files that are named like trials and are not."""
+    called = [path for path in sorted(_visible(folder)) if called_like_a_trial(path) and path.is_file()]
     found = [path for path in called if _is_trial(path)]
     return tuple(found), tuple(path for path in called if path not in found)
 
 
-def _refuse(others: tuple[Path, ...]) -> None:
-    """Files that are called like a trial and are none: a header that is mistyped, or something else."""
-    for path in others[:1]:
+def _refuse(rejected: tuple[Path, ...]) -> None:
+    """Refuse files that are named like trials and are not: with a mistyped header, or something else."""
+    for path in rejected[:1]:
         why = (
             "no column t_s"
             if path.suffix.lower() == ".csv"
             else f"it does not begin like {reader_of(path).description}"
         )
-        raise InputError(path, "", f"is no trial: {why}", "correct its header, or put it elsewhere if it is none")
+        raise InputError(path, "", f"is not a trial: {why}", "correct its header, or move it elsewhere")
 
 
 def _is_trial(path: Path) -> bool:

@@ -1,5 +1,4 @@
-"""What was found of a fleet, ship by ship: read from the results of each, so that it does not matter which run they
-are of."""
+"""Results of a fleet, ship by ship, read from the results of each ship, of whatever run."""
 
 from __future__ import annotations
 
@@ -18,7 +17,7 @@ REPORT_FILE = "report.html"
 
 
 @dataclass(frozen=True)
-class ShipTold:
+class ShipSummary:
     """One ship of a fleet.
 
     Parameters
@@ -32,14 +31,14 @@ class ShipTold:
     effects : tuple of mappings
         As in ``gap.json``: ``name``, ``parameters``, ``standard_errors``, ``confidence``; in the units of their names.
     alternatives : tuple of str
-        What its trials cannot tell from them.
+        Explanations that its trials cannot distinguish from them.
     misfit : mapping
         ``before`` and ``after`` to {``fit``, ``holdout``}: units of the noise, None without such trials or where a
-        simulation left all bounds.
+        simulation exceeded all bounds.
     trials : mapping
         Numbers of trials, by ``fit`` and ``holdout``.
     fault : str
-        Why it has no result, in one line; all but `folder` is then empty.
+        Reason why it has no result, in one line; all fields except `folder` are then empty.
     """
 
     folder: str
@@ -58,7 +57,7 @@ class ShipTold:
 
     def misfits(self) -> tuple[float | None, float | None]:
         """Misfit before and after of the trials by which it is judged."""
-        before, after = (self.misfit.get(which, {}).get(self.judged_by) for which in ("before", "after"))
+        before, after = (self.misfit.get(version, {}).get(self.judged_by) for version in ("before", "after"))
         return before, after
 
     def as_json(self) -> dict[str, object]:
@@ -78,20 +77,20 @@ class ShipTold:
 
 
 @dataclass(frozen=True)
-class FleetTold:
+class FleetSummary:
     """All ships of a fleet.
 
     Parameters
     ----------
     name : str
         Of the folder.
-    ships : tuple of ShipTold
+    ships : tuple of ShipSummary
         In the order of their folders' names, those with a fault among them.
     notices : tuple of str
     """
 
     name: str
-    ships: tuple[ShipTold, ...]
+    ships: tuple[ShipSummary, ...]
     notices: tuple[str, ...] = ()
 
     @property
@@ -101,7 +100,7 @@ class FleetTold:
         return {word: words.count(word) for word in sorted(set(words))}
 
     @property
-    def faults(self) -> tuple[ShipTold, ...]:
+    def faults(self) -> tuple[ShipSummary, ...]:
         """The ships without a result."""
         return tuple(ship for ship in self.ships if ship.fault)
 
@@ -115,8 +114,8 @@ class FleetTold:
         }
 
 
-def ship_told(folder: Path) -> ShipTold:
-    """The ship whose results lie in a folder.
+def ship_summary(folder: Path) -> ShipSummary:
+    """Summary of the ship whose results are in a folder.
 
     Raises
     ------
@@ -124,16 +123,16 @@ def ship_told(folder: Path) -> ShipTold:
         They were changed or taken away while this run went on.
     """
     try:
-        told = json.loads((folder / GAP).read_text(encoding="utf-8"))
+        results = json.loads((folder / GAP).read_text(encoding="utf-8"))
         card = tomllib.loads((folder / IMPROVED).read_text(encoding="utf-8-sig"))
-        held = [bool(one["held_out"]) for one in told["trials"]]
-        return ShipTold(
+        held = [bool(trial["held_out"]) for trial in results["trials"]]
+        return ShipSummary(
             folder=folder.name,
             name=str(card["ship"]["name"]),
-            verdict=told["verdict"],
-            effects=tuple(told["effects"]),
-            alternatives=tuple(told["alternatives"]),
-            misfit={which: told["misfit"][which] for which in ("before", "after")},
+            verdict=results["verdict"],
+            effects=tuple(results["effects"]),
+            alternatives=tuple(results["alternatives"]),
+            misfit={version: results["misfit"][version] for version in ("before", "after")},
             trials={"fit": held.count(False), "holdout": held.count(True)},
         )
     except (OSError, ValueError, KeyError, TypeError):

@@ -1,7 +1,7 @@
 """The measured motion of all trials side by side, about which every explanation of the gap is linearised.
 
 The motion that was measured, smoothed, is within the noise of the true one whatever effect is missing. About it the
-error of the motion is small, the filter of :mod:`.observer` is linear, and an effect enters as what it adds to the
+error of the motion is small, the filter of :mod:`.kalman_filter` is linear, and an effect enters as its addition to the
 rates of the states along this motion. A simulated motion would drift away from the measured one, and need a new
 linearisation for each explanation.
 """
@@ -31,11 +31,11 @@ choice)."""
 
 FINE_PER_SHIP_TIME = 200
 """Fine steps in L/u0 at most, if the record has so many samples: a step of the rudder order must not be averaged with
-what was before, for a gear at its limit would then answer early."""
+the value before it, or a gear at its limit would respond too early."""
 
 _LEAST_NOISE = 1e-5
-"""Noise of a sample over the variable's nominal size, for records without any: no filter can take those as exact (ours,
-far below the noise of any sensor)."""
+"""Noise of a sample over the variable's nominal size, for records without any: no filter can take these as exact
+(project choice: far below the noise of any sensor)."""
 
 
 GUESSED = (0.1, 0.1, 1e-3, 0.01, 1.0, 1.0)
@@ -68,7 +68,7 @@ class MeasuredBatch:
     measured : array (R, T, ny)
         Mean over each block, nan where nothing was measured.
     noise : array (ny,)
-        Standard deviation of what is too fast for a ship in the mean over a block.
+        Standard deviation of the mean over a block, of the part that is too fast for a ship.
     """
 
     names: tuple[str, ...]
@@ -94,7 +94,7 @@ class MeasuredBatch:
 
     @property
     def inside(self) -> _Truths:
-        """Which blocks are of a run and not padding (R, T)."""
+        """Mask of the blocks that belong to a run and are not padding (R, T)."""
         return np.arange(self.blocks) < self.lengths[:, None]
 
     @property
@@ -133,12 +133,12 @@ class MeasuredBatch:
 
     @property
     def errors(self) -> Array:
-        """About how well each state is known (6,): as its sensor shows it; a guess where none does."""
+        """Approximate error of each state (6,): the noise of its sensor; a guess where no sensor measures it."""
         noise = dict(zip(self.seen, self.noise, strict=True))
         return np.array([noise.get(name, guess) for name, guess in zip(MEASURED_STATES, GUESSED, strict=True)])
 
-    def moved(self, away: Array, transition: Array, lack: Array, more: Array) -> MeasuredBatch:
-        """The same trials about a motion that is `away` from this one.
+    def moved(self, away: Array, transition: Array, lack: Array, added: Array) -> MeasuredBatch:
+        """Return the same trials, linearised about a motion that differs from this one by `away`.
 
         Parameters
         ----------
@@ -147,8 +147,8 @@ class MeasuredBatch:
         transition : array (R, T - 1, 6, 6)
             exp(A h) from each middle to the next.
         lack : array (R, n - 1, 6)
-            What the model's rates have beyond those of this motion, at each fine step.
-        more : array (R, T - 1, 6)
+            Rates of the model less those of this motion, at each fine step.
+        added : array (R, T - 1, 6)
             Rates that are added to those of the model, over each block.
         """
         # log(exp(A h))/h to second order is enough within a block: its end is known
@@ -160,11 +160,11 @@ class MeasuredBatch:
         course = np.empty((len(lack), count, self.fine, 6))
         for step in range(self.fine):
             course[:, :, step] = at
-            rate = (slope @ at[..., None])[..., 0] + inside[:, :, step] + more
+            rate = (slope @ at[..., None])[..., 0] + inside[:, :, step] + added
             rate = rate + 0.5 * h * (slope @ rate[..., None])[..., 0]
             at = at + h * rate
         shares = np.arange(self.fine)[:, None] / self.fine
-        # Past a run's last middle nothing is known: there the model goes on.
+        # After the last middle of a run nothing is known: the model continues there.
         known_end = np.where(self.inside[:, 1:, None], away[:, 1:] - at, 0.0)
         course += shares * known_end[:, :, None]
         states = self.states.copy()
@@ -189,7 +189,7 @@ def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> Mea
     Raises
     ------
     InputError
-        A trial is too short, or tells neither velocities nor positions.
+        A trial is too short, or records neither velocities nor positions.
     """
     seen = seen_in(model, trials)
     step = max(ship_time / FINE_PER_SHIP_TIME, *(sampling_step(trial) for trial in trials))
@@ -222,20 +222,24 @@ def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> Mea
 
 
 def _at_step(run: SampledRun, step: float) -> SampledRun:
-    """A run at a step that may not be a whole number of its own samples: others may sample otherwise."""
+    """Resample a run to a step that may not be a whole number of its samples: trials may differ in sampling."""
     if abs(run.step_s - step) < 1e-6 * step:
         return run
     count = len(run.measured)
-    own, places = run.step_s * np.arange(count), step * np.arange(int((count - 1) * run.step_s / step + 1e-6) + 1)
+    sample_times = run.step_s * np.arange(count)
+    step_times = np.arange(0.0, sample_times[-1] + 1e-6 * step, step)
     # The mean over a step is the difference of the integral; the last row repeats the one before, as in every run.
     whole = np.cumsum(np.vstack([np.zeros(run.inputs.shape[1]), run.inputs[:-1]]), axis=0) * run.step_s
-    measured, at = (np.column_stack([np.interp(places, own, one) for one in rows.T]) for rows in (run.measured, whole))
+    measured, at = (
+        np.column_stack([np.interp(step_times, sample_times, column) for column in rows.T])
+        for rows in (run.measured, whole)
+    )
     inputs = np.diff(at, axis=0) / step
     return replace(run, step_s=step, measured=measured, inputs=np.vstack([inputs, inputs[-1:]]))
 
 
 def _smooth(states: Array, ship_steps: float) -> Array:
-    """States (n, 6) with heading and position as smooth as velocities are: a block's rates are their differences."""
+    """States (n, 6) with heading and position smoothed like velocities: rates over a block are their differences."""
     window = min(int(SMOOTHING * ship_steps), len(states) - 1) // 2 * 2 + 1
     if window < 5:
         return states
@@ -246,7 +250,7 @@ def _smooth(states: Array, ship_steps: float) -> Array:
 def _typical(noise: Sequence[Array], least: Array) -> Array:
     """Median over the runs of each signal's noise (ny,), where it was measured; `least` at least."""
     known = np.array(noise)
-    medians = [np.median(one[one > 0]) if (one > 0).any() else 0.0 for one in known.T]
+    medians = [np.median(levels[levels > 0]) if (levels > 0).any() else 0.0 for levels in known.T]
     typical: Array = np.maximum(np.array(medians), least)
     return typical
 

@@ -1,4 +1,4 @@
-"""What goes into a fit and what comes out: beliefs beforehand, columns of the least squares, and the fit."""
+"""Input and output of a fit: priors, columns of the least squares, and the fitted hypothesis."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from tank2sim.gap.inference.kalman_filter import NoiseLevels
 
 @dataclass(frozen=True, eq=False)
 class NuisanceParameters:
-    """What may be a little wrong next to the effects: the card's coefficients, and the clock of the rudder's record.
+    """Parameters that may be in error besides the effects: the card's coefficients, the clock of the rudder's record.
 
     Parameters
     ----------
     names : tuple of str
-        The n parameters of the model, and :data:`.explained.CLOCK`.
+        The n parameters of the model, and :data:`.hypothesis.CLOCK`.
     mixing : array (n, nc)
-        Change of each by one standard deviation of each of nc independent causes: its own error, and errors that it
-        shares with others.
+        Change of each by one standard deviation of each of nc independent causes: its individual error, and errors
+        that it shares with other parameters.
     """
 
     names: tuple[str, ...]
@@ -36,12 +36,12 @@ class NuisanceParameters:
 
 @dataclass(frozen=True, eq=False)
 class Belief:
-    """What is believed beforehand of the noise, and of where a run begins.
+    """Prior of the noise, and of the first state of a run.
 
     Parameters
     ----------
     logs, spread : array
-        Mean and standard deviation of each logarithm (:attr:`.observer.Noise.logs`, and that of the width).
+        Mean and standard deviation of each logarithm (:attr:`.kalman_filter.NoiseLevels.logs`, and that of the width).
     wide : array (6,), optional
         Standard deviation of each state at the beginning of a run about the measured one: wide, for a sensor may be at
         fault; by default :data:`.likelihood.WIDE` times its noise.
@@ -53,60 +53,61 @@ class Belief:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Three standard deviations either way: what is further away is no noise of this kind."""
+        """Three standard deviations either way: a level further away is not noise of this kind."""
         return self.logs - 3 * self.spread, self.logs + 3 * self.spread
 
     def cost(self, logs: Array) -> tuple[float, Array]:
-        """Price of a noise and its slope."""
+        """Cost of a noise (-2 log of its prior density, without the constant) and its slope."""
         away = (logs - self.logs) / self.spread
         return float(away @ away), 2 * away / self.spread
 
 
 @dataclass(frozen=True, eq=False)
 class FilterColumns:
-    """What goes through the filter: the residual, the effects' parameters, the coefficients (by unit standard error).
+    """Columns of the filter: the residual, the effects' parameters, the coefficients (per standard error).
 
     Parameters
     ----------
     driving : array (R, T - 1, 6, 1 + k + nc)
     shown : array (R, T, ny, 1 + k + nc)
-    asked : int
+    parameter_count : int
         k.
-    uncertain : int
-        nc, the coefficients'; what follows them is of the effects' form.
+    coefficient_count : int
+        nc, of the coefficients; the columns after them are of the effects' form.
     """
 
     driving: Array
     shown: Array
-    asked: int
-    uncertain: int
+    parameter_count: int
+    coefficient_count: int
 
     def scaled(self, width: float) -> FilterColumns:
-        """With the coefficients' standard errors times `width`."""
+        """Return the columns with the coefficients' standard errors multiplied by `width`."""
         factors = np.ones(self.driving.shape[-1])
-        factors[1 + self.asked : 1 + self.asked + self.uncertain] = width
+        factors[1 + self.parameter_count : 1 + self.parameter_count + self.coefficient_count] = width
         return replace(self, driving=self.driving * factors, shown=self.shown * factors)
 
 
 @dataclass(frozen=True, eq=False)
 class ExplanationFit:
-    """An explanation at its best.
+    """A hypothesis with its most probable parameters.
 
     Parameters
     ----------
-    explained : Hypothesis
+    hypothesis : Hypothesis
     theta : array (k,)
         Its parameters.
     covariance : array (k, k)
     logs : array
-        Of the noise (:attr:`.observer.Noise.logs`), and of the width of the coefficients' prior as the last element.
+        Of the noise (:attr:`.kalman_filter.NoiseLevels.logs`), and of the width of the coefficients' prior as the last
+        element.
     score : float
         T.
     change : array (nc,)
         Most probable change of the coefficients, in their standard errors beforehand.
     """
 
-    explained: Hypothesis
+    hypothesis: Hypothesis
     theta: Array
     covariance: Array
     logs: Array

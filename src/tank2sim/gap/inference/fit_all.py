@@ -43,12 +43,12 @@ class Proposal:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """In the order of the library: the same set is the same explanation."""
+        """Names in the order of the library: the same set is the same explanation."""
         return tuple(sorted(self.thetas, key=list(EFFECTS).index))
 
 
-class Known:
-    """Explanations by their effects, each made once."""
+class HypothesisCache:
+    """Hypotheses by their effects, each built once."""
 
     def __init__(self, none: Hypothesis):
         self.none = none
@@ -62,8 +62,8 @@ class Known:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sent:
-    """What another process needs to make the same likelihood."""
+class _LikelihoodParts:
+    """The data from which another process builds the same likelihood."""
 
     token: str
     card: ManoeuvringCard
@@ -79,78 +79,79 @@ class Fitting:
     Parameters
     ----------
     likelihood : Likelihood
-    known : Known
+    hypotheses : HypothesisCache
     progress : callable
-        Told what is being fitted.
+        Called with the name of each explanation that is fitted.
     executor : Executor, optional
         Fits several explanations at once; the result does not depend on it.
     """
 
-    def __init__(self, likelihood: Likelihood, known: Known, progress: StageReport, executor: Executor | None):
-        self.likelihood, self.known, self.progress, self.executor = likelihood, known, progress, executor
+    def __init__(
+        self, likelihood: Likelihood, hypotheses: HypothesisCache, progress: StageReport, executor: Executor | None
+    ):
+        self.likelihood, self.hypotheses, self.progress, self.executor = likelihood, hypotheses, progress, executor
         self.found: dict[tuple[str, ...], ExplanationFit] = {}
         none = likelihood.none
         parts = none.card, none.driven_by, likelihood.motion, likelihood.coefficients, likelihood.belief
-        self._sent = _Sent(uuid4().hex, *parts)
+        self._parts = _LikelihoodParts(uuid4().hex, *parts)
 
     def fit(self, proposals: Sequence[Proposal]) -> None:
-        """Fit what is proposed, and keep the better of it and what was found before."""
+        """Fit the proposals, and keep the better of each and of any earlier fit of the same effects."""
         if self.executor is None:
             for proposal in proposals:
                 self.progress(" and ".join(proposal.effects) or "the card as it is")
-                self._keep(proposal, _fitted(self.likelihood, self.known, proposal))
+                self._keep(proposal, _fit(self.likelihood, self.hypotheses, proposal))
             return
-        waiting = [(proposal, self.executor.submit(_fitted_there, self._sent, proposal)) for proposal in proposals]
-        for one, future in waiting:
-            self.progress(" and ".join(one.effects) or "the card as it is")
-            self._keep(one, future.result())
+        waiting = [(proposal, self.executor.submit(_fit_in_worker, self._parts, proposal)) for proposal in proposals]
+        for proposal, future in waiting:
+            self.progress(" and ".join(proposal.effects) or "the card as it is")
+            self._keep(proposal, future.result())
 
     def _keep(self, proposal: Proposal, found: ExplanationFit) -> None:
         before = self.found.get(proposal.effects)
         if before is None or found.score < before.score:
-            self.found[proposal.effects] = replace(found, explained=self.known(*proposal.effects))
+            self.found[proposal.effects] = replace(found, hypothesis=self.hypotheses(*proposal.effects))
 
     def best(self, count: int | None = None) -> ExplanationFit:
-        """The best so far, of all or of those with so many effects; raises ValueError if there is none."""
-        chosen = [one for one in self.found.values() if count is None or len(one.explained.effects) == count]
-        return min(chosen, key=lambda one: one.score)
+        """The best fit so far, of all or of those with `count` effects; raises ValueError if there is none."""
+        chosen = [fit for fit in self.found.values() if count is None or len(fit.hypothesis.effects) == count]
+        return min(chosen, key=lambda fit: fit.score)
 
     def has(self, count: int) -> bool:
-        """Whether one with so many effects was fitted."""
+        """Whether an explanation with `count` effects was fitted."""
         return any(len(effects) == count for effects in self.found)
 
 
 def thetas_of(fit: ExplanationFit) -> dict[str, Array]:
     """Parameters of a fit by effect."""
-    names = [one.effect for one in fit.explained.asked]
-    return {
-        effect: fit.theta[[place for place, name in enumerate(names) if name == effect]]
-        for effect in fit.explained.effects
-    }
+    names = np.array([parameter.effect for parameter in fit.hypothesis.estimated])
+    return {effect: fit.theta[names == effect] for effect in fit.hypothesis.effects}
 
 
-def _fitted(likelihood: Likelihood, known: Known, proposal: Proposal) -> ExplanationFit:
+def _fit(likelihood: Likelihood, hypotheses: HypothesisCache, proposal: Proposal) -> ExplanationFit:
     effects = proposal.effects
     theta = np.concatenate([np.zeros(0), *(proposal.thetas[effect] for effect in effects)])
-    return likelihood.at_best(known(*effects), theta, proposal.starts, proposal.rounds, proposal.limit)
+    return likelihood.at_best(hypotheses(*effects), theta, proposal.starts, proposal.rounds, proposal.limit)
 
 
-_THERE: dict[str, tuple[Likelihood, Known]] = {}
-"""In a worker: the likelihood of the last search it was sent."""
+_LIKELIHOODS: dict[str, tuple[Likelihood, HypothesisCache]] = {}
+"""In a worker: the likelihood of the last search that it received."""
 
-_ONE = Lock()
-"""Threads of one executor share what is above."""
+_LOCK = Lock()
+"""Threads of one executor share the dictionary above."""
 
 
-def _fitted_there(sent: _Sent, proposal: Proposal) -> ExplanationFit:
-    with _ONE:
-        if sent.token not in _THERE:
+def _fit_in_worker(sent: _LikelihoodParts, proposal: Proposal) -> ExplanationFit:
+    with _LOCK:
+        if sent.token not in _LIKELIHOODS:
             ship = sent.card, sent.driven_by
-            known = next((one for _, one in _THERE.values() if (one.none.card, one.none.driven_by) == ship), None)
-            none = known.none if known else Hypothesis(*ship)
-            _THERE.clear()
+            hypotheses = next(
+                (cache for _, cache in _LIKELIHOODS.values() if (cache.none.card, cache.none.driven_by) == ship), None
+            )
+            none = hypotheses.none if hypotheses else Hypothesis(*ship)
+            _LIKELIHOODS.clear()
             likelihood = Likelihood(sent.motion, none, sent.coefficients, sent.belief)
-            _THERE[sent.token] = likelihood, known or Known(none)
-        there = _THERE[sent.token]
-    found = _fitted(*there, proposal)
-    return replace(found, explained=None)  # type: ignore[arg-type]  # CasADi's functions stay where they are
+            _LIKELIHOODS[sent.token] = likelihood, hypotheses or HypothesisCache(none)
+        likelihood_and_hypotheses = _LIKELIHOODS[sent.token]
+    found = _fit(*likelihood_and_hypotheses, proposal)
+    return replace(found, hypothesis=None)  # type: ignore[arg-type]  # CasADi's functions stay where they are

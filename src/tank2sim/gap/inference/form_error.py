@@ -12,12 +12,13 @@ from tank2sim.gap.inference.kalman_filter import FORCE_STATES
 
 FORM = 0.15
 """Standard deviation of the factors by which the force of a real effect differs from its formula, as a whole and with
-rudder, yaw rate and loss of speed, and of the time by which it differs, in blocks (ours; 10 to 20 % is what empirical
-force formulas are worth). Without it the difference would be taken for a second effect where the noise is small."""
+rudder, yaw rate and loss of speed, and of the time by which it differs, in blocks (project choice; 10 to 20 % is the
+accuracy of empirical force formulas). Without it the difference would be taken for a second effect where the noise is
+small."""
 
 
 class Forms:
-    """Shapes by which a formula may be wrong, along one motion.
+    """Shapes of the error of a formula, along one motion.
 
     Parameters
     ----------
@@ -30,15 +31,15 @@ class Forms:
         self.motion, self.command = motion, command
 
     def columns(self, added: Array, *, directed: bool) -> Array:
-        """Driving by which an effect may differ, by one standard deviation each (R, T - 1, 6, nf).
+        """Driving of each form error, for one standard deviation (R, T - 1, 6, nf).
 
-        Only accelerations count: kinematics and sensors are what their formulas say. As a whole each acceleration may
-        differ from the others alone, for their common size is a parameter of the effect.
+        Only accelerations have form errors: the formulas of kinematics and sensors are exact. As a whole the
+        accelerations differ from one another alone, for their common size is a parameter of the effect.
 
         Parameters
         ----------
         added : array (R, T - 1, 6)
-            What the effect adds by its formula.
+            Driving that the effect adds by its formula.
         directed : bool
             It comes from a direction of the compass (wind), and may differ with the heading as well.
         """
@@ -58,7 +59,7 @@ class Forms:
         motion = self.motion
         rudder = np.abs(motion.block_inputs[..., [self.command]])
         speed, rate = motion.block_states[..., [0]], np.abs(motion.block_states[..., [2]])
-        return tuple(2 * (one - one.min()) / (np.ptp(one) or 1.0) - 1 for one in (rudder, rate, -speed))
+        return tuple(2 * (signal - signal.min()) / (np.ptp(signal) or 1.0) - 1 for signal in (rudder, rate, -speed))
 
     @cached_property
     def _turns(self) -> tuple[Array, ...]:

@@ -1,7 +1,7 @@
-"""A ship with some effects on top, asked what it would do along the measured motion.
+"""A ship with added effects, evaluated along the measured motion.
 
 States that were not measured (the rudder behind its gear, heel, remembered flow) are integrated along the measured
-motion from the recorded inputs; the rates of the measured states, and what the sensors show, follow from both.
+motion from the recorded inputs; the rates of the measured states, and the readings of the sensors, follow from both.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from tank2sim.identification.trials.problem.problem_from_card import driven_mode
 from tank2sim.simulation.rows import Chain
 
 CLOCK = "rudder.clock"
-"""Among the parameters of which slopes are asked: how much later than the rudder's record the ship acts on it, s."""
+"""Parameter of the slopes: delay of the ship's response behind the rudder's record, s."""
 
 SENSED = (*MEASURED_STATES, "motion.u_ground", "motion.v_ground", "motion.sog")
-"""What sensors may show."""
+"""Variables that sensors may measure."""
 
 SMALL_SHARE = 0.01
 """Change of a parameter for a difference quotient, as a share of it."""
 
 NEWTON_STEPS = 8
-"""To the steady value of a state that was not measured, at the beginning of a run."""
+"""Newton steps to the steady value of a state that was not measured, at the beginning of a run."""
 
 STEPS_IN_A_TIME = 2.5
 """Integration steps in a time constant or period that is estimated, at least. Classical Runge-Kutta is stable up to a
@@ -55,24 +55,29 @@ class EstimatedParameter:
     parameter: EffectParameter
     variable: str
 
+    @property
+    def is_amplitude(self) -> bool:
+        """Whether the effect vanishes at one value of the parameter, which has no default."""
+        return self.parameter.absent is not None and self.parameter.default is None
+
 
 class Hypothesis:
-    """The model of a card with some effects more.
+    """The model of a card with added effects.
 
     Parameters
     ----------
     card : ManoeuvringCard
         The ship as it was known.
     driven_by : str
-        ``angle`` or ``order``: what of the rudder was recorded.
+        ``angle`` or ``order``: the recorded rudder signal.
     effects : sequence of str
         Names of effects that are added.
     ship : Model, optional
-        The card's model as it is driven so, if it was built already.
+        The card's model driven by that signal, if it was built already.
 
     Attributes
     ----------
-    asked : tuple of EstimatedParameter
+    estimated : tuple of EstimatedParameter
         The parameters that are estimated, in the order of every `theta`.
     """
 
@@ -80,7 +85,7 @@ class Hypothesis:
         self.card, self.driven_by = card, driven_by
         self.effects = tuple(effects)
         model = driven_model(card, driven_by) if ship is None else ship
-        asked: list[EstimatedParameter] = []
+        estimated: list[EstimatedParameter] = []
         for name in self.effects:
             effect = EFFECTS[name]
             start = {
@@ -90,29 +95,30 @@ class Hypothesis:
             }
             model = effect.apply(model, start, card)
             places = effect.model_names()
-            asked += [
+            estimated += [
                 EstimatedParameter(name, parameter, places[parameter.name])
                 for parameter in effect.parameters
                 if parameter.name in effect.free(card)
             ]
         self.model = model
-        self.asked = tuple(asked)
-        self.own = tuple(name for name in model.state_names if name not in MEASURED_STATES)
+        self.estimated = tuple(estimated)
+        self.unmeasured = tuple(name for name in model.state_names if name not in MEASURED_STATES)
         self._chains: dict[float, Chain] = {}
 
     @property
     def directed(self) -> bool:
         """Whether one of the effects comes from a direction of the compass."""
-        return any(one.parameter.name == "direction_rad" for one in self.asked)
+        return any(estimate.parameter.name == "direction_rad" for estimate in self.estimated)
 
     @cached_property
-    def touches(self) -> tuple[bool, bool, bool]:
-        """Whether what is asked for changes states that were not measured, rates of the measured ones, and readings.
+    def influences(self) -> tuple[bool, bool, bool]:
+        """Whether the estimated parameters change unmeasured states, rates of the measured states, and readings.
 
-        What it does not change is what the card without the effects has.
+        Those that they do not change equal the values of the card without the effects.
         """
-        chosen = ca.vcat([self.model.symbol(one.variable) for one in self.asked]) if self.asked else ca.SX(0, 1)
-        states = bool(self._delays(np.ones(len(self.asked)))) or ca.depends_on(self._of(self.own), chosen)
+        symbols = [self.model.symbol(estimate.variable) for estimate in self.estimated]
+        chosen = ca.vcat(symbols) if symbols else ca.SX(0, 1)
+        states = bool(self._delays(np.ones(len(self.estimated)))) or ca.depends_on(self._of(self.unmeasured), chosen)
         rates = states or ca.depends_on(self._known_rates, chosen)
         return states, rates, states or ca.depends_on(self._shown(SENSED), chosen)
 
@@ -120,38 +126,40 @@ class Hypothesis:
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
-        """Least and largest value of each parameter asked for (k,); times at least as long as can be integrated."""
-        low = np.array([one.parameter.lowest(self.card) for one in self.asked])
-        times = np.array([one.parameter.name.endswith("_s") for one in self.asked], dtype=bool) & (low > 0)
+        """Least and largest value of each estimated parameter (k,); times at least as long as can be integrated."""
+        low = np.array([estimate.parameter.lowest(self.card) for estimate in self.estimated])
+        timed = [estimate.parameter.name.endswith("_s") for estimate in self.estimated]
+        times = np.array(timed, dtype=bool) & (low > 0)
         low[times] = np.maximum(low[times], STEPS_IN_A_TIME * self.model.step_s)
-        return low, np.array([one.parameter.maximum for one in self.asked])
+        return low, np.array([estimate.parameter.maximum for estimate in self.estimated])
 
     @cached_property
     def prior(self) -> tuple[Array, Array]:
-        """What is known beforehand of each parameter asked for: mean and precision (k,), precision 0 for nothing."""
+        """Prior mean and precision of each estimated parameter (k,); precision 0 where nothing is known."""
         means, precisions = [], []
-        for one in self.asked:
-            spread = one.parameter.spread_value(self.card)
-            means.append(one.parameter.value({}, self.card) if spread else 0.0)
+        for estimate in self.estimated:
+            spread = estimate.parameter.spread_value(self.card)
+            means.append(estimate.parameter.value({}, self.card) if spread else 0.0)
             precisions.append(1 / spread**2 if spread else 0.0)
         return np.array(means), np.array(precisions)
 
     @property
     def steps(self) -> Array:
-        """A small change of each parameter asked for (k,), for difference quotients."""
+        """A small change of each estimated parameter (k,), for difference quotients."""
         sizes: list[float] = []
-        for one in self.asked:
-            typical = one.parameter.typical_values(self.card) or (self.prior[0][len(sizes)],)
-            spread = one.parameter.spread_value(self.card)
-            sizes.append(0.01 * (max(map(abs, typical)) or spread or one.parameter.maximum))
+        for estimate in self.estimated:
+            typical = estimate.parameter.typical_values(self.card) or (self.prior[0][len(sizes)],)
+            spread = estimate.parameter.spread_value(self.card)
+            sizes.append(0.01 * (max(map(abs, typical)) or spread or estimate.parameter.maximum))
         return np.array(sizes)
 
     def parameters(self, theta: Array) -> Array:
-        """The model's parameter vector with those asked for at `theta` (k,)."""
+        """The model's parameter vector with the estimated parameters at `theta` (k,)."""
         return self.model.parameter_values(self._chosen(theta, self.model.parameter_names))
 
     def _chosen(self, theta: Array, names: Sequence[str]) -> dict[str, float]:
-        return {one.variable: float(v) for one, v in zip(self.asked, theta, strict=True) if one.variable in names}
+        values = zip(self.estimated, theta, strict=True)
+        return {estimate.variable: float(value) for estimate, value in values if estimate.variable in names}
 
     def inputs(self, motion: MeasuredBatch, theta: Array) -> Array:
         """Inputs of this model at every fine step (R, n - 1, nu)."""
@@ -170,8 +178,9 @@ class Hypothesis:
         return inputs
 
     def _delays(self, theta: Array) -> dict[str, float]:
-        """Name of each input whose record is not in time with the motion, to how much later the ship acts on it, s."""
-        values = {(one.effect, one.parameter.name): float(v) for one, v in zip(self.asked, theta, strict=True)}
+        """Name of each input whose record is not synchronous with the motion, to the delay of the ship, s."""
+        keys = [(estimate.effect, estimate.parameter.name) for estimate in self.estimated]
+        values = dict(zip(keys, map(float, theta), strict=True))
         return {
             name: values[effect, parameter]
             for effect in self.effects
@@ -179,22 +188,23 @@ class Hypothesis:
         }
 
     def _states_behind(self, name: str) -> tuple[int, ...]:
-        """Places of the states through which alone an input reaches the ship: what is late is these.
+        """Indices of the states through which alone an input acts on the ship: these are delayed.
 
-        A gear at its largest rate answers to a step of the order at once or a whole sample later, and to nothing
-        between; its angle can be late by any time.
+        A gear at its largest rate responds to a step of the order at once or a whole sample later, never
+        between them; its angle can be delayed by any time.
         """
-        if name != "rudder.command" or "rudder.angle" not in self.own:
+        if name != "rudder.command" or "rudder.angle" not in self.unmeasured:
             return ()
         behind = {"rudder.angle"}
         behind |= {state for effect in EFFECTS.values() for state, by in effect.states_behind.items() if by == name}
-        return tuple(place for place, one in enumerate(self.own) if one in behind)
+        return tuple(place for place, state in enumerate(self.unmeasured) if state in behind)
 
-    # -- what it would do --------------------------------------------------------------------------------------------
+    # -- states, rates and readings
+    # ---------------------------------------------------------------------------------------
 
-    def own_states(self, motion: MeasuredBatch, theta: Array, p: Array | None = None) -> Array:
+    def unmeasured_states(self, motion: MeasuredBatch, theta: Array, p: Array | None = None) -> Array:
         """States that were not measured, at the fine instants (R, n, no); `p` are other parameters of the model."""
-        if not self.own:
+        if not self.unmeasured:
             return np.zeros((*motion.states.shape[:2], 0))
         inputs, p = self.inputs(motion, theta), self.parameters(theta) if p is None else p
         x = motion.states
@@ -202,40 +212,42 @@ class Hypothesis:
         for run in range(len(x)):
             start = self._settled(x[run, 0], inputs[run, 0], p)
             tracks.append(self._chain(motion.step_s).run(start, x[run, :-1], x[run, 1:], inputs[run], p))
-        own = np.array(tracks)
+        unmeasured = np.array(tracks)
         for name, delay in self._delays(theta).items():
             for place in self._states_behind(name):
-                own[:, :, place] = _late(own[:, :, place], delay / motion.step_s)
-        return own
+                unmeasured[:, :, place] = _late(unmeasured[:, :, place], delay / motion.step_s)
+        return unmeasured
 
-    def rates(self, motion: MeasuredBatch, theta: Array, own: Array | None = None) -> Array:
+    def rates(self, motion: MeasuredBatch, theta: Array, unmeasured: Array | None = None) -> Array:
         """Rates of the measured states, each from the middle of a block to that of the next (R, T - 1, 6).
 
-        `own` are the states that were not measured, if they are known already (:meth:`own_states`).
+        `unmeasured` are the states that were not measured, if they are known already (:meth:`unmeasured_states`).
         """
-        return _rowwise(self._rates, *self._along(motion, theta, own), self.parameters(theta))
+        return _rowwise(self._rates, *self._along(motion, theta, unmeasured), self.parameters(theta))
 
     def fine_rates(self, motion: MeasuredBatch, theta: Array) -> Array:
-        """The same, with the mean over the fine steps in place of the rate at the mean."""
+        """Rates as of :meth:`rates`, with the mean over the fine steps in place of the rate at the mean."""
         return motion.over_blocks(self.rates_between(motion, theta))
 
     def rates_between(self, motion: MeasuredBatch, theta: Array) -> Array:
         """Rates of the measured states halfway between the fine instants (R, n - 1, 6)."""
-        own = self.own_states(motion, theta)
+        unmeasured = self.unmeasured_states(motion, theta)
         x = 0.5 * (motion.states[:, 1:] + motion.states[:, :-1])
-        xi = 0.5 * (own[:, 1:] + own[:, :-1])
+        xi = 0.5 * (unmeasured[:, 1:] + unmeasured[:, :-1])
         return _rowwise(self._rates, x, xi, self.inputs(motion, theta), self.parameters(theta))
 
-    def readings(self, motion: MeasuredBatch, theta: Array, own: Array | None = None) -> Array:
-        """What the sensors would show in the middle of each block, except for their noise (R, T, ny)."""
-        return _rowwise(self._readings(motion.seen), *self._in_blocks(motion, theta, own), self.parameters(theta))
+    def readings(self, motion: MeasuredBatch, theta: Array, unmeasured: Array | None = None) -> Array:
+        """Readings of noiseless sensors in the middle of each block (R, T, ny)."""
+        return _rowwise(
+            self._readings(motion.seen), *self._in_blocks(motion, theta, unmeasured), self.parameters(theta)
+        )
 
     def slopes(self, motion: MeasuredBatch, theta: Array) -> tuple[Array, Array]:
         """Rates by states (R, T - 1, 6, 6), and readings by states (R, T, ny, 6)."""
-        own = self.own_states(motion, theta)
+        unmeasured = self.unmeasured_states(motion, theta)
         p = self.parameters(theta)
-        by_state = _rowwise(self._state_slopes, *self._along(motion, theta, own), p)
-        seen = _rowwise(self._reading_slopes(motion.seen), *self._in_blocks(motion, theta, own), p)
+        by_state = _rowwise(self._state_slopes, *self._along(motion, theta, unmeasured), p)
+        seen = _rowwise(self._reading_slopes(motion.seen), *self._in_blocks(motion, theta, unmeasured), p)
         shape = by_state.shape[:2]
         ny = len(motion.seen)
         return (
@@ -244,25 +256,25 @@ class Hypothesis:
         )
 
     def coefficient_slopes(self, motion: MeasuredBatch, theta: Array, names: Sequence[str]) -> Array:
-        """Rates by parameters of the ship (R, T - 1, 6, len(names)); 0 for what an effect has replaced."""
-        there = [name for name in names if name in self.model]
-        direct = [name for name in there if not name.startswith("steering.")]
+        """Rates by parameters of the ship (R, T - 1, 6, len(names)); 0 for parameters that an effect has replaced."""
+        present = [name for name in names if name in self.model]
+        direct = [name for name in present if not name.startswith("steering.")]
         along, p = self._along(motion, theta, None), self.parameters(theta)
         columns = np.zeros((*along[0].shape, len(names)))
         if direct:
             slopes = _rowwise(self._coefficient_slopes(tuple(direct)), *along, p)
             by_name = slopes.reshape(*slopes.shape[:2], len(direct), 6).swapaxes(-1, -2)
             columns[..., [names.index(name) for name in direct]] = by_name
-        for name in there:
-            if name.startswith("steering."):  # through the rudder's own state
+        for name in present:
+            if name.startswith("steering."):  # through the state of the rudder
                 moved = p.copy()
                 place = self.model.parameter_names.index(name)
                 moved[place] *= 1 + SMALL_SHARE
-                own = self.own_states(motion, theta, moved)
-                rates = _rowwise(self._rates, *self._along(motion, theta, own), moved)
+                unmeasured = self.unmeasured_states(motion, theta, moved)
+                rates = _rowwise(self._rates, *self._along(motion, theta, unmeasured), moved)
                 columns[..., names.index(name)] = (rates - _rowwise(self._rates, *along, p)) / (moved[place] - p[place])
         if CLOCK in names:
-            late = self.own_states(motion, theta), self.inputs(motion, theta)
+            late = self.unmeasured_states(motion, theta), self.inputs(motion, theta)
             behind = self._states_behind("rudder.command")
             for rows, places in zip(late, (behind, () if behind else (self._command,)), strict=True):
                 for place in places:
@@ -276,18 +288,18 @@ class Hypothesis:
     def _command(self) -> int:
         return self.model.input_names.index("rudder.command")
 
-    def _along(self, motion: MeasuredBatch, theta: Array, own: Array | None) -> tuple[Array, Array, Array]:
-        if own is None:
-            own = self.own_states(motion, theta)
-        xi = motion.over_blocks(0.5 * (own[:, 1:] + own[:, :-1]))
+    def _along(self, motion: MeasuredBatch, theta: Array, unmeasured: Array | None) -> tuple[Array, Array, Array]:
+        if unmeasured is None:
+            unmeasured = self.unmeasured_states(motion, theta)
+        xi = motion.over_blocks(0.5 * (unmeasured[:, 1:] + unmeasured[:, :-1]))
         return motion.block_states, xi, motion.over_blocks(self.inputs(motion, theta))
 
-    def _in_blocks(self, motion: MeasuredBatch, theta: Array, own: Array | None) -> tuple[Array, Array, Array]:
-        if own is None:
-            own = self.own_states(motion, theta)
+    def _in_blocks(self, motion: MeasuredBatch, theta: Array, unmeasured: Array | None) -> tuple[Array, Array, Array]:
+        if unmeasured is None:
+            unmeasured = self.unmeasured_states(motion, theta)
         inputs = self.inputs(motion, theta)
         every = np.concatenate([inputs, inputs[:, -1:]], axis=1)
-        x, xi, u = (motion.in_blocks(values) for values in (motion.states, own, every))
+        x, xi, u = (motion.in_blocks(values) for values in (motion.states, unmeasured, every))
         return x, xi, u
 
     # -- CasADi functions --------------------------------------------------------------------------------------------
@@ -296,8 +308,8 @@ class Hypothesis:
     def _symbols(self) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
         model = self.model
         known = ca.vcat([model.symbol(name) for name in MEASURED_STATES])
-        own = ca.vcat([model.symbol(name) for name in self.own]) if self.own else ca.SX(0, 1)
-        return known, own, model.u, model.p
+        unmeasured = ca.vcat([model.symbol(name) for name in self.unmeasured]) if self.unmeasured else ca.SX(0, 1)
+        return known, unmeasured, model.u, model.p
 
     def _of(self, names: Sequence[str]) -> ca.SX:
         return ca.vcat([self.model.rates[self.model.state_names.index(name)] for name in names])
@@ -322,7 +334,7 @@ class Hypothesis:
 
     def _shown(self, seen: Sequence[str]) -> ca.SX:
         names = [f"sensor.{name.partition('.')[2]}" for name in seen]
-        chosen = [there if there in self.model else name for there, name in zip(names, seen, strict=True)]
+        chosen = [sensor if sensor in self.model else name for sensor, name in zip(names, seen, strict=True)]
         return self.model.expand(ca.vcat([self.model.symbol(name) for name in chosen]))
 
     def _readings(self, seen: Sequence[str]) -> ca.Function:
@@ -333,54 +345,59 @@ class Hypothesis:
         return ca.Function("reading_slopes", [*self._symbols], [ca.densify(ca.vec(slopes))], {"cse": True})
 
     @cached_property
-    def _own_rates(self) -> ca.Function:
-        known, own, u, p = self._symbols
-        return ca.Function("own_rates", [own, known, u, p], [self._of(self.own)], {"cse": True})
+    def _unmeasured_rates(self) -> ca.Function:
+        known, unmeasured, u, p = self._symbols
+        return ca.Function("unmeasured_rates", [unmeasured, known, u, p], [self._of(self.unmeasured)], {"cse": True})
 
     def _chain(self, step_s: float) -> Chain:
-        """Own states over one fine step, with the motion straight between its ends (classical Runge-Kutta)."""
+        """Unmeasured states over one fine step, with the motion straight between its ends (classical Runge-Kutta)."""
         if step_s not in self._chains:
-            known, own, u, p = self._symbols
+            known, unmeasured, u, p = self._symbols
             end = ca.SX.sym("end", 6)
             count = max(1, int(np.ceil(step_s / self.model.step_s - 1e-9)))
-            h, state = step_s / count, own
+            h, state = step_s / count, unmeasured
             for part in range(count):
                 a, b, c = (known + (end - known) * (part + share) / count for share in (0.0, 0.5, 1.0))
-                k1 = self._own_rates(state, a, u, p)
-                k2 = self._own_rates(state + h / 2 * k1, b, u, p)
-                k3 = self._own_rates(state + h / 2 * k2, b, u, p)
-                k4 = self._own_rates(state + h * k3, c, u, p)
+                k1 = self._unmeasured_rates(state, a, u, p)
+                k2 = self._unmeasured_rates(state + h / 2 * k1, b, u, p)
+                k3 = self._unmeasured_rates(state + h / 2 * k2, b, u, p)
+                k4 = self._unmeasured_rates(state + h * k3, c, u, p)
                 state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-            step = ca.Function("own_step", [own, known, end, u, p], [ca.densify(state)], {"cse": True})
+            step = ca.Function("unmeasured_step", [unmeasured, known, end, u, p], [ca.densify(state)], {"cse": True})
             self._chains[step_s] = Chain(step)
         return self._chains[step_s]
 
     @cached_property
     def _begin(self) -> ca.Function:
-        """Trims of the own states, or else their starts."""
-        known, own, u, p = self._symbols
+        """Trims of the unmeasured states, or else their starts."""
+        known, unmeasured, u, p = self._symbols
         trims = {
             state.name: state.trim if state.trim is not None else ca.SX(state.start) for state in self.model.states
         }
-        start = ca.densify(self.model.expand(ca.vcat([trims[name] for name in self.own])))
-        return ca.Function("begin", [own, known, u, p], [start])
+        start = ca.densify(self.model.expand(ca.vcat([trims[name] for name in self.unmeasured])))
+        return ca.Function("begin", [unmeasured, known, u, p], [start])
 
     @cached_property
     def _newton(self) -> ca.Function:
-        """Rates of the own states, and their slopes by these."""
-        known, own, u, p = self._symbols
-        own_rates = self._of(self.own)
-        return ca.Function("newton", [own, known, u, p], [own_rates, ca.jacobian(own_rates, own)], {"cse": True})
+        """Rates of the unmeasured states, and their slopes by these states."""
+        known, unmeasured, u, p = self._symbols
+        unmeasured_rates = self._of(self.unmeasured)
+        return ca.Function(
+            "newton",
+            [unmeasured, known, u, p],
+            [unmeasured_rates, ca.jacobian(unmeasured_rates, unmeasured)],
+            {"cse": True},
+        )
 
     def _settled(self, x: Array, u: Array, p: Array) -> Array:
-        """Own states at rest next to a motion that stands still: where trims are known they are taken."""
+        """Steady unmeasured states for a constant motion: their trims where these are known."""
         states = {state.name: state for state in self.model.states}
-        xi = np.array(self._begin(np.zeros(len(self.own)), x, u, p)).ravel()
-        moving = np.array([states[name].trim is None and states[name].steady for name in self.own])
+        xi = np.array(self._begin(np.zeros(len(self.unmeasured)), x, u, p)).ravel()
+        moving = np.array([states[name].trim is None and states[name].steady for name in self.unmeasured])
         for _ in range(NEWTON_STEPS if moving.any() else 0):
-            rate, slope_there = (np.array(value) for value in self._newton(xi, x, u, p))
+            rate, slope = (np.array(value) for value in self._newton(xi, x, u, p))
             part = np.ix_(moving, moving)
-            xi[moving] -= np.linalg.lstsq(slope_there[part], rate[moving, 0], rcond=None)[0]
+            xi[moving] -= np.linalg.lstsq(slope[part], rate[moving, 0], rcond=None)[0]
             xi = np.where(moving, xi, np.array(self._begin(xi, x, u, p)).ravel())
         return xi
 
@@ -394,6 +411,6 @@ def _rowwise(function: ca.Function, *arguments: Array) -> Array:
 
 
 def _late(rows: Array, steps: float) -> Array:
-    """Values (R, n) as they would have been `steps` (a real number) later; the first one held before."""
+    """Values (R, n) delayed by `steps` (a real number); the first value is held before."""
     places = np.arange(rows.shape[1])
     return np.array([np.interp(places - steps, places, row) for row in rows])

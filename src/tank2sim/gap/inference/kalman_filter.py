@@ -1,16 +1,16 @@
-"""A Kalman filter about the measured motion: how likely the measurements are, whatever is missing.
+"""A Kalman filter about the measured motion: likelihood of the measurements, whatever effect is missing.
 
-The error of the measured motion, the slow forces that nobody modelled (process noise) and the slow errors of the
-sensors are the states; the filter is linear, so that what an effect adds to the motion passes through it as a column of
-its own, and every explanation with the same noise is one small least-squares problem.
+The error of the measured motion, the slow unmodelled forces (process noise) and the slow errors of the
+sensors are the states; the filter is linear, so that the contribution of an effect passes through it as a separate
+column, and every explanation with the same noise is one small least-squares problem.
 
     state      z = (dx of 6 states, 3 accelerations, ny sensor errors)
-    dx[k+1]    = Phi dx[k] + Gamma (g a[k] + w[k] + d[k]),   d = what the model's rates have beyond the measured change
+    dx[k+1]    = Phi dx[k] + Gamma (g a[k] + w[k] + d[k]),   d = the model's rates less the measured change
     a, e       first-order Gauss-Markov processes (white noise through a lag)
     y - h(x)   = H dx + e + white noise
 
 Durbin and Koopman (2012), Time Series Analysis by State Space Methods, 2nd ed., chapters 4 and 7: likelihood by
-innovations, its slope in the noise's own parameters by the backward (disturbance) smoother.
+innovations, its slope in the parameters of the noise by the backward (disturbance) smoother.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class NoiseLevels:
     white, slow, slow_s : array (ny,)
         Of each sensor: standard deviation of the white noise of a block's mean, of the slow error, its time constant.
     force, force_s : array (3,)
-        Of the accelerations that nobody modelled: standard deviation (m/s2, m/s2, rad/s2) and time constant.
+        Of the unmodelled accelerations: standard deviation (m/s2, m/s2, rad/s2) and time constant.
     """
 
     white: Array
@@ -74,7 +74,7 @@ class Linear:
     transition : array (R, T - 1, 6, 6)
         From the middle of each block to that of the next.
     spreading : array (R, T - 1, 6, 6)
-        What rates that are added during that time come to at its end, over what they would if nothing moved on.
+        Change of the states at the end of that time by rates added during it, relative to a motion with zero slopes.
     reading : array (R, T, ny, 6)
         Readings by states.
     known : array (R, T, ny)
@@ -110,26 +110,26 @@ def linear_filter(by_state: Array, reading: Array, known: _Truths, block_s: floa
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """The filter for one noise: gains, and what a backward pass needs.
+    """The filter for one noise: gains, and the covariances of the backward pass.
 
     Parameters
     ----------
-    what : Linear
+    linear : Linear
     noise : NoiseLevels
     push : array (R, T - 1, 6, 3)
         Errors of the motion by the accelerations a block before.
     fading : array (nz - 6,)
-        Share of each acceleration and sensor error that is left a block later.
+        Share of each acceleration and sensor error that remains a block later.
     gain : array (R, T, nz, ny)
     white : array (R, T, ny, ny)
         Inverse of the lower Cholesky factor of the innovations' covariance.
     filtered : array (R, T, nz, nz)
         Covariance after each measurement.
     log_det : float
-        Sum of log det of the innovations' covariance, over what was measured.
+        Sum of log det of the innovations' covariance, over the measurements.
     """
 
-    what: Linear
+    linear: Linear
     noise: NoiseLevels
     push: Array
     fading: Array
@@ -144,9 +144,9 @@ class Observer:
         Parameters
         ----------
         driving : array (R, T - 1, 6, C)
-            What the rates add to the states from block to block.
+            Change of the states from block to block by the rates.
         shown : array (R, T, ny, C)
-            What the sensors show; nan where nothing was measured.
+            Readings of the sensors; nan where nothing was measured.
 
         Returns
         -------
@@ -170,11 +170,11 @@ class Observer:
 
     @property
     def _seeing(self) -> tuple[Array, _Truths]:
-        return self.what.reading, self.what.known
+        return self.linear.reading, self.linear.known
 
     @property
     def _moving(self) -> tuple[Array, Array, Array, Array]:
-        return self.what.transition, self.what.spreading, self.push, self.fading
+        return self.linear.transition, self.linear.spreading, self.push, self.fading
 
     @property
     def _filtering(self) -> tuple[Array, Array, Array]:
@@ -184,7 +184,7 @@ class Observer:
 @dataclass(frozen=True, eq=False)
 class _Pushed:
     """An acceleration of first order over a block (3,): the change of speed that its value at the beginning makes
-    (`gain`), and the variances of what comes on top by chance: of that change, of it with the acceleration at the end
+    (`gain`), and the variances of the random part: of that change, of it with the acceleration at the end
     (`both`), and the slopes of all three in the logarithm of the time constant. Singer (1970), IEEE Trans. AES 6(4)."""
 
     gain: Array
@@ -212,38 +212,38 @@ def _pushed(noise: NoiseLevels, block_s: float) -> _Pushed:
     )
 
 
-def observer(what: Linear, noise: NoiseLevels) -> Observer:
+def observer(linear: Linear, noise: NoiseLevels) -> Observer:
     """The filter of a noise: the covariance recursion, once for all columns."""
-    runs, blocks, ny, _ = what.reading.shape
+    runs, blocks, ny, _ = linear.reading.shape
     nz = 6 + FORCE_STATES + ny
-    fading = np.exp(-what.block_s / np.concatenate([noise.force_s, noise.slow_s]))
+    fading = np.exp(-linear.block_s / np.concatenate([noise.force_s, noise.slow_s]))
     levels = np.concatenate([noise.force, noise.slow])
-    pushed = _pushed(noise, what.block_s)
-    B = what.spreading[..., :FORCE_STATES]
+    pushed = _pushed(noise, linear.block_s)
+    B = linear.spreading[..., :FORCE_STATES]
     Q = np.zeros((runs, blocks - 1, nz, nz))
     Q[..., range(6, nz), range(6, nz)] = levels**2 * (1 - fading**2)
     Q[..., :6, :6] = (B * pushed.way) @ B.swapaxes(-1, -2)
     Q[..., :6, 6:9] = B * pushed.both
     Q[..., 6:9, :6] = Q[..., :6, 6:9].swapaxes(-1, -2)
     push = B * pushed.gain
-    start = np.concatenate([what.wide**2, levels**2])
-    seeing = what.reading, what.known, noise.white**2
-    gain, white, filtered = kalman_kernels.covariances(start, what.transition, push, fading, Q, seeing)
+    start = np.concatenate([linear.wide**2, levels**2])
+    seeing = linear.reading, linear.known, noise.white**2
+    gain, white, filtered = kalman_kernels.covariances(start, linear.transition, push, fading, Q, seeing)
     # rows without a measurement have S = 1 on their diagonal and count nothing
     log_det = float(-2 * np.sum(np.log(white[..., range(ny), range(ny)])))
-    return Observer(what, noise, push, fading, gain, white, filtered, log_det)
+    return Observer(linear, noise, push, fading, gain, white, filtered, log_det)
 
 
 def slopes(seen: Observer, driving: Array, shown: Array, whitened: Array) -> Array:
     """Slope of ``sum(log det S) + |whitened|^2`` in the logarithms of the noise (:attr:`NoiseLevels.logs`).
 
     `whitened` (R, T, ny, C) are the columns that count: the residual, and those of uncertain coefficients each times
-    the root of its covariance; `driving` and `shown` are what they were made of.
+    the root of its covariance; `driving` and `shown` are the columns before the filter.
 
     d(log det V + e'V^-1 e) = tr(V^-1 dV) - e'V^-1 dV V^-1 e, which the backward recursion gives for every noise at
     once: r carries V^-1 e back to the states, N its covariance under the model (Durbin and Koopman, 7.3.3).
     """
-    noise, block_s = seen.noise, seen.what.block_s
+    noise, block_s = seen.noise, seen.linear.block_s
     after = seen.passed(driving, shown)[1]
     moved = seen._seeing, seen._moving, seen._filtering
     variance, start, fading_slope, way, both, gain, white = kalman_kernels.backward(*moved, whitened, after)

@@ -1,9 +1,9 @@
 """The loops of the filter over time, compiled: forward for covariances and for columns, backward for slopes.
 
-What they compute stands in :mod:`.observer`. They are loops over small matrices, most of them known to be zero, which
-NumPy would leave waiting for Python; Numba compiles them once and keeps the result on disk. States are ordered as in
-:mod:`.observer`: 6 errors of the motion, 3 accelerations, ny sensor errors. A row of `known` that is False has zeros
-for its row of the reading matrix H.
+Their equations are in :mod:`.kalman_filter`. They are loops over small, mostly sparse matrices, for which the
+overhead of NumPy calls dominates; Numba compiles them once and caches the result on disk. States are ordered as in
+:mod:`.kalman_filter`: 6 errors of the motion, 3 accelerations, ny sensor errors. A row of `known` that is False has
+zeros for its row of the reading matrix H.
 """
 
 from __future__ import annotations
@@ -17,35 +17,35 @@ from tank2sim.arrays import Array
 _Truths = NDArray[np.bool_]
 
 compiled = njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
-"""Products and sums in any order, which makes them twice as fast; what is not a number stays so."""
+"""Products and sums in any order, which makes them twice as fast; nan propagates."""
 
 
 @compiled
 def _predicted(P: Array, phi: Array, push: Array, fading: Array) -> Array:
     """F P F', the whole transition F being (phi, push, 0; 0, fading)."""
     nz = P.shape[0]
-    left = np.zeros((nz, nz))
+    FP = np.zeros((nz, nz))
     for i in range(6):
         for j in range(6):
             for b in range(nz):
-                left[i, b] += phi[i, j] * P[j, b]
+                FP[i, b] += phi[i, j] * P[j, b]
         for f in range(3):
             for b in range(nz):
-                left[i, b] += push[i, f] * P[6 + f, b]
+                FP[i, b] += push[i, f] * P[6 + f, b]
     for i in range(6, nz):
         for b in range(nz):
-            left[i, b] = fading[i - 6] * P[i, b]
+            FP[i, b] = fading[i - 6] * P[i, b]
     both = np.empty((nz, nz))
     for a in range(nz):
         for i in range(6):
             total = 0.0
             for j in range(6):
-                total += left[a, j] * phi[i, j]
+                total += FP[a, j] * phi[i, j]
             for f in range(3):
-                total += left[a, 6 + f] * push[i, f]
+                total += FP[a, 6 + f] * push[i, f]
             both[a, i] = total
         for i in range(6, nz):
-            both[a, i] = left[a, i] * fading[i - 6]
+            both[a, i] = FP[a, i] * fading[i - 6]
     return both
 
 
@@ -104,11 +104,11 @@ def covariances(
     push : array (R, T - 1, 6, 3)
         Errors of the motion by accelerations a step before.
     fading : array (nz - 6,)
-        Share of accelerations and sensor errors that is left a step later.
+        Share of accelerations and sensor errors that remains a step later.
     added : array (R, T - 1, nz, nz)
-        Covariance of what comes by chance.
+        Covariance of the process noise.
     seeing : arrays (R, T, ny, 6), (R, T, ny), (ny,)
-        Readings by states, where there is one, variances of their white noise.
+        Readings by states, mask of the measurements, variances of their white noise.
     """
     reading, known, white_noise = seeing
     runs, blocks, ny, _ = reading.shape
@@ -168,7 +168,7 @@ def _corrected(z: Array, whitened: Array, e: Array, gain: Array, white: Array) -
 
 @compiled
 def _moved(moved: Array, z: Array, F: tuple[Array, Array, Array], spreading: Array, driving: Array) -> None:
-    """F z and what drives it, into `moved`."""
+    """F z plus the driving, into `moved`."""
     phi, push, fading = F
     count = z.shape[1]
     for i in range(6):
@@ -269,7 +269,7 @@ def smooth_backward(
     after: Array,
 ) -> Array:
     """States given all measurements (R, T, nz, C); arguments as of :func:`run_filter`, and the covariances after each
-    measurement. r carries what later measurements say of a state."""
+    measurement. r carries the information of later measurements about a state."""
     reading, known = seeing
     transition, _, push, fading = moving
     gain, white, filtered = filtering
@@ -297,9 +297,9 @@ def _seen_from_before(N: Array, K: Array, W: Array, reading: Array, known: _Trut
         if known[i]:
             H[i, :6] = reading[i]
             H[i, 9 + i] = 1.0
-    left, WH = np.eye(nz) - K @ H, W @ H
+    correction, WH = np.eye(nz) - K @ H, W @ H
     D = K.T @ (N @ K) + W.T @ W
-    return left.T @ (N @ left) + WH.T @ WH, np.diag(D)
+    return correction.T @ (N @ correction) + WH.T @ WH, np.diag(D)
 
 
 @compiled
@@ -310,7 +310,7 @@ def _between(
     smooth: Array,
     sums: tuple[Array, Array, Array, Array, Array],
 ) -> None:
-    """Add to the sums what a step between two blocks tells; r, N, N F and their like of what follows, P of before."""
+    """Add the contribution of one step to the sums; r, N, N F are of the later block, P of the earlier."""
     r, N, NF, _ = back
     variance, fading, way, both, gain = sums
     pushing, BN, BNF = BT @ r[:6], BT @ N[:6], BT @ NF[:6]
@@ -331,7 +331,7 @@ def backward(
     whitened: Array,
     after: Array,
 ) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
-    """Slopes of the cost in what the noise is made of; arguments as of :func:`smooth_backward`.
+    """Slopes of the cost in the parameters of the noise; arguments as of :func:`smooth_backward`.
 
     Returns
     -------

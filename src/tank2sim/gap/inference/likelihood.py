@@ -1,8 +1,8 @@
-"""The score of an explanation: how likely the measurements are if it holds, whatever the noise and the coefficients.
+"""The score of an explanation: the likelihood of the measurements if it holds, whatever the noise and the coefficients.
 
-    T = sum(log det S) + |e|^2 + c'c + log det(I + Jc'Jc) + k log(n/20) + what is known of noise and shapes
+    T = sum(log det S) + |e|^2 + c'c + log det(I + Jc'Jc) + k log(n/20) + prior of noise and shapes
 
-e are the innovations of :mod:`.observer` in units of their standard deviation, linear in the k parameters of the
+e are the innovations of :mod:`.kalman_filter` in units of their standard deviation, linear in the k parameters of the
 effects and in the coefficients of the card, c in units of their standard error beforehand; Jc are their columns. The
 coefficients are integrated out, the noise is estimated again for each explanation, "none" as well: else a rival that
 adapts the noise would win without an effect. T is -2 log of the likelihood; of two explanations the one with the
@@ -27,27 +27,28 @@ from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.kalman_filter import FORCE_STATES, Linear, Observer, linear_filter, observer, slopes
 
 COUNTED = 20.0
-"""Measurements that are worth one independent one in the price of a parameter, k log(n/20): noise has colour."""
+"""Measurements that count as one independent measurement in the penalty k log(n/20) of a parameter: noise is
+coloured."""
 
 WIDE_PRIOR = 10.0
 """Error of the smoothed motion at the beginning of a run, in its noise: wide, so that no initial state is assumed."""
 
 LARGEST_FORM, IMPOSSIBLE = 3.5, 1000.0
-"""Standard deviations by which a form may differ, and what each beyond costs (project choice): a force that is all
-but taken back by its form is none, and its slope is then that of another force."""
+"""Standard deviations by which a form may differ, and the cost of each beyond (project choice): a force that its
+form almost cancels is not a force, and its slope is then that of another one."""
 
 BY_FORMULA = (6, 4)
-"""Iterations on the noise, for parameters by the formula alone: the noise must first cover what the formula lacks."""
+"""Iterations on the noise, for parameters by the formula alone: the noise must first cover the error of the formula."""
 
 REMEMBERED = 100
-"""Residuals that are kept: a search asks for the same ones again and again."""
+"""Residuals in the cache: a search needs the same ones repeatedly."""
 
-LEAST_TOLD = 0.02
-"""A combination of coefficients whose variance the trials would lessen by less than this share is left out while the
-noise is sought (project choice); the score is of all."""
+LEAST_INFORMATION = 0.02
+"""A combination of coefficients whose variance the trials reduce by less than this share is omitted while the noise
+is estimated (project choice); the score includes all."""
 
 LEAST_GAIN = 0.1
-"""Gauss-Newton stops where the next step promises less of the score than this."""
+"""Gauss-Newton stops where the predicted decrease of the score is less than this."""
 
 WIDTHS = (0.02, 2.5)
 """Factor on the standard errors of the card's coefficients: 2 % where a card states none, and hardly above 5 %."""
@@ -71,12 +72,12 @@ class Likelihood:
         self.motion, self.none, self.coefficients, self.belief = motion, none, coefficients, belief
         self._residuals: dict[tuple[tuple[str, ...], bytes], tuple[Array, Array]] = {}
         nothing = np.zeros(0)
-        self._own = none.own_states(motion, nothing)
-        self._block_rates = none.rates(motion, nothing, self._own)
+        self._unmeasured = none.unmeasured_states(motion, nothing)
+        self._block_rates = none.rates(motion, nothing, self._unmeasured)
         self._inside = motion.inside[:, 1:, None].astype(float)
         changes = np.diff(motion.middles, axis=1)
         self._lack = (motion.block_s * none.fine_rates(motion, nothing) - changes) * self._inside
-        self._shown = motion.measured - none.readings(motion, nothing, self._own)
+        self._shown = motion.measured - none.readings(motion, nothing, self._unmeasured)
         self._forms: Forms | None = Forms(motion, none.model.input_names.index("rudder.command"))
         self.known = ~np.isnan(motion.measured) & motion.inside[..., None]
         self.count = int(self.known.sum())
@@ -84,66 +85,66 @@ class Likelihood:
         self.base = self.linear(none, nothing)
         self.coefficient_columns = self.of_coefficients(none, nothing)
 
-    def linear(self, explained: Hypothesis, theta: Array) -> Linear:
-        """The filter's motion for an explanation: its own slopes, for forces and slopes must be of one model.
+    def linear(self, hypothesis: Hypothesis, theta: Array) -> Linear:
+        """The linearised motion of an explanation, with the slopes of the same model as its forces.
 
-        The measured motion holds the noise itself. A force of it is no known input: only with the slope that belongs to
-        it is the likelihood that of the measurements, whatever motion it is linear about.
+        The measured motion contains noise. A force evaluated on it is not a known input: only with the matching slope
+        is the likelihood that of the measurements, whatever motion it is linear about.
         """
-        by_state, reading = explained.slopes(self.motion, theta)
-        by_state = by_state * self._inside[..., None]  # nothing moves where there is no run
+        by_state, reading = hypothesis.slopes(self.motion, theta)
+        by_state = by_state * self._inside[..., None]  # zero outside the runs
         return linear_filter(by_state, reading, self.known, self.motion.block_s, self.wide)
 
-    def of_coefficients(self, explained: Hypothesis, theta: Array) -> Array:
-        """Driving of each cause of errors in the coefficients, by its standard deviation (R, T - 1, 6, nc)."""
+    def of_coefficients(self, hypothesis: Hypothesis, theta: Array) -> Array:
+        """Driving of each cause of coefficient errors, per standard deviation (R, T - 1, 6, nc)."""
         if not self.coefficients.names:
             return np.zeros((*self._lack.shape, 0))
-        columns = explained.coefficient_slopes(self.motion, theta, self.coefficients.names) @ self.coefficients.mixing
+        columns = hypothesis.coefficient_slopes(self.motion, theta, self.coefficients.names) @ self.coefficients.mixing
         scaled: Array = self.motion.block_s * columns * self._inside[..., None]
         return scaled
 
-    def residual(self, explained: Hypothesis, theta: Array) -> tuple[Array, Array]:
+    def residual(self, hypothesis: Hypothesis, theta: Array) -> tuple[Array, Array]:
         """Driving (R, T - 1, 6) and shown (R, T, ny) of the residual at some parameters."""
-        key = explained.effects, theta.tobytes()
+        key = hypothesis.effects, theta.tobytes()
         found = self._residuals.get(key)
         if found is None:
             if len(self._residuals) >= REMEMBERED:
                 self._residuals.clear()
-            found = self._residuals[key] = self._residual(explained, theta)
+            found = self._residuals[key] = self._residual(hypothesis, theta)
         return found
 
-    def _residual(self, explained: Hypothesis, theta: Array) -> tuple[Array, Array]:
+    def _residual(self, hypothesis: Hypothesis, theta: Array) -> tuple[Array, Array]:
         motion, driving, shown = self.motion, self._lack, self._shown
-        states, rates, readings = explained.touches
-        more_states = len(explained.own) > self._own.shape[-1]
-        own = explained.own_states(motion, theta) if states or more_states else self._own
+        states, rates, readings = hypothesis.influences
+        extra_states = len(hypothesis.unmeasured) > self._unmeasured.shape[-1]
+        unmeasured = hypothesis.unmeasured_states(motion, theta) if states or extra_states else self._unmeasured
         if rates:
-            more = explained.rates(motion, theta, own) - self._block_rates
-            driving = driving + motion.block_s * more * self._inside
+            change = hypothesis.rates(motion, theta, unmeasured) - self._block_rates
+            driving = driving + motion.block_s * change * self._inside
         if readings:
-            shown = motion.measured - explained.readings(motion, theta, own)
+            shown = motion.measured - hypothesis.readings(motion, theta, unmeasured)
         return driving, shown
 
-    def added(self, explained: Hypothesis, theta: Array) -> tuple[Array, Array]:
-        """What the effects add to driving (R, T - 1, 6) and to what the sensors show (R, T, ny)."""
-        driving, shown = self.residual(explained, theta)
+    def added(self, hypothesis: Hypothesis, theta: Array) -> tuple[Array, Array]:
+        """Contribution of the effects to the driving (R, T - 1, 6) and to the readings (R, T, ny)."""
+        driving, shown = self.residual(hypothesis, theta)
         return driving - self._lack, self._shown - shown
 
-    def columns(self, explained: Hypothesis, theta: Array, of_coefficients: Array) -> FilterColumns:
+    def columns(self, hypothesis: Hypothesis, theta: Array, of_coefficients: Array) -> FilterColumns:
         """Residual, its slopes in the parameters (difference quotients), and the coefficients."""
-        driving, shown = self.residual(explained, theta)
-        _, high = explained.bounds
+        driving, shown = self.residual(hypothesis, theta)
+        _, high = hypothesis.bounds
         driven, seen = [driving], [shown]
-        for place, step in enumerate(explained.steps):
+        for place, step in enumerate(hypothesis.steps):
             moved = theta.copy()
             moved[place] += step if theta[place] + step <= high[place] else -step
-            more = self.residual(explained, moved)
+            moved_residual = self.residual(hypothesis, moved)
             change = moved[place] - theta[place]
-            driven.append((more[0] - driving) / change)
-            seen.append((more[1] - shown) / change)
+            driven.append((moved_residual[0] - driving) / change)
+            seen.append((moved_residual[1] - shown) / change)
         forms = np.zeros((*driving.shape, 0))
         if len(theta) and self._forms is not None:
-            forms = self._forms.columns(driving - self._lack, directed=explained.directed)
+            forms = self._forms.columns(driving - self._lack, directed=hypothesis.directed)
         pairs = np.concatenate([np.stack(driven, axis=-1), of_coefficients, forms], axis=-1)
         readings = np.zeros((*shown.shape, pairs.shape[-1]))
         readings[..., : 1 + len(theta)] = np.stack(seen, axis=-1)
@@ -153,38 +154,42 @@ class Likelihood:
         """Columns of an explanation in units of the innovations (R, T, ny, C), and its innovations (R, T, ny)."""
         seen, columns = self._seen(fit)
         whitened = seen.whitened(columns.driving, columns.shown)
-        return whitened, whitened[..., 0] + whitened[..., 1 + columns.asked :] @ fit.change
+        return whitened, whitened[..., 0] + whitened[..., 1 + columns.parameter_count :] @ fit.change
 
     def smoothed(self, fit: ExplanationFit) -> tuple[Array, Array]:
-        """States of the filter given all measurements (R, T, nz), and the covariance of the accelerations that nobody
-        modelled, given those until then (R, T, 3, 3): an upper bound of that given all."""
+        """States of the filter given all measurements (R, T, nz), and the covariance of the unmodelled
+        accelerations, given the measurements until then (R, T, 3, 3): an upper bound of that given all."""
         seen, columns = self._seen(fit)
-        by_coefficients = columns.driving[..., 1 + columns.asked :] @ fit.change
+        by_coefficients = columns.driving[..., 1 + columns.parameter_count :] @ fit.change
         states = seen.smoothed(columns.driving[..., 0] + by_coefficients, columns.shown[..., 0])
         return states, seen.filtered[..., 6 : 6 + FORCE_STATES, 6 : 6 + FORCE_STATES]
 
     def about(self, fit: ExplanationFit) -> Likelihood:
-        """The same likelihood, linearised about the motion that an explanation makes of the measurements.
+        """The same likelihood, linearised about the smoothed motion of an explanation.
 
         The smoothed measurements are rounded where the rudder kicks; the smoother's motion follows the model there.
         """
-        motion, explained, theta = self.motion, fit.explained, fit.theta
+        motion, hypothesis, theta = self.motion, fit.hypothesis, fit.theta
         seen, columns = self._seen(fit)
-        by_coefficients = columns.driving[..., 1 + columns.asked :] @ fit.change
+        by_coefficients = columns.driving[..., 1 + columns.parameter_count :] @ fit.change
         states = seen.smoothed(columns.driving[..., 0] + by_coefficients, columns.shown[..., 0])
-        more = by_coefficients + np.pad(motion.block_s * states[:, :-1, 6 : 6 + FORCE_STATES], ((0, 0), (0, 0), (0, 3)))
-        between = explained.rates_between(motion, theta) - np.diff(motion.states, axis=1) / motion.step_s
-        moved = motion.moved(states[..., :6], seen.what.transition, between, more * self._inside / motion.block_s)
+        added_rates = by_coefficients + np.pad(
+            motion.block_s * states[:, :-1, 6 : 6 + FORCE_STATES], ((0, 0), (0, 0), (0, 3))
+        )
+        between = hypothesis.rates_between(motion, theta) - np.diff(motion.states, axis=1) / motion.step_s
+        moved = motion.moved(
+            states[..., :6], seen.linear.transition, between, added_rates * self._inside / motion.block_s
+        )
         return Likelihood(moved, self.none, self.coefficients, self.belief)
 
     def by_formula(self, fit: ExplanationFit) -> ExplanationFit:
-        """An explanation with the parameters that suit the measurements best if its formula is to be taken as it is.
+        """An explanation with the parameters that fit the measurements best without form errors.
 
-        So a simulation takes it. The standard errors stay those of a formula that may be a little wrong.
+        A simulation uses the formula without form errors. The standard errors remain those with form errors.
         """
         strict = copy(self)
         strict._forms = None
-        found = strict.at_best(fit.explained, fit.theta, [fit.logs], BY_FORMULA)
+        found = strict.at_best(fit.hypothesis, fit.theta, [fit.logs], BY_FORMULA)
         return replace(fit, theta=found.theta)
 
     def innovations(self, fit: ExplanationFit) -> Array:
@@ -192,15 +197,15 @@ class Likelihood:
         return self.whitened(fit)[1]
 
     def _seen(self, fit: ExplanationFit) -> tuple[Observer, FilterColumns]:
-        explained, theta = fit.explained, fit.theta
-        columns = self.columns(explained, theta, self.of_coefficients(explained, theta)).scaled(fit.width)
-        return observer(self.linear(explained, theta), fit.noise), columns
+        hypothesis, theta = fit.hypothesis, fit.theta
+        columns = self.columns(hypothesis, theta, self.of_coefficients(hypothesis, theta)).scaled(fit.width)
+        return observer(self.linear(hypothesis, theta), fit.noise), columns
 
     # -- the best parameters and the best noise ----------------------------------------------------------------------
 
     def at_best(
         self,
-        explained: Hypothesis,
+        hypothesis: Hypothesis,
         theta: Array,
         starts: Sequence[Array],
         rounds: Sequence[int],
@@ -210,51 +215,51 @@ class Likelihood:
 
         Parameters
         ----------
-        explained : Hypothesis
+        hypothesis : Hypothesis
         theta : array (k,)
             Parameters to begin with.
         starts : sequence of arrays
             Noises to choose from to begin with, and width (:attr:`ExplanationFit.logs`).
         rounds : sequence of int
-            How many iterations on the noise (L-BFGS) follow each solution for the parameters.
+            Number of iterations on the noise (L-BFGS) after each solution for the parameters.
         limit : float
-            With a score above this at the best of the noises given, its own noise is not sought.
+            With a score above this at the best of the given noises, the noise is not estimated.
         """
-        fit = ExplanationFit(explained, theta, np.zeros((len(theta), len(theta))), starts[0], np.inf, np.zeros(0))
+        fit = ExplanationFit(hypothesis, theta, np.zeros((len(theta), len(theta))), starts[0], np.inf, np.zeros(0))
         for turn, count in enumerate(rounds):
-            what = self.linear(explained, fit.theta) if len(theta) else self.base
-            coefficients = self.of_coefficients(explained, fit.theta) if len(theta) else self.coefficient_columns
+            linear = self.linear(hypothesis, fit.theta) if len(theta) else self.base
+            coefficients = self.of_coefficients(hypothesis, fit.theta) if len(theta) else self.coefficient_columns
             if turn == 0 and len(starts) > 1:
-                fit = self._nearest(fit, what, coefficients, starts)
-            fit = self._parameters(fit, what, coefficients)
+                fit = self._nearest(fit, linear, coefficients, starts)
+            fit = self._parameters(fit, linear, coefficients)
             if fit.score > limit:
                 break
             if count:
-                fit = self._noise(fit, what, coefficients, count)
+                fit = self._noise(fit, linear, coefficients, count)
         return fit
 
     def _nearest(
-        self, fit: ExplanationFit, what: Linear, coefficients: Array, starts: Sequence[Array]
+        self, fit: ExplanationFit, linear: Linear, coefficients: Array, starts: Sequence[Array]
     ) -> ExplanationFit:
         """The noise of several at which the explanation, free in its parameters, scores best."""
-        columns = self.columns(fit.explained, fit.theta, coefficients)
+        columns = self.columns(fit.hypothesis, fit.theta, coefficients)
         scored: list[tuple[float, int]] = []
         for logs in starts:
-            here = replace(fit, logs=logs)
-            seen = observer(what, here.noise)
-            solved = self._solved(fit.explained, fit.theta, seen, columns.scaled(here.width), free=True)
-            scored.append((self._score(here, seen, solved), len(scored)))
+            noisy = replace(fit, logs=logs)
+            seen = observer(linear, noisy.noise)
+            solved = self._solved(fit.hypothesis, fit.theta, seen, columns.scaled(noisy.width), free=True)
+            scored.append((self._score(noisy, seen, solved), len(scored)))
         return replace(fit, logs=starts[min(scored)[1]])
 
-    def _parameters(self, fit: ExplanationFit, what: Linear, coefficients: Array, steps: int = 4) -> ExplanationFit:
+    def _parameters(self, fit: ExplanationFit, linear: Linear, coefficients: Array, steps: int = 4) -> ExplanationFit:
         """Gauss-Newton in the parameters at one noise."""
-        explained, theta = fit.explained, fit.theta
-        low, high = explained.bounds
-        seen = observer(what, fit.noise)
+        hypothesis, theta = fit.hypothesis, fit.theta
+        low, high = hypothesis.bounds
+        seen = observer(linear, fit.noise)
         best: ExplanationFit | None = None
         for _ in range(steps if len(theta) else 1):
-            columns = self.columns(explained, theta, coefficients).scaled(fit.width)
-            solved = self._solved(explained, theta, seen, columns)
+            columns = self.columns(hypothesis, theta, coefficients).scaled(fit.width)
+            solved = self._solved(hypothesis, theta, seen, columns)
             found = replace(
                 fit,
                 theta=theta,
@@ -272,24 +277,26 @@ class Likelihood:
         assert best is not None
         return best
 
-    def _noise(self, fit: ExplanationFit, what: Linear, coefficients: Array, count: int) -> ExplanationFit:
+    def _noise(self, fit: ExplanationFit, linear: Linear, coefficients: Array, count: int) -> ExplanationFit:
         """Noise and width for the columns as they are; the parameters follow linearly unless one is at a bound."""
-        least, largest = fit.explained.bounds
+        least, largest = fit.hypothesis.bounds
         free = bool(np.all((fit.theta > least) & (fit.theta < largest)))
-        columns = self._told(fit, what, self.columns(fit.explained, fit.theta, coefficients))
+        columns = self._informative(fit, linear, self.columns(fit.hypothesis, fit.theta, coefficients))
 
         def cost(logs: Array) -> tuple[float, Array]:
-            here = replace(fit, logs=logs)
-            seen = observer(what, here.noise)
-            wide = columns.scaled(here.width)
-            solved = self._solved(fit.explained, fit.theta, seen, wide, free=free)
+            noisy = replace(fit, logs=logs)
+            seen = observer(linear, noisy.noise)
+            wide = columns.scaled(noisy.width)
+            solved = self._solved(fit.hypothesis, fit.theta, seen, wide, free=free)
             weights = solved.weights
             by_noise = slopes(seen, wide.driving @ weights, wide.shown @ weights, solved.whitened @ weights)
-            own = solved.change[: columns.uncertain]
-            by_width = 2 * (len(own) - solved.left - own @ own)
+            coefficients_change = solved.change[: columns.coefficient_count]
+            by_width = 2 * (
+                len(coefficients_change) - solved.coefficient_variance - coefficients_change @ coefficients_change
+            )
             belief, by_belief = self.belief.cost(logs)
-            # Without the price: what it has of the noise is next to nothing, and not in the slopes.
-            return seen.log_det + solved.rest + belief, np.append(by_noise, by_width) + by_belief
+            # Without the penalty of the parameters: its dependence on the noise is negligible, and not in the slopes.
+            return seen.log_det + solved.reduced_cost + belief, np.append(by_noise, by_width) + by_belief
 
         low, high = self.belief.bounds
         low[-1], high[-1] = np.log(WIDTHS[0]), np.log(WIDTHS[1])
@@ -301,23 +308,23 @@ class Likelihood:
             bounds=list(zip(low, high, strict=True)),
             options={"maxiter": count, "maxfun": count + 3},
         )
-        best = self._parameters(replace(fit, logs=found.x), what, coefficients, 3)
-        return best if best.score < fit.score else fit  # the parameters may not follow so far
+        best = self._parameters(replace(fit, logs=found.x), linear, coefficients, 3)
+        return best if best.score < fit.score else fit  # the parameters may be nonlinear over so large a change
 
-    def _told(self, fit: ExplanationFit, what: Linear, columns: FilterColumns) -> FilterColumns:
-        """The columns with only those combinations of the coefficients of which the trials tell anything.
+    def _informative(self, fit: ExplanationFit, linear: Linear, columns: FilterColumns) -> FilterColumns:
+        """The columns with only those combinations of the coefficients that the trials determine better than the prior.
 
-        Combinations turned among themselves are as independent beforehand as the coefficients were.
+        A rotation of the combinations leaves them as independent beforehand as the coefficients were.
         """
-        seen, k = observer(what, fit.noise), columns.asked
+        seen, k = observer(linear, fit.noise), columns.parameter_count
         flat = seen.whitened(columns.driving, columns.shown).reshape(-1, columns.driving.shape[-1])[:, 1 + k :]
-        gram, count = flat.T @ flat, columns.uncertain
-        told, turned = np.linalg.eigh(gram[:count, :count] * fit.width**2)
-        turned = turned[:, told > LEAST_TOLD]
-        kept = 1 + k + count + np.flatnonzero(np.diag(gram)[count:] > LEAST_TOLD)
-        parts = columns.driving[..., : 1 + k], columns.driving[..., 1 + k : 1 + k + count] @ turned
+        gram, count = flat.T @ flat, columns.coefficient_count
+        information, directions = np.linalg.eigh(gram[:count, :count] * fit.width**2)
+        directions = directions[:, information > LEAST_INFORMATION]
+        kept = 1 + k + count + np.flatnonzero(np.diag(gram)[count:] > LEAST_INFORMATION)
+        parts = columns.driving[..., : 1 + k], columns.driving[..., 1 + k : 1 + k + count] @ directions
         driving = np.concatenate([*parts, columns.driving[..., kept]], axis=-1)
-        return FilterColumns(driving, columns.shown[..., : driving.shape[-1]], k, turned.shape[1])
+        return FilterColumns(driving, columns.shown[..., : driving.shape[-1]], k, directions.shape[1])
 
     def _score(self, fit: ExplanationFit, seen: Observer, solved: _Solved) -> float:
         forms = np.abs(solved.change[len(self.coefficients.mixing.T) :])
@@ -325,14 +332,14 @@ class Likelihood:
         return (
             twisted
             + seen.log_det
-            + solved.rest
-            + self.price(fit.explained, solved.covariance)
+            + solved.reduced_cost
+            + self.price(fit.hypothesis, solved.covariance)
             + self.belief.cost(fit.logs)[0]
         )
 
-    def price(self, explained: Hypothesis, covariance: Array) -> float:
-        """What the parameters of the effects cost: k log(n/20), or by how much the trials narrow what was known."""
-        precision = explained.prior[1]
+    def price(self, hypothesis: Hypothesis, covariance: Array) -> float:
+        """Penalty of the effects' parameters: k log(n/20), or the reduction of their prior variance by the trials."""
+        precision = hypothesis.prior[1]
         known = precision > 0
         cost = float(np.count_nonzero(~known) * np.log(self.count / COUNTED))
         if known.any():
@@ -341,20 +348,20 @@ class Likelihood:
         return cost
 
     def _solved(
-        self, explained: Hypothesis, theta: Array, seen: Observer, columns: FilterColumns, *, free: bool = False
+        self, hypothesis: Hypothesis, theta: Array, seen: Observer, columns: FilterColumns, *, free: bool = False
     ) -> _Solved:
-        """Least squares over the parameters' and coefficients' columns; the residual's own cost is where they stand,
-        or where the parameters are free to move if `free`."""
+        """Least squares over the parameters' and coefficients' columns; the cost of the residual is at the given
+        parameters, or at the solution if `free`."""
         whitened = seen.whitened(columns.driving, columns.shown)
         flat = whitened.reshape(-1, whitened.shape[-1])
         gram = flat.T @ flat
-        k, count = columns.asked, columns.uncertain
-        mean, precision = explained.prior
-        own = np.diag(np.concatenate([precision, np.ones(gram.shape[0] - 1 - k)]))
-        normal = gram[1:, 1:] + own
+        k, count = columns.parameter_count, columns.coefficient_count
+        mean, precision = hypothesis.prior
+        weight = np.diag(np.concatenate([precision, np.ones(gram.shape[0] - 1 - k)]))
+        normal = gram[1:, 1:] + weight
         pull = -gram[1:, 0] - np.concatenate([precision * (theta - mean), np.zeros(gram.shape[0] - 1 - k)])
         size = np.sqrt(np.diag(normal))
-        size[size == 0] = 1.0  # a shape of something that is absent shows nothing
+        size[size == 0] = 1.0  # the shape of an absent effect has no column
         factor = cho_factor(normal / np.outer(size, size) + 1e-12 * np.eye(len(normal)))
         whole = cho_solve(factor, pull / size) / size
         inner = normal[k:, k:]
@@ -363,8 +370,8 @@ class Likelihood:
         gain = float(pull @ whole - alone @ (inner @ alone))
         change = whole[k:] if free else alone
         base = gram[0, 0] + float(precision @ (theta - mean) ** 2)
-        rest = base - (float(pull @ whole) if free else float(alone @ (inner @ alone)))
-        rest += 2 * float(np.sum(np.log(np.diag(held[0]))))
+        reduced_cost = base - (float(pull @ whole) if free else float(alone @ (inner @ alone)))
+        reduced_cost += 2 * float(np.sum(np.log(np.diag(held[0]))))
         covariance = np.linalg.inv(normal / np.outer(size, size) + 1e-12 * np.eye(len(normal))) / np.outer(size, size)
         spread = np.linalg.inv(inner)
         root = np.linalg.cholesky(0.5 * (spread + spread.T)) if len(inner) else np.zeros((0, 0))
@@ -373,7 +380,7 @@ class Likelihood:
         weights[1:, 0] = whole if free else np.concatenate([np.zeros(k), alone])
         weights[1 + k :, 1:] = root
         return _Solved(
-            rest,
+            reduced_cost,
             whole[:k],
             covariance[:k, :k],
             change,
@@ -390,11 +397,11 @@ class _Solved:
     gain, their covariance, change of the coefficients, trace of their covariance afterwards, and the columns that count
     for the noise: the residual, and the root of that covariance."""
 
-    rest: float
+    reduced_cost: float
     move: Array
     covariance: Array
     change: Array
     gain: float
-    left: float
+    coefficient_variance: float
     weights: Array
     whitened: Array

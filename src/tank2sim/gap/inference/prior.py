@@ -1,4 +1,4 @@
-"""From a card and trials to the likelihood that judges explanations: what of the card may be wrong, and which noise."""
+"""The likelihood of explanations from a card and trials: errors of the card's coefficients, and prior of the noise."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ from tank2sim.identification.trials.problem.problem_from_card import free_parame
 from tank2sim.records.trials import sampling_step
 
 SLOW_SHARE = 0.3
-"""Slow error of a sensor over its white noise at 10 samples in a block, before the trials tell (project choice)."""
+"""Slow error of a sensor over its white noise at 10 samples in a block, prior to the trials (project choice)."""
 
 SLOW_TIME = 3.0
-"""Time constant of a sensor's slow error before the trials tell, in L/u0 (project choice): it outlasts a manoeuvre's
+"""Time constant of a sensor's slow error prior to the trials, in L/u0 (project choice): it outlasts a manoeuvre's
 phases."""
 
 FORCE_SHARE = 0.01
-"""Unexplained acceleration before the trials tell, as a share of what the ship's accelerations are (project choice)."""
+"""Unexplained acceleration prior to the trials, as a share of the ship's accelerations (project choice)."""
 
 FORCE_TIME = 0.5
-"""Time constant of the unexplained acceleration before the trials tell, in L/u0 (project choice): that of gusts."""
+"""Time constant of the unexplained acceleration prior to the trials, in L/u0 (project choice): that of gusts."""
 
 GEAR, ASSUMED_GEAR = 0.02, 0.5
-"""Standard error of what a card states of its steering gear, as that of a coefficient without one, and of the time
-constant that is assumed where it states none (project choice)."""
+"""Relative standard error of the steering gear's data in a card, equal to that of a coefficient without a stated one,
+and of the time constant that is assumed where the card states none (project choice)."""
 
 BEGINNING = 0.1
 """Standard deviation of the first state about the measured one, in u0, u0/L, rad and 3 L (project choice): more than
-a log, a gyro, a compass or the place of an antenna is wrong by."""
+the errors of a log, a gyro, a compass or an antenna position."""
 
 CLOCK_SHARE = 0.5
 """Standard error of the time of the rudder's record, in sampling steps (project choice)."""
@@ -49,8 +49,8 @@ LARGEST_SHARE = 0.1
 """A group of coefficients is wrong together by no more than this share of their values (project choice)."""
 
 BELIEVED = {"white": 0.5, "slow": 1.5, "slow_s": 0.7, "force": 2.5, "force_s": 0.7, "width": 0.7}
-"""Standard deviation of the logarithm of each, before the trials tell (project choice): noise may be anything within
-reason."""
+"""Standard deviation of the logarithm of each, prior to the trials (project choice): wide, for any
+plausible noise."""
 
 
 def likelihood_from_card(card: ManoeuvringCard, measured: Measured) -> Likelihood:
@@ -59,14 +59,14 @@ def likelihood_from_card(card: ManoeuvringCard, measured: Measured) -> Likelihoo
     Raises
     ------
     InputError
-        A trial is too short, or tells neither velocities nor positions.
+        A trial is too short, or records neither velocities nor positions.
     """
     none = Hypothesis(card, measured.driven_by)
     ship_time = card.ship.length_m / card.model.speed_mps
     motion = batch_trials(none.model, measured.trials, ship_time)
     free = free_parameters(card, inertia=True)
     known = {name: error for name, (_, error) in free.items() if name in none.model.parameter_names}
-    known |= _of_the_gear(card, none.model)
+    known |= _gear_errors(card, none.model)
     known[CLOCK] = CLOCK_SHARE * max(sampling_step(trial) for trial in measured.trials)
     mixing = np.column_stack([np.diag(list(known.values())), *_shared(tuple(known), known, free)])
     length, speed = card.ship.length_m, card.model.speed_mps
@@ -76,7 +76,7 @@ def likelihood_from_card(card: ManoeuvringCard, measured: Measured) -> Likelihoo
 
 
 def _group(name: str) -> str:
-    """Which coefficients came from the same tests, and may be wrong together."""
+    """Name of the group of coefficients that came from the same tests, and may have a common error."""
     term = known_term(name)
     if term.acceleration:
         return "accelerations"
@@ -89,7 +89,7 @@ def _group(name: str) -> str:
 def _shared(
     names: tuple[str, ...], errors: Mapping[str, float], free: Mapping[str, tuple[float, float]]
 ) -> list[NDArray[np.float64]]:
-    """Errors that coefficients share: a group all too large or too small, each by its own standard error."""
+    """Errors that coefficients share: a group all too large or too small, each by its standard error."""
     columns: dict[str, NDArray[np.float64]] = {}
     for place, name in enumerate(names):
         value = free.get(name, (0.0, 0.0))[0]
@@ -99,7 +99,7 @@ def _shared(
     return list(columns.values())
 
 
-def _of_the_gear(card: ManoeuvringCard, model: Model) -> dict[str, float]:
+def _gear_errors(card: ManoeuvringCard, model: Model) -> dict[str, float]:
     """Rate and time constant of the steering gear, as uncertain as a coefficient; one that was assumed far more so."""
     start = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
     stated = card.steering_gear is not None and card.steering_gear.time_constant_s is not None
@@ -108,7 +108,7 @@ def _of_the_gear(card: ManoeuvringCard, model: Model) -> dict[str, float]:
 
 
 def belief(motion: MeasuredBatch, ship_time: float) -> Belief:
-    """What is believed of the noise before the trials tell."""
+    """Prior of the noise."""
     accelerations = np.diff(motion.states[..., :3], axis=1) / motion.step_s
     size = np.sqrt(np.mean(accelerations**2, axis=(0, 1)))
     ny = len(motion.seen)
@@ -124,9 +124,9 @@ def belief(motion: MeasuredBatch, ship_time: float) -> Belief:
 
 
 def candidate_explanations(card: ManoeuvringCard, driven_by: str) -> tuple[str, ...]:
-    """Effects that can be asked for: those the card has not, with values to begin a search from.
+    """Effects that can be tried: those not on the card, with values to begin a search from.
 
-    Where the rudder's angle was measured, what the gear does is in the record, and nothing of it is asked for.
+    Where the rudder's angle was measured, the record contains the response of the gear, and its effects are not tried.
     """
     have = {entry.name for entry in card.effects}
     chosen = []

@@ -1,1 +1,1 @@
-"""What follows from a gap: the improved card, corrected sensors, the next test."""
+"""Results of a gap: the improved card, corrected sensors, the next test."""

@@ -1,4 +1,4 @@
-"""Trials without the faults of sensors that were found in them, and their files written again."""
+"""Correction of the sensor faults found in trials, and of their files."""
 
 from __future__ import annotations
 
@@ -24,27 +24,28 @@ from tank2sim.records.trials import RUDDERS, Trial
 from tank2sim.units import from_si
 
 REMAINING_FAULTS = "left as it is"
-"""How a notice begins of a fault that cannot be corrected in a trial."""
+"""First words of the notice of a fault that cannot be corrected in a trial."""
 
 DIGITS_OF_A_CORRECTION = 2
-"""A corrected column has at least so many digits of the correction (project choice); others have those of the file."""
+"""Significant digits of the correction in a corrected column, at least (project choice); other columns stay
+unchanged."""
 
 
 def correct_sensor_faults(trial: Trial, found: Sequence[Found]) -> Trial:
-    """The trial as it would be without the faults of its sensors; its notices tell what was done.
+    """The trial without the faults of its sensors; its notices list the corrections.
 
-    A fault stays, and a notice says so, where a signal is lacking with which another must be corrected.
+    A fault stays, and a notice says so, where a signal is missing with which another must be corrected.
 
     Parameters
     ----------
     trial : Trial
     found : sequence of Found
-        In the order in which their model was built; what is no sensor's is passed over.
+        In the order in which their model was built; effects of other kinds are ignored.
     """
     signals = dict(trial.signals)
     faults = [(name, values) for name, values, _ in found if EFFECTS[name].acts_on == "sensor"]
     messages = []
-    for name, values in reversed(faults):  # the last fault acts on what the others show
+    for name, values in reversed(faults):  # the last fault acts on the readings of the others
         try:
             signals = without_fault(trial.time_s, signals, EFFECTS[name], values)
         except ValueError as error:
@@ -55,7 +56,7 @@ def correct_sensor_faults(trial: Trial, found: Sequence[Found]) -> Trial:
 
 
 def corrected_text(path: Path, trial: Trial, found: Sequence[Found]) -> str | None:
-    """Text of a trial's file with the columns corrected that faulty sensors had shown, and a comment that says so.
+    """Text of a trial's file with the columns of faulty sensors corrected, and a comment that says so.
 
     Comments, other columns and their digits stay as they are in a trial CSV. Files of other formats, and those of which
     a corrected column had to be repaired before use, are written in the trial format at the size of the file.
@@ -65,14 +66,14 @@ def corrected_text(path: Path, trial: Trial, found: Sequence[Found]) -> str | No
     path : Path
         The file as it was measured.
     trial : Trial
-        What was read from it, repaired and scaled to the ship to which `found` applies.
+        Its data, repaired and scaled to the ship to which `found` applies.
     found : sequence of Found
         See :func:`correct_sensor_faults`.
 
     Returns
     -------
     str or None
-        None if the trial has nothing that the faulty sensors show, or cannot be corrected.
+        None if the trial has no signal of the faulty sensors, or cannot be corrected.
 
     Raises
     ------
@@ -80,30 +81,29 @@ def corrected_text(path: Path, trial: Trial, found: Sequence[Found]) -> str | No
         The file cannot be read any more.
     """
     raw = read_trial_file(path, rising=False)
-    own, _ = repair_trial(raw)
-    sized = _at_size_of(own, trial, found)
-    fixed = correct_sensor_faults(own, sized)
-    touched = [
-        name for name in own.signals if not np.array_equal(own.signals[name], fixed.signals[name], equal_nan=True)
-    ]
+    repaired, _ = repair_trial(raw)
+    sized = _at_size_of(repaired, trial, found)
+    fixed = correct_sensor_faults(repaired, sized)
+    touched = [name for name in repaired.signals if not _equal_signal(repaired, fixed, name)]
     if not touched:
         return None
-    faults = [one for one in sized if EFFECTS[one[0]].acts_on == "sensor"]
-    columns = ", ".join(own.heading(name) for name in touched)
+    faults = [fault for fault in sized if EFFECTS[fault[0]].acts_on == "sensor"]
+    columns = ", ".join(repaired.heading(name) for name in touched)
     names = " and ".join(f"{fault[0]} ({in_short(*fault)})" for fault in faults)
     text = f"{columns} corrected by tank2sim gap for {names}"
     sheet = _sheet(path)
-    if sheet is None or not _same(raw, own, touched):
+    if sheet is None or not _same(raw, repaired, touched):
         return trial_text(fixed, [f"from {path.name}", text])
     return _edited(sheet, _Columns(path, raw, fixed, touched), f"# {' '.join(text.split())}")
 
 
-def _at_size_of(own: Trial, trial: Trial, found: Sequence[Found]) -> list[Found]:
+def _at_size_of(repaired: Trial, trial: Trial, found: Sequence[Found]) -> list[Found]:
     """Faults at the size of a file, from those at the ship's: by Froude's law, as in :func:`.trials.froude_scaled`."""
-    scale = own.scale or 1.0
+    scale = repaired.scale or 1.0
     tried = (1.0, scale, 1 / scale)
     span = trial.time_s[-1] - trial.time_s[0]
-    ratio = min(tried, key=lambda one: abs(span - math.sqrt(one) * (own.time_s[-1] - own.time_s[0])))
+    file_span = repaired.time_s[-1] - repaired.time_s[0]
+    ratio = min(tried, key=lambda candidate: abs(span - math.sqrt(candidate) * file_span))
     factors = {"m": 1 / ratio, "mps": ratio**-0.5, "s": ratio**-0.5, "radps": ratio**0.5}
 
     def small(values: Mapping[str, float]) -> dict[str, float]:
@@ -112,13 +112,13 @@ def _at_size_of(own: Trial, trial: Trial, found: Sequence[Found]) -> list[Found]
     return [(name, small(values), small(errors)) for name, values, errors in found]
 
 
-def _same(raw: Trial, own: Trial, names: Sequence[str]) -> bool:
-    """Whether columns and times of a file are used as they stand."""
-    if len(raw.time_s) != len(own.time_s) or not np.array_equal(raw.time_s, own.time_s):
-        return False
-    return all(
-        name in raw.signals and np.array_equal(raw.signals[name], own.signals[name], equal_nan=True) for name in names
-    )
+def _same(raw: Trial, repaired: Trial, names: Sequence[str]) -> bool:
+    """Whether columns and times of a file are used unchanged."""
+    return np.array_equal(raw.time_s, repaired.time_s) and all(_equal_signal(raw, repaired, name) for name in names)
+
+
+def _equal_signal(first: Trial, second: Trial, name: str) -> bool:
+    return name in first.signals and np.array_equal(first.signals[name], second.signals[name], equal_nan=True)
 
 
 # -- editing a file ------------------------------------------------------------------------------------------------
@@ -133,7 +133,7 @@ def _sheet(path: Path) -> str | None:
 
 @dataclass(frozen=True, eq=False)
 class _Columns:
-    """Columns of a file to be written again: what was read, what shall be read, and the names of those signals."""
+    """Columns of a file to be rewritten: the signals as read, the corrected ones, and the names of the changed ones."""
 
     path: Path
     raw: Trial
@@ -147,7 +147,7 @@ class _Columns:
         found = {}
         for name in self.names:
             heading = self.raw.heading(name)
-            before, after = (from_si(heading, 1.0) * one.signals[name] for one in (self.raw, self.fixed))
+            before, after = (from_si(heading, 1.0) * trial.signals[name] for trial in (self.raw, self.fixed))
             if name in RUDDERS and to_port:
                 before, after = -before, -after
             if name == "psi_rad":
@@ -158,10 +158,10 @@ class _Columns:
 
 
 def _as_wrapped(shown: Array, before: Array, after: Array, turn: float) -> Array:
-    """Headings after the correction, wrapped as the file has those before (from 0 to a turn, about 0, or not)."""
+    """Headings after the correction, wrapped as in the file (from 0 to 360 deg, about 0, or not at all)."""
     found = shown + (after - before)
     lowest, highest = float(np.nanmin(shown)), float(np.nanmax(shown))
-    if highest - lowest < turn / 2:  # it does not come to where it would wrap
+    if highest - lowest < turn / 2:  # it does not reach the wrap
         return found
     if lowest >= 0 and highest <= turn:
         return np.asarray(np.mod(found, turn))
@@ -174,7 +174,7 @@ _SCIENTIFIC = re.compile(r"[eE]")
 
 
 def _form(cells: Sequence[str], change: Array) -> Callable[[float], str]:
-    """How numbers are written in a column: with its digits, and enough for the correction."""
+    """Format of the numbers of a column: with its digits, and enough for the correction."""
     if any(_SCIENTIFIC.search(cell) for cell in cells):
         digits = max(len(_SCIENTIFIC.split(cell)[0].partition(".")[2]) for cell in cells)
         return lambda value: f"{value:.{max(digits, 6)}e}"
@@ -187,7 +187,7 @@ def _form(cells: Sequence[str], change: Array) -> Callable[[float], str]:
 def _edited(text: str, columns: _Columns, comment: str) -> str:
     """The text with the cells of some columns replaced, and a comment line in front."""
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
-    lines = re.split(r"(\r\n|\r|\n)", text.removeprefix(mark))  # ends of lines in between
+    lines = re.split(r"(\r\n|\r|\n)", text.removeprefix(mark))  # line ends in between
     end = lines[1] if len(lines) > 1 else "\n"
     rows = [
         place for place in range(0, len(lines), 2) if lines[place].strip() and not lines[place].lstrip().startswith("#")

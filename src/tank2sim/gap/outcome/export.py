@@ -1,4 +1,4 @@
-"""What the gap workflow found, as JSON; and its parameters as a card and a reader have them."""
+"""Results of the gap workflow as JSON, and its parameters in the units of cards and readers."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ NOISE_FLOOR = 1.0
 """Misfit of a perfect model: it is counted in standard deviations of the measurement noise."""
 
 _MOST_PASSAGES = 24
-"""Passages in which the model is wrong that are reported, the most telling (project choice)."""
+"""Number of reported intervals in which the model is wrong, the most significant (project choice)."""
 
 _IN_FILE = {"rad": "deg", "radps": "degps"}
 
 
 def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, object]:
-    """All that was found, in the form of ``gap.json``; angles in degrees, what is not finite is None.
+    """All results, in the form of ``gap.json``; angles in degrees, None for values that are not finite.
 
     Parameters
     ----------
     gap : Gap
     files : mapping, optional
-        Trial's name to its file's; by default that of the trial format, ``<name>.csv``.
+        Name of a trial to that of its file; by default ``<name>.csv``, of the trial format.
     """
     names = {replay.name: (files or {}).get(replay.name, f"{replay.name}.csv") for replay in gap.passed}
     return {
@@ -72,21 +72,21 @@ def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, o
 
 
 def hidden(gap: Gap) -> dict[str, Mapping[str, float]]:
-    """What could be there without showing; what was named, or may be what is missing, is not among it."""
+    """Detection limits by effect, except of those that were named or are alternatives."""
     possible = {effect.name for effect in gap.effects} | {name for names in gap.alternatives for name in names}
     return {effect: sizes for effect, sizes in gap.could_hide.items() if effect not in possible}
 
 
 def replaces(effect: str, parameter: str) -> bool:
-    """Whether a parameter stands in place of something that the ship has anyway, so that there is no "up to"."""
+    """Whether a parameter replaces a property that the ship has anyway, so that "up to" has no meaning."""
     known = EFFECTS[effect].parameters if effect in EFFECTS else ()
-    return any(one.name == parameter and one.absent is None for one in known)
+    return any(entry.name == parameter and entry.absent is None for entry in known)
 
 
 def hidden_in_words(effect: str, parameter: str, size: float) -> str:
     """``angle up to 0.25 deg would not show``, or ``max rate of 5 deg/s in place of the card's would not show``."""
-    own, value = in_file_units(parameter, size)
-    words, unit = in_words(own)
+    key, value = in_file_units(parameter, size)
+    words, unit = in_words(key)
     text = f"{value:.2g}{f' {unit}' if unit else ''}"
     if replaces(effect, parameter):
         return f"{words} of {text} in place of the card's would not show"
@@ -100,15 +100,15 @@ def joined(effects: tuple[str, ...]) -> str:
 
 def signal_display_name(variable: str) -> SignalName:
     """The signal of a trial that measures a variable of the model: ``motion.psi`` is ``psi_deg`` in a file."""
-    signals = {own: signal for signal, own in OBSERVED_SIGNALS.items()}
+    signals = {name: signal for signal, name in OBSERVED_SIGNALS.items()}
     return SignalName(signals.get(variable, variable.removeprefix("motion.")))
 
 
 def in_file_units(name: str, value: float) -> tuple[str, float]:
-    """Name and value of an effect's parameter as a card has them, from those in SI: degrees in place of radians."""
+    """Name and value of an effect's parameter in the units of a card, from SI: degrees in place of radians."""
     stem, _, suffix = name.rpartition("_")
-    own = f"{stem}_{_IN_FILE[suffix]}" if stem and suffix in _IN_FILE else name
-    return own, from_si(own, value)
+    key = f"{stem}_{_IN_FILE[suffix]}" if stem and suffix in _IN_FILE else name
+    return key, from_si(key, value)
 
 
 def estimate_in_file(name: str, value: float) -> tuple[str, float]:
@@ -116,32 +116,32 @@ def estimate_in_file(name: str, value: float) -> tuple[str, float]:
     return in_file_units(name, value % (2 * math.pi) if name == "direction_rad" else value)
 
 
-class Meant(NamedTuple):
+class EffectParameterName(NamedTuple):
     """A variable of a model that holds a parameter of an effect: the effect's name, the parameter's in SI."""
 
     effect: str
     parameter: str
 
 
-def meant(variable: str) -> Meant:
+def effect_parameter_name(variable: str) -> EffectParameterName:
     """The parameter that a variable of a model holds: ``current.direction`` is ``direction_rad`` of ``current``."""
     for effect in EFFECTS.values():
-        for parameter, own in effect.model_names().items():
-            if own == variable:
-                return Meant(effect.name, parameter)
+        for parameter, name in effect.model_names().items():
+            if name == variable:
+                return EffectParameterName(effect.name, parameter)
     effect_name, _, parameter = variable.rpartition(".")
-    return Meant(effect_name, parameter)
+    return EffectParameterName(effect_name, parameter)
 
 
 def measured_in(trial: Passed) -> tuple[str, ...]:
-    """The variables of which a trial has measurements."""
+    """The measured variables of a trial."""
     return tuple(name for name in trial.noise if np.isfinite(trial.measured[name]).any())
 
 
 def paired_figures(gap: Gap) -> list[tuple[FigureComparison | None, FigureComparison]]:
-    """Each figure of a turn or zigzag, before (None if it is not there) and after; the same where nothing was added."""
-    old = {(one.trial, one.name): one for one in gap.figures_before}
-    return [(old.get((one.trial, one.name)), one) for one in gap.figures_after or gap.figures_before]
+    """Each figure of a turn or zigzag, before (None if not found) and after; the same where no effect was added."""
+    old = {(figure.trial, figure.name): figure for figure in gap.figures_before}
+    return [(old.get((figure.trial, figure.name)), figure) for figure in gap.figures_after or gap.figures_before]
 
 
 def _where(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
@@ -160,35 +160,35 @@ def _where(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
 def _acting(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
     return [
         {
-            "trial": names.get(one.trial, f"{one.trial}.csv"),
-            "equation": one.equation,
-            "t_start_s": _time(one.t_start_s),
-            "t_end_s": _time(one.t_end_s),
-            "standard_errors": _finite(one.size),
+            "trial": names.get(interval.trial, f"{interval.trial}.csv"),
+            "equation": interval.equation,
+            "t_start_s": _time(interval.t_start_s),
+            "t_end_s": _time(interval.t_end_s),
+            "standard_errors": _finite(interval.size),
         }
-        for one in acting(gap)[:_MOST_PASSAGES]
+        for interval in acting(gap)[:_MOST_PASSAGES]
     ]
 
 
 def _figures(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
     return [
         {
-            "trial": names.get(now.trial, now.trial),
-            "figure": now.name,
-            "measured": _finite(now.measured),
+            "trial": names.get(after.trial, after.trial),
+            "figure": after.name,
+            "measured": _finite(after.measured),
             "before": _finite(before.predicted if before else None),
-            "after": _finite(now.predicted),
+            "after": _finite(after.predicted),
         }
-        for before, now in paired_figures(gap)
+        for before, after in paired_figures(gap)
     ]
 
 
-def _effect(one: Named) -> dict[str, object]:
+def _effect(effect: Named) -> dict[str, object]:
     return {
-        "name": one.name,
-        "parameters": {own: _finite(there) for own, there in _each(one.parameters, wrapped=True)},
-        "standard_errors": {own: _finite(there) for own, there in _each(one.standard_errors, wrapped=False)},
-        "confidence": _finite(one.confidence),
+        "name": effect.name,
+        "parameters": {key: _finite(value) for key, value in _each(effect.parameters, wrapped=True)},
+        "standard_errors": {key: _finite(value) for key, value in _each(effect.standard_errors, wrapped=False)},
+        "confidence": _finite(effect.confidence),
     }
 
 
@@ -207,45 +207,47 @@ def _misfit(gap: Gap) -> dict[str, object]:
         "noise": noise,
         "noise_floor": NOISE_FLOOR,
         **{
-            which: {word: _finite(gap.misfit(which, held_out=held)) for word, held in sets.items()}
-            for which in ("before", "after", "black_box")
+            version: {word: _finite(gap.misfit(version, held_out=held)) for word, held in sets.items()}
+            for version in ("before", "after", "black_box")
         },
     }
 
 
-def _trial(one: Passed, file: str) -> dict[str, object]:
-    whiches = ("before", "after", *(("black_box",) if one.black_box else ()))
+def _trial(replay: Passed, file: str) -> dict[str, object]:
+    versions = ("before", "after", *(("black_box",) if replay.black_box else ()))
     return {
         "trial": file,
-        "held_out": one.held_out,
-        "misfit": {which: _finite(one.misfit(which)) for which in whiches} if measured_in(one) else {},
+        "held_out": replay.held_out,
+        "misfit": {version: _finite(replay.misfit(version)) for version in versions} if measured_in(replay) else {},
         "signals": {
-            signal_display_name(variable).file: {which: _finite(one.misfit(which, variable)) for which in whiches}
-            for variable in measured_in(one)
+            signal_display_name(variable).file: {
+                version: _finite(replay.misfit(version, variable)) for version in versions
+            }
+            for variable in measured_in(replay)
         },
     }
 
 
 def _agreement(gap: Gap, names: Mapping[str, str]) -> dict[str, object]:
-    told: dict[str, object] = {}
+    agreement: dict[str, object] = {}
     for variable, trials in gap.agreement.items():
-        effect, parameter = meant(variable)
-        told[f"{effect}.{in_file_units(parameter, 0.0)[0]}"] = {
+        effect, parameter = effect_parameter_name(variable)
+        agreement[f"{effect}.{in_file_units(parameter, 0.0)[0]}"] = {
             names.get(trial, trial): {
                 "value": _finite(estimate_in_file(parameter, value)[1]),
                 "standard_error": _finite(in_file_units(parameter, error)[1]),
             }
             for trial, (value, error) in trials.items()
         }
-    return told
+    return agreement
 
 
-def _missing(what: MissingForce | MissingSignal | None) -> dict[str, object] | None:
-    if what is None:
+def _missing(lacking: MissingForce | MissingSignal | None) -> dict[str, object] | None:
+    if lacking is None:
         return None
-    key = {"equation": what.equation} if isinstance(what, MissingForce) else {"quantity": what.quantity}
-    explained = {state: _finite(share) for state, share in what.explained.items()}
-    return {**key, "explaining": what.explaining, "explained": explained}
+    key = {"equation": lacking.equation} if isinstance(lacking, MissingForce) else {"quantity": lacking.quantity}
+    explained = {state: _finite(share) for state, share in lacking.explained.items()}
+    return {**key, "explaining": lacking.explaining, "explained": explained}
 
 
 def _next_test(test: NextTest | None) -> dict[str, object] | None:
@@ -254,13 +256,13 @@ def _next_test(test: NextTest | None) -> dict[str, object] | None:
     expected = {manoeuvre: _finite(score) for manoeuvre, score in test.expected.items()}
     sizes = {
         name: {
-            "parameters": {own: _finite(there) for own, there in _each(values, wrapped=True)},
-            "standard_errors": {own: _finite(there) for own, there in _each(errors, wrapped=False)},
+            "parameters": {key: _finite(value) for key, value in _each(values, wrapped=True)},
+            "standard_errors": {key: _finite(value) for key, value in _each(errors, wrapped=False)},
         }
         for name, (values, errors) in test.sizes.items()
     }
-    told = {"manoeuvre": test.manoeuvre, "orders": NEXT_TEST_FILE, "why": test.why}
-    return {**told, "expected": expected, "candidates": sizes}
+    test_plan = {"manoeuvre": test.manoeuvre, "orders": NEXT_TEST_FILE, "why": test.why}
+    return {**test_plan, "expected": expected, "candidates": sizes}
 
 
 def _time(value: float) -> float | None:

@@ -1,6 +1,6 @@
-"""A card with the effects that were found: keys where an effect changes what the card states, else ``[[effects]]``.
+"""A card with the effects that were found: keys where an effect changes stated values, else ``[[effects]]``.
 
-A quantity is stated once. Both ways give the same model.
+A quantity is stated once. Both forms give the same model.
 """
 
 from __future__ import annotations
@@ -37,20 +37,20 @@ fitted."""
 
 
 def add_effects_to_card(card: ManoeuvringCard, found: Sequence[Found]) -> ManoeuvringCard:
-    """The card with effects on top; the given card where none of them is of the ship (faults of sensors).
+    """The card with effects added; the given card where none of them is of the ship (faults of sensors).
 
     Parameters
     ----------
     card : ManoeuvringCard
     found : sequence of Found
-        In the order in which their model was built. None of them may be among the card's own effects.
+        In the order in which their model was built. None of them may be on the card already.
 
     Notes
     -----
-    Keys that change bear their old value as a comment, and derivatives a combined standard error: that of the card and
-    that of the effect, each by its slope, as if they were independent. Trials tell the sum of the two better than
-    either, so that this is too large rather than too small. Particulars that an effect took for want of stated ones
-    are written into ``[ship]`` as estimated.
+    Changed keys have their old value as a comment, and derivatives a combined standard error: that of the card and
+    that of the effect, each by its slope, as if they were independent. Trials determine the sum of the two better
+    than either, so that this is too large rather than too small. Particulars that an effect estimated because the card
+    states none are written into ``[ship]`` as estimated.
 
     Raises
     ------
@@ -59,11 +59,11 @@ def add_effects_to_card(card: ManoeuvringCard, found: Sequence[Found]) -> Manoeu
     ValueError
         The card has one of the effects already.
     """
-    ship = [one for one in found if EFFECTS[one[0]].acts_on != "sensor"]
+    ship = [effect for effect in found if EFFECTS[effect[0]].acts_on != "sensor"]
     for name in {entry.name for entry in card.effects} & {name for name, *_ in ship}:
         raise ValueError(f"the card has {name} already")
     for place, (name, values, errors) in enumerate(ship):
-        read_later = any(EFFECTS[other].reads_derivatives for other, *_ in ship[place + 1 :])
+        read_later = any(EFFECTS[later].reads_derivatives for later, *_ in ship[place + 1 :])
         if EFFECTS[name].in_place_of:
             card = _changed(card, _stated(card, name, values, errors))
         elif EFFECTS[name].changes and not read_later:
@@ -78,7 +78,8 @@ def card_with_effects_text(
 ) -> str:
     """Text of a card with effects added by :func:`add_effects_to_card`, headed by their names and the trials used.
 
-    A card to which nothing was added is given as it stands. `rivals` are what these trials cannot tell from them.
+    A card to which no effect was added is returned unchanged. `rivals` are the explanations that these trials cannot
+    distinguish from them.
     """
     names = [name for name, *_ in found if EFFECTS[name].acts_on != "sensor"]
     if not names:
@@ -88,9 +89,9 @@ def card_with_effects_text(
     messages = [f"{name}: {in_short(name, values, errors)}" for name, values, errors in found if name in names]
     lines = [how, *messages]
     if any(EFFECTS[name].in_place_of or EFFECTS[name].changes for name in names):
-        lines.append("Keys that were changed for this bear their old values in comments.")
+        lines.append("Keys that were changed for this have their old values in comments.")
     if rivals:
-        lines.append(f"These trials cannot tell this from: {'; '.join(rivals)}.")
+        lines.append(f"These trials cannot distinguish this from: {'; '.join(rivals)}.")
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
     return mark + "".join(f"# {_printable(line)}\n" for line in lines) + text.removeprefix(mark)
 
@@ -101,8 +102,8 @@ def in_short(name: str, values: Mapping[str, float], errors: Mapping[str, float]
     for parameter in EFFECTS[name].parameters:
         if parameter.name not in values:
             continue
-        own, value, error = _written(parameter, values, errors)
-        words, unit = in_words(own)
+        key, value, error = _written(parameter, values, errors)
+        words, unit = in_words(key)
         spread = f" (standard error {error:.2g})" if error else ""
         messages.append(f"{words} {value:.6g}{f' {unit}' if unit else ''}{spread}")
     return ", ".join(messages)
@@ -114,8 +115,8 @@ Change = tuple[object, str]
 
 def _changed(card: ManoeuvringCard, changes: Mapping[str, Change]) -> ManoeuvringCard:
     text = card.text
-    for comment, those in groupby(sorted(changes.items(), key=_comment), key=_comment):
-        text = changed_text(text, card.source, {key: value for key, (value, _) in those}, comment=comment)
+    for comment, group in groupby(sorted(changes.items(), key=_comment), key=_comment):
+        text = changed_text(text, card.source, {key: value for key, (value, _) in group}, comment=comment)
     return _parsed(card, text)
 
 
@@ -134,19 +135,19 @@ def _document(card: ManoeuvringCard) -> tomlkit.TOMLDocument:
 
 
 def _was(document: tomlkit.TOMLDocument, key: str, name: str) -> str:
-    """Comment of a key that an effect changes: its old value as it stood in the file."""
-    section, _, own = key.partition(".")
+    """Comment of a key that an effect changes: its old value as written in the file."""
+    section, _, leaf = key.partition(".")
     content = document.get(section, {})
-    return f"was {content[own].as_string()} before {name}" if own in content else f"not stated before {name}"
+    return f"was {content[leaf].as_string()} before {name}" if leaf in content else f"not stated before {name}"
 
 
-# -- what the card states of the steering gear ---------------------------------------------------------------------
+# -- data of the steering gear -------------------------------------------------------------------------------------
 
 
 def _stated(
     card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
 ) -> dict[str, Change]:
-    """Keys of ``[steering_gear]`` that an effect states otherwise."""
+    """Keys of ``[steering_gear]`` that an effect changes."""
     changes: dict[str, Change] = {}
     for parameter in EFFECTS[name].in_place_of:
         spelling = f"steering_gear.{in_file_units(parameter, 0.0)[0]}"
@@ -166,13 +167,13 @@ def _derivatives(
     """Keys of ``[derivatives]`` and ``[uncertainty]`` that an effect changes."""
     scales = card.scales if card.model.scaling == "dimensional" else None
     document, changes = _document(card), dict[str, Change]()
-    spelt = {known_term(key).name: key for key in document.get("uncertainty", {})}  # it may be unlike [derivatives]
-    for derivative, value, own, total in changed_derivatives(card, name, values, errors):
+    spelt = {known_term(key).name: key for key in document.get("uncertainty", {})}  # it may differ from [derivatives]
+    for derivative, value, effect_error, total in changed_derivatives(card, name, values, errors):
         factor = file_factor(known_term(derivative), scales, rudder_to_port=card.model.rudder_sign == "port")
         stated = card.places.get(derivative, derivative)
         key, error = f"derivatives.{stated}", f"uncertainty.{spelt.get(derivative, stated)}"
-        # To a thousandth of what the effect is known to; the card's own error would take away digits that it states.
-        changes[key] = _rounded(value * factor, own * abs(factor)), _was(document, key, name)
+        # Rounded to a thousandth of the effect's standard error; the card's error would remove digits that it states.
+        changes[key] = _rounded(value * factor, effect_error * abs(factor)), _was(document, key, name)
         if total > 0:
             changes[error] = float(f"{total * abs(factor):.3g}"), f"that of the card combined with that of {name}"
     return changes
@@ -181,9 +182,9 @@ def _derivatives(
 def changed_derivatives(
     card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
 ) -> Iterator[tuple[str, float, float, float]]:
-    """Derivatives that an effect changes: name, value then (prime), standard error by the effect alone, and altogether.
+    """Derivatives that an effect changes: name, new value (prime), standard error by the effect alone, and in total.
 
-    The effect itself is asked: it is applied to a model that has each derivative as a quantity.
+    The effect is applied to a model that has each derivative as a quantity.
     """
     model = build(card)
     names = [term for term in ALL_TERMS if f"derivatives.{term}" in model]
@@ -195,19 +196,19 @@ def changed_derivatives(
     changed = effect.apply(model.extend(*asked), values, card)
     found = {name: changed.symbol(f"changed.{name}") for name in names}
     if effect.magnified_by:  # of forces that are sums of terms, each in proportion to its derivative
-        more = 1 + changed.symbol(effect.model_names()[effect.magnified_by])
-        found |= {term: more * found[term] for term in names if term in effect.changes}
+        factor = 1 + changed.symbol(effect.model_names()[effect.magnified_by])
+        found |= {term: factor * found[term] for term in names if term in effect.changes}
     after, slopes = _values_and_slopes(changed, ca.vcat(list(found.values())))
-    own = np.zeros(len(changed.parameters))
+    effect_error = np.zeros(len(changed.parameters))
     card_error = np.zeros(len(changed.parameters))
     for parameter, place in effect.model_names().items():
-        own[changed.parameter_names.index(place)] = errors.get(parameter, 0.0)
-    for one in names:
-        card_error[changed.parameter_names.index(f"derivatives.{one}")] = card.standard_error(one)
-    by_effect, by_card = (np.sqrt(slopes**2 @ each**2) for each in (own, card_error))
-    for row, one in enumerate(names):
-        if after[row] != card.derivatives.get(one, 0.0) or by_effect[row] > 0:
-            yield one, float(after[row]), float(by_effect[row]), math.hypot(by_effect[row], by_card[row])
+        effect_error[changed.parameter_names.index(place)] = errors.get(parameter, 0.0)
+    for term in names:
+        card_error[changed.parameter_names.index(f"derivatives.{term}")] = card.standard_error(term)
+    by_effect, by_card = (np.sqrt(slopes**2 @ each**2) for each in (effect_error, card_error))
+    for row, term in enumerate(names):
+        if after[row] != card.derivatives.get(term, 0.0) or by_effect[row] > 0:
+            yield term, float(after[row]), float(by_effect[row]), math.hypot(by_effect[row], by_card[row])
 
 
 def _values_and_slopes(model: Model, wanted: ca.SX) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -224,15 +225,15 @@ def _values_and_slopes(model: Model, wanted: ca.SX) -> tuple[NDArray[np.float64]
 def _with_entry(
     card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
 ) -> ManoeuvringCard:
-    """The card with one of ``[[effects]]`` more, behind those that it has."""
+    """The card with an effect appended to its ``[[effects]]``."""
     parameters, uncertainty = tomlkit.table(), tomlkit.table()
     for parameter in EFFECTS[name].parameters:
         if parameter.name not in values:
             continue
-        own, value, error = _written(parameter, values, errors)
-        parameters[own] = value
+        key, value, error = _written(parameter, values, errors)
+        parameters[key] = value
         if error:
-            uncertainty[own] = error
+            uncertainty[key] = error
     document = _document(card)
     if "effects" not in document:
         document["effects"] = tomlkit.aot()
@@ -241,7 +242,7 @@ def _with_entry(
     if uncertainty:
         entry["uncertainty"] = uncertainty
     if isinstance(document["effects"], tomlkit.items.AoT):
-        entry.trivia.indent = "\n"  # a line between this entry and what is before it
+        entry.trivia.indent = "\n"  # an empty line before this entry
         document["effects"].append(entry)
     else:  # effects = [{...}]
         document["effects"].append(entry.unwrap())
@@ -250,7 +251,7 @@ def _with_entry(
 
 
 def _with_particulars(card: ManoeuvringCard, name: str, values: Mapping[str, float]) -> ManoeuvringCard:
-    """The card with the particulars that an effect took for want of stated ones."""
+    """The card with the particulars that an effect estimated because the card states none."""
     model = build(card)
     notices = [notice for notice in EFFECTS[name].apply(model, values, card).notices if notice not in model.notices]
     changes: dict[str, Change] = {}
@@ -268,15 +269,15 @@ def _with_particulars(card: ManoeuvringCard, name: str, values: Mapping[str, flo
 def _written(
     parameter: EffectParameter, values: Mapping[str, float], errors: Mapping[str, float]
 ) -> tuple[str, float, float]:
-    """Name, value and standard error (0 if there is none) of a parameter as a card has them, rounded, within bounds."""
-    own, value = estimate_in_file(parameter.name, values[parameter.name])
+    """Name, value and standard error (0 if there is none) of a parameter in a card's units, rounded, within bounds."""
+    key, value = estimate_in_file(parameter.name, values[parameter.name])
     error = in_file_units(parameter.name, errors.get(parameter.name, 0.0))[1]
     error = float(f"{error:.3g}") if math.isfinite(error) else 0.0
     # At a bound it may be rounded past it, in another unit even by the last bit of a float.
     tried = (_rounded(value, error), value, value * (1 - 1e-12), value * (1 + 1e-12))
     lowest = -math.inf if callable(parameter.minimum) else parameter.minimum
-    shown = next((one for one in tried if lowest <= to_si(own, one)[1] <= parameter.maximum), value)
-    return own, shown, error
+    shown = next((candidate for candidate in tried if lowest <= to_si(key, candidate)[1] <= parameter.maximum), value)
+    return key, shown, error
 
 
 def _rounded(value: float, error: float) -> float:
@@ -284,5 +285,5 @@ def _rounded(value: float, error: float) -> float:
 
 
 def _printable(line: str) -> str:
-    """One line without what a comment must not hold: names of files may have anything."""
+    """One line without characters that a comment must not contain, which file names may have."""
     return "".join(letter if letter.isprintable() else " " for letter in line)

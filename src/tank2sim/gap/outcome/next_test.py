@@ -1,4 +1,4 @@
-"""The manoeuvre that would decide between explanations, by simulation of each and by what could still hide it."""
+"""The manoeuvre that would best decide between explanations, from simulations of each and their uncertainty."""
 
 from __future__ import annotations
 
@@ -33,24 +33,24 @@ LENGTH = 24.0
 choice)."""
 
 DECIDES = 10.0
-"""Gain of the score that decides: as for naming an effect."""
+"""Gain of the score that decides, as for naming an effect."""
 
 AS_GOOD = 0.9
-"""Of manoeuvres with this share of the best score the first in the list is chosen: standard ones stand first (project
-choice)."""
+"""Of manoeuvres with this share of the best score the first in the list is chosen: standard ones are listed first
+(project choice)."""
 
 READ_S = 1.0
-"""Readings are compared this far apart, s; nearer ones are taken to err together (project choice)."""
+"""Readings are compared this far apart, s; the errors of nearer ones are taken as equal (project choice)."""
 
 _WINDOW = 3.0
 """Length of a window, L/u0 (project choice): the slowest transients of a hull are in it, and a gust that lasts is as
 good as constant."""
 
 GUSTS = math.radians(0.25)
-"""Wind, waves and what else no model foresees are as strong as this much rudder (project choice)."""
+"""Unmodelled disturbances (wind, waves) are as strong as this rudder angle, rad (project choice)."""
 
 FREE = 0.1
-"""The first motion of a window is known to this share of nominal values beforehand: as good as not at all (project
+"""The first motion of a window is known to this share of nominal values beforehand: practically unknown (project
 choice)."""
 
 TO_FEEL = 0.1
@@ -62,7 +62,7 @@ _ROUNDED = 1
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """What could be the truth.
+    """A possible explanation.
 
     Parameters
     ----------
@@ -83,16 +83,16 @@ class Explanation:
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
-    """What one explanation foresees of c manoeuvres in w windows each, in noise units.
+class _Prediction:
+    """Prediction of one explanation for c manoeuvres in w windows each, in noise units.
 
     Parameters
     ----------
     readings : array (c, w, m)
     slopes : array (c, w, m, k)
-        By what is unknown of the explanation, each column per standard deviation.
+        By the unknowns of the explanation, each column per standard deviation.
     passing : array (c, w, m, j)
-        By what is unknown of the window: its first state, and disturbances.
+        By the unknowns of the window: its first state, and disturbances.
     """
 
     readings: Array
@@ -109,18 +109,18 @@ def next_test(
     """The manoeuvre by which the first explanation is distinguished best from all the others.
 
     A manoeuvre's score is the loss of the wrong explanation that is to be expected, the mean over which of the two is
-    true, against the rival that it distinguishes worst: ``d' (I - J (J'J + P^-1)^-1 J') d``, d the difference of what
-    both foresee in noise units, J its derivatives by all that the wrong one could still be: its parameters and its
-    card's coefficients within their covariance P. Both foresee windows of :data:`_WINDOW` L/u0 from the motion of the
-    first explanation, each with a first state and constant disturbances of its own that absorb what they can: at sea,
-    too, a difference shows in what happens next and not in what has summed up.
+    true, against the rival that it distinguishes worst: ``d' (I - J (J'J + P^-1)^-1 J') d``, d the difference of both
+    predictions in noise units, J its derivatives by all that the wrong one could still be: its parameters and its
+    card's coefficients within their covariance P. Both predict windows of :data:`_WINDOW` L/u0 from the motion of the
+    first explanation, each with a first state and constant disturbances, which absorb a part of the difference: at
+    sea, too, it shows in the next motion and not in the accumulated one.
 
     Parameters
     ----------
     explanations : sequence of Explanation
         Two or more; zigzags are steered with the first.
     noise : mapping
-        Variable (``motion.*``) to the standard deviation of one reading, SI: what the sensors of the test will see.
+        Variable (``motion.*``) to the standard deviation of one reading, SI: the signals of the test's sensors.
     duration_s : float, optional
         Of the test; by default :data:`LENGTH` L/u0.
     correlation_s : float
@@ -128,7 +128,7 @@ def next_test(
 
     Returns
     -------
-    NextTest, or None if there is only one explanation, or the ship leaves all bounds in every manoeuvre.
+    NextTest, or None if there is only one explanation, or the ship exceeds all bounds in every manoeuvre.
     """
     if len(explanations) < 2:
         return None
@@ -136,25 +136,26 @@ def next_test(
     length = LENGTH if duration_s is None else duration_s / ships[0].ship_time
     of = _with_headings(candidate_manoeuvres(explanations[0].card, length), explanations)
     orders, motion = ships[0].sail(of, length)
-    first, *others = (ship.foreseen(of, orders, motion) for ship in ships)
-    each = np.stack([_lost(first, other) for other in others])
+    first, *rivals = (ship.predict(of, orders, motion) for ship in ships)
+    each = np.stack([_expected_loss(first, rival) for rival in rivals])
     if not np.isfinite(scores := each.min(axis=0)).any():
         return None
     best, least = _best_and_least(scores)
     why = _why(
         of[best], [explanation.name for explanation in explanations], each[:, best], (float(scores[least]), of[least])
     )
+    named = zip((candidate.name for candidate in of), map(float, scores), strict=True)
     return NextTest(
         manoeuvre=of[best].manoeuvre or "file:next_test.csv",
         orders=orders_csv(ships[0].step_s, {name: values[best] for name, values in orders.items()}, why),
         why=why,
-        expected={one.name: float(score) for one, score in zip(of, scores, strict=True) if np.isfinite(score)},
+        expected={name: score for name, score in named if math.isfinite(score)},
         sizes=_sizes(explanations),
     )
 
 
 def _ships(explanations: Sequence[Explanation], noise: Mapping[str, float], correlation_s: float) -> list[_Ship]:
-    """The ship of each explanation, with the sensors that there are and that all models know."""
+    """The ship of each explanation, with the available sensors that all models have."""
     models = [driven_model(explanation.card, "order") for explanation in explanations]
     seen = {
         name: noise[name]
@@ -165,13 +166,13 @@ def _ships(explanations: Sequence[Explanation], noise: Mapping[str, float], corr
 
 
 def _best_and_least(scores: Array) -> tuple[int, int]:
-    """Places of the first manoeuvre that is as good as the best, and of the least telling."""
+    """Indices of the first manoeuvre that is as good as the best, and of the least informative."""
     good = np.nan_to_num(scores) >= AS_GOOD * np.nanmax(scores)
     return int(np.argmax(good)), int(np.nanargmin(scores))
 
 
 def _sizes(explanations: Sequence[Explanation]) -> dict[str, tuple[Mapping[str, float], Mapping[str, float]]]:
-    """Each effect to its parameters and standard errors; what all explanations have alike was on the card before."""
+    """Each effect to its parameters and standard errors; effects of all explanations were on the card before."""
     had = [
         entry
         for entry in explanations[0].card.effects
@@ -181,20 +182,20 @@ def _sizes(explanations: Sequence[Explanation]) -> dict[str, tuple[Mapping[str, 
     return {entry.name: (entry.parameters, entry.uncertainty) for entry in reversed(entries)}
 
 
-def _lost(one: _Seen, other: _Seen) -> Array:
+def _expected_loss(first: _Prediction, second: _Prediction) -> Array:
     """Expected loss of the wrong one of two explanations in each manoeuvre (c,); nan where a motion left all bounds."""
-    difference = one.readings - other.readings
-    return 0.5 * (_left(difference, other) + _left(difference, one))
+    difference = first.readings - second.readings
+    return 0.5 * (_unabsorbed(difference, second) + _unabsorbed(difference, first))
 
 
-def _left(difference: Array, wrong: _Seen) -> Array:
-    """What the wrong explanation cannot absorb of a difference (c, w, m): its unknowns have unit prior variance."""
+def _unabsorbed(difference: Array, wrong: _Prediction) -> Array:
+    """Loss by a difference (c, w, m) that the wrong explanation cannot absorb; unknowns have unit prior variance."""
     known = np.isfinite(difference).all(axis=(1, 2)) & np.isfinite(wrong.slopes).all(axis=(1, 2, 3))
     losses = np.full(len(difference), np.nan)
     S, A = wrong.passing[known], np.concatenate([wrong.slopes, difference[..., None]], axis=3)[known]
     pull = S.swapaxes(2, 3) @ A
     inner = S.swapaxes(2, 3) @ S + np.eye(S.shape[3])
-    # What is left of slopes and difference when each window has taken its part, summed over the windows.
+    # Slopes and difference with the unknowns of each window projected out, summed over the windows.
     G = (A.swapaxes(2, 3) @ A - pull.swapaxes(2, 3) @ np.linalg.solve(inner, pull)).sum(axis=1)
     J, mixed = G[:, :-1, :-1] + np.eye(G.shape[1] - 1), G[:, :-1, -1:]
     losses[known] = G[:, -1, -1] - (mixed.swapaxes(1, 2) @ np.linalg.solve(J, mixed))[:, 0, 0]
@@ -203,31 +204,27 @@ def _left(difference: Array, wrong: _Seen) -> Array:
 
 
 def _with_headings(of: Sequence[Candidate], explanations: Sequence[Explanation]) -> list[Candidate]:
-    """Those that keep to one heading on another one too, where an explanation has a direction of its own."""
-    directed = any(
-        key.startswith("direction")
-        for explanation in explanations
-        for e in explanation.card.effects
-        for key in e.parameters
-    )
-    return [*of, *(on_heading(one, math.pi / 2) for one in of if one.on_course)] if directed else list(of)
+    """Add manoeuvres on a constant heading for another heading, where an explanation has a direction."""
+    entries = [entry for explanation in explanations for entry in explanation.card.effects]
+    directed = any(key.startswith("direction") for entry in entries for key in entry.parameters)
+    return [*of, *(on_heading(candidate, math.pi / 2) for candidate in of if directed and candidate.on_course)]
 
 
 def _why(best: Candidate, names: Sequence[str], each: Array, least: tuple[float, Candidate]) -> str:
-    """What a manoeuvre would tell: the root of a score is a difference in standard deviations of the noise."""
+    """Reason for a manoeuvre: the root of a score is a difference in standard deviations of the noise."""
     first, *rivals = names
     apart = " and ".join(f"{math.sqrt(score):.2g} from {name}" for score, name in zip(each, rivals, strict=True))
     if min(each) < DECIDES:
-        text = f"No manoeuvre considered would tell {first} from {' and '.join(rivals)} for sure; nearest"
+        text = f"No manoeuvre considered would distinguish {first} from {' and '.join(rivals)} for sure; nearest"
     else:
-        text = f"The manoeuvre that would tell {first} from {' and '.join(rivals)} best"
+        text = f"The manoeuvre that would distinguish {first} from {' and '.join(rivals)} best"
     text += (
-        f" is {best.name}: what {first} foresees differs there by {apart}, in standard deviations of the noise of all "
-        f"readings together and beyond what uncertain parameters can make up for; {math.sqrt(DECIDES):.2g} would "
-        f"decide. The least telling, {least[1].name}, would give {math.sqrt(max(least[0], 0.0)):.1g}."
+        f" is {best.name}: the prediction by {first} differs there by {apart}, in standard deviations of the noise of "
+        f"all readings together and beyond the uncertainty of the parameters; {math.sqrt(DECIDES):.2g} would "
+        f"decide. The least informative, {least[1].name}, would give {math.sqrt(max(least[0], 0.0)):.1g}."
     )
     if best.heading:
-        text += f" Begin on heading {math.degrees(best.heading):.0f} deg (initial.psi), which orders cannot say."
+        text += f" Begin on heading {math.degrees(best.heading):.0f} deg (initial.psi), which orders cannot state."
     return text
 
 
@@ -251,7 +248,7 @@ class _Ship:
         self.axes = _independent(explanation.covariance) if self.free else np.zeros((0, 0))
 
     def sail(self, of: Sequence[Candidate], length: float) -> tuple[dict[str, Array], Array]:
-        """The helmsmen's orders by input (c, n) each, and the motion (c, n, 6) that comes of them, as in MEASURED."""
+        """The helmsmen's orders by input (c, n) each, and the resulting motion (c, n, 6), as MEASURED_BEFOREHAND."""
         window = round(_WINDOW * self.ship_time / self.step_s)
         n = window * max(1, round(length / _WINDOW))
         time = np.arange(n) * self.step_s / self.ship_time
@@ -260,9 +257,9 @@ class _Ship:
         ordered = [RUDDER]
         if self.card.propulsion is not None:
             ordered.append(REVOLUTIONS)
-            shares = np.array([[one.revolutions(t) for t in time] for one in of])
+            shares = np.array([[candidate.revolutions(t) for t in time] for candidate in of])
             inputs[:, :, names.index(REVOLUTIONS)] *= shares
-        headings, helmsmen = np.array([one.heading for one in of]), [one.helmsman() for one in of]
+        headings, helmsmen = np.array([candidate.heading for candidate in of]), [each.helmsman() for each in of]
         motion = np.empty((len(of), n, len(self._motion)))
         x = self._starts(headings)
         for row in range(n):
@@ -273,17 +270,17 @@ class _Ship:
             x = self._after(x, inputs[:, row], self.p)
         return {name: inputs[:, :, names.index(name)] for name in ordered}, motion
 
-    def foreseen(self, of: Sequence[Candidate], orders: Mapping[str, Array], motion: Array) -> _Seen:
-        """What the sensors would show in windows that begin with the motion (c, n, 6) of another, under its orders."""
+    def predict(self, of: Sequence[Candidate], orders: Mapping[str, Array], motion: Array) -> _Prediction:
+        """Readings in windows that begin with the motion (c, n, 6) of another explanation, under its orders."""
         c, n, _ = motion.shape
-        own = np.tile(self.model.input_values(), (c, n, 1))
+        inputs = np.tile(self.model.input_values(), (c, n, 1))
         for name, values in orders.items():
-            own[:, :, self.model.input_names.index(name)] = values
+            inputs[:, :, self.model.input_names.index(name)] = values
         window = round(_WINDOW * self.ship_time / self.step_s)
-        begins = self._begins(of, own, motion)[:, ::window]
+        begins = self._begins(of, inputs, motion)[:, ::window]
         changes, shares, first = self._variations()
         rows, w = len(changes), n // window
-        acting = np.stack([self._acting(own, change) for change in changes]).reshape(rows * c * w, window, -1)
+        acting = np.stack([self._acting(inputs, change) for change in changes]).reshape(rows * c * w, window, -1)
         p = np.repeat(self.p + np.stack([self._of_parameters(change) for change in changes]), c * w, axis=0)
         x = (begins[None] + first[:, None, None]).reshape(rows * c * w, -1)
         readings = []
@@ -294,7 +291,7 @@ class _Ship:
         seen = np.stack(readings, axis=1).reshape(rows, c, w, -1)
         slopes = np.moveaxis((seen[1:] - seen[0]) / shares[1:, None, None, None], 0, -1)
         unknown = self.axes.shape[1]
-        return _Seen(seen[0], slopes[..., :unknown], slopes[..., unknown:])
+        return _Prediction(seen[0], slopes[..., :unknown], slopes[..., unknown:])
 
     def _after(self, x: Array, inputs: Array, p: Array) -> Array:
         """States (rows, nx) a step later."""
@@ -307,11 +304,11 @@ class _Ship:
         place = self.names.index("initial.psi")
         p = np.tile(self.p, (len(headings), 1))
         p[:, place] = headings
-        return np.stack([np.array(self.model.initial(one)).ravel() for one in p])
+        return np.stack([np.array(self.model.initial(row)).ravel() for row in p])
 
     def _begins(self, of: Sequence[Candidate], inputs: Array, motion: Array) -> Array:
-        """States (c, n, nx): the motion, and this ship's own rudder, heel and whatever else it has."""
-        x = self._starts(np.array([one.heading for one in of]))
+        """States (c, n, nx): the given motion, and the rudder, heel and further states of this explanation."""
+        x = self._starts(np.array([candidate.heading for candidate in of]))
         acting = self._acting(inputs, {})
         states = np.empty((*motion.shape[:2], len(self.model.states)))
         for row in range(motion.shape[1]):
@@ -330,7 +327,7 @@ class _Ship:
         for axis in self.axes.T:
             change = dict(zip(self.free, TO_FEEL * axis, strict=True))
             side = 1.0 if self._inside(change, 1.0) or not self._inside(change, -1.0) else -1.0
-            changes.append({name: side * own for name, own in change.items()})
+            changes.append({name: side * value for name, value in change.items()})
             shares.append(side * TO_FEEL)
             first.append(first[0])
         for place in self._motion:
@@ -346,28 +343,27 @@ class _Ship:
         return changes, np.array(shares), np.stack(first)
 
     def _acting(self, inputs: Array, change: Mapping[str, float]) -> Array:
-        """Inputs (c, n, nu) as the ship gets them: with what is changed of them, and late where an effect delays."""
+        """Inputs (c, n, nu) as they act on the ship: with the changes, and late where an effect delays."""
         acting = inputs.copy()
-        for name, own in change.items():
+        for name, value in change.items():
             if name in self.model.input_names:
-                acting[:, :, self.model.input_names.index(name)] += own
+                acting[:, :, self.model.input_names.index(name)] += value
         p = self.p + self._of_parameters(change)
         if not any(EFFECTS[entry.name].delays for entry in self.card.effects):
             return acting
-        return np.stack([delayed(self.card, self.model, one, self.step_s, p) for one in acting])
+        return np.stack([delayed(self.card, self.model, rows, self.step_s, p) for rows in acting])
 
     def _of_parameters(self, change: Mapping[str, float]) -> Array:
         return np.array([change.get(name, 0.0) for name in self.names])
 
     def _inside(self, change: Mapping[str, float], side: float) -> bool:
         """Whether all variables stay within their bounds."""
-        for name, own in change.items():
+        for name, size in change.items():
             variable = self.model[name]
             assert isinstance(variable, Parameter | Input)
-            value = variable.start + side * own
-            if (variable.minimum is not None and value < variable.minimum) or (
-                variable.maximum is not None and value > variable.maximum
-            ):
+            low, high = variable.minimum, variable.maximum
+            value = variable.start + side * size
+            if (low is not None and value < low) or (high is not None and value > high):
                 return False
         return True
 
@@ -376,14 +372,14 @@ _STEERED = ("motion.psi", "motion.r")
 
 
 def _disturbances(card: ManoeuvringCard) -> dict[str, float]:
-    """Standard deviations (prime) of constant forces in a window: what :data:`GUSTS` of rudder would do."""
+    """Standard deviations (prime) of constant forces in a window: the forces of :data:`GUSTS` of rudder."""
     sway, yaw = (GUSTS * abs(card.derivatives.get(name, 0.0)) for name in ("Yd", "Nd"))
     sizes = {"derivatives.X0": sway, "derivatives.Y0": sway, "derivatives.N0": yaw}
     return {name: size for name, size in sizes.items() if size > 0}
 
 
 def _independent(covariance: Array) -> Array:
-    """Columns (k, m) whose sum of squares is the covariance: its independent unknowns, without those of no spread."""
+    """Columns (k, m) whose sum of squares is the covariance: its independent unknowns with a spread above zero."""
     deviations = np.sqrt(np.diag(covariance))
     scale = np.where(deviations > 0, deviations, 1.0)
     spread, axes = np.linalg.eigh(covariance / np.outer(scale, scale))

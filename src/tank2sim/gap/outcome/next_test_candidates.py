@@ -1,4 +1,4 @@
-"""Manoeuvres that could be sailed next, each as a helmsman who orders rudder and revolutions by what he sees."""
+"""Candidate manoeuvres of the next test, each as a helmsman who orders rudder and revolutions from the motion."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ Helmsman = Callable[[float, float, float], float]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A manoeuvre that is considered.
+    """A manoeuvre to be compared.
 
     Parameters
     ----------
     name : str
-        For people, and the key under which its score is reported.
+        Display name, and the key of its score in the report.
     manoeuvre : str
-        As ``simulate --manoeuvre`` takes it; "" for those that only a file can tell.
+        As ``simulate --manoeuvre`` takes it; "" for those that only a file can state.
     helmsman : callable
         ``helmsman()`` gives a new :data:`Helmsman`.
     revolutions : callable
@@ -43,7 +43,7 @@ class Candidate:
     heading : float
         First heading, rad.
     on_course : bool
-        It keeps near its first heading, so that it may tell something else on another.
+        It keeps near its first heading, so that another heading may give other information.
     """
 
     name: str
@@ -126,7 +126,7 @@ def _pull_out(rudder: float, end: float) -> Callable[[], Helmsman]:
 
 
 def _steered(course: float, heading: float, rate: float, largest: float) -> float:
-    """Rudder of an autopilot: a rad a rad of error, and a rad for a rad in L/u0 of rate (ours: well damped)."""
+    """Rudder of an autopilot: gain 1 on the error, and 1 on the rate in rad per L/u0 (project choice: well damped)."""
     return float(np.clip(course - heading - rate, -largest, largest))
 
 
@@ -140,7 +140,7 @@ def _straight() -> Helmsman:
 
 
 def _keeping_course() -> Helmsman:
-    """Changes of course by 2 deg to and fro every 2 L/u0: what small rudder angles there are at sea."""
+    """Changes of course by 2 deg to and fro every 2 L/u0: the small rudder angles of course keeping."""
 
     def helmsman(time: float, heading: float, rate: float) -> float:
         side = 1.0 if int(time / 2) % 2 == 0 else -1.0
@@ -150,7 +150,7 @@ def _keeping_course() -> Helmsman:
 
 
 def _random_steps(largest: float, length: float) -> Callable[[], Helmsman]:
-    """Rudders of any size to either side, each held 0.5 to 2 L/u0, and the other way when the heading is off."""
+    """Rudders of any size to either side, each held 0.5 to 2 L/u0, and reversed when the heading is too far off."""
     rng = np.random.default_rng(0)
     ends = np.cumsum(rng.uniform(0.5, 2.0, int(2 * length) + 2))
     sizes = rng.uniform(-largest, largest, len(ends))
@@ -163,7 +163,7 @@ def _random_steps(largest: float, length: float) -> Callable[[], Helmsman]:
 
 
 def on_heading(candidate: Candidate, heading: float) -> Candidate:
-    """The same on another first heading, rad."""
+    """The candidate on another first heading, rad."""
     return replace(candidate, name=f"{candidate.name} on heading {math.degrees(heading):03.0f}", heading=heading)
 
 

@@ -1,4 +1,4 @@
-"""Whether a named effect deserves its name: against a mere refit, trial by trial, and whether the trials agree."""
+"""Checks of a named effect: against a mere refit, trial by trial, and the agreement of the trials."""
 
 from __future__ import annotations
 
@@ -20,21 +20,20 @@ _LINEAR = ("Yv", "Yr", "Yd", "Nv", "Nr", "Nd", "Xu")
 """Terms of the linear black box: sway velocity, yaw rate and rudder in Y and N, speed in X."""
 
 _STEPS = 4
-"""Gauss-Newton steps of a fit; the last one begins where another ended."""
+"""Gauss-Newton steps of a fit; the last one begins at the result of another."""
 
 TRIED = 3
-"""Terms that are fitted to choose one of them (ours: far from the truth the linearised gain errs)."""
+"""Terms that are fitted to choose one of them (project choice: far from the truth the linearised gain errs)."""
 
 MUCH = 3.0
-"""Misfit in noise units beyond which a name must close something of the gap (project choice): below, noise is most of
-it."""
+"""Misfit in noise units beyond which a name must reduce the gap (project choice): below, noise is most of it."""
 
 CLOSES = 0.9
-"""Share of the misfit before that may be left after, in the middle of all signals of all trials (project choice)."""
+"""Largest ratio of the misfit after to that before, as the median over all signals of all trials (project choice)."""
 
 REACH = 1e-3
-"""Differences by a coefficient are taken over this share of the largest linear one (ours: rounding and curvature are
-both far below the noise)."""
+"""Differences by a coefficient are taken over this share of the largest linear one (project choice: rounding and
+curvature are both far below the noise)."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +53,11 @@ class BlackBox:
 
 
 def black_box(card: ManoeuvringCard, measured: Measured, noise: Mapping[str, float], count: int) -> BlackBox:
-    """What a mere refit would reach: as many linear terms of :data:`_LINEAR` as an effect has parameters.
+    """Fit a linear black box: as many terms of :data:`_LINEAR` as an effect has parameters.
 
-    The terms are chosen one after another by what they gain, and fitted by output error to the whole trials; at the end
-    the initial states are settled and the terms fitted again. What is made least is the very misfit that is shown
-    afterwards, so that the black box does as well as it can.
+    The terms are chosen one after another by their gain, and fitted by output error to the whole trials; at the end
+    the initial states are estimated and the terms fitted again. The minimised quantity is the reported misfit, so that
+    the black box follows the trials as well as it can.
 
     Parameters
     ----------
@@ -80,7 +79,7 @@ def black_box(card: ManoeuvringCard, measured: Measured, noise: Mapping[str, flo
     names: tuple[str, ...] = ()
     found = np.zeros(0)
     while len(names) < min(count, len(linear)):
-        names, found = _one_more(fit, names, found, linear, reach)
+        names, found = _add_term(fit, names, found, linear, reach)
     fit.settle(names, found)
     found = fit.found(names, found, reach)[0]
     values = dict(zip(names, map(float, found), strict=True))
@@ -90,23 +89,23 @@ def black_box(card: ManoeuvringCard, measured: Measured, noise: Mapping[str, flo
     return BlackBox(revised(card, derivatives, comment="linear black box"), values)
 
 
-def _one_more(
+def _add_term(
     fit: _Fit, names: tuple[str, ...], values: Array, linear: Sequence[str], reach: float
 ) -> tuple[tuple[str, ...], Array]:
-    """The terms with one more, and their changes: the best of the :data:`TRIED` that promise most if it were linear."""
-    rest = [name for name in linear if name not in names]
-    every = (*names, *rest)
-    at = np.append(values, np.zeros(len(rest)))
-    there = fit.misfit(every, at)
-    slopes = difference_slopes(lambda changes: fit.misfit(every, changes), at, there, np.full(len(every), reach))
-    left = []
+    """The terms with an additional one, and their changes: the best of the :data:`TRIED` with most linearised gain."""
+    remaining = [name for name in linear if name not in names]
+    every = (*names, *remaining)
+    at = np.append(values, np.zeros(len(remaining)))
+    residual = fit.misfit(every, at)
+    slopes = difference_slopes(lambda changes: fit.misfit(every, changes), at, residual, np.full(len(every), reach))
+    costs = []
     for place in range(len(names), len(every)):
         J = slopes[:, [*range(len(names)), place]]
-        unexplained = there - J @ np.linalg.lstsq(J, there, rcond=None)[0]
-        left.append(float(unexplained @ unexplained))
-    tried = [(*names, rest[place]) for place in np.argsort(left)[:TRIED]]
-    fits = [(one, *fit.found(one, np.append(values, 0.0), reach)) for one in tried]
-    best, changes, _ = min(fits, key=lambda one: one[2])
+        unexplained = residual - J @ np.linalg.lstsq(J, residual, rcond=None)[0]
+        costs.append(float(unexplained @ unexplained))
+    tried = [(*names, remaining[place]) for place in np.argsort(costs)[:TRIED]]
+    fits = [(terms, *fit.found(terms, np.append(values, 0.0), reach)) for terms in tried]
+    best, changes, _ = min(fits, key=lambda candidate: candidate[2])
     return best, changes
 
 
@@ -116,7 +115,7 @@ class _Fit:
     def __init__(self, replayer: Replayer, records: Sequence[InputRecord], noise: Mapping[str, float]):
         self.replayer, self.records = replayer, records
         self.sigma = np.array([noise[name] for name in replayer.seen])
-        # As read off the first seconds: an initial state that suits a wrong model keeps it where it is.
+        # From the first seconds: an initial state fitted with a wrong model would compensate its errors.
         p = replayer.model.parameter_values()
         self.starts = [replayer.first(record, self.sigma, p) for record in records]
 
@@ -126,7 +125,7 @@ class _Fit:
         self.starts = [self.replayer.settled(record, self.sigma, p) for record in self.records]
 
     def misfit(self, names: Sequence[str], changes: Array) -> Array:
-        """(Simulated less measured)/noise of all that was measured."""
+        """(Simulated less measured)/noise of all measurements."""
         p = self._parameters(names, changes)
         parts = []
         for record, start in zip(self.records, self.starts, strict=True):
@@ -140,13 +139,15 @@ class _Fit:
         def misfit(changes: Array) -> Array:
             return self.misfit(names, changes)
 
-        at, there = start, misfit(start)
+        at, residual = start, misfit(start)
         for _ in range(_STEPS):
-            before = float(there @ there)
-            at, there = downhill(misfit, at, there, difference_slopes(misfit, at, there, np.full(len(at), reach)))
-            if before - float(there @ there) < 1e-3 * before:
+            before = float(residual @ residual)
+            at, residual = downhill(
+                misfit, at, residual, difference_slopes(misfit, at, residual, np.full(len(at), reach))
+            )
+            if before - float(residual @ residual) < 1e-3 * before:
                 break
-        return at, float(there @ there)
+        return at, float(residual @ residual)
 
     def _parameters(self, names: Sequence[str], changes: Array) -> Array:
         model = self.replayer.model
@@ -155,22 +156,22 @@ class _Fit:
         return model.parameter_values({name: values[name] + float(change) for name, change in moved.items()})
 
 
-def closes(passed: Sequence[Passed]) -> bool:
-    """Whether the improved card follows the trials any better: a name that closes nothing of the gap is a guess.
+def closes_gap(passed: Sequence[Passed]) -> bool:
+    """Whether the improved card follows the trials better: a name that does not reduce the gap is a guess.
 
-    By the middle of the ratios of misfits after and before, over all signals of all trials, for a simulation that runs
-    away in one of them outweighs all others in a mean.
+    By the median ratio of misfits after and before, over all signals of all trials, for one diverging simulation
+    would dominate a mean.
     """
-    rms = [np.array([replay.misfit(which) for replay in passed]) for which in ("before", "after")]
-    if min(np.sqrt(np.mean(one**2)) for one in rms) < MUCH:
+    rms = [np.array([replay.misfit(version) for replay in passed]) for version in ("before", "after")]
+    if min(np.sqrt(np.mean(values**2)) for values in rms) < MUCH:
         return True
     shown = [(replay, name) for replay in passed for name in replay.noise if np.isfinite(replay.measured[name]).any()]
-    pairs = [(one.misfit("before", name), one.misfit("after", name)) for one, name in shown]
+    pairs = [(replay.misfit("before", name), replay.misfit("after", name)) for replay, name in shown]
     ratios = [1.0 if before == after else after / before if np.isfinite(before) else 0.0 for before, after in pairs]
     return bool(np.median(ratios) < CLOSES)
 
 
-def worse(passed: Sequence[Passed], tolerance: float = 0.05) -> tuple[str, ...]:
+def worse_trials(passed: Sequence[Passed], tolerance: float = 0.05) -> tuple[str, ...]:
     """Names of the trials that the improved card follows worse than the given one, by more than chance.
 
     Parameters
@@ -179,57 +180,57 @@ def worse(passed: Sequence[Passed], tolerance: float = 0.05) -> tuple[str, ...]:
         Fitting and held-out trials alike.
     tolerance : float
         Share of the misfit before (at least of 1, the noise) by which the misfit after may be larger. The default of
-        0.05 is ours: the estimated size of a true effect is not exact either.
+        0.05 is a project choice: the estimated size of a true effect is not exact either.
     """
     pairs = [(replay.name, replay.misfit("before"), replay.misfit("after")) for replay in passed]
     return tuple(name for name, before, after in pairs if after > before + tolerance * max(before, 1.0))
 
 
 REMAINS = 1.5
-"""Misfit in noise units from which a part of the gap is said to remain (project choice): what is left beyond the
-noise is then as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
+"""Misfit in noise units from which a remaining gap is reported (project choice): the misfit beyond the noise is
+then as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
 
 EVEN = 0.5
 """A probability below which the opposite is likelier."""
 
 _BETTER = 0.05
-"""A black box follows better if its misfit is smaller by this share (project choice), as in :func:`worse`."""
+"""A black box follows better if its misfit is smaller by this share (project choice), as in :func:`worse_trials`."""
 
 
 def proof_cautions(gap: Gap) -> tuple[str, ...]:
-    """What is to be said against a name: how much of the gap remains, and whether a mere refit does better.
+    """Objections to a name: the remaining share of the gap, and a mere refit that follows better.
 
-    Both are asked of the held-out trials, or of the fitting ones where none was held out. The share that remains is the
+    Both are of the held-out trials, or of the fitting ones where none was held out. The share that remains is the
     root of the mean square beyond the noise after, over that before.
     """
     held = any(replay.held_out for replay in gap.passed)
-    before, after, box = (gap.misfit(which, held_out=held) for which in ("before", "after", "black_box"))
+    before, after, box = (gap.misfit(version, held_out=held) for version in ("before", "after", "black_box"))
     if gap.verdict not in (MISSING, AMBIGUOUS) or not gap.effects or before is None or after is None:
         return ()
-    of, told = f"the {'held-out' if held else 'fitting'} trials", []
-    least = min(gap.effects, key=lambda one: one.confidence)
+    group, notices = f"the {'held-out' if held else 'fitting'} trials", []
+    least = min(gap.effects, key=lambda effect: effect.confidence)
     if gap.verdict == MISSING and least.confidence < EVEN:
-        told.append(
-            f"{least.name} is named as the simplest explanation, but those without it are likelier together: its "
+        notices.append(
+            f"{least.name} is named as the simplest explanation, but those without it are together likelier: its "
             f"probability is {least.confidence:.2g}"
         )
     if round(after, 6) > REMAINS:
-        told.append(
-            _what_remains(before, after, of, "named, but" if gap.verdict == MISSING else "with the best of them")
+        notices.append(
+            _what_remains(before, after, group, "named, but" if gap.verdict == MISSING else "with the best of them")
         )
     if box is not None and box < (1 - _BETTER) * after:
-        told.append(
-            f"a linear black box with as many coefficients follows {of} better (misfit {box:.3g} against {after:.3g}): "
-            "the name explains less than a mere refit does"
+        notices.append(
+            f"a linear black box with as many coefficients follows {group} better (misfit {box:.3g} against "
+            f"{after:.3g}): the name explains less than a mere refit does"
         )
-    return tuple(told)
+    return tuple(notices)
 
 
-def _what_remains(before: float, after: float, of: str, begin: str) -> str:
+def _what_remains(before: float, after: float, group: str, begin: str) -> str:
     if not np.isfinite(after):
-        return f"{begin} the simulation of one of {of} runs away: something more is missing, or the form differs"
+        return f"{begin} the simulation of one of {group} diverges: something more is missing, or the form differs"
     share = np.sqrt((after**2 - 1) / (before**2 - 1)) if before > 1 else np.inf
-    much = f"{100 * share:.0f} % of the gap of {of} remains" if share < 1 else f"the gap of {of} is no smaller"
+    much = f"{100 * share:.0f} % of the gap of {group} remains" if share < 1 else f"the gap of {group} is not smaller"
     return (
         f"{begin} {much} (misfit {after:.3g} in noise units, before {before:.3g}): something more is missing, or its "
         "form differs"
@@ -237,12 +238,12 @@ def _what_remains(before: float, after: float, of: str, begin: str) -> str:
 
 
 OUTLYING = 3.0
-"""A trial is named as an outlier if it lies this many standard errors from what all others say (project choice)."""
+"""A trial is named as an outlier if it is this many standard errors from the mean of all others (project choice)."""
 
 
 @dataclass(frozen=True)
 class TrialConsistency:
-    """Whether trials, each for itself, want the same value.
+    """Agreement of the estimates of single trials.
 
     Parameters
     ----------
@@ -251,7 +252,7 @@ class TrialConsistency:
     q, p : float
         Cochran's Q, and the probability of one as large if all trials have the same true value.
     outliers : tuple of str
-        Trials that lie :data:`OUTLYING` standard errors or more from all the others, the farthest first.
+        Trials that are :data:`OUTLYING` standard errors or more from all the others, the farthest first.
     """
 
     mean: float
@@ -279,7 +280,7 @@ def trial_consistency(trials: Mapping[str, tuple[float, float]]) -> TrialConsist
     """
     kept = {name: pair for name, pair in trials.items() if np.isfinite(pair).all()}
     if not kept:
-        raise ValueError("no trial tells the value")
+        raise ValueError("no trial determines the value")
     values, errors = np.array(list(kept.values())).T
     weights = errors**-2.0
     mean = float(weights @ values / weights.sum())
@@ -287,9 +288,9 @@ def trial_consistency(trials: Mapping[str, tuple[float, float]]) -> TrialConsist
     p = float(chi2.sf(q, len(kept) - 1)) if len(kept) > 1 else 1.0
     away = {}
     if len(kept) > 1:
-        others = weights.sum() - weights
-        rest = (weights @ values - weights * values) / others
-        z = np.abs(values - rest) / np.sqrt(1 / weights + 1 / others)
+        remaining_weights = weights.sum() - weights
+        remaining_mean = (weights @ values - weights * values) / remaining_weights
+        z = np.abs(values - remaining_mean) / np.sqrt(1 / weights + 1 / remaining_weights)
         away = dict(zip(kept, map(float, z), strict=True))
     outliers = sorted((name for name, z in away.items() if z >= OUTLYING), key=lambda name: -away[name])
     return TrialConsistency(mean, float(weights.sum() ** -0.5), q, p, tuple(outliers))

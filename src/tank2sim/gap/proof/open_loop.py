@@ -20,28 +20,29 @@ from tank2sim.simulation.rows import Chain, RowFunction
 from tank2sim.simulation.scheme import runge_kutta_step
 
 INSTANTS = 40
-"""Instants in L/u0 at which simulated and measured are compared (ours: the fastest motion lasts a tenth of L/u0)."""
+"""Instants in L/u0 at which simulated and measured are compared (project choice: the fastest motion lasts a tenth of
+L/u0)."""
 
 COARSEST = 2.5
 """Integration steps of up to this many of the model's own: RK4 then errs by less than 1e-3 of a gear's motion in one
 step, (1/2)^5/120, far below any noise."""
 
 _FAR = 1e6
-"""A motion with a state beyond this many of its nominal sizes has left all bounds."""
+"""A motion with a state beyond this many of its nominal sizes is out of bounds."""
 
 FIRST = 0.25
-"""The initial state is read off the first quarter of L/u0 (ours: nothing of a ship's motion changes much in it)."""
+"""The initial state is read off the first quarter of L/u0 (project choice: a ship's motion hardly changes in it)."""
 
 TRUST = 2.0
 """That reading is trusted to this many of its standard errors, as the motion is not quite straight (project choice)."""
 
 ASTERN = 0.2
-"""Standard deviation of an initial speed that nothing tells of, as a share of the nominal one (project choice)."""
+"""Standard deviation of an initial speed that was not measured, as a share of the nominal one (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)
 class InputRecord:
-    """A trial as a replayer takes it.
+    """A trial on the equal steps of a replayer.
 
     Parameters
     ----------
@@ -50,8 +51,8 @@ class InputRecord:
     begin_s, step_s : float
         First instant in the trial's own time, and the step of the inputs, s.
     inputs : array (n, nu)
-        Each row held for a step: as fine as the sampling, for the mean of two orders is an order that nobody gave, and
-        a gear with a largest rate makes something else of it.
+        Each row held for a step: as fine as the sampling, for the mean of two orders was never ordered, and a
+        gear at its largest rate responds differently to it.
     every : int
         Each n-th instant is compared.
     readings : array (m, ny)
@@ -73,29 +74,29 @@ class InputRecord:
 
 
 _LEAST_RUDDER = math.radians(1.0)
-"""A first order below this is no execute (project choice)."""
+"""A first order below this is not an execute (project choice)."""
 
 _ROUNDS = 5
-"""Gauss-Newton steps, and times that the weights of signals are found again; both settle in two or three."""
+"""Gauss-Newton steps, and updates of the weights of signals; both converge in two or three."""
 
 _SETTLED = 0.02
 """A step below this share of the trust in the first reading ends the search."""
 
 _NEAR = 2.0
 """A model that follows a record to within this many times the noise is taken as right when its initial state is sought
-(project choice): what is left then is too small to bend it far."""
+(project choice): the remaining misfit is too small to bias it much."""
 
 
 class Replayer:
     """A card's model ready to be run under recorded inputs, in machine code.
 
-    What is compared is what a sensor shows: ``sensor.psi`` where the model has it (a sensor at fault), else
+    Readings of sensors are compared: ``sensor.psi`` where the model has it (a sensor at fault), else
     ``motion.psi``, under the name ``motion.psi``.
 
     Parameters
     ----------
     card : ManoeuvringCard
-        Its effects' inputs (a current's speed) keep what the card says unless the trial measured them.
+        Its effects' inputs (a current's speed) keep the values of the card unless the trial measured them.
     driven_by : str
         ``angle`` or ``order``.
     seen : sequence of str
@@ -121,27 +122,27 @@ class Replayer:
         return states
 
     def seen_along(self, start: Array, inputs: Array, step_s: float, p: Array, every: int) -> Array:
-        """What the sensors show (m, ny) at every n-th of the instants of :meth:`states`."""
+        """Readings of the sensors (m, ny) at every n-th of the instants of :meth:`states`."""
         states = self.states(start, inputs, step_s, p)[::every]
         return self._shown(states, inputs[::every], p)[0]
 
     def motion(self, record: InputRecord, start: Array, p: Array) -> Array:
-        """What the sensors show (m, ny) at the instants of a record that are compared."""
+        """Readings of the sensors (m, ny) at the compared instants of a record."""
         return self.seen_along(start, record.inputs, record.step_s, p, record.every)
 
     def settled(self, record: InputRecord, sigma: Array, p: Array) -> Array:
-        """Initial state (nx,) that suits a record best, kept near what its first seconds show.
+        """Initial state (nx,) that fits a record best, kept near the state of its first seconds.
 
         `sigma` (ny,) is the noise of the signals. If with the least squares in noise units the model follows the record
-        to within :data:`_NEAR`, these have the word. Else the model is wrong, and would bend its heading and speed to
-        correct its track: then a signal weighs less by the size of its own residual beyond the noise (the likelihood
-        of a deviation that is not known), of which only one value in L/u0 counts as independent.
+        to within :data:`_NEAR`, the least squares hold. Else the model is wrong, and its heading and
+        speed would be biased to correct its track: then a signal weighs less by the size of its own residual beyond the
+        noise (the likelihood of a deviation that is not known), of which only one value in L/u0 counts as independent.
         """
-        start, left = self._settled_from(record, sigma, p, wrong=False)
-        return start if left < _NEAR else self._settled_from(record, sigma, p, wrong=True)[0]
+        start, misfit = self._settled_from(record, sigma, p, wrong=False)
+        return start if misfit < _NEAR else self._settled_from(record, sigma, p, wrong=True)[0]
 
     def first(self, record: InputRecord, sigma: Array, p: Array) -> Array:
-        """Initial state (nx,) as its first seconds show it, with the rudder that suits the record better."""
+        """Initial state (nx,) from the first seconds, with the rudder that fits the record better."""
         guess, _ = _first_state(self, record, sigma, p)
         known = ~np.isnan(record.readings)
 
@@ -162,7 +163,7 @@ class Replayer:
         return [guess, amidships]
 
     def _settled_from(self, record: InputRecord, sigma: Array, p: Array, *, wrong: bool) -> tuple[Array, float]:
-        """Initial state by Gauss-Newton, and the misfit that it leaves: inf where the motion leaves all bounds.
+        """Initial state by Gauss-Newton, and its misfit: inf where the motion exceeds all bounds.
 
         Derivatives are differences: an effect need not be smooth.
         """
@@ -171,16 +172,16 @@ class Replayer:
         column = np.broadcast_to(np.arange(len(sigma)), known.shape)[known]
         number = np.maximum(np.bincount(column, minlength=len(sigma)), 1)
 
-        def left(start: Array) -> Array:
+        def residuals(start: Array) -> Array:
             return (self.motion(record, start, p) - record.readings)[known]
 
-        start, residual, before, slopes = guess, left(guess), np.zeros(0), np.zeros(0)
+        start, residual, before, slopes = guess, residuals(guess), np.zeros(0), np.zeros(0)
         for turn in range(_ROUNDS):
             size = np.sqrt(np.bincount(column, residual**2, len(sigma)) / number)
             beyond = INSTANTS * np.maximum(size**2 - sigma**2, 0) if wrong else 0.0
             weights = np.sqrt(sigma**2 + beyond)
             if turn % 2 == 0:  # the motion is nearly linear in its initial state
-                slopes = difference_slopes(left, start, residual, 1e-4 * self._nominal)
+                slopes = difference_slopes(residuals, start, residual, 1e-4 * self._nominal)
             if not (np.isfinite(weights).all() and np.isfinite(slopes).all()):
                 break
             if wrong and turn and np.allclose(weights, before, rtol=0.02):
@@ -189,11 +190,11 @@ class Replayer:
             J = np.concatenate([slopes / each[:, None], np.diag(1 / spread)])
 
             def misfit(start: Array, each: Array = each) -> Array:
-                return np.append(left(start) / each, (start - guess) / spread)
+                return np.append(residuals(start) / each, (start - guess) / spread)
 
-            then, all_left = downhill(misfit, start, np.append(residual / each, (start - guess) / spread), J)
+            then, all_residuals = downhill(misfit, start, np.append(residual / each, (start - guess) / spread), J)
             near = float(np.max(np.abs(then - start) / spread)) < _SETTLED
-            start, residual = then, all_left[: len(column)] * each
+            start, residual = then, all_residuals[: len(column)] * each
             if near:
                 break
         whole = float(np.sqrt(np.mean((residual / sigma[column]) ** 2)))
@@ -201,9 +202,9 @@ class Replayer:
 
 
 def shown_by(model: Model, seen: Sequence[str]) -> RowFunction:
-    """What sensors show of the variables `seen` (``sensor.psi`` where the model has it) as a function of x, u, p."""
-    names = [name.replace("motion.", "sensor.") for name in seen]
-    shown = ca.vcat([model.symbol(sensor if sensor in model else own) for sensor, own in zip(names, seen, strict=True)])
+    """Readings of the variables `seen` (``sensor.psi`` where the model has it) as a function of x, u, p."""
+    pairs = [(name.replace("motion.", "sensor."), name) for name in seen]
+    shown = ca.vcat([model.symbol(sensor if sensor in model else name) for sensor, name in pairs])
     arguments = [model.x, model.u, model.p]
     return RowFunction(ca.Function("shown", arguments, [ca.densify(model.expand(shown))], {"cse": True}))
 
@@ -213,29 +214,29 @@ def parts_of(model: Model, step_s: float) -> int:
     return max(1, math.ceil(step_s / (COARSEST * model.step_s) - 1e-9))
 
 
-def difference_slopes(function: Callable[[Array], Array], at: Array, there: Array, reach: Array) -> Array:
-    """Derivatives (n, k) of ``function(at) = there`` (n,) by forward differences of `reach` (k,)."""
+def difference_slopes(function: Callable[[Array], Array], at: Array, value: Array, reach: Array) -> Array:
+    """Derivatives (n, k) of ``function(at) = value`` (n,) by forward differences of `reach` (k,)."""
     columns = []
     for place, step in enumerate(reach):
         moved = at.copy()
         moved[place] += step
-        columns.append((function(moved) - there) / step)
+        columns.append((function(moved) - value) / step)
     return np.stack(columns, axis=1)
 
 
-def downhill(misfit: Callable[[Array], Array], at: Array, there: Array, slopes: Array) -> tuple[Array, Array]:
-    """One Gauss-Newton step from ``misfit(at) = there``: the new point and its misfit.
+def downhill(misfit: Callable[[Array], Array], at: Array, value: Array, slopes: Array) -> tuple[Array, Array]:
+    """One Gauss-Newton step from ``misfit(at) = value``: the new point and its misfit.
 
-    A step that does not lower the sum of squares is halved; if none does, the old point is kept. `misfit` may answer
-    nan where a motion leaves all bounds: such points are never taken.
+    A step that does not lower the sum of squares is halved; if none does, the old point is kept. `misfit` may return
+    nan where a motion exceeds all bounds: such points are never taken.
     """
-    step, cost = np.linalg.lstsq(slopes, there, rcond=None)[0], float(there @ there)
+    step, cost = np.linalg.lstsq(slopes, value, rcond=None)[0], float(value @ value)
     for _ in range(8):
         then = misfit(at - step)
         if float(then @ then) < cost:
             return at - step, then
         step = step / 2
-    return at, there
+    return at, value
 
 
 def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
@@ -244,7 +245,7 @@ def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
     Raises
     ------
     InputError
-        The trial is too short, or has none of the signals that are seen.
+        The trial is too short, or has none of the compared signals.
     """
     model, sampling = replayer.model, sampling_step(trial)
     stride = max(1, int(model.step_s / sampling + 1e-6))
@@ -278,7 +279,7 @@ def delayed(card: ManoeuvringCard, model: Model, inputs: Array, step_s: float, p
 
 
 def later(values: Array, steps: float) -> Array:
-    """Values (n,), each held for a step, as they come so many steps (any number) later; the first stands before it."""
+    """Values (n,), each held for a step, delayed by `steps` (any number); the first value is held before."""
     n = len(values)
     edges: Array = np.arange(-1, n + 2, dtype=float)
     edges[0], edges[-1] = -n - abs(steps), n + 1 + abs(steps)
@@ -293,7 +294,7 @@ def _first_state(replayer: Replayer, record: InputRecord, sigma: Array, p: Array
     """State read off the first seconds of a record, and how far to trust it (nx,) each.
 
     A straight line through :data:`FIRST` L/u0 of each signal; a speed or heading that was not measured is that of the
-    track. What nothing tells of is the model's own start, within a nominal value.
+    track. States that were not measured have the model's start, within a nominal value.
     """
     model, step = replayer.model, record.every * record.step_s
     n = max(3, round(FIRST * INSTANTS))
@@ -303,7 +304,7 @@ def _first_state(replayer: Replayer, record: InputRecord, sigma: Array, p: Array
     track = [values.get(f"motion.{axis}") for axis in "xy"]
     if track[0] is not None and track[1] is not None:
         north, east = track[0][2] / step, track[1][2] / step
-        rate = sum(one[1] for one in track if one is not None) / (n * step)
+        rate = sum(line[1] for line in track if line is not None) / (n * step)
         way = float(np.hypot(north, east))
         if way > rate:
             read.setdefault("motion.u", (way, rate + ASTERN * way))

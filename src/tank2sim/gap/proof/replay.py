@@ -14,6 +14,10 @@ from tank2sim.gap.result import Passed
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import driven_model
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
+from tank2sim.records.audit.noise import record_noise
+
+_LEAST_NOISE = 1e-6
+"""Noise of a record without any, SI: all its signals then weigh alike. Project choice."""
 
 
 def replay_trials(
@@ -24,7 +28,7 @@ def replay_trials(
     held_out: bool,
     corrected: Measured | None = None,
 ) -> tuple[Passed, ...]:
-    """Each trial as measured and as both cards' models make it, from the initial state that suits the record best.
+    """Each trial as measured and as both cards' models simulate it, from the initial state that fits the record best.
 
     Measurements are compared as they are, at :data:`INSTANTS` instants in L/u0 or as often as they were sampled, so
     that `noise` is that of one reading.
@@ -32,17 +36,17 @@ def replay_trials(
     Parameters
     ----------
     card, improved : ManoeuvringCard
-        As given, and with what was found.
+        As given, and with the effects found.
     measured : Measured
         As recorded.
     noise : mapping
         Variable to the standard deviation of one reading, SI; others are not compared.
     held_out : bool
-        What is noted of these trials.
+        Whether these trials are held out.
     corrected : Measured, optional
         The same trials without the faults of sensors that were found. The improved card then follows these; its motion
-        is shown as the faulty sensor would have it, with what the correction took away put back, so that it stands
-        next to what was recorded and its misfit is that in the corrected data.
+        is shown as the faulty sensor would, with the correction added back, so that it is comparable with the
+        recorded signals and its misfit is that in the corrected data.
 
     Raises
     ------
@@ -51,23 +55,42 @@ def replay_trials(
     """
     replayers = {True: _replayer(card, measured, noise)}
     replayers[False] = replayers[True] if improved is card else _replayer(improved, measured, noise)
-    mended = {trial.name: trial for trial in corrected.trials} if corrected is not None else {}
+    corrected_trials = {trial.name: trial for trial in corrected.trials} if corrected is not None else {}
     results = []
     for trial in measured.trials:
         record = input_record(replayers[True], trial)
         before = _simulated(replayers[True], record, noise)
         after = before
-        if improved is not card or trial.name in mended:
-            better = input_record(replayers[False], mended.get(trial.name, trial))
+        if improved is not card or trial.name in corrected_trials:
+            better = input_record(replayers[False], corrected_trials.get(trial.name, trial))
             after = _simulated(replayers[False], better, noise) + np.nan_to_num(record.readings - better.readings)
         results.append(_passed(record, replayers[True].seen, noise, held_out, (before, after)))
     return tuple(results)
 
 
+def replay_by_card(card: ManoeuvringCard, measured: Measured) -> tuple[Passed, ...]:
+    """Each trial, free running with its recorded inputs over its whole length, from the state that fits it best.
+
+    Signals are weighted by their stated or estimated noise.
+
+    Raises
+    ------
+    InputError
+        A trial is too short, or none of its signals can be compared.
+    """
+    squares: dict[str, list[float]] = {}
+    for trial in measured.trials:
+        for signal, deviation in record_noise(trial).items():
+            if signal in OBSERVED_SIGNALS:
+                squares.setdefault(OBSERVED_SIGNALS[signal], []).append(deviation**2)
+    noise = {name: max(float(np.sqrt(np.mean(values))), _LEAST_NOISE) for name, values in squares.items()}
+    return replay_trials(card, card, measured, noise, held_out=True)
+
+
 def with_black_box(
     results: Sequence[Passed], box: ManoeuvringCard, measured: Measured, noise: Mapping[str, float]
 ) -> tuple[Passed, ...]:
-    """The same with what a black box's card makes of each trial."""
+    """The same replays with the simulation of each trial by a black box's card."""
     replayer = _replayer(box, measured, noise)
     trials = {trial.name: trial for trial in measured.trials}
     boxed = []
@@ -94,17 +117,17 @@ def _simulated(replayer: Replayer, record: InputRecord, noise: Mapping[str, floa
 def _passed(
     record: InputRecord, seen: Sequence[str], noise: Mapping[str, float], held_out: bool, simulated: tuple[Array, Array]
 ) -> Passed:
-    there = [name for place, name in enumerate(seen) if not np.isnan(record.readings[:, place]).all()]
+    measured_names = [name for place, name in enumerate(seen) if not np.isnan(record.readings[:, place]).all()]
 
     def columns(values: Array) -> dict[str, Array]:
-        return {name: values[:, seen.index(name)] for name in there}
+        return {name: values[:, seen.index(name)] for name in measured_names}
 
     before, after = simulated
     return Passed(
         name=record.name,
         held_out=held_out,
         time_s=record.times,
-        noise={name: noise[name] for name in there},
+        noise={name: noise[name] for name in measured_names},
         measured=columns(record.readings),
         before=columns(before),
         after=columns(after),

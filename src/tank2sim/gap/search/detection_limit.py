@@ -1,8 +1,8 @@
-"""What could hide in the trials: up to what size each effect would be there without showing.
+"""Detection limits: the size of each effect below which the trials could not show it.
 
-By the linear screen, at the noise of the best explanation and at others that would cost little: without the effect the
-noise is estimated as well, and may take an effect for a slow error of a sensor or a force that nobody modelled. An
-effect that is not linear in its size is asked again at the size that was found.
+By the linear screen, at the noise of the best explanation and at other noises of little additional cost: without the
+effect the noise is estimated as well, and may absorb an effect as a slow sensor error or an unmodelled force. An effect
+that is not linear in its size is evaluated again at the size that was found.
 """
 
 from __future__ import annotations
@@ -23,32 +23,32 @@ from tank2sim.gap.search.screening import Screen, Variant, resized, variants_at
 _Sizes = dict[str, dict[str, float]]
 
 SIZES = (1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0)
-"""Shares of its typical value at which an effect without amplitude is asked whether it would show."""
+"""Shares of its typical value at which an effect without amplitude is tested for visibility."""
 
 LOUDER = 3.0
 """Factor on the level of one slow error or one force at a time, of the noises that may hide an effect (project
 choice)."""
 
 SURE = float(norm.ppf(0.95))
-"""Standard deviations by which a size must be beyond what is enough, to show in 95 of 100 such sets of trials."""
+"""Standard deviations by which a size must exceed the threshold, to show in 95 of 100 such sets of trials."""
 
 _ROUNDS = 2
-"""How often the size is sought at which an effect shows (project choice): its force need not grow with it."""
+"""Iterations on the size at which an effect shows (project choice): its force need not be linear in it."""
 
 _NEAR = 1.2
 """A size that the next round would change by less than this factor is found."""
 
 
 def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
-    """Effect to {parameter: size} below which the trials could not show it, next to what is explained already.
+    """Effect to {parameter: size} below which the trials could not show it, in addition to the effects of `best`.
 
     Parameters
     ----------
     search : Search
     best : ExplanationFit
-        What is explained already.
+        The explanation with the effects that are taken as present.
     enough : float
-        By how much the score must fall for an effect more, beyond its price.
+        Decrease of the score that an additional effect needs, beyond its penalty.
 
     Returns
     -------
@@ -58,35 +58,35 @@ def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
     """
     likelihood = search.likelihood
     sized = [
-        variant for variant in search.variants if variant.amplitudes and variant.effect not in best.explained.effects
+        variant for variant in search.variants if variant.amplitudes and variant.effect not in best.hypothesis.effects
     ]
     for _ in range(_ROUNDS):
         shares = _shares(likelihood, [best], sized, enough)
-        sized = [_at_its_size(likelihood, one, own) for one, own in zip(sized, shares, strict=True)]
+        sized = [_at_its_size(likelihood, *pair) for pair in zip(sized, shares, strict=True)]
     shares = _shares(likelihood, [best, *_louder(likelihood, best)], sized, enough)
     sizes: _Sizes = {}
-    for one, own in zip(sized, shares, strict=True):
-        for amplitude, share in zip(one.amplitudes, own, strict=True):
-            parameter = one.explained.asked[amplitude].parameter
-            largest = max(abs(parameter.lowest(one.explained.card)), abs(parameter.maximum))
-            size = min(float(abs(one.theta[amplitude]) * share), largest)
-            known = sizes.setdefault(one.effect, {})
+    for variant, variant_shares in zip(sized, shares, strict=True):
+        for amplitude, share in zip(variant.amplitudes, variant_shares, strict=True):
+            parameter = variant.hypothesis.estimated[amplitude].parameter
+            largest = max(abs(parameter.lowest(variant.hypothesis.card)), abs(parameter.maximum))
+            size = min(float(abs(variant.theta[amplitude]) * share), largest)
+            known = sizes.setdefault(variant.effect, {})
             known[parameter.name] = max(size, known.get(parameter.name, 0.0))
-    others = {variant.effect: variant for variant in search.variants if not variant.amplitudes}
-    for one in (other for name, other in others.items() if name not in best.explained.effects):
-        value = _hidden_value(likelihood, best, one, enough)
+    replacing = {variant.effect: variant for variant in search.variants if not variant.amplitudes}
+    for variant in (replacing[name] for name in replacing if name not in best.hypothesis.effects):
+        value = _hidden_value(likelihood, best, variant, enough)
         if value is not None:
-            sizes[one.effect] = {one.explained.asked[0].parameter.name: value}
+            sizes[variant.effect] = {variant.hypothesis.estimated[0].parameter.name: value}
     return sizes
 
 
-def _at_its_size(likelihood: Likelihood, one: Variant, shares: Array) -> Variant:
-    """The variant at the size at which it shows, if that is another one."""
-    return resized(likelihood, one, shares) if np.any(np.abs(np.log(shares)) > np.log(_NEAR)) else one
+def _at_its_size(likelihood: Likelihood, variant: Variant, shares: Array) -> Variant:
+    """The variant at the size at which it shows, if that differs from its own."""
+    return resized(likelihood, variant, shares) if np.any(np.abs(np.log(shares)) > np.log(_NEAR)) else variant
 
 
 def _louder(likelihood: Likelihood, best: ExplanationFit) -> Iterator[ExplanationFit]:
-    """The same with one slow error of a sensor, or one force that nobody modelled, larger than it is."""
+    """Copies of a fit with the level of one slow sensor error, or of one unmodelled force, increased."""
     low, high = likelihood.belief.bounds
     sensors = len(likelihood.motion.seen)
     for place in (*range(sensors, 2 * sensors), *range(3 * sensors, 3 * sensors + FORCE_STATES)):
@@ -101,27 +101,27 @@ def _shares(
     """Shares of each variant's amplitudes, each alone, at which it would show even at the noise that hides it best."""
     screens = [Screen(likelihood, noise, every) for noise in noises]
     shares = []
-    for place, one in enumerate(every):
-        priced = int(np.count_nonzero(one.explained.prior[1] == 0))
+    for place, variant in enumerate(every):
+        priced = int(np.count_nonzero(variant.hypothesis.prior[1] == 0))
         least = enough + priced * np.log(likelihood.count / COUNTED)
         columns = screens[0].places[place]
         largest = np.zeros(len(columns))
         for screen in screens:
-            left = least - (screen.cost - screens[0].cost)
-            if left > 0:
-                own = np.sqrt(np.maximum(np.diag(screen.gram)[columns], 1e-12))
-                largest = np.maximum(largest, (np.sqrt(left) + SURE) / own)
+            remaining = least - (screen.cost - screens[0].cost)
+            if remaining > 0:
+                sizes = np.sqrt(np.maximum(np.diag(screen.gram)[columns], 1e-12))
+                largest = np.maximum(largest, (np.sqrt(remaining) + SURE) / sizes)
         shares.append(largest)
     return shares
 
 
-def _hidden_value(likelihood: Likelihood, best: ExplanationFit, one: Variant, enough: float) -> float | None:
-    """For an effect without amplitude: the tried value that comes nearest to being visible and is not."""
-    tried = variants_at(likelihood, one, SIZES)
+def _hidden_value(likelihood: Likelihood, best: ExplanationFit, variant: Variant, enough: float) -> float | None:
+    """For an effect without amplitude: the tried value nearest to the limit of visibility that is not visible."""
+    tried = variants_at(likelihood, variant, SIZES)
     if not tried:
         return None
     screen = Screen(likelihood, best, tried)
-    least = enough + len(one.theta) * np.log(likelihood.count / COUNTED)
+    least = enough + len(variant.theta) * np.log(likelihood.count / COUNTED)
     seen = [screen.gram[places[0], places[0]] for places in screen.places]
     hidden = [(size, float(v.theta[0])) for size, v in zip(seen, screen.every, strict=True) if size < least]
     return max(hidden)[1] if hidden else None

@@ -1,9 +1,9 @@
 """The search for the explanation: none, single effects, pairs; screened together, then each fitted by itself.
 
 The screen is linear and at one noise, the fit is not and estimates the noise again; so the screen only proposes. It is
-asked at the noise of "none" (large, for it must cover what is missing), and again at that of the best explanation so
-far. Pairs are screened as pairs, for with two effects missing the best single one is often neither of them; and each
-half of the best pair is tried with all others.
+evaluated at the noise of "none" (large, for it must cover the missing effect), and again at that of the best
+explanation so far. Pairs are screened as pairs, for with two effects missing the best single one is often neither of
+them; and each effect of the best pair is tried with all other effects.
 """
 
 from __future__ import annotations
@@ -16,32 +16,32 @@ import numpy as np
 
 from tank2sim.errors import InputError
 from tank2sim.gap.inference.fit import ExplanationFit
-from tank2sim.gap.inference.fit_all import Fitting, Known, Proposal, StageReport, thetas_of
+from tank2sim.gap.inference.fit_all import Fitting, HypothesisCache, Proposal, StageReport, thetas_of
 from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.inference.prior import candidate_explanations
 from tank2sim.gap.search.screening import Screen, Screened, Variant, variants
 
 FIRST_SINGLES, FIRST_PAIRS = 4, 2
 SINGLES, PAIRS, WITH_THE_BEST, SWAPS = 4, 3, 3, 2
-"""How many proposals of each screen are fitted (project choice)."""
+"""Number of proposals of each screen that are fitted (project choice)."""
 
 WORTH = 5.0
 """Proposals whose gain in the screen is further below 0 are not fitted (project choice)."""
 
 HOPELESS = 100.0
-"""Nor those whose gain, or whose score when fitted roughly, is so far behind the best of their kind (project
-choice)."""
+"""Proposals whose gain, or whose score in the first fit, is this far behind the best of their kind are not fitted
+(project choice)."""
 
 _FAR = 300.0
-"""An explanation so far behind the best at the noise of the best has its own noise not sought, nor is it tried again
-(project choice)."""
+"""The noise of an explanation this far behind the best, at the noise of the best, is not estimated, and it is not tried
+again (project choice)."""
 
 ROUNDS_OF_NONE, ROUNDS, LAST_ROUNDS = (15,), (0, 10), (20,)
 """Iterations on the noise after each solution for the parameters, see :meth:`.likelihood.Likelihood.at_best`. A score
 is known to some 100 after 6, to 20 after 15, to a few after 25."""
 
 SAME_NOISE = (0,)
-"""Rounds that only ask for the parameters, at the nearest of the noises given."""
+"""Rounds that estimate the parameters alone, at the best of the given noises."""
 
 CLOSE = 30.0
 """Explanations within this of the best are fitted once more at the end (project choice)."""
@@ -49,7 +49,7 @@ CLOSE = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What was tried.
+    """Result of the search.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Search:
     @property
     def none(self) -> ExplanationFit:
         """The card as it is."""
-        return next(fit for fit in self.fits if not fit.explained.effects)
+        return next(fit for fit in self.fits if not fit.hypothesis.effects)
 
 
 def search(
@@ -79,47 +79,47 @@ def search(
     *,
     most: int = 2,
 ) -> Search:
-    """Find what explains the trials best.
+    """Find the explanations that fit the trials best.
 
     Parameters
     ----------
     likelihood : Likelihood
     progress : callable
-        Told what is being fitted.
+        Called with the name of each explanation that is fitted.
     executor : Executor, optional
         Fits several explanations at once.
     names : sequence of str, optional
-        Effects to ask for; by default all that can be.
+        Effects to try; by default all that can be tried.
     most : int
         Effects at a time, 1 or 2.
     """
-    known, believed = Known(likelihood.none), likelihood.belief.logs
-    rough = Fitting(likelihood, known, progress, executor)
+    hypotheses, believed = HypothesisCache(likelihood.none), likelihood.belief.logs
+    rough = Fitting(likelihood, hypotheses, progress, executor)
     rough.fit([Proposal({}, [believed], ROUNDS_OF_NONE)])
     chosen = candidate_explanations(likelihood.none.card, likelihood.none.driven_by) if names is None else names
-    every = tuple(one for name in chosen for one in _variants(likelihood, known, name))
+    every = tuple(variant for name in chosen for variant in _variants(likelihood, hypotheses, name))
     none = rough.best()
     first = Screen(likelihood, none, every)
     proposed = [*first.singles()[:FIRST_SINGLES], *(first.pairs()[:FIRST_PAIRS] if most > 1 else ())]
     rough.fit(_proposals(rough, proposed, [none.logs, believed], least=2))
     best = rough.best()
-    # Once more about the motion of the best: what it leaves over is small, and none is judged by it as well.
-    fitting = Fitting(likelihood.about(best), known, progress, executor)
-    again = [one for one in rough.found.values() if one.score < best.score + HOPELESS and one.explained.effects]
+    # Again about the motion of the best: its residual is small, and "none" is scored about the same motion.
+    fitting = Fitting(likelihood.about(best), hypotheses, progress, executor)
+    again = [fit for fit in rough.found.values() if fit.score < best.score + HOPELESS and fit.hypothesis.effects]
     fitting.fit(
         [Proposal({}, [best.logs, none.logs, believed], ROUNDS_OF_NONE)]
-        + [Proposal(thetas_of(one), [best.logs, one.logs], ROUNDS) for one in again]
+        + [Proposal(thetas_of(fit), [best.logs, fit.logs], ROUNDS) for fit in again]
     )
     _explore(fitting, every, believed, most)
     _polish(fitting)
-    fits = sorted(fitting.found.values(), key=lambda one: one.score)
+    fits = sorted(fitting.found.values(), key=lambda fit: fit.score)
     return Search(fitting.likelihood, tuple(fits), every)
 
 
-def _variants(likelihood: Likelihood, known: Known, name: str) -> tuple[Variant, ...]:
-    """Variants of an effect; none if the card lacks what it needs (revolutions, for an effect of the propeller)."""
+def _variants(likelihood: Likelihood, hypotheses: HypothesisCache, name: str) -> tuple[Variant, ...]:
+    """Variants of an effect; none if the card lacks its data (revolutions, for an effect of the propeller)."""
     try:
-        return variants(likelihood, known(name))
+        return variants(likelihood, hypotheses(name))
     except InputError:
         return ()
 
@@ -132,7 +132,7 @@ def _explore(fitting: Fitting, every: Sequence[Variant], believed: np.ndarray, m
     singles, pairs = second.singles(), second.pairs() if most > 1 else ()
     proposed = [single for single in singles[:SINGLES] if single.gain > singles[0].gain - HOPELESS]
     proposed += [pair for pair in pairs[:PAIRS] if pair.gain > singles[0].gain]
-    if len(best.explained.effects) == 1 and most > 1:
+    if len(best.hypothesis.effects) == 1 and most > 1:
         proposed += _on_top_of(fitting, best, every)[:WITH_THE_BEST]
     fitting.fit(_proposals(fitting, proposed, starts, least=1, limit=best.score + _FAR))
     if not fitting.has(2) or fitting.best(2).score > fitting.best(1).score - WORTH:
@@ -140,26 +140,26 @@ def _explore(fitting: Fitting, every: Sequence[Variant], believed: np.ndarray, m
     pair = fitting.best(2)
     swapped: list[Screened] = []
     for name, theta in thetas_of(pair).items():
-        alone = fitting.known(name)
+        alone = fitting.hypotheses(name)
         base = ExplanationFit(alone, theta, np.zeros((len(theta), len(theta))), pair.logs, np.inf, pair.change)
         swapped += [Screened({name: theta}, 0.0), *_on_top_of(fitting, base, every)[:SWAPS]]
     fitting.fit(_proposals(fitting, swapped, [pair.logs], limit=pair.score + _FAR))
 
 
 def _polish(fitting: Fitting) -> None:
-    """The best with its noise well settled; the others at this noise as well; those that are then close once more.
+    """Refit the best with a converged noise, all others at this noise, and those that are then close once more.
 
-    Scores at noises that are not settled differ by more than explanations do. What shares an effect with the best is
-    tried from the best's parameters too: a search downhill may have stopped elsewhere.
+    Scores at noises that have not converged differ by more than explanations do. An explanation that shares an effect
+    with the best is also tried from the best's parameters: a descent may have stopped at another minimum.
     """
     fitting.fit([Proposal(thetas_of(fitting.best()), [fitting.best().logs], LAST_ROUNDS)])
     best = fitting.best()
-    own = thetas_of(best)
-    begins = [{name: own[name]} for name in own if len(own) > 1]
-    for one in (one for one in fitting.found.values() if one.score < best.score + _FAR or not one.explained.effects):
-        theirs = thetas_of(one)
-        begins += [theirs] if one is not best else []
-        begins += [theirs | {name: own[name] for name in own if name in theirs}] if len(theirs) > 1 else []
+    best_thetas = thetas_of(best)
+    begins = [{name: theta} for name, theta in best_thetas.items() if len(best_thetas) > 1]
+    for fit in (fit for fit in fitting.found.values() if fit.score < best.score + _FAR or not fit.hypothesis.effects):
+        thetas = thetas_of(fit)
+        begins += [thetas] if fit is not best else []
+        begins += [{name: best_thetas.get(name, theta) for name, theta in thetas.items()}] if len(thetas) > 1 else []
     fitting.fit([Proposal(thetas, [best.logs], SAME_NOISE) for thetas in begins])
     best = fitting.best()
     close = [
@@ -167,11 +167,11 @@ def _polish(fitting: Fitting) -> None:
         for effects, fit in fitting.found.items()
         if fit is not best and (fit.score < best.score + CLOSE or fit is fitting.best(len(effects)))
     ]
-    fitting.fit([Proposal(thetas_of(one), [one.logs, best.logs], LAST_ROUNDS) for one in close])
+    fitting.fit([Proposal(thetas_of(fit), [fit.logs, best.logs], LAST_ROUNDS) for fit in close])
 
 
 def _on_top_of(fitting: Fitting, base: ExplanationFit, every: Sequence[Variant]) -> list[Screened]:
-    """Each effect together with those of `base`."""
+    """Each effect in addition to the effects of `base`."""
     proposals = Screen(fitting.likelihood, base, every).singles()
     return [Screened({**thetas_of(base), **proposal.thetas}, proposal.gain) for proposal in proposals]
 
@@ -183,10 +183,10 @@ def _proposals(
     least: int = 0,
     limit: float = np.inf,
 ) -> list[Proposal]:
-    """Those that promise something and were not fitted yet; the first `least` of them in any case."""
+    """Proposals with a sufficient gain that were not fitted yet; the first `least` of them in any case."""
     proposals: dict[tuple[str, ...], Proposal] = {}
-    for place, one in enumerate(screened):
-        proposal = Proposal(one.thetas, starts, ROUNDS, limit)
-        if proposal.effects not in fitting.found and (one.gain > -WORTH or place < least):
+    for place, proposed in enumerate(screened):
+        proposal = Proposal(proposed.thetas, starts, ROUNDS, limit)
+        if proposal.effects not in fitting.found and (proposed.gain > -WORTH or place < least):
             proposals.setdefault(proposal.effects, proposal)
     return list(proposals.values())

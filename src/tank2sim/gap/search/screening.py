@@ -1,8 +1,8 @@
 """Every effect and every pair at once, from one pass of the filter at one noise.
 
-Each effect is asked at one or several sizes and shapes (its *variants*); what each adds to the motion is a column, or
-one for each of its amplitudes. With the card's coefficients projected out (Schur complement), what any set of columns
-explains follows from one Gram matrix.
+Each effect is evaluated at one or several sizes and shapes (its *variants*); the contribution of each to the motion is
+a column, or one for each of its amplitudes. With the card's coefficients projected out (Schur complement), the gain of
+any set of columns follows from one Gram matrix.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tank2sim.gap.inference.kalman_filter import observer
 from tank2sim.gap.inference.likelihood import COUNTED, Likelihood
 
 LEAST_AMPLITUDE = 0.05
-"""Sizes below this share of the typical one are taken as this (a search must begin somewhere)."""
+"""Smallest initial size, as a share of the typical one (a search cannot begin at zero)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,18 +30,18 @@ class Variant:
 
     Parameters
     ----------
-    explained : Hypothesis
+    hypothesis : Hypothesis
         The ship with this effect alone.
     theta : array (k,)
         Size and shape.
     amplitudes : tuple of int
-        Places in `theta` of what makes the effect vanish; empty for an effect that replaces something.
+        Indices in `theta` of the parameters that make the effect vanish; empty for an effect that replaces something.
     driving : array (R, T - 1, 6, a)
     shown : array (R, T, ny, a)
-        What each amplitude adds at its size in `theta` (one column for an effect without amplitudes).
+        Contribution of each amplitude at its size in `theta` (one column for an effect without amplitudes).
     """
 
-    explained: Hypothesis
+    hypothesis: Hypothesis
     theta: Array
     amplitudes: tuple[int, ...]
     driving: Array
@@ -50,13 +50,13 @@ class Variant:
     @property
     def effect(self) -> str:
         """Name of the effect."""
-        return self.explained.effects[0]
+        return self.hypothesis.effects[0]
 
     def allowed(self, shares: Array) -> bool:
         """Whether the bounds allow the signs of amplitudes in such shares of their size here (a,)."""
         places = list(self.amplitudes)
         sizes = self.theta[places] * shares[: len(places)]
-        low, high = (bound[places] for bound in self.explained.bounds)
+        low, high = (bound[places] for bound in self.hypothesis.bounds)
         return bool(np.all((sizes >= 0) | (low < 0)) and np.all((sizes <= 0) | (high > 0)))
 
     def start(self, shares: Array) -> Array:
@@ -64,56 +64,52 @@ class Variant:
         theta = self.theta.copy()
         for place, share in zip(self.amplitudes, shares, strict=False):
             theta[place] *= np.sign(share or 1.0) * max(abs(share), LEAST_AMPLITUDE)
-        low, high = self.explained.bounds
+        low, high = self.hypothesis.bounds
         inside: Array = np.clip(theta, low, high)
         return inside
 
 
-def variants(likelihood: Likelihood, explained: Hypothesis) -> tuple[Variant, ...]:
+def variants(likelihood: Likelihood, hypothesis: Hypothesis) -> tuple[Variant, ...]:
     """An effect at each of its typical shapes.
 
     Parameters
     ----------
     likelihood : Likelihood
-    explained : Hypothesis
+    hypothesis : Hypothesis
         With one effect.
     """
     card = likelihood.none.card
     grids = [
-        one.parameter.typical_values(card) if one.parameter.default is None else (explained.prior[0][place],)
-        for place, one in enumerate(explained.asked)
+        estimate.parameter.typical_values(card) if estimate.parameter.default is None else (hypothesis.prior[0][place],)
+        for place, estimate in enumerate(hypothesis.estimated)
     ]
-    amplitudes = tuple(
-        place
-        for place, one in enumerate(explained.asked)
-        if one.parameter.absent is not None and one.parameter.default is None
-    )
-    return tuple(_variant(likelihood, explained, np.array(theta), amplitudes) for theta in product(*grids))
+    amplitudes = tuple(place for place, estimate in enumerate(hypothesis.estimated) if estimate.is_amplitude)
+    return tuple(_variant(likelihood, hypothesis, np.array(theta), amplitudes) for theta in product(*grids))
 
 
-def variants_at(likelihood: Likelihood, one: Variant, shares: Sequence[float]) -> tuple[Variant, ...]:
+def variants_at(likelihood: Likelihood, variant: Variant, shares: Sequence[float]) -> tuple[Variant, ...]:
     """A variant with its first parameter at shares of its value, where the effect's bounds allow it."""
-    low, high = one.explained.bounds
-    thetas = [np.concatenate([[share * one.theta[0]], one.theta[1:]]) for share in shares]
+    low, high = variant.hypothesis.bounds
+    thetas = [np.concatenate([[share * variant.theta[0]], variant.theta[1:]]) for share in shares]
     inside = [theta for theta in thetas if low[0] <= theta[0] <= high[0]]
-    return tuple(_variant(likelihood, one.explained, theta, one.amplitudes) for theta in inside)
+    return tuple(_variant(likelihood, variant.hypothesis, theta, variant.amplitudes) for theta in inside)
 
 
-def resized(likelihood: Likelihood, one: Variant, shares: Array) -> Variant:
-    """A variant with its amplitudes in shares of what they were (a,), as far as the effect's bounds allow."""
-    return _variant(likelihood, one.explained, one.start(shares), one.amplitudes)
+def resized(likelihood: Likelihood, variant: Variant, shares: Array) -> Variant:
+    """A variant with its amplitudes multiplied by `shares` (a,), as far as the effect's bounds allow."""
+    return _variant(likelihood, variant.hypothesis, variant.start(shares), variant.amplitudes)
 
 
-def _variant(likelihood: Likelihood, explained: Hypothesis, theta: Array, amplitudes: tuple[int, ...]) -> Variant:
-    absent = np.array([one.parameter.absent if one.parameter.absent is not None else np.nan for one in explained.asked])
+def _variant(likelihood: Likelihood, hypothesis: Hypothesis, theta: Array, amplitudes: tuple[int, ...]) -> Variant:
     columns = []
-    for one in amplitudes or (None,):
+    for amplitude in amplitudes or (None,):
         alone = theta.copy()
-        others = [place for place in amplitudes if place != one]
-        alone[others] = absent[others]
-        columns.append(likelihood.added(explained, alone))
+        for place in amplitudes:
+            if place != amplitude:
+                alone[place] = hypothesis.estimated[place].parameter.absent
+        columns.append(likelihood.added(hypothesis, alone))
     driving, shown = (np.stack(parts, axis=-1) for parts in zip(*columns, strict=True))
-    return Variant(explained, theta, amplitudes, driving, shown)
+    return Variant(hypothesis, theta, amplitudes, driving, shown)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +121,7 @@ class Screened:
     thetas : mapping
         Effect to its parameters to begin a search from.
     gain : float
-        By which the score falls, the price of the parameters paid.
+        Decrease of the score, after the penalty of the parameters.
     """
 
     thetas: dict[str, Array]
@@ -138,7 +134,7 @@ class Screened:
 
 
 class Screen:
-    """What each set of variants would explain, at one noise.
+    """Gain of each set of variants, at one noise.
 
     Attributes
     ----------
@@ -149,49 +145,50 @@ class Screen:
     ----------
     likelihood : Likelihood
     base : ExplanationFit
-        About which and at whose noise: of "none", or of what is taken as there already.
+        The fit about which, and at the noise of which: "none", or the effects that are assumed present.
     every : sequence of Variant
     """
 
     def __init__(self, likelihood: Likelihood, base: ExplanationFit, every: Sequence[Variant]):
         self.likelihood, self.base = likelihood, base
-        self.every = tuple(one for one in every if one.effect not in base.explained.effects)
-        there = base.explained
-        what = likelihood.linear(there, base.theta) if there.effects else likelihood.base
-        seen = observer(what, base.noise)
-        own = likelihood.columns(there, base.theta, likelihood.coefficient_columns).scaled(base.width)
-        driving = np.concatenate([own.driving, *(one.driving for one in self.every)], axis=-1)
-        shown = np.concatenate([own.shown, *(-one.shown for one in self.every)], axis=-1)
+        self.every = tuple(variant for variant in every if variant.effect not in base.hypothesis.effects)
+        assumed = base.hypothesis
+        linear = likelihood.linear(assumed, base.theta) if assumed.effects else likelihood.base
+        seen = observer(linear, base.noise)
+        columns = likelihood.columns(assumed, base.theta, likelihood.coefficient_columns).scaled(base.width)
+        driving = np.concatenate([columns.driving, *(variant.driving for variant in self.every)], axis=-1)
+        shown = np.concatenate([columns.shown, *(-variant.shown for variant in self.every)], axis=-1)
         flat = seen.whitened(driving, shown).reshape(-1, driving.shape[-1])
         gram = flat.T @ flat
-        count = own.driving.shape[-1]
-        # The residual is free of the coefficients (known beforehand) and of what is there already (not known).
+        count = columns.driving.shape[-1]
+        # The coefficients (with a prior) and the assumed effects (without) are projected out of the residual.
         held = np.arange(1, count)
         kept = np.concatenate([[0], np.arange(count, len(gram))])
-        known = np.concatenate([np.maximum(there.prior[1], 1e-12), np.ones(count - 1 - own.asked)])
+        known = np.concatenate([np.maximum(assumed.prior[1], 1e-12), np.ones(count - 1 - columns.parameter_count)])
         inner = cho_factor(gram[np.ix_(held, held)] + np.diag(known))
         mixed = gram[np.ix_(held, kept)]
-        mixed[: own.asked, 0] += there.prior[1] * (base.theta - there.prior[0])
+        mixed[: columns.parameter_count, 0] += assumed.prior[1] * (base.theta - assumed.prior[0])
         self.gram = gram[np.ix_(kept, kept)] - mixed.T @ cho_solve(inner, mixed)
         believed = likelihood.belief.cost(base.logs)[0]
         self.cost = float(seen.log_det + self.gram[0, 0] + 2 * np.sum(np.log(np.diag(inner[0]))) + believed)
-        widths = [one.driving.shape[-1] for one in self.every]
+        widths = [variant.driving.shape[-1] for variant in self.every]
         ends = 1 + np.cumsum(widths)
         self.places = [np.arange(end - width, end) for end, width in zip(ends, widths, strict=True)]
 
     def of(self, chosen: Sequence[int]) -> tuple[float, Array]:
         """Gain of some variants together, and the shares of their amplitudes; none where a sign is not allowed."""
-        places = np.concatenate([self.places[one] for one in chosen])
-        block = self.gram[np.ix_(places, places)]
+        gram_places = np.concatenate([self.places[place] for place in chosen])
+        block = self.gram[np.ix_(gram_places, gram_places)]
         size = np.sqrt(np.maximum(np.diag(block), 1e-300))
         scaled = block / np.outer(size, size) + 1e-9 * np.eye(len(block))
-        pull = -self.gram[places, 0] / size
+        pull = -self.gram[gram_places, 0] / size
         shares = np.linalg.solve(scaled, pull)
-        asked = sum(np.count_nonzero(self.every[one].explained.prior[1] == 0) for one in chosen)
-        price = asked * np.log(self.likelihood.count / COUNTED)
+        free_parameters = sum(np.count_nonzero(self.every[place].hypothesis.prior[1] == 0) for place in chosen)
+        price = free_parameters * np.log(self.likelihood.count / COUNTED)
         found = shares / size
-        ends = np.cumsum([len(self.places[one]) for one in chosen])
-        if not all(self.every[one].allowed(part) for one, part in zip(chosen, np.split(found, ends[:-1]), strict=True)):
+        ends = np.cumsum([len(self.places[place]) for place in chosen])
+        parts = zip(chosen, np.split(found, ends[:-1]), strict=True)
+        if not all(self.every[place].allowed(part) for place, part in parts):
             return -float(price), np.zeros(len(found))
         return float(pull @ shares - price), found
 
@@ -207,12 +204,12 @@ class Screen:
 
     def pairs(self, of_each: int = 2) -> tuple[Screened, ...]:
         """Each pair of effects at the best of some variants of each, the best first."""
-        names = dict.fromkeys(one.effect for one in self.every)
+        names = dict.fromkeys(variant.effect for variant in self.every)
         kept: dict[str, list[int]] = {name: [] for name in names}
         for place in sorted(range(len(self.every)), key=lambda place: -self.of([place])[0]):
-            one = self.every[place].effect
-            if len(kept[one]) < of_each:
-                kept[one].append(place)
+            effect = self.every[place].effect
+            if len(kept[effect]) < of_each:
+                kept[effect].append(place)
         chosen = []
         for a, b in combinations(names, 2):
             chosen.append(max(product(kept[a], kept[b]), key=lambda pair: self.of(pair)[0]))
@@ -228,4 +225,4 @@ class Screen:
                 for place, begin in zip(places, begins, strict=False)
             ]
             found.append(Screened(dict(zip((self.every[place].effect for place in places), starts, strict=True)), gain))
-        return tuple(sorted(found, key=lambda one: -one.gain))
+        return tuple(sorted(found, key=lambda screened: -screened.gain))

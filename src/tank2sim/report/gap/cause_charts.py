@@ -9,7 +9,7 @@ import altair as alt
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.gap.outcome.export import estimate_in_file, in_file_units, joined, meant
+from tank2sim.gap.outcome.export import effect_parameter_name, estimate_in_file, in_file_units, joined
 from tank2sim.gap.result import Gap, MissingForce, MissingSignal, NextTest
 from tank2sim.records.thinning import thin_points
 from tank2sim.report.gap.charts import SETS, small
@@ -259,7 +259,7 @@ def agreement_chart(gap: Gap, *, title: str = "") -> alt.HConcatChart | None:
 def _agreement_panel(
     gap: Gap, variable: str, trials: Mapping[str, tuple[float, float]], *, named: bool
 ) -> alt.LayerChart:
-    effect, parameter = meant(variable)
+    effect, parameter = effect_parameter_name(variable)
     words, unit = in_words(in_file_units(parameter, 0.0)[0])
     whole = next(
         (

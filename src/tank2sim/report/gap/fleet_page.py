@@ -9,7 +9,7 @@ from typing import Any
 
 import altair as alt
 
-from tank2sim.gap.fleet.summary import REPORT_FILE, FleetTold, ShipTold
+from tank2sim.gap.fleet.summary import REPORT_FILE, FleetSummary, ShipSummary
 from tank2sim.gap.result import AMBIGUOUS, GAP_VERDICTS, MISSING
 from tank2sim.report.gap.text import effect_in_words, parameter_in_words, with_error
 from tank2sim.report.kit.chart_parts import NUMBER, data, series_look
@@ -25,7 +25,7 @@ _CHART = "The line is the noise; the scale is logarithmic. Where nothing was add
 _BEFORE, _AFTER = "card as given", "card found"
 
 
-def fleet_page(fleet: FleetTold) -> Page:
+def fleet_page(fleet: FleetSummary) -> Page:
     """Return the page, for the folder in which each ship has a page of its own."""
     found = [ship for ship in fleet.ships if not ship.fault]
     sections = []
@@ -52,7 +52,7 @@ def fleet_page(fleet: FleetTold) -> Page:
     )
 
 
-def _figures(fleet: FleetTold) -> list[KeyFigure]:
+def _figures(fleet: FleetSummary) -> list[KeyFigure]:
     counts = fleet.verdicts
     figures = [KeyFigure(label="Ships", value=str(len(fleet.ships)))]
     figures += [
@@ -65,7 +65,7 @@ def _figures(fleet: FleetTold) -> list[KeyFigure]:
     return figures
 
 
-def _ships(found: list[ShipTold]) -> PageTable:
+def _ships(found: list[ShipSummary]) -> PageTable:
     rows: list[list[Cell]] = [
         [
             Link(text=ship.folder, path=f"{ship.folder}/{REPORT_FILE}"),
@@ -82,7 +82,7 @@ def _ships(found: list[ShipTold]) -> PageTable:
     return PageTable(caption="What was found", columns=[Column(title=head, digits=7) for head in heads], rows=rows)
 
 
-def _effects(ship: ShipTold) -> str:
+def _effects(ship: ShipSummary) -> str:
     """Effects with their parameters, ± one standard error; or all that it may be."""
     named = "; ".join(_effect(effect) for effect in ship.effects)
     if ship.verdict == AMBIGUOUS:
@@ -104,7 +104,7 @@ def _hundredths(misfit: float | None) -> float | None:
     return None if misfit is None else round(misfit, 2)
 
 
-def _misfit_chart(found: list[ShipTold]) -> alt.LayerChart | None:
+def _misfit_chart(found: list[ShipSummary]) -> alt.LayerChart | None:
     """Misfit of each ship before and after, a row each; None where no simulation came to its end."""
     rows = [
         {"ship": ship.folder, "run": label, "misfit": _hundredths(misfit)}
@@ -148,7 +148,7 @@ def fleet_page_of_json(found: Json) -> Page:
     """Return the page of ``fleet.json`` alone: ships by the names of their folders, without links to their pages."""
     names = ("name", "verdict", "misfit", "trials", "fault")
     ships = tuple(
-        ShipTold(
+        ShipSummary(
             folder=ship["folder"],
             effects=tuple(ship.get("effects") or ()),
             alternatives=tuple(ship.get("alternatives") or ()),
@@ -156,7 +156,7 @@ def fleet_page_of_json(found: Json) -> Page:
         )
         for ship in found["ships"]
     )
-    page = fleet_page(FleetTold(name=str(found["fleet"]), ships=ships, notices=tuple(found.get("notices") or ())))
+    page = fleet_page(FleetSummary(name=str(found["fleet"]), ships=ships, notices=tuple(found.get("notices") or ())))
     return replace(page, sections=[_without_links(section) for section in page.sections])
 
 
