@@ -13,7 +13,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.straight_course import OperatingPoint, straight_course
 
-__all__ = ["OperatingPoint", "jacobians", "following_states", "signal_name", "state_space", "straight_course"]
+__all__ = ["OperatingPoint", "following_states", "jacobians", "signal_name", "state_space", "straight_course"]
 
 
 def jacobians(
