@@ -66,7 +66,7 @@ def test_a_sensor_at_fault_is_not_called_a_fault_of_the_model() -> None:
 
 def test_ambiguity_names_each_explanation_once() -> None:
     gap = made_up.ambiguous()
-    assert verdict_in_words(gap).endswith("which of several effects it is: current, or wind with rudder bias.")
+    assert verdict_in_words(gap).endswith("do not distinguish several effects: current, or wind with rudder bias.")
     told = tables_of(page_of(gap))["Effects that these data cannot distinguish"].rows
     assert [row[0] for row in told] == ["current", "wind", "rudder bias"]
 

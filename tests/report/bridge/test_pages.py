@@ -129,7 +129,7 @@ def test_circles_are_with_the_largest_rudder_and_say_so(mariner_bridge, bridge) 
     page = poster_page(mariner_bridge)
     assert mariner_bridge.rudder_deg == pytest.approx(40) and "rudder 40°" in page
     assert "Turning circles at maximum rudder angle" in page
-    assert "Turning circles at 35° rudder: the card tells no maximum angle" in poster_page(bridge)
+    assert "Turning circles at 35° rudder: the card states no maximum angle" in poster_page(bridge)
 
 
 def test_orders_that_are_not_given_stay_blanks(crowded) -> None:
