@@ -290,7 +290,10 @@ class Gap:
     notices: tuple[str, ...] = ()
 
     def misfit(self, version: str, *, held_out: bool) -> float | None:
-        """Root mean square over all fitting (or held-out) trials of (simulated - measured)/noise; None without any."""
+        """Root mean square over all fitting (or held-out) trials of (simulated - measured)/noise; None without any.
+
+        `version` is ``before``, ``after`` or ``black_box``.
+        """
         trials = [replay for replay in self.passed if replay.held_out == held_out]
         if not trials or (version == "black_box" and not all(trial.black_box for trial in trials)):
             return None

@@ -90,7 +90,7 @@ def replay_by_card(card: ManoeuvringCard, measured: Measured) -> tuple[Passed, .
 def with_black_box(
     results: Sequence[Passed], box: ManoeuvringCard, measured: Measured, noise: Mapping[str, float]
 ) -> tuple[Passed, ...]:
-    """The same replays with the simulation of each trial by a black box's card."""
+    """The same replays with the simulation of each trial by a black box's card; `noise` weighs its initial states."""
     replayer = _replayer(box, measured, noise)
     trials = {trial.name: trial for trial in measured.trials}
     boxed = []
