@@ -1,4 +1,4 @@
-"""What several test modules need: the measured data beside the project, and the bundled ships."""
+"""What several test modules need: the measured data next to the project, and the bundled ships."""
 
 from __future__ import annotations
 

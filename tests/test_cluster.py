@@ -146,7 +146,7 @@ def test_who_is_interrupted_leaves_nothing_at_the_scheduler(two) -> None:
         assert client.run_on_scheduler(TASKS) == 0
 
 
-def test_workers_that_do_not_come_back_are_told(two, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_that_do_not_come_back_are_reported(two, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "PATIENCE_S", 1.0)
     with executing(two.option) as executor:
         waiting = [executor.submit(time.sleep, 5.0) for _ in range(4)]
@@ -169,6 +169,8 @@ def test_a_scheduler_that_is_lost_is_one_line_on_the_screen(two, tmp_path) -> No
                 assert process.poll() is None and time.monotonic() < until, "it has begun"
                 time.sleep(0.1)
         two.scheduler.kill()
-        _, told = process.communicate(timeout=60)
+        _, reported = process.communicate(timeout=60)
     assert process.returncode == 2
-    assert told.count("\n") == 1 and "the scheduler at dask://" in told and "was lost during the work" in told
+    assert (
+        reported.count("\n") == 1 and "the scheduler at dask://" in reported and "was lost during the work" in reported
+    )

@@ -22,7 +22,7 @@ def test_what_is_no_executor_is_refused(text: str) -> None:
         check_executor(text)
 
 
-def test_dask_that_is_not_installed_is_told_with_the_way_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dask_that_is_not_installed_is_reported_with_the_way_to_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(executors.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"pip install 'tank2sim\[dask\]'"):
         check_executor("dask://localhost:8786")
@@ -30,7 +30,7 @@ def test_dask_that_is_not_installed_is_told_with_the_way_to_it(monkeypatch: pyte
 
 @needs_dask
 @pytest.mark.slow
-def test_a_scheduler_that_is_not_there_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_is_not_there_is_reported_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "ANSWERS_WITHIN_S", 1.0)
     with pytest.raises(InputError, match="no scheduler answers"), executing(f"dask://127.0.0.1:{free_port()}"):
         pass

@@ -40,7 +40,7 @@ def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
-def test_a_full_device_is_told_and_nothing_else_is_written(tmp_path: Path) -> None:
+def test_a_full_device_is_reported_and_nothing_else_is_written(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="/dev/full: cannot be written"):
         write_together({tmp_path / "a": "a", Path("/dev/full"): "b"})
     assert not list(tmp_path.iterdir())
@@ -67,7 +67,7 @@ def test_one_file_for_two_outputs_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["n" * 300, "missing/a", "file/a", "folder", "loop"])
-def test_a_name_that_cannot_be_written_is_told_before_anything_is(tmp_path: Path, name: str) -> None:
+def test_a_name_that_cannot_be_written_is_reported_before_anything_is(tmp_path: Path, name: str) -> None:
     (tmp_path / "file").touch()
     (tmp_path / "folder").mkdir()
     (tmp_path / "loop").symlink_to("loop")

@@ -59,8 +59,8 @@ def found() -> dict[str, PaperNumbers]:
 
 @pytest.mark.parametrize("name", PRINTED)
 def test_every_printed_number_is_named_with_a_verdict(name: str, found: dict[str, PaperNumbers]) -> None:
-    told = {number.printed for number in found[name].numbers if number.verdict}
-    missing = [value for value in PRINTED[name] if not any(abs(value - own) <= 1e-9 * abs(value) for own in told)]
+    reported = {number.printed for number in found[name].numbers if number.verdict}
+    missing = [value for value in PRINTED[name] if not any(abs(value - own) <= 1e-9 * abs(value) for own in reported)]
     assert not missing
 
 

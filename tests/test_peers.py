@@ -32,7 +32,7 @@ def of_levels(error: float) -> peer_ships.Case:
     )
 
 
-def test_the_coarsest_accurate_level_is_found_and_one_out_of_reach_is_told() -> None:
+def test_the_coarsest_accurate_level_is_found_and_one_out_of_reach_is_reported() -> None:
     assert peers.accurate_level(of_levels(1.5e-4)) == (
         1.0,
         True,
@@ -57,7 +57,7 @@ def test_shipmmg_has_the_ship_on_a_steady_course_at_the_speed_of_our_card() -> N
     assert np.abs(v).max() < 1e-9
 
 
-def test_what_a_peer_needs_and_does_not_install_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_peer_needs_and_does_not_install_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(peers.MODULES, "VMM", "numpy")
     monkeypatch.setitem(peers.BESIDES, "VMM", ("numpy", "no_such_module"))
     assert "vessel-manoeuvring-models needs no_such_module, which it does not install" in peers.reason_to_skip("VMM")
@@ -68,9 +68,9 @@ def test_the_printed_table_says_what_its_columns_are(capsys: pytest.CaptureFixtu
         "none", peer_ships.MMG, "turn", "equal accuracy", "step, s 1", 969.0, 0.019, "reference", 1, None, 2
     )
     peers.show([row], {"tank2sim": 1.0})
-    told = capsys.readouterr().out
+    reported = capsys.readouterr().out
     assert all(
-        words in told
+        words in reported
         for words in ("0.01%", "35 deg", "20/20", "second overshoot", "us/s", "KVLCC2 MMG", "1.9000 % reference")
     )
 
@@ -91,7 +91,7 @@ def test_the_table_has_every_library_and_holds_ours_and_theirs_to_one_accuracy(
 ) -> None:
     pytest.importorskip("shipmmg", reason="shipmmg is not installed (the extra 'peers')")
     peers.main(["--rounds", "1", "--json", str(tmp_path / "peers.json")])
-    told = capsys.readouterr().out
+    reported = capsys.readouterr().out
     found = json.loads((tmp_path / "peers.json").read_text())
     turns = {
         row["library"]: row
@@ -101,4 +101,4 @@ def test_the_table_has_every_library_and_holds_ours_and_theirs_to_one_accuracy(
     assert {"tank2sim", "shipmmg"} <= set(turns)
     assert all(row["change"] < peers.ACCURACY for row in turns.values())
     assert 2 < turns["shipmmg"]["figure"] / 320 < 4 and math.isfinite(turns["shipmmg"]["times_ours"])
-    assert all(f"{row['figure']:.5g}" in told for row in found["rows"])
+    assert all(f"{row['figure']:.5g}" in reported for row in found["rows"])

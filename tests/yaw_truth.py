@@ -115,7 +115,7 @@ def by_steps(rates, times: np.ndarray) -> dict[str, np.ndarray]:
 def written(path: Path, truth: Truth, columns: dict[str, np.ndarray] | None = None, **comments: object) -> Path:
     """The record as a file of the program's format."""
     own = columns or record(truth)
-    told = {
+    reported = {
         "programme": "reversing" if truth.reversing else "unidirectional",
         "max_rate_radps": truth.top,
         "rise_s": truth.rise,
@@ -123,7 +123,7 @@ def written(path: Path, truth: Truth, columns: dict[str, np.ndarray] | None = No
         "torque_constant_NmpA": truth.kt,
         **comments,
     }
-    lines = [f"# {key}: {value}" for key, value in told.items() if value is not None]
+    lines = [f"# {key}: {value}" for key, value in reported.items() if value is not None]
     rows = [f"{t:.6f},{p:.12g},{i:.12g}" for t, p, i in zip(own["t"], own["psi"], own["I"], strict=True)]
     path.write_text("\n".join([*lines, "t_s,phi_rad,current_A", *rows]) + "\n")
     return path

@@ -73,7 +73,7 @@ def test_the_audit_finds_a_rudder_to_port_and_agrees_with_the_json(write):
     assert noise.loc[(str(bad), "psi_deg"), "sigma"] == pytest.approx(0.1, rel=0.1)  # what was added
 
 
-def test_a_folder_stands_for_its_trials(write, tmp_path):
+def test_a_folder_is_for_its_trials(write, tmp_path):
     write("b.csv"), write("a.csv")
     (tmp_path / "notes.csv").write_text("word\nnothing\n")
     found = t2s.audit(tmp_path)

@@ -1,4 +1,4 @@
-"""The covariance beside a card: what is written is read again, and what cannot be is refused in one line."""
+"""The covariance next to a card: what is written is read again, and what cannot be is refused in one line."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, text: str, content: str)
         read_covariance(card)
 
 
-def test_a_missing_file_is_told(tmp_path: Path, text: str) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path, text: str) -> None:
     card = card_with(tmp_path, Covariance(NAMES, MATRIX), text)
     covariance_file(tmp_path / "ship.toml").unlink()
     with pytest.raises(InputError, match="is missing"):

@@ -108,8 +108,8 @@ def test_uncertainty_left_out_is_two_percent() -> None:
 )
 def test_a_faulty_card_is_refused_with_its_place(old: str, new: str, place: str, expected: str) -> None:
     assert old in SI_CARD
-    told = refusal(SI_CARD.replace(old, new, 1))
-    assert told.startswith("ship.toml: ") and place in told and expected in told
+    reported = refusal(SI_CARD.replace(old, new, 1))
+    assert reported.startswith("ship.toml: ") and place in reported and expected in reported
 
 
 def test_a_singular_mass_matrix_is_refused() -> None:
@@ -117,8 +117,8 @@ def test_a_singular_mass_matrix_is_refused() -> None:
     body, added = card.rigid_body, card.derivatives
     coupling = (body.mass * body.x_G - added["Yrdot"]) * (body.mass * body.x_G - added["Nvdot"])
     singular = body.yaw_inertia - coupling / (body.mass - added["Yvdot"])
-    told = refusal(card.text.replace("Nrdot = -43.8e-5", f"Nrdot = {singular!r}"))
-    assert "f4 = 0" in told and "rigid_body" in told
+    reported = refusal(card.text.replace("Nrdot = -43.8e-5", f"Nrdot = {singular!r}"))
+    assert "f4 = 0" in reported and "rigid_body" in reported
 
 
 def test_positive_added_mass_is_refused() -> None:
@@ -130,9 +130,9 @@ def test_an_angle_given_in_both_units_is_refused() -> None:
     assert "given twice" in refusal(text)
 
 
-def test_an_angle_out_of_bounds_is_told_in_the_units_of_the_file() -> None:
-    told = refusal(read_card("mariner").text.replace("max_angle_deg = 40.0", "max_angle_deg = 120.0"))
-    assert "is 120" in told and "below 90" in told
+def test_an_angle_out_of_bounds_is_reported_in_the_units_of_the_file() -> None:
+    reported = refusal(read_card("mariner").text.replace("max_angle_deg = 40.0", "max_angle_deg = 120.0"))
+    assert "is 120" in reported and "below 90" in reported
 
 
 @pytest.mark.parametrize(
@@ -211,9 +211,9 @@ def test_the_propeller_term_of_a_dimensional_card_is_a_force() -> None:
 )
 def test_what_no_ship_can_have_is_refused_in_one_short_line(old: str, new: str, place: str, expected: str) -> None:
     assert old in SI_CARD
-    told = refusal(SI_CARD.replace(old, new, 1))
-    assert told.startswith("ship.toml: ") and place in told and expected in told
-    assert len(told) < 300
+    reported = refusal(SI_CARD.replace(old, new, 1))
+    assert reported.startswith("ship.toml: ") and place in reported and expected in reported
+    assert len(reported) < 300
 
 
 def test_a_name_no_file_can_have_is_refused() -> None:
@@ -231,7 +231,7 @@ def test_line_ends_and_byte_order_mark_are_written_back(tmp_path: Path) -> None:
     assert new.startswith("\ufeff\r\nformat") and "# kg\r\n" in new
 
 
-def test_an_angle_can_be_told_as_the_file_has_it() -> None:
+def test_an_angle_can_be_reported_as_the_file_has_it() -> None:
     effect = '[[effects]]\nname = "current"\nparameters = {speed_mps = 0.5, direction_deg = 30.0}\n'
     card = parse_card(f"{SI_CARD}\n{effect}", "ship.toml")
     place, value = card.in_file("effects.0.parameters.direction_rad", math.pi)

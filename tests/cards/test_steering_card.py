@@ -1,4 +1,4 @@
-"""Steering cards: angles converted at the door, faults told by file and key."""
+"""Steering cards: angles converted at the door, faults reported by file and key."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_ship_cards_are_no_steering_cards(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "reported"),
     [
         ("length_m = 148.13", "length_ft = 486", "ship.length_ft: is not a key"),
         ("length_m = 148.13", "length_m = -1", "ship.length_m"),
@@ -49,11 +49,11 @@ def test_ship_cards_are_no_steering_cards(tmp_path: Path) -> None:
         ("[ship]", "[ship", "is not TOML"),
     ],
 )
-def test_a_fault_is_told_by_its_key(old: str, new: str, told: str) -> None:
+def test_a_fault_is_reported_by_its_key(old: str, new: str, reported: str) -> None:
     assert old in TEXT
     with pytest.raises(InputError) as caught:
         parse_steering_card(TEXT.replace(old, new, 1), "own.toml")
-    assert str(caught.value).startswith("own.toml") and told in str(caught.value)
+    assert str(caught.value).startswith("own.toml") and reported in str(caught.value)
 
 
 def test_an_unknown_name_lists_what_is_bundled() -> None:

@@ -1,4 +1,4 @@
-"""``tank2sim`` as a user calls it, in the process of the tests: importing it anew for each call would take a second."""
+"""``tank2sim`` as a user calls it, in the process of the tests: importing it again takes a second each."""
 
 from __future__ import annotations
 

@@ -28,18 +28,18 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_the_json_has_gains_margins_and_the_closed_loop(result: Path) -> None:
-    told = json.loads((result / "ap.json").read_text())
-    assert told["gains"]["Kp"] == pytest.approx(1.18)
-    design = told["margins"]["at_design"]
+    reported = json.loads((result / "ap.json").read_text())
+    assert reported["gains"]["Kp"] == pytest.approx(1.18)
+    design = reported["margins"]["at_design"]
     assert design["phase_margin_deg"] == pytest.approx(96.5, abs=0.5)
     assert design["gain_margin_dB"] is None and design["stable"] is True
-    assert len(told["margins"]["at_speeds"]) == 5
-    changes = told["closed_loop"]["course_changes"]
+    assert len(reported["margins"]["at_speeds"]) == 5
+    changes = reported["closed_loop"]["course_changes"]
     assert changes["large"]["overshoot_deg"] < changes["large without anti-windup"]["overshoot_deg"]
-    assert told["closed_loop"]["largest_step_within_rate_limit_deg"] == pytest.approx(5.0 / 1.18, rel=0.01)
-    assert set(told["track"]) == {"line of sight", "with integral"}
-    assert told["weather"]["wind_from_deg"] == 45.0
-    assert any("3.9 m/s" in notice for notice in told["notices"])
+    assert reported["closed_loop"]["largest_step_within_rate_limit_deg"] == pytest.approx(5.0 / 1.18, rel=0.01)
+    assert set(reported["track"]) == {"line of sight", "with integral"}
+    assert reported["weather"]["wind_from_deg"] == 45.0
+    assert any("3.9 m/s" in notice for notice in reported["notices"])
 
 
 @pytest.mark.slow
@@ -50,7 +50,7 @@ def test_the_fmu_is_valid_and_the_page_has_its_charts(result: Path) -> None:
         assert heading in page
 
 
-def test_what_is_wrong_is_told_in_one_line_and_nothing_is_written(tmp_path: Path) -> None:
+def test_what_is_wrong_is_reported_in_one_line_and_nothing_is_written(tmp_path: Path) -> None:
     (tmp_path / "track.csv").write_text("x_m,y_m\n0,0\n0,0\n")
     (tmp_path / "short.csv").write_text("x_m,y_m\n0,0\n2,0\n0,9000\n")
     wrong = {
@@ -80,7 +80,7 @@ def test_a_tanker_that_is_unstable_is_steered_and_verified_together_with_her_fmu
     more = ["--export", "ap.fmu", "--fmi", "3", "--verify", "--json", "ap.json", "--wave-yaw", "0.1", "--seed", "5"]
     ended = tank2sim("autopilot", "kvlcc2", "--design", "lqr", *more, cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
-    told = json.loads((tmp_path / "ap.json").read_text())
-    assert told["export"]["co_simulation"]["order"] == pytest.approx(1.0, abs=0.1)
-    assert told["margins"]["at_design"]["gain_margin_down"] > 0.05
-    assert told["weather"]["seed"] == 5 and told["weather"]["wave_yaw_deg"] == pytest.approx(0.1)
+    reported = json.loads((tmp_path / "ap.json").read_text())
+    assert reported["export"]["co_simulation"]["order"] == pytest.approx(1.0, abs=0.1)
+    assert reported["margins"]["at_design"]["gain_margin_down"] > 0.05
+    assert reported["weather"]["seed"] == 5 and reported["weather"]["wave_yaw_deg"] == pytest.approx(0.1)

@@ -49,9 +49,9 @@ def test_stability_and_influence_tell_chances_and_bands(tmp_path) -> None:
     figure = "steady_radius_m@20"
     result = tank2sim("influence", "mariner", "--figure", figure, *more, "--page", "i.html", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    told = json.loads((tmp_path / "s.json").read_text())
-    spread = told["ensemble"]["figures"][figure]["standard_deviation"]
-    assert spread == pytest.approx(told["figures"][figure]["standard_error"], rel=0.8)
+    reported = json.loads((tmp_path / "s.json").read_text())
+    spread = reported["ensemble"]["figures"][figure]["standard_deviation"]
+    assert spread == pytest.approx(reported["figures"][figure]["standard_error"], rel=0.8)
     assert "Ensemble of 6" in (tmp_path / "i.html").read_text()
 
 

@@ -100,12 +100,12 @@ def test_a_current_is_written_into_a_card_a_page_and_json(folder: Path, tmp_path
     ]
     assert options.without == ("wind", "trim") and options.max_effects == 1 and options.workers == 1
 
-    told = json.loads((out / "gap.json").read_text())
+    reported = json.loads((out / "gap.json").read_text())
     assert (tmp_path / "g.json").read_text() == (out / "gap.json").read_text()
-    (effect,) = told["effects"]
+    (effect,) = reported["effects"]
     assert effect["name"] == "current" and effect["parameters"]["direction_deg"] == pytest.approx(250.0)
-    assert {one["trial"] for one in told["trials"]} == {"turn20.csv", "zigzag.csv", "turn-35.csv"}
-    assert told["where"][0]["trial"] == "turn20.csv"
+    assert {one["trial"] for one in reported["trials"]} == {"turn20.csv", "zigzag.csv", "turn-35.csv"}
+    assert reported["where"][0]["trial"] == "turn20.csv"
     improved = read_card(out / "improved.toml")
     assert isinstance(improved, ManoeuvringCard)
     assert [one.name for one in improved.effects] == ["current"]
@@ -115,8 +115,8 @@ def test_a_current_is_written_into_a_card_a_page_and_json(folder: Path, tmp_path
     assert "</html>" in (out / "report.html").read_text(encoding="utf-8")
 
     words = " ".join(result.stdout.split())
-    for told in ("The model lacks an effect: current", "0.45", "250", "m/s", "turn-35", "held out", "8.00", "1.00"):
-        assert told in words, told
+    for reported in ("The model lacks an effect: current", "0.45", "250", "m/s", "turn-35", "held out", "8.00", "1.00"):
+        assert reported in words, reported
     assert "next test: turn:35. A turn tells most." in words
     again = tank2sim("stability", str(out / "improved.toml"), cwd=tmp_path)
     assert again.returncode == 0, again.stderr
@@ -148,8 +148,10 @@ def test_what_an_earlier_run_wrote_does_not_lie_there_as_if_it_were_of_this_one(
     assert json.loads((tmp_path / "gap.json").read_text())["files"] == sorted(written(tmp_path))
     (tmp_path / "corrected/mine.csv").write_text("t_s\n")
     # As if the card had had a covariance then.
-    told = json.loads((tmp_path / "gap.json").read_text())
-    (tmp_path / "gap.json").write_text(json.dumps({**told, "files": [*told["files"], "improved.covariance.json"]}))
+    reported = json.loads((tmp_path / "gap.json").read_text())
+    (tmp_path / "gap.json").write_text(
+        json.dumps({**reported, "files": [*reported["files"], "improved.covariance.json"]})
+    )
     (tmp_path / "improved.covariance.json").write_text("{}")
     finding((), NO_EFFECT_MISSING, test=False)
     result = tank2sim(*arguments, cwd=folder)
@@ -250,7 +252,7 @@ def test_bad_input_is_one_line_and_no_folder_is_made(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_that_cannot_be_written_is_told_before_the_work(folder: Path, tmp_path: Path, finding) -> None:
+def test_a_folder_that_cannot_be_written_is_reported_before_the_work(folder: Path, tmp_path: Path, finding) -> None:
     calls = finding((CURRENT,))
     (tmp_path / "file").write_text("no folder")
     refused(tank2sim("gap", "mariner", "turn20.csv", "-o", str(tmp_path / "file"), cwd=folder), "file", "not a folder")

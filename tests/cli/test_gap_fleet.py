@@ -58,7 +58,7 @@ def ships(tmp_path: Path) -> Path:
 def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
     """Lets each ship lack a current; gives the ships that were sought. Pages are left out: they take seconds."""
     for place in ("api.gap.GapResult.page", "cli.gap_fleet.render_page"):
-        monkeypatch.setattr(f"tank2sim.{place}", lambda told: f"<html>{type(told).__name__}</html>")
+        monkeypatch.setattr(f"tank2sim.{place}", lambda reported: f"<html>{type(reported).__name__}</html>")
 
     def set_up(fails: dict[str, BaseException] | None = None) -> list[str]:
         calls: list[str] = []
@@ -95,8 +95,8 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 def touched(folder: Path) -> dict[str, tuple[int, int]]:
     """When files were written, and which they are."""
-    told = {path: path.stat() for path in folder.rglob("*") if path.is_file()}
-    return {str(path): (stat.st_mtime_ns, stat.st_ino) for path, stat in told.items()}
+    reported = {path: path.stat() for path in folder.rglob("*") if path.is_file()}
+    return {str(path): (stat.st_mtime_ns, stat.st_ino) for path, stat in reported.items()}
 
 
 def test_a_fleet_has_for_each_ship_what_the_ship_alone_has(ships: Path, tmp_path: Path, finding) -> None:
@@ -113,10 +113,10 @@ def test_a_fleet_has_for_each_ship_what_the_ship_alone_has(ships: Path, tmp_path
         assert json.loads(of_fleet.pop("run.json"))["options"]["max_effects"] == 1
         assert of_fleet == contents(tmp_path / "one" / name)
 
-    told = json.loads((tmp_path / "out/fleet.json").read_text())
+    reported = json.loads((tmp_path / "out/fleet.json").read_text())
     assert (tmp_path / "f.json").read_text() == (tmp_path / "out/fleet.json").read_text()
-    assert told["fleet"] == "ships" and told["verdicts"] == {"missing effect": 3}
-    alpha, beta, _ = told["ships"]
+    assert reported["fleet"] == "ships" and reported["verdicts"] == {"missing effect": 3}
+    alpha, beta, _ = reported["ships"]
     assert alpha["name"] == "Mariner alpha" and alpha["trials"] == {"fit": 2, "holdout": 1}
     assert alpha["effects"][0]["parameters"]["speed_mps"] == 0.45 and alpha["report"] == "alpha/report.html"
     assert alpha["misfit"]["before"]["holdout"] == pytest.approx(8.0) and beta["misfit"]["before"]["holdout"] is None
@@ -186,7 +186,7 @@ def test_what_changed_is_computed_again_and_the_rest_is_not(ships: Path, tmp_pat
     assert tank2sim(*arguments, "--without", "wind", cwd=tmp_path).returncode == 0 and calls == ["alpha", "beta"]
 
 
-def test_bad_ships_are_told_at_the_end_and_the_others_are_kept(ships: Path, tmp_path: Path, finding) -> None:
+def test_bad_ships_are_reported_at_the_end_and_the_others_are_kept(ships: Path, tmp_path: Path, finding) -> None:
     (ships / "beta/ship.toml").write_text('format = "tank2sim-ship/1"\n[ship\n')
     (ships / "empty").mkdir()
     torn = ships / "gamma ray #1/slow.csv"
@@ -199,9 +199,9 @@ def test_bad_ships_are_told_at_the_end_and_the_others_are_kept(ships: Path, tmp_
     assert trial.startswith("tank2sim: gamma ray #1: ships/gamma ray #1/slow.csv: ")
     assert "ships/empty: holds neither card nor trial, and was passed over" in result.stdout
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"alpha", "fleet.json", "fleet.html"}
-    told = json.loads((tmp_path / "out/fleet.json").read_text())
-    assert told["verdicts"] == {"missing effect": 1}
-    assert {one["folder"] for one in told["ships"] if "fault" in one} == {"beta", "gamma ray #1"}
+    reported = json.loads((tmp_path / "out/fleet.json").read_text())
+    assert reported["verdicts"] == {"missing effect": 1}
+    assert {one["folder"] for one in reported["ships"] if "fault" in one} == {"beta", "gamma ray #1"}
     torn.write_text(straight(7.0))
     calls = finding()
     assert tank2sim("gap", "ships", "-o", "out", *ONE, cwd=tmp_path).returncode == 2 and calls == ["gamma ray #1"]
@@ -212,8 +212,8 @@ def test_a_folder_that_holds_a_card_is_one_ship(ships: Path, tmp_path: Path, fin
     result = tank2sim("gap", "ships/alpha", "-o", "out", *ONE, cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     assert calls == ["alpha"] and "was taken for one ship" in result.stdout
-    told = json.loads((tmp_path / "out/gap.json").read_text())
-    assert [one["trial"] for one in told["trials"] if one["held_out"]] == ["held.csv"]
+    reported = json.loads((tmp_path / "out/gap.json").read_text())
+    assert [one["trial"] for one in reported["trials"] if one["held_out"]] == ["held.csv"]
     assert not (tmp_path / "out/run.json").exists()
 
 
@@ -242,7 +242,7 @@ def test_what_a_fleet_cannot_be_asked_is_one_line_and_nothing_is_written(
 
 
 def test_no_card_is_overwritten_by_the_results_of_its_ship(ships: Path, tmp_path: Path, finding) -> None:
-    """FOLDER inside DIR: a ship that is called like it would have its results beside the cards."""
+    """FOLDER inside DIR: a ship that is called like it would have its results next to the cards."""
     calls = finding()
     (tmp_path / "out").mkdir()
     (ships / "alpha/ship.toml").rename(ships / "alpha/improved.toml")
@@ -291,8 +291,8 @@ def whole(drifting: Path) -> dict[str, bytes]:
     """What one process makes of both, without a break."""
     result = tank2sim(*SOUGHT, "--workers", "1", "-o", "whole", cwd=drifting)
     assert result.returncode == 0, result.stderr
-    told = json.loads((drifting / "whole/fleet.json").read_text())
-    assert [[effect["name"] for effect in one["effects"]] for one in told["ships"]] == [["current"], ["current"]]
+    reported = json.loads((drifting / "whole/fleet.json").read_text())
+    assert [[effect["name"] for effect in one["effects"]] for one in reported["ships"]] == [["current"], ["current"]]
     return contents(drifting / "whole")
 
 

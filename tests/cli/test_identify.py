@@ -86,7 +86,7 @@ def test_a_card_that_is_off_comes_back_to_the_truth(folder: Path) -> None:
 
 
 def test_a_trial_of_a_model_identifies_the_ship(folder: Path) -> None:
-    """A 4 m model's zigzag, Froude-scaled, beside the ship's own turn."""
+    """A 4 m model's zigzag, Froude-scaled, next to the ship's own turn."""
     result = tank2sim("identify", "off.toml", "small.csv", "turn25.csv", "--json", "small.json", cwd=folder)
     assert result.returncode == 0, result.stderr
     assert "25 times as long" in " ".join(result.stdout.split())
@@ -141,12 +141,12 @@ def test_a_term_that_is_held_stays_as_the_card_has_it(folder: Path) -> None:
     assert after.derivatives["Nr"] != before.derivatives["Nr"]
     assert after.model.valid_speed_mps is not None and after.model.valid_speed_mps[1] > 4.9
     assert "# Identified by tank2sim" in after.text.splitlines()[0]
-    beside = read_covariance(after)  # which it refuses if its standard errors are not those of the card
-    assert beside is not None and "derivatives.Nr" in beside.names
+    covariance = read_covariance(after)  # which it refuses if its standard errors are not those of the card
+    assert covariance is not None and "derivatives.Nr" in covariance.names
     refused(tank2sim("identify", "off.toml", "zigzag20.csv", "--hold", "Nope", cwd=folder), "--hold", "Nope")
 
 
-def test_the_figures_told_are_those_of_the_card_written(folder: Path) -> None:
+def test_the_figures_reported_are_those_of_the_card_written(folder: Path) -> None:
     """Of a hard turn too, in which the ship is slower than in any of the zigzags fitted."""
     options = ("--method", "equation_error", "--members", "0")
     files = ("zigzag20.csv", "zigzag10.csv", "--holdout", "turn-35.csv")
@@ -154,14 +154,14 @@ def test_the_figures_told_are_those_of_the_card_written(folder: Path) -> None:
     assert result.returncode == 0, result.stderr
     card = read_card(str(folder / "w.toml"))
     assert isinstance(card, ManoeuvringCard) and card.model.valid_speed_mps is not None
-    told = json.loads((folder / "w.json").read_text())
+    reported = json.loads((folder / "w.json").read_text())
     trials = measured([folder / "turn-35.csv"], card).trials
     again = {one.name: one.predicted for one in predicted_figures(card, trials)}
-    found = {one["figure"]: one["predicted"] for one in told["figures"]["holdout"]}
+    found = {one["figure"]: one["predicted"] for one in reported["figures"]["holdout"]}
     assert len(found) >= 2 and found == pytest.approx(again, rel=1e-9)
     slowest = min(np.loadtxt(folder / "turn-35.csv", delimiter=",", skiprows=1)[:, 2])
     assert slowest < card.model.valid_speed_mps[0], "the turn is held out at all its speeds"
-    assert "turn-35" in told["yaw_rate_error_over_windows"]["holdout"]
+    assert "turn-35" in reported["yaw_rate_error_over_windows"]["holdout"]
 
 
 def test_trials_without_velocities_identify_what_they_show(folder: Path) -> None:
@@ -200,7 +200,7 @@ def test_holdout_takes_all_that_follow_it_up_to_the_next_option(folder: Path) ->
     assert set(found["holdout"]) == {"turn-35", "turn25", "small", "all"}
 
 
-def test_what_the_trials_demand_of_the_prior_is_told(folder: Path) -> None:
+def test_what_the_trials_demand_of_the_prior_is_reported(folder: Path) -> None:
     result = tank2sim("identify", "off.toml", *FITTED[::2], "--method", "equation_error", cwd=folder)
     assert "standard errors were widened" in " ".join(result.stdout.split())
 

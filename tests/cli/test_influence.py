@@ -57,8 +57,8 @@ def test_a_tuned_card_has_a_covariance_of_its_own_in_any_folder(tmp_path) -> Non
         cwd=tmp_path,
     )
     assert result.returncode == 0, result.stderr
-    told = " ".join(result.stdout.split())
-    assert "as if they were independent" in told and "errors of the others are independent now: Nd" in told
+    reported = " ".join(result.stdout.split())
+    assert "as if they were independent" in reported and "errors of the others are independent now: Nd" in reported
     found = read_covariance(read_card(tmp_path / "there" / "new.toml"))
     assert found is not None and found.names == names[1:]
     np.testing.assert_array_equal(found.matrix, matrix[1:, 1:])
@@ -66,8 +66,8 @@ def test_a_tuned_card_has_a_covariance_of_its_own_in_any_folder(tmp_path) -> Non
 
 def test_wishes_that_contradict_each_other_are_a_finding_unless_a_card_was_asked_for(tmp_path) -> None:
     wishes = ("influence", "mariner", "--tune", "steady_radius_m@20=640", "steady_diameter_m@20=1200")
-    told = tank2sim(*wishes, "--json", "t.json", cwd=tmp_path)
-    assert told.returncode == 0 and "contradict" in told.stdout
+    reported = tank2sim(*wishes, "--json", "t.json", cwd=tmp_path)
+    assert reported.returncode == 0 and "contradict" in reported.stdout
     assert json.loads((tmp_path / "t.json").read_text())["tuned"]["contradiction"]
     refused(tank2sim(*wishes, "-o", "new.toml", cwd=tmp_path), "contradict", "nearest")
     assert not (tmp_path / "new.toml").exists()

@@ -38,7 +38,7 @@ def test_a_reader_that_goes_away_is_no_fault(arguments) -> None:
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
 @pytest.mark.parametrize("arguments", [["ships"], ["--help"]])
-def test_a_full_output_is_told_in_one_line(arguments) -> None:
+def test_a_full_output_is_reported_in_one_line(arguments) -> None:
     with open("/dev/full", "w") as full:
         refused(into(full.fileno(), *arguments), "output cannot be written")
 

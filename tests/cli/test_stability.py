@@ -48,17 +48,17 @@ def test_a_ship_that_holds_no_straight_course_is_refused_in_one_line(tmp_path) -
 
 def test_what_leaves_the_card_and_what_is_open_says_why_on_the_screen(tmp_path) -> None:
     result = tank2sim("stability", "kvlcc2", "--no-spiral", cwd=tmp_path)
-    told = " ".join(result.stdout.split())
-    assert "advance (1)" in told and "(1) EXTRAPOLATED beyond what the card was measured in" in told
-    assert re.search(r"\(\d\) the card has no \[propulsion\]", told)
+    reported = " ".join(result.stdout.split())
+    assert "advance (1)" in reported and "(1) EXTRAPOLATED beyond what the card was measured in" in reported
+    assert re.search(r"\(\d\) the card has no \[propulsion\]", reported)
 
 
-def test_a_linear_card_has_no_curve_over_speed_and_weather_is_told(tmp_path) -> None:
+def test_a_linear_card_has_no_curve_over_speed_and_weather_is_reported(tmp_path) -> None:
     weather = '[{name = "current", parameters = {speed_mps = 0.5, direction_deg = 90.0}}]'
     arguments = ["--set", "model.kind=linear", "--set", f"effects={weather}", "--speed", "5.4", "--json", "s.json"]
     result = tank2sim("stability", "mariner", "--no-spiral", *arguments, "-o", "s.html", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     found = json.loads((tmp_path / "s.json").read_text())
     assert found["margins"]["speed"] is None and "Over the card" not in (tmp_path / "s.html").read_text()
-    told = " ".join(found["notices"])
-    assert "do not change with speed" in told and "in the card's current" in told
+    reported = " ".join(found["notices"])
+    assert "do not change with speed" in reported and "in the card's current" in reported

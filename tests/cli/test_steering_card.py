@@ -18,13 +18,13 @@ def test_a_steering_card_gives_the_tables_of_paper_4(tmp_path: Path) -> None:
     assert result.returncode == 0, result.stderr
     for words in ("399.64", "404.04", "410.58", "model of Pavlenko", "unstable on a straight course", "not given"):
         assert words in result.stdout.replace("pavlenko: ", "model of Pavlenko "), words
-    told = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
-    assert told["steady_turns"]["inoue-hirano"][3]["radius_m"] == pytest.approx(399.6, abs=0.25)
-    assert told["influence"]["inoue-hirano"]["K_percent"]["C_m_w"] == pytest.approx(7.1, abs=0.05)
-    deeper = told["combined_predictions"]["inoue-hirano-deeper"]
+    reported = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
+    assert reported["steady_turns"]["inoue-hirano"][3]["radius_m"] == pytest.approx(399.6, abs=0.25)
+    assert reported["influence"]["inoue-hirano"]["K_percent"]["C_m_w"] == pytest.approx(7.1, abs=0.05)
+    deeper = reported["combined_predictions"]["inoue-hirano-deeper"]
     assert (deeper["predicted_m"], deeper["misread_m"]) == pytest.approx((404.0, 410.6), abs=0.06)
-    assert set(told["missing"]) == {"inoue-hirano", "base", "base-restored", "pavlenko", "sobolev"}
-    assert set(told["manoeuvres"]) == {"inoue-hirano", "curve-3", "base-restored"}
+    assert set(reported["missing"]) == {"inoue-hirano", "base", "base-restored", "pavlenko", "sobolev"}
+    assert set(reported["manoeuvres"]) == {"inoue-hirano", "curve-3", "base-restored"}
     page = (tmp_path / "out.html").read_text(encoding="utf-8")
     for words in ("Steering diagrams", "Influence of each coefficient", "Turning circles", "What is missing"):
         assert words in page
@@ -40,8 +40,8 @@ def test_a_ship_card_is_scaled_to_turn_through_two_points(tmp_path: Path) -> Non
     assert result.returncode == 0, result.stderr
     again = tank2sim("influence", "own.toml", "--through", "35@35", "1400m@3", "--json", "again.json", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
-    told = json.loads((tmp_path / "again.json").read_text(encoding="utf-8"))
-    assert (told["hull_factor"], told["rudder_factor"]) == pytest.approx((1, 1), abs=1e-6)
+    reported = json.loads((tmp_path / "again.json").read_text(encoding="utf-8"))
+    assert (reported["hull_factor"], reported["rudder_factor"]) == pytest.approx((1, 1), abs=1e-6)
     card = read_card(tmp_path / "own.toml")
     assert isinstance(card, ManoeuvringCard) and "turn through 35@35 1400m@3" in card.ship.source
 
@@ -61,8 +61,8 @@ def test_two_points_have_a_page_and_a_steering_card_a_picture(tmp_path: Path) ->
 def test_a_yaw_rate_is_to_the_side_of_the_rudder(tmp_path: Path) -> None:
     result = tank2sim("influence", "kvlcc2", "--through", "30@-35", "31.5@-10", "--json", "out.json", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
-    told = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
-    assert [turn["yaw_rate_degpmin"] for turn in told["after"]] == pytest.approx([-30, -31.5])
+    reported = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
+    assert [turn["yaw_rate_degpmin"] for turn in reported["after"]] == pytest.approx([-30, -31.5])
 
 
 @pytest.mark.parametrize(

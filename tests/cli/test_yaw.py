@@ -70,7 +70,7 @@ def test_k_t_comes_from_a_body_of_known_inertia(folder):
 
 
 @pytest.mark.slow
-def test_the_page_stands_alone(folder):
+def test_the_page_is_alone(folder):
     ended = tank2sim("yaw", "water.csv", "air.csv", "--page", "yaw.html", cwd=folder)
     assert ended.returncode == 0, ended.stderr
     page = (folder / "yaw.html").read_text()
@@ -126,7 +126,7 @@ def test_a_ships_motion_is_run_at_model_size(folder):
     refused(tank2sim("yaw", "similar.csv", "--similar-to", "38,8,100,120", cwd=folder), "--simulate CARD")
 
 
-def test_theory_stands_beside_the_record(folder):
+def test_theory_is_next_to_the_record(folder):
     ended = tank2sim("yaw", "water.csv", "--theory", "0.685,0.2,0.1,0.24,0.49", "--json", "t.json", cwd=folder)
     assert ended.returncode == 0 and "reproduces" in ended.stdout, ended.stderr
     rows = {row["formula"]: row for row in json.loads((folder / "t.json").read_text())["theory"]}

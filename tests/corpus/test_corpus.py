@@ -54,7 +54,9 @@ def check(crew: Crew, command: str, numbers: range) -> None:
     outcomes = crew.all(jobs)
     print(command, len(jobs), dict(Counter(outcome.code for outcome in outcomes)))
     faults = [
-        f"{each}\n  {told}" for each, outcome in zip(jobs, outcomes, strict=True) if (told := fault(each, outcome))
+        f"{each}\n  {reported}"
+        for each, outcome in zip(jobs, outcomes, strict=True)
+        if (reported := fault(each, outcome))
     ]
     assert not faults, f"{len(faults)} of {len(jobs)}:\n" + "\n".join(faults)
 

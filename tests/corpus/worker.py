@@ -112,7 +112,7 @@ def _run(job: Job) -> Outcome:
     from tank2sim.cli import main
 
     resource.setrlimit(resource.RLIMIT_DATA, (_status("VmData") + MEMORY, resource.RLIM_INFINITY))
-    Path("/proc/self/clear_refs").write_text("5")  # the peak of the memory begins anew
+    Path("/proc/self/clear_refs").write_text("5")  # the peak of the memory begins again
     out, err = io.StringIO(), io.StringIO()
     folder = Path(tempfile.mkdtemp(prefix="corpus-"))
     code: object = None

@@ -19,9 +19,9 @@ pytestmark = pytest.mark.slow  # the whole way, which the README's first command
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict, list[str]]:
     folder = tmp_path_factory.mktemp("demo")
-    told: list[str] = []
-    found = t2s.run_demo(folder, report=told.append)
-    return folder, found.to_dict(), told
+    reported: list[str] = []
+    found = t2s.run_demo(folder, report=reported.append)
+    return folder, found.to_dict(), reported
 
 
 def test_it_tells_each_of_its_steps(demo) -> None:
@@ -79,10 +79,10 @@ def test_a_second_run_gives_the_same_files_to_the_bit(demo, tmp_path) -> None:
 
 
 def test_stopped_half_way_it_leaves_no_half_written_file(demo, tmp_path) -> None:
-    folder, _, told = demo
+    folder, _, reported = demo
 
     def stop(words: str) -> None:
-        if words == told[4]:
+        if words == reported[4]:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

@@ -86,7 +86,7 @@ def run(example: Example, folder: Path) -> str:
     return text
 
 
-def told(words: str) -> list[str]:
+def reported(words: str) -> list[str]:
     """Words and numbers of an output, without the frames of its tables."""
     return words.translate(_FRAME).split()
 
@@ -97,7 +97,7 @@ def alike(found: str, wanted: str, tolerance: float = 0.03) -> bool:
     ``...`` stands for lines left out. A number may differ by the share `tolerance`, or by as much in all of them that
     are below 1e-6.
     """
-    words = told(found)
+    words = reported(found)
     start = 0
     for block in _blocks(wanted):
         place = next((n for n in range(start, len(words)) if _same(words[n : n + len(block)], block, tolerance)), None)
@@ -110,7 +110,7 @@ def alike(found: str, wanted: str, tolerance: float = 0.03) -> bool:
 def _blocks(wanted: str) -> Iterator[list[str]]:
     for left_out, lines in groupby(wanted.splitlines(), lambda line: line.strip() == LEFT_OUT):
         if not left_out:
-            yield told("\n".join(lines))
+            yield reported("\n".join(lines))
 
 
 def _same(found: list[str], wanted: list[str], tolerance: float) -> bool:

@@ -26,7 +26,7 @@ def shown() -> Callable[[str], str]:
 
 
 @pytest.mark.parametrize(("formula", "accent"), [(r"\hat c_i", "ˆ"), (r"\dot\omega_i", "˙"), (r"\ddot{c}_i", "¨")])
-def test_a_subscript_of_an_accented_symbol_stands_beside_it(
+def test_a_subscript_of_an_accented_symbol_is_next_to_it(
     shown: Callable[[str], str], formula: str, accent: str
 ) -> None:
     found = shown(formula)

@@ -59,7 +59,7 @@ def test_the_manual_has_equations() -> None:
 
 
 @pytest.mark.parametrize("page", THEORY, ids=lambda page: page.stem)
-def test_every_equation_says_where_it_is_from_where_it_stands_and_what_holds_it(page: Path) -> None:
+def test_every_equation_says_where_it_is_from_where_it_is_and_what_holds_it(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     for found, where in zip(_EQUATION.finditer(text), places(page), strict=True):
         assert where is not None, f"{page.name}: nothing after {found[1]}"

@@ -173,10 +173,10 @@ def test_halving_the_step_changes_nothing_that_matters(integrator) -> None:
     assert coarse == pytest.approx(fine, rel=1e-6, abs=1e-7)
 
 
-def test_the_card_is_told_to_contradict_itself() -> None:
-    told = " ".join(MODEL.notices)
-    assert "0.0628 m3" in told and "+12.8 kg" in told and "0.05 m3" in told
-    assert "V^(2/3)" in told and "attitude is prescribed" in told
+def test_the_card_is_reported_to_contradict_itself() -> None:
+    reported = " ".join(MODEL.notices)
+    assert "0.0628 m3" in reported and "+12.8 kg" in reported and "0.05 m3" in reported
+    assert "V^(2/3)" in reported and "attitude is prescribed" in reported
     right = read_card("kulikovsky-velikanov", {"glider.volume_m3": 0.05, "glider.reference_area_m2": 0.0356})
     assert glider_warnings(right) == ()
 

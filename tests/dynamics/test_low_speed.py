@@ -210,7 +210,7 @@ def test_low_speed_needs_no_event_of_a_solver(mariner) -> None:
 
 
 def stated(card: ManoeuvringCard, u: float, v: float, r: float, d: float, n: float) -> np.ndarray:
-    """X, Y, N below the range of a driven Mariner, written out anew in plain numbers; n over its nominal."""
+    """X, Y, N below the range of a driven Mariner, written out again in plain numbers; n over its nominal."""
     c, half, m = card.derivatives, RHO / 2 * L**2, card.rigid_body.mass
     mass, moment = m * RHO / 2 * L**3, m * card.rigid_body.x_G * RHO / 2 * L**4
     thrust, V, e = half * U0**2 * 77e-5, math.hypot(u, v), LINEAR_DAMPING * U0
@@ -248,7 +248,7 @@ RUDDERS = {
     "lost at the bound": {},
     "as the square of speed": {"Ndu": 0.0, "Nduu": 0.0},
     "kept in the race": {"Ndu": -1.2, "Nduu": 0.45},
-    "strong beside the thrust": {"Ndu": -1.2, "Nduu": 0.45, "Yd": 3.0},
+    "strong next to the thrust": {"Ndu": -1.2, "Nduu": 0.45, "Yd": 3.0},
 }
 """Terms of the Mariner over that which is linear in the rudder."""
 
@@ -270,13 +270,13 @@ def built(rudder: str) -> Model:
     return build(with_rudder(**RUDDERS[rudder]))
 
 
-@pytest.mark.parametrize("rudder", ["as the square of speed", "kept in the race", "strong beside the thrust"])
+@pytest.mark.parametrize("rudder", ["as the square of speed", "kept in the race", "strong next to the thrust"])
 def test_at_nominal_revolutions_the_rudder_keeps_its_moment_through_the_bound(rudder) -> None:
     model = built(rudder)
     small = 1e-3  # the slope at no angle
     speeds = SLOWEST * np.sqrt(np.linspace(BLEND, 1.0, 21))
     moments = [force(model, "rudder.N", state(model, u, rudder=small), propeller_speed=N0) for u in speeds]
-    assert moments[0] == pytest.approx(moments[-1], rel=0.5 if rudder == "strong beside the thrust" else 0.3)
+    assert moments[0] == pytest.approx(moments[-1], rel=0.5 if rudder == "strong next to the thrust" else 0.3)
     assert 0.85 * min(moments[0], moments[-1]) <= min(moments) <= max(moments) <= 1.02 * max(moments[0], moments[-1])
 
 
@@ -287,7 +287,7 @@ def test_at_rest_the_rudder_gets_no_more_side_force_than_the_race_has_momentum(r
     side = abs(force(model, "rudder.Y", state(model, 0.0, rudder=small), propeller_speed=N0)) / small
     thrust = force(model, "force.X", state(model, 0.0), propeller_speed=N0) / (1 - THRUST_DEDUCTION)
     assert side <= thrust * (1 + 1e-6)
-    if rudder == "strong beside the thrust":
+    if rudder == "strong next to the thrust":
         assert side == pytest.approx(thrust, rel=1e-4)
 
 

@@ -1,4 +1,4 @@
-"""The ship's equations against (3.5), (3.8) written out anew, term by term as printed, in plain numpy."""
+"""The ship's equations against (3.5), (3.8) written out again, term by term as printed, in plain numpy."""
 
 from __future__ import annotations
 

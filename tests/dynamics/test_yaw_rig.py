@@ -1,4 +1,4 @@
-"""The rig's model against the equation written anew, and what turning the other way does."""
+"""The rig's model against the equation written again, and what turning the other way does."""
 
 import math
 from dataclasses import replace

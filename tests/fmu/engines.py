@@ -58,7 +58,7 @@ class Task:
 def libcosimpy(task: Task) -> Rows:
     """The engine of the Open Simulation Platform: inputs are overrides, outputs what an observer saw last.
 
-    A second ship sails beside the one that is read, with neither start values nor orders.
+    A second ship sails next to the one that is read, with neither start values nor orders.
     """
     from libcosimpy.CosimEnums import CosimVariableType
     from libcosimpy.CosimExecution import CosimExecution
@@ -88,7 +88,7 @@ def libcosimpy(task: Task) -> Rows:
 def ecospy(task: Task) -> Rows:
     """The ecos engine: variables by name.
 
-    A second ship sails beside the one that is read, with neither start values nor orders; and both have sailed before,
+    A second ship sails next to the one that is read, with neither start values nor orders; and both have sailed before,
     and were reset.
     """
     from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure

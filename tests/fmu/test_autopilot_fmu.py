@@ -51,6 +51,6 @@ def test_the_first_order_is_the_gain_times_the_error(design: HeadingDesign, pair
     assert np.all(np.diff(run.heading_rad) >= 0)
 
 
-def test_an_fmu_that_is_no_autopilot_is_told(pair: tuple[Path, Path]) -> None:
+def test_an_fmu_that_is_no_autopilot_is_reported(pair: tuple[Path, Path]) -> None:
     with pytest.raises(InputError, match=r"has no heading\.command"):
         co_simulate_heading(pair[0], pair[0], 0.1, step_s=1.0, duration_s=1.0)

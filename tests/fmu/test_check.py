@@ -114,7 +114,7 @@ def test_a_sign_changed_in_the_generated_code_fails(
     assert report.max_error["motion.y"] > 0.1
 
 
-def test_an_fmu_of_another_ship_is_told_by_its_variables(
+def test_an_fmu_of_another_ship_is_reported_by_its_variables(
     models: dict[str, Model], fmu_file: Callable[[str, int], Path]
 ) -> None:
     report = compare_with_model(fmu_file("body", 2), model=models["hull"])
@@ -155,7 +155,7 @@ def rewritten(source: Path, target: Path, change: Callable[[str, bytes], bytes])
 
 @FMI
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "reported"),
     [
         ('start="-0.12"', 'start="-0.22"', r"derivatives\.Yv.*start is -0\.22 in the FMU and -0\.12 in the model"),
         ('factor="1.9438444924406046"', 'factor="1.0"', "Unit m/s: DisplayUnit knots: factor is 1.0 in"),
@@ -170,29 +170,29 @@ def rewritten(source: Path, target: Path, change: Callable[[str, bytes], bytes])
         ("+ to starboard", "+ to port", "rudder.command.*description is Rudder order, . to port in"),
     ],
 )
-def test_whatever_is_falsified_in_a_description_is_told(
-    fmi: int, old: str, new: str, told: str, fmu_file: Callable[[str, int], Path], hull: Model, tmp_path: Path
+def test_whatever_is_falsified_in_a_description_is_reported(
+    fmi: int, old: str, new: str, reported: str, fmu_file: Callable[[str, int], Path], hull: Model, tmp_path: Path
 ) -> None:
     with zipfile.ZipFile(fmu_file("hull", fmi)) as archive:
         text = archive.read("modelDescription.xml")
     assert description_differences(tmp_path, text, hull, fmi) == []
     assert old.encode() in text
     differences = description_differences(tmp_path, text.replace(old.encode(), new.encode()), hull, fmi)
-    assert any(re.search(told, line) for line in differences), differences
+    assert any(re.search(reported, line) for line in differences), differences
 
 
 @pytest.mark.parametrize(
-    ("old", "told"), [(b'start="-0.12"', "start is 0.7"), (b'factor="1.9438444924406046"', "knots")]
+    ("old", "reported"), [(b'start="-0.12"', "start is 0.7"), (b'factor="1.9438444924406046"', "knots")]
 )
 def test_an_fmu_with_a_falsified_description_fails(
-    old: bytes, told: str, fmu_file: Callable[[str, int], Path], hull: Model, tmp_path: Path
+    old: bytes, reported: str, fmu_file: Callable[[str, int], Path], hull: Model, tmp_path: Path
 ) -> None:
     def falsify(name: str, data: bytes) -> bytes:
         return data.replace(old, old.split(b"=")[0] + b'="0.7"') if name == "modelDescription.xml" else data
 
     report = compare_with_model(rewritten(fmu_file("hull", 2), tmp_path / "x.fmu", falsify), model=hull)
     assert not report.passed
-    assert len(report.differences) == 1 and told in report.differences[0]
+    assert len(report.differences) == 1 and reported in report.differences[0]
     assert max(report.errors["CoSimulation"].values()) < 1e-9
 
 
@@ -237,9 +237,9 @@ def test_a_library_that_cannot_be_used_is_a_failed_check(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("end", "told"), [("abort()", "SIGABRT"), ("exit(0)", "exit code 0")])
+@pytest.mark.parametrize(("end", "reported"), [("abort()", "SIGABRT"), ("exit(0)", "exit code 0")])
 def test_a_library_that_ends_its_process_is_a_failed_check(
-    end: str, told: str, hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    end: str, reported: str, hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from tank2sim.fmu import sources
 
@@ -249,7 +249,7 @@ def test_a_library_that_ends_its_process_is_a_failed_check(
     write_fmu(hull, tmp_path / "x.fmu")
     report = compare_with_model(tmp_path / "x.fmu", model=hull)
     assert not report.passed
-    assert all("ended the process" in line and told in line for line in report.differences)
+    assert all("ended the process" in line and reported in line for line in report.differences)
     assert len(report.differences) == len(KINDS)
 
 
@@ -269,7 +269,7 @@ def test_the_report_is_plain_data_and_nothing_is_printed(
 # ---- files that are not FMU ----
 
 
-def test_files_that_are_no_fmu_are_told_in_one_line(
+def test_files_that_are_no_fmu_are_reported_in_one_line(
     fmu_file: Callable[[str, int], Path], tmp_path: Path, hull: Model
 ) -> None:
     whole = fmu_file("hull", 2).read_bytes()
@@ -299,7 +299,7 @@ def test_files_that_are_no_fmu_are_told_in_one_line(
         (b'modelIdentifier="Test_hull"', b'modelIdentifier="Other"', "no library for this machine"),
     ],
 )
-def test_a_description_that_cannot_be_used_is_told(
+def test_a_description_that_cannot_be_used_is_reported(
     old: bytes, new: bytes, problem: str, fmu_file: Callable[[str, int], Path], tmp_path: Path
 ) -> None:
     with zipfile.ZipFile(fmu_file("hull", 2)) as source, zipfile.ZipFile(tmp_path / "x.fmu", "w") as target:

@@ -224,7 +224,7 @@ def test_without_a_compiler_nothing_is_written(hull: Model, tmp_path: Path, monk
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_is_missing_is_told(hull: Model, tmp_path: Path) -> None:
+def test_a_folder_that_is_missing_is_reported(hull: Model, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be written"):
         write_fmu(hull, tmp_path / "missing" / "x.fmu")
 
@@ -235,7 +235,7 @@ def test_there_is_no_fmi_1(hull: Model, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("epoch", ["yesterday", "1e9", "99999999999999999999"])
-def test_a_source_date_epoch_that_is_no_time_is_told(
+def test_a_source_date_epoch_that_is_no_time_is_reported(
     epoch: str, hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)

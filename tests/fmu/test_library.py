@@ -223,9 +223,9 @@ def test_a_step_to_states_that_no_ship_has_is_discarded(fmi: int, instantiate: I
     assert status(fmu.instance.doStep, 1.0, 0.1) == DISCARD
     assert fmu.read(STATES) == before
     assert fmu.read(["time"]) == [1.0]
-    (told,) = fmu.log
-    assert "motion." in told and "leaves all bounds" in told
-    assert told.endswith("derivatives.thrust = 1000")  # 10 000 times its start value, the revolutions 1000 times
+    (reported,) = fmu.log
+    assert "motion." in reported and "leaves all bounds" in reported
+    assert reported.endswith("derivatives.thrust = 1000")  # 10 000 times its start value, the revolutions 1000 times
     if fmi == 2:  # FMPy does not hand on what fmi3DoStep says of it
         assert fmu.instance.getBooleanStatus(fmpy.fmi2.fmi2Terminated)
     fmu.write({"propeller.speed": 1.0, "derivatives.thrust": 0.1})

@@ -42,7 +42,7 @@ def entry(path: Path, name: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def told(mariner_fmu: Fmu) -> dict[str, Any]:
+def reported(mariner_fmu: Fmu) -> dict[str, Any]:
     """The passport of the Mariner."""
     found: dict[str, Any] = json.loads(entry(mariner_fmu(2), PASSPORT_FILE))
     return found
@@ -52,9 +52,9 @@ def told(mariner_fmu: Fmu) -> dict[str, Any]:
 
 
 def test_every_coefficient_of_the_card_is_there_with_its_value(
-    told: dict[str, Any], mariner_card: ManoeuvringCard
+    reported: dict[str, Any], mariner_card: ManoeuvringCard
 ) -> None:
-    found = {one["variable"]: one for one in told["coefficients"]}
+    found = {one["variable"]: one for one in reported["coefficients"]}
     for name, value in mariner_card.derivatives.items():
         one = found[f"derivatives.{name}"]
         assert one["value"] == value
@@ -65,15 +65,15 @@ def test_every_coefficient_of_the_card_is_there_with_its_value(
     assert not [name for name in found if name.startswith(("initial.", "origin.", "solver."))]
 
 
-def test_what_low_speed_needs_and_the_card_does_not_state_says_where_it_is_from(told: dict[str, Any]) -> None:
-    found = {one["variable"]: one["source"] for one in told["coefficients"]}
+def test_what_low_speed_needs_and_the_card_does_not_state_says_where_it_is_from(reported: dict[str, Any]) -> None:
+    found = {one["variable"]: one["source"] for one in reported["coefficients"]}
     assert "Chislett" in found["ship.draught"]  # which the card states
     assert found["ship.propeller_diameter"] == "not in the card: 0.6 of the draught, typical"
     assert "Faltinsen" in found["low_speed.drag_coefficient"]
     assert "choice" in found["low_speed.rudder_astern"]
 
 
-def test_remarks_and_uncertainties_of_a_card_are_told() -> None:
+def test_remarks_and_uncertainties_of_a_card_are_reported() -> None:
     known = origins(read_card("kvlcc2"))
     assert "Clarke" in known["derivatives.Yr"].remark
     assert (known["derivatives.Yr"].standard_error, known["derivatives.Yr"].error_from) == (0.00129, STATED_ERROR)
@@ -120,11 +120,11 @@ def test_each_bundled_ship_has_a_passport_that_machines_and_people_can_read(name
 # ---- what was found of the FMU ----
 
 
-def test_figures_are_those_of_the_simulation(told: dict[str, Any], mariner: Model) -> None:
+def test_figures_are_those_of_the_simulation(reported: dict[str, Any], mariner: Model) -> None:
     for key, manoeuvre in (("turn_35", "turn:35"), ("zigzag_20_20", "zigzag:20/20")):
         figures = simulate(mariner, parse_manoeuvre(manoeuvre)).figures
         for name, value in figures.items():
-            assert told["figures"][key][name] == pytest.approx(value, rel=1e-9)
+            assert reported["figures"][key][name] == pytest.approx(value, rel=1e-9)
 
 
 @FMI
@@ -135,7 +135,7 @@ def test_the_fmu_repeats_its_reference_run_on_the_machine_that_wrote_it(fmi: int
     assert 0 <= replay["max_error"] < 1e-9
 
 
-def test_a_library_that_answers_otherwise_is_told(hull: Model, fmu_file: Callable[[str, int], Path]) -> None:
+def test_a_library_that_answers_otherwise_is_reported(hull: Model, fmu_file: Callable[[str, int], Path]) -> None:
     reference, _ = reference_run(hull)
     assert reference is not None
     outputs = reference.outputs.copy()

@@ -56,7 +56,7 @@ def test_platforms_go_by_the_names_of_both_versions() -> None:
 
 
 @pytest.mark.parametrize("names", ["", "amiga", "linux64,", "all,linux64", "host,win64", "LINUX64"])
-def test_what_is_no_platform_is_told(names: str, tmp_path: Path) -> None:
+def test_what_is_no_platform_is_reported(names: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is not a platform") as caught:
         named_platforms(names)
     assert "x86_64-windows" in caught.value.remedy
@@ -92,14 +92,14 @@ def test_macs_share_a_folder_in_fmi_2_and_patience_is_asked_for(monkeypatch: pyt
 
     monkeypatch.setattr(fmu_libraries, "has_compiled", lambda target: "windows" not in target.triple)
     monkeypatch.setattr(fmu_libraries, "cross_compiled", compiled)
-    told: list[str] = []
-    made = fmu_libraries.libraries({}, PLATFORMS, 2, told.append)
+    reported: list[str] = []
+    made = fmu_libraries.libraries({}, PLATFORMS, 2, reported.append)
     assert [folder for folder, _ in made] == FOLDERS[2]
     joined = made["darwin64", ".dylib"]
     assert b"x86_64-macos" in joined and b"aarch64-macos" in joined
     assert b"x86_64-windows-gnu" in made["win64", ".dll"]
-    assert "x86_64-windows (the first time: 2 to 3 minutes)" in told[0] and "x86_64-linux," in told[0]
-    assert told[-1] == "5 of 5 libraries compiled; left: none"
+    assert "x86_64-windows (the first time: 2 to 3 minutes)" in reported[0] and "x86_64-linux," in reported[0]
+    assert reported[-1] == "5 of 5 libraries compiled; left: none"
     assert [folder for folder, _ in fmu_libraries.libraries({}, PLATFORMS, 3)] == FOLDERS[3]
 
 
@@ -151,10 +151,10 @@ def test_every_platform_is_there_and_nothing_is_compiled_twice(
     folder = exported(fmi)
     assert sorted(path.name for path in (folder / "binaries").iterdir()) == sorted(FOLDERS[fmi])
     monkeypatch.setattr(cross, "_compile", lambda *_: pytest.fail("compiled again"))
-    told: list[str] = []
-    again = make_fmu(hull, fmi=fmi, platforms=PLATFORMS, report=told.append)
+    reported: list[str] = []
+    again = make_fmu(hull, fmi=fmi, platforms=PLATFORMS, report=reported.append)
     assert again.platforms == tuple(FOLDERS[fmi])
-    assert told[0].startswith("0 of 5") and told[-1].startswith("5 of 5")
+    assert reported[0].startswith("0 of 5") and reported[-1].startswith("5 of 5")
 
 
 @needs_compiler

@@ -87,7 +87,7 @@ def test_a_course_change_settles_without_an_error_that_stays(run: np.ndarray) ->
 
 def test_it_agrees_with_the_closed_loop_without_communication_steps(mariner: Model, run: np.ndarray) -> None:
     loop = Joined(mariner)
-    times = run["time"] + STEP_S  # fmpy writes what was found at the end of a step beside its beginning
+    times = run["time"] + STEP_S  # fmpy writes what was found at the end of a step next to its beginning
     truth = solve_ivp(loop.rate, (0, times[-1]), loop.start, "LSODA", t_eval=times, rtol=1e-8, atol=1e-10)
     heading = truth.y[loop.seen[0]]
     # Signals are a communication step or two old: 0.5 s in a loop of 24 s.
@@ -153,7 +153,7 @@ def test_other_engines_come_to_the_same_heading(engine: str, script: str, marine
 
 
 @pytest.mark.slow
-def test_the_command_writes_the_package_beside_the_fmu(tmp_path: Path) -> None:
+def test_the_command_writes_the_package_next_to_the_fmu(tmp_path: Path) -> None:
     ended = tank2sim("export", "kvlcc2", "-o", "k.fmu", "--ssp", "k.ssp", "--json", "k.json", cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     assert json.loads((tmp_path / "k.json").read_text())["ssp"] == "k.ssp"

@@ -101,7 +101,7 @@ def missing() -> Gap:
 
 
 def nothing() -> Gap:
-    """The card follows both of its trials to the noise; none was held out, and little is told."""
+    """The card follows both of its trials to the noise; none was held out, and little is reported."""
     trials = tuple(passed(name, 1.02, 1.02) for name in ("turn35", "zigzag"))
     return replace(
         missing(),

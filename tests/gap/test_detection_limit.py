@@ -1,4 +1,4 @@
-"""What could hide: beside fits of trials in which it does, and does not."""
+"""What could hide: next to fits of trials in which it does, and does not."""
 
 from __future__ import annotations
 
@@ -71,9 +71,9 @@ def test_what_could_hide_grows_with_the_noise_and_falls_with_the_length(card) ->
 
 
 def test_what_could_hide_is_where_the_score_begins_to_tell(card) -> None:
-    """Three times as much is told by more than is enough, a quarter is not: by fits of trials that have it.
+    """Three times as much is reported by more than is enough, a quarter is not: by fits of trials that have it.
 
-    In between the noise, that is sought anew without the effect, takes part of it for the sensor's slow error.
+    In between the noise, that is sought again without the effect, takes part of it for the sensor's slow error.
     """
     size = sizes(judged(card))["gyro_bias"]["rate_radps"]
     gains = []
@@ -86,7 +86,7 @@ def test_what_could_hide_is_where_the_score_begins_to_tell(card) -> None:
     assert gains[0] < 10.0 < gains[1]
 
 
-def test_beside_what_is_named_it_is_not_told_again(card) -> None:
+def test_next_to_what_is_named_it_is_not_reported_again(card) -> None:
     likelihood = judged(card, bias=0.002)
     hypothesis = Hypothesis(card, "angle", ["gyro_bias"])
     best = likelihood.at_best(hypothesis, np.array([0.002]), [likelihood.belief.logs], [0, 6])
@@ -94,7 +94,7 @@ def test_beside_what_is_named_it_is_not_told_again(card) -> None:
     assert set(could_hide(Search(likelihood, (best,), tuple(every)), best, 10.0)) == set(HIDDEN) - {"gyro_bias"}
 
 
-def test_of_an_effect_without_amplitude_a_value_is_told_that_does_not_show(card) -> None:
+def test_of_an_effect_without_amplitude_a_value_is_reported_that_does_not_show(card) -> None:
     """A lag of the gear: the longest that was tried and does not show, and the next longer one would."""
     trial = made_up_ship.trial(made_up_ship.zigzag(20, rate_degps=1000.0), duration=150, step=0.5)
     trial.signals["delta_order_rad"] = trial.signals.pop("delta_rad")

@@ -54,7 +54,7 @@ def test_a_current_acts_from_the_beginning_to_the_end_and_a_late_one_late() -> N
     assert part.t_start_s == pytest.approx(250.0, abs=25.0) and part.t_end_s == pytest.approx(TIME[-1], abs=0.6)
 
 
-def test_forces_act_where_one_is_missing_and_not_beside_a_current_alone() -> None:
+def test_forces_act_where_one_is_missing_and_not_next_to_a_current_alone() -> None:
     passage = Acting("turn35", "yaw", 10.0, 20.0, 5.0)
     gap = replace(made_up.missing(), passed=(motion(),), missing_force=replace(made_up.force(), passages=(passage,)))
     assert acting(gap) == () and missing_force_intervals(gap) is None

@@ -26,10 +26,10 @@ def written(gap, **more):
 
 @pytest.mark.parametrize("verdict", made_up.EVERY)
 def test_every_verdict_is_valid_json_with_the_keys_of_the_format(verdict) -> None:
-    told = written(made_up.EVERY[verdict]())
-    assert told["verdict"] == verdict
-    assert {"effects", "alternatives", "where", "misfit", "could_hide", "next_test"} <= set(told)
-    assert {"noise", "noise_floor", "before", "after"} <= set(told["misfit"])
+    reported = written(made_up.EVERY[verdict]())
+    assert reported["verdict"] == verdict
+    assert {"effects", "alternatives", "where", "misfit", "could_hide", "next_test"} <= set(reported)
+    assert {"noise", "noise_floor", "before", "after"} <= set(reported["misfit"])
 
 
 def test_an_effect_is_in_the_units_of_a_card() -> None:
@@ -49,7 +49,7 @@ def test_places_bear_names_of_files_and_columns() -> None:
     ("variable", "column"),
     [("motion.x", "x_m"), ("motion.u", "u_mps"), ("motion.r", "r_degps"), ("motion.u_ground", "u_ground_mps")],
 )
-def test_a_variable_is_told_by_the_column_that_measures_it(variable, column) -> None:
+def test_a_variable_is_reported_by_the_column_that_measures_it(variable, column) -> None:
     assert signal_display_name(variable).file == column
 
 
@@ -73,18 +73,18 @@ def test_what_could_hide_is_in_the_units_of_a_card() -> None:
 
 
 def test_explanations_are_joined_and_the_next_test_names_its_file() -> None:
-    told = written(made_up.ambiguous())
-    assert told["alternatives"] == ["current", "wind + rudder_bias"]
-    assert told["next_test"]["orders"] == "next_test.csv" and told["next_test"]["manoeuvre"] == "turn:35"
-    assert [one["effects"] for one in told["rivals"]] == [["current"], ["heading_offset"], []]
+    reported = written(made_up.ambiguous())
+    assert reported["alternatives"] == ["current", "wind + rudder_bias"]
+    assert reported["next_test"]["orders"] == "next_test.csv" and reported["next_test"]["manoeuvre"] == "turn:35"
+    assert [one["effects"] for one in reported["rivals"]] == [["current"], ["heading_offset"], []]
 
 
 def test_a_simulation_that_left_all_bounds_has_no_misfit() -> None:
-    told = written(made_up.outside())
-    assert told["misfit"]["before"] == {"fit": None, "holdout": None}
-    lost, other = told["trials"]
+    reported = written(made_up.outside())
+    assert reported["misfit"]["before"] == {"fit": None, "holdout": None}
+    lost, other = reported["trials"]
     assert lost["misfit"]["before"] is None and other["misfit"]["before"] == pytest.approx(6.0)
-    assert told["effects"] == [] and told["next_test"] is None
+    assert reported["effects"] == [] and reported["next_test"] is None
 
 
 def test_a_signal_that_a_trial_lacks_is_left_out_of_its_misfits() -> None:
@@ -139,9 +139,9 @@ def test_candidates_do_not_hide_and_tell_their_sizes() -> None:
     gap = made_up.ambiguous()
     assert gap.next_test is not None
     sizes = {"wind": ({"direction_rad": -np.pi / 2}, {"direction_rad": 0.1})}
-    told = written(replace(gap, next_test=replace(gap.next_test, sizes=sizes)))
-    assert set(told["could_hide"]) == {"linear_yaw_damping"} == set(told["could_hide_in_words"])
-    (wind,) = told["next_test"]["candidates"].values()
+    reported = written(replace(gap, next_test=replace(gap.next_test, sizes=sizes)))
+    assert set(reported["could_hide"]) == {"linear_yaw_damping"} == set(reported["could_hide_in_words"])
+    (wind,) = reported["next_test"]["candidates"].values()
     assert wind["parameters"] == {"direction_deg": pytest.approx(270.0)}
 
 
@@ -152,7 +152,7 @@ def test_what_could_hide_is_worded_by_what_a_size_means() -> None:
     assert words["rudder_rate_limit"] == "max rate of 4 deg/s in place of the card's would not show"
 
 
-def test_no_force_is_told_of_where_none_is_missing() -> None:
+def test_no_force_is_reported_of_where_none_is_missing() -> None:
     gap = made_up.missing()
     assert written(gap)["missing_force"] is None
     assert written(replace(gap, effects=(), equation="sway"))["missing_force"]["equation"] == "Y"

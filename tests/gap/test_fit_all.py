@@ -117,11 +117,11 @@ def test_the_better_of_two_fits_is_kept(likelihood, alone) -> None:
         fitting.best(2)
 
 
-def test_what_is_being_fitted_is_told_in_order(likelihood, executor) -> None:
-    told: list[str] = []
-    fitting = Fitting(likelihood, HypothesisCache(likelihood.none), told.append, executor)
+def test_what_is_being_fitted_is_reported_in_order(likelihood, executor) -> None:
+    reported: list[str] = []
+    fitting = Fitting(likelihood, HypothesisCache(likelihood.none), reported.append, executor)
     fitting.fit(proposals(likelihood, (), ("gyro_bias",), rounds=(0,)))
-    assert told == ["the card as it is", "gyro_bias"]
+    assert reported == ["the card as it is", "gyro_bias"]
 
 
 def test_explanations_are_made_once(card) -> None:

@@ -55,7 +55,7 @@ def test_each_sub_folder_with_a_card_and_trials_is_a_ship(tmp_path: Path) -> Non
         (("s/a.toml", "s/t.csv", "s/holdout/read.me"), "holds no trial"),
     ],
 )
-def test_a_folder_at_fault_is_told_and_does_not_hide_the_others(
+def test_a_folder_at_fault_is_reported_and_does_not_hide_the_others(
     tmp_path: Path, names: tuple[str, ...], words: str
 ) -> None:
     found = fleet_in(laid(tmp_path, *names, "good/a.toml", "good/t.csv"), tmp_path / "out")
@@ -148,7 +148,7 @@ CHANGES: dict[str, tuple[Callable[[Path], object], str]] = {
 
 
 @pytest.mark.parametrize("what", CHANGES)
-def test_a_result_stands_until_what_it_was_computed_from_changes(tmp_path: Path, what: str) -> None:
+def test_a_result_is_until_what_it_was_computed_from_changes(tmp_path: Path, what: str) -> None:
     ship = ship_in(laid(tmp_path / "ship", "c.toml", "t.csv", "holdout/h.csv"))
     assert ship is not None
     out = wrote(tmp_path / "out", ship, GapOptions())
@@ -156,8 +156,8 @@ def test_a_result_stands_until_what_it_was_computed_from_changes(tmp_path: Path,
     change(tmp_path)
     now = ship_in(tmp_path / "ship")
     assert now is not None
-    told = stale(fleet_run_record(now, GapOptions()), out)
-    assert (words in told) if words else told == ""
+    reported = stale(fleet_run_record(now, GapOptions()), out)
+    assert (words in reported) if words else reported == ""
 
 
 def test_options_that_change_the_result_make_it_stale_and_others_do_not(
@@ -199,12 +199,12 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_bad_ship_does_not_stop_the_others(mariner_card: ManoeuvringCard, failing) -> None:
-    told: list[str] = []
+    reported: list[str] = []
     ships = sought(mariner_card, "a", "bad", "odd", "z")
     with ThreadPoolExecutor(2) as pool:
         for found in (
-            find_in_turn(ships, GapOptions(), told.append),
-            find_at_once(iter(ships), GapOptions(), told.append, pool),
+            find_in_turn(ships, GapOptions(), reported.append),
+            find_at_once(iter(ships), GapOptions(), reported.append, pool),
         ):
             results = {ship.folder.name: result for ship, result in found}
             assert results["a"] == "gap of a" and results["z"] == "gap of z"
@@ -212,7 +212,7 @@ def test_a_bad_ship_does_not_stop_the_others(mariner_card: ManoeuvringCard, fail
             assert (
                 isinstance(results["odd"], Fault) and "not of yours: ZeroDivisionError: by zero" in results["odd"].line
             )
-    assert "a: looking" in told and any(" to go: " in one for one in told)
+    assert "a: looking" in reported and any(" to go: " in one for one in reported)
 
 
 def test_a_lost_executor_ends_the_run_in_one_line(mariner_card: ManoeuvringCard) -> None:

@@ -82,7 +82,7 @@ MOTIONS = RNG.uniform(-1, 1, (5, 20))
 
 
 def rates(model: Model) -> np.ndarray:
-    """Rates of all states at motions of all kinds; what a model has beside those of the bare ship is excited too."""
+    """Rates of all states at motions of all kinds; what a model has next to those of the bare ship is excited too."""
     sizes = {"motion.u": 1.5, "motion.v": 1.0, "motion.r": 0.01, "motion.psi": 3.0, "rudder.angle": 0.5}
     found = []
     for numbers in MOTIONS:
@@ -255,8 +255,8 @@ def test_particulars_that_were_estimated_are_written_into_the_card() -> None:
     (line,) = [line for line in improved.text.splitlines() if line.startswith("projected_area_side_m2")]
     assert "# estimated for wind: 0.055 of the length squared, typical" in line
     for name in ESTIMATING:
-        told = build(add_effects_to_card(card, [(name, si(name), {})])).notices
-        assert not [one for one in told if "is taken" in one and "time constant" not in one], name
+        reported = build(add_effects_to_card(card, [(name, si(name), {})])).notices
+        assert not [one for one in reported if "is taken" in one and "time constant" not in one], name
     full = add_effects_to_card(read(CARDS["total"]), [("wind", si("wind"), {})])
     assert full.ship == read(CARDS["total"]).ship
 

@@ -107,7 +107,7 @@ def test_a_parameter_known_beforehand_is_integrated_out(spread: float) -> None:
     assert fit.score == pytest.approx(whole, abs=LEAST_GAIN)
 
 
-def test_a_free_parameter_beside_a_known_one() -> None:
+def test_a_free_parameter_next_to_a_known_one() -> None:
     of, toy = judge(toy_motion((0.8, -0.6))), Toy((None, (-0.5, 0.2)))
     fit = fitted(of, toy)
     best = minimize_scalar(

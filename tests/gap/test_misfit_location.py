@@ -51,7 +51,7 @@ def of_velocities(one: Passed) -> Passed:
 
 
 def test_a_track_is_a_place_while_it_is_left_and_not_for_staying_off() -> None:
-    """For 50 s the model is carried to the side; after that it stays beside the track, and is right again."""
+    """For 50 s the model is carried to the side; after that it stays next to the track, and is right again."""
     one = motion()
     off = 0.4 * np.clip(TIME - 150.0, 0.0, 50.0)
     drifted = replace(one, before={**one.before, "motion.y": one.before["motion.y"] + off})

@@ -89,7 +89,7 @@ def of_scores(*fits: ExplanationFit) -> module.Decision:
 @pytest.mark.parametrize(
     ("fits", "verdict", "effects", "alike"),
     [
-        # not enough, enough, and a size that is not told from nothing
+        # not enough, enough, and a size that is not reported from nothing
         ([fit(0), fit(-EVIDENCE_NEEDED + 0.1, 0)], NO_EFFECT_MISSING, (), []),
         ([fit(0), fit(-EVIDENCE_NEEDED - 0.1, 0)], MISSING, (YAW,), []),
         ([fit(0), fit(-50, 0, sure=STANDARD_ERRORS - 0.1)], NO_EFFECT_MISSING, (), []),
@@ -194,7 +194,7 @@ def test_a_rate_of_the_gear_that_the_card_may_be_wrong_by_is_not_named() -> None
         assert is_significant(found) == named, rate
 
 
-def test_an_effect_without_amplitude_stands_out_by_its_score_alone() -> None:
+def test_an_effect_without_amplitude_is_out_by_its_score_alone() -> None:
     card = parse_card(made_up_ship.CARD, "made_up.toml")
     hypothesis = Hypothesis(card, "order", ["rudder_lag"])
     assert is_significant(ExplanationFit(hypothesis, np.array([3.0]), np.array([[100.0]]), LOGS, 0.0, np.zeros(0)))
@@ -306,7 +306,7 @@ def test_a_trial_that_has_another_value_disagrees() -> None:
     assert (found[0].begin_s, found[0].end_s) == pytest.approx((200.0 + 0.5 * BLOCK_S, 200.0 + 149.5 * BLOCK_S))
 
 
-def test_the_strangest_is_told_first() -> None:
+def test_the_strangest_is_reported_first() -> None:
     added, theta = np.zeros((RUNS, BLOCKS, NY)), np.zeros((RUNS, 2))
     added[0, 20:60] = 4.0
     theta[2, 1] = 0.35

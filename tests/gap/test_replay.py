@@ -131,7 +131,7 @@ def test_a_motion_that_runs_away_has_no_finite_misfit(record: Trial) -> None:
     assert one.misfit("after") == pytest.approx(1.0, abs=0.06)
 
 
-def test_a_black_box_stands_beside_both(record: Trial) -> None:
+def test_a_black_box_is_next_to_both(record: Trial) -> None:
     given_card = card(changes={"Nr = -0.0022": "Nr = -0.0015"})
     results = replay_trials(given_card, given_card, together(record), NOISE, held_out=False)
     (one,) = with_black_box(results, card(), together(record), NOISE)
@@ -140,7 +140,7 @@ def test_a_black_box_stands_beside_both(record: Trial) -> None:
 
 
 def test_an_order_that_a_gear_with_a_largest_rate_follows_keeps_its_time(mariner_card: ManoeuvringCard) -> None:
-    """The rudder leaves when it is told, and not earlier by the mean of two orders."""
+    """The rudder leaves when it is reported, and not earlier by the mean of two orders."""
     track = simulate(build(mariner_card), Zigzag(np.radians(20), np.radians(20)), duration_s=300.0).trajectory
     t = np.arange(0.0, 299.0, 0.1)
     names = {"u_mps": "motion.u", "r_radps": "motion.r", "psi_rad": "motion.psi", "x_m": "motion.x", "y_m": "motion.y"}

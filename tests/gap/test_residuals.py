@@ -53,9 +53,9 @@ def test_each_trial_says_what_its_own_least_squares_say(theta) -> None:
     of = judge(toy_motion(theta, (0.3, -0.2)))
     toy = Toy((None,) * len(theta))
     fit = of.at_best(toy, np.array(theta), [LOGS], [0])
-    told = each_trial(of, fit)
-    assert list(told) == [one.variable for one in toy.estimated]
-    for place, values in enumerate(told.values()):
+    reported = each_trial(of, fit)
+    assert list(reported) == [one.variable for one in toy.estimated]
+    for place, values in enumerate(reported.values()):
         assert list(values) == ["a", "b"]
         for run, found in enumerate(values.values()):
             assert found == pytest.approx(by_hand(of, fit, run, place), rel=1e-6)
@@ -72,7 +72,7 @@ def test_a_trial_that_tells_nothing_is_left_out() -> None:
     assert list(values) == ["a"]
 
 
-def test_estimates_are_told_by_effect_and_parameter() -> None:
+def test_estimates_are_reported_by_effect_and_parameter() -> None:
     toy = Toy((None, None))
     fit = ExplanationFit(toy, np.array([0.5, -0.3]), np.diag([0.04, 0.09]), LOGS, 0.0, np.zeros(0))
     first, second = estimates(fit)

@@ -107,7 +107,7 @@ def test_gains_are_those_of_least_squares(screened) -> None:
         check(screened, screened.base, [a, b])
 
 
-def test_gains_beside_an_effect_that_is_there_are_those_of_least_squares(card, damped) -> None:
+def test_gains_next_to_an_effect_that_is_there_are_those_of_least_squares(card, damped) -> None:
     """Also where something is known of its parameters, and away from the best ones."""
     there = Hypothesis(card, "angle", ["wave_drift"])
     logs = none_of(damped).logs

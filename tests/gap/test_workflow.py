@@ -169,6 +169,6 @@ def test_two_hidden_effects_are_both_named(effects: tuple[str, str], tmp_path: P
     ],
 )
 def test_straight_runs_alone_never_make_a_wrong_name_sure(effect: str, tmp_path: Path) -> None:
-    """What shows in turns alone cannot be told from straight runs."""
+    """What shows in turns alone cannot be reported from straight runs."""
     case = hidden(tmp_path, effect, trials=("straight", "accel"))
     assert case.gap.verdict in (NO_EFFECT_MISSING, AMBIGUOUS) or (case.sole and case.named == {effect})

@@ -1,4 +1,4 @@
-"""A compiler that is there and of no use is told in one line, and is not a compiler to those who can do without."""
+"""A compiler that is there and of no use is reported in one line, and is not a compiler to those who can do without."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ def body() -> Model:
     ],
     ids=["fails", "makes nothing", "cannot link", "open quote"],
 )
-def told(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+def reported(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     """What to say of the compiler that CC names now."""
     text, words = request.param
     monkeypatch.setenv("CC", "gcc 'x" if text is None else script(tmp_path, text))
     return str(words)
 
 
-def test_a_compiler_of_no_use_is_told_in_one_line(told: str, tmp_path: Path) -> None:
+def test_a_compiler_of_no_use_is_reported_in_one_line(reported: str, tmp_path: Path) -> None:
     assert find_compiler() is None
     source = tmp_path / "x.c"
     source.write_text("int x;\n")
@@ -67,19 +67,19 @@ def test_a_compiler_of_no_use_is_told_in_one_line(told: str, tmp_path: Path) -> 
         lambda: cached_library({"model.c": "int x;\n"}),
         lambda: make_fmu(body()),
     ):
-        with pytest.raises(InputError, match=told) as caught:
+        with pytest.raises(InputError, match=reported) as caught:
             use()
         assert "\n" not in str(caught.value)
         assert "environment variable CC" in caught.value.remedy
 
 
-def test_the_integrator_does_without_it(told: str) -> None:
+def test_the_integrator_does_without_it(reported: str) -> None:
     model = body()
     integrator = Integrator(model)
     assert not integrator.compiled
     path = integrator.rollout(np.array([2.0]), np.empty(0), model.parameter_values(), 0.1, 100)
     assert path[-1, 0] == pytest.approx(2.0 / (1 + 0.05 * 2.0 * 10.0), rel=1e-9)
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=reported):
         Integrator(model, compiled=True)
 
 

@@ -80,7 +80,7 @@ def faulty(kind, change, shrunk=None, **options):
 
 @pytest.mark.parametrize("kind", ["zigzag", "turn_port"])
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_wrong_column_is_named_and_mended(kind, name):
+def test_a_wrong_column_is_named_and_corrected(kind, name):
     change, column, truth = FAULTS[name]
     record = faulty(kind, change, SHRUNK.get(name))
     (finding,) = audit_trial(record)
@@ -97,7 +97,7 @@ def test_a_wrong_column_is_named_and_mended(kind, name):
     assert not audit_trial(right)
 
 
-def test_several_faults_at_once_are_told_apart():
+def test_several_faults_at_once_are_distinguished():
     def change(m):
         earth = over_ground(m)
         rest = {"delta_rad": -m["delta_rad"], "r_radps": m["r_radps"] * DEG}
@@ -201,7 +201,7 @@ def test_faults_of_time_and_sensors_are_found(name):
 
 
 @pytest.mark.parametrize("name", ["repeated rows", "rows in disorder", "rounded times"])
-def test_a_mended_time_base_is_the_true_one(name):
+def test_a_corrected_time_base_is_the_true_one(name):
     record = trial(MOTIONS["zigzag"])
     right, (finding,) = repair_trial(SENSORS[name][0](record))
     np.testing.assert_allclose(right.time_s, record.time_s, atol=2e-3 * 400)
@@ -317,7 +317,7 @@ def test_hidden_effects_of_the_gap_cases_are_measured_and_a_clean_one_is_clean(d
 
 @pytest.mark.parametrize(("unit", "name"), [(60.0, "minutes"), (3600.0, "hours")])
 @pytest.mark.parametrize("kind", ["zigzag", "turn"])
-def test_time_in_another_unit_is_told_from_a_rate_in_another_unit(unit, name, kind):
+def test_time_in_another_unit_is_distinguished_from_a_rate_in_another_unit(unit, name, kind):
     right = trial(motion(kind))
     wrong = replace(right, time_s=right.time_s / unit)
     (finding,) = [one for one in audit_trial(wrong) if one.kind == "fault"]
@@ -334,7 +334,7 @@ def test_velocities_of_the_opposite_sign_are_a_fault():
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("every", [5, 10, 20])
-def test_the_side_of_the_rudder_is_told_by_a_turn_recorded_from_its_execute(every, sign, mariner) -> None:
+def test_the_side_of_the_rudder_is_reported_by_a_turn_recorded_from_its_execute(every, sign, mariner) -> None:
     run = simulate(mariner, parse_manoeuvre("turn:35"), duration_s=300.0).trajectory
     names = {"delta_rad": "rudder.angle", "u_mps": "motion.u", "r_radps": "motion.r", "psi_rad": "motion.psi"}
     signals = {"t_s": run.t[::every], **{name: np.asarray(run[of])[::every] for name, of in names.items()}}

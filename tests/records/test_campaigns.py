@@ -1,4 +1,4 @@
-"""Reading captive campaigns: conventions met at the door, faults told with their place."""
+"""Reading captive campaigns: conventions met at the door, faults reported with their place."""
 
 import math
 
@@ -115,7 +115,7 @@ def test_a_gauge_that_shows_nothing_in_any_row_of_averages_is_refused_by_its_col
 
 
 @pytest.mark.parametrize(
-    ("change", "place", "told"),
+    ("change", "place", "reported"),
     [
         (("length_m = 4.0", "lenght_m = 4.0"), "model.lenght_m", "did you mean length_m"),
         (("length_m = 4.0", "length_m = -4.0"), "model.length_m", "greater than 0"),
@@ -131,16 +131,16 @@ def test_a_gauge_that_shows_nothing_in_any_row_of_averages_is_refused_by_its_col
         (("length_m = 4.0", f"length_m = {'1' * 5000}"), "campaign.toml", "thousands of digits"),
     ],
 )
-def test_a_fault_of_the_file_is_told_with_its_key(folder, change, place, told):
+def test_a_fault_of_the_file_is_reported_with_its_key(folder, change, place, reported):
     path = campaign(folder)
     path.write_text(path.read_text().replace(*change))
     with pytest.raises(InputError) as fault:
         read_campaign(path)
     assert place in str(fault.value)
-    assert told in str(fault.value)
+    assert reported in str(fault.value)
 
 
-def test_missing_files_and_bad_cells_are_told_together_by_run(folder):
+def test_missing_files_and_bad_cells_are_reported_together_by_run(folder):
     (folder / "bad.csv").write_text(f"{HEADER}\n0,0,0,0,0,1.2,0,x,1,1\n")
     runs = RUN.format(file="drift.csv", type="static_drift", more="")
     runs += RUN.format(file="gone.csv", type="pure_sway", more="")

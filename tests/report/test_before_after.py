@@ -45,7 +45,7 @@ setTimeout(async () => {
 </script></body>"""
 
 
-def test_a_switch_stands_at_all_together_and_one_model_needs_none() -> None:
+def test_a_switch_is_at_all_together_and_one_model_needs_none() -> None:
     (two,), (three,) = (switch(words) for words in (["before", "after"], ["before", "after", "black box"]))
     assert two.to_dict()["value"] == BOTH and three.to_dict()["value"] == ALL
     assert two.to_dict()["bind"]["options"] == ["before", "after", BOTH]

@@ -100,7 +100,7 @@ def test_a_force_that_no_loop_has_is_refused():
         loop_chart([ForceLoop(label="a", motion=[0], forces={"Y": [0]})], Across(title="v"), {"X": "X (N)"})
 
 
-def test_harmonics_are_bars_in_the_order_of_the_runs_with_the_fit_beside_them():
+def test_harmonics_are_bars_in_the_order_of_the_runs_with_the_fit_next_to_them():
     runs = [
         Harmonics(run="yaw_01", amplitude=[10.0, 0.1, 2.0], fitted=[9.5, 0.0, -2.1]),
         Harmonics(run="sway_00", amplitude=[5.0, 0.2]),

@@ -42,5 +42,5 @@ def test_the_chart_of_errors_has_a_point_for_each_difference(found) -> None:
 
 
 def test_the_report_of_the_json_is_this_page(found) -> None:
-    told = json.loads(json_text(found.as_json()))
-    assert render_page(result_page(told, "c.json")) == render_page(compare_page(plain_json(found.as_json())))
+    reported = json.loads(json_text(found.as_json()))
+    assert render_page(result_page(reported, "c.json")) == render_page(compare_page(plain_json(found.as_json())))

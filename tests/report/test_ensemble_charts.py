@@ -51,7 +51,7 @@ def test_a_gap_of_the_band_is_not_bridged() -> None:
     low, high = (one.copy() for one in (whole.curves[FROM_STARBOARD].low, whole.curves[FROM_STARBOARD].high))
     low[5:8] = high[5:8] = np.nan
     gap = BandOverTime(low, whole.curves[FROM_STARBOARD].median, high)
-    told = replace(whole, curves={**whole.curves, FROM_STARBOARD: gap, FROM_PORT: gap})
-    specification = chart_specification(turns_chart(plain_json(told.as_json())["steady_turning"]))
+    reported = replace(whole, curves={**whole.curves, FROM_STARBOARD: gap, FROM_PORT: gap})
+    specification = chart_specification(turns_chart(plain_json(reported.as_json())["steady_turning"]))
     area = rows(specification, 1)
     assert len(area) == 10 and len({row["band"] for row in area}) == 2 and len(rows(specification, 0)) == 13

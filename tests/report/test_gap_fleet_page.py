@@ -56,7 +56,7 @@ def test_the_chart_has_each_ship_before_and_after() -> None:
     assert [(one["ship"], one["misfit"]) for one in rows] == [("gamma ray #1", 9.0), ("gamma ray #1", 1.23)]
 
 
-def test_all_that_an_ambiguous_ship_may_lack_is_told() -> None:
+def test_all_that_an_ambiguous_ship_may_lack_is_reported() -> None:
     ship = replace(
         ONE, verdict=AMBIGUOUS, effects=({**CURRENT, "parameters": {}},), alternatives=("wind", "rudder_bias")
     )

@@ -49,7 +49,7 @@ def test_every_verdict_has_a_whole_page(verdict) -> None:
     assert (page.figures[0].verdict is Verdict.CAUTION) == (verdict in (AMBIGUOUS, OUTSIDE_LIBRARY))
 
 
-def test_a_named_effect_is_told_in_words_and_in_a_mariners_units() -> None:
+def test_a_named_effect_is_reported_in_words_and_in_a_mariners_units() -> None:
     words = verdict_in_words(made_up.missing())
     assert "current (speed 0.45 ± 0.02 m/s, direction towards 270.0 ± 1.5 deg)" in words
     assert "The water moves over the ground" in words
@@ -67,8 +67,8 @@ def test_a_sensor_at_fault_is_not_called_a_fault_of_the_model() -> None:
 def test_ambiguity_names_each_explanation_once() -> None:
     gap = made_up.ambiguous()
     assert verdict_in_words(gap).endswith("do not distinguish several effects: current, or wind with rudder bias.")
-    told = tables_of(page_of(gap))["Effects that these data cannot distinguish"].rows
-    assert [row[0] for row in told] == ["current", "wind", "rudder bias"]
+    reported = tables_of(page_of(gap))["Effects that these data cannot distinguish"].rows
+    assert [row[0] for row in reported] == ["current", "wind", "rudder bias"]
 
 
 def test_nothing_missing_says_how_well_the_card_follows() -> None:
@@ -82,7 +82,7 @@ def test_nothing_missing_says_how_well_the_card_follows() -> None:
     assert "4 times the noise, which is more than noise" in verdict_in_words(worse)
 
 
-def test_misfits_stand_before_and_after_beside_the_black_box() -> None:
+def test_misfits_stand_before_and_after_next_to_the_black_box() -> None:
     tables = tables_of(page_of(made_up.missing()))
     signals = tables["Misfit of each signal, noise units"]
     assert [column.title for column in signals.columns[1:4]] == [
@@ -156,7 +156,7 @@ def test_the_missing_force_is_drawn_over_one_turn_of_the_compass() -> None:
     ]
 
 
-def test_directions_of_trials_lie_beside_each_other(charts) -> None:
+def test_directions_of_trials_lie_next_to_each_other(charts) -> None:
     rows = [row for row in rows_of(charts["agreement"]) if row.get("name") == "zigzag"]
     assert {round(row["v"], 3) for row in rows} == {0.47, 271.0}
 
@@ -187,7 +187,7 @@ def test_rivals_are_ranked_and_none_is_always_among_them() -> None:
         (3.2e-5, 1.1e-6, "3.2×10⁻⁵ ± 1.1×10⁻⁶"),
     ],
 )
-def test_a_value_is_told_to_two_figures_of_its_error(value, error, shown) -> None:
+def test_a_value_is_reported_to_two_figures_of_its_error(value, error, shown) -> None:
     assert with_error(value, error) == shown
 
 
@@ -265,7 +265,7 @@ def test_each_probability_says_of_what_it_is() -> None:
     assert "as a whole" in json.dumps(rival_chart(gap).to_dict(validate=False))
 
 
-def test_what_the_others_would_be_is_told_and_they_do_not_hide() -> None:
+def test_what_the_others_would_be_is_reported_and_they_do_not_hide() -> None:
     gap = made_up.ambiguous()
     test = gap.next_test
     assert test is not None
@@ -282,7 +282,7 @@ def test_what_replaces_something_of_the_card_has_no_up_to() -> None:
     assert lag[2] == "1 in place of the card's" and trim[2] == "up to 0.1"
 
 
-def test_a_name_that_leaves_much_of_the_gap_is_told_with_caution() -> None:
+def test_a_name_that_leaves_much_of_the_gap_is_reported_with_caution() -> None:
     gap = made_up.missing()
     poor = replace(gap, passed=tuple(made_up.passed(one.name, 9.0, 5.0, held_out=one.held_out) for one in gap.passed))
     words = verdict_in_words(poor)

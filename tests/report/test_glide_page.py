@@ -68,8 +68,8 @@ def test_a_climb_to_the_east_is_drawn_where_it_goes() -> None:
 
 
 def test_the_polar_marks_the_glides_it_is_given(found) -> None:
-    told = found.as_json()
-    chart = polar_chart(told["polar"], {"best": told["design"]["best_glide"]})
+    reported = found.as_json()
+    chart = polar_chart(reported["polar"], {"best": reported["design"]["best_glide"]})
     marked = lines(chart, 2)
     assert math.degrees(math.atan2(marked[0]["y"], marked[0]["x"])) == pytest.approx(23.385, abs=1e-3)
     speeds = np.array([row["x"] for row in lines(chart)])

@@ -155,7 +155,7 @@ def test_windows_show_the_share_of_each_signal_by_trial(found) -> None:
         assert now[one.name, "ψ"] == pytest.approx(100 * one.relative("motion.psi"), 1e-4)
 
 
-def test_maps_beside_each_other_share_one_legend(found) -> None:
+def test_maps_next_to_each_other_share_one_legend(found) -> None:
     """Vega warns in the console where one of them has a legend and another none."""
     maps = [one for row in chart_specification(found[2]["windows"])["vconcat"] for one in row["hconcat"]]
     legends = [one["layer"][0]["encoding"]["color"]["legend"] for one in maps]

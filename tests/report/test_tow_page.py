@@ -26,7 +26,7 @@ def study(table_1):
     return study_tows(result, towed_body(table_1, result.mass_kg, {}))
 
 
-def test_the_page_holds_the_paper_beside_what_its_tows_give(study):
+def test_the_page_holds_the_paper_next_to_what_its_tows_give(study):
     page = tow_page(plain_json(study.as_json()))
     assert [figure.value for figure in page.figures[:3]] == [2772, 529, "2.55 to 3.40"]
     estimates, speeds, models, by_tow, drag, theory = page.sections
@@ -40,7 +40,7 @@ def test_the_page_holds_the_paper_beside_what_its_tows_give(study):
     assert [row[3] for row in theory.tables[0].rows] == [2357, 2316, 2489]
 
 
-def test_other_tows_are_not_held_beside_the_paper(table_1):
+def test_other_tows_are_not_held_next_to_the_paper(table_1):
     one = replace(table_1.only(0), body={})
     page = tow_page(plain_json(study_tows(identify_tow(one, terms=("B3",))).as_json()))
     assert [section.heading for section in page.sections] == [

@@ -19,7 +19,7 @@ def result(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def told(result):
+def reported(result):
     return plain_json(result.as_json())
 
 
@@ -40,28 +40,28 @@ def values(chart, *keys):
     return found
 
 
-def test_bars_of_the_balance_add_up_to_the_motors_work(result, told):
-    rows = values(balance_chart(told["energy_balance"]), "part", "run", "v")
+def test_bars_of_the_balance_add_up_to_the_motors_work(result, reported):
+    rows = values(balance_chart(reported["energy_balance"]), "part", "run", "v")
     motor = sum(row["v"] for row in rows if row["run"] == "motor")
     spent = sum(row["v"] for row in rows if row["run"] != "motor")
     assert spent == pytest.approx(motor, rel=1e-3)
     assert motor == pytest.approx(1e3 * result.fit.balance.work_J.sum(), rel=1e-4)
 
 
-def test_estimates_stand_within_their_bars(result, told):
-    rows = values(estimates_chart(told["methods"]), "name", "v", "low", "high")
+def test_estimates_stand_within_their_bars(result, reported):
+    rows = values(estimates_chart(reported["methods"]), "name", "v", "low", "high")
     assert len(rows) == len(result.estimates)
     assert all(row["low"] <= row["v"] <= row["high"] for row in rows)
 
 
-def test_every_subinterval_has_its_residual(told):
-    rows = values(energy_residual_chart(told["energy_residuals"]), "hump", "w", "v")
+def test_every_subinterval_has_its_residual(reported):
+    rows = values(energy_residual_chart(reported["energy_residuals"]), "hump", "w", "v")
     assert len(rows) == 12 and {row["run"] for row in rows} == {"accelerating", "braking"}
 
 
-def test_page_has_a_chart_for_each_record_and_says_what_is_noted(result, told):
-    page = yaw_page(told)
+def test_page_has_a_chart_for_each_record_and_says_what_is_noted(result, reported):
+    page = yaw_page(reported)
     notes = [note for section in page.sections for note in section.notes]
     assert notes == list(result.notes)
-    assert values(record_chart(*next(iter(told["histories"].items()))), "run")
+    assert values(record_chart(*next(iter(reported["histories"].items()))), "run")
     assert page.figures[0].value == pytest.approx(300, rel=0.01)

@@ -64,7 +64,7 @@ def test_the_result_depends_on_neither_batches_nor_executor(batch: int) -> None:
     np.testing.assert_array_equal(more.figures["slope"][:60], whole.figures["slope"])
 
 
-def test_members_that_cannot_be_used_are_counted_and_told() -> None:
+def test_members_that_cannot_be_used_are_counted_and_reported() -> None:
     found = ensemble(Linear(), DRAWS, 200)
     expected = sum(DRAWS.member(k)["a"] > 4 for k in range(200))
     assert expected > 3 and found.unusable == {"a is too large": expected}
@@ -79,7 +79,7 @@ def test_only_the_first_members_keep_their_histories(monkeypatch: pytest.MonkeyP
     assert np.isfinite(found.figures["slope"][10:]).any()
 
 
-def test_what_is_drawn_beyond_a_bound_is_drawn_anew_as_a_whole_and_told() -> None:
+def test_what_is_drawn_beyond_a_bound_is_drawn_again_as_a_whole_and_reported() -> None:
     root = np.array([[1.0, 0.0], [1.0, 0.01]])  # correlation 0.99995
     held = Draws(DRAWS.names, DRAWS.mean, root, np.array([0.0, -np.inf]), np.array([2.0, np.inf]), 7)
     first = 0
@@ -119,7 +119,7 @@ def test_bands_are_numpys_quantiles_and_end_where_members_end() -> None:
 
 def test_the_band_of_a_track_lies_across_its_course() -> None:
     t, offset = np.linspace(0, 10, 21), np.linspace(-1, 1, 201)
-    # All members go north-east, beside each other: their distance across the course is the offset itself.
+    # All members go north-east, next to each other: their distance across the course is the offset itself.
     x = t / np.sqrt(2) - offset[:, None] / np.sqrt(2)
     y = t / np.sqrt(2) + offset[:, None] / np.sqrt(2)
     found = Ensemble(201, 0, {}, np.stack([x, y], axis=1).astype(np.float32))
@@ -131,7 +131,7 @@ def test_the_band_of_a_track_lies_across_its_course() -> None:
 
 
 def test_the_band_of_a_track_ends_before_its_edges_run_back() -> None:
-    # A circle of 100 m: members beside each other, more and more, up to 200 m inwards.
+    # A circle of 100 m: members next to each other, more and more, up to 200 m inwards.
     angle, offset = np.linspace(0, 2, 101), np.linspace(-1, 1, 201)[:, None]
     radius = 100 - 100 * angle * offset
     xy = np.stack([radius * np.sin(angle), 100 - radius * np.cos(angle)], axis=1)

@@ -190,7 +190,7 @@ def test_a_run_is_written_as_a_trial_in_the_units_of_its_header(mariner) -> None
     assert last["x_m"] == pytest.approx(run["motion.x"][-1])
 
 
-def test_a_single_order_needs_to_be_told_how_long(mariner, tmp_path) -> None:
+def test_a_single_order_needs_to_be_reported_how_long(mariner, tmp_path) -> None:
     (tmp_path / "o.csv").write_text("t_s,delta_order_deg\n0,10\n")
     with pytest.raises(InputError, match="--duration"):
         simulate(mariner, parse_manoeuvre(f"file:{tmp_path}/o.csv"))
@@ -198,12 +198,12 @@ def test_a_single_order_needs_to_be_told_how_long(mariner, tmp_path) -> None:
     assert run.t[-1] == pytest.approx(20.0) and run["motion.psi"][-1] > 0
 
 
-def test_an_order_beyond_the_gear_is_told(mariner) -> None:
+def test_an_order_beyond_the_gear_is_reported(mariner) -> None:
     run = simulate(mariner, parse_manoeuvre("turn:60"), duration_s=60.0)
     assert any("its gear stops at 40 deg" in notice for notice in run.notices)
 
 
-def test_a_duration_beside_the_grid_by_rounding_ends(mariner) -> None:
+def test_a_duration_next_to_the_grid_by_rounding_ends(mariner) -> None:
     run = simulate(mariner, parse_manoeuvre("zigzag:10/10"), duration_s=100.00000000001).trajectory
     assert run.t[-1] == pytest.approx(100.0)
 

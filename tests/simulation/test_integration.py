@@ -97,7 +97,7 @@ def test_splitting_a_run_does_not_change_it(integrator) -> None:
     np.testing.assert_allclose(parts.trajectory().x[-1], whole.trajectory().x[-1], rtol=1e-12)
 
 
-def test_a_motion_that_leaves_all_bounds_is_told(mariner_card) -> None:
+def test_a_motion_that_leaves_all_bounds_is_reported(mariner_card) -> None:
     model = build(parse_card(mariner_card.text.replace("Yv = -1160e-5", "Yv = 0.5"), "ship.toml"))
     with pytest.raises(InputError, match="leaves all bounds"):
         simulate(model, parse_manoeuvre("turn:35"))
@@ -147,8 +147,8 @@ def test_events_are_as_exact_where_only_every_tenth_step_is_kept(mariner) -> Non
 
 
 def test_what_a_short_run_does_not_show_is_named_in_words(mariner) -> None:
-    (told,) = (
+    (reported,) = (
         one for one in simulate(mariner, parse_manoeuvre("turn:35"), duration_s=60.0).notices if "not show" in one
     )
-    listed = told.split(": ")[1].split(", ")
+    listed = reported.split(": ")[1].split(", ")
     assert {"advance", "transfer", "tactical diameter", "steady diameter"} <= set(listed)

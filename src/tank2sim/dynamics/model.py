@@ -387,7 +387,7 @@ class Model:
 
     @cached_property
     def trim_step(self) -> ca.Function | None:
-        """``trim_step(x, u, p) -> x``: one Newton step towards steady motion; None if the model has no such states.
+        """``trim_step(x, u, p) -> x``: one Newton step towards steady motion; None if the model has no steady states.
 
         States with a ``trim`` expression take its value; those marked ``steady`` move by ``-J^-1 f``, f their
         derivatives, shortened to :data:`TRIM_STRIDE`; the others stay.

@@ -135,7 +135,7 @@ def _of_effects(card: ManoeuvringCard, document: Mapping[str, Any]) -> Iterator[
 
 
 def _line_comment(section: Any, key: str) -> str | None:
-    """The comment next to a key, which the file may spell in another unit; None if it has no such key."""
+    """The comment next to a key, which the file may spell in another unit; None if it does not have it."""
     if section is None:
         return None
     for name in section:

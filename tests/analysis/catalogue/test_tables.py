@@ -106,7 +106,7 @@ def test_table_5_is_404_with_the_right_pairing_and_410_6_as_printed(card: Steeri
     assert found.own_m == pytest.approx(found.direct_m, abs=0.1)
 
 
-def test_a_percent_less_draught_is_foretold_as_the_model_gives_it(card: SteeringCard) -> None:
+def test_a_percent_less_draught_is_predicted_as_the_model_gives_it(card: SteeringCard) -> None:
     found = combined_prediction(card, "inoue-hirano-lighter")
     assert found.percent == pytest.approx(-0.884, abs=0.001)
     assert found.predicted_m == pytest.approx(396.1, abs=0.06)

@@ -159,9 +159,9 @@ def test_criteria_of_a_member_are_those_of_the_ship_with_its_numbers(mariner_car
 def test_figures_over_a_criterion_of_both_signs_have_no_band() -> None:
     C = np.array([2.0, 1.0, 0.5, -0.5, -1.0])
     figures = {"criterion_C": C, "K_prime": -1 / C, "T_prime": 1 / C, "T3_s": np.ones(5), "advance_m": C}
-    bands, told = bands_without_poles(Ensemble(5, 0, figures))
+    bands, reported = bands_without_poles(Ensemble(5, 0, figures))
     assert set(bands) == {"criterion_C", "T3_s", "advance_m"}
-    (line,) = told
+    (line,) = reported
     assert "K prime and T prime" in line and "3 of 5 members have C' above zero" in line
     # Without C' its sign is that of T; where all are on one side there is a band.
     assert "T_prime" not in bands_without_poles(Ensemble(5, 0, {"T_prime": 1 / C}))[0]
@@ -169,7 +169,7 @@ def test_figures_over_a_criterion_of_both_signs_have_no_band() -> None:
     assert set(bands_without_poles(Ensemble(3, 0, same))[0]) == set(figures)
 
 
-def test_what_is_assumed_is_told(mariner_card: ManoeuvringCard) -> None:
-    _, told = draws_of(mariner_card, 0)
-    assert any("2 % of the value is taken" in one for one in told)
+def test_what_is_assumed_is_reported(mariner_card: ManoeuvringCard) -> None:
+    _, reported = draws_of(mariner_card, 0)
+    assert any("2 % of the value is taken" in one for one in reported)
     assert results.TIMES > 100 and Path(mariner_card.source).name == "ship.toml"

@@ -104,6 +104,6 @@ def test_branches_are_those_of_the_diagram_and_part_in_the_loop_alone(found) -> 
 
 def test_curves_go_to_json_with_the_ships_own(found) -> None:
     *_, grid, bands = found
-    told = bands.as_json()
-    assert told["members"] == MEMBERS and len(told["bode"][MAGNITUDE]["own"]) == len(grid.omega_radps)
-    assert np.isfinite(told["step"][STEP]["p95"]).all()
+    reported = bands.as_json()
+    assert reported["members"] == MEMBERS and len(reported["bode"][MAGNITUDE]["own"]) == len(grid.omega_radps)
+    assert np.isfinite(reported["step"][STEP]["p95"]).all()

@@ -86,7 +86,7 @@ def test_the_autopilot_of_a_ship_is_of_its_nomoto_model_and_gear(mariner: Model)
     assert math.degrees(made["autopilot.max_rudder"]) == pytest.approx(35.0)  # the gear of the card goes to 40
 
 
-def test_a_rudder_that_turns_the_wrong_way_is_told(mariner: Model) -> None:
+def test_a_rudder_that_turns_the_wrong_way_is_reported(mariner: Model) -> None:
     with pytest.raises(ValueError, match="wrong way"):
         heading_gains(Nomoto(-0.1, 100.0, None, None, 0.0))
     wrong = mariner.substitute("derivatives.Nd", -mariner.symbol("derivatives.Nd"))

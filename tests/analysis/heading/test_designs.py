@@ -136,7 +136,7 @@ def test_a_wave_filter_lets_a_tenth_of_the_waves_through_and_leaves_slow_motions
         design_heading(mariner, "lqr", wave_filter_radps=frequency)
 
 
-def test_what_cannot_be_steered_is_told(mariner: Model) -> None:
+def test_what_cannot_be_steered_is_reported(mariner: Model) -> None:
     with pytest.raises(InputError, match="outside the range"):
         design_heading(mariner, speed_mps=20.0)
     with pytest.raises(InputError, match="has no rudder"):

@@ -54,7 +54,7 @@ def test_the_closed_loop_is_that_of_an_independent_integration(loop: HeadingLoop
 def change_by_hand(band_deg: float, *, trimmed: bool) -> tuple[float, float]:
     """Overshoot and largest rudder (deg) of the Mariner in a change by 20 deg, with nothing of the program but gains.
 
-    Her polynomial and her gear are written down anew from the printed coefficients.
+    Her polynomial and her gear are written down again from the printed coefficients.
     """
     card = tomllib.loads(Path(read_card("mariner").source).read_text(encoding="utf-8"))
     d, body, L, u0 = card["derivatives"], card["rigid_body"], card["ship"]["length_m"], card["model"]["speed_mps"]
@@ -86,7 +86,7 @@ def change_by_hand(band_deg: float, *, trimmed: bool) -> tuple[float, float]:
     return math.degrees(run.y[3].max()) - 20.0, math.degrees(run.y[4].max())
 
 
-def test_the_overshoot_is_that_of_a_ship_written_down_anew_and_the_band_of_the_integral_makes_it(
+def test_the_overshoot_is_that_of_a_ship_written_down_again_and_the_band_of_the_integral_makes_it(
     loop: HeadingLoop,
 ) -> None:
     found = course_change(loop.run({"heading.command": COURSE}, 250.0), COURSE)

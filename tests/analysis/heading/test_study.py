@@ -26,7 +26,7 @@ def rolling(Nphi: float):
 
 
 @pytest.mark.slow
-def test_a_ship_that_rolls_herself_out_of_control_is_told_so_and_not_her_steering_gear() -> None:
+def test_a_ship_that_rolls_herself_out_of_control_is_reported_so_and_not_her_steering_gear() -> None:
     card = rolling(0.02)
     ship = build(card)
     assert set(growing_effects(ship)) == {"motion.phi", "motion.p"}
@@ -55,12 +55,12 @@ def test_a_linear_card_has_margins_at_its_own_speed_alone() -> None:
 
 
 @pytest.mark.slow
-def test_a_gear_that_waves_overwork_is_told_with_the_remedy_which_helps() -> None:
+def test_a_gear_that_waves_overwork_is_reported_with_the_remedy_which_helps() -> None:
     card = read_card("kvlcc2")
     ship = build(card)
     found = study_autopilot(card, ship, StudySettings())
-    (told,) = [notice for notice in found.notices if "full rate" in notice]
-    assert found.keeping.rate_limited_percent > 50 and "--wave-filter 0.424" in told
+    (reported,) = [notice for notice in found.notices if "full rate" in notice]
+    assert found.keeping.rate_limited_percent > 50 and "--wave-filter 0.424" in reported
     filtered = study_autopilot(card, ship, StudySettings(wave_filter_radps=0.424))
     assert filtered.keeping.rate_limited_percent < 10
     assert not any("full rate" in notice for notice in filtered.notices)

@@ -93,12 +93,12 @@ def test_a_current_across_leaves_an_error_that_the_integral_takes_away(loop: Hea
         ("x_m,y_m\n0,0\n2e6,0\n3e6,1.5e6\n", "track.csv: its track is 3802.78 km long"),
     ],
 )
-def test_waypoints_at_fault_are_told(tmp_path: Path, text: str, words: str) -> None:
+def test_waypoints_at_fault_are_reported(tmp_path: Path, text: str, words: str) -> None:
     (tmp_path / "track.csv").write_text(text)
     with pytest.raises(InputError, match=words):
         read_waypoints(tmp_path / "track.csv")
 
 
-def test_a_leg_within_the_circle_of_acceptance_is_told(loop: HeadingLoop) -> None:
+def test_a_leg_within_the_circle_of_acceptance_is_reported(loop: HeadingLoop) -> None:
     with pytest.raises(InputError, match="leg 2"):
         keep_track(loop, np.array([[0.0, 0.0], [4000.0, 0.0], [4100.0, 0.0]]), Guidance())

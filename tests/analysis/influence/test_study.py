@@ -206,7 +206,7 @@ def test_no_turn_is_steady_in_wind() -> None:
         ({"derivatives.Nd": 139e-5}, "advance_m@35", "does not show"),
     ],
 )
-def test_a_figure_that_the_ship_does_not_show_is_told(changes, text, words) -> None:
+def test_a_figure_that_the_ship_does_not_show_is_reported(changes, text, words) -> None:
     with pytest.raises(InputError) as error:
         study_of(read_card("mariner", SYMMETRIC | changes), text)
     assert words in str(error.value) and text in str(error.value)

@@ -52,7 +52,7 @@ def test_sensitivities_are_those_of_finite_differences_of_the_whole_analysis(nam
     ]
     slope = next((one.slope for one in found.influences if one.short_name == name), None)
     difference = (ends[0] - ends[1]) / (2 * step)
-    if slope is None:  # too weak to be told
+    if slope is None:  # too weak to be reported
         assert abs(0.1 * difference * value) < 1e-3 * abs(found.criterion)
     else:
         assert slope == pytest.approx(difference, rel=1e-6)

@@ -98,7 +98,7 @@ def test_linear_and_third_order_models_agree_at_the_speed_of_expansion() -> None
     np.testing.assert_allclose(first.eigenvalues, third.eigenvalues, rtol=1e-9)
 
 
-def test_no_straight_course_is_told(mariner_card) -> None:
+def test_no_straight_course_is_reported(mariner_card) -> None:
     text = mariner_card.text.replace("Nd = -139e-5", "Nd = 0.0").replace("Nddd = 45e-5", "Nddd = 0.0")
     text = text.replace("N0 = 3e-5", "N0 = 900e-5").replace("Nvvd = -489e-5", "Nvvd = 0.0")
     with pytest.raises(InputError, match="straight course"):
@@ -267,7 +267,7 @@ def test_prime_numbers_bear_no_seconds(mariner) -> None:
     assert list(nomoto_json["dimensional"]) == ["K_per_s", "T_s", "T1_s", "T2_s", "T3_s"]
 
 
-def test_a_ship_that_sway_does_not_push_is_told_so() -> None:
+def test_a_ship_that_sway_does_not_push_is_reported_so() -> None:
     with pytest.raises(InputError, match="Yv and Nv"):
         stability(build(read_card("mariner", {"derivatives.Yv": 0.0, "derivatives.Nv": 0.0})))
     with pytest.raises(InputError, match="Yd and Nd"):

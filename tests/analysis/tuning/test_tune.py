@@ -133,7 +133,7 @@ def test_a_target_that_no_ship_can_meet_is_refused(text) -> None:
         parse_target(text)
 
 
-def test_a_target_beyond_the_bounds_is_told_alone_and_wider_bounds_reach_it(card) -> None:
+def test_a_target_beyond_the_bounds_is_reported_alone_and_wider_bounds_reach_it(card) -> None:
     _, found = tuned_to(card, ["steady_radius_m@20=900"])
     assert [target.figure.text for target in found.contradiction] == ["steady_radius_m@20"]
     assert 640 < found.after[0] < 900

@@ -54,7 +54,7 @@ def test_norrbin_and_bech_of_a_cubic_ship_are_her_own_coefficients(N_r: float) -
     assert found.K_per_s == pytest.approx(abs(stability(model).nomoto.K_per_s), rel=1e-6)
 
 
-def test_the_error_of_a_cubic_is_told_where_a_ship_is_none(mariner) -> None:
+def test_the_error_of_a_cubic_is_reported_where_a_ship_is_none(mariner) -> None:
     found = steering_characteristic(steady_turning(mariner))
     assert found is not None
     assert found.n[1] == 1.0 and 0.1 < math.degrees(found.bech.rms_rad) < math.degrees(found.norrbin.rms_rad) < 2

@@ -140,7 +140,7 @@ def test_the_heel_of_a_steady_turn_is_that_of_its_centrifugal_force() -> None:
     np.testing.assert_allclose(found.heel_rad, -ratio * u * found.yaw_rate_radps / 9.80665, rtol=1e-6, atol=1e-12)
 
 
-def test_a_ship_without_a_steady_speed_is_told() -> None:
+def test_a_ship_without_a_steady_speed_is_reported() -> None:
     with pytest.raises(InputError, match="steady speed"):
         steady_turning(build(read_card("kvlcc2", {"derivatives.X0": 0.05, "derivatives.Xu": 0.02})))
 

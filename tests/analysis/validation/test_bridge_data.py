@@ -1,4 +1,4 @@
-"""What a bridge is told: circles, stops and speeds that agree with the simulation, and nothing that is guessed."""
+"""What a bridge is reported: circles, stops and speeds that agree with the simulation, and nothing that is guessed."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def test_a_card_does_not_differ_from_itself(mariner_card) -> None:
             assert rows[name].differences[0].standard_errors is None and rows[name].differences[0].why == SAME
 
 
-def test_a_difference_is_told_in_the_root_of_both_variances(mariner_card) -> None:
+def test_a_difference_is_reported_in_the_root_of_both_variances(mariner_card) -> None:
     first = replace(mariner_card, uncertainty={"Yv": 3e-4})
     other = replace(first, derivatives={**first.derivatives, "Yv": -1160e-5 + 1e-3}, uncertainty={"Yv": 4e-4})
     rows, _ = rows_of(first, other)
@@ -85,7 +85,7 @@ def test_parameters_of_effects_are_compared_and_those_with_a_unit_at_one_size_al
     assert other[names[-1]].differences[0].why == "of a ship of another size"
 
 
-def test_a_term_that_one_model_has_not_is_told_and_not_compared(mariner_card) -> None:
+def test_a_term_that_one_model_has_not_is_reported_and_not_compared(mariner_card) -> None:
     fewer = {name: value for name, value in mariner_card.derivatives.items() if name != "Nvvd"}
     rows, _ = rows_of(mariner_card, replace(mariner_card, derivatives=fewer))
     assert rows["Nvvd"].cards[1].value is None

@@ -59,7 +59,7 @@ def test_members_are_the_same_ships_at_both_sizes_and_again(found, esso) -> None
     assert members(esso, ship.model, 3)[0] == members(esso, ship.model, 5)[0][:3]
 
 
-def test_members_vary_together_as_the_covariance_beside_the_card_says(mariner_card, tmp_path) -> None:
+def test_members_vary_together_as_the_covariance_next_to_the_card_says(mariner_card, tmp_path) -> None:
     errors = {"Yv": (-1160e-5, 2e-4), "Nv": (-264e-5, 1e-4)}
     card = revised(mariner_card, errors)
     _, alone = members(card, build(card), 1)
@@ -69,10 +69,10 @@ def test_members_vary_together_as_the_covariance_beside_the_card_says(mariner_ca
     covariance_file(path).write_text(Covariance(("derivatives.Yv", "derivatives.Nv"), matrix).as_text())
     path.write_text(f"# covariance: {covariance_file(path).name}\n{card.text}")
     together = read_card(str(path))
-    drawn, told = members(together, build(together), 5)
+    drawn, reported = members(together, build(together), 5)
     for member in drawn:
         assert member["derivatives.Yv"] + 1160e-5 == pytest.approx(2 * (member["derivatives.Nv"] + 264e-5), rel=1e-6)
-    assert "go together" in told[0]
+    assert "go together" in reported[0]
 
 
 def test_the_summary_counts_what_is_beyond_two_errors(found, esso) -> None:
@@ -126,7 +126,7 @@ def test_turns_keep_to_what_every_gear_allows(mariner_card, esso) -> None:
     assert "turn 30 deg to port" in trials and "full astern stop" not in trials
 
 
-def test_other_ships_and_other_sizes_are_told(esso, found, mariner_card) -> None:
+def test_other_ships_and_other_sizes_are_reported(esso, found, mariner_card) -> None:
     assert any("of another size than" in one for one in found.notices)
     two = compare_cards([mariner_card, read_card("kvlcc2")], 0)
     assert any("another form" in one and "breadth" in one for one in two.notices)

@@ -55,7 +55,7 @@ def joint(tmp_path_factory: pytest.TempPathFactory, mariner_card: ManoeuvringCar
 
 def test_members_have_all_numbers_of_the_joint_draw_and_none_that_is_an_input(joint: ManoeuvringCard) -> None:
     model = build(joint)
-    drawn, told = members(joint, model, 4)
+    drawn, reported = members(joint, model, 4)
     draws, _ = draws_of(joint, SEED)
     for number, member in enumerate(drawn):
         whole = draws.member(number)
@@ -64,24 +64,24 @@ def test_members_have_all_numbers_of_the_joint_draw_and_none_that_is_an_input(jo
         moved.append(member["propeller_side_force.Y"] - 4e-5)
         np.testing.assert_allclose(moved / FALLS, moved[0] / FALLS[0], rtol=1e-6)
         assert "current.speed" not in member
-    assert told == ("errors of 3 numbers go together, as the covariance next to the card says",)
+    assert reported == ("errors of 3 numbers go together, as the covariance next to the card says",)
 
 
-def test_only_numbers_without_a_standard_error_are_told_to_have_none(joint: ManoeuvringCard) -> None:
-    told = " ".join(draws_of(joint, 0)[1])
-    assumed = told.partition("no standard error of ")[2].partition(":")[0].split(", ")
-    assert "any number" not in told and {"Xudot", "Yvdot", "Nd", "current.direction"} < set(assumed)
+def test_only_numbers_without_a_standard_error_are_reported_to_have_none(joint: ManoeuvringCard) -> None:
+    reported = " ".join(draws_of(joint, 0)[1])
+    assumed = reported.partition("no standard error of ")[2].partition(":")[0].split(", ")
+    assert "any number" not in reported and {"Xudot", "Yvdot", "Nd", "current.direction"} < set(assumed)
     assert not {"Yv", "Nv", "current.speed", "propeller_side_force.Y"} & set(assumed)
 
 
-def test_a_card_of_which_all_errors_go_together_is_not_told_to_have_none(tmp_path, mariner_card) -> None:
+def test_a_card_of_which_all_errors_go_together_is_not_reported_to_have_none(tmp_path, mariner_card) -> None:
     path, names = tmp_path / "ship.toml", ("derivatives.Yv", "derivatives.Nv")
     text = referring(f"{mariner_card.text}\n[uncertainty]\nYv = 5e-4\nNv = 1.6e-4\n", path)
     covariance_file(path).write_text(Covariance(names, MATRIX[:2, :2]).as_text())
     card = parse_card(text, str(path))
     assert isinstance(card, ManoeuvringCard)
-    told = " ".join(draws_of(card, 0)[1])
-    assert "no standard error of any number" not in told and "no standard error of Xu" in told
+    reported = " ".join(draws_of(card, 0)[1])
+    assert "no standard error of any number" not in reported and "no standard error of Xu" in reported
 
 
 def test_the_standard_error_of_a_figure_is_of_the_whole_covariance(joint: ManoeuvringCard) -> None:

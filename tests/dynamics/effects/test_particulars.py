@@ -1,4 +1,4 @@
-"""Effects on cards that state no more than a length: estimates, and that they are told."""
+"""Effects on cards that state no more than a length: estimates, and that they are reported."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BEAM, DRAUGHT = L / 7, L / 17.5
 BLOCK = 0.5 * MASS * L**2 / (BEAM * DRAUGHT)
 
 
-def test_every_effect_that_needs_no_engine_stands_on_a_minimal_card() -> None:
+def test_every_effect_that_needs_no_engine_is_on_a_minimal_card() -> None:
     for name in EFFECTS:
         if name not in ("propeller_walk", "engine_lag"):
             assert np.all(np.isfinite(forces(ship({name: TYPICAL[name]}, MINIMAL), STATES[0])))
@@ -39,20 +39,20 @@ def test_every_effect_that_needs_no_engine_stands_on_a_minimal_card() -> None:
         ("water_depth", {"beam_m": BEAM, "draught_m": DRAUGHT, "block_coefficient": BLOCK}),
     ],
 )
-def test_an_estimate_is_told_with_its_number_and_acts_as_if_stated(name: str, stated: dict[str, float]) -> None:
+def test_an_estimate_is_reported_with_its_number_and_acts_as_if_stated(name: str, stated: dict[str, float]) -> None:
     more = "".join(f"{key} = {value!r}\n" for key, value in stated.items())
     known = ship({name: TYPICAL[name]}, MINIMAL.replace("[ship]\n", f"[ship]\n{more}"))
     guessed = ship({name: TYPICAL[name]}, MINIMAL)
     at = {**STATES[0], "motion.psi": 0.4}
     np.testing.assert_allclose(forces(guessed, at), forces(known, at), rtol=1e-12)
-    told = [notice for notice in guessed.notices if notice not in known.notices]
-    assert len(told) == len(stated)
-    for notice, (key, value) in zip(told, stated.items(), strict=True):
+    reported = [notice for notice in guessed.notices if notice not in known.notices]
+    assert len(reported) == len(stated)
+    for notice, (key, value) in zip(reported, stated.items(), strict=True):
         assert key in notice and "typical" in notice
         assert float(re.search(r" as ([\d.e+]+)", notice)[1]) == pytest.approx(value, rel=5e-3)
 
 
-def test_an_estimate_is_told_once() -> None:
+def test_an_estimate_is_reported_once() -> None:
     model = ship({"cross_flow_drag": TYPICAL["cross_flow_drag"], "trim": TYPICAL["trim"]}, MINIMAL)
     assert len([notice for notice in model.notices if "draught_m" in notice]) == 1
 

@@ -64,8 +64,8 @@ def test_without_propulsion_an_engine_droops_from_a_typical_resistance() -> None
     thrust = 0.5 * RHO * L**2 * U0**2 * 6e-4 * (0.9**2 - 1)
     assert thrust < 0
     np.testing.assert_allclose(found, [thrust, 0.0, 0.0], rtol=1e-7, atol=1e-6)
-    told = [notice for notice in ship({"engine_droop": {"droop": 0.4}}, text).notices if "engine_droop" in notice]
-    assert len(told) == 1 and "0.0006" in told[0]
+    reported = [notice for notice in ship({"engine_droop": {"droop": 0.4}}, text).notices if "engine_droop" in notice]
+    assert len(reported) == 1 and "0.0006" in reported[0]
 
 
 LAGGING = ship({"engine_lag": {"time_constant_s": 15.0}})

@@ -123,7 +123,7 @@ def mixed(effect: str) -> tuple[str, ...]:
 @pytest.mark.parametrize("name", [name for name in SENSORS if name != "rudder_time_offset"])
 @settings(max_examples=8, deadline=None)
 @given(seed=st.integers(0, 10**6), size=st.floats(-0.9, 0.9))
-def test_a_record_is_mended_to_what_was_measured(name: str, seed: int, size: float) -> None:
+def test_a_record_is_corrected_to_what_was_measured(name: str, seed: int, size: float) -> None:
     effect, random = EFFECTS[name], np.random.default_rng(seed)
     given = {one.name: size * min(one.maximum, -one.minimum) for one in effect.parameters}
     true = dict(zip(NAMES, random.normal(size=(6, 40)) * [[8], [1], [0.02], [3], [900], [900]], strict=True))

@@ -347,7 +347,7 @@ def _in_degrees(table: np.ndarray) -> None:
 
 
 FAULTS = {"saturated": _saturated, "step": _step, "degrees": _in_degrees}
-"""Faults of the readings; beside them ``short`` (0.7 periods), ``wrong type`` and ``missing``."""
+"""Faults of the readings; next to them ``short`` (0.7 periods), ``wrong type`` and ``missing``."""
 
 
 def write(campaign: Campaign, folder: Path) -> Written:

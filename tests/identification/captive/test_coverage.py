@@ -55,13 +55,13 @@ def test_intervals_cover_the_truth_as_often_as_they_say(setting, tmp_path):
         for name, ratio in errors_over_standard_errors(replace(setting, seed=seed), tmp_path / str(seed)).items():
             ratios[name].append(ratio)
     table = {name: np.abs(values) for name, values in ratios.items()}
-    told = {name: f"{np.mean(values < TWO_SIDED_95):.2f} of {len(values)}" for name, values in table.items()}
+    reported = {name: f"{np.mean(values < TWO_SIDED_95):.2f} of {len(values)}" for name, values in table.items()}
     covered = np.mean(np.concatenate(list(table.values())) < TWO_SIDED_95)
-    assert 0.90 <= covered <= 0.98, told
+    assert 0.90 <= covered <= 0.98, reported
     for name in ("Yv", "Nv", "Yr", "Nr", "Yvdot", "Nrdot", "Yd", "Nd"):
         assert len(table[name]) == len(SEEDS), name
         # That 23 or fewer of 30 intervals cover, if each does in 95 of 100 cases, happens once in 1700 times.
-        assert np.count_nonzero(table[name] < TWO_SIDED_95) >= 0.8 * len(SEEDS), (name, told)
+        assert np.count_nonzero(table[name] < TWO_SIDED_95) >= 0.8 * len(SEEDS), (name, reported)
     for name, values in ratios.items():
         if len(values) >= len(SEEDS) // 2:
             assert abs(np.mean(values)) < 4.0 / np.sqrt(len(values)), (name, "is biased", np.mean(values))

@@ -38,7 +38,7 @@ def sway(periods: int, seed: int = 0, slope: float = 0.0, sigma: float = SIGMA) 
 
 
 def test_a_single_period_has_no_trend_and_its_sine_is_as_exact_as_white_noise_allows() -> None:
-    """n readings of white noise leave an error of sigma sqrt(2/n); a trend beside a sine would make it 2.5 times."""
+    """n readings of white noise leave an error of sigma sqrt(2/n); a trend next to a sine would make it 2.5 times."""
     found = [reduced_run(sway(1, seed)) for seed in range(60)]
     assert "trend" not in found[0].labels
     sine = found[0].labels.index("sin 1")

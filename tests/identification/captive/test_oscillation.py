@@ -73,7 +73,7 @@ def test_one_run_gives_the_printed_formulas_with_zero_error_and_drift_of_the_zer
             assert value == pytest.approx(prime(name, known[name]), rel=1e-5)
 
 
-def test_frequency_and_amplitude_are_told_in_prime_and_by_the_waves(tmp_path):
+def test_frequency_and_amplitude_are_reported_in_prime_and_by_the_waves(tmp_path):
     campaign = folder(tmp_path, "on_model")
     row = oscillations(campaign, [reduced_run(campaign.runs[0])])[0]
     assert row.frequency_radps == pytest.approx(0.6)
@@ -94,12 +94,12 @@ def test_the_third_order_is_found_from_the_third_harmonic_and_from_the_amplitude
             assert found[name].from_amplitude[0] == pytest.approx(prime(name, value), rel=1e-4)
 
 
-def test_two_ways_to_a_third_order_term_that_differ_are_told(tmp_path):
+def test_two_ways_to_a_third_order_term_that_differ_are_reported(tmp_path):
     campaign = folder(tmp_path, "on_gauge", amplitudes=(0.1, 0.2, 0.3))
     rows = [replace(row, frequency_radps=0.6) for row in oscillations(campaign, list(map(reduced_run, campaign.runs)))]
     skewed = [replace(row, values={k: v * (1 + abs(row.amplitude)) for k, v in row.values.items()}) for row in rows]
     assert not cubic_findings(cubics(rows))
-    assert any("Yvvv is" in told and "by the amplitude" in told for told in cubic_findings(cubics(skewed)))
+    assert any("Yvvv is" in reported and "by the amplitude" in reported for reported in cubic_findings(cubics(skewed)))
 
 
 def test_moderated_densities_are_alike_where_runs_are(tmp_path):

@@ -102,12 +102,12 @@ def test_the_papers_order_gives_linear_terms_from_the_simplest_tests(noisy):
         assert error > 0.9 * best.error(name) / 1.1
 
 
-def test_tests_that_contradict_each_other_are_told(tmp_path):
+def test_tests_that_contradict_each_other_are_reported(tmp_path):
     written = write(Campaign(seed=4, rate_hz=10.0), tmp_path)
     campaign = read_campaign(written.path)
     runs = [replace(run, Y_N=1.25 * run.Y_N) if run.type == "static_drift" else run for run in campaign.runs]
-    told = reduction_findings(reduce_campaign(replace(campaign, runs=tuple(runs))))
-    assert any(sentence.startswith("Yv is") and "paper's order" in sentence for sentence in told)
+    reported = reduction_findings(reduce_campaign(replace(campaign, runs=tuple(runs))))
+    assert any(sentence.startswith("Yv is") and "paper's order" in sentence for sentence in reported)
 
 
 def test_every_candidate_is_accounted_for_with_a_reason(noisy):
@@ -122,7 +122,7 @@ def test_every_candidate_is_accounted_for_with_a_reason(noisy):
     assert shown == {name for name in noisy.derivatives if name[0] == "N"}
 
 
-def test_terms_that_cannot_be_told_apart_are_left_out_and_told(hmri):
+def test_terms_that_cannot_be_distinguished_are_left_out_and_reported(hmri):
     reasons = {choice.name: choice for choice in hmri.forces["Y"].selection.choices}
     assert reasons["Yvdd"].reason == "collinear"  # rudder and drift keep one ratio in the combined tests
     assert "condition number" in reasons["Yvdd"].explanation
@@ -223,8 +223,8 @@ def test_a_trend_with_frequency_is_found_and_the_value_is_that_at_zero_frequency
 
 def test_a_run_that_does_not_belong_to_the_others_is_named(noisy):
     runs = [replace(run, N_Nm=1.3 * run.N_Nm) if run.name == "both_+08_-20.csv" else run for run in noisy.campaign.runs]
-    told = reduction_findings(reduce_campaign(replace(noisy.campaign, runs=tuple(runs))))
-    assert any(sentence.startswith("both_+08_-20.csv: N does not fit the other runs") for sentence in told)
+    reported = reduction_findings(reduce_campaign(replace(noisy.campaign, runs=tuple(runs))))
+    assert any(sentence.startswith("both_+08_-20.csv: N does not fit the other runs") for sentence in reported)
     assert not any("does not fit the other runs" in sentence for sentence in reduction_findings(noisy))
 
 
@@ -339,10 +339,10 @@ def test_the_real_table_has_the_signs_of_a_ship(hmri):
     assert values["Yd"] < 0 < values["Nd"]
 
 
-def test_speed_and_load_that_change_together_are_told_and_left_out(hmri):
+def test_speed_and_load_that_change_together_are_reported_and_left_out(hmri):
     assert len(hmri.not_used) == 20
-    told = " ".join(reduction_findings(hmri))
-    assert "speed and propeller load change together" in told
+    reported = " ".join(reduction_findings(hmri))
+    assert "speed and propeller load change together" in reported
     assert not any("u" in name.removesuffix("udot") for name in hmri.derivatives)
     more = reduce_campaign(hmri.campaign, ReductionOptions(off_speed=True))
     assert not more.not_used
@@ -352,11 +352,11 @@ def test_speed_and_load_that_change_together_are_told_and_left_out(hmri):
 
 
 @pytest.mark.parametrize("name", ["drift_+08.csv", "rudder_-20.csv"])
-def test_harmonics_are_told_without_dimension(noisy, name):
+def test_harmonics_are_reported_without_dimension(noisy, name):
     """The mean of a steady run by 1/2 rho L^2 U^2, and L more for a moment."""
-    told = reduction_as_json(noisy, card_contents(noisy), ())
+    reported = reduction_as_json(noisy, card_contents(noisy), ())
     record = next(run for run in noisy.campaign.runs if run.name == name)
-    shown = next(run for run in told["runs"] if run["name"] == name)
+    shown = next(run for run in reported["runs"] if run["name"] == name)
     assert shown["speed_mps"] == pytest.approx(record.speed_mps.mean(), rel=1e-3)
     force = 0.5 * 1000.0 * noisy.campaign.model.length_m**2 * record.speed_mps.mean() ** 2
     for letter, values, unit in (("Y", record.Y_N, force), ("N", record.N_Nm, force * noisy.campaign.model.length_m)):

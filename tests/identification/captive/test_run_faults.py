@@ -1,4 +1,4 @@
-"""Every fault of a run is told by name, and the rest is reduced when asked to go on."""
+"""Every fault of a run is reported by name, and the rest is reduced when asked to go on."""
 
 import re
 from dataclasses import replace
@@ -33,18 +33,18 @@ def run_of(campaign, name):
     return next(run for run in campaign.runs if run.name == f"{name}.csv")
 
 
-def told(campaign, run):
-    """Everything told of one run."""
+def reported(campaign, run):
+    """Everything reported of one run."""
     found = list(record_faults(campaign, run))
     return " | ".join(str(fault) for fault in found or reduced_faults(reduced_run(run)))
 
 
 def test_sound_runs_have_no_fault(sound):
-    assert not [told(sound, run) for run in sound.runs if told(sound, run)]
+    assert not [reported(sound, run) for run in sound.runs if reported(sound, run)]
 
 
 @pytest.mark.parametrize(("fault", "name", "message"), [(fault, *case) for fault, case in CASES.items()])
-def test_a_fault_is_told_with_the_name_of_its_run(tmp_path, fault, name, message):
+def test_a_fault_is_reported_with_the_name_of_its_run(tmp_path, fault, name, message):
     path = write(Campaign(seed=2, rate_hz=10.0, faults={name: fault}), tmp_path).path
     with pytest.raises(InputError, match=message) as error:
         reduce_campaign(read_campaign(path))
@@ -80,14 +80,14 @@ def test_the_rest_is_reduced_when_asked_to_go_on(tmp_path):
 )
 def test_records_that_cannot_be(sound, name, changes, message):
     run = run_of(sound, name)
-    assert not told(sound, run)
-    assert re.search(message, told(sound, replace(run, **changes(run))))
+    assert not reported(sound, run)
+    assert re.search(message, reported(sound, replace(run, **changes(run))))
 
 
 def test_a_plateau_of_a_coarse_digital_gauge_is_not_saturation(sound):
     run = run_of(sound, "sway_02")
     step = np.ptp(run.Y_N) / 12
-    assert "saturated" not in told(sound, replace(run, Y_N=np.round(run.Y_N / step) * step))
+    assert "saturated" not in reported(sound, replace(run, Y_N=np.round(run.Y_N / step) * step))
 
 
 def changed(campaign, name, **columns):
@@ -112,7 +112,7 @@ def changed(campaign, name, **columns):
         ("drift_-04", "N_Nm", lambda run: run.N_Nm / 1000, "gauge N: contradicts the other runs: its mean"),
     ],
 )
-def test_one_bad_run_among_sound_ones_is_told_and_left_out(sound, name, column, change, message):
+def test_one_bad_run_among_sound_ones_is_reported_and_left_out(sound, name, column, change, message):
     faulty = changed(sound, name, **{column: change})
     with pytest.raises(InputError, match=message) as error:
         reduce_campaign(faulty)
@@ -147,12 +147,12 @@ def test_coarse_gauges_are_not_saturated_or_dead(tmp_path, times_noise):
     for run in coarse.runs:
         columns = {"X_N": step, "Y_N": step, "N_Nm": 0.3 * step * written.ship.length_m}
         readings = {key: np.round(getattr(run, key) / size) * size for key, size in columns.items()}
-        assert not told(coarse, replace(run, **readings))
+        assert not reported(coarse, replace(run, **readings))
 
 
 def test_a_steady_gauge_at_the_end_of_its_range_is_saturated(sound):
     run = run_of(sound, "drift_+08")
-    assert "saturated" in told(sound, replace(run, Y_N=np.minimum(run.Y_N, np.quantile(run.Y_N, 0.3))))
+    assert "saturated" in reported(sound, replace(run, Y_N=np.minimum(run.Y_N, np.quantile(run.Y_N, 0.3))))
 
 
 def test_one_steady_run_shows_no_derivative_but_the_resistance(sound):

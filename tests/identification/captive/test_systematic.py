@@ -200,10 +200,10 @@ def test_half_the_mass_is_reported_first(tmp_path, seed):
         text = written.path.read_text().replace(number(written, "mass_kg"), f"mass_kg = {mass!r}")
         written.path.write_text(text)
         found = reduce_campaign(read_campaign(written.path))
-        told = implausible(found)
-        assert bool(told) == (mass < written.ship.mass_kg)
-        assert reduction_findings(found)[: len(told)] == told
-    assert any("added mass" in sentence for sentence in told)
+        messages = implausible(found)
+        assert bool(messages) == (mass < written.ship.mass_kg)
+        assert reduction_findings(found)[: len(messages)] == messages
+    assert any("added mass" in sentence for sentence in messages)
 
 
 def test_a_resistance_that_pushes_the_model_ahead_is_refused(sound):

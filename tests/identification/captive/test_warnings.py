@@ -85,7 +85,7 @@ def test_flow_memory_begins_at_two_in_sway_and_three_in_yaw():
     assert found == {"sway 0.5", "sway 0.7", "yaw 0.7"}
 
 
-def test_trim_is_told_or_missed():
+def test_trim_is_reported_or_missed():
     assert next(trim(None, 5.0)).missing == "[model] trim_m"
     assert not list(trim(0.0, 5.0))
     assert "1 % of the length" in said(trim(0.05, 5.0))
@@ -98,7 +98,7 @@ def test_standing_waves_of_known_tanks():
     assert standing_wave_frequency(1, 14.0, 6.0, 9.81) == pytest.approx(1.3865, abs=2e-4)
 
 
-def test_motion_and_third_harmonic_near_an_odd_standing_wave_are_told():
+def test_motion_and_third_harmonic_near_an_odd_standing_wave_are_reported():
     own = standing_wave_frequency(1, 10.0, 4.0, 9.81)
     even = standing_wave_frequency(2, 10.0, 4.0, 9.81)
     runs = (
@@ -135,7 +135,7 @@ def test_a_mass_in_the_wrong_unit_is_seen():
     assert "0.025 L" in said(carried_mass(replace(body, yaw_inertia_kgm2=body.yaw_inertia_kgm2 / 100)))
 
 
-def test_differences_of_model_and_ship_are_told_in_figures():
+def test_differences_of_model_and_ship_are_reported_in_figures():
     ship = {"m'": 0.01, "J_z'": 6e-4, "x_G'": 0.01, "z_G'": 0.02}
     assert not list(similarity(ship, ship))
     assert "5 % apart" in said(similarity(ship | {"m'": 0.0105}, ship))
@@ -166,7 +166,7 @@ def test_gauges_in_the_wrong_unit_are_seen_in_the_added_mass():
 
 
 @pytest.mark.parametrize("name", ["Yv", "Nv", "Nr", "Yd", "Nd", "Yvdot", "Nrdot"])
-def test_a_turned_sign_is_told_with_its_reason(name):
+def test_a_turned_sign_is_reported_with_its_reason(name):
     assert not list(unusual_signs(SHIP, {}))
     (caution,) = unusual_signs(SHIP | {name: -SHIP[name]}, {})
     assert caution.message.startswith(f"{name} is ") and "known ship: " in caution.message
@@ -180,7 +180,7 @@ def test_bundled_ships_have_the_signs_of_every_known_ship(mariner_card):
     assert not list(yaw_force(derivatives, mariner_card.rigid_body.mass))
 
 
-def test_forces_that_act_off_the_ship_are_told():
+def test_forces_that_act_off_the_ship_are_reported():
     assert "0.30 lengths abaft" in said(levers({"Yv": -0.01, "Nv": 0.003}, {}))
     assert "0.90 lengths" in said(levers({"Yd": -0.003, "Nd": 0.0027}, {}))
     assert "+0.26" in said(levers({"Yd": -0.003, "Nd": -0.00078}, {}))

@@ -1,4 +1,4 @@
-"""Lack of fit beside the scatter of repeated tows, at the percentiles of F that tables print."""
+"""Lack of fit next to the scatter of repeated tows, at the percentiles of F that tables print."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ def tows(readings: list[list[float]]) -> Tows:
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_a_misfit_is_told_from_the_95th_percentile_of_f_on_with_one_and_two_degrees_of_freedom(sign: int) -> None:
+def test_a_misfit_is_distinguished_from_the_95th_percentile_of_f_on_with_one_and_two_degrees_of_freedom(
+    sign: int,
+) -> None:
     """F(1, 2) is 18.51 at 95 %: two times, one estimate, two tows each."""
     pair = [[1 - SCATTER, 1 + SCATTER], [2 - SCATTER, 2 + SCATTER]]
     limit = SCATTER * math.sqrt(18.51)  # lack is 2 e^2, pure error 4 s^2 over 2 degrees of freedom
@@ -30,7 +32,7 @@ def test_a_misfit_is_told_from_the_95th_percentile_of_f_on_with_one_and_two_degr
     assert _worst_misfit(tows(pair), np.array([0.0, 1.0 + 1.01 * sign * limit, 2.0]), 1) == 1
 
 
-def test_a_misfit_is_told_with_a_single_repetition() -> None:
+def test_a_misfit_is_reported_with_a_single_repetition() -> None:
     """F(1, 1) is 161.4 at 95 %."""
     once = [[1 - SCATTER, 1 + SCATTER], [2.0, math.nan]]
     limit = SCATTER * math.sqrt(2 * 161.45)  # lack is e^2, pure error 2 s^2
@@ -38,7 +40,7 @@ def test_a_misfit_is_told_with_a_single_repetition() -> None:
     assert _worst_misfit(tows(once), np.array([0.0, 1.0, 2.0 + 1.01 * limit]), 1) == 2
 
 
-def test_no_misfit_is_told_without_freedom_without_repetition_or_without_scatter() -> None:
+def test_no_misfit_is_reported_without_freedom_without_repetition_or_without_scatter() -> None:
     off = np.array([0.0, 1.0, 9.0])
     pair = [[1 - SCATTER, 1 + SCATTER], [2 - SCATTER, 2 + SCATTER]]
     assert _worst_misfit(tows(pair), off, 1) == 2

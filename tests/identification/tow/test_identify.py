@@ -104,7 +104,7 @@ def test_tows_that_follow_the_model_give_no_warning_and_their_coefficients():
         assert abs(fit.values[1] - 150) < 3 * errors["B3_kgpm"] < 45
 
 
-def test_a_polynomial_that_cannot_follow_the_speed_is_told():
+def test_a_polynomial_that_cannot_follow_the_speed_is_reported():
     truth = SurgeCoefficients(total_mass_kg=3000.0, B3_kgpm=150.0)
     tows = synthetic(truth, np.arange(0, 401, 5.0), scatter=0.001)
     warnings = identify_tow(tows, 11.63, 2243.0, terms=("B3",)).warnings
@@ -116,7 +116,7 @@ def test_a_body_lighter_than_said_has_negative_added_mass(table_1):
     assert any("the added mass is negative" in warning for warning in warnings)
 
 
-def test_what_is_given_comes_before_the_file_and_is_told(table_1):
+def test_what_is_given_comes_before_the_file_and_is_reported(table_1):
     result = identify_tow(table_1, 2 * 11.63, terms=("B3",))
     # (1.5) is linear in the force: twice the force with the same speeds gives twice of everything
     reference = identify_tow(table_1, terms=("B3",))

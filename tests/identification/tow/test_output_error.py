@@ -106,8 +106,8 @@ def test_standard_errors_are_the_spread_of_repeated_tows():
         tows = Tows(Path("noisy.csv"), tuple("12345"), times, exact[:, None] + noise)
         fits.append(fit_speeds(tows, FORCE_N, ("B3",)))
     spread = np.std([fit.estimates for fit in fits], axis=0)
-    told = np.median([np.sqrt(np.diag(fit.covariance)) for fit in fits], axis=0)
-    np.testing.assert_allclose(told, spread, rtol=0.2)
+    reported = np.median([np.sqrt(np.diag(fit.covariance)) for fit in fits], axis=0)
+    np.testing.assert_allclose(reported, spread, rtol=0.2)
 
 
 def test_too_few_readings_are_refused():

@@ -31,7 +31,7 @@ def study(table_1):
     return study_tows(result, towed_body(table_1, result.mass_kg, {}))
 
 
-def test_speed_polynomials_of_the_printed_means_beside_table_2():
+def test_speed_polynomials_of_the_printed_means_next_to_table_2():
     tows = Tows(tow_paper.__file__, ("speed_1_mps",), tow_paper.TIMES_S, tow_paper.MEANS_MPS[:, None])
     rows = list(speed_polynomials(tows))
     expected = [(0.05499, 0.05768), (0.00438, 0.00460), (0.00318, 0.00334), (0.00282, 0.00296)]
@@ -180,6 +180,6 @@ def test_table_1_is_known_again(table_1):
     assert not tow_paper.are_of_the_paper(replace(table_1, speed_mps=1.01 * table_1.speed_mps))
 
 
-def test_a_tow_that_ends_early_is_told_with_its_polynomial_continued(study):
+def test_a_tow_that_ends_early_is_reported_with_its_polynomial_continued(study):
     (note,) = [note for note in study.notes if note.startswith("Tow ")]
     assert all(words in note for words in ("Tow 4", "45 s", "2682 kg", "50 s", "2687 kg"))

@@ -66,7 +66,7 @@ def test_gaps_are_passed_over_and_rounding_is_the_least():
     assert estimate_coloured_noise([np.full(100, np.nan)], 1e-3).deviation == pytest.approx(1e-3)
 
 
-def test_the_first_of_a_piece_stands_for_its_past():
+def test_the_first_of_a_piece_is_for_its_past():
     noise = ColouredNoise(1.0, phi=0.8)
     assert noise.deviation == pytest.approx(1 / 0.6)
     np.testing.assert_allclose(noise.whitened(np.array([[3.0, 2.4, 1.0]])), [[1.8, 0.0, 1.0 - 0.8 * 2.4]], atol=1e-12)

@@ -163,12 +163,12 @@ def test_a_run_without_long_stretches_is_refused(noisy):
         equation_error(problem([replace(noisy[0], signals={**noisy[0].signals, "r_radps": holed})]))
 
 
-def test_noise_left_in_regressors_is_told():
+def test_noise_left_in_regressors_is_reported():
     loud = [trial(zigzag(5), noise=20.0)]
     assert any("is noise" in notice for notice in equation_error(problem(loud)).notices)
 
 
-def test_a_parameter_that_no_acceleration_depends_on_is_told(noisy):
+def test_a_parameter_that_no_acceleration_depends_on_is_reported(noisy):
     asked = problem(noisy, free=("Nd",))
     blind = replace(
         asked, free=(*asked.free, "initial.psi"), prior_mean=np.array([0.0015, 0.3]), prior_error=np.array([3e-4, 0.1])

@@ -32,7 +32,7 @@ def test_information_in_units_of_the_prior(asked):
     assert known.pairs == known.unseen == known.notices == ()
 
 
-def test_two_that_drift_are_told_by_name(asked):
+def test_two_that_drift_are_reported_by_name(asked):
     rho = 0.98
     covariance = np.eye(3)
     covariance[0, 1] = covariance[1, 0] = -rho
@@ -43,7 +43,7 @@ def test_two_that_drift_are_told_by_name(asked):
     assert "Nv and Nr" in known.notices[0] and "drift" in known.notices[0]
 
 
-def test_an_unseen_sum_is_told_as_one_and_an_unseen_term_alone(asked):
+def test_an_unseen_sum_is_reported_as_one_and_an_unseen_term_alone(asked):
     difference = np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
     information = 1e4 * np.outer(difference, difference)
     known = identifiability(asked, answer(asked, information / np.outer(asked.prior_error, asked.prior_error)))

@@ -71,7 +71,7 @@ def test_derivatives_of_the_innovations_are_those_of_finite_differences(pushed):
     disturbed, batch = task.disturbed, task.batch
     case = (np.exp(-batch.steps[0] / np.exp(task.first.time)), batch.steps[:1])
 
-    def whitened(values):  # gains held: the observer alone is run anew
+    def whitened(values):  # gains held: the observer alone is run again
         p = problem.parameters(values)
         states = disturbed.predicted(batch.starts[0], batch.inputs[0], batch.measured[0], made.gains.K[0], (p, *case))
         e = batch.measured[0] - disturbed.seen(states, batch.inputs[0], p)
@@ -162,7 +162,7 @@ def test_what_was_not_measured_is_skipped(pushed):
     assert np.isfinite(found.smoothed[0].states).all()
 
 
-def test_a_run_says_the_same_beside_a_longer_one(pushed):
+def test_a_run_says_the_same_next_to_a_longer_one(pushed):
     problem = pushed[0][0]
     long, short = problem.runs[0], problem.runs[1].part(0, 60)
     task = task_of(problem.with_runs((long, short)))
@@ -199,12 +199,12 @@ def test_the_drift_of_a_sensor_is_found():
     assert np.all(np.abs(found.values - VALUES) < 3.5 * found.standard_errors)
 
 
-def test_each_iteration_is_better_and_is_told(pushed):
-    told = []
+def test_each_iteration_is_better_and_is_reported(pushed):
+    reported = []
     problem: Problem = pushed[0][0]
-    found = kalman(problem, start=VALUES, progress=lambda stage, values, cost: told.append((stage, cost)))
-    assert [cost for _, cost in told] == list(found.cost)
-    assert np.all(np.diff(found.cost) < 0) and {stage for stage, _ in told} == {"kalman"}
+    found = kalman(problem, start=VALUES, progress=lambda stage, values, cost: reported.append((stage, cost)))
+    assert [cost for _, cost in reported] == list(found.cost)
+    assert np.all(np.diff(found.cost) < 0) and {stage for stage, _ in reported} == {"kalman"}
     np.testing.assert_allclose((found.values - pushed[0][2].values) / found.standard_errors, 0, atol=0.2)
 
 

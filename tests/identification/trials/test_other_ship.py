@@ -1,4 +1,4 @@
-"""Trials of another ship than the card's: told, and no alarm on the measured ships and ships with unknown effects."""
+"""Trials of another ship than the card's: refused; no alarm on measured ships and ships with unknown effects."""
 
 from pathlib import Path
 
@@ -13,11 +13,11 @@ from tests.identification.trials.made_up_ship import TRUTH, problem, trial, turn
 
 
 @pytest.mark.parametrize("factor", [0.2, 5.0])
-def test_a_rudder_moment_far_off_the_cards_is_told_by_its_trial(factor):
+def test_a_rudder_moment_far_off_the_cards_is_reported_by_its_trial(factor):
     other = {**TRUTH, "Nd": factor * TRUTH["Nd"]}
     runs = [trial(zigzag(20), name="own"), trial(zigzag(15), name="other", truth=other)]
-    (told,) = (one for one in other_ship(problem(runs)) if one.startswith("other"))
-    assert float(told.split()[2]) == pytest.approx(factor, rel=0.5)
+    (reported,) = (one for one in other_ship(problem(runs)) if one.startswith("other"))
+    assert float(reported.split()[2]) == pytest.approx(factor, rel=0.5)
     assert not any(one.startswith("own") for one in other_ship(problem(runs)))
 
 

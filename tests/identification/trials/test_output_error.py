@@ -102,17 +102,17 @@ def test_a_prior_that_is_too_sure_is_widened(noisy):
     assert away[0] < away[1]
 
 
-def test_each_step_is_told_and_an_interruption_keeps_the_best(noisy):
-    told = []
+def test_each_step_is_reported_and_an_interruption_keeps_the_best(noisy):
+    reported = []
 
     def watch(stage, values, cost):
-        told.append((values.copy(), cost))
-        if len(told) == 2:
+        reported.append((values.copy(), cost))
+        if len(reported) == 2:
             raise KeyboardInterrupt
 
     answer = output_error(problem(noisy, free=FREE), settings=PIECES, progress=watch)
-    assert told[1][1] < told[0][1]
-    np.testing.assert_array_equal(answer.values, told[1][0])
+    assert reported[1][1] < reported[0][1]
+    np.testing.assert_array_equal(answer.values, reported[1][0])
     assert INTERRUPTED in answer.notices
     assert np.isfinite(answer.standard_errors).all()
 

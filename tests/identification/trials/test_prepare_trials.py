@@ -90,13 +90,13 @@ def test_a_tanker_is_no_mariner(data: Path, card: ManoeuvringCard) -> None:
         measured([data / "data/kvlcc2_hsva/HSVA_CPMC_KVLCC2_Z_10_10_P.dat"], card)
 
 
-def test_wind_that_the_card_cannot_take_is_told(tmp_path: Path, card: ManoeuvringCard) -> None:
+def test_wind_that_the_card_cannot_take_is_reported(tmp_path: Path, card: ManoeuvringCard) -> None:
     rows = "".join(f"{t},{np.sin(t / 9):.3f},7.7,5,200\n" for t in range(60))
     one = write(tmp_path / "a.csv", "t_s,delta_deg,u_mps,wind_speed_mps,wind_direction_deg", rows)
     assert any("wind was measured" in notice for notice in measured([one], card).notices)
 
 
-def test_wind_is_told_to_be_unused_by_the_effects_that_a_card_has_and_not_by_how_many(
+def test_wind_is_reported_to_be_unused_by_the_effects_that_a_card_has_and_not_by_how_many(
     tmp_path: Path, card: ManoeuvringCard
 ) -> None:
     rows = "".join(f"{t},{np.sin(t / 9):.3f},7.7,5,200\n" for t in range(60))

@@ -47,7 +47,7 @@ def test_first_overshoots_come_within_a_degree(result: Identification) -> None:
         assert np.abs(errors(result, basin, "overshoot_1_deg")).max() < 1.0
 
 
-def test_a_turn_never_fitted_is_foretold_from_zigzags(result: Identification) -> None:
+def test_a_turn_never_fitted_is_foredistinguished_from_zigzags(result: Identification) -> None:
     assert np.abs(errors(result, "MARIN", "advance_m")).max() < 0.06
     assert np.abs(errors(result, "MARIN", "tactical_diameter_m")).max() < 0.10
 
@@ -58,6 +58,6 @@ def test_intervals_hold_most_of_what_was_measured(result: Identification) -> Non
     assert len(inside) >= 10 and np.mean(inside) >= 0.8
 
 
-def test_the_frame_of_the_velocities_was_found_and_told(result: Identification) -> None:
+def test_the_frame_of_the_velocities_was_found_and_reported(result: Identification) -> None:
     for name in (*FITTED, *HELD_OUT):
         assert any(name in notice and "earth-fixed" in notice for notice in result.notices)

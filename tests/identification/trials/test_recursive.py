@@ -76,10 +76,12 @@ def test_a_slower_gain_forgets_the_beginning():
     assert 1 / total == pytest.approx(30**-0.7)
 
 
-def test_progress_is_told_and_can_stop(problem):
-    told = []
-    recursive(problem, settings=RecursiveSettings(passes=1), progress=lambda stage, values, cost: told.append(stage))
-    assert told == ["recursive"] * 3
+def test_progress_is_reported_and_can_stop(problem):
+    reported = []
+    recursive(
+        problem, settings=RecursiveSettings(passes=1), progress=lambda stage, values, cost: reported.append(stage)
+    )
+    assert reported == ["recursive"] * 3
 
     def stop(*_):
         raise KeyboardInterrupt

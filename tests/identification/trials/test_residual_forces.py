@@ -146,7 +146,7 @@ def test_members_hang_on_the_seed_and_not_on_the_executor():
     pickle.loads(pickle.dumps((SHIP, known(), manoeuvre, FORCES, settings)))
 
 
-def test_a_ship_that_always_runs_away_is_told():
+def test_a_ship_that_always_runs_away_is_reported():
     wild = replace(known(), free=("derivatives.Yvvv",), values=np.array([1e6]))
     with pytest.raises(InputError, match="every member"):
         bands(SHIP, wild, Turn(0.35), settings=PredictionSettings(members=2))

@@ -72,7 +72,7 @@ def test_friction_is_found_term_by_term(result):
         }
 
 
-def test_the_two_interval_formula_is_biased_and_its_bias_is_told(result):
+def test_the_two_interval_formula_is_biased_and_its_bias_is_reported(result):
     two, best = result.estimates["two_intervals"], result.estimates["energy_least_squares"]
     off = two.total_inertia_kgm2 - 0.0504
     assert abs(off) > 0.005 * 0.0504
@@ -314,7 +314,7 @@ def test_rounding_of_the_programme_moves_nothing(water):
     assert two.inertia_error_kgm2 == pytest.approx(one.inertia_error_kgm2, rel=1e-3)
 
 
-def test_gravity_is_found_by_itself_and_told(folder):
+def test_gravity_is_found_by_itself_and_reported(folder):
     truth = Truth(gravity=1.5e-3, gravity_angle=1.0)
     found = identify_yaw([read_yaw_record(written(folder / "hanging.csv", truth))])
     for method in ("energy_least_squares", "output_error"):
@@ -346,7 +346,7 @@ def test_units_and_signs_that_cannot_be_are_refused(folder, columns):
         identify_yaw([read_yaw_record(made)])
 
 
-def test_a_wrapped_angle_is_put_together_and_told(folder, columns, result):
+def test_a_wrapped_angle_is_put_together_and_reported(folder, columns, result):
     wrapped = (columns["psi"] + 3.0) % (2 * np.pi)
     read = read_yaw_record(written(folder / "wrapped.csv", TRUTH, {**columns, "psi": wrapped}))
     assert any("whole turn" in note for note in read.notes)

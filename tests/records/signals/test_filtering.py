@@ -45,10 +45,10 @@ FILTERS = {
 
 @pytest.mark.parametrize("name", FILTERS)
 @pytest.mark.parametrize("frequency_hz", [0.06, 0.23, 0.5, 0.9, 1.7])
-def test_told_gain_and_phase_are_those_of_a_sine_sent_through(name, frequency_hz):
+def test_reported_gain_and_phase_are_those_of_a_sine_sent_through(name, frequency_hz):
     filtered = FILTERS[name](wave(frequency_hz))
-    found, told = measured(frequency_hz, filtered), filtered.effect.at(frequency_hz)
-    assert abs(found - told) < 2e-3 * max(1.0, abs(told))
+    found, reported = measured(frequency_hz, filtered), filtered.effect.at(frequency_hz)
+    assert abs(found - reported) < 2e-3 * max(1.0, abs(reported))
 
 
 @pytest.mark.parametrize("name", ["lowpass", "highpass", "bandpass", "savgol", "spline", "decimate"])
@@ -77,13 +77,13 @@ def test_minus_3_db_one_way_and_minus_6_both_ways():
 )
 def test_the_sentence_tells_the_delay_that_a_sine_gets(kind, edges, word):
     sentence = butterworth(wave(0.3), kind, edges, causal=True).effect.sentence
-    told = re.match(r"(delays|brings) ([\d.]+) Hz (?:by )?([\d.e-]+) s", sentence)
-    assert told, sentence
-    frequency, shift = float(told[2]), float(told[3]) * (1 if told[1] == "delays" else -1)
+    reported = re.match(r"(delays|brings) ([\d.]+) Hz (?:by )?([\d.e-]+) s", sentence)
+    assert reported, sentence
+    frequency, shift = float(reported[2]), float(reported[3]) * (1 if reported[1] == "delays" else -1)
     found = measured(frequency, butterworth(wave(frequency), kind, edges, causal=True))
     assert cmath.phase(found * cmath.exp(2j * np.pi * frequency * shift)) == pytest.approx(0.0, abs=0.03)
     if word:
-        assert told[1] == word
+        assert reported[1] == word
         assert abs(shift) < 1.0 / frequency
 
 
@@ -93,13 +93,13 @@ def test_group_delay_is_how_much_later_a_packet_comes():
     filtered = butterworth(series(packet, STEP), FilterType.LOW, [0.5], causal=True)
     energy = filtered.series.values**2
     later = float(np.sum(time * energy) / np.sum(energy)) - 100.0
-    told = float(np.interp(0.3, filtered.effect.frequency_hz, filtered.effect.delay_s))
-    assert later == pytest.approx(told, rel=0.01)
+    reported = float(np.interp(0.3, filtered.effect.frequency_hz, filtered.effect.delay_s))
+    assert later == pytest.approx(reported, rel=0.01)
 
 
 @pytest.mark.parametrize("name", ["lowpass", "lowpass causal", "spline"])
-def test_the_middle_does_not_depend_on_what_is_beyond_the_ends_told(name):
-    # The same process with another past and future: inside the ends told the outputs agree to about 1 %.
+def test_the_middle_does_not_depend_on_what_is_beyond_the_ends_reported(name):
+    # The same process with another past and future: inside the ends reported the outputs agree to about 1 %.
     values = white(5, 2000)
     whole = FILTERS[name](series(values, STEP))
     part = FILTERS[name](series(values[700:1300], STEP))
@@ -132,15 +132,15 @@ def test_a_trend_is_taken_out_and_a_wave_left(degree):
     assert np.max(np.abs(detrend(series(slow, STEP), degree).series.values)) < 1e-9 * np.max(np.abs(slow))
 
 
-def test_the_gain_told_of_a_trend_is_the_mean_over_the_places_of_the_crests():
+def test_the_gain_reported_of_a_trend_is_the_mean_over_the_places_of_the_crests():
     frequency, time = 1.3 / 200.0, STEP * np.arange(4000)
     parts = []
     for start in np.linspace(0.0, 2 * np.pi, 6, endpoint=False):
         angle = 2 * np.pi * frequency * time + start
         kept = detrend(series(np.sin(angle), STEP), 1).series.values
         parts.append(2.0 * np.mean(kept * np.exp(-1j * angle)) * 1j)
-    told = detrend(wave(0.3), 1).effect.at(frequency)
-    assert np.mean(parts) == pytest.approx(told, abs=5e-3)
+    reported = detrend(wave(0.3), 1).effect.at(frequency)
+    assert np.mean(parts) == pytest.approx(reported, abs=5e-3)
 
 
 @pytest.mark.parametrize(
@@ -153,13 +153,13 @@ def test_what_is_no_filter_is_refused(text):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "reported"),
     [("lowpass:11", "not between"), ("bandpass:1,0.5", "that rise"), ("savgol:10,3", "odd number"),
      ("savgol:5001,3", "do not fit"), ("detrend:11", "not a degree"), ("detrend:-1", "not a degree"),
      ("decimate:1", "2 or more"), ("decimate:100", "2 or more"), ("spline:0.001", "not between")],
 )  # fmt: skip
-def test_numbers_that_do_not_fit_the_record_are_refused(text, told):
-    with pytest.raises(InputError, match=told):
+def test_numbers_that_do_not_fit_the_record_are_refused(text, reported):
+    with pytest.raises(InputError, match=reported):
         parse_filter(text).apply(wave(0.3))
 
 

@@ -39,7 +39,7 @@ def test_a_step_in_the_level_is_no_stationary_signal():
     assert Stationary.YES not in found
 
 
-def test_the_four_outcomes_are_told_apart_by_the_two_tests():
+def test_the_four_outcomes_are_distinguished_by_the_two_tests():
     found = stationarity(series(white(1)), autocorrelation(series(white(1))))
     assert found.level.dickey_fuller < 0.01
     assert found.level.kpss > 0.05
@@ -70,15 +70,15 @@ def test_all_samples_together_would_be_too_eager():
 
 
 @pytest.mark.parametrize(
-    ("make", "told"),
+    ("make", "reported"),
     [(np.exp, "skewed to high"), (lambda x: -np.exp(x), "skewed to low"), (lambda x: x**3, "heavy tails"),
      (np.sign, "flat")],
 )  # fmt: skip
-def test_what_is_not_normal_is_said_to_be_so_and_how(make, told):
+def test_what_is_not_normal_is_said_to_be_so_and_how(make, reported):
     one = series(make(first_order(4, 3.0)))
     found = normality(one, autocorrelation(one))
     assert found.normal is False
-    assert told in found.verdict
+    assert reported in found.verdict
 
 
 def test_too_few_independent_samples_are_not_judged():

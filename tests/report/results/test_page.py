@@ -140,7 +140,7 @@ def test_what_no_command_wrote_is_refused(result):
         result_page(result, "x.json")
 
 
-def test_every_kind_is_told_apart():
+def test_every_kind_is_distinguished():
     for kind in RESULT_TYPES:
         assert kind_of(dict.fromkeys(kind.keys), "x.json").title == kind.title
 
@@ -158,11 +158,11 @@ def test_the_tiles_of_a_gap_name_the_effect_with_its_parameters_and_judge_by_the
     ]
 
 
-@pytest.mark.parametrize(("found", "verdict", "told"), [(0.5, "", "better"), (110.0, "caution", "worse")])
-def test_the_tiles_of_coefficients_say_whether_the_trials_held_out_are_followed_better(found, verdict, told):
+@pytest.mark.parametrize(("found", "verdict", "reported"), [(0.5, "", "better"), (110.0, "caution", "worse")])
+def test_the_tiles_of_coefficients_say_whether_the_trials_held_out_are_followed_better(found, verdict, reported):
     misfit = {"fit": 1.0, "holdout": found, "before": {"fit": 2.0, "holdout": 0.997}}
     tile = result_page({"method": "output_error", "derivatives": {}, "misfit": misfit}, "r.json").figures[0]
-    assert (tile.value, tile.verdict) == (f"0.997 → {found:g}", verdict) and tile.note.startswith(told)
+    assert (tile.value, tile.verdict) == (f"0.997 → {found:g}", verdict) and tile.note.startswith(reported)
 
 
 def test_the_tiles_of_a_zigzag_are_its_overshoots_and_those_of_captive_tests_the_least_sure_derivative():
@@ -174,7 +174,7 @@ def test_the_tiles_of_a_zigzag_are_its_overshoots_and_those_of_captive_tests_the
     assert [(one.value, one.note) for one in page.figures] == [(2, ""), (50.0, "of the value, Yr")]
 
 
-def test_a_unit_that_stands_in_the_key_above_is_that_of_each_value_below():
+def test_a_unit_that_is_in_the_key_above_is_that_of_each_value_below():
     values = {"energy_least_squares": 0.03022, "two_intervals": 0.027}
     method = {"added_inertia_kgm2": 0.03022, "added_inertia_standard_error_kgm2": 0.00016}
     result = {"records": ["rig.csv"], "added_inertia_kgm2": values, "methods": {"energy_least_squares": method}}
@@ -191,10 +191,10 @@ def test_few_rows_of_many_columns_are_turned_and_what_nobody_knows_is_left_out()
     assert [row[0] for row in quantities("all", {"bootstrap": None, "ranges": [], "runs": 0}).rows] == ["runs"]
 
 
-def test_a_fleet_is_told_by_the_names_of_the_folders_without_ways_that_lead_nowhere():
-    told = {"verdict": "no missing effect", "effects": [], "alternatives": [], "trials": {"fit": 1, "holdout": 0}}
-    told |= {"misfit": {"before": {"fit": 1.0, "holdout": None}, "after": {"fit": 1.0, "holdout": None}}}
-    ships = [{"folder": "ship one", "name": "A ship", **told}, {"folder": "two", "fault": "no card"}]
+def test_a_fleet_is_reported_by_the_names_of_the_folders_without_ways_that_lead_nowhere():
+    reported = {"verdict": "no missing effect", "effects": [], "alternatives": [], "trials": {"fit": 1, "holdout": 0}}
+    reported |= {"misfit": {"before": {"fit": 1.0, "holdout": None}, "after": {"fit": 1.0, "holdout": None}}}
+    ships = [{"folder": "ship one", "name": "A ship", **reported}, {"folder": "two", "fault": "no card"}]
     page = result_page({"fleet": "f", "ships": ships, "notices": []}, "fleet.json")
     assert page.figures[0].value == "2"
     assert section(page, "Ships").tables[0].rows[0][0] == "ship one"
@@ -209,7 +209,7 @@ NEEDED = {kind.title: [*kind.keys, *needs_of(kind.title), "notices", "figures", 
 @settings(max_examples=25, deadline=None)
 @given(data=st.data(), kind=st.sampled_from(RESULT_TYPES), damage=DAMAGES)
 def test_a_damaged_key_is_an_error_of_the_file_and_never_one_of_the_program(data, kind, damage):
-    """Whatever stands under any key of any kind, the page is drawn or the key is told."""
+    """Whatever stands under any key of any kind, the page is drawn or the key is reported."""
     whole = {key: form() for key, form in needs_of(kind.title).items()}
     key = data.draw(st.sampled_from(NEEDED[kind.title]))
     result = {**dict.fromkeys(kind.keys), **whole, key: damage}
@@ -223,7 +223,7 @@ def test_a_damaged_key_is_an_error_of_the_file_and_never_one_of_the_program(data
 
 @pytest.mark.parametrize("damage", ["text", 5])
 @pytest.mark.parametrize(("kind", "key"), [(one.title, key) for one in RESULT_TYPES for key in needs_of(one.title)])
-def test_text_or_a_number_in_place_of_what_is_drawn_is_told_by_its_key(kind, key, damage):
+def test_text_or_a_number_in_place_of_what_is_drawn_is_reported_by_its_key(kind, key, damage):
     form = needs_of(kind)[key]
     if form is object or isinstance(damage, form):
         return

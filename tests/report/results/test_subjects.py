@@ -149,7 +149,7 @@ def test_a_simulated_manoeuvre_has_its_track_and_its_histories_in_their_units() 
     assert [row["v"] for row in shown["surge velocity (m/s)"]] == HISTORIES["u_mps"]
 
 
-def test_an_ensemble_is_drawn_as_bands_beside_the_run() -> None:
+def test_an_ensemble_is_drawn_as_bands_next_to_the_run() -> None:
     charts = drawn({**SIMULATED, "ensemble": ENSEMBLE})
     speeds = panels(charts["Histories: turn:10"])["surge velocity (m/s)"]
     for label, quantile in (("5 %", "p5"), ("50 %", "p50"), ("95 %", "p95")):
@@ -182,7 +182,7 @@ def test_places_of_findings_are_marked_in_the_panel_of_their_column_and_those_of
     assert [row[1] for row in page.sections[0].tables[0].rows] == ["psi [deg]", "t_s"]
 
 
-def test_a_validation_shows_errors_beside_their_uncertainty_and_the_replays() -> None:
+def test_a_validation_shows_errors_next_to_their_uncertainty_and_the_replays() -> None:
     charts = drawn(VALIDATED)
     (row,) = (row for row in rows_of(charts["Comparison error and validation uncertainty"].chart) if "e" in row)
     assert (row["e"], row["low"], row["high"]) == (10.0, -15.0, 15.0)
@@ -190,7 +190,7 @@ def test_a_validation_shows_errors_beside_their_uncertainty_and_the_replays() ->
     assert [row["v"] for row in speeds if row["run"] == "simulated"] == [7.0, 6.95, 6.9, 6.85]
 
 
-def test_an_identification_shows_each_trial_beside_both_cards_those_held_out_first() -> None:
+def test_an_identification_shows_each_trial_next_to_both_cards_those_held_out_first() -> None:
     charts = drawn(IDENTIFIED)
     assert list(charts)[::2] == ["Track: turn (held out)", "Track: zigzag (fitted)"]
     speeds = panels(charts["Histories: turn (held out)"])["surge velocity (m/s)"]
@@ -335,10 +335,10 @@ def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
     assert tank2sim(*command, cwd=tmp_path).returncode == 0
     assert tank2sim("report", "i.json", "-o", "r.html", cwd=tmp_path).returncode == 0
     assert (tmp_path / "i.html").read_bytes() == (tmp_path / "r.html").read_bytes()
-    told = json.loads((tmp_path / "i.json").read_text())
-    chart = charts_of(result_page(told, "i.json"))["Influence on criterion_C, K_per_s"]
+    reported = json.loads((tmp_path / "i.json").read_text())
+    chart = charts_of(result_page(reported, "i.json"))["Influence on criterion_C, K_per_s"]
     bars = {(row["name"], row["exact"]) for row in rows_of(chart.chart) if row.get("run") == "exact slope"}
-    exact = told["influence_percent"]["criterion_C"]["derivatives.Nr"]["exact"]
+    exact = reported["influence_percent"]["criterion_C"]["derivatives.Nr"]["exact"]
     assert any(name == "Nr" and value == pytest.approx(exact, rel=1e-5) for name, value in bars)
 
 

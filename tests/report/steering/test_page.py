@@ -65,12 +65,12 @@ DRIVE = """<script>{{
   const ready = setInterval(async () => {{
     if (document.documentElement.dataset.ship !== "ready") return;
     clearInterval(ready);
-    const told = {{}};
+    const seen = {{}};
     {steps}
     const read = (one) => at(one).textContent;
-    told.said = read("said");
-    for (const one of document.querySelectorAll("[id^=read-], output")) told[one.id] = read(one.id);
-    document.body.dataset.told = JSON.stringify({{ ...told, saved: await Promise.all(saved) }});
+    seen.said = read("said");
+    for (const one of document.querySelectorAll("[id^=read-], output")) reported[one.id] = read(one.id);
+    document.body.dataset.reported = JSON.stringify({{ ...reported, saved: await Promise.all(saved) }});
   }}, 50);
 }}</script>"""
 
@@ -103,17 +103,17 @@ def ghost(mariner, tmp_path):
 
 
 def sailed(html, folder, steps):
-    """What the page told after these steps, and the voyages that it saved."""
+    """What the page reported after these steps, and the voyages that it saved."""
     html = html.replace("<body>", "<body>" + FRAMES).replace("</body>", DRIVE.format(steps=steps) + "</body>")
     seen, console = opened(html, folder)
     assert console == []
-    told = json.loads(unescape(re.search(r'data-told="(.*?)"', seen)[1]))
+    seen = json.loads(unescape(re.search(r'data-told="(.*?)"', seen)[1]))
     voyages = []
-    for text in told.pop("saved"):
+    for text in seen.pop("saved"):
         lines = [one for one in text.splitlines() if not one.startswith("#")]
         rows = list(csv.DictReader(io.StringIO("\n".join(lines))))
         voyages.append({name: np.array([float(row[name]) for row in rows]) for name in rows[0]})
-    return told, voyages
+    return reported, voyages
 
 
 def worst(voyage, trajectory):
@@ -228,39 +228,39 @@ class TestInABrowser:
             click('zigzag'); click('finish'); click('save');"""
             for rudder, heading in manoeuvres.values()
         )
-        told, voyages = sailed(page, tmp_path, steps)
+        reported, voyages = sailed(page, tmp_path, steps)
         for manoeuvre, voyage in zip(manoeuvres, voyages, strict=True):
             run = simulate(mariner, parse_manoeuvre(manoeuvre))
             assert worst(voyage, run.trajectory) < 1e-9
-        shown = re.search(r"overshoots (.*) deg", told["said"])[1].split(", ")
+        shown = re.search(r"overshoots (.*) deg", reported["said"])[1].split(", ")
         assert [float(one) for one in shown] == pytest.approx(run.figures["overshoots_deg"], abs=0.06)
         assert len(page.encode()) < 1e6
 
     def test_keys_steer_and_readouts_bear_units(self, page, tmp_path):
         steps = """
         press("ArrowRight", { shiftKey: true }); press("ArrowRight"); press("ArrowLeft"); press("+");
-        told.factor = at("factor").value;
+        seen.factor = at("factor").value;
         press("z"); press("ArrowRight", { shiftKey: true });  // a hand on the rudder ends the zigzag
-        told.finish = at("finish").disabled;
+        seen.finish = at("finish").disabled;
         const wait = (ms) => new Promise((done) => setTimeout(done, ms));
         press("m"); press("ArrowLeft"); press("ArrowLeft"); await wait(1500); press(" "); click("save");
         const signals = ["motion.u", "motion.r", "rudder.angle", "motion.psi"];
-        told.read = Object.fromEntries(signals.map((name) => [name, at(`read-${name}`).textContent]));
+        seen.read = Object.fromEntries(signals.map((name) => [name, at(`read-${name}`).textContent]));
         click("reset"); put("factor", "50", "change"); click("run"); await wait(2000); click("run"); click("save");
         click("reset"); press("ArrowRight"); press("ArrowLeft"); press("ArrowLeft"); press("ArrowLeft");"""
-        told, (voyage, fast) = sailed(page, tmp_path, steps)
+        reported, (voyage, fast) = sailed(page, tmp_path, steps)
         assert 60 < fast["t_s"][-1] < 101
-        assert told["factor"] == "10"
-        assert told["finish"] is True
-        assert told["now-rudder.command"] == "2 deg port"
+        assert reported["factor"] == "10"
+        assert reported["finish"] is True
+        assert reported["now-rudder.command"] == "2 deg port"
         assert voyage["psi_deg"][-1] < 0
-        read = {name: float(text.replace("\u2212", "-")) for name, text in told["read"].items()}
+        read = {name: float(text.replace("\u2212", "-")) for name, text in reported["read"].items()}
         assert read["motion.u"] == pytest.approx(voyage["u_mps"][-1] * 3600 / 1852, abs=0.02)
         assert read["motion.r"] == pytest.approx(60 * voyage["r_degps"][-1], abs=0.06)
         assert read["rudder.angle"] == pytest.approx(voyage["delta_deg"][-1], abs=0.06)
         assert read["motion.psi"] == pytest.approx(360 + voyage["psi_deg"][-1], abs=0.06)
 
-    def test_sliders_with_the_focus_keep_their_keys_and_orders_are_told_with_their_side(self, pond, tmp_path):
+    def test_sliders_with_the_focus_keep_their_keys_and_orders_are_reported_with_their_side(self, pond, tmp_path):
         steps = """
         const engine = at("set-propeller.speed"), rudder = at("set-rudder.command");
         const on = (place, key) => {
@@ -268,63 +268,63 @@ class TestInABrowser:
           place.dispatchEvent(event);
           return event.defaultPrevented;
         };
-        told.wheel = on(document.body, "ArrowUp");
-        told.taken = on(engine, "ArrowLeft"); told.rudder = rudder.getAttribute("aria-valuetext");
-        told.down = on(rudder, "ArrowDown"); told.engine = engine.getAttribute("aria-valuetext");
-        on(engine, " "); told.sailing = at("run").textContent; told.under = at("said").textContent; on(engine, " ");
+        seen.wheel = on(document.body, "ArrowUp");
+        seen.taken = on(engine, "ArrowLeft"); seen.rudder = rudder.getAttribute("aria-valuetext");
+        seen.down = on(rudder, "ArrowDown"); seen.engine = engine.getAttribute("aria-valuetext");
+        on(engine, " "); seen.sailing = at("run").textContent; seen.under = at("said").textContent; on(engine, " ");
         engine.focus(); document.dispatchEvent(new Event("pointerdown"));
         put("set-propeller.speed", "-600", "input"); put("set-propeller.speed", "-600", "change");
-        told.focus = document.activeElement === engine;
-        told.astern = engine.getAttribute("aria-valuetext");
-        told.turning = at("read-propeller.speed_actual").textContent;
-        on(document.body, "w"); told.ahead = at("now-propeller.speed").textContent;
+        seen.focus = document.activeElement === engine;
+        seen.astern = engine.getAttribute("aria-valuetext");
+        seen.turning = at("read-propeller.speed_actual").textContent;
+        on(document.body, "w"); seen.ahead = at("now-propeller.speed").textContent;
         const wind = at("set-wind.speed");
-        put("set-wind.speed", "1e6", "change"); told.wind = wind.value; told.limit = at("said").textContent;
-        put("set-wind.speed", "", "change"); told.kept = wind.value; told.empty = at("said").textContent;
+        put("set-wind.speed", "1e6", "change"); seen.wind = wind.value; seen.limit = at("said").textContent;
+        put("set-wind.speed", "", "change"); seen.kept = wind.value; seen.empty = at("said").textContent;
         click("reset"); click("save");"""
-        told, (voyage,) = sailed(steering_page(pond, ship_in_page(pond)), tmp_path, steps)
-        assert (told["wheel"], told["taken"], told["down"], told["focus"]) == (False,) * 4
-        assert (told["rudder"], told["engine"]) == ("midships", "600.0 rpm ahead")
-        assert (told["sailing"], told["under"]) == ("Stop", "Under way.")
-        assert (told["astern"], told["turning"]) == ("600.0 rpm astern", "600.0")
-        assert told["ahead"] == "599.0 rpm astern"
-        assert float(told["wind"]) == pytest.approx(60 * 3600 / 1852, rel=1e-5)
-        assert "lies between 0 and 116.63 knots" in told["limit"]
-        assert told["kept"] == "116.631" and "a number was expected" in told["empty"]
+        reported, (voyage,) = sailed(steering_page(pond, ship_in_page(pond)), tmp_path, steps)
+        assert (reported["wheel"], reported["taken"], reported["down"], reported["focus"]) == (False,) * 4
+        assert (reported["rudder"], reported["engine"]) == ("midships", "600.0 rpm ahead")
+        assert (reported["sailing"], reported["under"]) == ("Stop", "Under way.")
+        assert (reported["astern"], reported["turning"]) == ("600.0 rpm astern", "600.0")
+        assert reported["ahead"] == "599.0 rpm astern"
+        assert float(reported["wind"]) == pytest.approx(60 * 3600 / 1852, rel=1e-5)
+        assert "lies between 0 and 116.63 knots" in reported["limit"]
+        assert reported["kept"] == "116.631" and "a number was expected" in reported["empty"]
         assert voyage["wind_speed_mps"] == pytest.approx(60, rel=1e-6)
 
     def test_the_page_warns_outside_the_range_and_tells_what_it_cannot_take(self, page, tmp_path):
         steps = """
         const outside = () => at("read-validity").closest("div").classList.contains("outside");
-        told.before = outside();
-        put("approach", "2", "change"); told.outside = outside();
-        told.after = getComputedStyle(document.querySelector(".outside dt"), "::after").content;
-        put("approach", "", "change"); told.empty = [at("approach").value, at("said").textContent];
-        put("approach", "-5", "change"); told.low = [at("approach").value, at("said").textContent];
-        put("approach", "1e9", "change"); told.high = [at("approach").value, at("said").textContent];
+        seen.before = outside();
+        put("approach", "2", "change"); seen.outside = outside();
+        seen.after = getComputedStyle(document.querySelector(".outside dt"), "::after").content;
+        put("approach", "", "change"); seen.empty = [at("approach").value, at("said").textContent];
+        put("approach", "-5", "change"); seen.low = [at("approach").value, at("said").textContent];
+        put("approach", "1e9", "change"); seen.high = [at("approach").value, at("said").textContent];
         put("approach", "15", "change");
         at("zigzag-rudder").value = -20.5; at("zigzag-heading").value = 7.3;
-        click("zigzag"); told.zigzag = at("said").textContent;
-        click("midships"); told.ended = at("said").textContent; click("run"); told.stopped = at("said").textContent;
-        at("zigzag-rudder").value = 60; click("zigzag"); told.gear = at("said").textContent; click("run");"""
-        told, _ = sailed(page, tmp_path, steps)
-        assert (told["before"], told["outside"]) == (False, True)
-        assert "outside" in told["after"]
-        assert told["empty"][0] == "2" and "a number was expected" in told["empty"][1]
-        assert told["low"][0] == "0" and "lies between 0 and" in told["low"][1]
-        assert float(told["high"][0]) < 60 and "is taken" in told["high"][1]
-        assert told["zigzag"] == "Zigzag \u221220.5/7.3 is executed."
-        assert "the zigzag is over" in told["ended"]
-        assert "Stopped at" in told["stopped"]
-        assert "its gear stops at 40 deg" in told["gear"]
+        click("zigzag"); seen.zigzag = at("said").textContent;
+        click("midships"); seen.ended = at("said").textContent; click("run"); seen.stopped = at("said").textContent;
+        at("zigzag-rudder").value = 60; click("zigzag"); seen.gear = at("said").textContent; click("run");"""
+        reported, _ = sailed(page, tmp_path, steps)
+        assert (reported["before"], reported["outside"]) == (False, True)
+        assert "outside" in reported["after"]
+        assert reported["empty"][0] == "2" and "a number was expected" in reported["empty"][1]
+        assert reported["low"][0] == "0" and "lies between 0 and" in reported["low"][1]
+        assert float(reported["high"][0]) < 60 and "is taken" in reported["high"][1]
+        assert reported["zigzag"] == "Zigzag \u221220.5/7.3 is executed."
+        assert "the zigzag is over" in reported["ended"]
+        assert "Stopped at" in reported["stopped"]
+        assert "its gear stops at 40 deg" in reported["gear"]
 
     def test_a_long_voyage_is_thinned_and_goes_on(self, page, tmp_path):
         steps = """
         Record.MOST = 300; click("reset"); put("set-rudder.command", "10", "input");
-        click("zigzag"); click("finish"); told.long = at("said").textContent; click("save");
+        click("zigzag"); click("finish"); seen.long = at("said").textContent; click("save");
         Record.MOST = 100000; click("reset"); click("zigzag"); click("finish"); click("save");"""
-        told, (thin, whole) = sailed(page, tmp_path, steps)
-        assert told["long"] == told["said"]  # the overshoots are those of every step
+        reported, (thin, whole) = sailed(page, tmp_path, steps)
+        assert reported["long"] == reported["said"]  # the overshoots are those of every step
         assert 150 <= len(thin["t_s"]) <= 301 < len(whole["t_s"])
         assert thin["t_s"][-1] == whole["t_s"][-1]
         assert np.all(np.diff(thin["t_s"]) > 0) and np.max(np.diff(thin["t_s"])) < 10

@@ -143,8 +143,8 @@ _AGREEMENT = (
 )
 _COULD_HIDE = (
     "Effects up to this size could be there without showing in these data, each with what was found. Limits and time "
-    "constants of the gear have no such size, for the ship has them anyway: of them the value furthest from the card's "
-    "is reported that would not show in its place."
+    "constants of the gear have no size of this kind, for the ship has them anyway: of them the value furthest from "
+    "the card's is reported that would not show in its place."
 )
 _NOISE = (
     "By these standard deviations misfits are counted. Stated: by the files; estimated: from the records themselves."

@@ -81,7 +81,7 @@ def with_unit(title: str, unit: str) -> str:
 
 
 def check_labels(labels: Sequence[str]) -> None:
-    """Raise ValueError if two series bear one label: they would be drawn as one line."""
+    """Raise ValueError if two series have the same label: they would be drawn as one line."""
     if len(set(labels)) != len(labels):
         raise ValueError(f"two series have one label: {labels}")
 

@@ -42,7 +42,7 @@
     return copy;
   }
 
-  // The inputs of a chart stand outside of its picture, in a form of their own; drawn anew, it keeps what was chosen.
+  // The inputs of a chart are outside of its picture, in a form of their own; drawn again, it keeps what was chosen.
   function switches(place) {
     return (charts[place].params ?? []).filter(({ bind }) => bind?.input);
   }
@@ -111,7 +111,7 @@
 
   const onScreen = () => drawAll(darkScreen.matches ? dark : light);
   darkScreen.addEventListener("change", onScreen);
-  // Paper has no switches: it shows what each stands at first.
+  // Paper has no switches: it shows the first choice of each.
   let left = [];
   addEventListener("beforeprint", () => {
     left = charts.map((_, place) => chosen(place));

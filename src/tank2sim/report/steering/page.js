@@ -96,10 +96,10 @@
   function ended(what) {
     if (what === "programme") { voyage.release(); return "The trial's orders have ended."; }
     const { overshoots } = voyage.done;
-    const told = overshoots.map((one) => shown(one / deg, 1)).join(", ");
+    const figures = overshoots.map((one) => shown(one / deg, 1)).join(", ");
     const whole = overshoots.length === Zigzag.EXECUTES - 1;
     if (!whole) return `${titled(voyage.done)} was given up: the heading is not reached.`;
-    return `${titled(voyage.done)} has ended; overshoots ${told} deg.`;
+    return `${titled(voyage.done)} has ended; overshoots ${figures} deg.`;
   }
 
   // Sails until `until` (s) or the end of a manoeuvre, for at most `most` ms.
@@ -128,7 +128,7 @@
     if (sailing) requestAnimationFrame(frame);
   }
 
-  // What was set by hand stays, but for rudder and engine.
+  // What was set by hand stays, except rudder and engine.
   function reset() {
     stop();
     const given = Object.fromEntries(data.controls.map((one) => [one.name, one.start]));
@@ -163,9 +163,9 @@
     }
     const limited = data.stop !== null && Math.abs(angle) > data.stop + 1e-9;
     voyage.startZigzag(limited ? Math.sign(angle) * data.stop * deg : angle * deg, heading * deg);
-    const told = [`${titled(voyage.zigzag)} is executed.`];
-    if (limited) told.push(`The rudder was to go to ${plain(angle)} deg: its gear stops at ${plain(data.stop)} deg.`);
-    const words = told.join(" ");
+    const lines = [`${titled(voyage.zigzag)} is executed.`];
+    if (limited) lines.push(`The rudder was to go to ${plain(angle)} deg: its gear stops at ${plain(data.stop)} deg.`);
+    const words = lines.join(" ");
     if (sailing) say(words); else start(words);
     show();
   }
@@ -203,15 +203,15 @@
 
   // Lines at the head of a saved voyage: what no column of a trial holds.
   function comments() {
-    const told = [`steered in the page of ${data.name}`];
+    const lines = [`steered in the page of ${data.name}`];
     for (const one of data.controls) {
       if (Voyage.ORDERS.includes(one.name)) continue;
       const from = voyage.changes.filter(([, name]) => name === one.name);
       const start = [0, one.name, voyage.begun[one.name]];
       const words = [start, ...from].map(([t, , value]) => `${plain(value * one.factor)} ${one.unit} at ${plain(t)} s`);
-      told.push(`${one.label}: ${words.join(", ")}`);
+      lines.push(`${one.label}: ${words.join(", ")}`);
     }
-    return told;
+    return lines;
   }
 
   function save() {
@@ -222,7 +222,7 @@
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   }
 
-  // A number that was typed, brought within its bounds; null where there is none. The user is told of both.
+  // A number that was typed, brought within its bounds; null where there is none. Both are reported to the user.
   function typed(input, name, unit, low, high) {
     const value = Number(input.value);
     if (input.value.trim() === "" || !Number.isFinite(value)) {

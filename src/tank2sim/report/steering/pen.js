@@ -41,7 +41,7 @@ function prepared(canvas) {
   return { pen, width, height };
 }
 
-// Room between the edge and the frame; on the left for the title and the widest label beside it.
+// Room between the edge and the frame; on the left for the title and the widest label next to it.
 function margins(pen, values) {
   const widest = Math.max(0, ...values.map((one) => pen.measureText(label(one)).width));
   return { left: Math.ceil(widest) + 32, right: 14, top: 12, bottom: 38 };

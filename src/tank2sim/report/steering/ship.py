@@ -43,7 +43,7 @@ _LARGEST_RUDDER = math.radians(35.0)
 """End of the rudder slider where a card states no largest angle: the hard-over of IMO MSC.137(76)."""
 
 FULL_AHEAD, FULL_ASTERN = 1.2, -1.0
-"""Ends of the engine slider, in nominal revolutions. Project choice: the little overload that engines bear, and as
+"""Ends of the engine slider, in nominal revolutions. Project choice: the little overload that engines allow, and as
 much astern as ahead."""
 
 GHOST_STEERS, GHOST_RATE = "ghost.steers", "ghost.rudder_rate"

@@ -8,7 +8,7 @@ class TrackChart {
     this.forget();
   }
 
-  // Bounds of what was sailed begin anew, with the ghost in view.
+  // Bounds of what was sailed begin again, with the ghost in view.
   forget() {
     this.seen = 0;
     this.bounds = { north: -Infinity, south: Infinity, east: -Infinity, west: Infinity };
@@ -93,20 +93,20 @@ class TrackChart {
       const [speed, direction] = [orders[`${name}.speed`], orders[`${name}.direction`]];
       if (!(speed > 0)) continue;
       const bearing = Math.round(((direction * 180 / Math.PI) % 360 + 360) % 360) % 360;
-      const told = `${name} ${(speed * 3600 / 1852).toFixed(1)} knots ${word} ${bearing} deg`;
-      const wide = pen.measureText(told).width + 34;
+      const text = `${name} ${(speed * 3600 / 1852).toFixed(1)} knots ${word} ${bearing} deg`;
+      const wide = pen.measureText(text).width + 34;
       if (right - wide < 0) [right, top] = [width - 14, top + 28];
-      found.push({ told, left: right - wide, top, towards: direction + turned });
+      found.push({ text, left: right - wide, top, towards: direction + turned });
       right -= wide + 16;
     }
     return { found, high: found.length > 0 ? top + 20 : 0 };
   }
 
   // An arrow along which it goes, and its words.
-  #flow(pen, colour, { told, left, top, towards }) {
+  #flow(pen, colour, { text, left, top, towards }) {
     arrow(pen, left + 13, top + 13, towards, colour.own);
     Object.assign(pen, { fillStyle: colour.ink, textAlign: "left", textBaseline: "middle" });
-    pen.fillText(told, left + 34, top + 14);
+    pen.fillText(text, left + 34, top + 14);
   }
 
   // A ship seen from above, to scale, but never too small to see.

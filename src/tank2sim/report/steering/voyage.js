@@ -1,4 +1,4 @@
-// A voyage with the ship: her orders, the zigzag, and the record of what she did.
+// A voyage with the ship: its orders, the zigzag, and the record of the motion.
 
 // Rudder one way until the heading has changed by `heading`, then the other way, and so on: five executes, rad.
 class Zigzag {
@@ -101,7 +101,7 @@ class Voyage {
     if (!Voyage.ORDERS.includes(name)) this.changes.push([this.time, name, value]);
   }
 
-  // The rudder is the hand's again, and her gear's. Returns what has ended: "zigzag", "programme" or null.
+  // The rudder is the hand's again, and the gear's. Returns what has ended: "zigzag", "programme" or null.
   release() {
     const ended = this.zigzag ? "zigzag" : this.programme.length > 0 ? "programme" : null;
     this.zigzag = null;

@@ -188,10 +188,10 @@ def captive_tests(
 
 def _refuse_other_form(card: ManoeuvringCard, campaign: Campaign) -> None:
     for key in ("beam_m", "draught_m"):
-        ours, theirs = getattr(card.ship, key), getattr(campaign.model, key)
-        if not ours or not theirs:
+        size, tested = getattr(card.ship, key), getattr(campaign.model, key)
+        if not size or not tested:
             continue
-        of_card, of_model = card.ship.length_m / ours, campaign.model.length_m / theirs
+        of_card, of_model = card.ship.length_m / size, campaign.model.length_m / tested
         if abs(of_model / of_card - 1) > SAME_FORM:
             problem = f"length over {key.removesuffix('_m')} is {of_model:.4g}, and {of_card:.4g} on {card.source}"
             raise InputError(campaign.path, f"model.{key}", problem, "give the campaign of a model of this ship")
