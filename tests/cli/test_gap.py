@@ -228,7 +228,7 @@ def _with_trials(folder: Path, new: Path) -> Path:
         (["mariner", "turn20.csv", "--holdout", "no.csv"], ["no.csv"]),
         (["titanic", "turn20.csv"], ["titanic"]),
         (["linear.toml", "turn20.csv"], ["linear.toml", "model.kind", "linear"]),
-        (["wilinski-zellman", "turn20.csv"], ["model.kind", "manoeuvres"]),
+        (["wilinski-zellman", "turn20.csv"], ["model.kind", "manoeuvring"]),
         (["mariner"], ["TRIALS"]),
         (["mariner", "turn20.csv", "--effects", "curent"], ["--effects", "curent", "did you mean current"]),
         (["mariner", "turn20.csv", "--without", "kraken"], ["--without", "kraken"]),

@@ -20,16 +20,16 @@ from tank2sim.units import to_si
 from tests.gap import made_up
 
 
-def written(gap, **more):
-    return json.loads(json.dumps(gap_as_json(gap, **more), allow_nan=False))
+def written(gap, **options):
+    return json.loads(json.dumps(gap_as_json(gap, **options), allow_nan=False))
 
 
 @pytest.mark.parametrize("verdict", made_up.EVERY)
 def test_every_verdict_is_valid_json_with_the_keys_of_the_format(verdict) -> None:
-    told = written(made_up.EVERY[verdict]())
-    assert told["verdict"] == verdict
-    assert {"effects", "alternatives", "where", "misfit", "could_hide", "next_test"} <= set(told)
-    assert {"noise", "noise_floor", "before", "after"} <= set(told["misfit"])
+    result = written(made_up.EVERY[verdict]())
+    assert result["verdict"] == verdict
+    assert {"effects", "alternatives", "where", "misfit", "could_hide", "next_test"} <= set(result)
+    assert {"noise", "noise_floor", "before", "after"} <= set(result["misfit"])
 
 
 def test_an_effect_is_in_the_units_of_a_card() -> None:
@@ -73,25 +73,25 @@ def test_what_could_hide_is_in_the_units_of_a_card() -> None:
 
 
 def test_explanations_are_joined_and_the_next_test_names_its_file() -> None:
-    told = written(made_up.ambiguous())
-    assert told["alternatives"] == ["current", "wind + rudder_bias"]
-    assert told["next_test"]["orders"] == "next_test.csv" and told["next_test"]["manoeuvre"] == "turn:35"
-    assert [one["effects"] for one in told["rivals"]] == [["current"], ["heading_offset"], []]
+    result = written(made_up.ambiguous())
+    assert result["alternatives"] == ["current", "wind + rudder_bias"]
+    assert result["next_test"]["orders"] == "next_test.csv" and result["next_test"]["manoeuvre"] == "turn:35"
+    assert [rival["effects"] for rival in result["rivals"]] == [["current"], ["heading_offset"], []]
 
 
 def test_a_simulation_that_left_all_bounds_has_no_misfit() -> None:
-    told = written(made_up.outside())
-    assert told["misfit"]["before"] == {"fit": None, "holdout": None}
-    lost, other = told["trials"]
-    assert lost["misfit"]["before"] is None and other["misfit"]["before"] == pytest.approx(6.0)
-    assert told["effects"] == [] and told["next_test"] is None
+    result = written(made_up.outside())
+    assert result["misfit"]["before"] == {"fit": None, "holdout": None}
+    lost, turn = result["trials"]
+    assert lost["misfit"]["before"] is None and turn["misfit"]["before"] == pytest.approx(6.0)
+    assert result["effects"] == [] and result["next_test"] is None
 
 
 def test_a_signal_that_a_trial_lacks_is_left_out_of_its_misfits() -> None:
     found = made_up.missing()
-    turn, *others = found.passed
+    turn, *remaining = found.passed
     blind = replace(turn, measured={**turn.measured, "motion.x": np.full(len(turn.time_s), np.nan)})
-    first, second, _ = written(replace(found, passed=(blind, *others)))["trials"]
+    first, second, _ = written(replace(found, passed=(blind, *remaining)))["trials"]
     assert "x_m" not in first["signals"] and "x_m" in second["signals"]
     assert first["signals"]["y_m"]["before"] == pytest.approx(8.0)
 
@@ -110,15 +110,15 @@ def test_figures_stand_before_and_after() -> None:
     assert advance["before"] == pytest.approx(550) and advance["after"] == pytest.approx(505)
     assert lost["after"] is None
     same = written(made_up.nothing())["figures"]
-    assert [one["before"] == one["after"] for one in same] == [True] * 3
+    assert [figure["before"] == figure["after"] for figure in same] == [True] * 3
 
 
 def test_every_parameter_of_the_library_is_read_back_as_it_was() -> None:
     for effect in EFFECTS.values():
         for parameter, variable in effect.model_names().items():
-            own, value = in_file_units(parameter, 0.3)
-            assert "rad" not in own.rpartition("_")[2]
-            assert to_si(own, value) == (parameter, pytest.approx(0.3))
+            key, value = in_file_units(parameter, 0.3)
+            assert "rad" not in key.rpartition("_")[2]
+            assert to_si(key, value) == (parameter, pytest.approx(0.3))
             assert effect_parameter_name(variable) == (effect.name, parameter)
 
 
@@ -139,9 +139,9 @@ def test_candidates_do_not_hide_and_tell_their_sizes() -> None:
     gap = made_up.ambiguous()
     assert gap.next_test is not None
     sizes = {"wind": ({"direction_rad": -np.pi / 2}, {"direction_rad": 0.1})}
-    told = written(replace(gap, next_test=replace(gap.next_test, sizes=sizes)))
-    assert set(told["could_hide"]) == {"linear_yaw_damping"} == set(told["could_hide_in_words"])
-    (wind,) = told["next_test"]["candidates"].values()
+    result = written(replace(gap, next_test=replace(gap.next_test, sizes=sizes)))
+    assert set(result["could_hide"]) == {"linear_yaw_damping"} == set(result["could_hide_in_words"])
+    (wind,) = result["next_test"]["candidates"].values()
     assert wind["parameters"] == {"direction_deg": pytest.approx(270.0)}
 
 

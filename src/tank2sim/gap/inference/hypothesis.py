@@ -210,7 +210,7 @@ class Hypothesis:
         x = motion.states
         tracks = []
         for run in range(len(x)):
-            start = self._settled(x[run, 0], inputs[run, 0], p)
+            start = self._steady_states(x[run, 0], inputs[run, 0], p)
             tracks.append(self._chain(motion.step_s).run(start, x[run, :-1], x[run, 1:], inputs[run], p))
         unmeasured = np.array(tracks)
         for name, delay in self._delays(theta).items():
@@ -389,7 +389,7 @@ class Hypothesis:
             {"cse": True},
         )
 
-    def _settled(self, x: Array, u: Array, p: Array) -> Array:
+    def _steady_states(self, x: Array, u: Array, p: Array) -> Array:
         """Steady unmeasured states for a constant motion: their trims where these are known."""
         states = {state.name: state for state in self.model.states}
         xi = np.array(self._begin(np.zeros(len(self.unmeasured)), x, u, p)).ravel()

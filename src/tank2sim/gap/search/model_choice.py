@@ -255,7 +255,7 @@ def _pushes(likelihood: Likelihood, fit: ExplanationFit) -> list[Strange]:
     neither. A window holds as many independent values of the force as it holds twice its time constant.
     """
     motion, found = likelihood.motion, []
-    states, spread = likelihood.smoothed(fit)
+    states, spread = likelihood.smooth(fit)
     inside = motion.inside
     for axis, time in enumerate(fit.noise.force_s):
         squares = np.where(inside, states[..., 6 + axis] ** 2, 0.0)
