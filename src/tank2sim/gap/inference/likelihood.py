@@ -173,13 +173,11 @@ class Likelihood:
         seen, columns = self._seen(fit)
         by_coefficients = columns.driving[..., 1 + columns.parameter_count :] @ fit.change
         states = seen.smooth(columns.driving[..., 0] + by_coefficients, columns.shown[..., 0])
-        added_rates = by_coefficients + np.pad(
-            motion.block_s * states[:, :-1, 6 : 6 + FORCE_STATES], ((0, 0), (0, 0), (0, 3))
-        )
+        added = by_coefficients.copy()
+        added[..., :FORCE_STATES] += motion.block_s * states[:, :-1, 6 : 6 + FORCE_STATES]
+        added *= self._inside / motion.block_s
         between = hypothesis.rates_between(motion, theta) - np.diff(motion.states, axis=1) / motion.step_s
-        moved = motion.shift(
-            states[..., :6], seen.linear.transition, between, added_rates * self._inside / motion.block_s
-        )
+        moved = motion.shift(states[..., :6], seen.linear.transition, between, added)
         return Likelihood(moved, self.none, self.coefficients, self.belief)
 
     def by_formula(self, fit: ExplanationFit) -> ExplanationFit:
@@ -243,13 +241,13 @@ class Likelihood:
     ) -> ExplanationFit:
         """The noise of several at which the explanation, free in its parameters, scores best."""
         columns = self.columns(fit.hypothesis, fit.theta, coefficients)
-        scored: list[tuple[float, int]] = []
-        for logs in starts:
-            noisy = replace(fit, logs=logs)
+
+        def score(noisy: ExplanationFit) -> float:
             seen = observer(linear, noisy.noise)
             solved = self._solved(fit.hypothesis, fit.theta, seen, columns.scaled(noisy.width), free=True)
-            scored.append((self._score(noisy, seen, solved), len(scored)))
-        return replace(fit, logs=starts[min(scored)[1]])
+            return self._score(noisy, seen, solved)
+
+        return min((replace(fit, logs=logs) for logs in starts), key=score)
 
     def _parameters(self, fit: ExplanationFit, linear: Linear, coefficients: Array, steps: int = 4) -> ExplanationFit:
         """Gauss-Newton in the parameters at one noise."""
@@ -362,7 +360,8 @@ class Likelihood:
         pull = -gram[1:, 0] - np.concatenate([precision * (theta - mean), np.zeros(gram.shape[0] - 1 - k)])
         size = np.sqrt(np.diag(normal))
         size[size == 0] = 1.0  # the shape of an absent effect has no column
-        factor = cho_factor(normal / np.outer(size, size) + 1e-12 * np.eye(len(normal)))
+        identity = np.eye(len(normal))
+        factor = cho_factor(normal / np.outer(size, size) + 1e-12 * identity)
         whole = cho_solve(factor, pull / size) / size
         inner = normal[k:, k:]
         held = cho_factor(inner)
@@ -372,7 +371,7 @@ class Likelihood:
         base = gram[0, 0] + float(precision @ (theta - mean) ** 2)
         reduced_cost = base - (float(pull @ whole) if free else float(alone @ (inner @ alone)))
         reduced_cost += 2 * float(np.sum(np.log(np.diag(held[0]))))
-        covariance = np.linalg.inv(normal / np.outer(size, size) + 1e-12 * np.eye(len(normal))) / np.outer(size, size)
+        covariance = cho_solve(factor, identity) / np.outer(size, size)
         spread = np.linalg.inv(inner)
         root = np.linalg.cholesky(0.5 * (spread + spread.T)) if len(inner) else np.zeros((0, 0))
         weights = np.zeros((gram.shape[0], 1 + len(inner)))
