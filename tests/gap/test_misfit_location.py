@@ -15,7 +15,6 @@ from tank2sim.gap.diagnosis.misfit_location import (
     explained_share,
     figures,
     missing_force_by_state,
-    parity,
     places,
 )
 from tank2sim.gap.result import MissingForce, Passed
@@ -132,7 +131,6 @@ def test_a_force_that_is_a_function_of_the_rudder_is_explained_by_the_rudder() -
     found = found_force(force, np.tile([1e3, 1e3, 1e5], (4000, 1)))
     assert found is not None and found.equation == "Y" and found.explaining == "rudder"
     assert found.explained["rudder"] > 0.8 and found.explained["heading"] < 0.2
-    assert parity(found.states["rudder"], found.force) > 0.9
 
 
 def test_a_force_of_the_heading_is_found_round_the_circle() -> None:
@@ -161,14 +159,6 @@ def test_shares_are_those_of_the_variance_and_none_for_what_is_unrelated() -> No
     assert explained_share(state, force, weights) == pytest.approx(0.5, abs=0.03)
     assert explained_share(rng.uniform(-1, 1, 5000), force, weights) < 0.01
     assert explained_share(np.zeros(5000), force, weights) == 0.0
-
-
-def test_parity_tells_odd_from_even() -> None:
-    state = np.random.default_rng(10).uniform(-1, 1, 5000)
-    assert parity(state, state**3) > 0.95
-    assert parity(state, state**2) < -0.95
-    assert abs(parity(state, np.maximum(state, 0.0))) < 0.1
-    assert parity(np.abs(state), state) == 0.0
 
 
 def test_kinematics_contradict_a_biased_gyro_and_a_current() -> None:

@@ -83,7 +83,7 @@ class Decision:
     strange: tuple[Strange, ...]
 
     def confidence(self, effect: str) -> float:
-        """Probability that an effect is among what is missing."""
+        """Probability that an effect is among the missing ones."""
         return _confidence(self.probabilities, effect)
 
 
@@ -213,7 +213,7 @@ PADDED = 512
 
 
 def find_strangeness(likelihood: Likelihood, fit: ExplanationFit) -> tuple[Strange, ...]:
-    """Where the innovations of an explanation are not noise, the strangest first."""
+    """Places where the innovations of an explanation are not noise, the least probable first."""
     e = likelihood.innovations(fit)
     found = [*_passages(likelihood, e), *_periods(likelihood, e), *_disagreements(likelihood, fit)]
     found += _pushes(likelihood, fit)
