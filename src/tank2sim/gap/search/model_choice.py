@@ -65,7 +65,7 @@ class Decision:
     Parameters
     ----------
     verdict : str
-        One of :data:`.result.VERDICTS`.
+        One of :data:`.result.GAP_VERDICTS`.
     best : ExplanationFit
         The explanation that is named, "none" among them; the best of all where a name is withheld.
     alike : tuple of ExplanationFit
