@@ -76,9 +76,9 @@ class Dense:
         """What a block adds by chance, by independent normal numbers: two of each acceleration, one of each sensor."""
         root = np.diag(np.r_[np.zeros(9), (levels * np.sqrt(1 - fading**2))[3:]])
         for axis, (_, covariance) in enumerate(pushes):
-            (speed, both), (_, left) = np.linalg.cholesky(covariance).T
+            (speed, both), (_, remaining) = np.linalg.cholesky(covariance).T
             root[:6, axis], root[6 + axis, axis] = spreading[:, axis] * speed, both
-            root[6 + axis, 3 + axis] = left
+            root[6 + axis, 3 + axis] = remaining
         return root
 
     def error(self, driving, shown):

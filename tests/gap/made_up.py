@@ -110,7 +110,7 @@ def nothing() -> Gap:
         rivals=(Rival((), 0.0, 0.9), Rival(("current",), 6.0, 0.05)),
         where=(),
         equation="",
-        passed=tuple(replace(one, black_box={}) for one in trials),
+        passed=tuple(replace(trial, black_box={}) for trial in trials),
         figures_after=(),
         missing_force=None,
         agreement={},

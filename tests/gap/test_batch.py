@@ -47,14 +47,15 @@ def record(
     """A record that is no ship's; its rudder goes up steadily."""
     t = begin + np.arange(0, duration + step / 2, step)
     rng = np.random.default_rng(2)
-    signals = {one: kind(one, t) + noise * WAVES[one] * rng.standard_normal(len(t)) for one in STARTS}
+    signals = {name: kind(name, t) + noise * WAVES[name] * rng.standard_normal(len(t)) for name in STARTS}
     signals["delta_rad"] = 0.002 * t
     return Trial(Path(f"{name}.csv"), t, signals)
 
 
 def order_of(motion: MeasuredBatch) -> list[str]:
     return [
-        {variable: signal for signal, variable in zip(STARTS, MEASURED_STATES, strict=True)}[one] for one in motion.seen
+        {variable: signal for signal, variable in zip(STARTS, MEASURED_STATES, strict=True)}[name]
+        for name in motion.seen
     ]
 
 
@@ -202,12 +203,12 @@ def test_a_rounded_motion_is_moved_to_the_exact_one_between_the_blocks() -> None
     halfway = 0.5 * (rounded[:, 1:] + rounded[:, :-1])
     lack = halfway @ A.T + push(times[:-1] + STEP / 2) - np.diff(rounded, axis=1) / STEP
     transition = np.tile(expm(A * STEP * FINE), (2, BLOCKS - 1, 1, 1))
-    moved = motion.moved(away, transition, lack, np.tile(lacking, (2, BLOCKS - 1, 1)))
+    moved = motion.shift(away, transition, lack, np.tile(lacking, (2, BLOCKS - 1, 1)))
     inside = slice(FINE // 2, n - FINE // 2)
-    left = np.abs(moved.states - true)[:, inside].max(axis=(0, 1)) / sizes
-    assert np.all(left < 0.02)
+    remaining = np.abs(moved.states - true)[:, inside].max(axis=(0, 1)) / sizes
+    assert np.all(remaining < 0.02)
     assert moved.middles == pytest.approx(true[:, FINE // 2 :: FINE])
-    straight = motion.moved(away, transition, 0 * lack, np.zeros((2, BLOCKS - 1, 6)))
+    straight = motion.shift(away, transition, 0 * lack, np.zeros((2, BLOCKS - 1, 6)))
     assert np.abs(straight.states - true)[:, inside].max() > 5 * np.abs(moved.states - true)[:, inside].max()
 
 

@@ -66,9 +66,9 @@ def test_a_biased_gyro_is_set_right_and_nothing_else_is_touched(tmp_path: Path, 
     assert new[0].startswith("\ufeff# r_degps corrected by tank2sim gap for gyro_bias (rate 0.052 deg/s")
     assert len(new) == len(old) + 1 and new[1:4] == [old[0].removeprefix("\ufeff"), *old[1:3]]
     for before, after in zip(old[3:-1], new[4:-1], strict=True):
-        cells, others = before.split(","), after.split(",")
-        assert cells[:3] + cells[4:] == others[:3] + others[4:]
-        assert (cells[3] == "") == (others[3] == "")
+        cells, corrected = before.split(","), after.split(",")
+        assert cells[:3] + cells[4:] == corrected[:3] + corrected[4:]
+        assert (cells[3] == "") == (corrected[3] == "")
     assert new[4].split(",")[3] == "0.0000", "the digits of the file, and one more that the correction needs"
     again = reread(tmp_path, fixed)
     np.testing.assert_allclose(np.delete(degrees(again, "r_radps"), 2), np.delete(RATE, 2), atol=1e-9)

@@ -33,8 +33,8 @@ def judged(card: ManoeuvringCard, *, bias: float = 0.0, noise: float = 1.0, dura
         made_up_ship.trial(made_up_ship.zigzag(20), name="zigzag", duration=duration, step=0.5, noise=noise),
         made_up_ship.trial(made_up_ship.turn(30), name="turn", duration=duration, step=0.5, noise=noise, seed=2),
     ]
-    for one in trials:
-        one.signals["r_radps"][:] += bias
+    for trial in trials:
+        trial.signals["r_radps"][:] += bias
     return likelihood_from_card(card, Measured(tuple(trials), "angle", ()))
 
 
@@ -45,7 +45,7 @@ def none_of(likelihood: Likelihood) -> ExplanationFit:
 def sizes(likelihood: Likelihood, enough: float = 10.0, names=HIDDEN) -> dict[str, dict[str, float]]:
     none = likelihood.none
     hypothesis = [Hypothesis(none.card, none.driven_by, [name]) for name in names]
-    every = tuple(one for each in hypothesis for one in variants(likelihood, each))
+    every = tuple(variant for each in hypothesis for variant in variants(likelihood, each))
     best = none_of(likelihood)
     return could_hide(Search(likelihood, (best,), every), best, enough)
 
@@ -53,21 +53,21 @@ def sizes(likelihood: Likelihood, enough: float = 10.0, names=HIDDEN) -> dict[st
 def test_what_could_hide_goes_with_the_root_of_what_is_enough(card) -> None:
     likelihood = judged(card)
     price = np.log(likelihood.count / COUNTED)
-    some, more = sizes(likelihood, 10.0), sizes(likelihood, 50.0)
+    limits, higher = sizes(likelihood, 10.0), sizes(likelihood, 50.0)
     for name, asked in (("gyro_bias", 1), ("linear_yaw_damping", 1), ("current", 2)):
-        for parameter, size in some[name].items():
+        for parameter, size in limits[name].items():
             much, little = (np.sqrt(enough + asked * price) + SURE for enough in (50.0, 10.0))
-            assert more[name][parameter] >= 0.99 * much / little * size, name  # louder noises hide more of more
-            assert more[name][parameter] < 1.6 * much / little * size, name
-    assert set(some["current"]) == {"speed_mps"} and set(some) == set(HIDDEN)
+            assert higher[name][parameter] >= 0.99 * much / little * size, name  # louder noises hide more of more
+            assert higher[name][parameter] < 1.6 * much / little * size, name
+    assert set(limits["current"]) == {"speed_mps"} and set(limits) == set(HIDDEN)
 
 
 def test_what_could_hide_grows_with_the_noise_and_falls_with_the_length(card) -> None:
-    one, loud, long = (sizes(judged(card, **how)) for how in ({}, {"noise": 4.0}, {"duration": 480.0}))
+    standard, loud, long = (sizes(judged(card, **how)) for how in ({}, {"noise": 4.0}, {"duration": 480.0}))
     # a rate is a mean over the time, half as uncertain over four times as long; a current is a way over the time
     for name, parameter, least, most in (("gyro_bias", "rate_radps", 0.3, 0.8), ("current", "speed_mps", 0.1, 0.35)):
-        assert 2.5 < loud[name][parameter] / one[name][parameter] < 4.5, name
-        assert least < long[name][parameter] / one[name][parameter] < most, name
+        assert 2.5 < loud[name][parameter] / standard[name][parameter] < 4.5, name
+        assert least < long[name][parameter] / standard[name][parameter] < most, name
 
 
 def test_what_could_hide_is_where_the_score_begins_to_tell(card) -> None:
@@ -81,8 +81,8 @@ def test_what_could_hide_is_where_the_score_begins_to_tell(card) -> None:
         likelihood = judged(card, bias=share * size)
         hypothesis = Hypothesis(card, "angle", ["gyro_bias"])
         none = none_of(likelihood)
-        one = likelihood.at_best(hypothesis, np.array([share * size]), [none.logs, likelihood.belief.logs], [0, 6])
-        gains.append(none.score - one.score)
+        fit = likelihood.at_best(hypothesis, np.array([share * size]), [none.logs, likelihood.belief.logs], [0, 6])
+        gains.append(none.score - fit.score)
     assert gains[0] < 10.0 < gains[1]
 
 
@@ -90,7 +90,7 @@ def test_next_to_what_is_named_it_is_not_reported_again(card) -> None:
     likelihood = judged(card, bias=0.002)
     hypothesis = Hypothesis(card, "angle", ["gyro_bias"])
     best = likelihood.at_best(hypothesis, np.array([0.002]), [likelihood.belief.logs], [0, 6])
-    every = [one for name in HIDDEN for one in variants(likelihood, Hypothesis(card, "angle", [name]))]
+    every = [variant for name in HIDDEN for variant in variants(likelihood, Hypothesis(card, "angle", [name]))]
     assert set(could_hide(Search(likelihood, (best,), tuple(every)), best, 10.0)) == set(HIDDEN) - {"gyro_bias"}
 
 
@@ -104,7 +104,7 @@ def test_of_an_effect_without_amplitude_a_value_is_reported_that_does_not_show(c
     typical = hypothesis.estimated[0].parameter.typical_values(card)[0]
     tried = sorted(share * typical for share in SIZES if share * typical >= hypothesis.bounds[0][0])
     (value,) = found.values()
-    assert value == pytest.approx(min(tried, key=lambda one: abs(one - value)))
+    assert value == pytest.approx(min(tried, key=lambda size: abs(size - value)))
     best = none_of(likelihood)
 
     def cost(lag: float) -> float:
@@ -112,5 +112,5 @@ def test_of_an_effect_without_amplitude_a_value_is_reported_that_does_not_show(c
         held = replace(best, hypothesis=hypothesis, theta=np.array([lag]))
         return likelihood._parameters(held, likelihood.base, likelihood.coefficient_columns, 1).score - best.score
 
-    longer = [one for one in tried if one > value]
+    longer = [size for size in tried if size > value]
     assert not longer or cost(longer[0]) > cost(value)

@@ -31,8 +31,8 @@ def test_what_records_lack_has_the_size_that_was_put_in(fault: dict[str, float],
 def test_a_log_that_shows_too_little_lacks_speed_ahead_and_not_to_north() -> None:
     slow = []
     for seed in (1, 2):
-        one = motion(seed=seed)
-        slow.append(replace(one, measured={**one.measured, "motion.u": 0.9 * one.measured["motion.u"]}))
+        replay = motion(seed=seed)
+        slow.append(replace(replay, measured={**replay.measured, "motion.u": 0.9 * replay.measured["motion.u"]}))
     found = missing_signal(slow)
     assert found is not None and found.quantity == "ahead"
     assert np.mean(found.values) == pytest.approx(0.5, rel=0.03)

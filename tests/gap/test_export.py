@@ -20,16 +20,16 @@ from tank2sim.units import to_si
 from tests.gap import made_up
 
 
-def written(gap, **more):
-    return json.loads(json.dumps(gap_as_json(gap, **more), allow_nan=False))
+def written(gap, **options):
+    return json.loads(json.dumps(gap_as_json(gap, **options), allow_nan=False))
 
 
 @pytest.mark.parametrize("verdict", made_up.EVERY)
 def test_every_verdict_is_valid_json_with_the_keys_of_the_format(verdict) -> None:
-    reported = written(made_up.EVERY[verdict]())
-    assert reported["verdict"] == verdict
-    assert {"effects", "alternatives", "where", "misfit", "could_hide", "next_test"} <= set(reported)
-    assert {"noise", "noise_floor", "before", "after"} <= set(reported["misfit"])
+    result = written(made_up.EVERY[verdict]())
+    assert result["verdict"] == verdict
+    assert {"effects", "alternatives", "where", "misfit", "could_hide", "next_test"} <= set(result)
+    assert {"noise", "noise_floor", "before", "after"} <= set(result["misfit"])
 
 
 def test_an_effect_is_in_the_units_of_a_card() -> None:
@@ -49,7 +49,7 @@ def test_places_bear_names_of_files_and_columns() -> None:
     ("variable", "column"),
     [("motion.x", "x_m"), ("motion.u", "u_mps"), ("motion.r", "r_degps"), ("motion.u_ground", "u_ground_mps")],
 )
-def test_a_variable_is_reported_by_the_column_that_measures_it(variable, column) -> None:
+def test_a_variable_is_told_by_the_column_that_measures_it(variable, column) -> None:
     assert signal_display_name(variable).file == column
 
 
@@ -73,25 +73,25 @@ def test_what_could_hide_is_in_the_units_of_a_card() -> None:
 
 
 def test_explanations_are_joined_and_the_next_test_names_its_file() -> None:
-    reported = written(made_up.ambiguous())
-    assert reported["alternatives"] == ["current", "wind + rudder_bias"]
-    assert reported["next_test"]["orders"] == "next_test.csv" and reported["next_test"]["manoeuvre"] == "turn:35"
-    assert [one["effects"] for one in reported["rivals"]] == [["current"], ["heading_offset"], []]
+    result = written(made_up.ambiguous())
+    assert result["alternatives"] == ["current", "wind + rudder_bias"]
+    assert result["next_test"]["orders"] == "next_test.csv" and result["next_test"]["manoeuvre"] == "turn:35"
+    assert [rival["effects"] for rival in result["rivals"]] == [["current"], ["heading_offset"], []]
 
 
 def test_a_simulation_that_left_all_bounds_has_no_misfit() -> None:
-    reported = written(made_up.outside())
-    assert reported["misfit"]["before"] == {"fit": None, "holdout": None}
-    lost, other = reported["trials"]
-    assert lost["misfit"]["before"] is None and other["misfit"]["before"] == pytest.approx(6.0)
-    assert reported["effects"] == [] and reported["next_test"] is None
+    result = written(made_up.outside())
+    assert result["misfit"]["before"] == {"fit": None, "holdout": None}
+    lost, turn = result["trials"]
+    assert lost["misfit"]["before"] is None and turn["misfit"]["before"] == pytest.approx(6.0)
+    assert result["effects"] == [] and result["next_test"] is None
 
 
 def test_a_signal_that_a_trial_lacks_is_left_out_of_its_misfits() -> None:
     found = made_up.missing()
-    turn, *others = found.passed
+    turn, *remaining = found.passed
     blind = replace(turn, measured={**turn.measured, "motion.x": np.full(len(turn.time_s), np.nan)})
-    first, second, _ = written(replace(found, passed=(blind, *others)))["trials"]
+    first, second, _ = written(replace(found, passed=(blind, *remaining)))["trials"]
     assert "x_m" not in first["signals"] and "x_m" in second["signals"]
     assert first["signals"]["y_m"]["before"] == pytest.approx(8.0)
 
@@ -110,15 +110,15 @@ def test_figures_stand_before_and_after() -> None:
     assert advance["before"] == pytest.approx(550) and advance["after"] == pytest.approx(505)
     assert lost["after"] is None
     same = written(made_up.nothing())["figures"]
-    assert [one["before"] == one["after"] for one in same] == [True] * 3
+    assert [figure["before"] == figure["after"] for figure in same] == [True] * 3
 
 
 def test_every_parameter_of_the_library_is_read_back_as_it_was() -> None:
     for effect in EFFECTS.values():
         for parameter, variable in effect.model_names().items():
-            own, value = in_file_units(parameter, 0.3)
-            assert "rad" not in own.rpartition("_")[2]
-            assert to_si(own, value) == (parameter, pytest.approx(0.3))
+            key, value = in_file_units(parameter, 0.3)
+            assert "rad" not in key.rpartition("_")[2]
+            assert to_si(key, value) == (parameter, pytest.approx(0.3))
             assert effect_parameter_name(variable) == (effect.name, parameter)
 
 
@@ -139,9 +139,9 @@ def test_candidates_do_not_hide_and_tell_their_sizes() -> None:
     gap = made_up.ambiguous()
     assert gap.next_test is not None
     sizes = {"wind": ({"direction_rad": -np.pi / 2}, {"direction_rad": 0.1})}
-    reported = written(replace(gap, next_test=replace(gap.next_test, sizes=sizes)))
-    assert set(reported["could_hide"]) == {"linear_yaw_damping"} == set(reported["could_hide_in_words"])
-    (wind,) = reported["next_test"]["candidates"].values()
+    result = written(replace(gap, next_test=replace(gap.next_test, sizes=sizes)))
+    assert set(result["could_hide"]) == {"linear_yaw_damping"} == set(result["could_hide_in_words"])
+    (wind,) = result["next_test"]["candidates"].values()
     assert wind["parameters"] == {"direction_deg": pytest.approx(270.0)}
 
 
@@ -152,7 +152,7 @@ def test_what_could_hide_is_worded_by_what_a_size_means() -> None:
     assert words["rudder_rate_limit"] == "max rate of 4 deg/s in place of the card's would not show"
 
 
-def test_no_force_is_reported_of_where_none_is_missing() -> None:
+def test_no_force_is_told_of_where_none_is_missing() -> None:
     gap = made_up.missing()
     assert written(gap)["missing_force"] is None
     assert written(replace(gap, effects=(), equation="sway"))["missing_force"]["equation"] == "Y"

@@ -30,9 +30,9 @@ def card() -> ManoeuvringCard:
 
 @pytest.fixture(scope="module")
 def likelihood(card) -> Likelihood:
-    one = made_up_ship.trial(made_up_ship.zigzag(20), name="zigzag", duration=120, step=0.5)
-    one.signals["r_radps"][:] += 5e-4
-    return likelihood_from_card(card, Measured((one,), "angle", ()))
+    trial = made_up_ship.trial(made_up_ship.zigzag(20), name="zigzag", duration=120, step=0.5)
+    trial.signals["r_radps"][:] += 5e-4
+    return likelihood_from_card(card, Measured((trial,), "angle", ()))
 
 
 def proposals(likelihood: Likelihood, *sets: tuple[str, ...], rounds=(0, 3)) -> list[Proposal]:
@@ -59,10 +59,10 @@ def alone(likelihood) -> dict[tuple[str, ...], ExplanationFit]:
 def assert_same(found: dict[tuple[str, ...], ExplanationFit], expected: dict[tuple[str, ...], ExplanationFit]) -> None:
     """To the bit."""
     assert list(found) == list(expected)
-    for effects, one in found.items():
-        assert one.hypothesis.effects == effects and one.score == expected[effects].score
+    for effects, fit in found.items():
+        assert fit.hypothesis.effects == effects and fit.score == expected[effects].score
         for name in ("theta", "covariance", "logs", "change"):
-            np.testing.assert_array_equal(getattr(one, name), getattr(expected[effects], name))
+            np.testing.assert_array_equal(getattr(fit, name), getattr(expected[effects], name))
 
 
 def executors() -> dict[str, Executor]:
@@ -83,9 +83,9 @@ def test_the_result_does_not_depend_on_who_does_the_work(likelihood, alone, exec
 
 def test_another_ship_in_the_same_worker_is_another_ship(card, likelihood, alone) -> None:
     """By the order in place of the angle: the same card, and a gear between."""
-    one = made_up_ship.trial(made_up_ship.zigzag(20), name="zigzag", duration=60, step=0.5)
-    one.signals["delta_order_rad"] = one.signals.pop("delta_rad")
-    ordered = likelihood_from_card(card, Measured((one,), "order", ()))
+    trial = made_up_ship.trial(made_up_ship.zigzag(20), name="zigzag", duration=60, step=0.5)
+    trial.signals["delta_order_rad"] = trial.signals.pop("delta_rad")
+    ordered = likelihood_from_card(card, Measured((trial,), "order", ()))
     expected = fitted(ordered, None, ("gyro_bias",))
     with ThreadPoolExecutor(1) as pool:
         assert_same(fitted(likelihood, pool, ("gyro_bias",)), {("gyro_bias",): alone["gyro_bias",]})
@@ -94,12 +94,12 @@ def test_another_ship_in_the_same_worker_is_another_ship(card, likelihood, alone
 
 
 def test_the_order_of_effects_does_not_matter(likelihood, alone) -> None:
-    (one,) = fitted(likelihood, None, ("gyro_bias", "current")).items()
-    assert_same(dict([one]), {one[0]: alone[one[0]]})
-    assert set(one[0]) == {"current", "gyro_bias"} and one[0] in alone
-    for name, theta in thetas_of(one[1]).items():
+    (pair,) = fitted(likelihood, None, ("gyro_bias", "current")).items()
+    assert_same(dict([pair]), {pair[0]: alone[pair[0]]})
+    assert set(pair[0]) == {"current", "gyro_bias"} and pair[0] in alone
+    for name, theta in thetas_of(pair[1]).items():
         assert len(theta) == len(THETAS[name])
-    assert thetas_of(one[1])["gyro_bias"] == pytest.approx([5e-4], abs=2e-4)
+    assert thetas_of(pair[1])["gyro_bias"] == pytest.approx([5e-4], abs=2e-4)
 
 
 def test_the_better_of_two_fits_is_kept(likelihood, alone) -> None:
@@ -117,11 +117,11 @@ def test_the_better_of_two_fits_is_kept(likelihood, alone) -> None:
         fitting.best(2)
 
 
-def test_what_is_being_fitted_is_reported_in_order(likelihood, executor) -> None:
-    reported: list[str] = []
-    fitting = Fitting(likelihood, HypothesisCache(likelihood.none), reported.append, executor)
+def test_what_is_being_fitted_is_told_in_order(likelihood, executor) -> None:
+    messages: list[str] = []
+    fitting = Fitting(likelihood, HypothesisCache(likelihood.none), messages.append, executor)
     fitting.fit(proposals(likelihood, (), ("gyro_bias",), rounds=(0,)))
-    assert reported == ["the card as it is", "gyro_bias"]
+    assert messages == ["the card as it is", "gyro_bias"]
 
 
 def test_explanations_are_made_once(card) -> None:

@@ -39,7 +39,7 @@ def test_each_sub_folder_with_a_card_and_trials_is_a_ship(tmp_path: Path) -> Non
     laid(tmp_path, ".hidden/c.toml", ".hidden/t.csv", "papers/read.me", "ship.txt", "a/.old.toml", "a/._t.csv")
     (tmp_path / "a/folder.csv").mkdir()
     found = fleet_in(tmp_path, tmp_path / "out")
-    assert found.faults == {} and [one.name for one in found.ships] == ["a", "b b"]
+    assert found.faults == {} and [ship.name for ship in found.ships] == ["a", "b b"]
     a, b = found.ships
     assert [path.name for path in a.inputs] == ["c.toml", "t.csv", "h.csv"]
     assert found.passed_over == (tmp_path / "papers",)
@@ -55,11 +55,11 @@ def test_each_sub_folder_with_a_card_and_trials_is_a_ship(tmp_path: Path) -> Non
         (("s/a.toml", "s/t.csv", "s/holdout/read.me"), "holds no trial"),
     ],
 )
-def test_a_folder_at_fault_is_reported_and_does_not_hide_the_others(
+def test_a_folder_at_fault_is_told_and_does_not_hide_the_others(
     tmp_path: Path, names: tuple[str, ...], words: str
 ) -> None:
     found = fleet_in(laid(tmp_path, *names, "good/a.toml", "good/t.csv"), tmp_path / "out")
-    assert [one.name for one in found.ships] == ["good"]
+    assert [ship.name for ship in found.ships] == ["good"]
     assert list(found.faults) == ["s"] and words in found.faults["s"] and str(tmp_path / "s") in found.faults["s"]
 
 
@@ -88,7 +88,7 @@ def test_results_are_no_ships(tmp_path: Path) -> None:
     laid(tmp_path, "one/gap.json", "one/improved.toml", "one/next_test.csv")
     for output in ("out", "new"):
         found = fleet_in(tmp_path, tmp_path / output)
-        assert [one.name for one in found.ships] == ["a"] and found.faults == {}
+        assert [ship.name for ship in found.ships] == ["a"] and found.faults == {}
     laid(tmp_path, "out/mine.csv")
     assert fleet_in(tmp_path, tmp_path / "out").faults == {}
 
@@ -148,16 +148,16 @@ CHANGES: dict[str, tuple[Callable[[Path], object], str]] = {
 
 
 @pytest.mark.parametrize("what", CHANGES)
-def test_a_result_is_until_what_it_was_computed_from_changes(tmp_path: Path, what: str) -> None:
+def test_a_result_stands_until_what_it_was_computed_from_changes(tmp_path: Path, what: str) -> None:
     ship = ship_in(laid(tmp_path / "ship", "c.toml", "t.csv", "holdout/h.csv"))
     assert ship is not None
     out = wrote(tmp_path / "out", ship, GapOptions())
     change, words = CHANGES[what]
     change(tmp_path)
-    now = ship_in(tmp_path / "ship")
-    assert now is not None
-    reported = stale(fleet_run_record(now, GapOptions()), out)
-    assert (words in reported) if words else reported == ""
+    changed = ship_in(tmp_path / "ship")
+    assert changed is not None
+    reason = stale(fleet_run_record(changed, GapOptions()), out)
+    assert (words in reason) if words else reason == ""
 
 
 def test_options_that_change_the_result_make_it_stale_and_others_do_not(
@@ -167,8 +167,8 @@ def test_options_that_change_the_result_make_it_stale_and_others_do_not(
     assert ship is not None
     out = wrote(tmp_path / "out", ship, GapOptions(effects=("current",)))
     assert stale(fleet_run_record(ship, GapOptions(effects=("current",), workers=7)), out) == ""
-    for other in (GapOptions(), GapOptions(("current",), ("wind",)), GapOptions(("current",), max_effects=1)):
-        assert stale(fleet_run_record(ship, other), out) == "the options were changed"
+    for options in (GapOptions(), GapOptions(("current",), ("wind",)), GapOptions(("current",), max_effects=1)):
+        assert stale(fleet_run_record(ship, options), out) == "the options were changed"
     monkeypatch.setattr("tank2sim.gap.fleet.run_record.__version__", "99")
     assert stale(fleet_run_record(ship, GapOptions(effects=("current",))), out) == "computed by another version"
 
@@ -199,12 +199,12 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_bad_ship_does_not_stop_the_others(mariner_card: ManoeuvringCard, failing) -> None:
-    reported: list[str] = []
+    messages: list[str] = []
     ships = sought(mariner_card, "a", "bad", "odd", "z")
     with ThreadPoolExecutor(2) as pool:
         for found in (
-            find_in_turn(ships, GapOptions(), reported.append),
-            find_at_once(iter(ships), GapOptions(), reported.append, pool),
+            find_in_turn(ships, GapOptions(), messages.append),
+            find_at_once(iter(ships), GapOptions(), messages.append, pool),
         ):
             results = {ship.folder.name: result for ship, result in found}
             assert results["a"] == "gap of a" and results["z"] == "gap of z"
@@ -212,12 +212,12 @@ def test_a_bad_ship_does_not_stop_the_others(mariner_card: ManoeuvringCard, fail
             assert (
                 isinstance(results["odd"], Fault) and "not of yours: ZeroDivisionError: by zero" in results["odd"].line
             )
-    assert "a: looking" in reported and any(" to go: " in one for one in reported)
+    assert "a: looking" in messages and any(" to go: " in message for message in messages)
 
 
 def test_a_lost_executor_ends_the_run_in_one_line(mariner_card: ManoeuvringCard) -> None:
     class Lost(ThreadPoolExecutor):
-        def submit(self, *work, **more):  # type: ignore[override]
+        def submit(self, *work, **options):  # type: ignore[override]
             future: Future[object] = Future()
             future.set_exception(BrokenExecutor("killed"))
             return future
@@ -228,5 +228,5 @@ def test_a_lost_executor_ends_the_run_in_one_line(mariner_card: ManoeuvringCard)
 
 def test_what_is_sent_to_a_worker_needs_no_file_of_this_machine(mariner_card: ManoeuvringCard) -> None:
     (ship,) = sought(mariner_card, "a")
-    there = pickle.loads(pickle.dumps(ship))
-    assert there.card == ship.card and there.folder == ship.folder
+    received = pickle.loads(pickle.dumps(ship))
+    assert received.card == ship.card and received.folder == ship.folder

@@ -14,8 +14,8 @@ SIZES = np.array([0.8, -0.6, 0.9])
 
 def pushes(motion) -> np.ndarray:
     """What that force adds to the three speeds in each block (R, T - 1, 3), 0 beyond a run's end."""
-    more = Toy((None,) * 3).rates_between(motion, SIZES) - Toy().rates_between(motion, [])
-    return motion.block_s * np.where(motion.inside[:, 1:, None], motion.over_blocks(more)[..., :3], 0.0)
+    change = Toy((None,) * 3).rates_between(motion, SIZES) - Toy().rates_between(motion, [])
+    return motion.block_s * np.where(motion.inside[:, 1:, None], motion.over_blocks(change)[..., :3], 0.0)
 
 
 def everywhere(force: np.ndarray) -> np.ndarray:
@@ -26,7 +26,7 @@ def everywhere(force: np.ndarray) -> np.ndarray:
 def shapes(motion) -> list[np.ndarray]:
     """Rudder, yaw rate and loss of speed, each from -1 where it is least to 1 where it is largest."""
     courses = np.abs(motion.block_inputs[..., 0]), np.abs(motion.block_states[..., 2]), -motion.block_states[..., 0]
-    return [np.interp(one, (one.min(), one.max()), (-1, 1)) for one in courses]
+    return [np.interp(course, (course.min(), course.max()), (-1, 1)) for course in courses]
 
 
 @pytest.mark.parametrize("directed", [False, True])
@@ -50,7 +50,7 @@ def test_the_form_of_a_force_leaves_its_size_to_the_effect() -> None:
     motion = toy_motion(tuple(SIZES))
     force = pushes(motion)
     first, second, *_ = np.moveaxis(Forms(motion, 0).columns(everywhere(force), directed=False), -1, 0)
-    whole = np.stack([one[..., :3].ravel() for one in (first, second, force)], axis=-1)
+    whole = np.stack([driving[..., :3].ravel() for driving in (first, second, force)], axis=-1)
     assert np.linalg.matrix_rank(whole) == 3
-    left = force.ravel() - whole[:, :2] @ np.linalg.lstsq(whole[:, :2], force.ravel(), rcond=None)[0]
-    assert np.linalg.norm(left) > 0.3 * np.linalg.norm(force)
+    residual = force.ravel() - whole[:, :2] @ np.linalg.lstsq(whole[:, :2], force.ravel(), rcond=None)[0]
+    assert np.linalg.norm(residual) > 0.3 * np.linalg.norm(force)

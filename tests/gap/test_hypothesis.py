@@ -112,7 +112,7 @@ def test_a_current_carries_the_ship(card) -> None:
     speed, direction = 0.7, 2.0
     motion = simulated(order, order, (speed * np.cos(direction), speed * np.sin(direction)))
     hypothesis = Hypothesis(card, "angle", ["current"])
-    assert [one.parameter.name for one in hypothesis.estimated] == ["speed_mps", "direction_rad"]
+    assert [estimate.parameter.name for estimate in hypothesis.estimated] == ["speed_mps", "direction_rad"]
     found = hypothesis.fine_rates(motion, np.array([speed, direction]))
     assert np.abs(found - true_rates(motion)).max(axis=(0, 1)) / SIZES == pytest.approx(0, abs=2e-4)
     away = hypothesis.fine_rates(motion, np.array([0.0, direction])) - true_rates(motion)
@@ -159,37 +159,37 @@ def test_a_time_offset_moves_the_rudder_by_the_delay(card, by_angle, by_order, d
     hypothesis = Hypothesis(card, "order", ["rudder_time_offset"])
     t = STEP * np.arange(FINE * BLOCKS)
     inside = (t > 6) & (t < t[-1] - 3)
-    own = hypothesis.unmeasured_states(by_order, np.array([delay]))
-    assert own[1, inside, 0] == pytest.approx(behind(t - delay)[inside], abs=1e-4)
+    states = hypothesis.unmeasured_states(by_order, np.array([delay]))
+    assert states[1, inside, 0] == pytest.approx(behind(t - delay)[inside], abs=1e-4)
     assert hypothesis.inputs(by_order, np.array([delay]))[0, :, 0] == pytest.approx(by_order.inputs[0, :, 0])
 
 
 def test_a_late_step_of_the_order_keeps_its_shape(card, by_order) -> None:
     """An order at 20 s that acts 0.44 s later: nothing before 20.44 s, and the lag from there."""
     kicked, t = stepped(by_order, 20.0, 0.3), STEP * np.arange(FINE * BLOCKS)
-    own = Hypothesis(card, "order", ["rudder_time_offset"]).unmeasured_states(kicked, np.array([0.44]))
+    states = Hypothesis(card, "order", ["rudder_time_offset"]).unmeasured_states(kicked, np.array([0.44]))
     exact = 0.3 * (1 - np.exp(-np.maximum(t - 20.44, 0) / LAG))
-    assert own[0, :, 0] == pytest.approx(exact, abs=0.3 * STEP / LAG * 0.3)
-    assert np.all(own[0, t < 20.35, 0] == 0)
+    assert states[0, :, 0] == pytest.approx(exact, abs=0.3 * STEP / LAG * 0.3)
+    assert np.all(states[0, t < 20.35, 0] == 0)
 
 
 def by_hand(name: str, theta, x):
     u, v, r, psi, north, east = (x[..., place] for place in range(6))
-    (a, *more) = theta
+    (a, *offsets) = theta
     changed = {
         "gyro_bias": lambda: {"r": r + a},
         "gyro_scale": lambda: {"r": (1 + a) * r},
         "heading_offset": lambda: {"psi": psi + a},
         "antenna_lever_arm": lambda: {
-            "x": north + a * np.cos(psi) - more[0] * np.sin(psi),
-            "y": east + a * np.sin(psi) + more[0] * np.cos(psi),
+            "x": north + a * np.cos(psi) - offsets[0] * np.sin(psi),
+            "y": east + a * np.sin(psi) + offsets[0] * np.cos(psi),
         },
         "log_scale": lambda: {"u": (1 + a) * u, "v": (1 + a) * v},
         "log_misalignment": lambda: {"u": u * np.cos(a) + v * np.sin(a), "v": v * np.cos(a) - u * np.sin(a)},
         "log_lever_arm": lambda: {"v": v + a * r},
     }[name]()
     plain = {"u": u, "v": v, "r": r, "psi": psi, "x": north, "y": east}
-    return np.stack([(plain | changed)[one.removeprefix("motion.")] for one in SEEN], axis=-1)
+    return np.stack([(plain | changed)[name.removeprefix("motion.")] for name in SEEN], axis=-1)
 
 
 SENSORS = {
@@ -210,7 +210,7 @@ def test_readings_of_faulty_sensors(card, by_angle, name: str) -> None:
     means = by_angle.states.reshape(2, BLOCKS, FINE, 6).mean(axis=2)
     assert hypothesis.readings(by_angle, theta) == pytest.approx(by_hand(name, theta, means))
     assert hypothesis.readings(by_angle, 0 * theta) == pytest.approx(
-        means[..., [MEASURED_STATES.index(one) for one in SEEN]]
+        means[..., [MEASURED_STATES.index(name) for name in SEEN]]
     )
     assert hypothesis.rates(by_angle, theta) == pytest.approx(Hypothesis(card, "angle").rates(by_angle, NOTHING))
 
@@ -220,11 +220,11 @@ def test_slopes_are_difference_quotients(card, by_angle) -> None:
     theta = np.array([-40.0, 7.0, 0.1])
     by_state, seen = hypothesis.slopes(by_angle, theta)
     for column, size in enumerate((1e-3, 1e-3, 1e-6, 1e-4, 1e-2, 1e-2)):
-        there, back = (
+        forward, back = (
             replace(by_angle, states=by_angle.states + sign * size * np.eye(6)[column]) for sign in (1.0, -1.0)
         )
         for whole, of in ((by_state, hypothesis.rates), (seen, hypothesis.readings)):
-            quotient = (of(there, theta) - of(back, theta)) / (2 * size)
+            quotient = (of(forward, theta) - of(back, theta)) / (2 * size)
             scale = np.abs(whole[..., column]).max() + 1e-9
             assert whole[..., column] / scale == pytest.approx(quotient / scale, abs=1e-5)
 
@@ -235,13 +235,13 @@ def test_slopes_in_the_coefficients_are_those_of_the_equations(card, by_angle) -
     x, rudder = by_angle.block_states, by_angle.block_inputs[..., 0]
     for column, name in enumerate(names):
         step = 1e-4 * abs(TRUTH[name])
-        there, back = (
+        forward, back = (
             np.stack(
                 accelerations(*np.moveaxis(x[..., :3], -1, 0), rudder, {**TRUTH, name: TRUTH[name] + sign * step}), -1
             )
             for sign in (1, -1)
         )
-        quotient = (there - back) / (2 * step)
+        quotient = (forward - back) / (2 * step)
         assert found[..., :3, column] == pytest.approx(quotient, rel=1e-5, abs=1e-7 * np.abs(quotient).max())
         assert np.all(found[..., 3:, column] == 0)
 
@@ -343,7 +343,7 @@ def test_what_an_effect_does_not_touch_is_as_without_it(card, by_order, name: st
     hypothesis, plain = Hypothesis(card, "order", [name]), Hypothesis(card, "order")
     states, rates_too, readings = hypothesis.influences
     assert TOUCHED.get(name, hypothesis.influences) == hypothesis.influences
-    theta = np.array([one.parameter.typical_values(card)[0] for one in hypothesis.estimated])
+    theta = np.array([estimate.parameter.typical_values(card)[0] for estimate in hypothesis.estimated])
     place = hypothesis.unmeasured.index("rudder.angle")
     pairs = (
         (
@@ -362,7 +362,7 @@ def test_what_an_effect_does_not_touch_is_as_without_it(card, by_order, name: st
 def test_parameters_that_are_known_a_little_are_asked_for_with_what_is_known(card) -> None:
     hypothesis = Hypothesis(card, "angle", ["wave_drift", "rudder_bias"])
     mean, precision = hypothesis.prior
-    known = {one.parameter.name: place for place, one in enumerate(hypothesis.estimated)}
+    known = {estimate.parameter.name: place for place, estimate in enumerate(hypothesis.estimated)}
     assert (mean[known["surge_coefficient"]], precision[known["surge_coefficient"]]) == pytest.approx((2 / 3, 1 / 0.09))
     assert precision[known["height_m"]] == precision[known["angle_rad"]] == 0
     low, high = hypothesis.bounds
@@ -374,8 +374,8 @@ def test_parameters_that_are_known_a_little_are_asked_for_with_what_is_known(car
 def test_the_shortest_time_that_is_tried_is_integrated(card, by_order, name: str) -> None:
     hypothesis = Hypothesis(card, "order", [name])
     theta = np.clip([0.1, 0.1, 0.0, 0.1][: len(hypothesis.estimated)], *hypothesis.bounds)
-    for place, one in enumerate(hypothesis.estimated):
-        if one.parameter.name.endswith("_s"):
+    for place, estimate in enumerate(hypothesis.estimated):
+        if estimate.parameter.name.endswith("_s"):
             theta[place] = hypothesis.bounds[0][place]
             assert 0 < theta[place] < 1.0
     assert np.abs(hypothesis.unmeasured_states(stepped(by_order, 20.0, 0.3), theta)).max() < 10.0

@@ -82,7 +82,7 @@ MOTIONS = RNG.uniform(-1, 1, (5, 20))
 
 
 def rates(model: Model) -> np.ndarray:
-    """Rates of all states at motions of all kinds; what a model has next to those of the bare ship is excited too."""
+    """Rates of all states at motions of all kinds; what a model has beside those of the bare ship is excited too."""
     sizes = {"motion.u": 1.5, "motion.v": 1.0, "motion.r": 0.01, "motion.psi": 3.0, "rudder.angle": 0.5}
     found = []
     for numbers in MOTIONS:
@@ -187,8 +187,8 @@ def test_derivatives_change_with_the_error_of_the_card_and_of_the_effect() -> No
         math.hypot(1.1 * 0.02 * 499e-5, 0.02 * (-499e-5 + 798e-5)), rel=5e-3
     )
     assert "was -166e-5 before linear_yaw_damping" in improved.text
-    others = set(card.derivatives) - {"Nr", "Yr"}
-    assert all(improved.derivatives[name] == card.derivatives[name] for name in others)
+    unchanged = set(card.derivatives) - {"Nr", "Yr"}
+    assert all(improved.derivatives[name] == card.derivatives[name] for name in unchanged)
     assert set(improved.uncertainty) == {"Nr", "Yr"}
 
 
@@ -231,7 +231,11 @@ def test_values_at_their_bounds_are_read_again(end: str) -> None:
     names = ["current", "wind", "rudder_bias", "rudder_stall", "rudder_backlash", "rudder_dead_band"]
     for error in (0.0, 0.01):
         values = {
-            name: {one.name: getattr(one, end) for one in EFFECTS[name].parameters if one.name in si(name)}
+            name: {
+                parameter.name: getattr(parameter, end)
+                for parameter in EFFECTS[name].parameters
+                if parameter.name in si(name)
+            }
             for name in names
         }
         build(
@@ -255,8 +259,8 @@ def test_particulars_that_were_estimated_are_written_into_the_card() -> None:
     (line,) = [line for line in improved.text.splitlines() if line.startswith("projected_area_side_m2")]
     assert "# estimated for wind: 0.055 of the length squared, typical" in line
     for name in ESTIMATING:
-        reported = build(add_effects_to_card(card, [(name, si(name), {})])).notices
-        assert not [one for one in reported if "is taken" in one and "time constant" not in one], name
+        notices = build(add_effects_to_card(card, [(name, si(name), {})])).notices
+        assert not [notice for notice in notices if "is taken" in notice and "time constant" not in notice], name
     full = add_effects_to_card(read(CARDS["total"]), [("wind", si("wind"), {})])
     assert full.ship == read(CARDS["total"]).ship
 

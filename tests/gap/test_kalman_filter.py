@@ -40,7 +40,7 @@ def test_innovations_tell_the_density_of_the_whole_gaussian(seed: int) -> None:
     what, noise, rng = problem(seed, gaps=seed > 0)
     driving, shown = columns(what, rng, 3)
     seen = observer(what, noise)
-    whitened = seen.whitened(driving, shown)
+    whitened = seen.whiten(driving, shown)
     assert np.all(whitened[~what.known] == 0)
     for column in range(3):
         cost = seen.log_det + np.sum(whitened[..., column] ** 2) + what.known.sum() * np.log(2 * np.pi)
@@ -52,15 +52,15 @@ def test_innovations_are_linear_in_their_columns() -> None:
     what, noise, rng = problem(7)
     driving, shown = columns(what, rng, 2)
     seen, mixture = observer(what, noise), np.array([[0.7], [-1.9]])
-    mixed = seen.whitened(driving @ mixture, shown @ mixture)
-    assert mixed == pytest.approx(seen.whitened(driving, shown) @ mixture)
+    mixed = seen.whiten(driving @ mixture, shown @ mixture)
+    assert mixed == pytest.approx(seen.whiten(driving, shown) @ mixture)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_smoothed_states_are_the_conditional_mean(seed: int) -> None:
     what, noise, rng = problem(seed)
     driving, shown = columns(what, rng)
-    states = observer(what, noise).smoothed(driving[..., 0], shown[..., 0])
+    states = observer(what, noise).smooth(driving[..., 0], shown[..., 0])
     for run in range(RUNS):
         assert states[run] == pytest.approx(Dense(what, noise, run).states(driving[run, ..., 0], shown[run, ..., 0]))
 
@@ -68,7 +68,7 @@ def test_smoothed_states_are_the_conditional_mean(seed: int) -> None:
 def test_states_after_the_last_measurement_are_the_conditional_mean() -> None:
     what, noise, rng = problem(5, gaps=False)
     driving, shown = columns(what, rng)
-    innovations, after = observer(what, noise).passed(driving, shown)
+    innovations, after = observer(what, noise).run(driving, shown)
     assert innovations.shape == (RUNS, BLOCKS, NY, 1)
     truth = Dense(what, noise, 0).states(driving[0, ..., 0], shown[0, ..., 0])
     assert after[0, -1, :, 0] == pytest.approx(truth[-1])
@@ -81,10 +81,10 @@ def test_slopes_are_difference_quotients_in_every_noise(count: int) -> None:
 
     def cost(logs: np.ndarray) -> float:
         seen = observer(what, NoiseLevels.of(logs))
-        return seen.log_det + float(np.sum(seen.whitened(driving, shown) ** 2))
+        return seen.log_det + float(np.sum(seen.whiten(driving, shown) ** 2))
 
     seen = observer(what, noise)
-    found = slopes(seen, driving, shown, seen.whitened(driving, shown))
+    found = slopes(seen, driving, shown, seen.whiten(driving, shown))
     step = 1e-4 * np.eye(len(noise.logs))
     quotients = [
         (8 * (cost(noise.logs + h) - cost(noise.logs - h)) - cost(noise.logs + 2 * h) + cost(noise.logs - 2 * h))
@@ -187,20 +187,20 @@ def test_the_push_over_a_block_is_that_of_many_small_steps() -> None:
     time_s, level, block_s, count = 4.0, 1.0, 2.0, 4000
     h = block_s / count
     fade = np.exp(-h / time_s)
-    left = fade ** np.arange(count)  # of a kick that many steps later
-    way = h * (1 - left) / (1 - fade)  # and the speed that it has made
+    decay = fade ** np.arange(count)  # of a kick that many steps later
+    way = h * (1 - decay) / (1 - fade)  # and the speed that it has made
     kick = level**2 * (1 - fade**2)
     transition, covariance = pushed(time_s, level, block_s)
     found, added = forecast(np.zeros((6, 6)), PUSHED, block_s)  # of which sway is as here
     assert PUSHED.force_s[1] == time_s and PUSHED.force[1] == level
-    assert [transition[0, 1], found[1, 7]] == pytest.approx([h * left.sum()] * 2, rel=1e-3)
+    assert [transition[0, 1], found[1, 7]] == pytest.approx([h * decay.sum()] * 2, rel=1e-3)
     for of_way, of_both, of_end in (
         (covariance[0, 0], covariance[0, 1], covariance[1, 1]),
         (added[1, 1], added[1, 7], added[7, 7]),
     ):
         assert of_way == pytest.approx(kick * way @ way, rel=2e-3)
-        assert of_both == pytest.approx(kick * way @ left, rel=2e-3)
-        assert of_end == pytest.approx(kick * left @ left, rel=2e-3)
+        assert of_both == pytest.approx(kick * way @ decay, rel=2e-3)
+        assert of_end == pytest.approx(kick * decay @ decay, rel=2e-3)
 
 
 SHIP = np.zeros((6, 6))

@@ -47,8 +47,8 @@ def dense_cost(of: Likelihood, toy: Toy, theta, *, about=None, marginal=()) -> f
     parts = [Dense(what, NOISE, run) for run in range(2)]
     error = np.concatenate([part.error(driving[run], shown[run]) for run, part in enumerate(parts)])
     covariance = block_diag(*(part.covariance for part in parts))
-    for one in vary:  # the runs share them
-        column = np.concatenate([part.of_driving @ one[run].ravel() for run, part in enumerate(parts)])
+    for change in vary:  # the runs share them
+        column = np.concatenate([part.of_driving @ change[run].ravel() for run, part in enumerate(parts)])
         covariance += np.outer(column, column)
     return float(np.linalg.slogdet(covariance)[1] + error @ np.linalg.solve(covariance, error))
 
@@ -136,15 +136,15 @@ def test_a_form_that_differs_beyond_belief_costs_its_excess(monkeypatch, largest
     scores = []
     for limit in (np.inf, largest):
         monkeypatch.setattr(module, "LARGEST_FORM", limit)
-        there = fitted(of, toy, fit.theta)
-        np.testing.assert_array_equal(there.theta, fit.theta)
-        scores.append(there.score)
+        repeated = fitted(of, toy, fit.theta)
+        np.testing.assert_array_equal(repeated.theta, fit.theta)
+        scores.append(repeated.score)
     assert scores[1] - scores[0] == pytest.approx(module.IMPOSSIBLE * np.maximum(away - largest, 0).sum())
 
 
 def test_residuals_are_remembered_for_each_explanation_and_its_parameters(monkeypatch) -> None:
     of, asked = judge(toy_motion((0.8, -0.6))), []
-    one, other, both = Toy((None,)), Toy((None,), which=(1,)), Toy((None, None))
+    first, second, both = Toy((None,)), Toy((None,), indices=(1,)), Toy((None, None))
     fresh = Likelihood._residual
 
     def counted(self, hypothesis, theta):
@@ -153,11 +153,11 @@ def test_residuals_are_remembered_for_each_explanation_and_its_parameters(monkey
 
     monkeypatch.setattr(Likelihood, "_residual", counted)
     for hypothesis, theta in (
-        (one, [0.5]),
-        (other, [0.5]),
-        (one, [0.6]),
+        (first, [0.5]),
+        (second, [0.5]),
+        (first, [0.6]),
         (both, [0.5, 0.0]),
-        (one, [0.5]),
+        (first, [0.5]),
         (both, [0.5, 0.1]),
     ):
         exact = fresh(of, hypothesis, np.array(theta))
@@ -165,7 +165,7 @@ def test_residuals_are_remembered_for_each_explanation_and_its_parameters(monkey
             np.testing.assert_array_equal(found, true)
     assert len(asked) == 5
     for size in np.arange(3 * module.REMEMBERED):
-        of.residual(one, np.array([float(size)]))
+        of.residual(first, np.array([float(size)]))
     assert len(of._residuals) <= module.REMEMBERED
 
 
@@ -199,9 +199,9 @@ def test_the_score_falls_as_the_noise_is_sought_and_stays_in_its_bounds() -> Non
 
 
 def test_belief_is_a_parabola_with_bounds_at_three_deviations() -> None:
-    one = Belief(np.array([1.0, -2.0]), np.array([0.5, 2.0]))
-    assert one.bounds[0] == pytest.approx([-0.5, -8.0]) and one.bounds[1] == pytest.approx([2.5, 4.0])
-    value, slope = one.cost(np.array([2.0, -2.0]))
+    belief = Belief(np.array([1.0, -2.0]), np.array([0.5, 2.0]))
+    assert belief.bounds[0] == pytest.approx([-0.5, -8.0]) and belief.bounds[1] == pytest.approx([2.5, 4.0])
+    value, slope = belief.cost(np.array([2.0, -2.0]))
     assert value == pytest.approx(4.0) and slope == pytest.approx([8.0, 0.0])
 
 
@@ -226,11 +226,11 @@ def test_known_amplitudes_are_recovered_within_their_errors(monkeypatch) -> None
 
 def test_what_is_not_there_does_not_pay() -> None:
     of = judge(toy_motion(), spread=1.0)
-    none, one = (of.at_best(toy, np.zeros(len(toy.priors)), [LOGS], [8]) for toy in (Toy(), Toy((None,))))
-    assert one.score > none.score - 2
-    there = judge(toy_motion((0.8,)), spread=1.0)
-    none, one = (there.at_best(toy, np.zeros(len(toy.priors)), [LOGS], [8]) for toy in (Toy(), Toy((None,))))
-    assert one.score < none.score - 10
+    none, single = (of.at_best(toy, np.zeros(len(toy.priors)), [LOGS], [8]) for toy in (Toy(), Toy((None,))))
+    assert single.score > none.score - 2
+    judged = judge(toy_motion((0.8,)), spread=1.0)
+    none, single = (judged.at_best(toy, np.zeros(len(toy.priors)), [LOGS], [8]) for toy in (Toy(), Toy((None,))))
+    assert single.score < none.score - 10
 
 
 def test_a_parameter_at_its_bound_stays_there() -> None:
@@ -253,7 +253,7 @@ def test_about_an_explanation_the_motion_is_nearer_to_the_true_one() -> None:
     of, toy = judge(motion), Toy((None,))
     moved = of.about(fitted(of, toy)).motion
     for run, end in enumerate(motion.lengths * motion.fine):
-        before, after = (np.abs((one.states - true)[run, :end]) / WHITE for one in (motion, moved))
+        before, after = (np.abs((batch.states - true)[run, :end]) / WHITE for batch in (motion, moved))
         assert np.all(np.sqrt(np.mean(after**2, axis=0)) < 0.8 * np.sqrt(np.mean(before**2, axis=0)))
         assert np.all(after < 2.0)  # up to the end of a shorter run
 

@@ -40,7 +40,8 @@ def said(theta) -> module.Decision:
     """Of the toy with some forces hidden, all single ones and pairs fitted."""
     of = judge(toy_motion(theta), spread=1.0)
     fits = [
-        of.at_best(Toy((None,) * len(which), which=which), np.full(len(which), 0.1), [LOGS], [0, 8]) for which in SETS
+        of.at_best(Toy((None,) * len(indices), indices=indices), np.full(len(indices), 0.1), [LOGS], [0, 8])
+        for indices in SETS
     ]
     return decide(Search(of, tuple(sorted(fits, key=lambda fit: fit.score)), ()))
 
@@ -61,18 +62,18 @@ def test_what_is_hidden_in_the_toy_is_said(theta, verdict, effects) -> None:
     assert sum(found.probabilities.values()) == pytest.approx(1.0)
     for name, size in zip(NAMES, theta, strict=False):
         assert found.confidence(name) > 0.9 or size == 0
-    for value, one in zip(found.best.theta, found.best.hypothesis.estimated, strict=True):
-        assert value == pytest.approx(theta[NAMES.index(one.effect)], abs=0.3)
+    for value, estimate in zip(found.best.theta, found.best.hypothesis.estimated, strict=True):
+        assert value == pytest.approx(theta[NAMES.index(estimate.effect)], abs=0.3)
 
 
 # -- scores typed by hand --------------------------------------------------------------------------------------------
 
 
-def fit(score: float, *which: int, sure: float = 10.0) -> ExplanationFit:
+def fit(score: float, *indices: int, sure: float = 10.0) -> ExplanationFit:
     """An explanation whose sizes are 1 and so many standard errors."""
-    count = len(which)
+    count = len(indices)
     return ExplanationFit(
-        Toy((None,) * count, which=which), np.ones(count), np.eye(count) / sure**2, LOGS, score, np.zeros(2)
+        Toy((None,) * count, indices=indices), np.ones(count), np.eye(count) / sure**2, LOGS, score, np.zeros(2)
     )
 
 
@@ -82,7 +83,7 @@ def calm(monkeypatch) -> None:
 
 
 def of_scores(*fits: ExplanationFit) -> module.Decision:
-    return decide(Search(SimpleNamespace(), tuple(sorted(fits, key=lambda one: one.score)), ()))
+    return decide(Search(SimpleNamespace(), tuple(sorted(fits, key=lambda found: found.score)), ()))
 
 
 @pytest.mark.usefixtures("calm")
@@ -108,7 +109,7 @@ def of_scores(*fits: ExplanationFit) -> module.Decision:
         ([fit(0), fit(-50, 0), fit(-54, 0, 1), fit(-52, 1, 2)], MISSING, (YAW,), []),
         # many that are a little less good are together more probable than the best
         (
-            [fit(0), fit(-50, 0), *(fit(-50 + ALIKE + 0.5, one) for one in range(1, 7))],
+            [fit(0), fit(-50, 0), *(fit(-50 + ALIKE + 0.5, index) for index in range(1, 7))],
             AMBIGUOUS,
             (YAW,),
             [(name,) for name in NAMES[1:]],
@@ -122,7 +123,7 @@ def of_scores(*fits: ExplanationFit) -> module.Decision:
 def test_verdicts_follow_the_scores(fits, verdict, effects, alike) -> None:
     found = of_scores(*fits)
     assert (found.verdict, found.best.hypothesis.effects) == (verdict, effects)
-    assert [one.hypothesis.effects for one in found.alike] == alike
+    assert [alternative.hypothesis.effects for alternative in found.alike] == alike
 
 
 FORCE, DRAG, BIAS, LAG, LATE = range(2, 7)
@@ -168,7 +169,7 @@ def test_no_name_is_said_where_the_innovations_are_strange(monkeypatch, fits) ->
     monkeypatch.setattr(module, "find_strangeness", lambda likelihood, fit: asked.append(fit) or odd)
     found = of_scores(*fits)
     assert found.verdict == OUTSIDE_LIBRARY and found.strange == odd
-    assert asked == [found.best] and found.best.score == min(one.score for one in fits)
+    assert asked == [found.best] and found.best.score == min(candidate.score for candidate in fits)
 
 
 @pytest.mark.parametrize("effect", ["linear_yaw_damping", "added_sway_mass", "rudder_effectiveness"])
@@ -241,8 +242,8 @@ def made_up(seed: int, *, added=0.0, theta=None, gaps: float = 0.05, pushed=0.0)
         motion=motion,
         known=known,
         innovations=lambda fit: e,
-        whitened=lambda fit: (whitened, e),
-        smoothed=lambda fit: (states, spread),
+        whiten=lambda fit: (whitened, e),
+        smooth=lambda fit: (states, spread),
     )
     return likelihood, ExplanationFit(Toy((None, None)), best, np.linalg.inv(flat.T @ flat), LOGS, 0.0, np.zeros(0))
 
@@ -268,8 +269,8 @@ def test_a_burst_is_a_passage_of_its_trial(run: int) -> None:
 def test_a_burst_at_the_end_of_a_short_run_ends_with_it() -> None:
     added = np.zeros((RUNS, BLOCKS, NY))
     added[3, 80:90] = 3.0
-    found = [one for one in find_strangeness(*made_up(2, added=added)) if one.kind == "passage"]
-    assert [one.trial for one in found] == ["d"]
+    found = [strange for strange in find_strangeness(*made_up(2, added=added)) if strange.kind == "passage"]
+    assert [strange.trial for strange in found] == ["d"]
     assert 300.0 + BLOCK_S * 65.5 < found[0].begin_s < found[0].end_s <= 300.0 + BLOCK_S * 89.5 + 1e-9
 
 
@@ -280,7 +281,7 @@ def test_a_line_in_all_trials_is_a_period(period: float) -> None:
     added = np.zeros((RUNS, BLOCKS, NY))
     added[..., 4] = np.sin(2 * np.pi * t / period + np.arange(RUNS)[:, None])
     found = find_strangeness(*made_up(3, added=added, gaps=0.0))
-    assert [one.kind for one in found] == ["period"]
+    assert [strange.kind for strange in found] == ["period"]
     assert found[0].begin_s == found[0].end_s == pytest.approx(period, rel=0.05)
 
 
@@ -302,7 +303,7 @@ def test_a_trial_that_has_another_value_disagrees() -> None:
     theta = np.zeros((RUNS, 2))
     theta[2, 1] = 0.35  # some ten of its standard errors; in a trial's passages it drowns
     found = find_strangeness(*made_up(4, theta=theta))
-    assert [(one.kind, one.trial) for one in found] == [("trial", "c")]
+    assert [(strange.kind, strange.trial) for strange in found] == [("trial", "c")]
     assert (found[0].begin_s, found[0].end_s) == pytest.approx((200.0 + 0.5 * BLOCK_S, 200.0 + 149.5 * BLOCK_S))
 
 
@@ -311,9 +312,9 @@ def test_the_strangest_is_reported_first() -> None:
     added[0, 20:60] = 4.0
     theta[2, 1] = 0.35
     found = find_strangeness(*made_up(5, added=added, theta=theta))
-    assert found[0].kind == "passage" and {one.kind for one in found} >= {"passage", "trial"}
-    assert [one.excess for one in found] == sorted((one.excess for one in found), reverse=True)
-    assert all(np.isfinite(one.excess) for one in found)
+    assert found[0].kind == "passage" and {strange.kind for strange in found} >= {"passage", "trial"}
+    assert [strange.excess for strange in found] == sorted((strange.excess for strange in found), reverse=True)
+    assert all(np.isfinite(strange.excess) for strange in found)
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.9])

@@ -105,8 +105,8 @@ def test_coloured_readings_tell_less_and_the_nearest_rival_counts(mariner_card: 
     damped, bare = explanation(card, "linear_yaw_damping", factor=0.1), Explanation("none", card, (), np.zeros((0, 0)))
     near = explanation(card, "linear_yaw_damping", factor=0.09)
     scores = [
-        next_test(those, NOISE, duration_s=130.0, correlation_s=correlation)
-        for those, correlation in (([damped, bare], 0.0), ([damped, bare], 8.0), ([damped, bare, near], 0.0))
+        next_test(explanations, NOISE, duration_s=130.0, correlation_s=correlation)
+        for explanations, correlation in (([damped, bare], 0.0), ([damped, bare], 8.0), ([damped, bare, near], 0.0))
     ]
     white, coloured, three = (found.expected["zigzag:10/10"] for found in scores if found is not None)
     assert 0 < coloured < 0.5 * white
@@ -137,13 +137,13 @@ def test_the_orders_run_and_a_zigzag_in_them_is_one(mariner_card: ManoeuvringCar
 def test_candidates_stay_within_the_gear_and_order_revolutions_only_with_propulsion(
     mariner_card: ManoeuvringCard,
 ) -> None:
-    names = [one.name for one in candidate_manoeuvres(mariner_card, 20.0)]
+    names = [candidate.name for candidate in candidate_manoeuvres(mariner_card, 20.0)]
     assert "turn:35" in names and "slow-down and acceleration" not in names
     text = mariner_card.text.replace("max_angle_deg = 40.0", "max_angle_deg = 25.0")
     assert text != mariner_card.text
     weak = parse_card(text + "\n[propulsion]\nnominal_rpm = 80.0\nXnn = 7e-4\n", "weak.toml")
     assert isinstance(weak, ManoeuvringCard)
-    names = [one.name for one in candidate_manoeuvres(weak, 20.0)]
+    names = [candidate.name for candidate in candidate_manoeuvres(weak, 20.0)]
     assert "turn:25" in names and "turn:35" not in names and "slow-down and acceleration" in names
 
 
@@ -170,7 +170,11 @@ def test_what_is_left_is_that_of_the_plain_formula() -> None:
 
 
 def test_the_straight_run_on_two_headings_turns_after_a_third_of_its_length(mariner_card: ManoeuvringCard) -> None:
-    (found,) = (one for one in candidate_manoeuvres(mariner_card, 30.0) if one.name == "straight run on two headings")
+    (found,) = (
+        candidate
+        for candidate in candidate_manoeuvres(mariner_card, 30.0)
+        if candidate.name == "straight run on two headings"
+    )
     helmsman = found.helmsman()
     assert [np.degrees(helmsman(time, 0.0, 0.0)) for time in (0.0, 9.9, 10.1, 29.0)] == pytest.approx([0, 0, 20, 20])
     assert helmsman(20.0, np.pi / 2, 0.0) == pytest.approx(0.0)

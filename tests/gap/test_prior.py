@@ -25,29 +25,29 @@ def posed(*, by_angle: bool = True, gear: str = "time_constant_s = 0.5" + GEAR, 
         text += "\n[uncertainty]\n" + "\n".join(f"{name} = {abs(TRUTH[name]) * s}" for name, s in STATED.items())
     card = parse_card(text, "made_up.toml")
     assert isinstance(card, ManoeuvringCard)
-    one = made_up_ship.trial(made_up_ship.zigzag(20), duration=60, step=STEP)
+    trial = made_up_ship.trial(made_up_ship.zigzag(20), duration=60, step=STEP)
     if not by_angle:
-        one.signals["delta_order_rad"] = one.signals.pop("delta_rad")
-    return likelihood_from_card(card, Measured((one,), "angle" if by_angle else "order", ()))
+        trial.signals["delta_order_rad"] = trial.signals.pop("delta_rad")
+    return likelihood_from_card(card, Measured((trial,), "angle" if by_angle else "order", ()))
 
 
 def row(likelihood: Likelihood, name: str) -> np.ndarray:
     """What a coefficient is wrong by together with others, in its own standard error."""
     place = likelihood.coefficients.names.index(name)
     mixing = likelihood.coefficients.mixing
-    own = mixing[place, place]
-    shared: np.ndarray = mixing[place, len(mixing) :] / own
+    deviation = mixing[place, place]
+    shared: np.ndarray = mixing[place, len(mixing) :] / deviation
     return shared
 
 
 def test_each_coefficient_is_wrong_by_its_own_standard_error() -> None:
     coefficients = posed(stated=True).coefficients
     count = len(coefficients.names)
-    own = dict(zip(coefficients.names, np.diag(coefficients.mixing), strict=True))
+    errors = dict(zip(coefficients.names, np.diag(coefficients.mixing), strict=True))
     np.testing.assert_array_equal(coefficients.mixing[:, :count], np.diag(np.diag(coefficients.mixing)))
     for name in ESTIMATED:
-        assert own[f"derivatives.{name}"] == pytest.approx(STATED.get(name, 0.02) * abs(TRUTH[name])), name
-    assert own["derivatives.Nrdot"] == pytest.approx(0.02 * abs(TRUTH["Nrdot"]))
+        assert errors[f"derivatives.{name}"] == pytest.approx(STATED.get(name, 0.02) * abs(TRUTH[name])), name
+    assert errors["derivatives.Nrdot"] == pytest.approx(0.02 * abs(TRUTH["Nrdot"]))
 
 
 GROUPS = (
@@ -99,7 +99,7 @@ def test_the_gear_is_as_uncertain_as_a_coefficient_unless_it_was_assumed(gear: s
 def test_of_a_measured_angle_what_the_gear_is_wrong_by_does_not_show() -> None:
     for by_angle in (True, False):
         likelihood = posed(by_angle=by_angle)
-        places = [place for place, one in enumerate(likelihood.coefficients.names) if one.startswith("steering.")]
+        places = [place for place, name in enumerate(likelihood.coefficients.names) if name.startswith("steering.")]
         assert bool(np.any(likelihood.coefficient_columns[..., places])) != by_angle
 
 

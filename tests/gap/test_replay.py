@@ -51,92 +51,92 @@ def record() -> Trial:
 
 def changed(trial: Trial, **signals: np.ndarray | float) -> Trial:
     """The record with something added to some signals."""
-    return replace(trial, signals={**trial.signals, **{n: trial.signals[n] + more for n, more in signals.items()}})
+    return replace(trial, signals={**trial.signals, **{n: trial.signals[n] + change for n, change in signals.items()}})
 
 
 def test_the_very_ship_leaves_noise(record: Trial) -> None:
-    (one,) = replay_trials(card(), card(), together(record), NOISE, held_out=True)
-    assert one.held_out and one.name == "zigzag"
+    (replay,) = replay_trials(card(), card(), together(record), NOISE, held_out=True)
+    assert replay.held_out and replay.name == "zigzag"
     for name in NOISE:
-        assert one.misfit("before", name) == pytest.approx(1.0, abs=0.12), name
-        assert one.after[name] is one.before[name] or np.array_equal(one.after[name], one.before[name])
-    readings = np.interp(one.time_s, record.time_s, record.signals["x_m"])
-    np.testing.assert_allclose(one.measured["motion.x"], readings, atol=1e-9)
+        assert replay.misfit("before", name) == pytest.approx(1.0, abs=0.12), name
+        assert replay.after[name] is replay.before[name] or np.array_equal(replay.after[name], replay.before[name])
+    readings = np.interp(replay.time_s, record.time_s, record.signals["x_m"])
+    np.testing.assert_allclose(replay.measured["motion.x"], readings, atol=1e-9)
 
 
 def test_a_current_is_left_in_the_track_alone_and_its_effect_takes_it_away(record: Trial) -> None:
     t = record.time_s
     drifted = together(changed(record, x_m=0.5 * np.cos(2.0) * t, y_m=0.5 * np.sin(2.0) * t))
     improved = card(effect("current", speed_mps=0.5, direction_rad=2.0))
-    (one,) = replay_trials(card(), improved, drifted, NOISE, held_out=False)
+    (replay,) = replay_trials(card(), improved, drifted, NOISE, held_out=False)
     for name in ("motion.u", "motion.v", "motion.r", "motion.psi"):
-        assert one.misfit("before", name) < 1.15
-    assert one.misfit("before", "motion.x") > 10 < one.misfit("before", "motion.y")
-    assert one.misfit("after") == pytest.approx(1.0, abs=0.06)
+        assert replay.misfit("before", name) < 1.15
+    assert replay.misfit("before", "motion.x") > 10 < replay.misfit("before", "motion.y")
+    assert replay.misfit("after") == pytest.approx(1.0, abs=0.06)
     # Readings drift 0.5 m/s * 250 s from the model: 125 m at the end.
-    end = np.hypot(*(one.measured[n][-1] - one.before[n][-1] for n in ("motion.x", "motion.y")))
+    end = np.hypot(*(replay.measured[n][-1] - replay.before[n][-1] for n in ("motion.x", "motion.y")))
     assert end == pytest.approx(125.0, rel=0.05)
 
 
 def test_a_sensor_at_fault_in_the_card_is_compared_by_what_it_shows(record: Trial) -> None:
     biased = together(changed(record, r_radps=0.001))
-    (one,) = replay_trials(card(), card(effect("gyro_bias", rate_radps=0.001)), biased, NOISE, held_out=False)
-    assert one.misfit("before", "motion.r") > 2
-    assert one.misfit("after", "motion.r") == pytest.approx(1.0, abs=0.12)
+    (replay,) = replay_trials(card(), card(effect("gyro_bias", rate_radps=0.001)), biased, NOISE, held_out=False)
+    assert replay.misfit("before", "motion.r") > 2
+    assert replay.misfit("after", "motion.r") == pytest.approx(1.0, abs=0.12)
 
 
 def test_corrected_trials_are_followed_and_shown_as_the_faulty_sensor_has_them(record: Trial) -> None:
     biased = together(changed(record, r_radps=0.001))
     given_card = card()
-    (one,) = replay_trials(given_card, given_card, biased, NOISE, held_out=False, corrected=together(record))
-    assert one.misfit("before", "motion.r") > 2
-    assert one.misfit("after", "motion.r") == pytest.approx(1.0, abs=0.12)
-    assert np.mean(one.after["motion.r"] - one.before["motion.r"]) == pytest.approx(0.001, rel=0.2)
+    (replay,) = replay_trials(given_card, given_card, biased, NOISE, held_out=False, corrected=together(record))
+    assert replay.misfit("before", "motion.r") > 2
+    assert replay.misfit("after", "motion.r") == pytest.approx(1.0, abs=0.12)
+    assert np.mean(replay.after["motion.r"] - replay.before["motion.r"]) == pytest.approx(0.001, rel=0.2)
 
 
 def test_a_late_rudder_is_replayed_late(record: Trial) -> None:
     early = replace(record, signals={**record.signals, "delta_rad": np.array([ZIGZAG(t + 2.0) for t in record.time_s])})
-    (one,) = replay_trials(
+    (replay,) = replay_trials(
         card(), card(effect("rudder_time_offset", delay_s=2.0)), together(early), NOISE, held_out=False
     )
-    assert one.misfit("before") > 5
-    assert one.misfit("after") == pytest.approx(1.0, abs=0.06)
+    assert replay.misfit("before") > 5
+    assert replay.misfit("after") == pytest.approx(1.0, abs=0.06)
 
 
 def test_a_ship_that_measured_little_is_followed(record: Trial) -> None:
     few = {name: record.signals[name] for name in ("psi_rad", "delta_rad")}
-    (one,) = replay_trials(card(), card(), together(replace(record, signals=few)), NOISE, held_out=False)
-    assert set(one.noise) == {"motion.psi"}
-    assert one.misfit("before") == pytest.approx(1.0, abs=0.1)
+    (replay,) = replay_trials(card(), card(), together(replace(record, signals=few)), NOISE, held_out=False)
+    assert set(replay.noise) == {"motion.psi"}
+    assert replay.misfit("before") == pytest.approx(1.0, abs=0.1)
     track = {name: record.signals[name] for name in ("x_m", "y_m", "delta_rad")}
-    (one,) = replay_trials(card(), card(), together(replace(record, signals=track)), NOISE, held_out=False)
-    assert one.misfit("before") == pytest.approx(1.0, abs=0.1)
+    (replay,) = replay_trials(card(), card(), together(replace(record, signals=track)), NOISE, held_out=False)
+    assert replay.misfit("before") == pytest.approx(1.0, abs=0.1)
 
 
 def test_gaps_of_the_record_stay_gaps(record: Trial) -> None:
     u = record.signals["u_mps"].copy()
     u[300:600] = np.nan  # 60 to 120 s
-    (one,) = replay_trials(
+    (replay,) = replay_trials(
         card(), card(), together(replace(record, signals={**record.signals, "u_mps": u})), NOISE, held_out=False
     )
-    inside = (one.time_s > 61) & (one.time_s < 119)
-    assert np.isnan(one.measured["motion.u"][inside]).all() and np.isfinite(one.before["motion.u"]).all()
-    assert one.misfit("before", "motion.u") == pytest.approx(1.0, abs=0.12)
+    inside = (replay.time_s > 61) & (replay.time_s < 119)
+    assert np.isnan(replay.measured["motion.u"][inside]).all() and np.isfinite(replay.before["motion.u"]).all()
+    assert replay.misfit("before", "motion.u") == pytest.approx(1.0, abs=0.12)
 
 
 def test_a_motion_that_runs_away_has_no_finite_misfit(record: Trial) -> None:
     wild = card(changes={"Nr = -0.0022": "Nr = 0.05"})
-    (one,) = replay_trials(wild, card(), together(record), NOISE, held_out=False)
-    assert one.misfit("before") == np.inf and np.isnan(one.before["motion.r"][-1])
-    assert one.misfit("after") == pytest.approx(1.0, abs=0.06)
+    (replay,) = replay_trials(wild, card(), together(record), NOISE, held_out=False)
+    assert replay.misfit("before") == np.inf and np.isnan(replay.before["motion.r"][-1])
+    assert replay.misfit("after") == pytest.approx(1.0, abs=0.06)
 
 
 def test_a_black_box_is_next_to_both(record: Trial) -> None:
     given_card = card(changes={"Nr = -0.0022": "Nr = -0.0015"})
     results = replay_trials(given_card, given_card, together(record), NOISE, held_out=False)
-    (one,) = with_black_box(results, card(), together(record), NOISE)
-    assert one.misfit("before") > 5
-    assert one.misfit("black_box") == pytest.approx(1.0, abs=0.06)
+    (replay,) = with_black_box(results, card(), together(record), NOISE)
+    assert replay.misfit("before") > 5
+    assert replay.misfit("black_box") == pytest.approx(1.0, abs=0.06)
 
 
 def test_an_order_that_a_gear_with_a_largest_rate_follows_keeps_its_time(mariner_card: ManoeuvringCard) -> None:
@@ -149,8 +149,8 @@ def test_an_order_that_a_gear_with_a_largest_rate_follows_keeps_its_time(mariner
     signals["delta_order_rad"] = track["rudder.command"][held]
     measured = Measured((Trial(Path("zz.csv"), t, signals),), "order", ())
     fine = {"motion.psi": np.radians(0.1), "motion.r": np.radians(0.02), "motion.x": 0.6, "motion.y": 0.6}
-    (one,) = replay_trials(mariner_card, mariner_card, measured, fine, held_out=False)
-    assert one.misfit("before") < 0.5
+    (replay,) = replay_trials(mariner_card, mariner_card, measured, fine, held_out=False)
+    assert replay.misfit("before") < 0.5
 
 
 @settings(max_examples=20, deadline=None)

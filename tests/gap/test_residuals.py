@@ -34,15 +34,15 @@ def by_hand(of: Likelihood, fit: ExplanationFit, run: int, place: int) -> tuple[
         return part.error(driving[run], shown[run])
 
     e = error(fit.theta)
-    slopes = np.stack([(error(fit.theta + 0.01 * one) - e) / 0.01 for one in np.eye(len(fit.theta))], axis=-1)
+    slopes = np.stack([(error(fit.theta + 0.01 * axis) - e) / 0.01 for axis in np.eye(len(fit.theta))], axis=-1)
     vary = [WIDTH * of.of_coefficients(toy, fit.theta)]
     vary.append(forms_of(of, toy, fit.theta))
     covariance = part.covariance.copy()
-    for one in np.moveaxis(np.concatenate(vary, axis=-1)[run], -1, 0):
-        column = part.of_driving @ one.ravel()
+    for column_of_run in np.moveaxis(np.concatenate(vary, axis=-1)[run], -1, 0):
+        column = part.of_driving @ column_of_run.ravel()
         covariance += np.outer(column, column)
-    others = [other for other in range(len(fit.theta)) if other != place]
-    covariance += slopes[:, others] @ fit.covariance[np.ix_(others, others)] @ slopes[:, others].T
+    remaining = [index for index in range(len(fit.theta)) if index != place]
+    covariance += slopes[:, remaining] @ fit.covariance[np.ix_(remaining, remaining)] @ slopes[:, remaining].T
     weighed = np.linalg.solve(covariance, slopes[:, place])
     information = weighed @ slopes[:, place]
     return float(fit.theta[place] - weighed @ e / information), float(1 / np.sqrt(information))
@@ -53,9 +53,9 @@ def test_each_trial_says_what_its_own_least_squares_say(theta) -> None:
     of = judge(toy_motion(theta, (0.3, -0.2)))
     toy = Toy((None,) * len(theta))
     fit = of.at_best(toy, np.array(theta), [LOGS], [0])
-    reported = each_trial(of, fit)
-    assert list(reported) == [one.variable for one in toy.estimated]
-    for place, values in enumerate(reported.values()):
+    by_trial = each_trial(of, fit)
+    assert list(by_trial) == [estimate.variable for estimate in toy.estimated]
+    for place, values in enumerate(by_trial.values()):
         assert list(values) == ["a", "b"]
         for run, found in enumerate(values.values()):
             assert found == pytest.approx(by_hand(of, fit, run, place), rel=1e-6)
@@ -72,7 +72,7 @@ def test_a_trial_that_tells_nothing_is_left_out() -> None:
     assert list(values) == ["a"]
 
 
-def test_estimates_are_reported_by_effect_and_parameter() -> None:
+def test_estimates_are_told_by_effect_and_parameter() -> None:
     toy = Toy((None, None))
     fit = ExplanationFit(toy, np.array([0.5, -0.3]), np.diag([0.04, 0.09]), LOGS, 0.0, np.zeros(0))
     first, second = estimates(fit)

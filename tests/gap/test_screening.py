@@ -17,7 +17,7 @@ from tests.identification.trials import made_up_ship
 from tests.identification.trials.made_up_ship import TRUTH
 
 EFFECTS = ("linear_yaw_damping", "current", "gyro_bias", "cubic_yaw_damping", "hull_fouling", "rudder_time_offset")
-MORE = 0.25
+INCREASE = 0.25
 """By which the hidden ship's damping in yaw exceeds that of the card."""
 
 
@@ -33,16 +33,16 @@ def judged(card: ManoeuvringCard, truth=None, *, bias: float = 0.0, flow=(0.0, 0
         made_up_ship.trial(made_up_ship.zigzag(20), name="zigzag", duration=200, step=0.5, truth=truth),
         made_up_ship.trial(made_up_ship.turn(30), name="turn", duration=150, step=0.5, truth=truth, seed=2),
     ]
-    for one in trials:
-        one.signals["r_radps"][:] += bias
+    for trial in trials:
+        trial.signals["r_radps"][:] += bias
         for name, speed in zip(("x_m", "y_m"), flow, strict=True):  # velocities are through the water
-            one.signals[name][:] += speed * one.time_s
+            trial.signals[name][:] += speed * trial.time_s
     return likelihood_from_card(card, Measured(tuple(trials), "angle", ()))
 
 
 @pytest.fixture(scope="module")
 def damped(card) -> Likelihood:
-    return judged(card, {**TRUTH, "Yr": (1 + MORE) * TRUTH["Yr"], "Nr": (1 + MORE) * TRUTH["Nr"]}, bias=0.001)
+    return judged(card, {**TRUTH, "Yr": (1 + INCREASE) * TRUTH["Yr"], "Nr": (1 + INCREASE) * TRUTH["Nr"]}, bias=0.001)
 
 
 def none_of(likelihood: Likelihood) -> ExplanationFit:
@@ -51,7 +51,7 @@ def none_of(likelihood: Likelihood) -> ExplanationFit:
 
 def every(likelihood: Likelihood, names=EFFECTS) -> list[Variant]:
     card = likelihood.none.card
-    return [one for name in names for one in variants(likelihood, Hypothesis(card, "angle", [name]))]
+    return [variant for name in names for variant in variants(likelihood, Hypothesis(card, "angle", [name]))]
 
 
 @pytest.fixture(scope="module")
@@ -64,21 +64,23 @@ def least_squares(likelihood: Likelihood, base: ExplanationFit, chosen: list[Var
     seen = observer(
         likelihood.linear(base.hypothesis, base.theta) if base.hypothesis.effects else likelihood.base, base.noise
     )
-    own = likelihood.columns(base.hypothesis, base.theta, likelihood.coefficient_columns).scaled(base.width)
+    columns_of_base = likelihood.columns(base.hypothesis, base.theta, likelihood.coefficient_columns).scaled(base.width)
 
     def rows(driving, shown):
-        white = seen.whitened(driving, shown)
+        white = seen.whiten(driving, shown)
         return white.reshape(-1, white.shape[-1])
 
-    columns = [rows(own.driving, own.shown)]
+    columns = [rows(columns_of_base.driving, columns_of_base.shown)]
     # what the sensors show is left over by the effect: the residual has the opposite sign
-    columns += [rows(one.driving, -one.shown) for one in chosen]
+    columns += [rows(variant.driving, -variant.shown) for variant in chosen]
     residual, held = columns[0][:, :1], columns[0][:, 1:]
     design = np.hstack([held, *columns[1:]])
     mean, precision = base.hypothesis.prior
-    deviations = np.concatenate([np.sqrt(precision), np.ones(held.shape[1] - own.parameter_count)])
+    deviations = np.concatenate([np.sqrt(precision), np.ones(held.shape[1] - columns_of_base.parameter_count)])
     known = np.hstack([np.diag(deviations), np.zeros((held.shape[1], design.shape[1] - held.shape[1]))])
-    away = np.concatenate([np.sqrt(precision) * (base.theta - mean), np.zeros(held.shape[1] - own.parameter_count)])
+    away = np.concatenate(
+        [np.sqrt(precision) * (base.theta - mean), np.zeros(held.shape[1] - columns_of_base.parameter_count)]
+    )
     whole, target = np.vstack([design, known]), -np.concatenate([residual[:, 0], away])
     scale = np.linalg.norm(whole, axis=0)
     scale[scale == 0] = 1.0
@@ -90,10 +92,10 @@ def check(screen: Screen, base: ExplanationFit, places: list[int]) -> None:
     likelihood, chosen = screen.likelihood, [screen.every[place] for place in places]
     before, _ = least_squares(likelihood, base, [])
     after, shares = least_squares(likelihood, base, chosen)
-    asked = sum(len(one.theta) for one in chosen)
+    asked = sum(len(variant.theta) for variant in chosen)
     gain, found = screen.of(places)
-    ends = np.cumsum([one.driving.shape[-1] for one in chosen])[:-1]
-    if all(one.allowed(part) for one, part in zip(chosen, np.split(shares, ends), strict=True)):
+    ends = np.cumsum([variant.driving.shape[-1] for variant in chosen])[:-1]
+    if all(variant.allowed(part) for variant, part in zip(chosen, np.split(shares, ends), strict=True)):
         assert found == pytest.approx(shares, rel=1e-4, abs=1e-6)
         assert gain == pytest.approx(before - after - asked * np.log(likelihood.count / COUNTED), rel=1e-6, abs=1e-4)
     else:
@@ -109,12 +111,12 @@ def test_gains_are_those_of_least_squares(screened) -> None:
 
 def test_gains_next_to_an_effect_that_is_there_are_those_of_least_squares(card, damped) -> None:
     """Also where something is known of its parameters, and away from the best ones."""
-    there = Hypothesis(card, "angle", ["wave_drift"])
+    assumed = Hypothesis(card, "angle", ["wave_drift"])
     logs = none_of(damped).logs
-    theta = np.where(there.prior[1] > 0, there.prior[0] + 0.2, 1.0)
-    base = ExplanationFit(there, theta, np.eye(len(theta)), logs, 0.0, np.zeros(0))
+    theta = np.where(assumed.prior[1] > 0, assumed.prior[0] + 0.2, 1.0)
+    base = ExplanationFit(assumed, theta, np.eye(len(theta)), logs, 0.0, np.zeros(0))
     screen = Screen(damped, base, every(damped, ("linear_yaw_damping", "gyro_bias", "wave_drift")))
-    assert {one.effect for one in screen.every} == {"linear_yaw_damping", "gyro_bias"}
+    assert {variant.effect for variant in screen.every} == {"linear_yaw_damping", "gyro_bias"}
     check(screen, base, [0])
     check(screen, base, [0, 1])
 
@@ -122,9 +124,9 @@ def test_gains_next_to_an_effect_that_is_there_are_those_of_least_squares(card, 
 def test_two_hidden_effects_are_the_first_pair_at_the_right_sizes(screened) -> None:
     best, second, *_ = screened.pairs()
     assert set(best.effects) == {"linear_yaw_damping", "gyro_bias"} and best.gain > second.gain
-    assert best.thetas["linear_yaw_damping"] == pytest.approx([MORE], rel=0.3)
+    assert best.thetas["linear_yaw_damping"] == pytest.approx([INCREASE], rel=0.3)
     assert best.thetas["gyro_bias"] == pytest.approx([0.001], rel=0.15)
-    gains = [one.gain for one in screened.pairs()]
+    gains = [pair.gain for pair in screened.pairs()]
     assert gains == sorted(gains, reverse=True) and len(gains) == len(EFFECTS) * (len(EFFECTS) - 1) // 2
 
 
@@ -138,25 +140,27 @@ def test_a_small_hidden_amplitude_is_found_alone_at_its_size(card) -> None:
 
 def test_singles_are_the_best_variant_of_each_effect(screened) -> None:
     singles = screened.singles()
-    assert sorted(one.effects[0] for one in singles) == sorted(EFFECTS)
-    for one in singles:
+    assert sorted(single.effects[0] for single in singles) == sorted(EFFECTS)
+    for single in singles:
         gains = [
-            screened.of([place])[0] for place, other in enumerate(screened.every) if other.effect == one.effects[0]
+            screened.of([place])[0]
+            for place, variant in enumerate(screened.every)
+            if variant.effect == single.effects[0]
         ]
-        assert one.gain == max(gains)
-    assert [one.gain for one in singles] == sorted((one.gain for one in singles), reverse=True)
+        assert single.gain == max(gains)
+    assert [single.gain for single in singles] == sorted((single.gain for single in singles), reverse=True)
 
 
 def test_a_search_begins_at_something_and_within_the_bounds(screened) -> None:
     card = screened.likelihood.none.card
     asked = {name: Hypothesis(card, "angle", [name]).estimated for name in EFFECTS}
-    for one in (*screened.singles(), *screened.pairs()):
-        for name, theta in one.thetas.items():
+    for proposal in (*screened.singles(), *screened.pairs()):
+        for name, theta in proposal.thetas.items():
             for value, parameter in zip(theta, (each.parameter for each in asked[name]), strict=True):
                 assert parameter.minimum <= value <= parameter.maximum
                 if parameter.absent is not None:
                     least = LEAST_AMPLITUDE * abs(parameter.typical_values(card)[0])
-                    assert abs(value - parameter.absent) > 0.99 * least, one.effects
+                    assert abs(value - parameter.absent) > 0.99 * least, proposal.effects
 
 
 def test_a_current_is_never_begun_with_backwards(card) -> None:
@@ -165,7 +169,7 @@ def test_a_current_is_never_begun_with_backwards(card) -> None:
     screen = Screen(likelihood, none_of(likelihood), every(likelihood, ("current", "gyro_bias")))
     best, _ = screen.singles()
     assert best.thetas["current"] == pytest.approx([0.3, np.pi / 4], rel=0.1)
-    flows = [place for place, one in enumerate(screen.every) if one.effect == "current"]
+    flows = [place for place, variant in enumerate(screen.every) if variant.effect == "current"]
     backwards = [place for place in flows if np.cos(screen.every[place].theta[1] - 0.8) < -0.5]
     assert backwards and all(screen.of([place])[0] < 0 for place in backwards)
     (pair,) = screen.pairs()
@@ -174,7 +178,7 @@ def test_a_current_is_never_begun_with_backwards(card) -> None:
 
 def test_variants_are_all_typical_shapes_at_the_typical_size(card, damped) -> None:
     current = variants(damped, Hypothesis(card, "angle", ["current"]))
-    assert len(current) == 8 and {one.amplitudes for one in current} == {(0,)}
+    assert len(current) == 8 and {variant.amplitudes for variant in current} == {(0,)}
     assert current[0].driving.shape == (*damped.motion.block_states.shape[:2], 6, 1)
     (cubic,) = variants(damped, Hypothesis(card, "angle", ["cubic_yaw_damping"]))
     assert cubic.amplitudes == (0, 1) and cubic.driving.shape[-1] == 2

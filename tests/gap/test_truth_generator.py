@@ -39,15 +39,15 @@ def run(groups: dict[str, list[Lane]]) -> dict[str, list[Trial]]:
     return {name: [next(trials) for _ in group] for name, group in groups.items()}
 
 
-def misfits(ours: list[Trial], theirs: list[Trial]) -> np.ndarray:
+def misfits(first: list[Trial], second: list[Trial]) -> np.ndarray:
     """Root-mean-square difference of every signal of every trial, in white noise."""
-    pairs = [(a[s], b[s], sigma) for a, b in zip(ours, theirs, strict=True) for s, sigma in WHITE.items()]
+    pairs = [(a[s], b[s], sigma) for a, b in zip(first, second, strict=True) for s, sigma in WHITE.items()]
     return np.array([np.sqrt(np.mean((a[: len(b)] - b[: len(a)]) ** 2)) / sigma for a, b, sigma in pairs])
 
 
-def misfit(ours: list[Trial], theirs: list[Trial]) -> float:
+def misfit(first: list[Trial], second: list[Trial]) -> float:
     """The largest of them."""
-    return float(np.max(misfits(ours, theirs)))
+    return float(np.max(misfits(first, second)))
 
 
 def columns(path: Path) -> Trial:
@@ -102,14 +102,14 @@ def long() -> dict[str, list[Trial]]:
 
 def test_turn_agrees_with_an_independent_program(data: Path, long: dict[str, list[Trial]]) -> None:
     reference = columns(data / "reference" / "mariner_turn_35.csv")
-    (ours,) = long["from 0"]
-    psi = np.radians(ours["psi_deg"])
+    (run,) = long["from 0"]
+    psi = np.radians(run["psi_deg"])
     for angle, axis in ((np.pi / 2.0, "x_m"), (np.pi / 2.0, "y_m"), (np.pi, "y_m")):  # advance, transfer, diameter
-        theirs = np.interp(angle, reference["psi_rad"], reference[axis])
-        assert np.interp(angle, psi, ours[axis]) == pytest.approx(theirs, rel=1e-3)
+        expected = np.interp(angle, reference["psi_rad"], reference[axis])
+        assert np.interp(angle, psi, run[axis]) == pytest.approx(expected, rel=1e-3)
     then = reference["t_s"] <= 260.0
     for name in ("u_mps", "v_mps"):
-        at = np.interp(reference["t_s"][then], ours["t_s"], ours[name])
+        at = np.interp(reference["t_s"][then], run["t_s"], run[name])
         assert at == pytest.approx(reference[name][then], abs=2e-3)
 
 
@@ -143,13 +143,13 @@ def test_noise_has_the_stated_size() -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("name", EFFECTS)
 def test_effect_shows(short: dict[str, list[Trial]], name: str) -> None:
-    none, one = short["none"], short[name]
+    none, changed = short["none"], short[name]
     if name == "rudder_time_offset":
-        steps = [np.flatnonzero(trial[0]["delta_order_deg"])[0] for trial in (none, one)]
+        steps = [np.flatnonzero(trial[0]["delta_order_deg"])[0] for trial in (none, changed)]
         delay = 10.0 * parameters_of(Setting((name,), 1))[name]["delay_s"]
         assert steps[0] - steps[1] == pytest.approx(delay, abs=1.0)  # the record runs ahead of the gear
     else:
-        assert misfit(none, one) > 1.0
+        assert misfit(none, changed) > 1.0
 
 
 @pytest.mark.long

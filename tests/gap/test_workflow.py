@@ -27,7 +27,7 @@ class Case:
 
     @property
     def named(self) -> set[str]:
-        return {one.name for one in self.gap.effects}
+        return {named.name for named in self.gap.effects}
 
     @property
     def sole(self) -> bool:
@@ -36,9 +36,9 @@ class Case:
 
     def found(self, effect: str) -> dict[str, tuple[float, float, float]]:
         """What is in the truth of an effect: value found, its standard error, and truth, in the units of files."""
-        (one,) = [one for one in self.gap.effects if one.name == effect]
-        values = dict(in_file_units(name, value) for name, value in one.parameters.items())
-        errors = dict(in_file_units(name, value) for name, value in one.standard_errors.items())
+        (named,) = [named for named in self.gap.effects if named.name == effect]
+        values = dict(in_file_units(name, value) for name, value in named.parameters.items())
+        errors = dict(in_file_units(name, value) for name, value in named.standard_errors.items())
         return {name: (values[name], errors[name], true) for name, true in self.made.parameters[effect].items()}
 
 
@@ -47,8 +47,8 @@ def sought(folder: Path, made: Made, held: tuple[str, ...] = (), options: GapOpt
     card = read_card(folder / "ship.toml")
     assert isinstance(card, ManoeuvringCard)
     groups = [[name for name in made.trials if (name in held) == out] for out in (False, True)]
-    fitted, rest = (measured([folder / f"{name}.csv" for name in names], card) for names in groups)
-    return Case(made, run_gap_workflow(card, fitted, rest, options or GapOptions(workers=1)))
+    fitted, held = (measured([folder / f"{name}.csv" for name in names], card) for names in groups)
+    return Case(made, run_gap_workflow(card, fitted, held, options or GapOptions(workers=1)))
 
 
 def hidden(folder: Path, *effects: str, trials=FOUR, held=()) -> Case:
@@ -57,9 +57,9 @@ def hidden(folder: Path, *effects: str, trials=FOUR, held=()) -> Case:
     return sought(folder, made, held)
 
 
-def left(case: Case, *, held_out: bool) -> tuple[float, float]:
+def misfit_and_share(case: Case, *, held_out: bool) -> tuple[float, float]:
     """Misfit with what was found, in units of the noise, and as a share of that of the given card."""
-    before, after = (case.gap.misfit(which, held_out=held_out) for which in ("before", "after"))
+    before, after = (case.gap.misfit(version, held_out=held_out) for version in ("before", "after"))
     assert before is not None and after is not None
     return after, after / before
 
@@ -71,8 +71,8 @@ FEW = GapOptions(workers=1, effects=("current", "gyro_bias"))
 def made() -> dict[str, Made]:
     """With a current and without, all in one batch."""
     trials = ("turn35_stbd", "straight")
-    some = make([Setting(("current",), SEED, manoeuvres=(*trials, *HELD)), Setting((), SEED, manoeuvres=trials)])
-    return dict(zip(("current", "nothing"), some, strict=True))
+    cases = make([Setting(("current",), SEED, manoeuvres=(*trials, *HELD)), Setting((), SEED, manoeuvres=trials)])
+    return dict(zip(("current", "nothing"), cases, strict=True))
 
 
 @pytest.mark.slow
@@ -84,7 +84,7 @@ def test_a_current_is_found_and_proved_on_a_trial_held_out(made, tmp_path: Path)
         value, error, true = found[name]
         assert (value - true + 180) % 360 - 180 == pytest.approx(0, abs=tolerance)
         assert 0 < error < tolerance
-    after, share = left(case, held_out=True)
+    after, share = misfit_and_share(case, held_out=True)
     assert after < 1.5 and share < 0.1
     assert case.gap.equation == "kinematics"
 
@@ -127,9 +127,9 @@ def test_a_hidden_effect_is_named_out_of_the_whole_library(effect: str, tmp_path
         value, error, true = case.found(effect)[name]
         assert (value - true + 180) % 360 - 180 == pytest.approx(0, abs=tolerance)
         assert 0 < error < 2 * tolerance
-    (one,) = case.gap.effects
-    assert 0.5 < one.confidence < 1
-    after, share = left(case, held_out=True)
+    (named,) = case.gap.effects
+    assert 0.5 < named.confidence < 1
+    after, share = misfit_and_share(case, held_out=True)
     assert share < FORMED[effect] if effect in FORMED else after < 1.5 and share < 1
 
 
@@ -154,7 +154,7 @@ def test_what_no_effect_makes_is_said_to_be_outside_the_library(outsider: str, t
 def test_two_hidden_effects_are_both_named(effects: tuple[str, str], tmp_path: Path) -> None:
     case = hidden(tmp_path, *effects)
     assert case.gap.verdict == MISSING and case.named == set(effects)
-    _, share = left(case, held_out=False)
+    _, share = misfit_and_share(case, held_out=False)
     assert share < 0.5
 
 

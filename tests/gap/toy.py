@@ -40,12 +40,12 @@ def pushed(t):
 class Toy:
     """What a likelihood asks of an explanation; `priors` mean and standard deviation of each theta, or None.
 
-    Its effects are the first of :data:`SHAPES`, or those at the places `which`.
+    Its effects are the first of :data:`SHAPES`, or those at the places `indices`.
     """
 
     priors: tuple = ()
     directed: bool = False
-    which: tuple | None = None
+    indices: tuple | None = None
     model = SimpleNamespace(input_names=("rudder.command",))
     card = SimpleNamespace(steering_gear=None)
 
@@ -55,7 +55,7 @@ class Toy:
 
     @property
     def places(self):
-        return tuple(range(len(self.priors))) if self.which is None else self.which
+        return tuple(range(len(self.priors))) if self.indices is None else self.indices
 
     @property
     def estimated(self):
@@ -70,8 +70,8 @@ class Toy:
 
     @property
     def prior(self):
-        pairs = [(0.0, 0.0) if one is None else (one[0], 1 / one[1] ** 2) for one in self.priors]
-        return np.array([one[0] for one in pairs]), np.array([one[1] for one in pairs])
+        pairs = [(0.0, 0.0) if pair is None else (pair[0], 1 / pair[1] ** 2) for pair in self.priors]
+        return np.array([pair[0] for pair in pairs]), np.array([pair[1] for pair in pairs])
 
     @property
     def bounds(self):
@@ -125,7 +125,8 @@ def toy_trials(theta=(), coefficients=(), *, seed=1, blocks=(24, 17), fine=5, st
 
     def rate(t, x):
         added = [
-            size * one(t) for size, one in zip((*theta, *coefficients), (*SHAPES[: len(theta)], *TERMS), strict=False)
+            size * shape(t)
+            for size, shape in zip((*theta, *coefficients), (*SHAPES[: len(theta)], *TERMS), strict=False)
         ]
         return A @ x + pushed(t) + np.sum([np.zeros(6), *added], axis=0)
 

@@ -87,7 +87,7 @@ def run_fleet(request: FleetRequest) -> int:
     check_executor(request.executor)
     fleet = fleet_in(request.folder, request.output)
     refuse_early(request.output, request.json_file, [])
-    with folder_made(request.output), showing_stages("looking for what is computed") as progress:
+    with folder_made(request.output), showing_stages("looking for earlier results") as progress:
         course = _course(fleet, request)
         _compute(course, request, progress)
         progress("writing the fleet's page")

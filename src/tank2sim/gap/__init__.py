@@ -1,1 +1,1 @@
-"""Where simulation and measurement differ: the missing physical effect named, added, and proved."""
+"""Differences of simulation and measurement: the missing physical effect named, added, and checked."""

@@ -69,8 +69,8 @@ DRIVE = """<script>{{
     {steps}
     const read = (one) => at(one).textContent;
     seen.said = read("said");
-    for (const one of document.querySelectorAll("[id^=read-], output")) reported[one.id] = read(one.id);
-    document.body.dataset.reported = JSON.stringify({{ ...reported, saved: await Promise.all(saved) }});
+    for (const one of document.querySelectorAll("[id^=read-], output")) seen[one.id] = read(one.id);
+    document.body.dataset.seen = JSON.stringify({{ ...seen, saved: await Promise.all(saved) }});
   }}, 50);
 }}</script>"""
 
@@ -107,13 +107,13 @@ def sailed(html, folder, steps):
     html = html.replace("<body>", "<body>" + FRAMES).replace("</body>", DRIVE.format(steps=steps) + "</body>")
     seen, console = opened(html, folder)
     assert console == []
-    seen = json.loads(unescape(re.search(r'data-told="(.*?)"', seen)[1]))
+    seen = json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))
     voyages = []
     for text in seen.pop("saved"):
         lines = [one for one in text.splitlines() if not one.startswith("#")]
         rows = list(csv.DictReader(io.StringIO("\n".join(lines))))
         voyages.append({name: np.array([float(row[name]) for row in rows]) for name in rows[0]})
-    return reported, voyages
+    return seen, voyages
 
 
 def worst(voyage, trajectory):

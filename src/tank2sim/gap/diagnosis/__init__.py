@@ -1,1 +1,1 @@
-"""Where and when simulation and measurement differ."""
+"""Location and time of the differences of simulation and measurement."""

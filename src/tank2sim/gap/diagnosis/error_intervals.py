@@ -9,14 +9,14 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.diagnosis.exceedance_runs import stretches
+from tank2sim.gap.diagnosis.exceedance_runs import exceedance_intervals
 from tank2sim.gap.diagnosis.kinematic_consistency import (
     CONTRADICTED,
     kinematic_consistency,
     readable,
     recorded_earth_velocity,
 )
-from tank2sim.gap.diagnosis.misfit_location import CLEAR, STATE_BINS, most_telling
+from tank2sim.gap.diagnosis.misfit_location import CLEAR, STATE_BINS, by_significance
 from tank2sim.gap.result import Acting, Gap, MissingForce, MissingSignal, Passed
 
 SPAN = 84
@@ -39,7 +39,7 @@ def acting(gap: Gap) -> tuple[Acting, ...]:
     messages = [*_passages("heading", [signals[name] for name in TURNING if name in signals])]
     messages += _passages("track", [signals[name] for name in TRACK[:2] if name in signals])
     force = missing_force_intervals(gap)
-    return (*most_telling(messages), *(force.passages if force is not None else ()))
+    return (*by_significance(messages), *(force.passages if force is not None else ()))
 
 
 def earth_bound(gap: Gap) -> bool:
@@ -187,7 +187,7 @@ def _share(state: Array, values: Array) -> float:
 
 
 def _passages(equation: str, signals: Sequence[MissingSignal]) -> list[Acting]:
-    """When signals of the same rows are not noise: by the mean of their squares."""
+    """Intervals in which signals of the same rows are not noise, by the mean of their squares."""
     if not signals:
         return []
     of, found = signals[0], []
@@ -196,7 +196,7 @@ def _passages(equation: str, signals: Sequence[MissingSignal]) -> list[Acting]:
     for trial in dict.fromkeys(of.trials):
         rows = np.flatnonzero(trials == trial)
         reach = SPAN / 2 * float(np.median(np.diff(of.time_s[rows]))) if len(rows) > 1 else 0.0
-        for begin, end, excess in stretches(z[rows], limit=CLEAR):
+        for begin, end, excess in exceedance_intervals(z[rows], limit=CLEAR):
             first, last = (float(of.time_s[rows[place]]) for place in (begin, end - 1))
             # The first and the last value are held before and after.
             first, last = round(first - reach * (begin == 0), 9) + 0.0, last + reach * (end == len(rows))

@@ -13,12 +13,14 @@ EXCEEDANCE_WINDOW = 21
 """Instants over which the square of a residual is averaged to distinguish misfit from noise: half of L/u0."""
 
 BEYOND = 4.0
-"""A mean square belongs to a stretch if it exceeds that of noise by this many of its own standard deviations (project
+"""A mean square belongs to an interval if it exceeds that of noise by this many of its own standard deviations (project
 choice)."""
 
 
-def stretches(z: Array, limit: float | None = None, width: int = EXCEEDANCE_WINDOW) -> list[tuple[int, int, float]]:
-    """Begin, end (one past the last) and excess of each stretch in which the mean square of z is beyond that of noise.
+def exceedance_intervals(
+    z: Array, limit: float | None = None, width: int = EXCEEDANCE_WINDOW
+) -> list[tuple[int, int, float]]:
+    """Begin, end (one past the last) and excess of each interval in which the mean square of z is beyond that of noise.
 
     Parameters
     ----------
@@ -28,12 +30,12 @@ def stretches(z: Array, limit: float | None = None, width: int = EXCEEDANCE_WIND
         By how much the mean of z^2 - 1 over the window must exceed 0; by default :data:`BEYOND` standard deviations of
         it for white noise.
     width : int
-        Instants in the window; stretches nearer to each other are one.
+        Instants in the window; intervals nearer to each other are merged.
 
     Returns
     -------
     list of (int, int, float)
-        The excess is the sum of z^2 - 1 over the stretch; it is positive.
+        The excess is the sum of z^2 - 1 over the interval; it is positive.
     """
     excess = np.where(np.isfinite(z), np.nan_to_num(z) ** 2 - 1, 0.0)
     width = min(width, len(z))

@@ -17,7 +17,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
-from tank2sim.gap.diagnosis.exceedance_runs import EXCEEDANCE_WINDOW, stretches
+from tank2sim.gap.diagnosis.exceedance_runs import EXCEEDANCE_WINDOW, exceedance_intervals
 from tank2sim.gap.diagnosis.kinematic_consistency import (
     CONTRADICTED,
     ENDS,
@@ -60,12 +60,12 @@ INTEGRATED = ("motion.x", "motion.y", "motion.psi")
 
 
 def places(passed: Sequence[Passed], limit: int = 12) -> tuple[MisfitPlace, ...]:
-    """The stretches in which the given card's misfit arises, largest share of the whole excess first.
+    """The intervals in which the given card's misfit arises, largest share of the whole excess first.
 
-    The excess of a stretch is the sum of z^2 - 1. Velocities and rates have z = (simulated - measured)/noise; positions
-    and headings the growth of the difference over :data:`EXCEEDANCE_WINDOW` instants beyond what wrong velocities make
-    of it, where these are measured too, in its own noise: an offset of the track remains, and only its
-    growth is a place. The whole is that of all stretches of all trials. Where the motion exceeds all bounds the
+    The excess of an interval is the sum of z^2 - 1. Velocities and rates have z = (simulated - measured)/noise;
+    positions and headings the growth of the difference over :data:`EXCEEDANCE_WINDOW` instants beyond the integral of
+    wrong velocities, where these are measured too, in its own noise: an offset of the track remains, and only its
+    growth is a place. The whole is that of all intervals of all trials. Where the motion exceeds all bounds the
     residual counts as the largest before it.
     """
     found = [
@@ -83,12 +83,12 @@ def places(passed: Sequence[Passed], limit: int = 12) -> tuple[MisfitPlace, ...]
 def _misfit_runs(replay: Passed, signal: str) -> list[tuple[int, int, float]]:
     z = _in_noise(replay, signal)
     if signal not in INTEGRATED:
-        return stretches(z)
+        return exceedance_intervals(z)
     known, half = np.isfinite(replay.measured[signal]), EXCEEDANCE_WINDOW // 2
     lost = known & np.isnan(replay.before[signal])
     residual = np.where(known & ~lost, replay.before[signal] - replay.measured[signal], np.nan)
     if np.count_nonzero(np.isfinite(residual)) <= EXCEEDANCE_WINDOW:
-        return stretches(np.where(lost, z, 0.0))
+        return exceedance_intervals(np.where(lost, z, 0.0))
     difference = filled(residual)
     simulated, measured = _rates(replay, replay.before), _rates(replay, replay.measured)
     rate_noise = 0.0
@@ -102,7 +102,7 @@ def _misfit_runs(replay: Passed, signal: str) -> list[tuple[int, int, float]]:
     error = math.sqrt(2 / half * replay.noise[signal] ** 2 + half * rate_noise**2)
     growth = np.full(len(z), np.nan)
     growth[half : len(means)] = (means[half:] - means[:-half]) / error
-    return stretches(np.where(lost, z, growth), limit=GROWING)
+    return exceedance_intervals(np.where(lost, z, growth), limit=GROWING)
 
 
 def _rates(replay: Passed, columns: Mapping[str, Array]) -> dict[str, Array]:
@@ -236,14 +236,14 @@ def _at_work(trials: NDArray[np.object_], time_s: Array, force: Array, errors: A
         for axis, equation in enumerate(EQUATIONS.values()):
             mean = uniform_filter1d(np.nan_to_num(force[rows, axis]) ** 2, min(_SHORT, len(rows)))
             active = np.where(mean > USUAL * usual[axis], z[rows, axis], 0.0)
-            for begin, end, excess in stretches(active, limit=CLEAR, width=_SHORT):
+            for begin, end, excess in exceedance_intervals(active, limit=CLEAR, width=_SHORT):
                 size = math.sqrt(1 + excess / (end - begin))
                 times = time_s[rows[[begin, end - 1]]]
                 found.append(Acting(str(trial), equation, float(times[0]), float(times[1]), size))
-    return most_telling(found)
+    return by_significance(found)
 
 
-def most_telling(found: Sequence[Acting]) -> tuple[Acting, ...]:
+def by_significance(found: Sequence[Acting]) -> tuple[Acting, ...]:
     """Sorted by the sum of squares, the largest first."""
     return tuple(sorted(found, key=lambda interval: -(interval.size**2) * (interval.t_end_s - interval.t_start_s)))
 
@@ -269,27 +269,6 @@ def explained_share(state: Array, force: Array, weights: Array) -> float:
         return 0.0
     n, bins = len(force), int(used.sum())
     return max(0.0, 1 - unexplained / whole * (n - 1) / (n - bins))
-
-
-def parity(state: Array, force: Array) -> float:
-    """How odd a force (n,) is in a state (n,): 1 for odd, -1 for even, near 0 for neither or too little on one side.
-
-    Means over bins of the state's magnitude, on either side of zero: (difference^2 - sum^2)/(difference^2 + sum^2).
-    """
-    size = np.abs(state)
-    edges = np.unique(np.quantile(size, np.linspace(0, 1, STATE_BINS // 2 + 1)))
-    if len(edges) < 2:
-        return 0.0
-    places = np.clip(np.searchsorted(edges, size, side="right") - 1, 0, len(edges) - 2)
-    odd = even = 0.0
-    for place in range(len(edges) - 1):
-        sides = [force[(places == place) & (np.sign(state) == side)] for side in (1, -1)]
-        if min(map(len, sides)) < 3:
-            continue
-        plus, minus = (float(values.mean()) for values in sides)
-        share = min(map(len, sides)) / len(force)
-        odd, even = odd + share * (plus - minus) ** 2, even + share * (plus + minus) ** 2
-    return (odd - even) / (odd + even) if odd + even > 0 else 0.0
 
 
 OF_ACTION = {"kinematics": "kinematics", "sensor": "sensor", "actuator": "actuator", "propulsion": "surge"}

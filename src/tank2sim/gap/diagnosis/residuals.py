@@ -22,7 +22,7 @@ from tank2sim.gap.result import MissingForce
 def force_lacking(likelihood: Likelihood, fit: ExplanationFit) -> MissingForce | None:
     """The force that an explanation lacks, as the smoother needs it to follow the measurements."""
     motion, hypothesis = likelihood.motion, fit.hypothesis
-    states, spread = likelihood.smoothed(fit)
+    states, spread = likelihood.smooth(fit)
     inertia = _inertia(hypothesis)
     force = np.einsum("ij,rtj->rti", inertia, states[..., 6 : 6 + FORCE_STATES])
     errors = np.sqrt(np.einsum("ij,rtjk,ik->rti", inertia, spread, inertia))
@@ -66,7 +66,7 @@ def each_trial(likelihood: Likelihood, fit: ExplanationFit) -> dict[str, dict[st
     The other parameters have the covariance of the fit to all trials; the card's coefficients and the
     forms of the effects as before.
     """
-    whitened, _ = likelihood.whitened(fit)
+    whitened, _ = likelihood.whiten(fit)
     k = len(fit.theta)
     estimated = fit.hypothesis.estimated
     by_trial: dict[str, dict[str, tuple[float, float]]] = {estimate.variable: {} for estimate in estimated}

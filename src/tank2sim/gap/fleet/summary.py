@@ -27,7 +27,7 @@ class ShipSummary:
     name : str
         Of the ship, as its card has it.
     verdict : str
-        One of :data:`.result.VERDICTS`.
+        One of :data:`.result.GAP_VERDICTS`.
     effects : tuple of mappings
         As in ``gap.json``: ``name``, ``parameters``, ``standard_errors``, ``confidence``; in the units of their names.
     alternatives : tuple of str

@@ -137,7 +137,7 @@ class MeasuredBatch:
         noise = dict(zip(self.seen, self.noise, strict=True))
         return np.array([noise.get(name, guess) for name, guess in zip(MEASURED_STATES, GUESSED, strict=True)])
 
-    def moved(self, away: Array, transition: Array, lack: Array, added: Array) -> MeasuredBatch:
+    def shift(self, away: Array, transition: Array, lack: Array, added: Array) -> MeasuredBatch:
         """Return the same trials, linearised about a motion that differs from this one by `away`.
 
         Parameters

@@ -44,7 +44,7 @@ class Belief:
         Mean and standard deviation of each logarithm (:attr:`.kalman_filter.NoiseLevels.logs`, and that of the width).
     wide : array (6,), optional
         Standard deviation of each state at the beginning of a run about the measured one: wide, for a sensor may be at
-        fault; by default :data:`.likelihood.WIDE` times its noise.
+        fault; by default :data:`.likelihood.WIDE_PRIOR` times its noise.
     """
 
     logs: Array

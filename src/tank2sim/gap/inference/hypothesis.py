@@ -210,7 +210,7 @@ class Hypothesis:
         x = motion.states
         tracks = []
         for run in range(len(x)):
-            start = self._settled(x[run, 0], inputs[run, 0], p)
+            start = self._steady_states(x[run, 0], inputs[run, 0], p)
             tracks.append(self._chain(motion.step_s).run(start, x[run, :-1], x[run, 1:], inputs[run], p))
         unmeasured = np.array(tracks)
         for name, delay in self._delays(theta).items():
@@ -238,21 +238,16 @@ class Hypothesis:
 
     def readings(self, motion: MeasuredBatch, theta: Array, unmeasured: Array | None = None) -> Array:
         """Readings of noiseless sensors in the middle of each block (R, T, ny)."""
-        return _rowwise(
-            self._readings(motion.seen), *self._in_blocks(motion, theta, unmeasured), self.parameters(theta)
-        )
+        function = self._function("readings", self._shown(motion.seen))
+        return _rowwise(function, *self._in_blocks(motion, theta, unmeasured), self.parameters(theta))
 
     def slopes(self, motion: MeasuredBatch, theta: Array) -> tuple[Array, Array]:
         """Rates by states (R, T - 1, 6, 6), and readings by states (R, T, ny, 6)."""
-        unmeasured = self.unmeasured_states(motion, theta)
-        p = self.parameters(theta)
-        by_state = _rowwise(self._state_slopes, *self._along(motion, theta, unmeasured), p)
-        seen = _rowwise(self._reading_slopes(motion.seen), *self._in_blocks(motion, theta, unmeasured), p)
-        shape = by_state.shape[:2]
-        ny = len(motion.seen)
+        unmeasured, p = self.unmeasured_states(motion, theta), self.parameters(theta)
+        reading_slopes = self._function("reading_slopes", ca.jacobian(self._shown(motion.seen), self._symbols[0]))
         return (
-            by_state.reshape(*shape, 6, 6).swapaxes(-1, -2),
-            seen.reshape(*seen.shape[:2], 6, ny).swapaxes(-1, -2),
+            _matrices(_rowwise(self._state_slopes, *self._along(motion, theta, unmeasured), p), 6),
+            _matrices(_rowwise(reading_slopes, *self._in_blocks(motion, theta, unmeasured), p), 6),
         )
 
     def coefficient_slopes(self, motion: MeasuredBatch, theta: Array, names: Sequence[str]) -> Array:
@@ -260,10 +255,10 @@ class Hypothesis:
         present = [name for name in names if name in self.model]
         direct = [name for name in present if not name.startswith("steering.")]
         along, p = self._along(motion, theta, None), self.parameters(theta)
-        columns = np.zeros((*along[0].shape, len(names)))
+        columns, base = np.zeros((*along[0].shape, len(names))), _rowwise(self._rates, *along, p)
         if direct:
-            slopes = _rowwise(self._coefficient_slopes(tuple(direct)), *along, p)
-            by_name = slopes.reshape(*slopes.shape[:2], len(direct), 6).swapaxes(-1, -2)
+            slopes = ca.jacobian(self._known_rates, ca.vcat([self.model.symbol(name) for name in direct]))
+            by_name = _matrices(_rowwise(self._function("coefficient_slopes", slopes), *along, p), len(direct))
             columns[..., [names.index(name) for name in direct]] = by_name
         for name in present:
             if name.startswith("steering."):  # through the state of the rudder
@@ -272,7 +267,7 @@ class Hypothesis:
                 moved[place] *= 1 + SMALL_SHARE
                 unmeasured = self.unmeasured_states(motion, theta, moved)
                 rates = _rowwise(self._rates, *self._along(motion, theta, unmeasured), moved)
-                columns[..., names.index(name)] = (rates - _rowwise(self._rates, *along, p)) / (moved[place] - p[place])
+                columns[..., names.index(name)] = (rates - base) / (moved[place] - p[place])
         if CLOCK in names:
             late = self.unmeasured_states(motion, theta), self.inputs(motion, theta)
             behind = self._states_behind("rudder.command")
@@ -281,7 +276,7 @@ class Hypothesis:
                     rows[..., place] = _late(rows[..., place], 1.0)
             middles = motion.over_blocks(0.5 * (late[0][:, 1:] + late[0][:, :-1]))
             rates = _rowwise(self._rates, along[0], middles, motion.over_blocks(late[1]), p)
-            columns[..., names.index(CLOCK)] = (rates - _rowwise(self._rates, *along, p)) / motion.step_s
+            columns[..., names.index(CLOCK)] = (rates - base) / motion.step_s
         return columns
 
     @property
@@ -318,31 +313,22 @@ class Hypothesis:
     def _known_rates(self) -> ca.SX:
         return self._of(MEASURED_STATES)
 
+    def _function(self, name: str, expression: ca.SX) -> ca.Function:
+        """A matrix, column by column, as a function of measured and unmeasured states, inputs and parameters."""
+        return ca.Function(name, [*self._symbols], [ca.densify(ca.vec(expression))], {"cse": True})
+
     @cached_property
     def _rates(self) -> ca.Function:
-        return ca.Function("rates", [*self._symbols], [self._known_rates], {"cse": True})
+        return self._function("rates", self._known_rates)
 
     @cached_property
     def _state_slopes(self) -> ca.Function:
-        slopes = ca.jacobian(self._known_rates, self._symbols[0])
-        return ca.Function("state_slopes", [*self._symbols], [ca.densify(ca.vec(slopes))], {"cse": True})
-
-    def _coefficient_slopes(self, names: tuple[str, ...]) -> ca.Function:
-        chosen = ca.vcat([self.model.symbol(name) for name in names])
-        slopes = ca.jacobian(self._known_rates, chosen)
-        return ca.Function("coefficient_slopes", [*self._symbols], [ca.densify(ca.vec(slopes))], {"cse": True})
+        return self._function("state_slopes", ca.jacobian(self._known_rates, self._symbols[0]))
 
     def _shown(self, seen: Sequence[str]) -> ca.SX:
         names = [f"sensor.{name.partition('.')[2]}" for name in seen]
         chosen = [sensor if sensor in self.model else name for sensor, name in zip(names, seen, strict=True)]
         return self.model.expand(ca.vcat([self.model.symbol(name) for name in chosen]))
-
-    def _readings(self, seen: Sequence[str]) -> ca.Function:
-        return ca.Function("readings", [*self._symbols], [ca.densify(self._shown(seen))], {"cse": True})
-
-    def _reading_slopes(self, seen: Sequence[str]) -> ca.Function:
-        slopes = ca.jacobian(self._shown(seen), self._symbols[0])
-        return ca.Function("reading_slopes", [*self._symbols], [ca.densify(ca.vec(slopes))], {"cse": True})
 
     @cached_property
     def _unmeasured_rates(self) -> ca.Function:
@@ -389,7 +375,7 @@ class Hypothesis:
             {"cse": True},
         )
 
-    def _settled(self, x: Array, u: Array, p: Array) -> Array:
+    def _steady_states(self, x: Array, u: Array, p: Array) -> Array:
         """Steady unmeasured states for a constant motion: their trims where these are known."""
         states = {state.name: state for state in self.model.states}
         xi = np.array(self._begin(np.zeros(len(self.unmeasured)), x, u, p)).ravel()
@@ -408,6 +394,11 @@ def _rowwise(function: ca.Function, *arguments: Array) -> Array:
     columns = [argument.reshape(shape[0] * shape[1], -1).T for argument in arguments[:-1]]
     result = np.array(function(*columns, arguments[-1])).T
     return result.reshape(*shape, -1)
+
+
+def _matrices(values: Array, columns: int) -> Array:
+    """Matrices (R, n, rows, columns) from their values (R, n, columns x rows), column by column."""
+    return values.reshape(*values.shape[:2], columns, -1).swapaxes(-1, -2)
 
 
 def _late(rows: Array, steps: float) -> Array:

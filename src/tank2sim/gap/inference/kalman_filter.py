@@ -138,7 +138,7 @@ class Observer:
     filtered: Array
     log_det: float
 
-    def whitened(self, driving: Array, shown: Array) -> Array:
+    def whiten(self, driving: Array, shown: Array) -> Array:
         """Innovations in units of their standard deviation, of several columns at once.
 
         Parameters
@@ -153,18 +153,18 @@ class Observer:
         array (R, T, ny, C)
             0 where nothing was measured.
         """
-        return self.passed(driving, shown, keep=False)[0]
+        return self.run(driving, shown, keep=False)[0]
 
-    def passed(self, driving: Array, shown: Array, *, keep: bool = True) -> tuple[Array, Array]:
+    def run(self, driving: Array, shown: Array, *, keep: bool = True) -> tuple[Array, Array]:
         """Innovations in units of their standard deviation (R, T, ny, C), and states after each measurement
         (R, T, nz, C) if they are to be kept; arguments as above."""
         columns = np.ascontiguousarray(driving), np.ascontiguousarray(shown)
         whitened, after = kalman_kernels.run_filter(self._seeing, self._moving, (self.gain, self.white), columns, keep)
         return whitened, after
 
-    def smoothed(self, driving: Array, shown: Array) -> Array:
-        """States given all measurements (R, T, nz), of one column; arguments as in :meth:`whitened` without C."""
-        after = self.passed(driving[..., None], shown[..., None])
+    def smooth(self, driving: Array, shown: Array) -> Array:
+        """States given all measurements (R, T, nz), of one column; arguments as in :meth:`whiten` without C."""
+        after = self.run(driving[..., None], shown[..., None])
         states: Array = kalman_kernels.smooth_backward(self._seeing, self._moving, self._filtering, *after)[..., 0]
         return states
 
@@ -244,7 +244,7 @@ def slopes(seen: Observer, driving: Array, shown: Array, whitened: Array) -> Arr
     once: r carries V^-1 e back to the states, N its covariance under the model (Durbin and Koopman, 7.3.3).
     """
     noise, block_s = seen.noise, seen.linear.block_s
-    after = seen.passed(driving, shown)[1]
+    after = seen.run(driving, shown)[1]
     moved = seen._seeing, seen._moving, seen._filtering
     variance, start, fading_slope, way, both, gain, white = kalman_kernels.backward(*moved, whitened, after)
     levels = np.concatenate([noise.force, noise.slow])

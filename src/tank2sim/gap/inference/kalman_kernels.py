@@ -21,32 +21,18 @@ compiled = njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
 
 
 @compiled
-def _predicted(P: Array, phi: Array, push: Array, fading: Array) -> Array:
-    """F P F', the whole transition F being (phi, push, 0; 0, fading)."""
-    nz = P.shape[0]
-    FP = np.zeros((nz, nz))
+def _advance(moved: Array, z: Array, phi: Array, push: Array, fading: Array) -> None:
+    """F z into `moved`, the whole transition F being (phi, push, 0; 0, fading)."""
     for i in range(6):
-        for j in range(6):
-            for b in range(nz):
-                FP[i, b] += phi[i, j] * P[j, b]
-        for f in range(3):
-            for b in range(nz):
-                FP[i, b] += push[i, f] * P[6 + f, b]
-    for i in range(6, nz):
-        for b in range(nz):
-            FP[i, b] = fading[i - 6] * P[i, b]
-    both = np.empty((nz, nz))
-    for a in range(nz):
-        for i in range(6):
-            total = 0.0
-            for j in range(6):
-                total += FP[a, j] * phi[i, j]
-            for f in range(3):
-                total += FP[a, 6 + f] * push[i, f]
-            both[a, i] = total
-        for i in range(6, nz):
-            both[a, i] = FP[a, i] * fading[i - 6]
-    return both
+        moved[i] = 0.0
+        for j in range(9):
+            f = phi[i, j] if j < 6 else push[i, j - 6]
+            for c in range(z.shape[1]):
+                moved[i, c] += f * z[j, c]
+    for i in range(6, len(z)):
+        f = fading[i - 6]
+        for c in range(z.shape[1]):
+            moved[i, c] = f * z[i, c]
 
 
 @compiled
@@ -114,7 +100,7 @@ def covariances(
     runs, blocks, ny, _ = reading.shape
     nz = 9 + ny
     gain, white = np.empty((runs, blocks, nz, ny)), np.empty((runs, blocks, ny, ny))
-    filtered = np.empty((runs, blocks, nz, nz))
+    filtered, FP = np.empty((runs, blocks, nz, nz)), np.empty((nz, nz))
     for run in range(runs):
         P = np.diag(start)
         for k in range(blocks):
@@ -133,7 +119,9 @@ def covariances(
             P = P - G @ G.T
             gain[run, k], white[run, k], filtered[run, k] = G @ W, W, P
             if k + 1 < blocks:
-                P = _predicted(P, transition[run, k], push[run, k], fading) + added[run, k]
+                _advance(FP, P, transition[run, k], push[run, k], fading)
+                _advance(P, FP.T.copy(), transition[run, k], push[run, k], fading)
+                P += added[run, k]
                 P = 0.5 * (P + P.T)
     return gain, white, filtered
 
@@ -167,23 +155,13 @@ def _corrected(z: Array, whitened: Array, e: Array, gain: Array, white: Array) -
 
 
 @compiled
-def _moved(moved: Array, z: Array, F: tuple[Array, Array, Array], spreading: Array, driving: Array) -> None:
-    """F z plus the driving, into `moved`."""
-    phi, push, fading = F
-    count = z.shape[1]
+def _drive(moved: Array, spreading: Array, driving: Array) -> None:
+    """Add the driving of the six errors of the motion to `moved`."""
     for i in range(6):
-        moved[i] = 0.0
         for j in range(6):
-            f, s = phi[i, j], spreading[i, j]
-            for c in range(count):
-                moved[i, c] += f * z[j, c] + s * driving[j, c]
-        for j in range(3):
-            f = push[i, j]
-            for c in range(count):
-                moved[i, c] += f * z[6 + j, c]
-    for i in range(6, len(z)):
-        for c in range(count):
-            moved[i, c] = fading[i - 6] * z[i, c]
+            s = spreading[i, j]
+            for c in range(driving.shape[1]):
+                moved[i, c] += s * driving[j, c]
 
 
 @compiled
@@ -225,7 +203,8 @@ def run_filter(
             if keep:
                 after[run, k] = z
             if k + 1 < blocks:
-                _moved(moved, z, (transition[run, k], push[run, k], fading), spreading[run, k], driving[run, k])
+                _advance(moved, z, transition[run, k], push[run, k], fading)
+                _drive(moved, spreading[run, k], driving[run, k])
                 z, moved = moved, z
     return whitened, after
 

@@ -150,18 +150,18 @@ class Likelihood:
         readings[..., : 1 + len(theta)] = np.stack(seen, axis=-1)
         return FilterColumns(pairs, readings, len(theta), of_coefficients.shape[-1])
 
-    def whitened(self, fit: ExplanationFit) -> tuple[Array, Array]:
+    def whiten(self, fit: ExplanationFit) -> tuple[Array, Array]:
         """Columns of an explanation in units of the innovations (R, T, ny, C), and its innovations (R, T, ny)."""
         seen, columns = self._seen(fit)
-        whitened = seen.whitened(columns.driving, columns.shown)
+        whitened = seen.whiten(columns.driving, columns.shown)
         return whitened, whitened[..., 0] + whitened[..., 1 + columns.parameter_count :] @ fit.change
 
-    def smoothed(self, fit: ExplanationFit) -> tuple[Array, Array]:
+    def smooth(self, fit: ExplanationFit) -> tuple[Array, Array]:
         """States of the filter given all measurements (R, T, nz), and the covariance of the unmodelled
         accelerations, given the measurements until then (R, T, 3, 3): an upper bound of that given all."""
         seen, columns = self._seen(fit)
         by_coefficients = columns.driving[..., 1 + columns.parameter_count :] @ fit.change
-        states = seen.smoothed(columns.driving[..., 0] + by_coefficients, columns.shown[..., 0])
+        states = seen.smooth(columns.driving[..., 0] + by_coefficients, columns.shown[..., 0])
         return states, seen.filtered[..., 6 : 6 + FORCE_STATES, 6 : 6 + FORCE_STATES]
 
     def about(self, fit: ExplanationFit) -> Likelihood:
@@ -172,14 +172,12 @@ class Likelihood:
         motion, hypothesis, theta = self.motion, fit.hypothesis, fit.theta
         seen, columns = self._seen(fit)
         by_coefficients = columns.driving[..., 1 + columns.parameter_count :] @ fit.change
-        states = seen.smoothed(columns.driving[..., 0] + by_coefficients, columns.shown[..., 0])
-        added_rates = by_coefficients + np.pad(
-            motion.block_s * states[:, :-1, 6 : 6 + FORCE_STATES], ((0, 0), (0, 0), (0, 3))
-        )
+        states = seen.smooth(columns.driving[..., 0] + by_coefficients, columns.shown[..., 0])
+        added = by_coefficients.copy()
+        added[..., :FORCE_STATES] += motion.block_s * states[:, :-1, 6 : 6 + FORCE_STATES]
+        added *= self._inside / motion.block_s
         between = hypothesis.rates_between(motion, theta) - np.diff(motion.states, axis=1) / motion.step_s
-        moved = motion.moved(
-            states[..., :6], seen.linear.transition, between, added_rates * self._inside / motion.block_s
-        )
+        moved = motion.shift(states[..., :6], seen.linear.transition, between, added)
         return Likelihood(moved, self.none, self.coefficients, self.belief)
 
     def by_formula(self, fit: ExplanationFit) -> ExplanationFit:
@@ -194,7 +192,7 @@ class Likelihood:
 
     def innovations(self, fit: ExplanationFit) -> Array:
         """Innovations of an explanation, each over its standard deviation (R, T, ny), 0 where nothing was measured."""
-        return self.whitened(fit)[1]
+        return self.whiten(fit)[1]
 
     def _seen(self, fit: ExplanationFit) -> tuple[Observer, FilterColumns]:
         hypothesis, theta = fit.hypothesis, fit.theta
@@ -243,13 +241,13 @@ class Likelihood:
     ) -> ExplanationFit:
         """The noise of several at which the explanation, free in its parameters, scores best."""
         columns = self.columns(fit.hypothesis, fit.theta, coefficients)
-        scored: list[tuple[float, int]] = []
-        for logs in starts:
-            noisy = replace(fit, logs=logs)
+
+        def score(noisy: ExplanationFit) -> float:
             seen = observer(linear, noisy.noise)
             solved = self._solved(fit.hypothesis, fit.theta, seen, columns.scaled(noisy.width), free=True)
-            scored.append((self._score(noisy, seen, solved), len(scored)))
-        return replace(fit, logs=starts[min(scored)[1]])
+            return self._score(noisy, seen, solved)
+
+        return min((replace(fit, logs=logs) for logs in starts), key=score)
 
     def _parameters(self, fit: ExplanationFit, linear: Linear, coefficients: Array, steps: int = 4) -> ExplanationFit:
         """Gauss-Newton in the parameters at one noise."""
@@ -317,7 +315,7 @@ class Likelihood:
         A rotation of the combinations leaves them as independent beforehand as the coefficients were.
         """
         seen, k = observer(linear, fit.noise), columns.parameter_count
-        flat = seen.whitened(columns.driving, columns.shown).reshape(-1, columns.driving.shape[-1])[:, 1 + k :]
+        flat = seen.whiten(columns.driving, columns.shown).reshape(-1, columns.driving.shape[-1])[:, 1 + k :]
         gram, count = flat.T @ flat, columns.coefficient_count
         information, directions = np.linalg.eigh(gram[:count, :count] * fit.width**2)
         directions = directions[:, information > LEAST_INFORMATION]
@@ -352,7 +350,7 @@ class Likelihood:
     ) -> _Solved:
         """Least squares over the parameters' and coefficients' columns; the cost of the residual is at the given
         parameters, or at the solution if `free`."""
-        whitened = seen.whitened(columns.driving, columns.shown)
+        whitened = seen.whiten(columns.driving, columns.shown)
         flat = whitened.reshape(-1, whitened.shape[-1])
         gram = flat.T @ flat
         k, count = columns.parameter_count, columns.coefficient_count
@@ -362,7 +360,8 @@ class Likelihood:
         pull = -gram[1:, 0] - np.concatenate([precision * (theta - mean), np.zeros(gram.shape[0] - 1 - k)])
         size = np.sqrt(np.diag(normal))
         size[size == 0] = 1.0  # the shape of an absent effect has no column
-        factor = cho_factor(normal / np.outer(size, size) + 1e-12 * np.eye(len(normal)))
+        identity = np.eye(len(normal))
+        factor = cho_factor(normal / np.outer(size, size) + 1e-12 * identity)
         whole = cho_solve(factor, pull / size) / size
         inner = normal[k:, k:]
         held = cho_factor(inner)
@@ -372,7 +371,7 @@ class Likelihood:
         base = gram[0, 0] + float(precision @ (theta - mean) ** 2)
         reduced_cost = base - (float(pull @ whole) if free else float(alone @ (inner @ alone)))
         reduced_cost += 2 * float(np.sum(np.log(np.diag(held[0]))))
-        covariance = np.linalg.inv(normal / np.outer(size, size) + 1e-12 * np.eye(len(normal))) / np.outer(size, size)
+        covariance = cho_solve(factor, identity) / np.outer(size, size)
         spread = np.linalg.inv(inner)
         root = np.linalg.cholesky(0.5 * (spread + spread.T)) if len(inner) else np.zeros((0, 0))
         weights = np.zeros((gram.shape[0], 1 + len(inner)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -47,12 +47,7 @@ def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, o
         "acting": _acting(gap, names),
         "equation": gap.equation,
         "misfit": _misfit(gap),
-        "could_hide": {
-            effect: {
-                in_file_units(name, size)[0]: _finite(in_file_units(name, size)[1]) for name, size in sizes.items()
-            }
-            for effect, sizes in hidden(gap).items()
-        },
+        "could_hide": {effect: _in_file(sizes) for effect, sizes in hidden(gap).items()},
         "could_hide_in_words": {
             effect: "; ".join(hidden_in_words(effect, name, size) for name, size in sizes.items())
             for effect, sizes in hidden(gap).items()
@@ -186,15 +181,16 @@ def _figures(gap: Gap, names: Mapping[str, str]) -> list[dict[str, object]]:
 def _effect(effect: Named) -> dict[str, object]:
     return {
         "name": effect.name,
-        "parameters": {key: _finite(value) for key, value in _each(effect.parameters, wrapped=True)},
-        "standard_errors": {key: _finite(value) for key, value in _each(effect.standard_errors, wrapped=False)},
+        "parameters": _in_file(effect.parameters, estimate_in_file),
+        "standard_errors": _in_file(effect.standard_errors),
         "confidence": _finite(effect.confidence),
     }
 
 
-def _each(values: Mapping[str, float], *, wrapped: bool) -> list[tuple[str, float]]:
-    convert = estimate_in_file if wrapped else in_file_units
-    return [convert(name, value) for name, value in values.items()]
+def _in_file(
+    values: Mapping[str, float], convert: Callable[[str, float], tuple[str, float]] = in_file_units
+) -> dict[str, float | None]:
+    return {key: _finite(value) for key, value in (convert(*item) for item in values.items())}
 
 
 def _misfit(gap: Gap) -> dict[str, object]:
@@ -255,10 +251,7 @@ def _next_test(test: NextTest | None) -> dict[str, object] | None:
         return None
     expected = {manoeuvre: _finite(score) for manoeuvre, score in test.expected.items()}
     sizes = {
-        name: {
-            "parameters": {key: _finite(value) for key, value in _each(values, wrapped=True)},
-            "standard_errors": {key: _finite(value) for key, value in _each(errors, wrapped=False)},
-        }
+        name: {"parameters": _in_file(values, estimate_in_file), "standard_errors": _in_file(errors)}
         for name, (values, errors) in test.sizes.items()
     }
     test_plan = {"manoeuvre": test.manoeuvre, "orders": NEXT_TEST_FILE, "why": test.why}

@@ -80,8 +80,8 @@ def black_box(card: ManoeuvringCard, measured: Measured, noise: Mapping[str, flo
     found = np.zeros(0)
     while len(names) < min(count, len(linear)):
         names, found = _add_term(fit, names, found, linear, reach)
-    fit.settle(names, found)
-    found = fit.found(names, found, reach)[0]
+    fit.update_starts(names, found)
+    found = fit.minimise(names, found, reach)[0]
     values = dict(zip(names, map(float, found), strict=True))
     derivatives = {
         name: (card.derivatives.get(name, 0.0) + change, card.standard_error(name)) for name, change in values.items()
@@ -104,7 +104,7 @@ def _add_term(
         unexplained = residual - J @ np.linalg.lstsq(J, residual, rcond=None)[0]
         costs.append(float(unexplained @ unexplained))
     tried = [(*names, remaining[place]) for place in np.argsort(costs)[:TRIED]]
-    fits = [(terms, *fit.found(terms, np.append(values, 0.0), reach)) for terms in tried]
+    fits = [(terms, *fit.minimise(terms, np.append(values, 0.0), reach)) for terms in tried]
     best, changes, _ = min(fits, key=lambda candidate: candidate[2])
     return best, changes
 
@@ -117,12 +117,12 @@ class _Fit:
         self.sigma = np.array([noise[name] for name in replayer.seen])
         # From the first seconds: an initial state fitted with a wrong model would compensate its errors.
         p = replayer.model.parameter_values()
-        self.starts = [replayer.first(record, self.sigma, p) for record in records]
+        self.starts = [replayer.guess_initial_state(record, self.sigma, p) for record in records]
 
-    def settle(self, names: Sequence[str], changes: Array) -> None:
+    def update_starts(self, names: Sequence[str], changes: Array) -> None:
         """Find the initial states again."""
         p = self._parameters(names, changes)
-        self.starts = [self.replayer.settled(record, self.sigma, p) for record in self.records]
+        self.starts = [self.replayer.fit_initial_state(record, self.sigma, p) for record in self.records]
 
     def misfit(self, names: Sequence[str], changes: Array) -> Array:
         """(Simulated less measured)/noise of all measurements."""
@@ -133,7 +133,7 @@ class _Fit:
             parts.append(residual[~np.isnan(record.readings)])
         return np.concatenate(parts)
 
-    def found(self, names: Sequence[str], start: Array, reach: float) -> tuple[Array, float]:
+    def minimise(self, names: Sequence[str], start: Array, reach: float) -> tuple[Array, float]:
         """Changes of least misfit, and its sum of squares."""
 
         def misfit(changes: Array) -> Array:

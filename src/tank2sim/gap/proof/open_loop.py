@@ -130,7 +130,7 @@ class Replayer:
         """Readings of the sensors (m, ny) at the compared instants of a record."""
         return self.seen_along(start, record.inputs, record.step_s, p, record.every)
 
-    def settled(self, record: InputRecord, sigma: Array, p: Array) -> Array:
+    def fit_initial_state(self, record: InputRecord, sigma: Array, p: Array) -> Array:
         """Initial state (nx,) that fits a record best, kept near the state of its first seconds.
 
         `sigma` (ny,) is the noise of the signals. If with the least squares in noise units the model follows the record
@@ -138,10 +138,10 @@ class Replayer:
         speed would be biased to correct its track: then a signal weighs less by the size of its own residual beyond the
         noise (the likelihood of a deviation that is not known), of which only one value in L/u0 counts as independent.
         """
-        start, misfit = self._settled_from(record, sigma, p, wrong=False)
-        return start if misfit < _NEAR else self._settled_from(record, sigma, p, wrong=True)[0]
+        start, misfit = self._least_squares_start(record, sigma, p, wrong=False)
+        return start if misfit < _NEAR else self._least_squares_start(record, sigma, p, wrong=True)[0]
 
-    def first(self, record: InputRecord, sigma: Array, p: Array) -> Array:
+    def guess_initial_state(self, record: InputRecord, sigma: Array, p: Array) -> Array:
         """Initial state (nx,) from the first seconds, with the rudder that fits the record better."""
         guess, _ = _first_state(self, record, sigma, p)
         known = ~np.isnan(record.readings)
@@ -162,12 +162,12 @@ class Replayer:
         amidships[place] = 0.0
         return [guess, amidships]
 
-    def _settled_from(self, record: InputRecord, sigma: Array, p: Array, *, wrong: bool) -> tuple[Array, float]:
+    def _least_squares_start(self, record: InputRecord, sigma: Array, p: Array, *, wrong: bool) -> tuple[Array, float]:
         """Initial state by Gauss-Newton, and its misfit: inf where the motion exceeds all bounds.
 
         Derivatives are differences: an effect need not be smooth.
         """
-        guess, spread = self.first(record, sigma, p), _first_state(self, record, sigma, p)[1]
+        guess, spread = self.guess_initial_state(record, sigma, p), _first_state(self, record, sigma, p)[1]
         known = ~np.isnan(record.readings)
         column = np.broadcast_to(np.arange(len(sigma)), known.shape)[known]
         number = np.maximum(np.bincount(column, minlength=len(sigma)), 1)

@@ -111,7 +111,7 @@ def _replayer(card: ManoeuvringCard, measured: Measured, noise: Mapping[str, flo
 def _simulated(replayer: Replayer, record: InputRecord, noise: Mapping[str, float]) -> Array:
     p = replayer.model.parameter_values()
     sigma = np.array([noise[name] for name in replayer.seen])
-    return replayer.motion(record, replayer.settled(record, sigma, p), p)
+    return replayer.motion(record, replayer.fit_initial_state(record, sigma, p), p)
 
 
 def _passed(

@@ -65,7 +65,7 @@ class Decision:
     Parameters
     ----------
     verdict : str
-        One of :data:`.result.VERDICTS`.
+        One of :data:`.result.GAP_VERDICTS`.
     best : ExplanationFit
         The explanation that is named, "none" among them; the best of all where a name is withheld.
     alike : tuple of ExplanationFit
@@ -83,7 +83,7 @@ class Decision:
     strange: tuple[Strange, ...]
 
     def confidence(self, effect: str) -> float:
-        """Probability that an effect is among what is missing."""
+        """Probability that an effect is among the missing ones."""
         return _confidence(self.probabilities, effect)
 
 
@@ -213,7 +213,7 @@ PADDED = 512
 
 
 def find_strangeness(likelihood: Likelihood, fit: ExplanationFit) -> tuple[Strange, ...]:
-    """Where the innovations of an explanation are not noise, the strangest first."""
+    """Places where the innovations of an explanation are not noise, the least probable first."""
     e = likelihood.innovations(fit)
     found = [*_passages(likelihood, e), *_periods(likelihood, e), *_disagreements(likelihood, fit)]
     found += _pushes(likelihood, fit)
@@ -255,7 +255,7 @@ def _pushes(likelihood: Likelihood, fit: ExplanationFit) -> list[Strange]:
     neither. A window holds as many independent values of the force as it holds twice its time constant.
     """
     motion, found = likelihood.motion, []
-    states, spread = likelihood.smoothed(fit)
+    states, spread = likelihood.smooth(fit)
     inside = motion.inside
     for axis, time in enumerate(fit.noise.force_s):
         squares = np.where(inside, states[..., 6 + axis] ** 2, 0.0)

@@ -158,7 +158,7 @@ class Screen:
         columns = likelihood.columns(assumed, base.theta, likelihood.coefficient_columns).scaled(base.width)
         driving = np.concatenate([columns.driving, *(variant.driving for variant in self.every)], axis=-1)
         shown = np.concatenate([columns.shown, *(-variant.shown for variant in self.every)], axis=-1)
-        flat = seen.whitened(driving, shown).reshape(-1, driving.shape[-1])
+        flat = seen.whiten(driving, shown).reshape(-1, driving.shape[-1])
         gram = flat.T @ flat
         count = columns.driving.shape[-1]
         # The coefficients (with a prior) and the assumed effects (without) are projected out of the residual.
