@@ -29,8 +29,6 @@ from types import CodeType, ModuleType
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "docs" / "static" / "project_choices.json"
-SHOWN = ("report.", "cli.", "api.", "cluster.", "native.", "fmu.")
-"""Rooms whose numbers shape pages, tables and patience: no command's figures depend on them."""
 ZIGZAG, TURN, HELD = "trials/zigzag.csv", "trials/turn.csv", "trials/held_out.csv"
 IDENTIFY = f"identify mariner {ZIGZAG} {TURN} --holdout {HELD}"
 COMMANDS = {
@@ -71,7 +69,8 @@ COMMANDS = {
         f"validate mariner {ZIGZAG} {HELD}",
     ],
 }
-"""Commands that use a room, by the beginning of the name: the first that fits."""
+"""Commands that use a room, by the beginning of the name: the first that fits. Rooms without commands (pages, command
+line, patience with processes and clusters) have numbers on which no figure depends; they are not measured."""
 
 LONGEST = 20
 """Entries of the longest list that is compared: histories and tracks are not."""
@@ -81,10 +80,12 @@ Leaves = dict[str, list[Number] | str]
 
 
 def constants() -> list[str]:
+    """Names of the project's constants that are measured."""
     sys.path.insert(0, str(ROOT / "docs"))
     from generated import project_constants
 
-    return [constant.name for constant in project_constants()]
+    names = [constant.name for constant in project_constants()]
+    return [name for name in names if name.startswith(tuple(f"{room}." for room in COMMANDS))]
 
 
 def commands_of(name: str) -> list[str]:
@@ -262,7 +263,7 @@ def main() -> int:
             sys.meta_path.insert(0, Changing(name, factor))
         print(json.dumps(run_commands(commands)))
         return 0
-    names = [name for name in constants() if not name.startswith(SHOWN)]
+    names = constants()
     chosen = [name for name in names if not sys.argv[1:] or name.startswith(tuple(sys.argv[1:]))]
     table = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
     table = {name: cells for name, cells in table.items() if name in names}

@@ -1,8 +1,8 @@
 """Parts of the manual that are read off the program: effects, commands, and the reference of its modules.
 
 A page asks for one by a comment of its own, ``<!-- effects -->``, ``<!-- commands -->``, ``<!-- reference: cards -->``,
-``<!-- keys: Glider -->``, ``<!-- schemas -->``, ``<!-- project choices -->`` or ``<!-- fmu: mariner -->``; nothing is
-written into the sources.
+``<!-- keys: Glider -->``, ``<!-- schemas -->``, ``<!-- project choices -->``, ``<!-- benchmark records -->`` or
+``<!-- fmu: mariner -->``; nothing is written into the sources.
 """
 
 from __future__ import annotations
@@ -187,6 +187,12 @@ def project_choices() -> str:
     return "\n\n".join("\n".join([f"## {room}\n", heads, *lines]) for room, lines in rows.items())
 
 
+def benchmark_records() -> str:
+    """What the scripts of benchmarks printed when their figures were taken, as written by ``benchmarks/table.py``."""
+    files = sorted((Path(__file__).parent / "static" / "benchmarks").glob("*.txt"))
+    return "\n\n".join(f"```text\n{file.read_text(encoding='utf-8').rstrip()}\n```" for file in files)
+
+
 def schemas() -> str:
     """The JSON Schema of each command's JSON."""
     parts = []
@@ -274,6 +280,8 @@ def _fill(app: Sphinx, page: str, source: list[str]) -> None:
         text = text.replace("<!-- effects -->", effects())
     if "<!-- project choices -->" in text:
         text = text.replace("<!-- project choices -->", project_choices())
+    if "<!-- benchmark records -->" in text:
+        text = text.replace("<!-- benchmark records -->", benchmark_records())
     if "<!-- schemas -->" in text:
         text = text.replace("<!-- schemas -->", schemas())
     if "<!-- commands -->" in text:
@@ -292,6 +300,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 
 _GENERATED = {
+    "benchmarks",
     "formats/effects",
     "formats/campaign",
     "formats/other_cards",

@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -15,9 +17,11 @@ from tank2sim.identification.captive.findings import reduction_findings
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
 from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.result_card import card_contents, reduced_card_text, reynolds_ratio
+from tank2sim.identification.captive.stepwise import scatter_within_tests
 from tank2sim.identification.captive.tables import prediction_errors
 from tank2sim.identification.captive.type_b import type_b_shifts
 from tank2sim.records.campaigns import read_campaign
+from tests.conftest import ROOT
 from tests.identification.captive.generator import Campaign, write
 
 QUIET = Campaign(seed=4, noise=0.0, zero_error=0.0, vibration=False, rate_hz=10.0)
@@ -364,3 +368,18 @@ def test_harmonics_are_reported_without_dimension(noisy, name):
         assert abs(mean["value"]) == pytest.approx(abs(values.mean()) / unit, rel=2e-3)
         white = values.std() / unit / np.sqrt(len(values))
         assert 0.1 * white < mean["standard_error"] < 10 * white
+
+
+def test_the_scatter_within_tests_is_that_of_the_noise_in_any_order_of_the_runs(tmp_path):
+    """All drift runs are static or with rudder: a linear term of each of the two kinds is one column too many."""
+    script = ROOT / "docs" / "examples" / "make_campaign.py"
+    subprocess.run([sys.executable, script, "campaign"], cwd=tmp_path, check=True, capture_output=True)
+    campaign = read_campaign(tmp_path / "campaign" / "campaign.toml")
+    for force in "YN":
+        spreads = [
+            scatter_within_tests(reduce_campaign(replace(campaign, runs=runs)).forces[force].selection.equations)
+            for runs in (campaign.runs, campaign.runs[::-1])
+        ]
+        assert spreads[0].noise == pytest.approx(1.0, abs=0.2)  # the covariance within a run is complete: white noise
+        assert spreads[1].noise == pytest.approx(spreads[0].noise, rel=1e-4)
+        assert spreads[1].zero_variance == pytest.approx(spreads[0].zero_variance, rel=1e-2)

@@ -97,6 +97,14 @@ def stepwise(equations: CampaignEquations, spread: Spread, test_speed_mps: float
     return Stepwise(tuple(names), values, errors, tuple(found_in))
 
 
+def _is_independent(column: Array, others: Array) -> bool:
+    """True if a column (rows,) is not a combination of `others` (rows, n), to the rounding of a fit."""
+    norms = np.linalg.norm(others, axis=0)
+    scaled = others / np.where(norms > 0, norms, 1.0)
+    remainder = column - scaled @ np.linalg.lstsq(scaled, column, rcond=None)[0]
+    return bool(np.linalg.norm(remainder) > 1e-6 * np.linalg.norm(column))
+
+
 def scatter_within_tests(equations: CampaignEquations) -> Spread:
     """The spread of the runs if each type of test has its own linear terms.
 
@@ -106,8 +114,13 @@ def scatter_within_tests(equations: CampaignEquations) -> Spread:
     kinds = np.array([run.run.type for run in equations.runs])[equations.run_of_row]
     for kind, letter in (("static_drift", "v"), ("static_rudder", "d"), ("pure_yaw", "r"), ("drift_and_rudder", "v")):
         name = equations.force + letter
-        if name in equations.names and np.any(kinds == kind) and not np.all(kinds == kind):
-            columns.append(np.where(kinds == kind, equations.design[:, equations.names.index(name)], 0.0)[:, None])
+        if name not in equations.names or not np.any(kinds == kind):
+            continue
+        column = np.where(kinds == kind, equations.design[:, equations.names.index(name)], 0.0)
+        # A type of test that holds all of the term's motion has no linear term of its own: the likelihood of a
+        # dependent column would be that of rounding errors.
+        if _is_independent(column, np.hstack(columns)):
+            columns.append(column[:, None])
             names.append(f"{name} {kind}")
     if len(names) > len(equations.values):
         return fitted_spread(equations, by_type=False)
