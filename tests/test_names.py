@@ -39,3 +39,29 @@ def test_no_public_name_is_defined_twice() -> None:
 def test_no_test_imports_from_another_test() -> None:
     importing = re.compile(r"^from [\w.]*\btest_\w+ import|^import [\w.]*\btest_\w+", re.MULTILINE)
     assert [path.name for path in (ROOT / "tests").rglob("*.py") if importing.search(path.read_text("utf-8"))] == []
+
+
+PRIVATE_WORDS = re.compile(
+    r"\b(told|tells?|foretells?|foretold|foretelling|mended|mends?|wish|wishes|stands|stood|beside|ours|she|her|anew|bears"
+    r"|strangers|but for|no such)\b",
+    re.IGNORECASE,
+)
+KEYS_OF_FILES = re.compile(r'"(told|mended|wishes)"')
+"""Keys of JSON results that scripts rely on."""
+QUOTED = {"CHANGELOG.md"}  # names that moved
+
+
+def test_the_words_of_a_private_language_do_not_come_back() -> None:
+    """They were replaced by those of ITTC, SNAME, FMI and statistics: CONTRIBUTING, "Words"."""
+    found = {}
+    files = [path for folder in ("src", "docs", "fmu_templates") for path in (ROOT / folder).rglob("*")]
+    for path in [*files, *ROOT.glob("*.md")]:
+        if path.suffix not in {".py", ".md", ".j2", ".js", ".css", ".c", ".h"} or path.name in QUOTED:
+            continue
+        if lines := [
+            f"{number}: {line.strip()[:100]}"
+            for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+            if PRIVATE_WORDS.search(KEYS_OF_FILES.sub("", line))
+        ]:
+            found[path.relative_to(ROOT).as_posix()] = lines
+    assert found == {}

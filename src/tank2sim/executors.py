@@ -77,17 +77,20 @@ def processes_to_begin(workers: int | None = None) -> int:
 class _Process(multiprocessing.context.SpawnProcess):
     """A process that does not run the user's script again: all that it computes is in packages that it can import."""
 
+    _starting = threading.Lock()  # the main module belongs to all threads
+
     def start(self) -> None:
         """Start it while the main module has no name and no file by which the new process would run it."""
-        main = sys.modules["__main__"]
-        kept = {name: getattr(main, name) for name in ("__spec__", "__file__") if hasattr(main, name)}
-        for name in kept:
-            setattr(main, name, None)
-        try:
-            super().start()
-        finally:
-            for name, value in kept.items():
-                setattr(main, name, value)
+        with self._starting:
+            main = sys.modules["__main__"]
+            kept = {name: getattr(main, name) for name in ("__spec__", "__file__") if hasattr(main, name)}
+            for name in kept:
+                setattr(main, name, None)
+            try:
+                super().start()
+            finally:
+                for name, value in kept.items():
+                    setattr(main, name, value)
 
 
 class _Context(multiprocessing.context.SpawnContext):

@@ -19,7 +19,7 @@ def inertia_from_work(work_12_J: float, work_56_J: float, w1_radps: float, w2_ra
 def dissipation_from_work(work_12_J: float, work_56_J: float) -> float:
     """B + D in J, (2): (W12 + W56) / 2.
 
-    The print divides the corrections for accelerating and braking and for the walls by (w2^2 - w1^2), which is no
+    The print divides the corrections for accelerating and braking and for the walls by (w2^2 - w1^2), which is not
     energy; here they are part of the work, without a divisor.
     """
     return (work_12_J + work_56_J) / 2

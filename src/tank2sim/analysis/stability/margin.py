@@ -205,7 +205,7 @@ def stability_margin(model: Model, speed_mps: float | None = None) -> Margin:
     value, total, slopes = criterion.at(point)
     if not np.isfinite(value):
         raise InputError(
-            model.origin, "", "the slopes of its forces are no numbers", "check the derivatives of the card"
+            model.origin, "", "the slopes of its forces are not finite numbers", "check the derivatives of the card"
         )
     names = model.parameter_names
     influences = [

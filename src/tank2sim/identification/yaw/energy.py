@@ -144,8 +144,8 @@ def fit_energy(balance: Balance, record: YawRecord, programmed: Balance | None =
     """Least squares over all subintervals, with the `programmed` motion for instruments.
 
     Errors of the encoder's rate bias plain least squares: the inertia is too small, by several per cent with a coarse
-    encoder or few rows. The programme has no such errors and correlates with the motion, so that Z'(y - X b) = 0, Z the
-    rows of the programme, is unbiased (instrumental variables, Reiersol 1945).
+    encoder or few rows. The programme has no errors of this kind and correlates with the motion, so that Z'(y - X b) =
+    0, Z the rows of the programme, is unbiased (instrumental variables, Reiersol 1945).
 
     Raises
     ------

@@ -63,7 +63,7 @@ class Finding:
         return self.kind == "fault" and not (self.safe and self.repair is not None)
 
     def as_json(self) -> list[dict[str, Any]]:
-        """One entry a column: file, column, what, likely_truth, kind, repaired (by the safe mends), evidence,
+        """One entry a column: file, column, what, likely_truth, kind, repaired (by the safe corrections), evidence,
         places."""
         content = {
             "what": self.what,

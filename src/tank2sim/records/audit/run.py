@@ -1,4 +1,4 @@
-"""The audit as a whole: each group of checks on what the safe mends of those before it have left."""
+"""The audit as a whole: each group of checks on the record as the safe corrections of those before it leave it."""
 
 from __future__ import annotations
 

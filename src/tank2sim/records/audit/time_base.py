@@ -23,7 +23,7 @@ _FEW = 0.05
 
 
 def time_findings(trial: Trial) -> list[Finding]:
-    """Faults of the time base, each with what mends it."""
+    """Faults of the time base, each with its correction."""
     stray = _stray(trial)
     if stray is None:
         return _of_steps(trial)

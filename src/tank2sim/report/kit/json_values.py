@@ -81,7 +81,7 @@ _NAMES = {
     "p_values": ("p", ""),
     "members": ("members of the ensemble", ""),
 }
-"""Keys that are no words for a reader."""
+"""Keys that mean nothing to a reader."""
 
 
 def words(key: str) -> tuple[str, str]:

@@ -10,7 +10,7 @@ with the gain sequence of Robbins and Monro (1951, Ann. Math. Stat. 22; Ljung an
 of Recursive Identification, ch. 3). Data are forgotten, never the prior, so that a coefficient without
 information does not drift. The path of the estimates shows which coefficients settle, and when.
 
-Pieces that start at measured states are no alternative: on synthetic ships with process noise their estimates are
+Pieces that start at measured states are not an alternative: on synthetic ships with process noise their estimates are
 biased by up to half of a coefficient, with and without a correction of the initial state.
 """
 

@@ -258,7 +258,7 @@ def _water_forces(model: Model, free: Sequence[str]) -> ca.Function:
 
 
 def _states(model: Model, u: ca.SX, v: ca.SX, r: ca.SX, delta: ca.SX, revolutions: ca.SX) -> ca.SX:
-    """State vector of the model on the carriage; states that are no motion are as they are at the start."""
+    """State vector of the model on the carriage; other states have their start values."""
     driven = {"motion.u": u, "motion.v": v, "motion.r": r, "rudder.angle": delta}
     if "propulsion.nominal_speed" in model:
         driven["propeller.speed_actual"] = revolutions * model.symbol("propulsion.nominal_speed")
