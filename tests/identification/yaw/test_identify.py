@@ -356,7 +356,7 @@ def test_a_wrapped_angle_is_put_together_and_reported(folder, columns, result):
 
 def test_the_missing_part_of_the_programme_is_named(folder, columns):
     read = read_yaw_record(written(folder / "norise.csv", replace(TRUTH, rise=40 / 9), columns, rise_s=None))
-    assert not read.stated and any("does not tell rise_s of" in note for note in read.notes)
+    assert not read.stated and any("does not state rise_s of" in note for note in read.notes)
 
 
 def test_errors_of_j_and_of_k_t_count_once(water, folder):
