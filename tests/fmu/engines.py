@@ -6,7 +6,9 @@ is its argument; what the engine says goes where it says it. Nothing of the proj
 
 from __future__ import annotations
 
+import importlib.util
 import json
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -199,6 +201,15 @@ def _order(task: Task, ship: Any, write: Callable[..., Any], order: dict[str, fl
 def _event_over(task: Task, ship: Any) -> None:
     (ship.new_discrete_states if task.fmi == 2 else ship.update_discrete_states)()
     ship.enter_continuous_time_mode()
+
+
+def reason_to_skip(module: str) -> str:
+    """Why an engine cannot run on this machine: it, or a library of the system that it needs, is missing; else ""."""
+    if importlib.util.find_spec(module) is None:
+        return f"{module} is not installed (the extra 'engines')"
+    done = subprocess.run([sys.executable, "-c", f"import {module}"], capture_output=True, text=True, check=False)
+    missing = [line for line in done.stderr.splitlines() if "cannot open shared object file" in line]
+    return f"{module}: {missing[-1]}" if done.returncode and missing else ""
 
 
 ENGINES = {run.__name__: run for run in (libcosimpy, ecospy, fmuloader, fmuloader_exchange)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import json
 import logging
 import re
@@ -99,8 +98,8 @@ def disagreement(found: np.ndarray, expected: np.ndarray) -> float:
 
 
 def require(module: str) -> None:
-    if importlib.util.find_spec(module) is None:
-        pytest.skip(f"{module} is not installed (the extra 'engines')")
+    if reason := engines.reason_to_skip(module):
+        pytest.skip(reason)
 
 
 def run_in(engine: str, unpacked: UnpackedFmu, path: Path, answer: Path) -> tuple[np.ndarray, list[str]]:

@@ -23,6 +23,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.fmu.export import ExportedFmu
 from tank2sim.fmu.ssp import ship_with_autopilot
 from tank2sim.simulation.scheme import runge_kutta_step
+from tests.fmu.engines import reason_to_skip
 
 from ..cli.command_line import refused, tank2sim
 
@@ -144,7 +145,8 @@ print("heading", observer.last_real_values(names["ship"], [ship])[0])
 @pytest.mark.slow
 @pytest.mark.parametrize(("engine", "script"), [("ecospy", _ECOS), ("libcosimpy", _LIBCOSIM)])
 def test_other_engines_come_to_the_same_heading(engine: str, script: str, mariner_ssp: Path, run: np.ndarray) -> None:
-    pytest.importorskip(engine, reason=f"{engine} is not installed")
+    if reason := reason_to_skip(engine):
+        pytest.skip(reason)
     command = [sys.executable, "-c", script, str(mariner_ssp), str(STEP_S), str(COURSE)]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     words = [line.split()[1] for line in ended.stdout.splitlines() if line.startswith("heading")]
