@@ -61,7 +61,12 @@ class LoopbackCluster:
         self.number += 1
         home = self.folder / f"{what} {self.number}"
         home.mkdir(parents=True)
-        kept = {name: os.environ[name] for name in ("PATH", "PYTHONPATH", "SYSTEMROOT", "TMPDIR") if name in os.environ}
+        # OPENBLAS_*: another core type adds in another order, and the last bits of sums differ.
+        kept = {
+            name: text
+            for name, text in os.environ.items()
+            if name in ("PATH", "PYTHONPATH", "SYSTEMROOT", "TMPDIR") or name.startswith("OPENBLAS_")
+        }
         env = kept | {"HOME": str(home), "XDG_CACHE_HOME": str(home / "cache"), "OPENBLAS_NUM_THREADS": "1"}
         command = [sys.executable, "-m", f"distributed.cli.dask_{what}", *options, "--host", "127.0.0.1"]
         # No pipe: nobody would read it, and a full one would stop the process.

@@ -6,6 +6,7 @@ here and opened there, and its result likewise, so that Dask neither looks into 
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import logging
 import pickle
@@ -13,7 +14,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, wait
 from contextlib import contextmanager, suppress
 from functools import cache, partial
 from importlib.metadata import version
@@ -151,12 +152,34 @@ class Cluster(Executor):
 
     def _arrived(self, promised: Future[Any], remote: Remote) -> None:
         try:
-            result = pickle.loads(remote.result())
+            task_output = self._gathered(remote)
+            if task_output is None:
+                return
+            result = pickle.loads(task_output)
         except BaseException as error:
             failure = self._explained(error, lost=remote.cancelled() or self._client.status != "running")
             self._settle(promised, lambda: promised.set_exception(failure))
         else:
             self._settle(promised, lambda: promised.set_result(result))
+
+    def _gathered(self, remote: Remote) -> bytes | None:
+        """The output of a finished task; None after the shutdown.
+
+        `remote.result()` would wait for ever if the client's event loop is stopped in the meantime, and keep the
+        interpreter from ending: the thread of Dask's callbacks is joined at the exit.
+        """
+        coroutine = self._client.gather(remote, asynchronous=True)
+        try:
+            gathering = asyncio.run_coroutine_threadsafe(coroutine, self._client.loop.asyncio_loop)
+        except RuntimeError:  # the loop is closed
+            coroutine.close()
+            raise
+        while not wait([gathering], timeout=LOOKS_EVERY_S).done:
+            if self._ended.is_set():
+                gathering.cancel()
+                return None
+        data: bytes = gathering.result()
+        return data
 
     def _settle(self, promised: Future[Any], settle: Callable[[], None]) -> None:
         """Once: by its result, or by the watch."""
