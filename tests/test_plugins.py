@@ -207,6 +207,7 @@ def test_the_page_of_effects_has_it(site: Path, work: Path) -> None:
     assert "(input `bow_thruster.force`)" in section
 
 
+@pytest.mark.slow
 def test_gap_offers_it_as_a_candidate(site: Path, work: Path) -> None:
     code = """
 from tank2sim.cards import read_card
@@ -327,6 +328,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 def test_a_faulty_effect_is_refused_where_it_is_used(faulty: Path, tmp_path: Path) -> None:
     for name in FAULTS:
         (tmp_path / f"{name}.toml").write_text(mariner_text() + f'\n[[effects]]\nname = "{name}"\n')

@@ -17,6 +17,7 @@ def turn() -> t2s.ManoeuvreResult:
     return t2s.load("mariner").turn(35)
 
 
+@pytest.mark.slow
 def test_a_result_its_values_and_its_file_give_one_page(turn: t2s.ManoeuvreResult, tmp_path: Path) -> None:
     turn.to_json(tmp_path / "turn.json")
     reports = [t2s.make_report(given) for given in (turn, turn.to_dict(), tmp_path / "turn.json")]

@@ -179,6 +179,7 @@ def test_an_fmu_passes_its_check(ship, tmp_path) -> None:
     assert found.passed and found.report.fmi == 3 and not found.problems
 
 
+@pytest.mark.slow
 def test_a_script_without_a_guard_may_use_processes(tmp_path) -> None:
     script = tmp_path / "script.py"
     script.write_text(

@@ -65,6 +65,7 @@ def test_a_force_is_a_number_or_a_polynomial(path):
     assert rising.total_mass_kg == TOTAL_KG
 
 
+@pytest.mark.slow
 def test_it_fits_a_screen_and_shows_its_charts(found):
     assert len(repr(found).splitlines()) <= 24
     assert '<img alt="' in found._repr_html_()

@@ -46,6 +46,7 @@ def test_the_json_has_the_same_numbers(found):
     assert content["notices"] == list(found.notices)
 
 
+@pytest.mark.slow
 def test_it_fits_a_screen_and_shows_its_charts(found):
     assert len(repr(found).splitlines()) <= 24
     assert '<img alt="' in found._repr_html_()
@@ -62,6 +63,7 @@ def test_bad_input_is_refused_with_place_and_remedy(tmp_path):
     assert refusal.value.source == str(tmp_path) and refusal.value.remedy
 
 
+@pytest.mark.slow
 def test_a_record_counts_as_its_file(folder):
     by_file = t2s.validate("mariner", folder / "zigzag.csv", members=0)
     by_record = t2s.validate("mariner", t2s.read_trial(folder / "zigzag.csv"), members=0)

@@ -92,6 +92,7 @@ def test_bad_input_is_refused_and_nothing_is_written(write, tmp_path):
         run(bad)
 
 
+@pytest.mark.slow
 def test_a_page_and_pictures_are_written(write, tmp_path):
     path = write("good.csv")
     assert run(path, "--page", tmp_path / "audit.html", "--plot", tmp_path / "plots").exit_code == 0

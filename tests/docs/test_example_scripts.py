@@ -33,7 +33,7 @@ def test_every_tutorial_has_a_script_of_less_than_60_lines() -> None:
         assert len((SCRIPTS / f"{name}.py").read_text(encoding="utf-8").splitlines()) < 60
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", WRITTEN)
 def test_the_script_runs_and_writes(name: str, tmp_path: Path) -> None:
     done = subprocess.run(

@@ -62,6 +62,7 @@ def test_an_archive_that_would_fill_the_disk_is_not_unpacked(bomb: str, tmp_path
     assert not folder.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="process groups are POSIX")
 @pytest.mark.parametrize("ends", [False, True], ids=["at the time limit", "when it ends itself"])
 def test_no_process_that_a_library_started_goes_on(ends: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

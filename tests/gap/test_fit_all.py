@@ -75,6 +75,7 @@ def executor(request) -> Iterator[Executor]:
         yield pool
 
 
+@pytest.mark.slow
 def test_the_result_does_not_depend_on_who_does_the_work(likelihood, alone, executor) -> None:
     assert_same(fitted(likelihood, executor, *EVERY), alone)
     # a second search of the same ship finds the first one's explanations there

@@ -96,6 +96,7 @@ def test_signals_that_are_never_known_at_once_still_make_a_signature():
     assert signature(still) == ([], {})
 
 
+@pytest.mark.slow
 def test_measured_records_are_no_copies_of_each_other(data: Path) -> None:
     folders = [data / "data" / name for name in ("kvlcc2_hsva", "kvlcc2_marin", "gap_cases/case_1", "gap_cases/case_5")]
     folders += [path for path in (data / "data/esso_osaka").glob("*") if path.is_dir()]
