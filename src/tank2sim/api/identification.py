@@ -17,6 +17,7 @@ from tank2sim.api.trial import TrialPaths, fitted_and_held
 from tank2sim.cards import Card, ManoeuvringCard, parse_card
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
+from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
 from tank2sim.identification.trials.as_json import (
     estimate_rows,
     figure_rows,
@@ -34,11 +35,13 @@ from tank2sim.identification.trials.identify import (
     IdentificationOptions,
     identify_trials,
 )
+from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import SearchReport, silent
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import with_fitted_trials
-from tank2sim.identification.trials.problem.structures import AUTO, STRUCTURES
+from tank2sim.identification.trials.problem.structures import AUTO, EVIDENCE, STRUCTURES
 from tank2sim.marks import FORCED
+from tank2sim.records.campaigns import read_campaign
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
@@ -73,7 +76,9 @@ class IdentificationResult(Result):
     def card(self) -> Card:
         """The card found, with the covariance of its estimates; ``card.save("better.toml")`` writes it."""
         found = self.identification
-        text = identified_card_text(found, [trial.name for trial in self.fitted.trials])
+        captive = self.fitted.captive
+        tank = [f"{len(captive.runs)} captive tests of {captive.campaign.path.name}"] if captive else []
+        text = identified_card_text(found, [*(trial.name for trial in self.fitted.trials), *tank])
         text = with_fitted_trials(text, "the card found", self.fitted.trials)
         covariance = by_file_name(found.card, found.estimate.free, found.estimate.covariance)
         return replace(parse_card(text, "the card found"), covariance=covariance)
@@ -194,7 +199,8 @@ def identify(
     *,
     holdout: TrialPaths = (),
     method: str = "output_error",
-    structure: str = "card",
+    structure: str = EVIDENCE,
+    campaign: str | Path | None = None,
     inertia: bool = False,
     piece_s: float | None = None,
     trust_card: bool = False,
@@ -217,7 +223,13 @@ def identify(
     method : str
         ``output_error``, ``equation_error``, ``kalman`` or ``recursive``.
     structure : str
-        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, or ``auto``: by cross-validation.
+        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`; ``auto``: by cross-validation;
+        ``evidence``: cross-flow drag, unless the trials prefer the card's own terms very strongly by the Bayesian
+        information criterion.
+    campaign : path, optional
+        ``campaign.toml`` of captive tests with a model of the ship, fitted together with the trials: its forces,
+        Froude-scaled, with the gain of each force, of the rudder, an offset of X and the moment's reference point
+        uncertain between tank and ship.
     inertia : bool
         Estimate acceleration derivatives, too.
     piece_s : float, optional
@@ -246,7 +258,7 @@ def identify(
     """
     for name, value, known in (
         ("method", method, TRIAL_METHODS),
-        ("structure", structure, (*STRUCTURES.names(), AUTO)),
+        ("structure", structure, (*STRUCTURES.names(), AUTO, EVIDENCE)),
     ):
         if value not in known:
             raise InputError(name, "", f"{value!r} is not known", f"there are: {', '.join(known)}")
@@ -265,9 +277,23 @@ def identify(
         force=force,
     )
     fitted, held = fitted_and_held(trials, holdout, ship)
+    if campaign is not None:
+        fitted = replace(fitted, captive=captive_runs(campaign))
     with _computing(options, executor, workers, held=bool(held.trials)) as pool:
         found = identify_trials(ship, fitted, held, options, progress, pool)
     return IdentificationResult(ship, found, fitted, held)
+
+
+def captive_runs(campaign: str | Path) -> CaptiveRuns:
+    """The reduced runs of a campaign, rudder tests at other speeds included.
+
+    Raises
+    ------
+    InputError
+        The campaign is at fault, see :func:`tank2sim.reduce`.
+    """
+    read = read_campaign(campaign)
+    return CaptiveRuns(read, reduce_campaign(read, ReductionOptions(off_speed=True)).runs)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from tank2sim.cli.options import executor_option, page_option, plot_folder_optio
 from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.identification.trials.identify import TRIAL_METHODS
-from tank2sim.identification.trials.problem.structures import AUTO, STRUCTURES
+from tank2sim.identification.trials.problem.structures import AUTO, EVIDENCE, STRUCTURES
 
 
 @click.command("identify", cls=TakesSeveral, several=("--holdout",))
@@ -31,11 +31,18 @@ from tank2sim.identification.trials.problem.structures import AUTO, STRUCTURES
 @click.option("--method", type=click.Choice(TRIAL_METHODS), default="output_error", show_default=True)
 @click.option(
     "--structure",
-    type=click.Choice((*STRUCTURES.names(), AUTO)),
-    default="card",
+    type=click.Choice((*STRUCTURES.names(), AUTO, EVIDENCE)),
+    default=EVIDENCE,
     show_default=True,
     help="; ".join(f"{each.name}: {each.description}" for each in STRUCTURES.values())
-    + f"; {AUTO}: cross-validation decides.",
+    + f"; {AUTO}: cross-validation decides; {EVIDENCE}: cross_flow, or card if an information criterion prefers it "
+    "strongly.",
+)
+@click.option(
+    "--campaign",
+    type=click.Path(path_type=Path),
+    metavar="CAMPAIGN.toml",
+    help="Fit these captive tests of a model of the ship together with the trials.",
 )
 @click.option("--inertia", is_flag=True, help="Estimate acceleration derivatives, too.")
 @click.option("--piece", type=float, metavar="S", help="Length of the pieces of output error, s; by default 5 L/u0.")
@@ -68,6 +75,7 @@ def command(
     output: Path | None,
     method: str,
     structure: str,
+    campaign: Path | None,
     inertia: bool,
     piece: float | None,
     workers: int | None,
@@ -90,6 +98,7 @@ def command(
             holdout=holdout,
             method=method,
             structure=structure,
+            campaign=campaign,
             inertia=inertia,
             piece_s=piece,
             trust_card=trust_card,
@@ -102,7 +111,7 @@ def command(
             progress=progress,
         )
     files = result.card.files(output) if output else {}
-    inputs = [Path(ship.card.source), *trial_files(trials), *trial_files(holdout)]
+    inputs = [Path(ship.card.source), *trial_files(trials), *trial_files(holdout), *([campaign] if campaign else [])]
     write_result(result, inputs, json_file=json_file, page=page, plots=plots, files=files)
     show_result(result)
     if output:

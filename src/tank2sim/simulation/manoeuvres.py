@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -108,7 +109,8 @@ class Zigzag:
     A negative rudder begins to port; `heading` is positive. The order comes `lag_s` after the heading is reached: the
     delay of a helmsman or of a model basin's controller (0.1 to 0.6 s at model scale), and the rudder begins to move
     `wait_s` after each order (a gear's dead time). Headings count from `course` (rad), by default from that at the
-    execute.
+    execute. On the other side the rudder is held at `opposite` (rad, of the other sign), by default at -`rudder`: the
+    two angles of a measured zigzag differ where the zero of its rudder is off.
 
     Raises
     ------
@@ -121,6 +123,7 @@ class Zigzag:
     lag_s: float = 0.0
     course: float | None = None
     wait_s: float = 0.0
+    opposite: float | None = None
 
     def __post_init__(self) -> None:
         _check_angles("Zigzag", rudder=self.rudder, heading=self.heading)
@@ -135,10 +138,11 @@ class Zigzag:
         begin = running.state("motion.psi") if self.course is None else self.course
         end = 150 * ship_time if duration is None else duration
         side = math.copysign(1.0, self.rudder)
+        angles = cycle((self.rudder, -self.rudder if self.opposite is None else self.opposite))
         executes = 0
         running.run(min(self.wait_s, end))
         while running.time < end and (duration is not None or executes < ZIGZAG_EXECUTES):
-            running.order({"rudder.command": side * abs(self.rudder)})
+            running.order({"rudder.command": next(angles)})
             goal = begin + side * self.heading
             if not running.run_until("motion.psi", goal, rising=side > 0, at_most=end - running.time):
                 return

@@ -119,6 +119,8 @@ class Recorded:
         rudder = math.degrees(self.manoeuvre.rudder)
         if isinstance(self.manoeuvre, Turn):
             return f"turn {rudder:.3g}"
+        if self.manoeuvre.opposite is not None:
+            rudder = (rudder - math.degrees(self.manoeuvre.opposite)) / 2
         late = f"{self.manoeuvre.lag_s:.2g} s late"
         if "lag_s" in self.errors:
             late += f" (± {self.errors['lag_s']:.1g} s)"
@@ -240,9 +242,9 @@ def _zigzag(
     if found is None:
         return None
     free, fitted = found
-    angle = math.radians(_degrees(held))
+    first, second = (float(np.median([held_angle.angle for held_angle in held[side::2]])) for side in (0, 1))
     errors = {"heading_rad": free.errors[1], "course_rad": fitted.errors[0], "lag_s": fitted.errors[-1]}
-    return Zigzag(math.copysign(angle, held[0].angle), fitted.nominal, fitted.lag, fitted.course), errors
+    return Zigzag(first, fitted.nominal, fitted.lag, fitted.course, opposite=second), errors
 
 
 def _degrees(held: list[HeldAngle]) -> float:

@@ -9,7 +9,7 @@ from tank2sim.cards import parse_card
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.reduction import reduce_campaign
 from tank2sim.identification.captive.result_card import card_contents, reduced_card_text
-from tank2sim.identification.trials.problem.captive_tests import captive_tests
+from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests
 from tank2sim.identification.trials.problem.problem_from_card import driven_model
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import Campaign, write
@@ -26,7 +26,14 @@ def posed(tmp_path_factory):
     card = parse_card(reduced_card_text(reduction, card_contents(reduction), 25.0), "ship.toml")
     free = tuple(f"derivatives.{name}" for name in reduction.derivatives if name[0] in "YN")
     model = driven_model(card, "angle")
-    return campaign, written.derivatives, card, model, captive_tests(card, model, free, campaign, reduction.runs), free
+    return (
+        campaign,
+        written.derivatives,
+        card,
+        model,
+        captive_tests(card, model, free, CaptiveRuns(campaign, reduction.runs)),
+        free,
+    )
 
 
 def solved(tests, model, start):
@@ -72,5 +79,5 @@ def test_a_campaign_of_another_form_is_refused_by_its_key(posed):
     if not card.ship.beam_m:
         pytest.skip("the campaign of the generator states no beam")
     with pytest.raises(InputError) as caught:
-        captive_tests(card, model, free, wide, ())
+        captive_tests(card, model, free, CaptiveRuns(wide, ()))
     assert caught.value.place == "model.beam_m" and "ship.toml" in caught.value.problem

@@ -208,3 +208,23 @@ def test_the_made_up_ship_is_the_one_of_the_model():
     rates = np.array(model.rhs(x, model.input_values({"rudder.command": 0.2}), model.parameter_values())).ravel()
     own = [rates[model.state_names.index(f"motion.{name}")] for name in "uvr"]
     np.testing.assert_allclose(own, accelerations(4.6, 0.4, -0.02, 0.2, TRUTH), rtol=1e-10)
+
+
+def test_correlated_knowledge_is_weighed_as_in_the_formula_of_a_normal_prior(noisy):
+    """The model is linear in its coefficients: the estimate is (I + P)^-1 (I best + P mean), P the full precision."""
+    plain = problem(noisy[:1])
+    k = len(plain.free)
+    correlation = 0.95 ** np.abs(np.subtract.outer(np.arange(k), np.arange(k)))
+    asked = replace(plain, prior_inverse=np.linalg.inv(correlation))
+    settings = EquationErrorSettings(rounds=1, scale_prior=False)
+    wide = equation_error(replace(plain, prior_error=1e6 * plain.prior_error), settings=settings)
+    found = equation_error(asked, settings=settings)
+    P = np.linalg.inv(correlation * np.outer(plain.prior_error, plain.prior_error))
+    information = wide.information
+    expected = np.linalg.solve(information + P, information @ wide.values + P @ plain.prior_mean)
+    np.testing.assert_allclose(found.values, expected, rtol=1e-5, atol=1e-3 * plain.prior_error.min())
+    independent = equation_error(plain, settings=settings).values
+    assert np.abs(found.values - independent).max() > 0.01 * plain.prior_error.max()
+    P = asked.without(plain.free[:2]).prior_precision(plain.prior_error[2:])
+    whole = asked.prior_precision(plain.prior_error)
+    np.testing.assert_allclose(P, whole[2:, 2:])

@@ -19,6 +19,7 @@ from tank2sim.identification.trials.assessment.identifiability import Identifiab
 from tank2sim.identification.trials.assessment.model_selection import (
     Criteria,
     CrossValidation,
+    criteria,
     cross_validate,
     simplest,
     yaw_rate_error,
@@ -35,11 +36,17 @@ from tank2sim.identification.trials.methods.kalman import kalman
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.methods.recursive import recursive
+from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 from tank2sim.identification.trials.problem.picklable import portable
 from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.problem_from_card import card_with_estimate, problem_from_card, with_range
-from tank2sim.identification.trials.problem.structures import AUTO, STRUCTURES
+from tank2sim.identification.trials.problem.problem_from_card import (
+    card_with_estimate,
+    problem_from_card,
+    with_captive,
+    with_range,
+)
+from tank2sim.identification.trials.problem.structures import AUTO, EVIDENCE, STRUCTURES
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.recorded import recorded
 
@@ -49,6 +56,10 @@ small against the motion; shorter pieces show less of the derivatives, longer on
 
 LEAST_PIECE = 0.5
 """Shortest piece, in L/u0: in less the state hardly responds to the rudder, and initial states outnumber the data."""
+
+STRONGLY = 10.0
+"""Difference of the Bayesian information criterion from which evidence is called very strong (Kass and Raftery 1995, J.
+Am. Stat. Assoc. 90)."""
 
 WHOLE_RUN_MISFIT = 3.0
 """Largest error, over the noise of every signal, of a model that is fitted to whole runs, too (project choice)."""
@@ -67,7 +78,8 @@ class IdentificationOptions:
     method : str
         One of :data:`TRIAL_METHODS`.
     structure : str
-        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, or :data:`.structures.AUTO`.
+        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, :data:`.structures.EVIDENCE` or
+        :data:`.structures.AUTO`.
     inertia : bool
         Estimate acceleration derivatives, too.
     piece_s : float, optional
@@ -85,7 +97,7 @@ class IdentificationOptions:
     """
 
     method: str = "output_error"
-    structure: str = "card"
+    structure: str = EVIDENCE
     inertia: bool = False
     piece_s: float | None = None
     scale_prior: bool = True
@@ -166,7 +178,7 @@ def identify_trials(
     progress: SearchReport = silent,
     executor: Executor | None = None,
 ) -> Identification:
-    """Estimate the coefficients of a card from free-running trials.
+    """Estimate the coefficients of a card from free-running trials, alone or together with captive tests.
 
     Parameters
     ----------
@@ -183,8 +195,9 @@ def identify_trials(
     Raises
     ------
     InputError
-        The trials look like those of another ship than the card's, or of two ships, do not excite the estimated
-        parameters, lack necessary signals, or are driven by another rudder signal than the held-out trials.
+        The captive tests are of another ship, or the method is not output error; the trials look like those of another
+        ship than the card's, or of two ships, do not excite the estimated parameters, lack necessary signals, or are
+        driven by another rudder signal than the held-out trials.
     """
     options = options or IdentificationOptions()
     try:
@@ -203,11 +216,20 @@ def _identified(
     progress: SearchReport,
     executor: Executor | None,
 ) -> Identification:
-    structures = cross_validate_structures(card, trials, options, executor) if options.structure == AUTO else {}
-    structure = simplest(structures) if structures else options.structure
+    if trials.captive is not None and options.method != "output_error":
+        problem_text = f"{options.method} fits trials alone"
+        raise InputError("--campaign", "", problem_text, "leave --method out, or fit the card that reduce makes of it")
+    structures: Mapping[str, CrossValidation] = {}
+    chosen: tuple[str, ...] = ()
+    structure = options.structure
+    if structure == AUTO:
+        structures = cross_validate_structures(card, trials, options, executor)
+        structure = simplest(structures)
+    elif structure == EVIDENCE:
+        structure, chosen = structure_by_evidence(card, trials, options)
     started = STRUCTURES[structure].start(card)
-    problem = problem_from_card(started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold)
-    unseen = refuse_unseen(problem)
+    problem = _posed(started, trials, options)
+    unseen = refuse_unseen(problem) if trials.captive is None else ()  # what trials do not show, the tank may
     problem = problem.without(unseen)
     evidence = other_ship(problem_from_card(card, trials.trials, trials.driven_by))  # in the structure of the card
     if evidence and not options.force:
@@ -244,6 +266,8 @@ def _identified(
             *trials.notices,
             *(held.notices if held else ()),
             *(() if card.uncertainty else (_NO_UNCERTAINTY,)),
+            *_captive_notice(card, trials.captive),
+            *chosen,
             *_unseen_notice(unseen),
             *estimate.notices,
         ),
@@ -275,6 +299,34 @@ def estimate_parameters(problem: Problem, options: IdentificationOptions, progre
     return output_error(problem, in_pieces.values, replace(settings, piece_s=None), progress)
 
 
+def structure_by_evidence(
+    card: ManoeuvringCard, trials: Measured, options: IdentificationOptions
+) -> tuple[str, tuple[str, ...]]:
+    """Name of the structure, and a notice: cross-flow drag, or the card's own terms if the trials prefer them strongly.
+
+    Both are fitted by equation error. Terms of the card are preferred if their Bayesian information criterion is less
+    by more than :data:`STRONGLY`. Where the trials hardly distinguish the two, cross-flow drag is the better guess
+    beyond them: it is bounded by the physics of separated flow where a polynomial is not.
+    """
+    if card.model.kind != "abkowitz":
+        return "card", ()
+    found: list[Criteria] = []
+    try:
+        for name in ("card", "cross_flow"):
+            started = STRUCTURES[name].start(card)
+            posed = _posed(started, trials, options)
+            posed = posed.without(refuse_unseen(posed))
+            found.append(criteria(posed, equation_error(posed), found[0].samples if found else None))
+    except (InputError, np.linalg.LinAlgError):  # no velocities to compare by, or a card that cannot have the structure
+        return "card", ()
+    own, drag = found
+    if own.bic < drag.bic - STRONGLY:
+        return "card", ()
+    words = "structure: cross-flow drag in place of the card's own third-order terms, which the trials do not prefer"
+    criterion = f"(difference of BIC {own.bic - drag.bic:+.3g}, very strong below -{STRONGLY:g})"
+    return "cross_flow", (f"{words} strongly {criterion}; --structure card keeps them",)
+
+
 def cross_validate_structures(
     card: ManoeuvringCard, trials: Measured, options: IdentificationOptions, executor: Executor | None = None
 ) -> dict[str, CrossValidation]:
@@ -282,12 +334,15 @@ def cross_validate_structures(
     results = {}
     for name, structure in STRUCTURES.items():
         started = structure.start(card)
-        problem = problem_from_card(
-            started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold
-        )
+        problem = _posed(started, trials, options)
         posed = portable(problem, started, trials.driven_by)
         results[name] = cross_validate(posed, partial(_in_pieces, options=options), yaw_rate_error, executor)
     return results
+
+
+def _posed(started: ManoeuvringCard, trials: Measured, options: IdentificationOptions) -> Problem:
+    problem = problem_from_card(started, trials.trials, trials.driven_by, inertia=options.inertia, hold=options.hold)
+    return with_captive(problem, started, trials.captive)
 
 
 def _in_pieces(problem: Problem, options: IdentificationOptions) -> Estimate:
@@ -321,6 +376,14 @@ def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
     results = replay_error(problem, estimate.values, estimate.noise)
     limits = {name: WHOLE_RUN_MISFIT * deviation for name, deviation in estimate.noise.items()}
     return all(error <= limits[name] for result in results for name, error in result.whole.items())
+
+
+def _captive_notice(card: ManoeuvringCard, captive: CaptiveRuns | None) -> Sequence[str]:
+    if captive is None:
+        return ()
+    times = card.ship.length_m / captive.campaign.model.length_m
+    words = f"{captive.campaign.path}: {len(captive.runs)} captive tests are fitted together with the trials"
+    return (f"{words}, scaled by Froude's law to a ship {times:.4g} times as long",)
 
 
 def _unseen_notice(names: Sequence[str]) -> Sequence[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -49,7 +49,7 @@ def compare_card(
     """
     posed = problem_from_card(card, trials.trials, trials.driven_by, whole=whole)
     # Without estimation a single free parameter is enough; the sensitivities of the others need not be compiled.
-    problem = replace(posed, free=posed.free[:1], prior_mean=posed.prior_mean[:1], prior_error=posed.prior_error[:1])
+    problem = posed.without(posed.free[1:])
     weights = {name: residual.get(name) or 1.0 for name in problem.seen}
     return Comparison(
         replay_error(problem, problem.prior_mean, weights),

@@ -102,7 +102,7 @@ def identifiability(problem: Problem, estimate: Estimate) -> Identifiability:
         correlation=alone,
         pairs=pairs,
         unseen=unseen,
-        share=1 - np.diag(np.linalg.inv(information + np.eye(len(unit)))),
+        share=1 - np.diag(np.linalg.inv(information + problem.known)) / np.diag(np.linalg.inv(problem.known)),
         notices=(*_pair_messages(pairs), *_direction_messages(unseen)),
     )
 

@@ -68,8 +68,9 @@ def criteria(problem: Problem, estimate: Estimate, samples: float | None = None)
     windows = form.at(estimate.values)
     series = [window.residuals[piece] for window, run in zip(windows, form.runs, strict=True) for piece in run.pieces]
     prior = scaled_prior(problem, estimate.prior_scale)
-    inverse = np.linalg.inv(estimate.information * np.outer(prior, prior) + np.eye(len(prior)))
-    return criteria_of(series, float(len(prior) - np.trace(inverse)), samples)
+    scaled = estimate.information * np.outer(prior, prior)
+    kept = np.trace(np.linalg.solve(scaled + problem.known, problem.known))
+    return criteria_of(series, float(len(prior) - kept), samples)
 
 
 def criteria_of(series: Sequence[Array], parameters: float, samples: float | None = None) -> Criteria:

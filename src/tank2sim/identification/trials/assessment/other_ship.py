@@ -9,7 +9,6 @@ prior standard error, from each trial alone (the trials may be of two ships) and
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -75,7 +74,7 @@ def _ratio(problem: Problem, runs: Sequence[SampledRun]) -> tuple[float, float] 
     means = dict(zip(problem.free, problem.prior_mean, strict=True))
     linear = tuple(name for name in _LINEAR if means.get(name))
     mean = np.array([means[name] for name in linear])
-    linear_problem = replace(problem, free=linear, prior_mean=mean, prior_error=np.abs(mean), runs=tuple(runs))
+    linear_problem = Problem(problem.model, linear, mean, np.abs(mean), tuple(runs))
     try:
         estimate = equation_error(linear_problem, settings=EquationErrorSettings(scale_prior=False))
     except (InputError, np.linalg.LinAlgError):

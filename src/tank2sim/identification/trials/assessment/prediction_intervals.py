@@ -254,7 +254,8 @@ def _again(task: _Again) -> Array | None:
             return None
         noise = sensor_noise(problem, run) * rng.standard_normal(measured.shape)
         runs.append(replace(run, measured=np.where(np.isnan(run.measured), np.nan, measured + noise)))
-    mean = estimate.values + problem.prior_error * rng.standard_normal(len(estimate.values))
+    correlated = np.linalg.cholesky(np.linalg.inv(problem.known)) @ rng.standard_normal(len(estimate.values))
+    mean = estimate.values + problem.prior_error * correlated
     return estimator(replace(problem, runs=tuple(runs), prior_mean=mean)).values
 
 

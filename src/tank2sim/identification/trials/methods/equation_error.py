@@ -127,7 +127,7 @@ def equation_error(
         method="equation_error",
         free=problem.free,
         values=values,
-        covariance=sandwich(normal.information, prior, normal.scores),
+        covariance=sandwich(normal.information, prior, normal.scores, problem.prior_precision(prior)),
         information=normal.information,
         noise=dict(zip(WEAK_EQUATIONS, map(float, deviations), strict=True)),
         cost=tuple(costs),
@@ -205,10 +205,11 @@ def _minimise(
 ) -> tuple[Array, list[WeakWindows], _Normal]:
     """Damped Gauss-Newton steps; values, windows and normal equations at the best point."""
     problem = form.problem
-    prior = 1 / errors**2
+    prior = problem.prior_precision(errors)
 
     def point(values: Array, windows: list[WeakWindows]) -> _Point:
-        cost = float(np.sum(prior * (values - problem.prior_mean) ** 2))
+        distance = values - problem.prior_mean
+        cost = float(distance @ prior @ distance)
         for window, run in zip(windows, form.runs, strict=True):
             cost += float(np.sum(weights.whitened(window.residuals, run.pieces) ** 2))
         return _Point(values, windows, cost)
@@ -218,8 +219,8 @@ def _minimise(
 
     def move(start: _Point, normal: _Normal, damping: float) -> _Point:
         # In units of the prior's errors the matrix is well scaled.
-        scaled = (normal.information + np.diag(prior)) * np.outer(errors, errors)
-        gradient = normal.gradient + prior * (start.values - problem.prior_mean)
+        scaled = (normal.information + prior) * np.outer(errors, errors)
+        gradient = normal.gradient + prior @ (start.values - problem.prior_mean)
         step = errors * np.linalg.solve(scaled + damping * np.diag(np.diag(scaled)), gradient * errors)
         values = np.clip(start.values - step, *problem.bounds)
         return point(values, form.at(values))

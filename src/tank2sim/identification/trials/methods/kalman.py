@@ -165,12 +165,13 @@ def kalman(
 
 def _information(task: SearchTask, point: SearchPoint) -> Array:
     """Information of the trials alone (k, k)."""
-    return normal(task, point)[0] - np.diag(1 / task.problem.prior_error**2)
+    return normal(task, point)[0] - task.problem.prior_precision(task.problem.prior_error)
 
 
 def _estimate(task: SearchTask, path: list[SearchPoint], scale: Mapping[str, float]) -> KalmanEstimate:
     problem, batch, best = task.problem, task.batch, path[-1]
     information = _information(task, best)
+    before = problem.prior_precision(problem.prior_error)
     spread = np.sqrt((best.filtered.innovations**2).sum(axis=(0, 1)) / np.maximum(batch.known.sum(axis=(0, 1)), 1))
     each = zip(np.exp(best.levels.process), np.exp(best.levels.time), strict=True)
     correlated = [CorrelatedNoise(float(deviation), float(time)) for deviation, time in each]
@@ -178,7 +179,7 @@ def _estimate(task: SearchTask, path: list[SearchPoint], scale: Mapping[str, flo
         method="kalman",
         free=problem.free,
         values=best.values,
-        covariance=sandwich(information, problem.prior_error, scores(task, best.filtered)),
+        covariance=sandwich(information, problem.prior_error, scores(task, best.filtered), before),
         information=information,
         noise=dict(zip(problem.seen, map(float, spread), strict=True)),
         cost=tuple(point.cost for point in path[1:]),

@@ -74,9 +74,10 @@ class SearchTask:
     def point(self, values: Array, levels: Levels, along: tuple[Array, Array]) -> SearchPoint:
         """A pass of the filter, linearised along a trajectory (before, after), and -2 log posterior."""
         filtered = filter_pass(self.disturbed, self.batch, self.problem.parameters(values), levels, along)
-        penalty = ((values - self.problem.prior_mean) / self.problem.prior_error) ** 2
+        distance = (values - self.problem.prior_mean) / self.problem.prior_error
+        penalty = distance @ self.problem.known @ distance
         level_penalty = self.time_precision * (levels.vector - self.first.vector) ** 2
-        return SearchPoint(values, levels, filtered, filtered.cost + float(penalty.sum() + level_penalty.sum()))
+        return SearchPoint(values, levels, filtered, filtered.cost + float(penalty + level_penalty.sum()))
 
     def relinearise(self, point: SearchPoint) -> SearchPoint:
         """The same parameters and levels, linearised along the newest trajectory."""
@@ -177,8 +178,9 @@ def normal(task: SearchTask, point: SearchPoint) -> tuple[Array, Array]:
     J, r = whitened_innovations(point.filtered)
     problem = task.problem
     flat = J.reshape(-1, J.shape[-1])
-    H: Array = flat.T @ flat + np.diag(1 / problem.prior_error**2)
-    g: Array = flat.T @ r.reshape(-1) + (point.values - problem.prior_mean) / problem.prior_error**2
+    prior = problem.prior_precision(problem.prior_error)
+    H: Array = flat.T @ flat + prior
+    g: Array = flat.T @ r.reshape(-1) + prior @ (point.values - problem.prior_mean)
     return H, g
 
 

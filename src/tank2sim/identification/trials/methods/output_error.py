@@ -18,7 +18,6 @@ from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise,
 from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton
 from tank2sim.identification.trials.methods.posterior import evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.shooting import Normal, Pieces, Shooting, cut
-from tank2sim.identification.trials.problem.captive_tests import CaptiveTests
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 
 LONGEST_SEARCH = 25
@@ -65,7 +64,6 @@ class _Search:
     values: Array
     starts: list[Array]
     noise: tuple[ColouredNoise, ...]
-    captive: CaptiveTests | None
     scale: dict[str, float] = field(default_factory=dict)
     costs: list[float] = field(default_factory=list)
 
@@ -92,9 +90,7 @@ def output_error(
     shooting = Shooting(problem)
     pieces = [cut(problem, run, settings.piece_s) for run in problem.runs]
     values = problem.prior_mean if start is None else start
-    search = _Search(
-        values.copy(), [piece.starts.copy() for piece in pieces], _first_noise(problem, pieces), problem.captive
-    )
+    search = _Search(values.copy(), [piece.starts.copy() for piece in pieces], _first_noise(problem, pieces))
     notices = []
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as threads:
         work = _Work(problem, shooting, pieces, threads, progress)
@@ -104,11 +100,9 @@ def output_error(
                 normals = _minimise(work, search, tolerance=1e-4 if last else 1e-2)
                 if not last:
                     search.noise = _new_noise(problem, pieces, normals, settings)
-                    if search.captive is not None:
-                        search.captive = search.captive.with_noise_at(problem.parameters(search.values))
                     if settings.scale_prior:
                         information = np.asarray(sum(normal.matrix for normal in normals))
-                        information = information + _captive_normal(search, problem, search.values)[0]
+                        information = information + _captive_normal(problem, search.values)[0]
                         search.scale = evidence_scale(problem, information, search.values, search.scale)
         except KeyboardInterrupt:
             notices.append(INTERRUPTED)
@@ -151,20 +145,21 @@ class _Work:
 def _minimise(work: _Work, search: _Search, tolerance: float) -> list[Normal]:
     """Damped Gauss-Newton steps from the state of the search, which holds the best point afterwards."""
     problem, noise = work.problem, search.noise
-    prior = scaled_prior(problem, search.scale)
+    prior = problem.prior_precision(scaled_prior(problem, search.scale))
 
     def point(values: Array, starts: list[Array]) -> _Point:
-        penalty = float(np.sum(((values - problem.prior_mean) / prior) ** 2))
-        captive = _captive_normal(search, problem, values)[2]
+        distance = values - problem.prior_mean
+        penalty = float(distance @ prior @ distance)
+        captive = _captive_normal(problem, values)[2]
         return _Point(values, starts, penalty + captive + work.cost(values, starts, noise))
 
     def linearise(start: _Point) -> list[Normal]:
         return work.normals(start.values, start.starts, noise)
 
     def move(start: _Point, normals: list[Normal], damping: float) -> _Point:
-        tank, pull, _ = _captive_normal(search, problem, start.values)
-        H = sum(normal.matrix for normal in normals) + tank + np.diag(1 / prior**2)
-        g = sum(normal.vector for normal in normals) + pull + (start.values - problem.prior_mean) / prior**2
+        tank, pull, _ = _captive_normal(problem, start.values)
+        H = sum(normal.matrix for normal in normals) + tank + prior
+        g = sum(normal.vector for normal in normals) + pull + prior @ (start.values - problem.prior_mean)
         step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
         step = np.clip(start.values + step, *problem.bounds) - start.values
         starts = [
@@ -184,11 +179,11 @@ def _minimise(work: _Work, search: _Search, tolerance: float) -> list[Normal]:
     return last or linearise(best)
 
 
-def _captive_normal(search: _Search, problem: Problem, values: Array) -> tuple[Array, Array, float]:
+def _captive_normal(problem: Problem, values: Array) -> tuple[Array, Array, float]:
     """Information (k, k), gradient (k,) and cost of the captive tests at `values`; 0 without any."""
-    if search.captive is None:
+    if problem.captive is None:
         return np.zeros((len(values), len(values))), np.zeros(len(values)), 0.0
-    return search.captive.normal(problem.parameters(values))
+    return problem.captive.normal(problem.parameters(values))
 
 
 def _new_noise(
@@ -207,16 +202,12 @@ def _new_noise(
 def _estimate(problem: Problem, search: _Search, normals: list[Normal], notices: tuple[str, ...]) -> Estimate:
     information = np.asarray(sum(normal.matrix for normal in normals))
     prior = scaled_prior(problem, search.scale)
+    before = problem.prior_precision(prior) + _captive_normal(problem, search.values)[0]
     return Estimate(
         method="output_error",
         free=problem.free,
         values=search.values,
-        covariance=sandwich(
-            information,
-            prior,
-            [normal.scores for normal in normals],
-            _captive_normal(search, problem, search.values)[0],
-        ),
+        covariance=sandwich(information, prior, [normal.scores for normal in normals], before),
         information=information,
         noise={name: noise.deviation for name, noise in zip(problem.seen, search.noise, strict=True)},
         cost=tuple(search.costs),

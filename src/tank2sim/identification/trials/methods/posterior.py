@@ -41,16 +41,18 @@ def evidence_scale(problem: Problem, information: Array, values: Array, scale: M
     """
     prior = scaled_prior(problem, scale)
     scaled = information * np.outer(prior, prior)
-    fixed = 1 - np.diag(np.linalg.inv(scaled + np.eye(len(prior))))
-    distances = ((values - problem.prior_mean) / problem.prior_error) ** 2
+    fixed = 1 - np.diag(np.linalg.solve(scaled + problem.known, problem.known))
+    distance = (values - problem.prior_mean) / problem.prior_error
     groups = np.array(problem.groups)
-    return {
-        group: max(1.0, float(np.sqrt(distances[groups == group].sum() / max(fixed[groups == group].sum(), 1.0))))
-        for group in sorted(set(problem.groups) - {""})
-    }
+    factors = {}
+    for group in sorted(set(problem.groups) - {""}):
+        rows = np.flatnonzero(groups == group)
+        squares = float(distance[rows] @ problem.known[np.ix_(rows, rows)] @ distance[rows])
+        factors[group] = max(1.0, float(np.sqrt(squares / max(fixed[rows].sum(), 1.0))))
+    return factors
 
 
-def sandwich(information: Array, prior_error: Array, scores: Sequence[Array], captive: Array | float = 0.0) -> Array:
+def sandwich(information: Array, unit: Array, scores: Sequence[Array], before: Array) -> Array:
     """Covariance (k, k) of estimates, robust to the true correlation of the residuals (Huber 1967; Newey and West
     1987).
 
@@ -58,21 +60,21 @@ def sandwich(information: Array, prior_error: Array, scores: Sequence[Array], ca
     ----------
     information : array (k, k)
         Of the trials alone, under the noise model.
-    prior_error : array (k,)
-        With its scale.
+    unit : array (k,)
+        Sizes of the parameters, which scale the matrices: the prior's errors.
     scores : sequence of arrays (blocks, k)
         Gradient of each run by blocks of :data:`BLOCK` ship lengths, in the order of time.
-    captive : array (k, k), optional
-        Information of captive tests, which counts as that of a prior.
+    before : array (k, k)
+        Information before the trials: of the prior, and of captive tests that were fitted with them.
     """
     # In units of the prior's errors the matrices are well scaled: a parameter without trials has information 0 against
     # 1.
-    scaled = information * np.outer(prior_error, prior_error)
-    known = np.eye(len(prior_error)) + captive * np.outer(prior_error, prior_error)
+    size = np.outer(unit, unit)
+    scaled, known = information * size, before * size
     bread = np.linalg.inv(scaled + known)
     determined = float(np.trace(bread @ scaled))
-    spread = bread @ (_meat(scaled, [score * prior_error for score in scores], determined) + known) @ bread
-    return spread * np.outer(prior_error, prior_error)
+    spread = bread @ (_meat(scaled, [score * unit for score in scores], determined) + known) @ bread
+    return spread * size
 
 
 def _meat(information: Array, scores: Sequence[Array], determined: float) -> Array:

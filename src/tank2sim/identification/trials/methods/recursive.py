@@ -181,7 +181,7 @@ def recursive(
 def _pass(task: SearchTask, point: SearchPoint, settings: RecursiveSettings, *, hold: bool) -> Iterator[_Step]:
     """Steps over all runs; with `hold` the model stays linearised at the start of the pass."""
     problem, at = task.problem, point.values
-    precision = np.diag(1 / problem.prior_error**2)
+    precision = problem.prior_precision(problem.prior_error)
     D, b, number = np.zeros_like(precision), np.zeros(len(at)), 0
     for run, length in enumerate(task.batch.lengths):
         carried: tuple[Array, Array | None, Array | None] = task.batch.starts[run], None, None
@@ -226,12 +226,13 @@ def _estimate(
 ) -> RecursiveEstimate:
     values = steps[-1].values
     group = max(1, round(BLOCK / settings.block))
+    before = problem.prior_precision(problem.prior_error)
     information, covariances = np.zeros_like(steps[0].matrix), []
     weighted: list[Array] = []
     for step in steps:
         information = step.kept * information + step.matrix
         weighted = [*(step.kept * score for score in weighted), step.vector + step.matrix @ (values - step.at)]
-        covariances.append(sandwich(information, problem.prior_error, _blocks(weighted, steps, group)))
+        covariances.append(sandwich(information, problem.prior_error, _blocks(weighted, steps, group), before))
     innovations = np.concatenate([step.innovations for step in steps])
     count = np.count_nonzero(~np.isnan(innovations), axis=0)
     deviations = np.sqrt(np.nansum(innovations**2, axis=0) / np.where(count > 0, count, np.nan))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -26,6 +26,9 @@ from tank2sim.identification.captive.equations import axial_speed, rigid_body_fo
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign
 
+if TYPE_CHECKING:
+    from tank2sim.identification.trials.problem.estimation_problem import Problem
+
 GAIN_ERROR = 0.05
 """Standard error of the gain of each force between tank and ship: Froude-scaled forces of one hull in different tanks
 differ by 5 to 10 % (SIMMAN 2008 and 2014, captive data of the KVLCC2). Project choice within that."""
@@ -34,8 +37,25 @@ SURGE_OFFSET = 1e-3
 """Standard error of a constant X' between tank and ship: resistance and thrust of a model are not those of the ship.
 Project choice: as large as the resistance itself."""
 
+RUDDER_GAIN_ERROR = 0.15
+"""Relative standard error of the rudder's forces between tank and ship: they follow the square of the inflow, and the
+loading of the propeller differs (HMRI's revolutions are 4 to 5 % below HSVA's and MARIN's by Froude's law, which is 5 %
+of force). Project choice: three times that, for wakes differ, too."""
+
+LOOSE = 30.0
+"""Factor on the standard errors before the trials in the fit of the captive tests alone, from which their noise comes:
+the tests then determine all that they show (project choice)."""
+
+ROUNDS, STEPS = 6, 6
+"""Rounds of noise, and Gauss-Newton steps in each, of the fit of the captive tests alone: the noise of the KVLCC2's
+changes by less than 1 % in the last (project choice)."""
+
 REFERENCE_ERROR = 0.01
 """Standard error of the reference point of the moment, in ship lengths. Project choice: 7 cm of a 7 m model."""
+
+LEAST_NOISE = 1e-3
+"""Least noise of a force, as a share of the standard deviation of all that was measured of it: gauges are calibrated to
+0.1 % at best (project choice)."""
 
 SAME_FORM = 0.05
 """Relative difference of L/B and L/T from which a campaign is of another ship. Project choice: models are built to
@@ -47,14 +67,29 @@ eight times."""
 
 
 @dataclass(frozen=True, eq=False)
+class CaptiveRuns:
+    """Reduced runs of a campaign, from which :func:`captive_tests` makes equations for any model of the ship.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    runs : tuple of ReducedRun
+        Means and harmonics of each run's forces.
+    """
+
+    campaign: Campaign
+    runs: tuple[ReducedRun, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class CaptiveTests:
     """Equations of a campaign in the k free parameters of a model.
 
     Parameters
     ----------
     forces : casadi.Function
-        ``forces(motion, p) -> (F, J)``: the water's X, Y, N (N and N m) and their slopes by the free parameters, at
-        one instant.
+        ``forces(motion, p) -> (F, J, R)``: the water's X', Y', N' at one instant, their slopes by the free parameters,
+        and the rudder's part of them.
     motion : array (9, instants)
         u, v, r, rudder angle, dv/dt, dr/dt, propeller speed over its nominal one, and the run's scales of force and
         moment (N, N m); ship size, SI.
@@ -70,6 +105,8 @@ class CaptiveTests:
         Standard deviation of the residual of each force, prime.
     columns : array of int (k,)
         Columns of J that belong to the free parameters.
+    source : CaptiveRuns
+        What the equations were made from.
     """
 
     forces: ca.Function
@@ -80,30 +117,35 @@ class CaptiveTests:
     mean: NDArray[np.bool_]
     noise: Array
     columns: NDArray[np.int64]
-
-    @cached_property
-    def nuisance(self) -> Array:
-        """Effects (m, 5) of the uncertain parameters between tank and ship, each times its standard error."""
-        columns = [np.where(self.force == place, GAIN_ERROR * self.measured, 0.0) for place in range(3)]
-        columns.append(np.where((self.force == 0) & self.mean, SURGE_OFFSET, 0.0))
-        sway = np.zeros(len(self.measured))
-        sway[self.force == 2] = self.measured[self.force == 1]  # the same coefficients of each run, in the same order
-        columns.append(REFERENCE_ERROR * sway)
-        return np.column_stack(columns)
+    source: CaptiveRuns
 
     def residuals(self, p: Array) -> tuple[Array, Array]:
         """Residuals (m,), model less measured, and their slopes (m, k), prime, at the model's parameters `p`."""
+        residuals, slopes, _ = self._linearised(p)
+        return residuals, slopes
+
+    def _linearised(self, p: Array) -> tuple[Array, Array, Array]:
+        """Residuals (m,), their slopes (m, k), and the effects (m, 6) of the uncertain parameters between tank and
+        ship, each times its standard error.
+        """
         instants = self.motion.shape[1]
-        values, slopes = map(np.array, self.forces.map(instants)(self.motion, p))
+        values, slopes, rudder = map(np.array, self.forces.map(instants)(self.motion, p))
         slopes = slopes.reshape(3, instants, -1)[:, :, self.columns]
-        predicted, jacobian, first = [], [], 0
+        predicted, jacobian, by_rudder, first = [], [], [], 0
         for projection in self.projection:
             rows = slice(first, first + projection.shape[1])
             first = rows.stop
             for place in range(3):
                 predicted.append(projection @ values[place, rows])
                 jacobian.append(projection @ slopes[place, rows])
-        return np.concatenate(predicted) - self.measured, np.vstack(jacobian)
+                by_rudder.append(projection @ rudder[place, rows])
+        forces = np.concatenate(predicted)
+        effects = [np.where(self.force == place, GAIN_ERROR * forces, 0.0) for place in range(3)]
+        effects.append(np.where((self.force == 0) & self.mean, SURGE_OFFSET, 0.0))
+        sway = np.zeros(len(forces))
+        sway[self.force == 2] = forces[self.force == 1]  # the same coefficients of each run, in the same order
+        effects += [REFERENCE_ERROR * sway, RUDDER_GAIN_ERROR * np.concatenate(by_rudder)]
+        return forces - self.measured, np.vstack(jacobian), np.column_stack(effects)
 
     def of(self, places: Sequence[int]) -> CaptiveTests:
         """The same equations in some of the free parameters."""
@@ -111,34 +153,47 @@ class CaptiveTests:
 
     def normal(self, p: Array) -> tuple[Array, Array, float]:
         """Information (k, k), gradient (k,) and cost, the uncertain parameters between tank and ship eliminated."""
-        residual, jacobian = self.residuals(p)
+        residual, jacobian, between = self._linearised(p)
         weight = 1 / self.noise[self.force]
         whole = np.column_stack([residual, jacobian]) * weight[:, None]
-        between = self.nuisance * weight[:, None]
+        between *= weight[:, None]
         inner = np.eye(between.shape[1]) + between.T @ between
         across = between.T @ whole
         gram = whole.T @ whole - across.T @ np.linalg.solve(inner, across)
         return gram[1:, 1:], gram[1:, 0], float(gram[0, 0])
 
-    def with_noise_at(self, p: Array, least: float = 1e-6) -> CaptiveTests:
-        """The same with the noise of each force as it is left at `p`, the uncertain parameters at their best."""
+    def with_noise_at(self, p: Array) -> CaptiveTests:
+        """The same with the root mean square residual of each force at `p` as its noise, less the fitted terms."""
         residual, jacobian = self.residuals(p)
-        weight = 1 / self.noise[self.force]
-        between = self.nuisance * weight[:, None]
-        inner = np.eye(between.shape[1]) + between.T @ between
-        best = np.linalg.solve(inner, between.T @ (residual * weight))
-        left = residual - self.nuisance @ best
         noise = []
         for place in range(3):
             rows = self.force == place
             used = min(jacobian[rows].any(axis=0).sum(), rows.sum() // 2)
-            noise.append(max(least, float(np.sqrt(np.sum(left[rows] ** 2) / max(rows.sum() - used, 1)))))
+            least = LEAST_NOISE * float(np.std(self.measured[rows]))
+            noise.append(max(least, float(np.sqrt(np.sum(residual[rows] ** 2) / max(rows.sum() - used, 1)))))
         return replace(self, noise=np.array(noise))
 
 
-def captive_tests(
-    card: ManoeuvringCard, model: Model, free: Sequence[str], campaign: Campaign, runs: Sequence[ReducedRun]
-) -> CaptiveTests:
+def noise_alone(tests: CaptiveTests, problem: Problem) -> CaptiveTests:
+    """The equations with the noise that they have at the best fit of the captive tests alone.
+
+    Fitted together with trials, the noise must not grow until tank and trials agree: it is what the tank's own scatter
+    and the structure of the model leave, with standard errors before the trials :data:`LOOSE` times those of `problem`.
+    Within one tank the uncertain parameters between tank and ship are none.
+    """
+    values, prior = problem.prior_mean.copy(), problem.prior_precision(LOOSE * problem.prior_error)
+    for _ in range(ROUNDS):
+        for _ in range(STEPS):
+            residual, slopes = tests.residuals(problem.parameters(values))
+            weighted = slopes / tests.noise[tests.force][:, None] ** 2
+            gradient = weighted.T @ residual + prior @ (values - problem.prior_mean)
+            step = np.linalg.solve(weighted.T @ slopes + prior, gradient)
+            values = np.clip(values - step, *problem.bounds)
+        tests = tests.with_noise_at(problem.parameters(values))
+    return tests
+
+
+def captive_tests(card: ManoeuvringCard, model: Model, free: Sequence[str], source: CaptiveRuns) -> CaptiveTests:
     """The equations of a campaign's runs in the free parameters of a model.
 
     Parameters
@@ -149,15 +204,14 @@ def captive_tests(
         Driven by the rudder's angle or order.
     free : sequence of str
         Names of the k free parameters.
-    campaign : Campaign
-    runs : sequence of ReducedRun
-        Of the campaign.
+    source : CaptiveRuns
 
     Raises
     ------
     InputError
         The campaign is of a ship of other proportions.
     """
+    campaign, runs = source.campaign, source.runs
     _refuse_other_form(card, campaign)
     ratio = card.ship.length_m / campaign.model.length_m
     motions, projections, measured, force, mean = [], [], [], [], []
@@ -181,9 +235,10 @@ def captive_tests(
         mean=np.concatenate(mean),
         noise=np.ones(3),
         columns=np.arange(len(free)),
+        source=source,
     )
     spread = [float(np.std(tests.measured[tests.force == place])) for place in range(3)]
-    return replace(tests, noise=np.maximum(0.1 * np.array(spread), 1e-6))
+    return replace(tests, noise=0.02 * np.array(spread))
 
 
 def _refuse_other_form(card: ManoeuvringCard, campaign: Campaign) -> None:
@@ -244,17 +299,22 @@ def _water_forces(model: Model, free: Sequence[str]) -> ca.Function:
     Y = model.symbol("force.Y") - sway - (added["sway"] - mass) * vdot - (added["sway_yaw"] - lever) * rdot
     inertia = model.symbol("ship.yaw_inertia")
     N = model.symbol("force.N") - yaw - (added["yaw_sway"] - lever) * vdot - (added["yaw"] - inertia) * rdot
-    forces = model.expand(ca.vertcat(X / force_scale, Y / force_scale, N / moment_scale))
-    forces = ca.substitute(forces, model.x, _states(model, u, v, r, delta, revolutions))
+    forces = ca.vertcat(X / force_scale, Y / force_scale, N / moment_scale)
+    by_rudder = [
+        model.symbol(f"rudder.{name}") / scale
+        for name, scale in (("X", force_scale), ("Y", force_scale), ("N", moment_scale))
+    ]
+    both = model.expand(ca.vertcat(forces, *by_rudder))
+    both = ca.substitute(both, model.x, _states(model, u, v, r, delta, revolutions))
     inputs = [ca.SX(variable.start) for variable in model.inputs]
     for place, name in enumerate(model.input_names):
         if name == "rudder.command":
             inputs[place] = delta
         elif name == "propeller.speed":
             inputs[place] = revolutions * model.symbol("propulsion.nominal_speed")
-    forces = ca.substitute(forces, model.u, ca.vcat(inputs))
+    forces, rudder = ca.vertsplit(ca.substitute(both, model.u, ca.vcat(inputs)), 3)
     slopes = ca.jacobian(forces, ca.vcat([model.symbol(name) for name in free]))
-    return ca.Function("captive", [motion, model.p], [forces, slopes], {"cse": True})
+    return ca.Function("captive", [motion, model.p], [forces, slopes, rudder], {"cse": True})
 
 
 def _states(model: Model, u: ca.SX, v: ca.SX, r: ca.SX, delta: ca.SX, revolutions: ca.SX) -> ca.SX:

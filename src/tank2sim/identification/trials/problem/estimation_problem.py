@@ -32,6 +32,8 @@ class Problem:
         Each with the same `seen`.
     captive : CaptiveTests, optional
         Captive tests of the ship, which output error fits together with the runs.
+    prior_inverse : array (k, k), optional
+        Inverse of the correlations before the trials; None where the parameters are independent.
     """
 
     model: Model
@@ -40,6 +42,16 @@ class Problem:
     prior_error: Array
     runs: tuple[SampledRun, ...]
     captive: CaptiveTests | None = None
+    prior_inverse: Array | None = None
+
+    @property
+    def known(self) -> Array:
+        """Information before the trials (k, k), in units of `prior_error`."""
+        return np.eye(len(self.free)) if self.prior_inverse is None else self.prior_inverse
+
+    def prior_precision(self, errors: Array) -> Array:
+        """Information before the trials (k, k), with standard errors `errors` (k,)."""
+        return np.asarray(self.known / np.outer(errors, errors), dtype=np.float64)
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -85,7 +97,9 @@ class Problem:
         free = tuple(self.free[place] for place in kept)
         captive = self.captive and self.captive.of(kept)
         mean, error = self.prior_mean[kept], self.prior_error[kept]
-        return replace(self, free=free, prior_mean=mean, prior_error=error, captive=captive)
+        # Of a normal distribution given some of its variables, the inverse covariance is a block of the whole one.
+        inverse = None if self.prior_inverse is None else self.prior_inverse[np.ix_(kept, kept)]
+        return replace(self, free=free, prior_mean=mean, prior_error=error, captive=captive, prior_inverse=inverse)
 
     def with_runs(self, runs: tuple[SampledRun, ...]) -> Problem:
         """The problem with other runs."""

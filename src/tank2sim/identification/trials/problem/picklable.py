@@ -11,8 +11,9 @@ from typing import TypeVar
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics.model import Model
+from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import Problem
-from tank2sim.identification.trials.problem.problem_from_card import driven_model
+from tank2sim.identification.trials.problem.problem_from_card import driven_model, with_captive
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
 Task = TypeVar("Task")
@@ -59,10 +60,16 @@ class Portable:
     prior_mean: Array
     prior_error: Array
     runs: tuple[SampledRun, ...]
+    prior_inverse: Array | None = None
+    captive: CaptiveRuns | None = None
 
     def problem(self) -> Problem:
         """The problem with its model."""
-        return Problem(self.ship.model(), self.free, self.prior_mean, self.prior_error, self.runs)
+        model = self.ship.model()
+        problem = Problem(
+            model, self.free, self.prior_mean, self.prior_error, self.runs, prior_inverse=self.prior_inverse
+        )
+        return with_captive(problem, self.ship.manoeuvring_card(), self.captive)
 
     def with_runs(self, runs: tuple[SampledRun, ...]) -> Portable:
         """The problem with other runs."""
@@ -88,7 +95,15 @@ def portable(problem: Problem, card: ManoeuvringCard, driven_by: str) -> Portabl
     ship = PicklableShip(card.text, driven_by)
     if ship.model().parameter_names != problem.model.parameter_names:
         raise ValueError("the problem was set up for another card")
-    return Portable(ship, problem.free, problem.prior_mean, problem.prior_error, problem.runs)
+    return Portable(
+        ship,
+        problem.free,
+        problem.prior_mean,
+        problem.prior_error,
+        problem.runs,
+        problem.prior_inverse,
+        problem.captive.source if problem.captive else None,
+    )
 
 
 def map_tasks(work: Callable[[Task], _Result], tasks: Iterable[Task], executor: Executor | None) -> Iterator[_Result]:

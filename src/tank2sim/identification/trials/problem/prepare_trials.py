@@ -12,6 +12,7 @@ import numpy as np
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
+from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.records.audit import Finding, audit_and_repair
 from tank2sim.records.reading import read_trial_file
 from tank2sim.records.same_record import refuse_copies
@@ -29,7 +30,7 @@ FARTHEST_FROUDE = 2.5
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Trials at the size of the ship.
+    """Trials at the size of the ship, and captive tests of a model of it where there are any.
 
     Parameters
     ----------
@@ -38,11 +39,14 @@ class Measured:
         ``angle`` if the rudder's angle was measured in all of them, ``order`` if only its order is known.
     notices : tuple of str
         Repairs and scalings.
+    captive : CaptiveRuns, optional
+        Captive tests, at the size of their model.
     """
 
     trials: tuple[Trial, ...]
     driven_by: str
     notices: tuple[str, ...]
+    captive: CaptiveRuns | None = None
 
 
 def measured(given: Iterable[Path | Trial], card: ManoeuvringCard) -> Measured:

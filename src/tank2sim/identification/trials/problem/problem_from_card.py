@@ -8,8 +8,10 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
+from tank2sim.analysis.influence.parameters import card_parameters, joint_errors, study_model
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.covariance import read_covariance
 from tank2sim.cards.form import Propulsion
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics import build
@@ -18,10 +20,15 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Quantity
 from tank2sim.errors import InputError
+from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests, noise_alone
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, in_range, prepare, seen_in
 from tank2sim.records.trials import Trial
 from tank2sim.units import from_si
+
+NEARLY_SINGULAR = 1e-6
+"""Share of a prior variance that is added to all, so that correlations of 1 (rounded in a file) have an inverse
+(project choice)."""
 
 LEAST_PART = 2.0
 """Parts of a run inside the card's range of speeds are used if they last this many L/u0 (project choice)."""
@@ -117,7 +124,8 @@ def problem_from_card(
 ) -> Problem:
     """The problem of fitting a card's free parameters to trials, except for those in `hold`.
 
-    Parts of runs at speeds outside the range of the card are omitted, unless `whole` is True.
+    Parts of runs at speeds outside the range of the card are omitted, unless `whole` is True. Parameters that are in
+    the card's covariance are correlated before the trials.
 
     Raises
     ------
@@ -146,7 +154,37 @@ def problem_from_card(
         problem = f"never goes for long at {low:g} to {high:g} m/s, where the card holds"
         raise InputError(trials[0].path, "", problem, "change model.valid_speed_mps of the card, or leave it out")
     values = np.array(list(free.values()))
-    return Problem(model, tuple(free), values[:, 0], values[:, 1], runs)
+    names, inverse = tuple(free), _inverse_correlation(card, tuple(free))
+    return Problem(model, names, values[:, 0], values[:, 1], runs, prior_inverse=inverse)
+
+
+def with_captive(problem: Problem, card: ManoeuvringCard, captive: CaptiveRuns | None) -> Problem:
+    """The problem with the equations of captive tests, at their own noise; unchanged without any.
+
+    Raises
+    ------
+    InputError
+        The campaign is of another ship than the card.
+    """
+    if captive is None:
+        return problem
+    tests = captive_tests(card, problem.model, problem.free, captive)
+    return replace(problem, captive=noise_alone(tests, problem))
+
+
+def _inverse_correlation(card: ManoeuvringCard, free: tuple[str, ...]) -> Array | None:
+    """Inverse correlations (k, k) of the free parameters by the card's covariance; None if it states none of them."""
+    if read_covariance(card) is None:
+        return None
+    joint = joint_errors(card, card_parameters(card, study_model(card)))
+    known = {parameter.name: place for place, parameter in enumerate(joint.parameters)}
+    rows = [place for place, name in enumerate(free) if name in known and joint.parameters[known[name]].standard_error]
+    columns = [known[free[place]] for place in rows]
+    block = joint.covariance[np.ix_(columns, columns)]
+    sizes = np.sqrt(np.diag(block))  # those of the problem may be wider
+    correlation = np.eye(len(free))
+    correlation[np.ix_(rows, rows)] = block / np.outer(sizes, sizes)
+    return np.asarray(np.linalg.inv(correlation + NEARLY_SINGULAR * np.eye(len(free))), dtype=np.float64)
 
 
 def _revolutions_vary(propulsion: Propulsion, trials: Sequence[Trial]) -> bool:
