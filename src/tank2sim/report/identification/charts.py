@@ -74,8 +74,8 @@ _SHARED = {"color": "shared", "strokeDash": "shared", "shape": "shared"}
 def track_grid(trials: Sequence[Json], *, title: str = "") -> alt.ConcatChart | None:
     """Tracks, a panel a trial, x north up and y east to the right in one scale; measured as points, models as lines.
 
-    `trials` are those of ``replays`` in the JSON. The scale is that of what was measured and of the card found: the card before may leave the panel. None where no
-    trial has a track.
+    `trials` are those of ``replays`` in the JSON. The scale is that of what was measured and of the card found: the
+    card before may leave the panel. None where no trial has a track.
     """
     panels, rows_of = [], {}
     for trial in trials:

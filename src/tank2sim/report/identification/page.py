@@ -150,8 +150,9 @@ def _worst(trials: Sequence[Json], windows: Sequence[Json]) -> list[Json]:
     errors = {
         trial["trial"]: relative_error(trial["found"]["r_degps"]) for trial in windows if "r_degps" in trial["found"]
     }
-    kept = sorted(trials, key=lambda trial: -errors.get(trial["trial"], 0.0))[:MOST_TRIALS]
-    return [trial for trial in trials if trial in kept]
+    worst = sorted(trials, key=lambda trial: -errors.get(trial["trial"], 0.0))[:MOST_TRIALS]
+    kept = {trial["trial"] for trial in worst}
+    return [trial for trial in trials if trial["trial"] in kept]
 
 
 def _key_figures(found: Json) -> list[KeyFigure]:

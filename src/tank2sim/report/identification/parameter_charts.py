@@ -97,7 +97,8 @@ def correlation_chart(known: Json, *, title: str = "") -> alt.LayerChart:
     close = [row for row in rows if row["one"] != row["other"] and abs(row["c"] or 0.0) > CLOSE_CORRELATION]
     frames = alt.Chart(data(close)).mark_rect(filled=False, stroke="black", strokeWidth=2)
     layers = [cells, *([frames.encode(x=x, y=y, tooltip=tooltip)] if close else [])]
-    text = f"Framed: {len(known['correlated_pairs'])} pairs above {CLOSE_CORRELATION:g} either way, which are known only together."
+    pairs = len(known["correlated_pairs"])
+    text = f"Framed: {pairs} pairs above {CLOSE_CORRELATION:g} either way, which are known only together."
     size = {"width": step * len(names), "height": step * len(names)}
     return alt.layer(*layers).properties(
         title=alt.Title(title, subtitle=f"Colour: correlation (-). {text}"),
