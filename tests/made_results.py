@@ -44,6 +44,11 @@ def _tune(_: Path) -> Result:
     return t2s.load("mariner").tune("steady_radius_m@20=460", figures="criterion_C", members=2)
 
 
+def _identify(folder: Path) -> Result:
+    t2s.load("mariner").turn(35, duration_s=400.0).to_csv(folder / "turn.csv")
+    return t2s.identify("mariner", _trials(folder), holdout=folder / "turn.csv", method="equation_error", members=3)
+
+
 RESULTS: dict[str, Callable[[Path], Result]] = {
     "audit": lambda folder: t2s.audit(_trials(folder)),
     "autopilot": lambda _: t2s.load("mariner").autopilot(),
@@ -53,6 +58,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "export": lambda folder: t2s.load("mariner").to_fmu(folder / "m.fmu", fmi=2),
     "glide": lambda _: t2s.load("kulikovsky-velikanov").glide([-30, -45]),
     "glide of a programme": _glide_programme,
+    "identify": _identify,
     "influence": lambda _: t2s.load("mariner").influence(
         ["criterion_C", "K_per_s"], joint_variation={"Yv": 1.0}, members=2
     ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -10,8 +11,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from tank2sim.api.identification import IdentificationResult
 from tank2sim.cards import parse_card
 from tank2sim.cli.identify import command
+from tank2sim.files import plain_json
+from tank2sim.identification.trials.as_json import replays_as_json
 from tank2sim.identification.trials.assessment.evaluation import comparison_windows
 from tank2sim.identification.trials.identify import IdentificationOptions, identify_trials
 from tank2sim.identification.trials.methods.posterior import scaled_prior
@@ -19,10 +23,11 @@ from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.records.trials import Trial
 from tank2sim.report.identification import page as identification_page_module
-from tank2sim.report.identification.charts import AFTER, BEFORE, MEASURED, BeforeAfter, track_grid
-from tank2sim.report.identification.page import MOST_TRIALS, identification_charts, identification_page, pairs_of
+from tank2sim.report.identification.charts import AFTER, BEFORE, MEASURED, history_grid, track_grid
+from tank2sim.report.identification.page import MOST_TRIALS, identification_charts, identification_page
 from tank2sim.report.kit.charts import chart_specification
 from tank2sim.report.kit.page import Verdict, render_page
+from tank2sim.report.results.page import result_page
 from tests.identification.trials import made_up_ship
 
 OFF = {"Nd": 1.25, "Nr": 0.8, "Yv": 1.2, "Xu": 0.8}
@@ -54,12 +59,17 @@ def trials():
 
 @pytest.fixture(scope="module")
 def found(trials):
+    """The identification, its JSON and its charts."""
     known = parse_card(text_of(OFF), "off.toml")
     fitted = Measured((trials["by_the_clock"],), "angle", ("mended",))
     held = Measured((trials["turn"],), "angle", ())
     result = identify_trials(known, fitted, held, IdentificationOptions(method="equation_error"))
-    pairs = pairs_of(known, result, fitted), pairs_of(known, result, held)
-    return result, pairs, identification_charts(result, *pairs)
+    found = IdentificationResult(known, result, fitted, held)
+    return result, found.to_dict(), found.charts()
+
+
+def held_out(found):
+    return [trial for trial in found[1]["replays"] if trial["held_out"]]
 
 
 def over_ground(trial: Trial) -> Trial:
@@ -115,8 +125,7 @@ def test_histories_are_in_degrees_and_thinned(found, trials) -> None:
 
 
 def test_a_track_has_one_scale_and_all_three_series(found) -> None:
-    _, (_, held), _ = found
-    chart = track_grid(held)
+    chart = track_grid(held_out(found))
     (panel,) = chart_specification(chart)["concat"]
     across, up = (panel["layer"][0]["encoding"][axis]["scale"]["domain"] for axis in ("x", "y"))
     assert (across[1] - across[0]) / panel["width"] == pytest.approx((up[1] - up[0]) / panel["height"])
@@ -128,14 +137,13 @@ def test_without_positions_the_cards_alone_have_tracks(trials) -> None:
     seen = {name: values for name, values in trials["turn"].signals.items() if name not in ("x_m", "y_m")}
     blind = (replace(trials["turn"], signals=seen),)
     (passage,) = comparison_windows(problem_from_card(truth, blind, "angle"), truth, blind, {})
-    chart = track_grid([BeforeAfter(before=passage, after=passage)])
+    chart = track_grid(plain_json(replays_as_json([(passage, passage)], held_out=True)))
     assert rows_of(chart, AFTER) and not rows_of(chart, MEASURED)
 
 
 def test_the_card_before_is_drawn_as_before_and_the_card_found_as_found(found) -> None:
     """The card that was off misses the record, the one found does not."""
-    _, (_, held), _ = found
-    chart = track_grid(held)
+    chart = track_grid(held_out(found))
     ends = {series: rows_of(chart, series)[-1] for series in (MEASURED, BEFORE, AFTER)}
     distance = {
         series: np.hypot(ends[series]["x"] - ends[MEASURED]["x"], ends[series]["y"] - ends[MEASURED]["y"])
@@ -162,14 +170,16 @@ def test_maps_next_to_each_other_share_one_legend(found) -> None:
     assert len(legends) == 4 and all(one == legends[0] for one in legends)
 
 
-def test_overshoots_keep_the_digits_that_their_errors_need(found, monkeypatch) -> None:
+def test_overshoots_keep_the_digits_that_their_errors_need(found) -> None:
+    keys = ("trial", "figure", "measured", "before", "predicted", "interval_95")
     rows = [
-        ["zigzag", "held out", "overshoot_1_deg", 7.7, 7.81, 7.72, "+0.02", "-"],
-        ["turn", "held out", "advance_m", 1234.5, 1300.0, 1235.5, "+0.1 %", "-"],
+        ("zigzag", "overshoot_1_deg", 7.7, 7.81, 7.72, None),
+        ("turn", "advance_m", 1234.5, 1300.0, 1235.5, [1200.0, 1300.0]),
     ]
-    monkeypatch.setattr(identification_page_module, "figure_rows", lambda _: rows)
-    html = render_page(identification_page(found[0], {}))
-    assert all(f">{shown}<" in html for shown in ("7.7", "7.81", "7.72", "1234", "1300"))
+    figures = [dict(zip(keys, row, strict=True)) for row in rows]
+    html = render_page(identification_page(found[1] | {"figures": {"fit": [], "holdout": figures}}))
+    shown = ("7.7", "7.81", "7.72", "+0.02", "1234", "1300", "+0.1 %", "1200 to 1300")
+    assert all(f">{text}<" in html for text in shown)
 
 
 def test_parameters_are_in_standard_errors_of_the_prior(found) -> None:
@@ -205,8 +215,8 @@ def test_figures_stand_with_their_errors_in_percent(found) -> None:
 
 
 def test_the_page_tells_the_errors_of_what_was_held_out(found) -> None:
-    result, _, charts = found
-    page = identification_page(result, charts)
+    result, content, charts = found
+    page = identification_page(content)
     figures = {figure.label: figure for figure in page.figures}
     assert figures["Trials fitted"].value == figures["Trials held out"].value == 1
     assert figures["Coefficients"].value == len(OFF)
@@ -217,35 +227,52 @@ def test_the_page_tells_the_errors_of_what_was_held_out(found) -> None:
     assert "Advance error, held out" in figures
     assert sum(len(section.charts) for section in page.sections) == len(charts)
     assert page.sections[-1].tables[0].rows == [["mended"], *([notice] for notice in result.notices[1:])]
-    heading = next(section.heading for section in page.sections if charts["tracks_held_out"] in _drawn(section))
-    assert heading == "Trials held out"
-
-
-def _drawn(section):
-    return [illustration.chart for illustration in section.charts]
+    tracks = chart_specification(charts["tracks_held_out"])
+    (section,) = (section for section in page.sections if section.heading == "Trials held out")
+    assert chart_specification(section.charts[0].chart) == tracks
 
 
 def test_of_many_trials_those_are_shown_that_are_followed_worst(found, monkeypatch) -> None:
-    result, (fitted, held), _ = found
     monkeypatch.setattr(identification_page_module, "MOST_TRIALS", 2)
     monkeypatch.setattr(identification_page_module, "_PER_SHEET", 1)
-    names = ("b", "c", "a")
-    many = [
-        replace(held[0], **{side: replace(held[0].after, name=name) for side in ("before", "after")}) for name in names
+    content = copy.deepcopy(found[1])
+    errors = {"b": 0.2, "c": 0.1, "a": 0.3}
+    content["replays"] = [trial | {"trial": name} for name in errors for trial in held_out(found)]
+    content["errors_over_windows"]["holdout"] = [
+        {"trial": name} | {key: {"r_degps": {"rms_error": error, "rms_signal": 1.0}} for key in ("before", "found")}
+        for name, error in errors.items()
     ]
-    followed = [
-        replace(result.holdout.following[0], name=name, windows={"motion.r": (error, 1.0)})
-        for name, error in zip(names, (0.2, 0.1, 0.3), strict=True)
-    ]
-    comparison = replace(result.holdout, following=tuple(followed))
-    other = replace(result, holdout=comparison, before_holdout=comparison)
-    shown = identification_charts(other, fitted, many)
+    shown = identification_charts(content)
     sheets = [chart_specification(shown[stem])["concat"] for stem in ("histories_held_out", "histories_held_out_2")]
     assert [[panel["title"]["text"] for panel in sheet] for sheet in sheets] == [["b"], ["a"]]
-    notes = [
-        section.text for section in identification_page(other, shown).sections if section.heading == "Trials held out"
-    ]
+    notes = [section.text for section in identification_page(content).sections if section.heading == "Trials held out"]
     assert notes == ["The 2 of 3 trials with the largest error of yaw rate."]
+
+
+def test_of_a_record_that_goes_on_after_the_manoeuvre_the_simulated_part_is_shown(found) -> None:
+    (turn,) = copy.deepcopy(held_out(found))
+    whole = turn["measured"]
+    turn["before"] = {}
+    turn["found"] = {name: values[: len(values) // 2] for name, values in turn["found"].items()}
+    times = [row["t"] for row in rows_of(history_grid([turn]), MEASURED)]
+    model = turn["found"]["t_s"]
+    assert model[0] <= min(times) and max(times) <= model[-1] < whole["t_s"][-1]
+    assert not rows_of(history_grid([turn]), BEFORE), "what ran away is left out"
+
+
+def test_a_json_of_an_older_version_has_the_page_of_any_result(found) -> None:
+    older = {key: value for key, value in found[1].items() if key not in ("errors_over_windows", "ship")}
+    page = result_page(older, "identify.json")
+    assert page.title == "Coefficients from trials" and any(section.charts for section in page.sections)
+
+
+def test_a_forced_result_is_marked_on_its_page(trials, found) -> None:
+    none = Measured((), "angle", ())
+    forced = replace(found[0], forced=("the rudder's moment differs",))
+    held = Measured((trials["by_the_clock"],), "angle", ())
+    made = IdentificationResult(parse_card(text_of(OFF), "off.toml"), forced, held, none)
+    assert any("FORCED: the rudder's moment differs" in notice for notice in made.to_dict()["notices"])
+    assert "FORCED" in made.page()
 
 
 def test_one_trial_takes_little_of_the_page(found) -> None:

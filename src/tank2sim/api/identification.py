@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tank2sim.analysis.ensemble.draws import by_file_name
 from tank2sim.api.result import Result, ResultTable
@@ -17,8 +17,10 @@ from tank2sim.api.trial import TrialPaths, fitted_and_held
 from tank2sim.cards import Card, ManoeuvringCard, parse_card
 from tank2sim.errors import InputError
 from tank2sim.executors import PROCESSES, check_executor, executing
+from tank2sim.files import plain_json
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
 from tank2sim.identification.trials.as_json import (
+    SETS,
     estimate_rows,
     figure_rows,
     following_rows,
@@ -40,7 +42,6 @@ from tank2sim.identification.trials.problem.estimation_problem import SearchRepo
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import with_fitted_trials
 from tank2sim.identification.trials.problem.structures import AUTO, EVIDENCE, STRUCTURES
-from tank2sim.marks import FORCED
 from tank2sim.records.campaigns import read_campaign
 from tank2sim.units import in_words
 
@@ -69,8 +70,8 @@ class IdentificationResult(Result):
     ) -> None:
         self.before, self.identification, self.fitted, self.held = before, identification, fitted, held
         self.remarks = tuple(remarks(identification))
-        forced = (f"{FORCED}: {'; '.join(identification.forced)}",) if identification.forced else ()
-        self.notices = (*forced, *identification.notices, *identification.identifiability.notices, *self.remarks)
+        self._found: Mapping[str, Any] = plain_json(identification_as_json(identification, self.remarks))
+        self.notices = (*self._found["notices"], *self._found["identifiability"]["notices"], *self.remarks)
 
     @cached_property
     def card(self) -> Card:
@@ -105,23 +106,18 @@ class IdentificationResult(Result):
         """
         import pandas as pd
 
-        found = self.identification
-        rows = []
-        for word, before, after in (
-            ("fitted", found.before, found.fit),
-            ("held out", found.before_holdout, found.holdout),
-        ):
-            earlier = {(figure.trial, figure.name): figure.predicted for figure in (before.figures if before else ())}
-            for figure in after.figures if after else ():
-                interval = figure.interval or (None, None)
-                known = earlier.get((figure.trial, figure.name))
-                rows.append((figure.trial, word, figure.name, figure.measured, known, figure.predicted, *interval))
+        keys = ("figure", "measured", "before", "predicted")
+        rows = [
+            (figure["trial"], word, *(figure[key] for key in keys), *(figure["interval_95"] or (None, None)))
+            for word, key in SETS.items()
+            for figure in self._found["figures"][key]
+        ]
         columns = ["trial", "set", "figure", "measured", "before", "now", "low_95", "high_95"]
         return pd.DataFrame(rows, columns=columns)
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""
-        return {**identification_as_json(self.identification, self.remarks), "replays": self._replays()}
+        return {**self._found, "replays": self._replays}
 
     @property
     def headline(self) -> tuple[str, ...]:
@@ -134,7 +130,7 @@ class IdentificationResult(Result):
         found = self.identification
         estimate = found.estimate
         title = f"{found.card.ship.name}: {len(estimate.free)} coefficients from {len(found.problem.runs)} trials"
-        tables = [ResultTable(title, ("", "found", "before", "from trials"), estimate_rows(found))]
+        tables = [ResultTable(title, ("", "found", "before", "from trials"), estimate_rows(self._found))]
         if found.bootstrap is not None:
             scatter = found.bootstrap.std(axis=0, ddof=1)
             triples = zip(estimate.free, estimate.standard_errors, scatter, strict=True)
@@ -149,13 +145,13 @@ class IdentificationResult(Result):
             ResultTable(
                 "Yaw rate: error over windows of 5 ship lengths, of its root mean square",
                 ("trial", "", "before", "now"),
-                following_rows(found),
+                following_rows(self._found),
             )
         )
-        if rows := structure_rows(found):
+        if rows := structure_rows(self._found):
             columns = ("structure", "one at a time, mean", "those of largest amplitude")
             tables.append(ResultTable("Yaw-rate error of trials left out of the fit, %", columns, rows))
-        if rows := figure_rows(found):
+        if rows := figure_rows(self._found):
             tables.append(
                 ResultTable(
                     "Figures, simulated in closed loop from the measured start, with the rudder rate and lag of each "
@@ -168,21 +164,11 @@ class IdentificationResult(Result):
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
         """Tracks, histories, errors and parameters, by file stem."""
-        from tank2sim.report.identification.page import identification_charts, pairs_of
+        from tank2sim.report.identification.page import identification_charts
 
-        fitted, held = (
-            pairs_of(self.before, self.identification, group) if group.trials else ()
-            for group in (self.fitted, self.held)
-        )
-        return dict(identification_charts(self.identification, fitted, held))
+        return identification_charts(self.to_dict())
 
-    def page(self) -> str:
-        """As :meth:`.Result.page`."""
-        from tank2sim.report.identification.page import identification_page
-        from tank2sim.report.kit.page import render_page
-
-        return render_page(identification_page(self.identification, self.charts()))
-
+    @cached_property
     def _replays(self) -> list[dict[str, object]]:
         """Every trial, fitted or held out, next to both cards."""
         return [

@@ -244,31 +244,86 @@ class EstimateKeys(_Part):
     standard_error: Number
     before: Number
     before_standard_error: Number
+    prior_standard_error: Number
     share_from_trials: Number
+
+
+class WindowErrorKeys(_Part):
+    """Root mean square of an error over windows, and of the measured signal."""
+
+    rms_error: Number
+    rms_signal: Number
+
+
+class TrialErrorKeys(_Part):
+    """Errors over windows of the card given and of the card found on a trial, by column."""
+
+    trial: str
+    before: dict[str, WindowErrorKeys]
+    found: dict[str, WindowErrorKeys]
+
+
+class PredictedFigureKeys(_Part):
+    """A figure of a trial, by the card given (`before`) and by the card found (`predicted`)."""
+
+    trial: str
+    figure: str
+    measured: float
+    before: Number
+    predicted: Number
+    error: Number
+    interval_95: list[Number] | None
+
+
+class IdentifiabilityKeys(_Part):
+    """How well the trials determine the parameters, in units of the prior's standard errors."""
+
+    parameters: list[str]
+    condition: Number
+    singular_values: list[Number]
+    correlation: list[list[Number]]
+    correlated_pairs: list[list[str | float]]
+    unseen: list[list[str]]
+    notices: list[str]
+
+
+class CardReplayKeys(_Part):
+    """A trial as measured and as simulated by the card given and by the card found, thinned to draw."""
+
+    trial: str
+    held_out: bool
+    closed_loop: bool
+    measured: Columns
+    before: Columns
+    found: Columns
 
 
 class IdentifyKeys(_Keys):
     """Coefficients identified from free-running trials."""
 
+    ship: str
     method: str
     structure: str
     forced: list[str]
     manoeuvres: dict[str, str]
     derivatives: dict[str, EstimateKeys]
     effects: dict[str, EstimateKeys]
+    effects_of_card: list[str]
     misfit: dict[str, Any]
     yaw_rate_error_over_windows: dict[str, dict[str, Number] | None]
+    errors_over_windows: dict[str, list[TrialErrorKeys]]
     figures_are: str
-    figures: dict[str, list[dict[str, Any]]]
+    figures: dict[str, list[PredictedFigureKeys]]
     structures: dict[str, Any]
     criteria: dict[str, Number] | None
     bootstrap: dict[str, Any] | None
     residual_noise: dict[str, Number]
     prior_scale: dict[str, Number]
     cost: list[Number]
-    identifiability: dict[str, Any]
+    identifiability: IdentifiabilityKeys
+    notices: list[str]
     warnings: list[str]
-    replays: list[dict[str, Any]]
+    replays: list[CardReplayKeys]
 
 
 class GapKeys(_Keys):

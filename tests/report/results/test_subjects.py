@@ -82,16 +82,6 @@ VALIDATED = {
         }
     ],
 }
-
-
-IDENTIFIED = {"method": "output_error", "derivatives": {}, "misfit": {}}
-IDENTIFIED |= {
-    "replays": [
-        {"trial": name, "held_out": held_out, "closed_loop": True, "measured": HISTORIES, "before": {}}
-        | {"found": {**HISTORIES, "u_mps": [7.0, 6.95, 6.9, 6.85]}}
-        for name, held_out in (("zigzag", False), ("turn", True))
-    ]
-}
 WAY = {"name": "starboard", "figures": {}, "ahead_m": [0.0, 500.0, 600.0], "starboard_m": [0.0, 50.0, 400.0]}
 POSTER = {"ship": "A ship", "turning_circles_deep": [WAY], "turning_circles_shallow": [], "stops": [], "telegraph": []}
 
@@ -188,13 +178,6 @@ def test_a_validation_shows_errors_next_to_their_uncertainty_and_the_replays() -
     assert (row["e"], row["low"], row["high"]) == (10.0, -15.0, 15.0)
     speeds = panels(charts["Histories: zigzag"])["surge velocity (m/s)"]
     assert [row["v"] for row in speeds if row["run"] == "simulated"] == [7.0, 6.95, 6.9, 6.85]
-
-
-def test_an_identification_shows_each_trial_next_to_both_cards_those_held_out_first() -> None:
-    charts = drawn(IDENTIFIED)
-    assert list(charts)[::2] == ["Track: turn (held out)", "Track: zigzag (fitted)"]
-    speeds = panels(charts["Histories: turn (held out)"])["surge velocity (m/s)"]
-    assert [row["v"] for row in speeds if row["run"] == "card found"] == [7.0, 6.95, 6.9, 6.85]
 
 
 def test_the_turning_circle_of_a_poster_is_drawn_with_the_way_ahead_up() -> None:
@@ -347,7 +330,7 @@ def test_influence_has_the_page_of_the_command(tmp_path: Any) -> None:
 def test_the_charts_of_every_kind_open_without_a_word_in_the_console(
     tow: dict[str, Any], yaw: dict[str, Any], glide: dict[str, Any], tmp_path: Any
 ) -> None:
-    results = [{**SIMULATED, "ensemble": ENSEMBLE}, AUDITED, VALIDATED, IDENTIFIED, POSTER, tow, yaw, glide, PILOTED]
+    results = [{**SIMULATED, "ensemble": ENSEMBLE}, AUDITED, VALIDATED, POSTER, tow, yaw, glide, PILOTED]
     pages = [result_page(json.loads(json_text(one)), "r.json") for one in results]
     sections = [
         PageSection(heading=page.title, charts=[chart for section in page.sections for chart in section.charts])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -20,11 +21,17 @@ from tank2sim.identification.trials.assessment.evaluation import (
     pooled,
 )
 from tank2sim.identification.trials.identify import Identification
+from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
+from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.marks import FORCED
+from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import drawn_columns
 from tank2sim.units import from_si
+
+SETS = {"fitted": "fit", "held out": "holdout"}
+"""Words for a set of trials to its key in the JSON."""
 
 NO_YAW = 3.0
 """A run whose yaw rate stays below this many times its noise is straight."""
@@ -40,7 +47,10 @@ def identification_as_json(result: Identification, messages: tuple[str, ...] = (
     """
     estimate, known = result.estimate, result.identifiability
     parameters = _parameters(result)
+    forced = (f"{FORCED}: {'; '.join(result.forced)}",) if result.forced else ()
+    comparisons = {SETS[word]: (before, found) for word, before, found in result.comparisons}
     return {
+        "ship": result.card.ship.name,
         "method": estimate.method,
         "structure": result.structure,
         "forced": list(result.forced),
@@ -49,16 +59,17 @@ def identification_as_json(result: Identification, messages: tuple[str, ...] = (
             name.partition(".")[2]: entry for name, entry in parameters.items() if name.startswith("derivatives.")
         },
         "effects": {name: entry for name, entry in parameters.items() if not name.startswith("derivatives.")},
+        "effects_of_card": [effect.name for effect in result.card.effects],
         "misfit": _misfit(result),
         "yaw_rate_error_over_windows": {
             "fit": _windows(result.fit),
             "holdout": _windows(result.holdout) if result.holdout else None,
         },
-        "figures_are": FIGURES_ARE,
-        "figures": {
-            "fit": [_figure(figure) for figure in result.fit.figures],
-            "holdout": [_figure(figure) for figure in result.holdout.figures] if result.holdout else [],
+        "errors_over_windows": {
+            key: _errors_over_windows(*comparisons[key]) if key in comparisons else [] for key in SETS.values()
         },
+        "figures_are": FIGURES_ARE,
+        "figures": {key: _figures(*comparisons[key]) if key in comparisons else [] for key in SETS.values()},
         "structures": {
             name: {
                 "errors": structure.errors,
@@ -72,11 +83,15 @@ def identification_as_json(result: Identification, messages: tuple[str, ...] = (
         "prior_scale": dict(estimate.prior_scale),
         "cost": list(estimate.cost),
         "identifiability": {
+            "parameters": [name.removeprefix("derivatives.") for name in known.free],
             "condition": known.condition,
             "singular_values": known.singular_values,
+            "correlation": np.round(known.correlation, 7),
             "correlated_pairs": [[first, second, value] for first, second, value in known.pairs],
             "unseen": [list(direction) for direction in known.unseen],
+            "notices": list(known.notices),
         },
+        "notices": [*forced, *result.notices],
         "warnings": [*result.notices, *known.notices, *messages],
     }
 
@@ -89,14 +104,16 @@ def _parameters(result: Identification) -> dict[str, dict[str, float]]:
             "standard_error": error,
             "before": before,
             "before_standard_error": before_error,
+            "prior_standard_error": prior_error,
             "share_from_trials": share,
         }
-        for name, value, error, before, before_error, share in zip(
+        for name, value, error, before, before_error, prior_error, share in zip(
             estimate.free,
             estimate.values,
             estimate.standard_errors,
             result.problem.prior_mean,
             result.problem.prior_error,
+            scaled_prior(result.problem, estimate.prior_scale),
             known.share,
             strict=True,
         )
@@ -122,56 +139,72 @@ def _bootstrap(result: Identification) -> dict[str, object] | None:
     return {"members": len(result.bootstrap), "standard_errors": dict(zip(result.estimate.free, errors, strict=True))}
 
 
-def estimate_rows(result: Identification) -> list[list[object]]:
-    """Name, estimate, before, share of the information from the trials: a row for each free parameter."""
-    rows: list[list[object]] = []
-    problem, estimate = result.problem, result.estimate
-    for place, name in enumerate(estimate.free):
-        fitted = f"{estimate.values[place]:.5g} ± {estimate.standard_errors[place]:.2g}"
-        before = f"{problem.prior_mean[place]:.5g} ± {problem.prior_error[place]:.2g}"
-        share = f"{100 * result.identifiability.share[place]:.0f} %"
-        rows.append([name.removeprefix("derivatives."), fitted, before, share])
-    return rows
+def parameters_of(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Name to entry of ``derivatives`` or ``effects``, in the order of the estimate."""
+    entries = {**found["derivatives"], **found["effects"]}
+    return {name: entries[name] for name in found["identifiability"]["parameters"]}
 
 
-def following_rows(result: Identification) -> list[list[object]]:
-    """Run, fitted or held out, yaw-rate error over windows and over the whole run, before and after."""
-    noise = result.noise.get("motion.r", 0.0)
+def as_number(value: float | None) -> float:
+    """A number of the JSON; infinity for null."""
+    return np.inf if value is None else value
+
+
+def value_with_error(value: float, error: float | None) -> str:
+    """Value and standard error in words: ``-0.0035 ± 0.00012``."""
+    return f"{value:.5g} ± {as_number(error):.2g}"
+
+
+def estimate_rows(found: Mapping[str, Any]) -> list[list[object]]:
+    """Name, estimate, before, share of the information from the trials: a row for each free parameter of the JSON."""
     return [
-        [new.name, word, _yaw_error(old, noise), _yaw_error(new, noise)]
-        for word, before, after in result.comparisons
-        for old, new in zip(before.following, after.following, strict=True)
+        [
+            name,
+            value_with_error(entry["value"], entry["standard_error"]),
+            value_with_error(entry["before"], entry["before_standard_error"]),
+            f"{100 * as_number(entry['share_from_trials']):.0f} %",
+        ]
+        for name, entry in parameters_of(found).items()
     ]
 
 
-def structure_rows(result: Identification) -> list[list[object]]:
+def following_rows(found: Mapping[str, Any]) -> list[list[object]]:
+    """Run, fitted or held out, yaw-rate error over windows before and after, of the JSON."""
+    noise = from_si("r_degps", found["misfit"]["noise"].get("motion.r") or 0.0)
+    return [
+        [trial["trial"], word, _yaw_error(trial["before"], noise), _yaw_error(trial["found"], noise)]
+        for word, key in SETS.items()
+        for trial in found["errors_over_windows"][key]
+    ]
+
+
+def structure_rows(found: Mapping[str, Any]) -> list[list[object]]:
     """Structure, mean yaw-rate error of single runs held out, and of the runs of largest amplitude held out, %."""
-    return [
-        [name, 100 * float(np.mean(structure.errors[:-1])), 100 * float(structure.errors[-1])]
-        for name, structure in result.structures.items()
-    ]
+    errors = {
+        name: [100 * as_number(error) for error in structure["errors"]]
+        for name, structure in found["structures"].items()
+    }
+    return [[name, float(np.mean(single)), largest] for name, (*single, largest) in errors.items()]
 
 
-def figure_rows(result: Identification) -> list[list[object]]:
+def figure_error(figure: Mapping[str, Any], key: str = "predicted") -> float:
+    """Predicted less measured by the JSON; for distances as a share of the measured one; nan where not reached."""
+    if figure[key] is None:
+        return np.nan
+    difference = float(figure[key] - figure["measured"])
+    return difference / figure["measured"] if figure["figure"].endswith("_m") else difference
+
+
+def figure_rows(found: Mapping[str, Any]) -> list[list[object]]:
     """Trial, fitted or held out, figure, measured, predicted before and after, error after, 95 % interval."""
     rows: list[list[object]] = []
-    for word, before, after in result.comparisons:
-        old = {(figure.trial, figure.name): figure for figure in before.figures}
-        for figure in after.figures:
-            earlier = old.get((figure.trial, figure.name))
-            error = f"{100 * figure.error:+.1f} %" if figure.name.endswith("_m") else f"{figure.error:+.2f}"
-            rows.append(
-                [
-                    figure.trial,
-                    word,
-                    figure.name,
-                    figure.measured,
-                    earlier.predicted if earlier else None,
-                    figure.predicted,
-                    "-" if np.isnan(figure.error) else error,
-                    f"{figure.interval[0]:.4g} to {figure.interval[1]:.4g}" if figure.interval else "-",
-                ]
-            )
+    for word, key in SETS.items():
+        for figure in found["figures"][key]:
+            error, interval = figure_error(figure), figure["interval_95"]
+            text = f"{100 * error:+.1f} %" if figure["figure"].endswith("_m") else f"{error:+.2f}"
+            numbers = [figure[name] for name in ("measured", "before", "predicted")]
+            expected = " to ".join(f"{as_number(end):.4g}" for end in interval) if interval else "-"
+            rows.append([figure["trial"], word, figure["figure"], *numbers, "-" if np.isnan(error) else text, expected])
     return rows
 
 
@@ -196,25 +229,65 @@ def _windows(comparison: Comparison) -> dict[str, float]:
     return {**runs, "all": pooled(comparison.following, "motion.r")}
 
 
-def _yaw_error(following: Following, noise: float) -> str:
+def _errors_over_windows(before: Comparison, found: Comparison) -> list[dict[str, object]]:
+    """Of each trial the errors of both cards by column, with the size of the signal that they are a share of."""
+    return [
+        {"trial": new.name, "before": _window_errors(old), "found": _window_errors(new)}
+        for old, new in zip(before.following, found.following, strict=True)
+    ]
+
+
+def _window_errors(following: Following) -> dict[str, dict[str, float]]:
+    return {
+        column: {"rms_error": from_si(column, error), "rms_signal": from_si(column, size)}
+        for column, (error, size) in ((_OBSERVED[name], errors) for name, errors in following.windows.items())
+    }
+
+
+def relative_error(errors: Mapping[str, float | None]) -> float:
+    """Error over windows as a share of the signal, of the JSON."""
+    size = errors["rms_signal"]
+    return as_number(errors["rms_error"]) / size if size else np.inf
+
+
+def pooled_error(trials: Sequence[Mapping[str, Any]], card: str) -> float:
+    """Error of the yaw rate over windows of all trials together, as a share of it, of the JSON.
+
+    `trials` are those of ``errors_over_windows``, `card` is ``before`` or ``found``.
+    """
+    errors = [trial[card]["r_degps"] for trial in trials if "r_degps" in trial[card]]
+    following = [Following("", {"r": (as_number(error["rms_error"]), error["rms_signal"])}, {}) for error in errors]
+    return pooled(following, "r")
+
+
+def _yaw_error(windows: Mapping[str, Any], noise: float) -> str:
     """Error of the yaw rate over windows, %; a phrase where such a share has no meaning."""
-    if "motion.r" not in following.windows:
+    if "r_degps" not in windows:
         return "no yaw rate measured"
-    if following.windows["motion.r"][1] < NO_YAW * noise:
+    if as_number(windows["r_degps"]["rms_signal"]) < NO_YAW * noise:
         return "no yaw"
-    return f"{100 * following.relative('motion.r'):.3g} %"
+    return f"{100 * relative_error(windows['r_degps']):.3g} %"
 
 
-def _figure(figure: FigureComparison) -> dict[str, object]:
+def _figures(before: Comparison, found: Comparison) -> list[dict[str, object]]:
+    given = {(figure.trial, figure.name): figure.predicted for figure in before.figures}
+    return [_figure(figure, given.get((figure.trial, figure.name))) for figure in found.figures]
+
+
+def _figure(figure: FigureComparison, before: float | None) -> dict[str, object]:
     return {
         "trial": figure.trial,
         "figure": figure.name,
         "measured": figure.measured,
+        "before": before,
         "predicted": figure.predicted,
         "error": None if figure.predicted is None else figure.predicted - figure.measured,
         "interval_95": figure.interval,
     }
 
+
+_OBSERVED = {variable: SignalName(signal).file for signal, variable in OBSERVED_SIGNALS.items()}
+"""Variable of a model to the column of a trial file that measures it."""
 
 _COLUMNS = {
     "rudder": "delta_deg",

@@ -11,7 +11,6 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.gap.outcome.export import measured_in, signal_display_name
 from tank2sim.gap.result import Gap, MisfitPlace, Passed
-from tank2sim.identification.trials.assessment.evaluation import Passage
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.thinning import thin_points
 from tank2sim.report.identification.charts import (
@@ -20,7 +19,7 @@ from tank2sim.report.identification.charts import (
     MEASURED,
     MODEL_SERIES,
     PANELS_PER_ROW,
-    BeforeAfter,
+    SERIES,
     history_grid,
     track_grid,
 )
@@ -37,6 +36,7 @@ from tank2sim.report.kit.chart_parts import (
     series_look,
     with_unit,
 )
+from tank2sim.report.kit.json_values import Json
 
 MOST_TRIALS_DRAWN = 12
 """Tracks in one picture: those of the largest misfit before; more are hard to look at (project choice)."""
@@ -48,15 +48,15 @@ _PER_SHEET = 6
 """Trials in one picture of histories: as many as are readable on a sheet of paper."""
 
 HISTORIES = {
-    "motion.psi": ("heading", "rad"),
-    "motion.r": ("yaw rate", "rad/s"),
-    "motion.u": ("velocity ahead", "m/s"),
-    "motion.v": ("velocity to starboard", "m/s"),
-    "motion.u_ground": ("velocity ahead, ground", "m/s"),
-    "motion.v_ground": ("to starboard, ground", "m/s"),
-    "motion.sog": ("speed over ground", "m/s"),
+    "psi_deg": "heading",
+    "r_degps": "yaw rate",
+    "u_mps": "velocity ahead",
+    "v_mps": "velocity to starboard",
+    "u_ground_mps": "velocity ahead, ground",
+    "v_ground_mps": "to starboard, ground",
+    "sog_mps": "speed over ground",
 }
-"""Signal that is shown over time, to its words and unit."""
+"""Column of a trial that is shown over time, to its words."""
 
 SHOWN_SAMPLES, SHOWN_POINTS = 140, 50
 """Samples of a line, and points of what was measured, in a panel of about 200 px."""
@@ -89,7 +89,7 @@ def gap_tracks(gap: Gap, *, held_out: bool, title: str = "") -> alt.ConcatChart 
     """
     chosen = [replay for replay in gap.passed if replay.held_out == held_out]
     worst = {trial.name for trial in sorted(chosen, key=lambda trial: -trial.misfit("before"))[:MOST_TRIALS_DRAWN]}
-    return track_grid([_pair(trial) for trial in chosen if trial.name in worst], title=title)
+    return track_grid([_columns(trial) for trial in chosen if trial.name in worst], title=title)
 
 
 def gap_histories(gap: Gap, *, held_out: bool, title: str = "") -> list[alt.ConcatChart]:
@@ -98,23 +98,26 @@ def gap_histories(gap: Gap, *, held_out: bool, title: str = "") -> list[alt.Conc
     Of many trials those are shown whose misfit before was largest.
     """
     chosen = [
-        replay for replay in gap.passed if replay.held_out == held_out and set(HISTORIES) & set(measured_in(replay))
+        replay
+        for replay in gap.passed
+        if replay.held_out == held_out
+        and any(signal_display_name(name).file in HISTORIES for name in measured_in(replay))
     ]
     worst = {trial.name for trial in sorted(chosen, key=lambda trial: -trial.misfit("before"))[:MOST_TRIALS_DRAWN]}
-    pairs = [_pair(trial) for trial in chosen if trial.name in worst]
-    sheets = [pairs[first : first + _PER_SHEET] for first in range(0, len(pairs), _PER_SHEET)]
+    columns = [_columns(trial) for trial in chosen if trial.name in worst]
+    sheets = [columns[first : first + _PER_SHEET] for first in range(0, len(columns), _PER_SHEET)]
     return [history_grid(sheet, signals=HISTORIES, title=title) for sheet in sheets]
 
 
-def _pair(replay: Passed) -> BeforeAfter:
-    measured = {name: replay.measured[name] for name in measured_in(replay)}
-    before, after = (
-        Passage(
-            replay.name, False, replay.time_s, measured, replay.time_s, {name: simulated[name] for name in measured}
-        )
-        for simulated in (replay.before, replay.after)
-    )
-    return BeforeAfter(before=before, after=after)
+def _columns(replay: Passed) -> Json:
+    """A trial in the form of ``replays`` in the JSON of an identification."""
+    names = {name: signal_display_name(name) for name in measured_in(replay)}
+    runs = {MEASURED: replay.measured, BEFORE: replay.before, AFTER: replay.after}
+    return {"trial": replay.name} | {
+        SERIES[label]: {"t_s": replay.time_s}
+        | {column.file: column.factor * values[name] for name, column in names.items()}
+        for label, values in runs.items()
+    }
 
 
 def shown_places(gap: Gap) -> list[MisfitPlace]:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import altair as alt
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.identification.trials.assessment.evaluation import FigureComparison, Following, Passage
+from tank2sim.identification.trials.as_json import as_number, relative_error
 from tank2sim.records.thinning import Indices, thin_points
 from tank2sim.report.kit.before_after import before_after_switch, switch
 from tank2sim.report.kit.chart_parts import (
@@ -24,9 +23,10 @@ from tank2sim.report.kit.chart_parts import (
     plain,
     records,
     series_look,
-    shown_unit,
     with_unit,
 )
+from tank2sim.report.kit.json_values import Json
+from tank2sim.units import in_words
 
 MEASURED, BEFORE, AFTER = "measured", "card before", "card found"
 
@@ -39,79 +39,67 @@ PANELS_PER_ROW = 3
 MODEL_SAMPLES, MEASURED_SAMPLES = 140, 40
 """Samples of a line, and points of a series, in a small panel (about 200 px wide)."""
 
+SERIES = {MEASURED: "measured", BEFORE: "before", AFTER: "found"}
+"""Series to its key in a trial of ``replays`` in the JSON."""
+
 _SIGNALS = {
-    "rudder": ("rudder", "rad"),
-    "motion.psi": ("heading", "rad"),
-    "motion.r": ("yaw rate", "rad/s"),
-    "motion.speed": ("speed", "m/s"),
-    "motion.beta": ("drift angle", "rad"),
+    "delta_deg": "rudder",
+    "psi_deg": "heading",
+    "r_degps": "yaw rate",
+    "speed_mps": "speed",
+    "beta_deg": "drift angle",
 }
-"""Signal of a passage that is shown over time, to its words and unit."""
+"""Column of a trial that is shown over time, to its words."""
 
 SYMBOLS = {
-    "motion.u": ("u", "m/s"),
-    "motion.v": ("v", "m/s"),
-    "motion.u_ground": ("u ground", "m/s"),
-    "motion.v_ground": ("v ground", "m/s"),
-    "motion.sog": ("speed", "m/s"),
-    "motion.r": ("r", "rad/s"),
-    "motion.psi": ("ψ", "rad"),
-    "motion.phi": ("φ", "rad"),
-    "motion.x": ("x", "m"),
-    "motion.y": ("y", "m"),
+    "u_mps": "u",
+    "v_mps": "v",
+    "u_ground_mps": "u ground",
+    "v_ground_mps": "v ground",
+    "sog_mps": "speed",
+    "r_degps": "r",
+    "psi_deg": "ψ",
+    "phi_deg": "φ",
+    "x_m": "x",
+    "y_m": "y",
 }
 
+_TRACK = ("x_m", "y_m")
 _LOOK = series_look([AFTER, BEFORE, MEASURED], as_points=[MEASURED])
 _POINT_LOOK = {"color": _LOOK.colour.to_dict(), "shape": _LOOK.shape.to_dict()}
 _LINE_LOOK = {"color": _LOOK.colour.to_dict(), "strokeDash": _LOOK.dash.to_dict()}
 _SHARED = {"color": "shared", "strokeDash": "shared", "shape": "shared"}
 
 
-@dataclass(frozen=True, kw_only=True)
-class BeforeAfter:
-    """One trial next to the card before, and next to the card found."""
-
-    before: Passage
-    after: Passage
-
-    @property
-    def name(self) -> str:
-        """Of the trial."""
-        return self.after.name
-
-
-def track_grid(pairs: Sequence[BeforeAfter], *, title: str = "") -> alt.ConcatChart | None:
+def track_grid(trials: Sequence[Json], *, title: str = "") -> alt.ConcatChart | None:
     """Tracks, a panel a trial, x north up and y east to the right in one scale; measured as points, models as lines.
 
-    The scale is that of what was measured and of the card found: the card before may leave the panel. None where no
-    trial has a track.
+    `trials` are those of ``replays`` in the JSON. The scale is that of what was measured and of the card found: the
+    card before may leave the panel. None where no trial has a track.
     """
     panels, rows_of = [], {}
-    for pair in pairs:
-        series = {
-            label: columns
-            for label, columns in _series(pair, ("motion.x", "motion.y")).items()
-            if {"motion.x", "motion.y"} <= set(columns)
-        }
+    for trial in trials:
+        series = {label: columns for label, columns in _series(trial, _TRACK).items() if set(_TRACK) <= set(columns)}
         if not series:
             continue
         shown = [columns for label, columns in series.items() if label != BEFORE] or list(series.values())
-        north, east = (np.concatenate([columns[name] for columns in shown]) for name in ("motion.x", "motion.y"))
+        north, east = (np.concatenate([columns[name] for columns in shown]) for name in _TRACK)
         frame = equal_frame(east, north, width_px=205, height_px=260)
         position = frame.axes(across=("y:Q", "east y (m)"), up=("x:Q", "north x (m)"))
         narrow = alt.Axis(tickCount=max(2, frame.width_px // 70), labelOverlap="greedy", labelSeparation=6)
         position["x"] = position["x"].axis(narrow)
         rows: list[ChartRecord] = []
         for label, columns in series.items():
-            kept = _thinned(label, [columns["motion.x"], columns["motion.y"]])
-            rows += records(label, {"x": columns["motion.x"][kept], "y": columns["motion.y"][kept]})
+            kept = _thinned(label, [columns["x_m"], columns["y_m"]])
+            rows += records(label, {"x": columns["x_m"][kept], "y": columns["y_m"][kept]})
         tooltip = [
             alt.Tooltip("x:Q", title="north (m)", format=NUMBER),
             alt.Tooltip("y:Q", title="east (m)", format=NUMBER),
         ]
-        rows_of[pair.name] = rows
-        layers = alt.layer(*_marks(position, tooltip), data=alt.NamedData(pair.name))
-        panels.append(layers.properties(title=_small(pair.name), width=frame.width_px, height=frame.height_px))
+        name = trial["trial"]
+        rows_of[name] = rows
+        layers = alt.layer(*_marks(position, tooltip), data=alt.NamedData(name))
+        panels.append(layers.properties(title=_small(name), width=frame.width_px, height=frame.height_px))
     if not panels:
         return None
     text = f"Tracks of {', '.join(rows_of)}, measured and simulated; north is up."
@@ -120,32 +108,29 @@ def track_grid(pairs: Sequence[BeforeAfter], *, title: str = "") -> alt.ConcatCh
     return _with_rows(chart, rows_of)
 
 
-def history_grid(
-    pairs: Sequence[BeforeAfter], *, signals: Mapping[str, tuple[str, str]] = _SIGNALS, title: str = ""
-) -> alt.ConcatChart:
-    """Signals over time, a column of panels a trial; `signals` as :data:`_SIGNALS` has them, angles in degrees."""
-    made = {pair.name: _histories(pair, signals) for pair in pairs}
+def history_grid(trials: Sequence[Json], *, signals: Mapping[str, str] = _SIGNALS, title: str = "") -> alt.ConcatChart:
+    """Signals over time, a column of panels a trial; `trials` as for :func:`track_grid`, `signals`: column to words."""
+    made = {trial["trial"]: _histories(trial, signals) for trial in trials}
     text = f"Time histories of {', '.join(made)}, measured and simulated."
     chart = _grid([panels for panels, _ in made.values()], title, text)
     return _with_rows(chart, {name: rows for name, (_, rows) in made.items()})
 
 
-def _histories(pair: BeforeAfter, signals: Mapping[str, tuple[str, str]]) -> tuple[alt.VConcatChart, list[ChartRecord]]:
-    series = _series(pair, tuple(signals))
+def _histories(trial: Json, signals: Mapping[str, str]) -> tuple[alt.VConcatChart, list[ChartRecord]]:
+    series = _series(trial, tuple(signals))
     names = [name for name in signals if any(name in columns for columns in series.values())]
     fields = {name: f"s{place}" for place, name in enumerate(signals)}
     rows: list[ChartRecord] = []
     for label, columns in series.items():
-        factors = {name: shown_unit(signals[name][1])[1] for name in names if name in columns}
-        kept = _thinned(label, [columns[name] for name in factors])
-        values = {fields[name]: factor * columns[name][kept] for name, factor in factors.items()}
-        rows += records(label, {"t": columns["time"][kept], **values})
-    times = extent(np.concatenate([columns["time"] for columns in series.values()]))
+        shown = {name: columns[name] for name in names if name in columns}
+        kept = _thinned(label, list(shown.values()))
+        values = {fields[name]: column[kept] for name, column in shown.items()}
+        rows += records(label, {"t": columns["t_s"][kept], **values})
+    times = extent(np.concatenate([columns["t_s"] for columns in series.values()]))
     scale = alt.Scale(domain=list(times), nice=False, zero=False)
     panels = []
     for name in names:
-        words, unit = signals[name]
-        up, last = with_unit(words, shown_unit(unit)[0]), name == names[-1]
+        up, last = with_unit(signals[name], in_words(name)[1]), name == names[-1]
         axis = alt.Axis(title="time (s)", tickCount=4) if last else alt.Axis(title=None, labels=False, ticks=False)
         position: Position = {
             "x": alt.X("t:Q", scale=scale, axis=axis),
@@ -156,8 +141,8 @@ def _histories(pair: BeforeAfter, signals: Mapping[str, tuple[str, str]]) -> tup
             alt.Tooltip(f"{fields[name]}:Q", title=up, format=NUMBER),
         ]
         panels.append(alt.layer(*_marks(position, tooltip)).properties(width=200, height=66))
-    chart = alt.vconcat(*panels, data=alt.NamedData(pair.name), spacing=12).resolve_scale(x="shared", **_SHARED)
-    return chart.properties(title=_small(pair.name)), rows
+    chart = alt.vconcat(*panels, data=alt.NamedData(trial["trial"]), spacing=12).resolve_scale(x="shared", **_SHARED)
+    return chart.properties(title=_small(trial["trial"])), rows
 
 
 def _whole(rows: Sequence[ChartRecord], field: str) -> alt.Scale:
@@ -166,25 +151,23 @@ def _whole(rows: Sequence[ChartRecord], field: str) -> alt.Scale:
     return alt.Scale(domain=list(extent(values)), nice=True, zero=False)
 
 
-def window_chart(
-    sets: Mapping[str, tuple[Sequence[Following], Sequence[Following]]], *, title: str = ""
-) -> alt.VConcatChart:
+def window_chart(sets: Mapping[str, Sequence[Json]], *, title: str = "") -> alt.VConcatChart:
     """Error over windows of each signal in each trial, as a share of the signal, as a heat map.
 
     Parameters
     ----------
     sets : mapping
-        ``fitted`` and ``held out`` to how the card before and the card found follow their trials.
+        ``fitted`` and ``held out`` to their trials in ``errors_over_windows`` of the JSON.
     title : str
         Of the chart.
     """
-    every = [result for pair in sets.values() for results in pair for result in results]
-    signals = [SYMBOLS[name][0] for name in SYMBOLS if any(name in comparison.windows for comparison in every)]
+    every = [trial[SERIES[label]] for trials in sets.values() for trial in trials for label in MODEL_SERIES.values()]
+    signals = [symbol for name, symbol in SYMBOLS.items() if any(name in errors for errors in every)]
     rows = []
-    for word, pair in sets.items():
+    for word, trials in sets.items():
         maps = [
-            _window_map(results, signals, f"{words} · {word}", named=words == BEFORE)
-            for words, results in zip((BEFORE, AFTER), pair, strict=True)
+            _window_map(trials, label, signals, f"{label} · {word}", named=label == BEFORE)
+            for label in MODEL_SERIES.values()
         ]
         rows.append(alt.hconcat(*maps, spacing=16))
     return alt.vconcat(*rows, spacing=18).properties(
@@ -193,19 +176,19 @@ def window_chart(
     )
 
 
-def _window_map(results: Sequence[Following], signals: Sequence[str], title: str, *, named: bool) -> alt.LayerChart:
+def _window_map(
+    trials: Sequence[Json], label: str, signals: Sequence[str], title: str, *, named: bool
+) -> alt.LayerChart:
     rows = []
-    for result in results:
-        for name, (error, _) in result.windows.items():
-            symbol, unit = SYMBOLS.get(name, (name, "1"))
-            shown, factor = shown_unit(unit)
-            share = 100 * result.relative(name)
+    for trial in trials:
+        for name, errors in trial[SERIES[label]].items():
+            share, error = 100 * relative_error(errors), as_number(errors["rms_error"])
             rows.append(
-                {"trial": result.name, "signal": symbol, "share": plain(share), "text": _in_three(share)}
-                | {"error": f"{factor * error:.3g} {shown}".strip()}
+                {"trial": trial["trial"], "signal": SYMBOLS.get(name, name), "share": plain(share)}
+                | {"text": _in_three(share), "error": f"{error:.3g} {in_words(name)[1]}".strip()}
             )
     side = alt.Axis(title=None, labelLimit=230) if named else alt.Axis(title=None, labels=False, ticks=False)
-    y = alt.Y("trial:N", sort=[result.name for result in results], axis=side)
+    y = alt.Y("trial:N", sort=[trial["trial"] for trial in trials], axis=side)
     x = alt.X("signal:N", sort=list(signals), scale=alt.Scale(domain=list(signals)))
     x = x.axis(title="signal", orient="bottom", labelAngle=0)
     colours = alt.Scale(type="log", domain=[1, 100], scheme="blues", clamp=True)
@@ -220,19 +203,17 @@ def _window_map(results: Sequence[Following], signals: Sequence[str], title: str
     cells = base.mark_rect().encode(color=alt.Color("share:Q", scale=colours, legend=legend))
     ink = alt.condition("datum.share > 18", alt.value("white"), alt.value("black"))  # on the cell, whatever the page
     numbers = base.mark_text(fontSize=10.5).encode(text="text:N", color=ink)
-    size = {"width": 38 * len(signals), "height": 21 * len(results)}
+    size = {"width": 38 * len(signals), "height": 21 * len(trials)}
     return alt.layer(cells, numbers).properties(title=_small(title), **size)
 
 
-def figure_chart(
-    sets: Mapping[str, tuple[Sequence[FigureComparison], Sequence[FigureComparison]]], *, title: str = ""
-) -> alt.VConcatChart | None:
+def figure_chart(sets: Mapping[str, Sequence[Json]], *, title: str = "") -> alt.VConcatChart | None:
     """Figures of turns and zigzags, predicted against measured, and their errors; None without a figure.
 
     Parameters
     ----------
     sets : mapping
-        ``fitted`` and ``held out`` to the figures by the card before, and by the card found.
+        ``fitted`` and ``held out`` to their ``figures`` in the JSON.
     title : str
         Of the chart.
     """
@@ -248,27 +229,27 @@ def figure_chart(
     )
 
 
-def _figure_rows(
-    sets: Mapping[str, tuple[Sequence[FigureComparison], Sequence[FigureComparison]]], ending: str
-) -> Iterable[ChartRecord]:
-    for word, pair in sets.items():
-        for label, figures in zip((BEFORE, AFTER), pair, strict=True):
+def _figure_rows(sets: Mapping[str, Sequence[Json]], ending: str) -> Iterable[ChartRecord]:
+    for word, figures in sets.items():
+        for label, key, interval in ((BEFORE, "before", None), (AFTER, "predicted", "interval_95")):
             for figure in figures:
-                if figure.name.endswith(ending):
-                    yield {"run": label, "set": word} | _figure_row(figure, ending)
+                if figure["figure"].endswith(ending):
+                    ends = figure[interval] if interval else None
+                    yield {"run": label, "set": word} | _figure_row(figure, ending, figure[key], ends)
 
 
-def _figure_row(figure: FigureComparison, ending: str) -> ChartRecord:
-    predicted = math.nan if figure.predicted is None else figure.predicted
-    low, high = figure.interval or (predicted, predicted)
+def _figure_row(figure: Json, ending: str, value: float | None, interval: Sequence[float | None] | None) -> ChartRecord:
+    predicted = math.nan if value is None else value
+    low, high = (as_number(end) for end in interval or (predicted, predicted))
+    measured = figure["measured"]
 
     def error(value: float) -> float | None:
-        difference = value - figure.measured
-        return plain(100 * difference / figure.measured if ending == "_m" else difference)
+        difference = value - measured
+        return plain(100 * difference / measured if ending == "_m" else difference)
 
     return {
-        "name": f"{figure.trial} · {figure.name.removesuffix(ending).replace('_', ' ')}",
-        "measured": plain(figure.measured),
+        "name": f"{figure['trial']} · {figure['figure'].removesuffix(ending).replace('_', ' ')}",
+        "measured": plain(measured),
         "predicted": plain(predicted),
         "low": plain(low),
         "high": plain(high),
@@ -322,33 +303,22 @@ def _figure_panels(rows: list[ChartRecord], words: str, unit: str, error_unit: s
     ).resolve_scale(**_SHARED)
 
 
-def _series(pair: BeforeAfter, names: Sequence[str]) -> dict[str, dict[str, Array]]:
-    """Label to time and those of the signals that it has; what ran away is left out.
+def _series(trial: Json, names: Sequence[str]) -> dict[str, dict[str, Array]]:
+    """Label to time and those of the columns that it has; what ran away is left out.
 
     Of what was measured the part that was simulated: after a turn, a model or ship may have sailed on for long.
     """
-    sources = {
-        MEASURED: (pair.after.time_s, pair.after.measured),
-        BEFORE: (pair.before.model_time_s, pair.before.simulated),
-        AFTER: (pair.after.model_time_s, pair.after.simulated),
+    series = {
+        label: {name: np.array(trial[key][name], dtype=float) for name in ("t_s", *names) if name in trial[key]}
+        for label, key in SERIES.items()
+        if not set(names).isdisjoint(trial[key])
     }
-    series = {}
-    for label, (time, columns) in sources.items():
-        known = {name: columns[name] for name in names if name in columns}
-        if label == MEASURED and known:
-            inside = _simulated_part(pair, time)
-            series[label] = {name: values[inside] for name, values in {"time": time, **known}.items()}
-        elif known:
-            series[label] = {"time": time, **known}
+    times = [columns["t_s"] for label, columns in series.items() if label != MEASURED]
+    if times and MEASURED in series:
+        time = series[MEASURED]["t_s"]
+        inside = (time >= min(model[0] for model in times)) & (time <= max(model[-1] for model in times))
+        series[MEASURED] = {name: values[inside] for name, values in series[MEASURED].items()}
     return series
-
-
-def _simulated_part(pair: BeforeAfter, time: Array) -> slice:
-    ends = [replay.model_time_s[[0, -1]] for replay in (pair.after, pair.before) if len(replay.model_time_s)]
-    if not ends:
-        return slice(None)
-    first, last = np.searchsorted(time, [min(end[0] for end in ends), max(end[1] for end in ends)])
-    return slice(max(int(first) - 1, 0), int(last) + 1)
 
 
 def _thinned(label: str, columns: Sequence[Array]) -> Indices:

@@ -7,26 +7,21 @@ from collections.abc import Mapping, Sequence
 import altair as alt
 import numpy as np
 
-from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.identification.trials.as_json import estimate_rows, figure_rows, following_rows, replays, structure_rows
-from tank2sim.identification.trials.assessment.comparison import Comparison
-from tank2sim.identification.trials.assessment.evaluation import TURN_FIGURE_NAMES, pooled
-from tank2sim.identification.trials.identify import Identification
-from tank2sim.identification.trials.methods.posterior import scaled_prior
-from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.report.identification.charts import (
-    BeforeAfter,
-    figure_chart,
-    history_grid,
-    track_grid,
-    window_chart,
+from tank2sim.identification.trials.as_json import (
+    SETS,
+    estimate_rows,
+    figure_error,
+    figure_rows,
+    following_rows,
+    parameters_of,
+    pooled_error,
+    relative_error,
+    structure_rows,
 )
-from tank2sim.report.identification.parameter_charts import (
-    Parameters,
-    correlation_chart,
-    parameter_chart,
-    singular_value_chart,
-)
+from tank2sim.identification.trials.assessment.evaluation import TURN_FIGURE_NAMES
+from tank2sim.report.identification.charts import figure_chart, history_grid, track_grid, window_chart
+from tank2sim.report.identification.parameter_charts import correlation_chart, parameter_chart, singular_value_chart
+from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
 
 FITTED, HELD_OUT = "fitted", "held out"
@@ -39,53 +34,36 @@ _PER_SHEET = 6
 """Trials in one picture of histories: as many as are readable on a sheet of paper."""
 
 
-def pairs_of(card: ManoeuvringCard, result: Identification, trials: Measured) -> tuple[BeforeAfter, ...]:
-    """Each trial next to `card`, the one that was given, and next to the card found."""
-    return tuple(BeforeAfter(before=before, after=after) for before, after in replays(card, result, trials))
-
-
-def identification_charts(
-    result: Identification, fitted: Sequence[BeforeAfter], held: Sequence[BeforeAfter] = ()
-) -> dict[str, alt.TopLevelMixin]:
-    """File stem to chart; `fitted` and `held` as :func:`pairs_of` gives them."""
+def identification_charts(found: Json) -> dict[str, alt.TopLevelMixin]:
+    """Return the charts of the JSON by file stem."""
     charts: dict[str, alt.TopLevelMixin] = {}
-    sets = _sets(result)
-    errors = {word: (before.following, after.following) for word, (before, after) in sets.items()}
-    charts["windows"] = window_chart(errors, title="Error over windows of five ship lengths, of each signal")
-    if chart := figure_chart(
-        {word: (before.figures, after.figures) for word, (before, after) in sets.items()},
-        title="Figures of turns and zigzags, in closed loop",
-    ):
+    windows = _sets(found["errors_over_windows"])
+    charts["windows"] = window_chart(windows, title="Error over windows of five ship lengths, of each signal")
+    figures = {word: found["figures"][SETS[word]] for word in windows}
+    if chart := figure_chart(figures, title="Figures of turns and zigzags, in closed loop"):
         charts["figures"] = chart
-    for word, pairs in ((HELD_OUT, held), (FITTED, fitted)):
-        if pairs:
-            stem, shown = word.replace(" ", "_"), _worst(pairs, sets[word][1])
+    for word in (HELD_OUT, FITTED):
+        trials = [trial for trial in found["replays"] if trial["held_out"] == (word == HELD_OUT)]
+        if trials:
+            stem, shown = word.replace(" ", "_"), _worst(trials, windows[word])
             if tracks := track_grid(shown, title=f"Tracks of trials {word}"):
                 charts[f"tracks_{stem}"] = tracks
             for first in range(0, len(shown), _PER_SHEET):
                 part = f"_{first // _PER_SHEET + 1}" if first else ""
                 sheet = shown[first : first + _PER_SHEET]
                 charts[f"histories_{stem}{part}"] = history_grid(sheet, title=f"Motions of trials {word}")
-    known, estimate = result.identifiability, result.estimate
-    names = [name.removeprefix("derivatives.") for name in estimate.free]
-    # The prior as the fit took it: widened where the trials demanded.
-    prior = scaled_prior(result.problem, estimate.prior_scale)
-    parameters = Parameters(
-        names=names,
-        values=estimate.values,
-        errors=estimate.standard_errors,
-        prior=result.problem.prior_mean,
-        prior_errors=prior,
-        share=known.share,
-    )
+    known, parameters = found["identifiability"], parameters_of(found)
     charts["parameters"] = parameter_chart(parameters, title="Parameters: estimate and prior with 95 % intervals")
     charts["correlation"] = correlation_chart(known, title="Correlation of the parameters, by the trials alone")
-    charts["singular_values"] = singular_value_chart(known, title="Information of the trials: singular values")
+    charts["singular_values"] = singular_value_chart(
+        known["singular_values"], title="Information of the trials: singular values"
+    )
     return charts
 
 
-def identification_page(result: Identification, charts: Mapping[str, alt.TopLevelMixin]) -> Page:
-    """The page; `charts` as :func:`identification_charts` gives them."""
+def identification_page(found: Json) -> Page:
+    """Return the page of the JSON of ``tank2sim identify``."""
+    charts = identification_charts(found)
 
     def drawn(*stems: str) -> list[Illustration]:
         return [
@@ -99,17 +77,17 @@ def identification_page(result: Identification, charts: Mapping[str, alt.TopLeve
             heading="How well trials are followed",
             text=_FOLLOWED,
             charts=drawn("windows"),
-            tables=[_table("Yaw rate, error over windows", ("trial", "", "before", "now"), following_rows(result))],
+            tables=[_table("Yaw rate, error over windows", ("trial", "", "before", "now"), following_rows(found))],
         )
     ]
-    if tables := _figure_tables(result):
+    if tables := _figure_tables(found):
         sections.append(
             PageSection(heading="Figures of manoeuvres", text=_FIGURES, charts=drawn("figures"), tables=tables)
         )
     for word in (HELD_OUT, FITTED):
         stem = word.replace(" ", "_")
         if charts_there := drawn(f"tracks_{stem}", f"histories_{stem}"):
-            count = len(_sets(result)[word][1].following)
+            count = len(found["errors_over_windows"][SETS[word]])
             text = f"The {MOST_TRIALS} of {count} trials with the largest error of yaw rate."
             sections.append(
                 PageSection(heading=f"Trials {word}", text=text if count > MOST_TRIALS else "", charts=charts_there)
@@ -117,22 +95,22 @@ def identification_page(result: Identification, charts: Mapping[str, alt.TopLeve
     sections.append(
         PageSection(
             heading="Parameters",
-            text=_PARAMETERS + _widened(result),
+            text=_PARAMETERS + _widened(found["prior_scale"]),
             charts=drawn("parameters", "correlation", "singular_values"),
-            tables=[_table("Parameters, ± one standard error", _PARAMETER_HEADS, estimate_rows(result))],
-            notes=result.identifiability.notices,
+            tables=[_table("Parameters, ± one standard error", _PARAMETER_HEADS, estimate_rows(found))],
+            notes=found["identifiability"]["notices"],
         )
     )
-    if structures := structure_rows(result):
+    if structures := structure_rows(found):
         table = _table("Yaw-rate error over windows of trials left out of the fit, %", _STRUCTURE_HEADS, structures)
         sections.append(PageSection(heading="Structure, by cross-validation", tables=[table]))
-    if result.notices:
-        rows: list[list[object]] = [[notice] for notice in result.notices]
+    if found["notices"]:
+        rows: list[list[object]] = [[notice] for notice in found["notices"]]
         sections.append(
             PageSection(heading="Notices", tables=[_table("What was repaired, scaled and assumed", ("",), rows)])
         )
-    subtitle = f"Coefficients from free-running trials by {result.estimate.method.replace('_', ' ')}"
-    return Page(title=result.card.ship.name, subtitle=subtitle, figures=_key_figures(result), sections=sections)
+    subtitle = f"Coefficients from free-running trials by {found['method'].replace('_', ' ')}"
+    return Page(title=found["ship"], subtitle=subtitle, figures=_key_figures(found), sections=sections)
 
 
 _FOLLOWED = (
@@ -162,42 +140,38 @@ _CAPTIONS = {
 }
 
 
-def _sets(result: Identification) -> dict[str, tuple[Comparison, Comparison]]:
-    sets = {FITTED: (result.before, result.fit)}
-    if result.holdout and result.before_holdout:
-        sets[HELD_OUT] = (result.before_holdout, result.holdout)
-    return sets
+def _sets(entries: Mapping[str, Json]) -> dict[str, Json]:
+    """Words for a set of trials to its entries, without a set that has none."""
+    return {word: entries[key] for word, key in SETS.items() if entries[key]}
 
 
-def _worst(pairs: Sequence[BeforeAfter], comparison: Comparison) -> list[BeforeAfter]:
+def _worst(trials: Sequence[Json], windows: Sequence[Json]) -> list[Json]:
     """The trials with the largest error of yaw rate, in their own order, where there are too many for a picture."""
     errors = {
-        trial.name: trial.relative("motion.r") if "motion.r" in trial.windows else 0.0 for trial in comparison.following
+        trial["trial"]: relative_error(trial["found"]["r_degps"]) for trial in windows if "r_degps" in trial["found"]
     }
-    kept = {pair.name for pair in sorted(pairs, key=lambda pair: -errors.get(pair.name, 0.0))[:MOST_TRIALS]}
-    return [pair for pair in pairs if pair.name in kept]
+    worst = sorted(trials, key=lambda trial: -errors.get(trial["trial"], 0.0))[:MOST_TRIALS]
+    kept = {trial["trial"] for trial in worst}
+    return [trial for trial in trials if trial["trial"] in kept]
 
 
-def _key_figures(result: Identification) -> list[KeyFigure]:
-    sets = _sets(result)
-    word = HELD_OUT if HELD_OUT in sets else FITTED
-    before, after = sets[word]
+def _key_figures(found: Json) -> list[KeyFigure]:
+    windows = found["errors_over_windows"]
+    word = HELD_OUT if windows[SETS[HELD_OUT]] else FITTED
+    trials, compared = windows[SETS[word]], found["figures"][SETS[word]]
+    effects = f"{len(found['effects_of_card'])} effects"
     figures = [
-        KeyFigure(label="Trials fitted", value=len(result.problem.runs)),
-        KeyFigure(label="Trials held out", value=len(result.holdout.following) if result.holdout else 0),
-        KeyFigure(label="Coefficients", value=len(result.estimate.free), note=f"{len(result.card.effects)} effects"),
-        _compared(
-            "Yaw-rate error",
-            word,
-            "%",
-            *(100 * pooled(comparison.following, "motion.r") for comparison in (before, after)),
-        ),
+        KeyFigure(label="Trials fitted", value=len(windows[SETS[FITTED]])),
+        KeyFigure(label="Trials held out", value=len(windows[SETS[HELD_OUT]])),
+        KeyFigure(label="Coefficients", value=len(found["identifiability"]["parameters"]), note=effects),
+        _compared("Yaw-rate error", word, "%", *(100 * pooled_error(trials, key) for key in ("before", "found"))),
     ]
     for label, unit, names in (
         ("Overshoot error", "deg", ("overshoot_1_deg", "overshoot_2_deg")),
         ("Advance error", "%", TURN_FIGURE_NAMES[:1]),
     ):
-        old, new = (_rms(comparison, names, 100 if unit == "%" else 1) for comparison in (before, after))
+        figures_named = [figure for figure in compared if figure["figure"] in names]
+        old, new = (_rms(figures_named, key, 100 if unit == "%" else 1) for key in ("before", "predicted"))
         if not np.isnan(new):
             figures.append(_compared(label, word, unit, old, new))
     return figures
@@ -209,21 +183,20 @@ def _compared(label: str, word: str, unit: str, before: float, after: float) -> 
     return KeyFigure(label=f"{label}, {word}", value=float(f"{after:.3g}"), unit=unit, verdict=worse, note=note)
 
 
-def _rms(comparison: Comparison, names: Sequence[str], factor: float) -> float:
-    errors = [factor * figure.error for figure in comparison.figures if figure.name in names]
-    known = [error for error in errors if not np.isnan(error)]
-    return float(np.sqrt(np.mean(np.square(known)))) if known else np.nan
+def _rms(figures: Sequence[Json], key: str, factor: float) -> float:
+    errors = [factor * figure_error(figure, key) for figure in figures if figure[key] is not None]
+    return float(np.sqrt(np.mean(np.square(errors)))) if errors else np.nan
 
 
-def _widened(result: Identification) -> str:
-    wide = {group: factor for group, factor in result.estimate.prior_scale.items() if factor > 1}
+def _widened(scale: Mapping[str, float]) -> str:
+    wide = {group: factor for group, factor in scale.items() if factor > 1}
     if not wide:
         return ""
     text = ", ".join(f"{group} {factor:.3g} times" for group, factor in sorted(wide.items()))
     return f" The card's standard errors were widened as the trials demanded: {text}."
 
 
-def _figure_tables(result: Identification) -> list[PageTable]:
+def _figure_tables(found: Json) -> list[PageTable]:
     heads = ("trial", "figure", "measured", "before", "now", "error", "95 %")
     tables = []
     for word in (HELD_OUT, FITTED):
@@ -231,7 +204,7 @@ def _figure_tables(result: Identification) -> list[PageTable]:
         for ending, caption in (("_deg", "overshoots in deg"), ("_m", "distances in m, with their error in %")):
             rows = [
                 [trial, str(name).rpartition("_")[0].replace("_", " "), *cells]
-                for trial, group, name, *cells in figure_rows(result)
+                for trial, group, name, *cells in figure_rows(found)
                 if group == word and str(name).endswith(ending)
             ]
             if rows:

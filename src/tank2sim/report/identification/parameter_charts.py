@@ -2,39 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import altair as alt
-import numpy as np
 
-from tank2sim.arrays import Array
-from tank2sim.identification.trials.assessment.identifiability import CLOSE_CORRELATION, Identifiability
+from tank2sim.identification.trials.as_json import as_number, value_with_error
+from tank2sim.identification.trials.assessment.identifiability import CLOSE_CORRELATION
 from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, plain, series_look
+from tank2sim.report.kit.json_values import Json
 
 _NORMAL = 1.959964
 
 
-@dataclass(frozen=True, kw_only=True)
-class Parameters:
-    """Names (k,), and estimates and priors (k,) with their standard errors; `share` of information from trials."""
+def parameter_chart(parameters: Mapping[str, Json], *, title: str = "") -> alt.HConcatChart:
+    """Estimates with their 95 % intervals next to the priors', in standard errors of the prior; shares next to.
 
-    names: Sequence[str]
-    values: Array
-    errors: Array
-    prior: Array
-    prior_errors: Array
-    share: Array
-
-
-def parameter_chart(parameters: Parameters, *, title: str = "") -> alt.HConcatChart:
-    """Estimates with their 95 % intervals next to the priors', in standard errors of the prior; shares next to."""
-    rows = [_parameter_row(parameters, place) for place in range(len(parameters.names))]
-    farthest = max((abs(row[key]) for row in rows for key in ("low", "high")), default=1.0)
+    `parameters` are entries of ``derivatives`` and ``effects`` in the JSON.
+    """
+    rows = [_parameter_row(name, parameter) for name, parameter in parameters.items()]
+    farthest = max((abs(row[key] or 0.0) for row in rows for key in ("low", "high")), default=1.0)
     # A few derivatives may move by dozens of standard errors, where the others move by one.
     kind = {"type": "symlog", "constant": 2} if farthest > 12 else {}
     ticks = {"values": _symmetric_ticks(farthest)} if kind else {}
-    y = alt.Y("name:N", sort=list(parameters.names), axis=alt.Axis(title=None, grid=True, labelLimit=200))
+    y = alt.Y("name:N", sort=list(parameters), axis=alt.Axis(title=None, grid=True, labelLimit=200))
     x = alt.X("v:Q", scale=alt.Scale(**kind), title="value less prior, in standard errors of the prior (-)")
     x = x.axis(**ticks)
     tooltip = [
@@ -52,7 +42,7 @@ def parameter_chart(parameters: Parameters, *, title: str = "") -> alt.HConcatCh
         layers.append(base.mark_rule(strokeWidth=1.8, yOffset=offset).encode(x=alt.X("low:Q"), x2="high:Q"))
         layers.append(base.mark_point(size=34, yOffset=offset).encode(x=x, shape=look.shape))
     height = 21 * len(rows)
-    bare = alt.Y("name:N", sort=list(parameters.names), axis=alt.Axis(title=None, labels=False, ticks=False))
+    bare = alt.Y("name:N", sort=list(parameters), axis=alt.Axis(title=None, labels=False, ticks=False))
     shares = alt.X("share:Q", scale=alt.Scale(domain=[0, 100]), title="information from trials (%)")
     bars = alt.Chart(data(rows)).mark_bar(height=9, opacity=0.7).encode(x=shares, y=bare, tooltip=tooltip)
     intervals = alt.layer(*layers).properties(width=400, height=height)
@@ -62,21 +52,19 @@ def parameter_chart(parameters: Parameters, *, title: str = "") -> alt.HConcatCh
     )
 
 
-def _parameter_row(parameters: Parameters, place: int) -> ChartRecord:
-    unit = parameters.prior_errors[place]
-    value, error = (
-        (parameters.values[place] - parameters.prior[place]) / unit,
-        _NORMAL * parameters.errors[place] / unit,
-    )
+def _parameter_row(name: str, parameter: Json) -> ChartRecord:
+    unit, share = parameter["prior_standard_error"], 100 * as_number(parameter["share_from_trials"])
+    value = (parameter["value"] - parameter["before"]) / unit
+    error = _NORMAL * as_number(parameter["standard_error"]) / unit
     return {
-        "name": parameters.names[place],
+        "name": name,
         "v": plain(value),
         "low": plain(value - error),
         "high": plain(value + error),
-        "share": plain(100 * parameters.share[place]),
-        "own": f"{parameters.values[place]:.5g} ± {parameters.errors[place]:.2g}",
-        "known": f"{parameters.prior[place]:.5g} ± {unit:.2g}",
-        "share_text": f"{100 * parameters.share[place]:.0f} %",
+        "share": plain(share),
+        "own": value_with_error(parameter["value"], parameter["standard_error"]),
+        "known": value_with_error(parameter["before"], unit),
+        "share_text": f"{share:.0f} %",
     }
 
 
@@ -86,14 +74,17 @@ def _symmetric_ticks(farthest: float) -> list[float]:
     return [-step for step in reversed(positive)] + [0.0, *positive]
 
 
-def correlation_chart(known: Identifiability, *, title: str = "") -> alt.LayerChart:
-    """Correlation of the estimates by the trials alone, as a heat map; frames mark :data:`CLOSE_CORRELATION`."""
-    names = [name.removeprefix("derivatives.") for name in known.free]
+def correlation_chart(known: Json, *, title: str = "") -> alt.LayerChart:
+    """Correlation of the estimates by the trials alone, as a heat map; frames mark :data:`CLOSE_CORRELATION`.
+
+    `known` is ``identifiability`` of the JSON.
+    """
+    names = known["parameters"]
     step = max(8, min(24, 560 // len(names)))
     rows: list[ChartRecord] = [
-        {"one": name, "other": column_name, "c": plain(known.correlation[row, column])}
-        for row, name in enumerate(names)
-        for column, column_name in enumerate(names)
+        {"one": name, "other": column_name, "c": plain(as_number(value))}
+        for name, row in zip(names, known["correlation"], strict=True)
+        for column_name, value in zip(names, row, strict=True)
     ]
     axis = alt.Axis(title=None, labelLimit=200, ticks=False)
     x = alt.X("other:N", sort=names, axis=axis)
@@ -106,7 +97,8 @@ def correlation_chart(known: Identifiability, *, title: str = "") -> alt.LayerCh
     close = [row for row in rows if row["one"] != row["other"] and abs(row["c"] or 0.0) > CLOSE_CORRELATION]
     frames = alt.Chart(data(close)).mark_rect(filled=False, stroke="black", strokeWidth=2)
     layers = [cells, *([frames.encode(x=x, y=y, tooltip=tooltip)] if close else [])]
-    text = f"Framed: {len(known.pairs)} pairs above {CLOSE_CORRELATION:g} either way, which are known only together."
+    pairs = len(known["correlated_pairs"])
+    text = f"Framed: {pairs} pairs above {CLOSE_CORRELATION:g} either way, which are known only together."
     size = {"width": step * len(names), "height": step * len(names)}
     return alt.layer(*layers).properties(
         title=alt.Title(title, subtitle=f"Colour: correlation (-). {text}"),
@@ -115,11 +107,9 @@ def correlation_chart(known: Identifiability, *, title: str = "") -> alt.LayerCh
     )
 
 
-def singular_value_chart(known: Identifiability, *, title: str = "") -> alt.LayerChart:
+def singular_value_chart(values: Sequence[float], *, title: str = "") -> alt.LayerChart:
     """Singular values of the sensitivities in units of the prior, falling; below 1 the prior determines more."""
-    rows = [
-        {"order": place + 1, "v": plain(float(value))} for place, value in enumerate(known.singular_values) if value > 0
-    ]
+    rows = [{"order": order, "v": plain(value)} for order, value in enumerate(values, start=1) if value > 0]
     x = alt.X(
         "order:Q", title="direction, by the information of the trials (-)", scale=alt.Scale(nice=False, padding=10)
     )
@@ -132,5 +122,5 @@ def singular_value_chart(known: Identifiability, *, title: str = "") -> alt.Laye
         title=title,
         width=620,
         height=220,
-        description=f"{len(rows)} singular values; {np.count_nonzero(known.singular_values < 1)} are below 1.",
+        description=f"{len(rows)} singular values; {sum(value < 1 for value in values)} are below 1.",
     )

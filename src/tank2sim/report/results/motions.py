@@ -139,21 +139,6 @@ def audit_sections(result: Json) -> list[PageSection]:
     return sections
 
 
-def identified(result: Json) -> list[PageSection]:
-    """Each trial as measured next to the card that was given and the card found, those held out first."""
-    charts: list[Illustration] = []
-    for replay in sorted(result["replays"], key=lambda replay: not replay["held_out"])[:_MOST_RECORDS]:
-        runs = {"measured": replay["measured"], "card given": replay["before"], "card found": replay["found"]}
-        name = f"{replay['trial']} ({'held out' if replay['held_out'] else 'fitted'})"
-        charts += motions(name, {label: run for label, run in runs.items() if is_columns(run)}, ["measured"])
-    return [PageSection(heading="Trials", text=_REPLAYED, charts=charts)] if charts else []
-
-
-_REPLAYED = (
-    "Turns and zigzags are steered as the manoeuvre asks, from the measured start; other trials are given the recorded "
-    "rudder, from the initial state that suits the record best."
-)
-
 _WAYS = {
     "turning_circles_deep": "Turning circles in deep water",
     "turning_circles_shallow": "Turning circles in shallow water",

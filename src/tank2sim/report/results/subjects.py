@@ -10,10 +10,11 @@ from tank2sim.report.captive.page import reduction_page
 from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
 from tank2sim.report.glide.page import glide_page
+from tank2sim.report.identification.page import identification_page
 from tank2sim.report.influence.page import influence_page
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Page, PageSection
-from tank2sim.report.results.motions import audit_sections, from_the_bridge, identified, simulated
+from tank2sim.report.results.motions import audit_sections, from_the_bridge, simulated
 from tank2sim.report.signals.page import signals_page
 from tank2sim.report.stability.page import stability_page
 from tank2sim.report.steering_card.page import steering_catalogue_page
@@ -58,7 +59,6 @@ _SECTIONS: Mapping[str, _Sections] = {
     "Audit of trials": _Sections(
         audit_sections, {"findings": list, "trials": list}, ("trials.*.histories", "findings")
     ),
-    "Coefficients from trials": _Sections(identified, {"replays": list}, ("replays",)),
     "Bridge": _Sections(
         from_the_bridge,
         {"turning_circles_deep": list, "turning_circles_shallow": list, "stops": list},
@@ -110,6 +110,11 @@ _PAGES: Mapping[str, _Page] = {
         reduction_page,
         {"plots": dict, "leave_one_out": dict, "selection": dict, "prediction_errors": dict, "model": dict}
         | {"runs": list, "not_used": object, "warnings": list},
+    ),
+    "Coefficients from trials": _Page(
+        identification_page,
+        {"ship": str, "effects_of_card": list, "errors_over_windows": dict, "figures": dict, "structures": dict}
+        | {"prior_scale": dict, "identifiability": dict, "notices": list, "replays": list},
     ),
     "Fleet": _Page(fleet_page_of_json, {"fleet": str, "ships": list}),
     "Influence coefficients": _Page(
