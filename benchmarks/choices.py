@@ -36,13 +36,13 @@ COMMANDS = {
     "analysis.heading": ["autopilot mariner --wave-yaw 0.5", "autopilot mariner --wave-filter 0.7"],
     "analysis.influence": ["influence mariner --figure criterion_C --figure advance_m@35"],
     "analysis.validation": [f"validate mariner {ZIGZAG} {HELD}", "poster mariner -o poster.html"],
-    "analysis": ["stability mariner", "stability kvlcc2"],
+    "analysis": ["stability mariner", "stability kvlcc2-captive"],
     "cards": [f"{IDENTIFY} -o new.toml", "simulate new.toml --manoeuvre turn:35 --ensemble 20"],
     "dynamics.glider": ["glide --angle-deg 25"],
     "dynamics": [
         *(f"simulate mariner --manoeuvre {word}" for word in ("turn:35", "pullout:20")),
-        "simulate esso-osaka --manoeuvre stop",
-        "simulate kvlcc2 --manoeuvre turn:35",
+        "simulate esso-osaka-estimated --manoeuvre stop",
+        "simulate kvlcc2-captive --manoeuvre turn:35",
         "simulate effects.toml --manoeuvre zigzag:20/20",
     ],
     "gap": [
@@ -65,7 +65,7 @@ COMMANDS = {
     "simulation.bands": ["simulate mariner --manoeuvre turn:35 --ensemble 60"],
     "simulation": [
         *(f"simulate mariner --manoeuvre {word}" for word in ("turn:35", "zigzag:10/10", "spiral:15")),
-        "simulate esso-osaka --manoeuvre stop",
+        "simulate esso-osaka-estimated --manoeuvre stop",
         f"validate mariner {ZIGZAG} {HELD}",
     ],
 }

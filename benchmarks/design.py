@@ -21,7 +21,7 @@ from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
 
-SHIPS = ("mariner", "kvlcc2")
+SHIPS = ("mariner", "kvlcc2-captive")
 WAVE_FILTER = 0.6  # rad/s, between the bandwidth of the Mariner's loop and the waves of the default weather
 
 

@@ -70,13 +70,13 @@ RIVALS = 3
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--ship", nargs="+", choices=("esso", "kvlcc2"), default=("esso", "kvlcc2"))
+    parser.add_argument("--ship", nargs="+", choices=("esso", "kvlcc2-captive"), default=("esso", "kvlcc2-captive"))
     parser.add_argument("--days", nargs="+", choices=DAYS, default=DAYS, help="of the Esso Osaka")
     parser.add_argument("--card", nargs="+", choices=("estimated", "identified"), default=("estimated", "identified"))
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, metavar="N", help="processes")
     args = parser.parse_args()
     warnings.filterwarnings("ignore", category=RuntimeWarning)  # a motion that runs away is counted as such
-    for ship, folder, run in (("esso", "esso_osaka", _esso_osaka), ("kvlcc2", "kvlcc2_hsva", _kvlcc2)):
+    for ship, folder, run in (("esso", "esso_osaka", _esso_osaka), ("kvlcc2-captive", "kvlcc2_hsva", _kvlcc2)):
         if ship in args.ship and (DATA / folder).is_dir():
             run(args)
         elif ship in args.ship:
@@ -88,7 +88,7 @@ def main() -> int:
 
 
 def _esso_osaka(args: argparse.Namespace) -> None:
-    card = read_card("esso-osaka")
+    card = read_card("esso-osaka-estimated")
     assert isinstance(card, ManoeuvringCard)
     everything = measured(sorted((DATA / "esso_osaka").glob("*/*.csv")), card)
     trials = [_longest_part(trial, card.model.speed_range_mps[0]) for trial in everything.trials]
@@ -181,7 +181,7 @@ def _unmeasured(trial: Trial) -> Trial:
 
 
 def _kvlcc2(args: argparse.Namespace) -> None:
-    card = read_card("kvlcc2")
+    card = read_card("kvlcc2-captive")
     assert isinstance(card, ManoeuvringCard)
     known, unknown = (
         measured([DATA / "kvlcc2_hsva" / f"HSVA_CPMC_KVLCC2_Z_{name}.dat" for name in names], card)

@@ -214,7 +214,7 @@ def main() -> int:
         print(f"no trials: there is no folder {data} (set TANK2SIM_DATA)")
         return 0
     trials = read(data)
-    card = read_card("esso-osaka")
+    card = read_card("esso-osaka-estimated")
     assert isinstance(card, ManoeuvringCard)
     calm = parse_card(card.text.partition("[[effects]]")[0], card.source)
     assert isinstance(calm, ManoeuvringCard)

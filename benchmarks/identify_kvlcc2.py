@@ -27,7 +27,7 @@ STRUCTURES = ("linear", "card", "third_order", "cross_flow")
 
 def main() -> None:
     warnings.filterwarnings("ignore", category=RuntimeWarning)
-    card = read_card("kvlcc2")
+    card = read_card("kvlcc2-captive")
     assert isinstance(card, ManoeuvringCard)
     zigzags = {name: _read(card, DATA / "kvlcc2_hsva" / f"HSVA_CPMC_KVLCC2_Z_{name}.dat") for name in ZIGZAGS}
     marin = _read(card, *sorted((DATA / "kvlcc2_marin").glob("*.dat")))

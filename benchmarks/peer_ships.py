@@ -90,7 +90,7 @@ def kvlcc2() -> tuple[Any, Any, float, float, float]:
     """
     from shipmmg.mmg_3dof import Mmg3DofBasicParams, Mmg3DofManeuveringParams
 
-    card: Any = read_card("kvlcc2")
+    card: Any = read_card("kvlcc2-captive")
     L, u, rho = card.ship.length_m, card.model.speed_mps, 1025.0
     scale = L / 7.0
     d, mass = 0.46 * scale, 3.27 * rho * scale**3

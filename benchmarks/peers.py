@@ -74,7 +74,7 @@ CAN = {
 READY = {
     "tank2sim": "from tank2sim.cards import read_card; from tank2sim.dynamics import build\n"
     "from tank2sim.simulation.run import simulate; from tank2sim.simulation.integrator import Integrator\n"
-    "Integrator(build(read_card('kvlcc2')))",
+    "Integrator(build(read_card('kvlcc2-captive')))",
     "shipmmg": "from shipmmg.mmg_3dof import simulate_mmg_3dof, zigzag_test_mmg_3dof",
     "VMM": "from vessel_manoeuvring_models.models import vmm_mariner\n"
     "from vessel_manoeuvring_models.models.vessels import mariner",
@@ -118,7 +118,7 @@ def reason_to_skip(peer: str) -> str:
 
 def ours() -> list[Case]:
     """tank2sim's KVLCC2, and the Mariner as VMM has her: the whole call, with every output and all figures."""
-    ship, other = build(read_card("kvlcc2")), build(mariner_card())
+    ship, other = build(read_card("kvlcc2-captive")), build(mariner_card())
     turn, zigzag = Turn(RUDDER), Zigzag(HEADING, HEADING)
     return [
         _own(ABKOWITZ, ship, "turn", turn, _diameter, _four_a_step),

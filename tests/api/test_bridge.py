@@ -40,7 +40,7 @@ def test_a_sheet_fits_a_screen_and_has_a_picture(poster: t2s.PosterResult) -> No
 
 
 def test_a_pilot_card_is_written_with_the_speeds_of_its_orders(tmp_path: Path) -> None:
-    ship = t2s.load("esso-osaka")
+    ship = t2s.load("esso-osaka-estimated")
     nominal = ship.card.propulsion.nominal_radps * 30 / 3.141592653589793  # type: ignore[attr-defined]
     card = ship.pilot_card(tmp_path / "pilot.html", orders={"Full sea speed": nominal, "Half ahead": nominal / 2})
     assert "Half ahead" in (tmp_path / "pilot.html").read_text(encoding="utf-8")
@@ -58,7 +58,7 @@ def test_a_pilot_card_is_written_with_the_speeds_of_its_orders(tmp_path: Path) -
         ({"orders": {"Full astern": 60.0}}, "--order", "Full astern=60"),
         ({"orders": {"a": 60.0, "A": 50.0}}, "--order", "A=50"),
         ({"orders": {f"order {number}": 50.0 for number in range(4)}}, "--order", "order 3=50"),
-        ({"ballast": "kvlcc2"}, "kvlcc2", "ship"),
+        ({"ballast": "kvlcc2-captive"}, "kvlcc2-captive", "ship"),
         ({"ballast": "mariner"}, "mariner", "ship.draught_m"),
     ],
 )

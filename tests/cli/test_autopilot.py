@@ -78,7 +78,7 @@ def test_the_robust_design_says_what_to_install(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_tanker_that_is_unstable_is_steered_and_verified_together_with_her_fmu(tmp_path: Path) -> None:
     more = ["--export", "ap.fmu", "--fmi", "3", "--verify", "--json", "ap.json", "--wave-yaw", "0.1", "--seed", "5"]
-    ended = tank2sim("autopilot", "kvlcc2", "--design", "lqr", *more, cwd=tmp_path)
+    ended = tank2sim("autopilot", "kvlcc2-captive", "--design", "lqr", *more, cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     reported = json.loads((tmp_path / "ap.json").read_text())
     assert reported["export"]["co_simulation"]["order"] == pytest.approx(1.0, abs=0.1)

@@ -35,7 +35,7 @@ def test_pilot_card_and_poster_are_written_with_their_blanks_counted(tmp_path) -
     found = json.loads((tmp_path / "p.json").read_text())
     assert found["telegraph"] == [] and len(found["turning_circles_deep"]) == 2
     orders = ["--order", "Full ahead=600", "--order", "Half ahead=450"]
-    result = tank2sim("poster", "esso-osaka", *orders, "-o", "w.html", cwd=tmp_path)
+    result = tank2sim("poster", "esso-osaka-estimated", *orders, "-o", "w.html", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     page = (tmp_path / "w.html").read_text()
     assert "Half ahead" in page and "Dead slow ahead" in page
@@ -50,9 +50,9 @@ def test_pilot_card_and_poster_are_written_with_their_blanks_counted(tmp_path) -
         (["poster", "mariner", "-o", "w.html", "--order", "Half ahead"], "NAME=RPM"),
         (["pilotcard", "mariner", "-o", "w.html", "--order", "Half ahead=-3"], "NAME=RPM"),
         (["pilotcard", "mariner", "-o", "w.html", "--order", "Full astern=60"], "order astern"),
-        (["poster", "esso-osaka", "-o", "w.html", "--order", "Full=7000000"], "beyond 1,200 revolutions"),
-        (["poster", "esso-osaka", "-o", "w.html", "--order", f"{'x' * 30}=500"], "no room"),
-        (["poster", "mariner", "-o", "w.html", "--ballast", "kvlcc2"], "length 320 m"),
+        (["poster", "esso-osaka-estimated", "-o", "w.html", "--order", "Full=7000000"], "beyond 1,200 revolutions"),
+        (["poster", "esso-osaka-estimated", "-o", "w.html", "--order", f"{'x' * 30}=500"], "no room"),
+        (["poster", "mariner", "-o", "w.html", "--ballast", "kvlcc2-captive"], "length 320 m"),
         (["poster", "mariner", "-o", "w.html", "--ballast", "mariner"], "ship.draught_m"),
         (["pilotcard", "mariner"], "--page"),
         (["validate", "mariner", "nothing.csv", "-o", "v.html"], "nothing.csv"),
@@ -66,7 +66,7 @@ def test_bad_input_is_refused_in_one_line_and_nothing_is_written(tmp_path, argum
 @pytest.mark.slow
 def test_validate_tells_each_figure_of_a_real_trial(tmp_path, data) -> None:
     trials = data / "data" / "kvlcc2_marin" / "MARIN_FREE_KVLCC2_zz_10_m.dat"
-    arguments = ["validate", "kvlcc2", str(trials), "--members", "0", "-o", "v.html", "--json", "v.json"]
+    arguments = ["validate", "kvlcc2-captive", str(trials), "--members", "0", "-o", "v.html", "--json", "v.json"]
     result = tank2sim(*arguments, cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     found = json.loads((tmp_path / "v.json").read_text())
@@ -80,7 +80,7 @@ def test_validate_tells_each_figure_of_a_real_trial(tmp_path, data) -> None:
 
 @pytest.mark.slow
 def test_a_criterion_beyond_the_card_is_neither_met_nor_probable(tmp_path) -> None:
-    result = tank2sim("stability", "kvlcc2", "--no-spiral", "--ensemble", "3", cwd=tmp_path)
+    result = tank2sim("stability", "kvlcc2-captive", "--no-spiral", "--ensemble", "3", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     tables = result.stdout.split("IMO MSC.137(76)")[1:]
     rows = [next(row for row in one.splitlines() if "tactical" in row) for one in tables]

@@ -12,7 +12,7 @@ from tests.cli.command_line import refused, tank2sim
 
 
 def test_all_of_the_study_is_in_the_json_and_the_page(tmp_path) -> None:
-    result = tank2sim("stability", "kvlcc2", "--no-spiral", "--json", "s.json", "-o", "s.html", cwd=tmp_path)
+    result = tank2sim("stability", "kvlcc2-captive", "--no-spiral", "--json", "s.json", "-o", "s.html", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     assert "unstable" in result.stdout and "hysteresis loop" in result.stdout
     found = json.loads((tmp_path / "s.json").read_text())
@@ -31,7 +31,7 @@ def test_all_of_the_study_is_in_the_json_and_the_page(tmp_path) -> None:
 
 
 def test_a_ship_without_a_steady_speed_gets_all_the_rest_and_a_note(tmp_path) -> None:
-    arguments = ["stability", "kvlcc2", "--set", "derivatives.X0=0.02", "--json", "s.json", "-o", "s.html"]
+    arguments = ["stability", "kvlcc2-captive", "--set", "derivatives.X0=0.02", "--json", "s.json", "-o", "s.html"]
     result = tank2sim(*arguments, cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     assert "no steady-turning diagram: keeps no steady speed" in " ".join(result.stdout.split())
@@ -47,7 +47,7 @@ def test_a_ship_that_holds_no_straight_course_is_refused_in_one_line(tmp_path) -
 
 
 def test_what_leaves_the_card_and_what_is_open_says_why_on_the_screen(tmp_path) -> None:
-    result = tank2sim("stability", "kvlcc2", "--no-spiral", cwd=tmp_path)
+    result = tank2sim("stability", "kvlcc2-captive", "--no-spiral", cwd=tmp_path)
     reported = " ".join(result.stdout.split())
     assert "advance (1)" in reported and "(1) EXTRAPOLATED beyond what the card was measured in" in reported
     assert re.search(r"\(\d\) the card has no \[propulsion\]", reported)

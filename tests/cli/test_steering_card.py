@@ -59,7 +59,9 @@ def test_two_points_have_a_page_and_a_steering_card_a_picture(tmp_path: Path) ->
 
 
 def test_a_yaw_rate_is_to_the_side_of_the_rudder(tmp_path: Path) -> None:
-    result = tank2sim("influence", "kvlcc2", "--through", "30@-35", "31.5@-10", "--json", "out.json", cwd=tmp_path)
+    result = tank2sim(
+        "influence", "kvlcc2-captive", "--through", "30@-35", "31.5@-10", "--json", "out.json", cwd=tmp_path
+    )
     assert result.returncode == 0, result.stderr
     reported = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
     assert [turn["yaw_rate_degpmin"] for turn in reported["after"]] == pytest.approx([-30, -31.5])

@@ -68,7 +68,7 @@ def plain() -> Files:
         "other.csv": trial(-20, 150, 20, 3),
         "hsva.dat": simman(),
         "card.toml": (MODELS / "mariner" / "ship.toml").read_bytes(),
-        "tanker.toml": (MODELS / "kvlcc2" / "ship.toml").read_bytes(),
+        "tanker.toml": (MODELS / "kvlcc2-captive" / "ship.toml").read_bytes(),
         "surge.toml": (MODELS / "wilinski-zellman" / "ship.toml").read_bytes(),
         "glider.toml": (MODELS / "kulikovsky-velikanov" / "ship.toml").read_bytes(),
         "rig.toml": (MODELS / "alyshev" / "ship.toml").read_bytes(),

@@ -433,7 +433,7 @@ def test_a_card_that_holds_down_to_rest_does_so_to_a_twentieth_of_its_speed() ->
 
 def test_bundled_ships_turn_from_rest_as_they_turn_from_speed() -> None:
     """Rudder hard over and full ahead from the berth ends in the steady turn of the card, not in a spin on the spot."""
-    for name in ("mariner", "esso-osaka"):
+    for name in ("mariner", "esso-osaka-estimated"):
         card = read_card(name)
         assert isinstance(card, ManoeuvringCard)
         model = build(card)

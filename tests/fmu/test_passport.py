@@ -74,7 +74,7 @@ def test_what_low_speed_needs_and_the_card_does_not_state_says_where_it_is_from(
 
 
 def test_remarks_and_uncertainties_of_a_card_are_reported() -> None:
-    known = origins(read_card("kvlcc2"))
+    known = origins(read_card("kvlcc2-captive"))
     assert "Clarke" in known["derivatives.Yr"].remark
     assert (known["derivatives.Yr"].standard_error, known["derivatives.Yr"].error_from) == (0.00129, STATED_ERROR)
     assert known["derivatives.Yv"].remark == ""

@@ -156,7 +156,7 @@ def test_other_engines_come_to_the_same_heading(engine: str, script: str, marine
 
 @pytest.mark.slow
 def test_the_command_writes_the_package_next_to_the_fmu(tmp_path: Path) -> None:
-    ended = tank2sim("export", "kvlcc2", "-o", "k.fmu", "--ssp", "k.ssp", "--json", "k.json", cwd=tmp_path)
+    ended = tank2sim("export", "kvlcc2-captive", "-o", "k.fmu", "--ssp", "k.ssp", "--json", "k.json", cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     assert json.loads((tmp_path / "k.json").read_text())["ssp"] == "k.ssp"
     with zipfile.ZipFile(tmp_path / "k.ssp") as archive:

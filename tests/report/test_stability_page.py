@@ -20,7 +20,7 @@ from tank2sim.report.stability.page import stability_page
 
 @pytest.fixture(scope="module")
 def study() -> StabilityStudy:
-    return stability_study(build(read_card("esso-osaka")), spirals=False)
+    return stability_study(build(read_card("esso-osaka-estimated")), spirals=False)
 
 
 def rows(specification, layer):

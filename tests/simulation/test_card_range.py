@@ -89,10 +89,10 @@ def invoked(*arguments):
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("simulate", "kvlcc2", "--manoeuvre", "turn:35"),
-        ("stability", "kvlcc2"),
-        ("influence", "kvlcc2", "--figure", "tactical_diameter_m@35"),
-        ("compare", "kvlcc2", "kvlcc2", "--members", "0"),
+        ("simulate", "kvlcc2-captive", "--manoeuvre", "turn:35"),
+        ("stability", "kvlcc2-captive"),
+        ("influence", "kvlcc2-captive", "--figure", "tactical_diameter_m@35"),
+        ("compare", "kvlcc2-captive", "kvlcc2-captive", "--members", "0"),
     ],
     ids=lambda arguments: arguments[0],
 )
@@ -104,12 +104,12 @@ def test_a_command_whose_figures_leave_the_card_says_so_before_it_shows_any(argu
 
 def test_json_names_the_figures_outside_the_card(tmp_path) -> None:
     file = tmp_path / "run.json"
-    invoked("simulate", "kvlcc2", "--manoeuvre", "zigzag:20/20", "--ensemble", "2", "--json", file)
+    invoked("simulate", "kvlcc2-captive", "--manoeuvre", "zigzag:20/20", "--ensemble", "2", "--json", file)
     found = json.loads(file.read_text())
     assert {"overshoot_1_deg", "overshoot_2_deg", "period_s"} <= set(found["outside_card_range"])
     assert found["left_card_range_s"] < 5
     assert set(found["outside_card_range"]) <= set(found["ensemble"]["figures"]), "bands have the names of the marks"
-    invoked("compare", "kvlcc2", "mariner", "--members", "0", "--json", file)
+    invoked("compare", "kvlcc2-captive", "mariner", "--members", "0", "--json", file)
     trials = {trial["name"]: trial["figures"] for trial in json.loads(file.read_text())["trials"]}
     assert trials["zigzag 20/20"]["overshoot_1_deg"]["outside_card_range"][0] is True
 

@@ -26,7 +26,7 @@ def test_a_stable_ship_with_a_neutral_rudder_off_zero_keeps_no_yaw_rate(side: in
 
 
 def test_an_unstable_ship_keeps_turning_to_its_side() -> None:
-    model = build(read_card("kvlcc2"))
+    model = build(read_card("kvlcc2-captive"))
     left, right = (simulate(model, parse_manoeuvre(f"pullout:{side}")).figures for side in (-20, 20))
     assert right["residual_rate_degps"] > 0.1 and left["residual_rate_degps"] < -0.1
     assert right["neutral_rudder_deg"] == pytest.approx(left["neutral_rudder_deg"])

@@ -264,7 +264,7 @@ def test_other_runs_are_neither(model):
 
 def test_each_measured_turn_and_zigzag_is_recognised_from_its_execute(data: Path) -> None:
     """Execute, s, and rudder, deg, by hand: where the rudder leaves course-keeping for the angle that it then keeps."""
-    ship = build(read_card("esso-osaka"))
+    ship = build(read_card("esso-osaka-estimated"))
     turns = {"14-Oct-2020_14_29_49": (110.0, 19.5), "14-Oct-2020_14_56_07": (110.0, -20.2)}
     turns["14-Sep-2020_15_47_33"] = (142.0, -35.3)
     runs = {f"turning/turn_{name}": (Turn, *own) for name, own in turns.items()}
@@ -279,7 +279,7 @@ def test_each_measured_turn_and_zigzag_is_recognised_from_its_execute(data: Path
 
 def test_the_controllers_of_two_basins_are_distinguished(data: Path) -> None:
     """HSVA's zigzags by their names; lags of one controller agree with each other over all runs, s at full scale."""
-    card = read_card("kvlcc2")
+    card = read_card("kvlcc2-captive")
     ship = build(card)
     lags = {}
     for basin, pattern in (("kvlcc2_hsva", "*.dat"), ("kvlcc2_marin", "*zz*.dat")):

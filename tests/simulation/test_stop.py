@@ -131,7 +131,7 @@ def test_revolutions_of_a_stop_are_in_rpm() -> None:
 
 
 def test_the_command_prints_reaches_and_refuses_a_ship_without_propulsion(tmp_path) -> None:
-    done = tank2sim("simulate", "esso-osaka", "--manoeuvre", "stop", "--json", "stop.json", cwd=tmp_path)
+    done = tank2sim("simulate", "esso-osaka-estimated", "--manoeuvre", "stop", "--json", "stop.json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     figures = json.loads((tmp_path / "stop.json").read_text())["figures"]
     assert 2 < figures["track_reach_lengths"] < 20

@@ -179,8 +179,8 @@ def share_of_low_speed(s: Symbols) -> ca.SX:
 
 
 def share_out_of_range(s: Symbols) -> ca.SX:
-    """How far the speed is below both u_b and the lowest speed at which the card holds: 0 to 1, as the share is."""
-    return _share_below(s, _bounded(s, ca.fmax(s["low_speed.bound"], s["ship.slowest"])))
+    """How far the speed is below the lowest speed at which the card holds: 0 to 1, as the share of low speed is."""
+    return _share_below(s, _bounded(s, s["ship.slowest"]))
 
 
 def _share_below(s: Symbols, bound: ca.SX) -> ca.SX:

@@ -36,7 +36,7 @@ def grid_of(card: ManoeuvringCard) -> Grid:
     return Grid.of(model, steering_responses(model, straight_course(model), stability(model).nomoto)[0])
 
 
-@pytest.fixture(scope="module", params=["mariner", "kvlcc2"])
+@pytest.fixture(scope="module", params=["mariner", "kvlcc2-captive"])
 def found(request: pytest.FixtureRequest):
     card = read_card(request.param)
     assert isinstance(card, ManoeuvringCard)

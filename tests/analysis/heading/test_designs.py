@@ -34,7 +34,7 @@ NO_SLYCOT = "slycot is not installed"
 
 @pytest.fixture(scope="module")
 def kvlcc2() -> Model:
-    return build(read_card("kvlcc2"))
+    return build(read_card("kvlcc2-captive"))
 
 
 @settings(max_examples=20, deadline=None)
@@ -90,7 +90,7 @@ def test_a_ship_that_is_unstable_is_held_on_her_course(kvlcc2: Model, kind: str)
 
 
 @pytest.mark.skipif(importlib.util.find_spec("slycot") is None, reason=NO_SLYCOT)
-@pytest.mark.parametrize("name", ["mariner", "kvlcc2"])
+@pytest.mark.parametrize("name", ["mariner", "kvlcc2-captive"])
 def test_the_robust_loop_is_robust_and_no_mode_of_it_is_slower_than_asked(name: str) -> None:
     from tank2sim.analysis.heading.robust import POLE_SHIFT
 

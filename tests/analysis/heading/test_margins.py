@@ -20,7 +20,7 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 
 
-@pytest.fixture(scope="module", params=[("mariner", "pid"), ("kvlcc2", "lqr")])
+@pytest.fixture(scope="module", params=[("mariner", "pid"), ("kvlcc2-captive", "lqr")])
 def loop(request: pytest.FixtureRequest) -> tuple[Model, Model]:
     name, kind = request.param
     ship = build(read_card(name))

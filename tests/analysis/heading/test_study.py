@@ -34,7 +34,7 @@ def test_a_ship_that_rolls_herself_out_of_control_is_reported_so_and_not_her_ste
         study_autopilot(card, ship, StudySettings())
 
 
-@pytest.mark.parametrize("card", [read_card("kvlcc2"), rolling(0.001)], ids=["unstable in yaw", "calm in roll"])
+@pytest.mark.parametrize("card", [read_card("kvlcc2-captive"), rolling(0.001)], ids=["unstable in yaw", "calm in roll"])
 def test_a_ship_that_is_unstable_in_yaw_alone_has_no_growing_effect(card) -> None:
     assert growing_effects(build(card)) == ()
 
@@ -56,7 +56,7 @@ def test_a_linear_card_has_margins_at_its_own_speed_alone() -> None:
 
 @pytest.mark.slow
 def test_a_gear_that_waves_overwork_is_reported_with_the_remedy_which_helps() -> None:
-    card = read_card("kvlcc2")
+    card = read_card("kvlcc2-captive")
     ship = build(card)
     found = study_autopilot(card, ship, StudySettings())
     (reported,) = [notice for notice in found.notices if "full rate" in notice]

@@ -92,7 +92,7 @@ def test_the_analytic_slope_of_the_criterion_is_met_to_rounding(linear_study) ->
     assert result.exact[0, place(linear_study, "Nv")] == pytest.approx(-10 * d["Nv"] * d["Yr"] / C, rel=1e-9)
 
 
-@pytest.mark.parametrize("ship", ["mariner", "esso-osaka"])
+@pytest.mark.parametrize("ship", ["mariner", "esso-osaka-estimated"])
 def test_linear_figures_are_those_of_the_stability_analysis(ship) -> None:
     card = read_card(ship)
     found = study_of(card, "K_per_s", "T_s", "T1_s", "T2_s", "T3_s", "T_prime", "criterion_C").base

@@ -138,7 +138,7 @@ def test_margins_are_what_is_left_to_the_limit(mariner) -> None:
 
 
 def test_the_stopping_criterion_is_the_track_reach_of_a_crash_stop() -> None:
-    model = build(read_card("esso-osaka"))
+    model = build(read_card("esso-osaka-estimated"))
     found = imo_criteria(model)
     reach = simulate(model, Stop()).figures["track_reach_lengths"]
     assert found[-1].found == pytest.approx(reach) and found[-1].allowed == 15.0
@@ -246,7 +246,9 @@ def test_the_flows_memory_is_among_the_modes() -> None:
 
 
 def test_an_engine_that_lags_is_no_state_that_answers_to_sway_and_yaw() -> None:
-    card = read_card("esso-osaka", {"effects": [{"name": "engine_lag", "parameters": {"time_constant_s": 2.0}}]})
+    card = read_card(
+        "esso-osaka-estimated", {"effects": [{"name": "engine_lag", "parameters": {"time_constant_s": 2.0}}]}
+    )
     assert stability(build(card)).effect_states == ()
 
 
@@ -285,7 +287,7 @@ def test_a_criterion_read_off_outside_the_range_of_the_card_is_not_passed() -> N
 
 
 def test_no_criterion_is_passed_by_a_card_that_was_never_measured_in_yaw() -> None:
-    criteria = imo_criteria(build(read_card("kvlcc2")))
+    criteria = imo_criteria(build(read_card("kvlcc2-captive")))
     assert all(one.beyond_card and one.passed is None for one in criteria if one.found is not None)
     assert sum(one.found is not None for one in criteria) == 6
 

@@ -107,14 +107,14 @@ def test_turns_between_the_points_solve_the_equations(mariner) -> None:
 
 
 def test_the_diagram_takes_less_than_a_second_of_the_processor() -> None:
-    model = build(read_card("kvlcc2"))
+    model = build(read_card("kvlcc2-captive"))
     begin = time.process_time()
     steady_turning(model)
     assert time.process_time() - begin < 1.0
 
 
 def test_a_symmetric_ship_turns_alike_to_both_sides() -> None:
-    found = steady_turning(build(read_card("esso-osaka")))
+    found = steady_turning(build(read_card("esso-osaka-estimated")))
     assert found.loop is not None and found.folds[0].rudder_rad == pytest.approx(-found.folds[1].rudder_rad)
     for rudder in np.radians([1.0, 10.0, 30.0]):
         port = sorted(-rate for rate, _ in found.turns_at(-rudder))
@@ -122,7 +122,7 @@ def test_a_symmetric_ship_turns_alike_to_both_sides() -> None:
 
 
 def test_the_straight_course_of_the_diagram_is_stable_where_the_criterion_says_so(mariner) -> None:
-    for model in (mariner, build(read_card("kvlcc2"))):
+    for model in (mariner, build(read_card("kvlcc2-captive"))):
         found = steady_turning(model)
         assert bool(found.stable[found.straight]) == stability(model).stable
         assert abs(found.yaw_rate_radps[found.straight]) < 1e-12
@@ -142,7 +142,7 @@ def test_the_heel_of_a_steady_turn_is_that_of_its_centrifugal_force() -> None:
 
 def test_a_ship_without_a_steady_speed_is_reported() -> None:
     with pytest.raises(InputError, match="steady speed"):
-        steady_turning(build(read_card("kvlcc2", {"derivatives.X0": 0.05, "derivatives.Xu": 0.02})))
+        steady_turning(build(read_card("kvlcc2-captive", {"derivatives.X0": 0.05, "derivatives.Xu": 0.02})))
 
 
 def test_a_polynomial_that_runs_away_ends_the_diagram_with_a_notice() -> None:

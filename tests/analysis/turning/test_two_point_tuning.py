@@ -58,7 +58,7 @@ def test_the_tuned_ship_simulated_turns_as_wanted() -> None:
 
 def test_an_unstable_ship_is_tuned_by_its_turn_with_the_rudder_amidships() -> None:
     """The pair of points of Melkozerova and Pershits; the amidships point asks the hull alone."""
-    model, levers = _ship("kvlcc2")
+    model, levers = _ship("kvlcc2-captive")
     points = TurningPoints(model)
     truth = _scaled(model, levers, 1.03, 1.05)
     wanted = [WantedTurn(at, points.turn_at(at, truth)[0].yaw_rate_radps) for at in (math.radians(5.0), 0.0)]

@@ -54,7 +54,7 @@ def test_shallow_water_widens_the_circles(bridge, mariner_card) -> None:
 
 
 def test_steady_speeds_are_those_that_the_ship_settles_at(card) -> None:
-    ship = ship_of(read_card("esso-osaka"))
+    ship = ship_of(read_card("esso-osaka-estimated"))
     speed = steady_speed(ship, 480 * RPM)
     orders = Orders(
         np.array([0.0, 1500.0]),
@@ -82,7 +82,7 @@ def test_the_gear_tells_hard_over_to_hard_over_and_asymmetry_the_neutral_rudder(
 def test_what_a_card_does_not_tell_is_none(mariner_card) -> None:
     bare = bridge_of(mariner_card)
     assert bare.telegraph == () and bare.stops == () and bare.stops_from == ()
-    tanker = bridge_of(read_card("esso-osaka"))
+    tanker = bridge_of(read_card("esso-osaka-estimated"))
     assert tanker.hard_over_s is None and tanker.neutral_deg is None
     assert [one.order for one in tanker.telegraph] == [""] * 5
     assert [one.within for one in tanker.telegraph] == [True, True, True, False, False]
@@ -90,7 +90,7 @@ def test_what_a_card_does_not_tell_is_none(mariner_card) -> None:
 
 def test_what_is_read_off_before_the_range_ends_is_kept() -> None:
     changed = {"model.valid_speed_mps": [5.8, 9.5], "model.valid_yaw_rate_prime": 1.0}
-    ship = ship_of(read_card("kvlcc2", changed))
+    ship = ship_of(read_card("kvlcc2-captive", changed))
     run = ship.run(Turn(math.radians(10)))
     read, path = run.reading, run.trajectory
     row = int(np.argmax(path["motion.speed"] < 5.8))
@@ -105,14 +105,14 @@ def test_a_card_that_holds_throughout_has_all_its_figures(mariner_card) -> None:
     found = bridge_of(mariner_card)
     assert all(one.range_exit is None and one.inside == len(one.ahead_m) for one in found.deep)
     assert found.as_json()["turning_circles_deep"][0]["outside_card_range"] == []
-    tanker = bridge_of(read_card("kvlcc2", {"model.valid_yaw_rate_prime": 1.0, "model.valid_rudder_deg": 40.0}))
+    tanker = bridge_of(read_card("kvlcc2-captive", {"model.valid_yaw_rate_prime": 1.0, "model.valid_rudder_deg": 40.0}))
     assert tanker.as_json()["turning_circles_deep"][0]["left_card_range_s"] == pytest.approx(91.6, abs=1)
     assert any("60° of heading" in one for one in tanker.notices)
 
 
 def test_absurd_revolutions_are_refused() -> None:
     with pytest.raises(InputError, match="beyond 1,200 revolutions"):
-        bridge_of(read_card("esso-osaka"), {"Full": 7e6})
+        bridge_of(read_card("esso-osaka-estimated"), {"Full": 7e6})
     with pytest.raises(InputError, match="beyond 10,000 revolutions"):
         bridge_of(read_card("mariner"), {"Full": 7e6})
     given = bridge_of(read_card("mariner"), {"Full ahead": 84.0}).telegraph

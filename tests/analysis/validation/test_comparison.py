@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def esso() -> ManoeuvringCard:
-    card = read_card("esso-osaka", {"environment.gravity_mps2": 9.80665})
+    card = read_card("esso-osaka-estimated", {"environment.gravity_mps2": 9.80665})
     assert isinstance(card, ManoeuvringCard)
     return replace(card, effects=())
 
@@ -128,7 +128,7 @@ def test_turns_keep_to_what_every_gear_allows(mariner_card, esso) -> None:
 
 def test_other_ships_and_other_sizes_are_reported(esso, found, mariner_card) -> None:
     assert any("of another size than" in one for one in found.notices)
-    two = compare_cards([mariner_card, read_card("kvlcc2")], 0)
+    two = compare_cards([mariner_card, read_card("kvlcc2-captive")], 0)
     assert any("another form" in one and "breadth" in one for one in two.notices)
     same = compare_cards([mariner_card, mariner_card], 0)
     assert not any("another" in one for one in same.notices)

@@ -30,7 +30,7 @@ def test_the_cards_own_ship_and_a_run_without_rudder_raise_no_alarm(off):
 @pytest.mark.slow
 def test_measured_ships_and_ships_with_an_unknown_effect_raise_no_alarm(data: Path) -> None:
     folder = data / "data"
-    kvlcc2, esso = read_card("kvlcc2"), read_card("esso-osaka")
+    kvlcc2, esso = read_card("kvlcc2-captive"), read_card("esso-osaka-estimated")
     asked = [(kvlcc2, sorted((folder / basin).glob("*.dat"))) for basin in ("kvlcc2_hsva", "kvlcc2_marin")]
     asked += [(esso, sorted(folder.glob(f"esso_osaka/{kind}/*.csv"))) for kind in ("zigzag", "turning", "random")]
     cases = [path for path in sorted((folder / "gap_cases").glob("case_*")) if path.is_dir()]
@@ -42,9 +42,9 @@ def test_measured_ships_and_ships_with_an_unknown_effect_raise_no_alarm(data: Pa
 
 def test_a_mariner_is_no_tanker(data: Path) -> None:
     trials = measured(
-        [data / f"data/gap_cases/case_1/zigzag{angle}.csv" for angle in ("20_20", "10_10")], read_card("kvlcc2")
+        [data / f"data/gap_cases/case_1/zigzag{angle}.csv" for angle in ("20_20", "10_10")], read_card("kvlcc2-captive")
     )
     for name in ("card", "cross_flow"):
         assert other_ship(
-            problem_from_card(STRUCTURES[name].start(read_card("kvlcc2")), trials.trials, trials.driven_by)
+            problem_from_card(STRUCTURES[name].start(read_card("kvlcc2-captive")), trials.trials, trials.driven_by)
         )

@@ -75,7 +75,7 @@ def test_a_trial_given_twice_is_refused(tmp_path: Path, card: ManoeuvringCard) -
 
 
 def test_hsva_and_marin_come_to_the_same_ship(data: Path) -> None:
-    card = read_card("kvlcc2")
+    card = read_card("kvlcc2-captive")
     assert isinstance(card, ManoeuvringCard)
     hsva = measured([data / "data/kvlcc2_hsva/HSVA_CPMC_KVLCC2_Z_10_10_P.dat"], card).trials[0]
     marin = measured([data / "data/kvlcc2_marin/MARIN_FREE_KVLCC2_zz_10_m.dat"], card).trials[0]

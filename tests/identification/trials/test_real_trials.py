@@ -19,7 +19,7 @@ FITTED, HELD_OUT = ("05_01", "10_05", "10_10_P", "20_10_S", "35_05"), ("10_10_S"
 
 @pytest.fixture(scope="module")
 def result(data: Path) -> Identification:
-    card = read_card("kvlcc2")
+    card = read_card("kvlcc2-captive")
     assert isinstance(card, ManoeuvringCard)
     hsva = [
         [data / f"data/kvlcc2_hsva/HSVA_CPMC_KVLCC2_Z_{name}.dat" for name in names] for names in (FITTED, HELD_OUT)

@@ -14,7 +14,7 @@ from tank2sim.identification.trials.problem.structures import STRUCTURES, prior_
 
 @pytest.fixture(scope="module")
 def kvlcc2() -> ManoeuvringCard:
-    card = read_card("kvlcc2")
+    card = read_card("kvlcc2-captive")
     assert isinstance(card, ManoeuvringCard)
     return card
 
@@ -64,7 +64,7 @@ def _estimate(free: dict[str, tuple[float, float]], factor: float) -> Estimate:
     return Estimate("test", tuple(free), values, np.diag(errors**2), np.diag(errors**-2))
 
 
-@pytest.mark.parametrize("name", ["mariner", "kvlcc2"])
+@pytest.mark.parametrize("name", ["mariner", "kvlcc2-captive"])
 def test_an_answer_goes_into_the_card_in_its_own_signs_and_scaling(name: str) -> None:
     card = read_card(name)
     assert isinstance(card, ManoeuvringCard)

@@ -21,7 +21,7 @@ BLANK = 'class="blank"'
 
 @pytest.fixture(scope="module")
 def bridge() -> Bridge:
-    return bridge_of(read_card("esso-osaka"))
+    return bridge_of(read_card("esso-osaka-estimated"))
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def mariner_bridge(mariner_card) -> Bridge:
 @pytest.fixture(scope="module")
 def tanker_bridge() -> Bridge:
     """Of a ship whose turning circles leave her card's range at 60 degrees."""
-    return bridge_of(read_card("kvlcc2", {"model.valid_yaw_rate_prime": 1.0, "model.valid_rudder_deg": 40.0}))
+    return bridge_of(read_card("kvlcc2-captive", {"model.valid_yaw_rate_prime": 1.0, "model.valid_rudder_deg": 40.0}))
 
 
 @pytest.fixture(scope="module")

@@ -88,7 +88,7 @@ def page(mariner):
 @pytest.fixture(scope="module")
 def pond(tmp_path_factory):
     """A ship with an engine that is late, and wind."""
-    text = bundled("models", "esso-osaka", "ship.toml").read_text(encoding="utf-8")
+    text = bundled("models", "esso-osaka-estimated", "ship.toml").read_text(encoding="utf-8")
     card = tmp_path_factory.mktemp("pond") / "ship.toml"
     late = '\n[[effects]]\nname = "engine_lag"\n[effects.parameters]\ntime_constant_s = 20.0\n'
     card.write_text(text + late, encoding="utf-8")

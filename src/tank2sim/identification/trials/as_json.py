@@ -302,11 +302,10 @@ _SAMPLES = 240
 
 
 def replays(card: ManoeuvringCard, result: Identification, trials: Measured) -> tuple[tuple[Passage, Passage], ...]:
-    """Each trial with the simulation by `card`, the given card, and with that by the card found."""
+    """Each trial, whole, with the simulation by `card`, the given card, and with that by the card found."""
     both = []
-    whole = card.model.valid_speed_mps is None  # the card found states only the speeds of the fitted trials
     for each_card in (card, result.card):
-        problem = problem_from_card(each_card, trials.trials, trials.driven_by, whole=whole)
+        problem = problem_from_card(each_card, trials.trials, trials.driven_by, whole=True)
         both.append(comparison_windows(problem, each_card, trials.trials, result.estimate.noise))
     return tuple(zip(*both, strict=True))
 

@@ -124,8 +124,7 @@ def problem_from_card(
 ) -> Problem:
     """The problem of fitting a card's free parameters to trials, except for those in `hold`.
 
-    Parts of runs at speeds outside the range of the card are omitted, unless `whole` is True. Parameters that are in
-    the card's covariance are correlated before the trials.
+    Parts of runs at speeds outside the range of the card are omitted, unless `whole` is True.
 
     Raises
     ------
@@ -154,8 +153,7 @@ def problem_from_card(
         problem = f"never goes for long at {low:g} to {high:g} m/s, where the card holds"
         raise InputError(trials[0].path, "", problem, "change model.valid_speed_mps of the card, or leave it out")
     values = np.array(list(free.values()))
-    names, inverse = tuple(free), _inverse_correlation(card, tuple(free))
-    return Problem(model, names, values[:, 0], values[:, 1], runs, prior_inverse=inverse)
+    return Problem(model, tuple(free), values[:, 0], values[:, 1], runs)
 
 
 def with_captive(problem: Problem, card: ManoeuvringCard, captive: CaptiveRuns | None) -> Problem:
@@ -172,19 +170,20 @@ def with_captive(problem: Problem, card: ManoeuvringCard, captive: CaptiveRuns |
     return replace(problem, captive=noise_alone(tests, problem))
 
 
-def _inverse_correlation(card: ManoeuvringCard, free: tuple[str, ...]) -> Array | None:
-    """Inverse correlations (k, k) of the free parameters by the card's covariance; None if it states none of them."""
+def with_correlations(problem: Problem, card: ManoeuvringCard) -> Problem:
+    """The problem with its free parameters correlated before the trials as in the card's covariance, if it has one."""
     if read_covariance(card) is None:
-        return None
+        return problem
     joint = joint_errors(card, card_parameters(card, study_model(card)))
-    known = {parameter.name: place for place, parameter in enumerate(joint.parameters)}
-    rows = [place for place, name in enumerate(free) if name in known and joint.parameters[known[name]].standard_error]
-    columns = [known[free[place]] for place in rows]
+    known = {parameter.name: place for place, parameter in enumerate(joint.parameters) if parameter.standard_error}
+    rows = [place for place, name in enumerate(problem.free) if name in known]
+    columns = [known[problem.free[place]] for place in rows]
     block = joint.covariance[np.ix_(columns, columns)]
     sizes = np.sqrt(np.diag(block))  # those of the problem may be wider
-    correlation = np.eye(len(free))
+    correlation = np.eye(len(problem.free))
     correlation[np.ix_(rows, rows)] = block / np.outer(sizes, sizes)
-    return np.asarray(np.linalg.inv(correlation + NEARLY_SINGULAR * np.eye(len(free))), dtype=np.float64)
+    inverse = np.linalg.inv(correlation + NEARLY_SINGULAR * np.eye(len(problem.free)))
+    return replace(problem, prior_inverse=np.asarray(inverse, dtype=np.float64))
 
 
 def _revolutions_vary(propulsion: Propulsion, trials: Sequence[Trial]) -> bool:

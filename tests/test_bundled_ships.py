@@ -1,0 +1,80 @@
+"""Bundled ships do what was measured of them, and a hard turn stays within their own range, without a kink."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bundled_ships
+import numpy as np
+import pytest
+
+import tank2sim as t2s
+from tank2sim.bundled import bundled_cards
+from tank2sim.cards import ManoeuvringCard, read_card
+
+IDENTIFIED = ("kvlcc2", "esso-osaka")
+
+
+@pytest.fixture(scope="module")
+def errors(data: Path) -> dict[str, dict[str, np.ndarray]]:
+    """Ship and pattern of trials, to the errors of each figure: deg, or a share of the measured distance."""
+    found: dict[str, dict[str, np.ndarray]] = {}
+    for comparison in bundled_ships.COMPARISONS:
+        if comparison.ship in IDENTIFIED:
+            figures = bundled_ships.figures(comparison)
+            names = {figure.name for figure in figures}
+            key = f"{comparison.ship} {comparison.pattern.rpartition('/')[0]}"
+            found[key] = {
+                name: np.array([figure.error for figure in figures if figure.name == name], dtype=float)
+                for name in names
+            }
+    return found
+
+
+@pytest.mark.slow
+def test_the_kvlcc2_turns_as_marin_measured_though_that_turn_was_not_fitted(errors) -> None:
+    turn = errors["kvlcc2 kvlcc2_marin"]
+    for name in ("advance_m", "transfer_m", "tactical_diameter_m"):
+        assert np.abs(turn[name]).max() < 0.10, name
+    assert np.sqrt(np.mean(turn["overshoot_1_deg"] ** 2)) < 1.0
+
+
+@pytest.mark.slow
+def test_the_kvlcc2_overshoots_as_hsva_measured(errors) -> None:
+    zigzags = errors["kvlcc2 kvlcc2_hsva"]
+    assert len(zigzags["overshoot_1_deg"]) == 7
+    assert np.sqrt(np.mean(zigzags["overshoot_1_deg"] ** 2)) < 0.5
+    assert np.sqrt(np.mean(zigzags["overshoot_2_deg"] ** 2)) < 2.0
+
+
+@pytest.mark.slow
+def test_the_esso_osaka_turns_as_wide_as_its_records(errors) -> None:
+    """The advance is 11 % long on average in the wind of the pond."""
+    turns = errors["esso-osaka esso_osaka/turning"]
+    assert len(turns["tactical_diameter_m"]) == 6
+    assert abs(np.mean(turns["tactical_diameter_m"])) < 0.10
+    assert abs(np.mean(turns["advance_m"])) < 0.15
+
+
+@pytest.mark.parametrize("name", IDENTIFIED)
+@pytest.mark.parametrize("rudder", [35, -35])
+def test_a_hard_turn_stays_in_the_range_of_the_card_and_has_no_kink(name: str, rudder: float) -> None:
+    run = t2s.load(name).turn(rudder)
+    assert not run.run.reading.message
+    t, drift = run.df.t_s.to_numpy(), np.arctan2(-run.df.v_mps, run.df.u_mps).to_numpy()
+    assert np.abs(np.degrees(drift)).max() < 30.0
+    ship_time = t2s.load(name).card.ship.length_m / t2s.load(name).card.model.speed_mps
+    every = np.arange(0.0, t[-1], 0.1 * ship_time)
+    slope = np.gradient(np.interp(every, t, drift), every) * ship_time
+    assert np.abs(np.diff(slope)).max() < 0.1  # rad in the time of a length, over a tenth of that time
+
+
+def test_identified_ships_name_their_trials_and_hold_no_record_of_them() -> None:
+    for name in IDENTIFIED:
+        card = read_card(name)
+        assert isinstance(card, ManoeuvringCard)
+        source = card.ship.source or ""
+        assert source.startswith("Identified by tank2sim") and ("github.com" in source or "FRT-DS" in source)
+        assert card.fitted_trials == () and "t_s" not in card.text
+        assert card.covariance is not None or "covariance:" in card.text
+    assert {"kvlcc2", "kvlcc2-captive", "esso-osaka", "esso-osaka-estimated", "mariner"} <= set(bundled_cards())
