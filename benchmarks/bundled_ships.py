@@ -22,7 +22,7 @@ DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A bundled ship and trials of it: files by a pattern in the data folder, and whether the card was fitted to them."""
+    """A bundled ship, trials of it by a pattern in the data folder, and whether the card was fitted to them."""
 
     ship: str
     pattern: str

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import tank2sim as t2s
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics import build
+from tank2sim.identification.trials.identify import IdentificationOptions, structure_by_evidence
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
+from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import card_with_estimate, free_parameters, rounded
 from tank2sim.identification.trials.problem.structures import STRUCTURES, prior_of_absent
 
@@ -101,3 +106,17 @@ def test_a_card_with_a_byte_order_mark_is_restructured_like_any_other(kvlcc2: Ma
     assert isinstance(marked, ManoeuvringCard)
     plain, found = (STRUCTURES["cross_flow"].start(card) for card in (kvlcc2, marked))
     assert found.derivatives == plain.derivatives and found.effects == plain.effects
+
+
+@pytest.mark.parametrize(
+    ("ship", "start", "expected"), [("mariner", "mariner", "card"), ("kvlcc2", "kvlcc2-captive", "cross_flow")]
+)
+def test_evidence_takes_the_terms_that_made_the_trials(ship: str, start: str, expected: str, tmp_path: Path) -> None:
+    """The Mariner is a polynomial of third order; the bundled KVLCC2 has cross-flow drag and a loaded rudder."""
+    for angle in (10, 20):
+        t2s.load(ship).zigzag(angle, angle).to_csv(tmp_path / f"{angle}.csv")
+    card = read_card(start)
+    assert isinstance(card, ManoeuvringCard)
+    trials = measured(sorted(tmp_path.glob("*.csv")), card)
+    structure, notices = structure_by_evidence(card, trials, IdentificationOptions())
+    assert structure == expected and bool(notices) == (expected == "cross_flow")
