@@ -20,7 +20,7 @@ from tank2sim.executors import PROCESSES, check_executor, executing
 from tank2sim.files import plain_json
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
 from tank2sim.identification.trials.as_json import (
-    SETS,
+    SET_KEYS,
     estimate_rows,
     figure_rows,
     following_rows,
@@ -41,7 +41,7 @@ from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import SearchReport, silent
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import with_fitted_trials
-from tank2sim.identification.trials.problem.structures import AUTO, EVIDENCE, STRUCTURES
+from tank2sim.identification.trials.problem.structures import AUTO, BY_EVIDENCE, STRUCTURES
 from tank2sim.records.campaigns import read_campaign
 from tank2sim.units import in_words
 
@@ -109,7 +109,7 @@ class IdentificationResult(Result):
         keys = ("figure", "measured", "before", "predicted")
         rows = [
             (figure["trial"], word, *(figure[key] for key in keys), *(figure["interval_95"] or (None, None)))
-            for word, key in SETS.items()
+            for word, key in SET_KEYS.items()
             for figure in self._found["figures"][key]
         ]
         columns = ["trial", "set", "figure", "measured", "before", "now", "low_95", "high_95"]
@@ -185,7 +185,7 @@ def identify(
     *,
     holdout: TrialPaths = (),
     method: str = "output_error",
-    structure: str = EVIDENCE,
+    structure: str = BY_EVIDENCE,
     campaign: str | Path | None = None,
     inertia: bool = False,
     piece_s: float | None = None,
@@ -244,7 +244,7 @@ def identify(
     """
     for name, value, known in (
         ("method", method, TRIAL_METHODS),
-        ("structure", structure, (*STRUCTURES.names(), AUTO, EVIDENCE)),
+        ("structure", structure, (*STRUCTURES.names(), AUTO, BY_EVIDENCE)),
     ):
         if value not in known:
             raise InputError(name, "", f"{value!r} is not known", f"there are: {', '.join(known)}")

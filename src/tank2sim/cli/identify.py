@@ -14,7 +14,7 @@ from tank2sim.cli.options import executor_option, page_option, plot_folder_optio
 from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.identification.trials.identify import TRIAL_METHODS
-from tank2sim.identification.trials.problem.structures import AUTO, EVIDENCE, STRUCTURES
+from tank2sim.identification.trials.problem.structures import AUTO, BY_EVIDENCE, STRUCTURES
 
 
 @click.command("identify", cls=TakesSeveral, several=("--holdout",))
@@ -31,11 +31,11 @@ from tank2sim.identification.trials.problem.structures import AUTO, EVIDENCE, ST
 @click.option("--method", type=click.Choice(TRIAL_METHODS), default="output_error", show_default=True)
 @click.option(
     "--structure",
-    type=click.Choice((*STRUCTURES.names(), AUTO, EVIDENCE)),
-    default=EVIDENCE,
+    type=click.Choice((*STRUCTURES.names(), AUTO, BY_EVIDENCE)),
+    default=BY_EVIDENCE,
     show_default=True,
     help="; ".join(f"{each.name}: {each.description}" for each in STRUCTURES.values())
-    + f"; {AUTO}: cross-validation decides; {EVIDENCE}: cross_flow, or card if an information criterion prefers it "
+    + f"; {AUTO}: cross-validation decides; {BY_EVIDENCE}: cross_flow, or card if an information criterion prefers it "
     "strongly.",
 )
 @click.option(

@@ -10,12 +10,12 @@ import pytest
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.analysis.influence.card_influence import CardInfluence, influence
 from tank2sim.analysis.influence.figures import parse_figure
-from tank2sim.analysis.influence.parameters import card_parameters, joint_errors, study_model
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.validation.standard_trials import SEED, members
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cards.covariance import Covariance, covariance_file, referring
 from tank2sim.dynamics import build
+from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.simulation.ensemble import ensemble
 
 CROSS_FLOW = """

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tank2sim.analysis.influence.parameters import (
+from tank2sim.arrays import Array
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.covariance import Covariance
+from tank2sim.dynamics.card_parameters import (
     CardParameter,
     JointErrors,
     card_parameters,
     joint_errors,
     study_model,
 )
-from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.cards.covariance import Covariance
 from tank2sim.simulation.ensemble import Draws
 
 

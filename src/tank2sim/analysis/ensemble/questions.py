@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.analysis.influence.figures import parse_figure
-from tank2sim.analysis.influence.parameters import study_model
 from tank2sim.analysis.stability.imo import imo_criteria
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import parse_card
 from tank2sim.dynamics import build
+from tank2sim.dynamics.card_parameters import study_model
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import mass_fault
 from tank2sim.errors import InputError

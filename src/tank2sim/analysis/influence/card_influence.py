@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tank2sim.analysis.influence.figures import InfluenceFigure
-from tank2sim.analysis.influence.parameters import CardParameter, JointErrors, agreed_by_name, joint_errors
 from tank2sim.analysis.influence.percent import STEP_PERCENT, change_percent, changed_together, combined_percent
 from tank2sim.analysis.influence.study import Study
 from tank2sim.arrays import Array
+from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, agreed_by_name, joint_errors
 from tank2sim.errors import InputError
 
 CURVED = 1.5

@@ -17,9 +17,9 @@ from tank2sim.analysis.influence.equilibria import (
 )
 from tank2sim.analysis.influence.figures import FIGURE_OPTION, STEADY, STRAIGHT, InfluenceFigure
 from tank2sim.analysis.influence.motion import HALF_TURN, MotionSlopes, overshoots_in
-from tank2sim.analysis.influence.parameters import CardParameter, card_parameters, study_model
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.card_parameters import CardParameter, card_parameters, study_model
 from tank2sim.errors import InputError
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator

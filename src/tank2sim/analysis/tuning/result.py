@@ -9,11 +9,11 @@ from typing import Any
 
 import tomlkit
 
-from tank2sim.analysis.influence.parameters import CardParameter
 from tank2sim.analysis.tuning.targets import Target
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import changed_text, parse_card
+from tank2sim.dynamics.card_parameters import CardParameter
 from tank2sim.errors import InputError
 from tank2sim.files import BYTE_ORDER_MARK
 

@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 from scipy.linalg import qr
 from scipy.optimize import Bounds, LinearConstraint, least_squares, milp, minimize
 
-from tank2sim.analysis.influence.parameters import CardParameter, agreed_by_name, find_parameter
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.result import FEWEST, Means, Move, Tuned
 from tank2sim.analysis.tuning.targets import AT_LEAST, AT_MOST, EQUAL, Target
 from tank2sim.arrays import Array
+from tank2sim.dynamics.card_parameters import CardParameter, agreed_by_name, find_parameter
 from tank2sim.errors import InputError
 
 Slice = NDArray[np.int64]

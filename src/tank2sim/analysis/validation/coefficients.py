@@ -21,11 +21,11 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from tank2sim.analysis.influence.parameters import card_parameters
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.scaling import file_factor
 from tank2sim.cards.terms import Term, known_term
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS, polynomial
+from tank2sim.dynamics.card_parameters import card_parameters
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertial_forces
 

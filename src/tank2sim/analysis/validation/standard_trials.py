@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_with
-from tank2sim.analysis.influence.parameters import card_parameters, joint_errors, study_model
 from tank2sim.analysis.stability.imo import TRIAL_RUDDER
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
+from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError

@@ -27,7 +27,6 @@ from enum import StrEnum
 
 import numpy as np
 
-from tank2sim.analysis.influence.parameters import card_parameters, standard_errors_in_words, study_model
 from tank2sim.analysis.validation.standard_trials import (
     MEMBERS,
     SEED,
@@ -39,6 +38,7 @@ from tank2sim.analysis.validation.standard_trials import (
 )
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
+from tank2sim.dynamics.card_parameters import card_parameters, standard_errors_in_words, study_model
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.signatures import fitted_as

@@ -30,7 +30,7 @@ from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import drawn_columns
 from tank2sim.units import from_si
 
-SETS = {"fitted": "fit", "held out": "holdout"}
+SET_KEYS = {"fitted": "fit", "held out": "holdout"}
 """Words for a set of trials to its key in the JSON."""
 
 NO_YAW = 3.0
@@ -48,7 +48,7 @@ def identification_as_json(result: Identification, messages: tuple[str, ...] = (
     estimate, known = result.estimate, result.identifiability
     parameters = _parameters(result)
     forced = (f"{FORCED}: {'; '.join(result.forced)}",) if result.forced else ()
-    comparisons = {SETS[word]: (before, found) for word, before, found in result.comparisons}
+    comparisons = {SET_KEYS[word]: (before, found) for word, before, found in result.comparisons}
     return {
         "ship": result.card.ship.name,
         "method": estimate.method,
@@ -66,10 +66,10 @@ def identification_as_json(result: Identification, messages: tuple[str, ...] = (
             "holdout": _windows(result.holdout) if result.holdout else None,
         },
         "errors_over_windows": {
-            key: _errors_over_windows(*comparisons[key]) if key in comparisons else [] for key in SETS.values()
+            key: _errors_over_windows(*comparisons[key]) if key in comparisons else [] for key in SET_KEYS.values()
         },
         "figures_are": FIGURES_ARE,
-        "figures": {key: _figures(*comparisons[key]) if key in comparisons else [] for key in SETS.values()},
+        "figures": {key: _figures(*comparisons[key]) if key in comparisons else [] for key in SET_KEYS.values()},
         "structures": {
             name: {
                 "errors": structure.errors,
@@ -173,7 +173,7 @@ def following_rows(found: Mapping[str, Any]) -> list[list[object]]:
     noise = from_si("r_degps", found["misfit"]["noise"].get("motion.r") or 0.0)
     return [
         [trial["trial"], word, _yaw_error(trial["before"], noise), _yaw_error(trial["found"], noise)]
-        for word, key in SETS.items()
+        for word, key in SET_KEYS.items()
         for trial in found["errors_over_windows"][key]
     ]
 
@@ -188,7 +188,10 @@ def structure_rows(found: Mapping[str, Any]) -> list[list[object]]:
 
 
 def figure_error(figure: Mapping[str, Any], key: str = "predicted") -> float:
-    """Predicted less measured by the JSON; for distances as a share of the measured one; nan where not reached."""
+    """Predicted less measured by the JSON; for distances as a share of the measured one; nan where not reached.
+
+    `key` is ``predicted`` or, for the card before, ``before``.
+    """
     if figure[key] is None:
         return np.nan
     difference = float(figure[key] - figure["measured"])
@@ -198,7 +201,7 @@ def figure_error(figure: Mapping[str, Any], key: str = "predicted") -> float:
 def figure_rows(found: Mapping[str, Any]) -> list[list[object]]:
     """Trial, fitted or held out, figure, measured, predicted before and after, error after, 95 % interval."""
     rows: list[list[object]] = []
-    for word, key in SETS.items():
+    for word, key in SET_KEYS.items():
         for figure in found["figures"][key]:
             error, interval = figure_error(figure), figure["interval_95"]
             text = f"{100 * error:+.1f} %" if figure["figure"].endswith("_m") else f"{error:+.2f}"

@@ -47,7 +47,7 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     with_correlations,
     with_range,
 )
-from tank2sim.identification.trials.problem.structures import AUTO, EVIDENCE, STRUCTURES
+from tank2sim.identification.trials.problem.structures import AUTO, BY_EVIDENCE, STRUCTURES
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.recorded import recorded
 
@@ -81,7 +81,7 @@ class IdentificationOptions:
     method : str
         One of :data:`TRIAL_METHODS`.
     structure : str
-        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, :data:`.structures.EVIDENCE` or
+        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, :data:`.structures.BY_EVIDENCE` or
         :data:`.structures.AUTO`.
     inertia : bool
         Estimate acceleration derivatives, too.
@@ -100,7 +100,7 @@ class IdentificationOptions:
     """
 
     method: str = "output_error"
-    structure: str = EVIDENCE
+    structure: str = BY_EVIDENCE
     inertia: bool = False
     piece_s: float | None = None
     scale_prior: bool = True
@@ -228,7 +228,7 @@ def _identified(
     if structure == AUTO:
         structures = cross_validate_structures(card, trials, options, executor)
         structure = simplest(structures)
-    elif structure == EVIDENCE:
+    elif structure == BY_EVIDENCE:
         structure, chosen = structure_by_evidence(card, trials, options)
     started = STRUCTURES[structure].start(card)
     problem = _posed(card, started, trials, options)

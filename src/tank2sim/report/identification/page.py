@@ -8,7 +8,7 @@ import altair as alt
 import numpy as np
 
 from tank2sim.identification.trials.as_json import (
-    SETS,
+    SET_KEYS,
     estimate_rows,
     figure_error,
     figure_rows,
@@ -39,7 +39,7 @@ def identification_charts(found: Json) -> dict[str, alt.TopLevelMixin]:
     charts: dict[str, alt.TopLevelMixin] = {}
     windows = _sets(found["errors_over_windows"])
     charts["windows"] = window_chart(windows, title="Error over windows of five ship lengths, of each signal")
-    figures = {word: found["figures"][SETS[word]] for word in windows}
+    figures = {word: found["figures"][SET_KEYS[word]] for word in windows}
     if chart := figure_chart(figures, title="Figures of turns and zigzags, in closed loop"):
         charts["figures"] = chart
     for word in (HELD_OUT, FITTED):
@@ -87,7 +87,7 @@ def identification_page(found: Json) -> Page:
     for word in (HELD_OUT, FITTED):
         stem = word.replace(" ", "_")
         if charts_there := drawn(f"tracks_{stem}", f"histories_{stem}"):
-            count = len(found["errors_over_windows"][SETS[word]])
+            count = len(found["errors_over_windows"][SET_KEYS[word]])
             text = f"The {MOST_TRIALS} of {count} trials with the largest error of yaw rate."
             sections.append(
                 PageSection(heading=f"Trials {word}", text=text if count > MOST_TRIALS else "", charts=charts_there)
@@ -142,7 +142,7 @@ _CAPTIONS = {
 
 def _sets(entries: Mapping[str, Json]) -> dict[str, Json]:
     """Words for a set of trials to its entries, without a set that has none."""
-    return {word: entries[key] for word, key in SETS.items() if entries[key]}
+    return {word: entries[key] for word, key in SET_KEYS.items() if entries[key]}
 
 
 def _worst(trials: Sequence[Json], windows: Sequence[Json]) -> list[Json]:
@@ -157,12 +157,12 @@ def _worst(trials: Sequence[Json], windows: Sequence[Json]) -> list[Json]:
 
 def _key_figures(found: Json) -> list[KeyFigure]:
     windows = found["errors_over_windows"]
-    word = HELD_OUT if windows[SETS[HELD_OUT]] else FITTED
-    trials, compared = windows[SETS[word]], found["figures"][SETS[word]]
+    word = HELD_OUT if windows[SET_KEYS[HELD_OUT]] else FITTED
+    trials, compared = windows[SET_KEYS[word]], found["figures"][SET_KEYS[word]]
     effects = f"{len(found['effects_of_card'])} effects"
     figures = [
-        KeyFigure(label="Trials fitted", value=len(windows[SETS[FITTED]])),
-        KeyFigure(label="Trials held out", value=len(windows[SETS[HELD_OUT]])),
+        KeyFigure(label="Trials fitted", value=len(windows[SET_KEYS[FITTED]])),
+        KeyFigure(label="Trials held out", value=len(windows[SET_KEYS[HELD_OUT]])),
         KeyFigure(label="Coefficients", value=len(found["identifiability"]["parameters"]), note=effects),
         _compared("Yaw-rate error", word, "%", *(100 * pooled_error(trials, key) for key in ("before", "found"))),
     ]

@@ -8,7 +8,6 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
-from tank2sim.analysis.influence.parameters import card_parameters, joint_errors, study_model
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.covariance import read_covariance
@@ -16,6 +15,7 @@ from tank2sim.cards.form import Propulsion
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
+from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Quantity
