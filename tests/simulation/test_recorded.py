@@ -14,7 +14,7 @@ from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
-from tank2sim.simulation.recorded import _smoothed, recorded, repeat
+from tank2sim.simulation.recorded import _smoothed, reading_errors, recorded, repeat
 from tank2sim.simulation.rudder_record import _held
 from tests.identification.trials.made_up_ship import CARD, NOISE, SPEED, TRUTH, accelerations
 
@@ -128,6 +128,22 @@ def test_course_nominal_heading_and_lag_come_from_all_reversals_together(model, 
     assert what.manoeuvre.course == pytest.approx(0.4 + off, abs=np.deg2rad(0.1))
     assert abs(what.manoeuvre.lag_s - lag) < 4 * what.errors["lag_s"] + STEP  # the controller acts at whole steps
     assert 0 < what.errors["heading_rad"] < np.deg2rad(0.5)
+
+
+def test_figures_change_with_the_measured_point_and_the_zero_of_the_heading_as_their_reading_errors_say(model):
+    trial = sail(lambda t, turned, before: np.deg2rad(35) * (t >= 12.0), 240.0)
+    psi, zero = trial.signals["psi_rad"], 0.25
+    length = 7.0
+    there = {"x_m": np.cos(psi), "y_m": np.sin(psi)}
+    moved = {name: trial.signals[name] + 0.01 * length * ahead for name, ahead in there.items()}
+    plain = recorded(trial, model)
+    point = recorded(replace(trial, signals={**trial.signals, **moved}), model).figures
+    turned = recorded(replace(trial, signals={**trial.signals, "psi_rad": psi + np.deg2rad(zero)}), model).figures
+    errors = reading_errors(plain, length)
+    assert set(errors) == {"advance_m", "transfer_m", "tactical_diameter_m"}
+    for name, error in errors.items():
+        changes = [point[name] - plain.figures[name], turned[name] - plain.figures[name]]
+        assert error == pytest.approx(math.hypot(*changes), rel=0.25), name
 
 
 def test_a_rudder_that_is_reversed_by_the_clock_at_any_heading_makes_no_zigzag(model):

@@ -60,6 +60,10 @@ COURSE_ERROR = math.radians(0.25)
 """Standard error of a zigzag's course from the heading of its approach, in addition to the scatter of that heading: the
 courses of MARIN's zigzags differ by 0.1 to 0.2 deg from the first headings of their records (project choice)."""
 
+POINT_ERROR = 0.01
+"""Standard error of the place of the measured point along the ship, in ship lengths: antennas and model origins are
+stated to a per cent of the length at best (project choice)."""
+
 LAG = 0.1
 """Prior scale of the lags of helmsmen and controllers, in L/u0: HSVA's are 0.06, MARIN's 0.02, those
 of the 3 m Esso Osaka 0.03. It matters only with too few reversals for the lag (project choice)."""
@@ -165,6 +169,32 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
     start["initial.rudder_angle"] = float(np.interp(first.execute_s, trial.time_s, rudder_of(trial)))
     inputs = _fed(trial, model)
     return Recorded(trial, manoeuvre, first.execute_s, end, first.rate, start, inputs, figures, errors)
+
+
+def reading_errors(record: Recorded, length: float) -> dict[str, float]:
+    """Standard errors with which figures can be read off a record: m, and rad for overshoots.
+
+    A point p ahead of the place that is taken for it changes the advance by -p and the transfer by p (heading 90 deg),
+    and the tactical diameter by nothing (180 deg). With a heading's zero off by e the axes turn: a distance changes by e
+    times that across it where it is read, which for the tactical diameter is the advance less half the diameter. An
+    overshoot changes as the course does.
+
+    Parameters
+    ----------
+    record : Recorded
+    length : float
+        Of the ship, m.
+    """
+    if isinstance(record.manoeuvre, Zigzag):
+        course = record.errors.get("course_rad", COURSE_ERROR)
+        return {f"overshoot_{number}_deg": course for number in (1, 2)}
+    named = ("advance_m", "transfer_m", "tactical_diameter_m")
+    advance, transfer, diameter = (record.figures.get(name) for name in named)
+    if not (isinstance(advance, float) and isinstance(transfer, float) and isinstance(diameter, float)):
+        return {}
+    point = POINT_ERROR * length
+    across = (transfer, point), (advance, point), (advance - diameter / 2, 0.0)
+    return {name: math.hypot(COURSE_ERROR * far, shift) for name, (far, shift) in zip(named, across, strict=True)}
 
 
 def steerable(card: ManoeuvringCard) -> ManoeuvringCard:

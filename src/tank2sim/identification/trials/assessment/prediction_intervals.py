@@ -6,6 +6,7 @@ executor or the order of its work.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -37,10 +38,14 @@ from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Manoeuvre
-from tank2sim.simulation.recorded import Recorded, recorded, repeat, steerable
+from tank2sim.simulation.recorded import Recorded, reading_errors, recorded, repeat, steerable
 from tank2sim.simulation.rows import Chain, RowFunction
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.scheme import runge_kutta_step
+from tank2sim.units import from_si
+
+NORMAL_95 = 1.96
+"""Half the width of a normal distribution's 95 % interval, in standard deviations."""
 
 IN_BANDS = {f"overshoots_deg.{number}": f"overshoot_{number}_deg" for number in (1, 2)}
 """Name of a figure in :class:`Bands` to its name in a comparison, where they differ."""
@@ -274,7 +279,8 @@ def compare_held_out(
     """Comparison of the new card with held-out trials, with a 95 % prediction interval of each figure.
 
     The intervals are of simulations with coefficients drawn from their covariance, under random forces with the size
-    and correlation time of those that the fit does not explain (:func:`bands`).
+    and correlation time of those that the fit does not explain (:func:`bands`). They are wider by what is uncertain of
+    the measured point and of the heading's zero (:func:`.recorded.reading_errors`).
     """
     plain = compare_card(fitted.card, held, fitted.estimate.noise, whole=fitted.whole)
     if not members or not plain.figures:
@@ -291,8 +297,12 @@ def compare_held_out(
             quantiles = bands(ship, fitted.estimate, manoeuvre, disturbances, settings, executor).quantiles
         except InputError:  # the motion of every member diverged: no interval
             continue
-        for name, (lowest, *_, highest) in quantiles.items():
-            intervals[trial.name, IN_BANDS.get(name, name)] = (lowest, highest)
+        reading = reading_errors(manoeuvre, card.ship.length_m)
+        for name, (lowest, median, highest) in quantiles.items():
+            figure = IN_BANDS.get(name, name)
+            error = NORMAL_95 * from_si(figure, reading.get(figure, 0.0))
+            below, above = math.hypot(median - lowest, error), math.hypot(highest - median, error)
+            intervals[trial.name, figure] = (median - below, median + above)
     figures = tuple(replace(figure, interval=intervals.get((figure.trial, figure.name))) for figure in plain.figures)
     return replace(plain, figures=figures)
 
