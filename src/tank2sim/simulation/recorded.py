@@ -105,6 +105,9 @@ class Recorded:
         As measured.
     errors : dict
         Standard errors of the joint fit of a zigzag's reversals: ``heading_rad``, ``course_rad``, ``lag_s``.
+    reading_errors : dict
+        Standard errors with which figures can be read off the record, by what is uncertain of the measured point and of
+        the heading's zero: m for distances of turns, rad for overshoots.
     """
 
     trial: Trial
@@ -116,6 +119,7 @@ class Recorded:
     inputs: dict[str, float]
     figures: Figures
     errors: dict[str, float] = field(default_factory=dict)
+    reading_errors: dict[str, float] = field(default_factory=dict)
 
     @property
     def words(self) -> str:
@@ -168,33 +172,34 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
     start = {f"initial.{name[7:]}": float(track[name][0]) for name in STATES.values()}
     start["initial.rudder_angle"] = float(np.interp(first.execute_s, trial.time_s, rudder_of(trial)))
     inputs = _fed(trial, model)
-    return Recorded(trial, manoeuvre, first.execute_s, end, first.rate, start, inputs, figures, errors)
+    if isinstance(manoeuvre, Turn):
+        reading = _turn_reading_errors(track, float(values["ship.length"]))
+    else:
+        reading = {f"overshoot_{number}_deg": errors["course_rad"] for number in (1, 2)}
+    return Recorded(trial, manoeuvre, first.execute_s, end, first.rate, start, inputs, figures, errors, reading)
 
 
-def reading_errors(record: Recorded, length: float) -> dict[str, float]:
-    """Standard errors with which figures can be read off a record: m, and rad for overshoots.
+def _turn_reading_errors(track: Trajectory, length: float) -> dict[str, float]:
+    """Standard errors of a turn's distances, m.
 
     A point p ahead of the place that is taken for it changes the advance by -p and the transfer by p (heading 90 deg),
-    and the tactical diameter by nothing (180 deg). With a heading's zero off by e the axes turn: a distance changes by e
-    times that across it where it is read, which for the tactical diameter is the advance less half the diameter. An
-    overshoot changes as the course does.
-
-    Parameters
-    ----------
-    record : Recorded
-    length : float
-        Of the ship, m.
+    and the tactical diameter by nothing (180 deg). With a heading's zero off by e the axes turn: a distance changes by
+    e times the one across it, where it is read.
     """
-    if isinstance(record.manoeuvre, Zigzag):
-        course = record.errors.get("course_rad", COURSE_ERROR)
-        return {f"overshoot_{number}_deg": course for number in (1, 2)}
-    named = ("advance_m", "transfer_m", "tactical_diameter_m")
-    advance, transfer, diameter = (record.figures.get(name) for name in named)
-    if not (isinstance(advance, float) and isinstance(transfer, float) and isinstance(diameter, float)):
-        return {}
-    point = POINT_ERROR * length
-    across = (transfer, point), (advance, point), (advance - diameter / 2, 0.0)
-    return {name: math.hypot(COURSE_ERROR * far, shift) for name, (far, shift) in zip(named, across, strict=True)}
+    psi, x, y = (track[f"motion.{name}"] - track[f"motion.{name}"][0] for name in ("psi", "x", "y"))
+    course = track["motion.psi"][0]
+    ahead, side = x * math.cos(course) + y * math.sin(course), y * math.cos(course) - x * math.sin(course)
+    turned = np.maximum.accumulate(np.abs(psi))
+    point, errors = POINT_ERROR * length, {}
+    for name, angle, across, shift in (
+        ("advance_m", 90.0, side, point),
+        ("transfer_m", 90.0, ahead, point),
+        ("tactical_diameter_m", 180.0, ahead, 0.0),
+    ):
+        place = int(np.searchsorted(turned, math.radians(angle)))
+        if place < len(turned):
+            errors[name] = math.hypot(COURSE_ERROR * float(across[place]), shift)
+    return errors
 
 
 def steerable(card: ManoeuvringCard) -> ManoeuvringCard:

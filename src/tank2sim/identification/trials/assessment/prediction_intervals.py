@@ -38,7 +38,7 @@ from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Manoeuvre
-from tank2sim.simulation.recorded import Recorded, reading_errors, recorded, repeat, steerable
+from tank2sim.simulation.recorded import Recorded, recorded, repeat, steerable
 from tank2sim.simulation.rows import Chain, RowFunction
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.scheme import runge_kutta_step
@@ -280,7 +280,7 @@ def compare_held_out(
 
     The intervals are of simulations with coefficients drawn from their covariance, under random forces with the size
     and correlation time of those that the fit does not explain (:func:`bands`). They are wider by what is uncertain of
-    the measured point and of the heading's zero (:func:`.recorded.reading_errors`).
+    the measured point and of the heading's zero (:class:`.recorded.Recorded`).
     """
     plain = compare_card(fitted.card, held, fitted.estimate.noise, whole=fitted.whole)
     if not members or not plain.figures:
@@ -297,10 +297,9 @@ def compare_held_out(
             quantiles = bands(ship, fitted.estimate, manoeuvre, disturbances, settings, executor).quantiles
         except InputError:  # the motion of every member diverged: no interval
             continue
-        reading = reading_errors(manoeuvre, card.ship.length_m)
         for name, (lowest, median, highest) in quantiles.items():
             figure = IN_BANDS.get(name, name)
-            error = NORMAL_95 * from_si(figure, reading.get(figure, 0.0))
+            error = NORMAL_95 * from_si(figure, manoeuvre.reading_errors.get(figure, 0.0))
             below, above = math.hypot(median - lowest, error), math.hypot(highest - median, error)
             intervals[trial.name, figure] = (median - below, median + above)
     figures = tuple(replace(figure, interval=intervals.get((figure.trial, figure.name))) for figure in plain.figures)
