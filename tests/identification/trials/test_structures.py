@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +10,18 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
+from tank2sim.cards.covariance import Covariance
 from tank2sim.dynamics import build
 from tank2sim.identification.trials.identify import IdentificationOptions, structure_by_evidence
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
 from tank2sim.identification.trials.problem.prepare_trials import measured
-from tank2sim.identification.trials.problem.problem_from_card import card_with_estimate, free_parameters, rounded
+from tank2sim.identification.trials.problem.problem_from_card import (
+    card_with_estimate,
+    free_parameters,
+    problem_from_card,
+    rounded,
+    with_correlations,
+)
 from tank2sim.identification.trials.problem.structures import STRUCTURES, prior_of_absent
 
 
@@ -120,3 +128,24 @@ def test_evidence_takes_the_terms_that_made_the_trials(ship: str, start: str, ex
     trials = measured(sorted(tmp_path.glob("*.csv")), card)
     structure, notices = structure_by_evidence(card, trials, IdentificationOptions())
     assert structure == expected and bool(notices) == (expected == "cross_flow")
+
+
+@pytest.mark.parametrize(("sign", "expected"), [("starboard", 0.8), ("port", -0.8)])
+def test_correlations_of_a_card_enter_the_prior_in_the_signs_of_the_model(
+    sign: str, expected: float, tmp_path: Path
+) -> None:
+    """A rudder that counts to port in the card turns the sign of Nd, and so of its correlation with Nr."""
+    text = read_card("kvlcc2-captive").text.replace('rudder_sign = "starboard"', f'rudder_sign = "{sign}"')
+    card = parse_card(text, "signed.toml")
+    assert isinstance(card, ManoeuvringCard)
+    errors = np.array([card.uncertainty["Nr"], card.uncertainty["Nd"]])
+    correlation = np.array([[1.0, 0.8], [0.8, 1.0]])
+    covariance = Covariance(("derivatives.Nr", "derivatives.Nd"), correlation * np.outer(errors, errors))
+    t2s.load("mariner").zigzag(20, 20).to_csv(tmp_path / "z.csv")
+    trials = measured([tmp_path / "z.csv"], card)
+    plain = problem_from_card(card, trials.trials, trials.driven_by)
+    assert with_correlations(plain, card) is plain
+    found = np.linalg.inv(with_correlations(plain, replace(card, covariance=covariance)).known)
+    rows = [plain.free.index(f"derivatives.{name}") for name in ("Nr", "Nd", "Yv")]
+    assert found[rows[0], rows[1]] == pytest.approx(expected, abs=1e-3)
+    assert found[rows[0], rows[2]] == pytest.approx(0.0, abs=1e-9) and found[rows[2], rows[2]] == pytest.approx(1.0)
