@@ -354,3 +354,15 @@ main()
     assert "interrupted" in out
     card = parse_card((folder / "stopped.toml").read_text(encoding="utf-8"), "stopped.toml")
     assert isinstance(card, ManoeuvringCard)
+
+
+@pytest.mark.slow
+def test_an_average_over_structures_states_their_weights_and_its_intervals_hold_each(folder: Path) -> None:
+    held = ["--holdout", "turn-35.csv", "--members", "40", "--method", "equation_error", "--json", "result.json"]
+    result = tank2sim("identify", "off.toml", *FITTED, "--structure", "average", *held, cwd=folder)
+    assert result.returncode == 0, result.stderr
+    found = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    weights = {name: structure["weight"] for name, structure in found["structures"].items()}
+    assert sum(weights.values()) == pytest.approx(1.0) and found["structure"] == max(weights, key=weights.__getitem__)
+    assert weights["linear"] < 0.02, "the ship has terms of third order"
+    assert all(figure["interval_95"] is not None for figure in found["figures"]["holdout"])

@@ -41,7 +41,7 @@ from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import SearchReport, silent
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.signatures import with_fitted_trials
-from tank2sim.identification.trials.problem.structures import AUTO, BY_EVIDENCE, STRUCTURES
+from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
 from tank2sim.records.campaigns import read_campaign
 from tank2sim.units import in_words
 
@@ -210,6 +210,7 @@ def identify(
         ``output_error``, ``equation_error``, ``kalman`` or ``recursive``.
     structure : str
         One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`; ``auto``: by cross-validation;
+        ``average``: intervals of all structures, weighted by their predictions, with the card of the best;
         ``evidence``: cross-flow drag, unless the trials prefer the card's own terms very strongly by the Bayesian
         information criterion.
     campaign : path, optional
@@ -244,7 +245,7 @@ def identify(
     """
     for name, value, known in (
         ("method", method, TRIAL_METHODS),
-        ("structure", structure, (*STRUCTURES.names(), AUTO, BY_EVIDENCE)),
+        ("structure", structure, (*STRUCTURES.names(), AUTO, AVERAGE, BY_EVIDENCE)),
     ):
         if value not in known:
             raise InputError(name, "", f"{value!r} is not known", f"there are: {', '.join(known)}")
@@ -288,10 +289,11 @@ def _computing(
 ) -> Iterator[Executor | None]:
     """For cross-validation and bootstrap; a cluster for the intervals of what is held out, too."""
     on_this_machine = check_executor(executor) == PROCESSES
-    if not on_this_machine and not (options.structure == AUTO or options.bootstrap or (held and options.members)):
+    several = options.structure in (AUTO, AVERAGE)
+    if not on_this_machine and not (several or options.bootstrap or (held and options.members)):
         remedy = f"give --structure {AUTO}, --bootstrap N or --holdout TRIAL, too"
         raise InputError("--executor", "", "has nothing to do", remedy)
-    if on_this_machine and options.structure != AUTO and not options.bootstrap:
+    if on_this_machine and not several and not options.bootstrap:
         yield None
         return
     with executing(executor, workers) as pool:

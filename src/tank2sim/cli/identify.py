@@ -14,7 +14,7 @@ from tank2sim.cli.options import executor_option, page_option, plot_folder_optio
 from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.identification.trials.identify import TRIAL_METHODS
-from tank2sim.identification.trials.problem.structures import AUTO, BY_EVIDENCE, STRUCTURES
+from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
 
 
 @click.command("identify", cls=TakesSeveral, several=("--holdout",))
@@ -31,12 +31,12 @@ from tank2sim.identification.trials.problem.structures import AUTO, BY_EVIDENCE,
 @click.option("--method", type=click.Choice(TRIAL_METHODS), default="output_error", show_default=True)
 @click.option(
     "--structure",
-    type=click.Choice((*STRUCTURES.names(), AUTO, BY_EVIDENCE)),
+    type=click.Choice((*STRUCTURES.names(), AUTO, AVERAGE, BY_EVIDENCE)),
     default=BY_EVIDENCE,
     show_default=True,
     help="; ".join(f"{each.name}: {each.description}" for each in STRUCTURES.values())
-    + f"; {AUTO}: cross-validation decides; {BY_EVIDENCE}: cross_flow, or card if an information criterion prefers it "
-    "strongly.",
+    + f"; {AUTO}: cross-validation decides; {AVERAGE}: intervals of all, weighted by their predictions; {BY_EVIDENCE}: "
+    "cross_flow, or card if an information criterion prefers it strongly.",
 )
 @click.option(
     "--campaign",

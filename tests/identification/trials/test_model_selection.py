@@ -19,6 +19,7 @@ from tank2sim.identification.trials.assessment.model_selection import (
     cross_validate,
     effective_samples,
     farthest,
+    predictive_weights,
     simplest,
     yaw_rate_error,
 )
@@ -156,3 +157,27 @@ def test_the_richer_is_taken_when_it_is_surely_better():
 
 def test_a_model_that_fails_anywhere_is_not_taken():
     assert simplest({"simple": validation(0.1, 0.1, np.inf), "rich": validation(1.0, 1.0, 1.0)}) == "rich"
+
+
+def cross_validation(errors):
+    folds = tuple(HeldOutFold((str(place),), error, np.empty(0)) for place, error in enumerate(errors))
+    return CrossValidation(folds, folds[0])
+
+
+def test_predictive_weights_are_equal_for_equal_predictions_and_follow_the_better_one():
+    even = predictive_weights({"a": cross_validation([0.1, 0.2]), "b": cross_validation([0.1, 0.2])}, [5.0, 5.0])
+    assert even == pytest.approx({"a": 0.5, "b": 0.5})
+    samples = [10.0] * 6
+    good, bad = [0.10, 0.12, 0.09, 0.11, 0.10, 0.12], [0.20, 0.22, 0.21, 0.19, 0.20, 0.23]
+    weights = predictive_weights({"good": cross_validation(good), "bad": cross_validation(bad)}, samples)
+    assert weights["good"] > 0.999 and sum(weights.values()) == pytest.approx(1.0)
+    mixed = predictive_weights({"a": cross_validation([0.1, 0.2]), "b": cross_validation([0.2, 0.1])}, [3.0, 3.0])
+    assert 0.4 < mixed["a"] < 0.6
+    failed = predictive_weights({"a": cross_validation([0.1, np.inf]), "b": cross_validation([0.2, 0.3])}, [3.0, 3.0])
+    assert failed["b"] > 0.9
+
+
+def test_weights_of_one_fold_are_those_of_its_likelihoods():
+    """n ln(e) of one fold: weights in the ratio (0.2/0.1)^4."""
+    weights = predictive_weights({"a": cross_validation([0.1]), "b": cross_validation([0.2])}, [4.0])
+    assert weights["a"] / weights["b"] == pytest.approx(16.0)

@@ -74,6 +74,7 @@ def identification_as_json(result: Identification, messages: tuple[str, ...] = (
             name: {
                 "errors": structure.errors,
                 "left_out": [list(fold.held_out) for fold in (*structure.single, structure.extrapolation)],
+                **({"weight": result.weights.get(name, 0.0)} if result.weights else {}),
             }
             for name, structure in result.structures.items()
         },

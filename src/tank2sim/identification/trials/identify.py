@@ -21,12 +21,14 @@ from tank2sim.identification.trials.assessment.model_selection import (
     CrossValidation,
     criteria,
     cross_validate,
+    predictive_weights,
     simplest,
     yaw_rate_error,
 )
 from tank2sim.identification.trials.assessment.other_ship import other_ship
 from tank2sim.identification.trials.assessment.prediction_intervals import (
     FittedProblem,
+    WeightedFit,
     bootstrap_estimates,
     compare_held_out,
     criteria_or_none,
@@ -47,7 +49,7 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     with_correlations,
     with_range,
 )
-from tank2sim.identification.trials.problem.structures import AUTO, BY_EVIDENCE, STRUCTURES
+from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.recorded import recorded
 
@@ -63,6 +65,9 @@ STRONGLY = 1.0
 better: residuals that are smaller by a factor e in generalised variance. On measured trials model error, which the
 criterion takes for noise, shifts it by up to 0.2; on trials of a ship that has the card's terms it is 59 (project
 choice: between the two)."""
+
+LEAST_WEIGHT = 0.02
+"""Structures of less weight are left out of an average: of 100 members they would be one or two (project choice)."""
 
 WHOLE_RUN_MISFIT = 3.0
 """Largest error, over the noise of every signal, of a model that is fitted to whole runs, too (project choice)."""
@@ -81,8 +86,8 @@ class IdentificationOptions:
     method : str
         One of :data:`TRIAL_METHODS`.
     structure : str
-        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, :data:`.structures.BY_EVIDENCE` or
-        :data:`.structures.AUTO`.
+        One of :data:`tank2sim.identification.trials.problem.structures.STRUCTURES`, :data:`.structures.BY_EVIDENCE`,
+        :data:`.structures.AUTO` or :data:`.structures.AVERAGE`.
     inertia : bool
         Estimate acceleration derivatives, too.
     piece_s : float, optional
@@ -137,7 +142,10 @@ class Identification:
     forced : tuple of str
         Evidence that the trials are not of the card's ship, where the fit was forced.
     structures : mapping
-        Cross-validation of each structure; empty unless the structure is :data:`.structures.AUTO`.
+        Cross-validation of each structure; empty unless the structure is :data:`.structures.AUTO` or
+        :data:`.structures.AVERAGE`.
+    weights : mapping
+        Weight of each structure in the intervals of held-out trials; empty unless it is :data:`.structures.AVERAGE`.
     criteria : Criteria or None
         Information criteria of the fit, for comparison with another model of the same trials; None where the
         velocities were not measured.
@@ -158,6 +166,7 @@ class Identification:
     before_holdout: Comparison | None
     structure: str
     structures: Mapping[str, CrossValidation]
+    weights: Mapping[str, float]
     criteria: Criteria | None
     bootstrap: Array | None
     manoeuvres: Mapping[str, str]
@@ -223,29 +232,32 @@ def _identified(
         problem_text = f"{options.method} fits trials alone"
         raise InputError("--campaign", "", problem_text, "leave --method out, or fit the card that reduce makes of it")
     structures: Mapping[str, CrossValidation] = {}
+    weights: dict[str, float] = {}
     chosen: tuple[str, ...] = ()
     structure = options.structure
-    if structure == AUTO:
+    if structure in (AUTO, AVERAGE):
         structures = cross_validate_structures(card, trials, options, executor)
         structure = simplest(structures)
     elif structure == BY_EVIDENCE:
         structure, chosen = structure_by_evidence(card, trials, options)
-    started = STRUCTURES[structure].start(card)
-    problem = _posed(card, started, trials, options)
-    unseen = refuse_unseen(problem) if trials.captive is None else ()  # what trials do not show, the tank may
-    problem = problem.without(unseen)
+    if options.structure == AVERAGE:
+        weights = _kept_weights(card, trials, options, structures)
+        structure = max(weights, key=weights.__getitem__)
+        chosen = (_average_in_words(weights),)
     evidence = other_ship(problem_from_card(card, trials.trials, trials.driven_by))  # in the structure of the card
     if evidence and not options.force:
         names = ", ".join(trial.name for trial in trials.trials)
         problem_text = f"not trials of the ship of {card.source}: {'; '.join(evidence)}"
         raise InputError(names, "", problem_text, "give the card and the trials of one ship, or --force")
-    estimate = estimate_parameters(problem, options, progress)
-    improved = with_range(card_with_estimate(started, estimate), problem)
-    whole = started.model.valid_speed_mps is None
-    fitted = FittedProblem(problem, estimate, improved, whole)
+    started, unseen, fitted = _fitted(card, structure, trials, options, progress)
+    problem, estimate, improved = fitted.problem, fitted.estimate, fitted.card
     noise = noise_of(trials, problem)
     result = identifiability(problem, estimate)
     held = holdout if holdout is not None and holdout.trials else None
+    average = [
+        WeightedFit(fitted if name == structure else _fitted(card, name, trials, options)[-1], weight)
+        for name, weight in weights.items()
+    ]
     return Identification(
         started=started,
         card=improved,
@@ -253,12 +265,13 @@ def _identified(
         estimate=estimate,
         identifiability=result,
         noise=noise,
-        fit=compare_card(improved, trials, estimate.noise, whole=whole),
-        holdout=compare_held_out(fitted, held, options.members, executor) if held else None,
+        fit=compare_card(improved, trials, estimate.noise, whole=fitted.whole),
+        holdout=compare_held_out(fitted, held, options.members, executor, average) if held else None,
         before=compare_card(card, trials, estimate.noise),
         before_holdout=compare_card(card, held, estimate.noise) if held else None,
         structure=structure,
         structures=structures,
+        weights=weights,
         criteria=criteria_or_none(fitted),
         bootstrap=bootstrap_estimates(
             fitted, trials.driven_by, partial(_in_pieces, options=options), options.bootstrap, executor
@@ -342,6 +355,40 @@ def cross_validate_structures(
         posed = portable(problem, started, trials.driven_by)
         results[name] = cross_validate(posed, partial(_in_pieces, options=options), yaw_rate_error, executor)
     return results
+
+
+def _fitted(
+    card: ManoeuvringCard,
+    structure: str,
+    trials: Measured,
+    options: IdentificationOptions,
+    progress: SearchReport = silent,
+) -> tuple[ManoeuvringCard, tuple[str, ...], FittedProblem]:
+    """The start card in a structure, parameters that the trials do not show, and the fit."""
+    started = STRUCTURES[structure].start(card)
+    problem = _posed(card, started, trials, options)
+    unseen = refuse_unseen(problem) if trials.captive is None else ()  # what trials do not show, the tank may
+    problem = problem.without(unseen)
+    estimate = estimate_parameters(problem, options, progress)
+    improved = with_range(card_with_estimate(started, estimate), problem)
+    return started, unseen, FittedProblem(problem, estimate, improved, started.model.valid_speed_mps is None)
+
+
+def _kept_weights(
+    card: ManoeuvringCard, trials: Measured, options: IdentificationOptions, structures: Mapping[str, CrossValidation]
+) -> dict[str, float]:
+    """Weights of the structures, those below :data:`LEAST_WEIGHT` left out; a window of a run counts as a sample."""
+    problem = _posed(card, card, trials, options)
+    samples = [max(1.0, (run.times[-1] - run.times[0]) / (PIECE * problem.ship_time)) for run in problem.runs]
+    weights = predictive_weights(structures, samples)
+    kept = {name: weight for name, weight in weights.items() if weight >= LEAST_WEIGHT}
+    return {name: weight / sum(kept.values()) for name, weight in kept.items()}
+
+
+def _average_in_words(weights: Mapping[str, float]) -> str:
+    shares = ", ".join(f"{name} {100 * weights[name]:.0f} %" for name in sorted(weights, key=weights.__getitem__)[::-1])
+    words = "intervals are of all, the card is that of the first"
+    return f"average over structures by their predictions: {shares}; {words}"
 
 
 def _posed(

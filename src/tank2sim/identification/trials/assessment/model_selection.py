@@ -26,6 +26,9 @@ from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 FARTHEST = 4
 """One in this many runs, those of largest amplitude, is held out to test extrapolation (project choice)."""
 
+RESAMPLINGS = 1000
+"""Random weights of folds over which predictive weights are averaged (project choice: 0.01 of a weight)."""
+
 TrialEstimator = Callable[[Problem], Estimate]
 Score = Callable[[Problem, Estimate], float]
 """``score(problem of the held-out runs, estimate) -> error``, the smaller the better."""
@@ -214,6 +217,31 @@ def simplest(candidates: Mapping[str, CrossValidation]) -> str:
         return bool(difference.mean() <= difference.std(ddof=1) / math.sqrt(len(difference)))
 
     return next(name for name in errors if as_good(name))
+
+
+def predictive_weights(candidates: Mapping[str, CrossValidation], samples: Sequence[float]) -> dict[str, float]:
+    """Weight of each model by its predictions of the runs held out one at a time; they add up to 1.
+
+    The predictive log density of fold f is -n_f log(error), up to a constant: that of n_f Gaussian residuals whose
+    variance is what it turns out to be. With few folds a sum over them claims too much, so that the weights (Akaike's)
+    are averaged over random weights of the folds, the Bayesian bootstrap: pseudo-BMA+ of Yao, Vehtari, Simpson and
+    Gelman (2018), Bayesian Analysis 13, (7) to (10).
+
+    Parameters
+    ----------
+    candidates : mapping
+        Name to cross-validation over the same runs.
+    samples : sequence of float
+        n_f, number of independent residuals in each run.
+    """
+    names = list(candidates)
+    errors = np.array([[fold.error for fold in candidates[name].single] for name in names])
+    density = -np.asarray(samples) * np.log(np.where(np.isfinite(errors), errors, 1e6))
+    folds = np.random.default_rng(0).dirichlet(np.ones(len(samples)), RESAMPLINGS) * len(samples)
+    scores = folds @ density.T
+    weights = np.exp(scores - scores.max(axis=1, keepdims=True))
+    weights /= weights.sum(axis=1, keepdims=True)
+    return dict(zip(names, weights.mean(axis=0).tolist(), strict=True))
 
 
 def yaw_rate_error(problem: Problem, estimate: Estimate) -> float:

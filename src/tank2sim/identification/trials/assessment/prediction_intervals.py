@@ -7,7 +7,7 @@ executor or the order of its work.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -59,6 +59,14 @@ class FittedProblem:
     estimate: Estimate
     card: ManoeuvringCard
     whole: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedFit:
+    """A fit in one of several structures, and the weight of its predictions."""
+
+    fit: FittedProblem
+    weight: float
 
 
 @dataclass(frozen=True)
@@ -274,36 +282,54 @@ def _simulated(problem: Problem, run: SampledRun, simulator: _Simulator, p: Arra
 
 
 def compare_held_out(
-    fitted: FittedProblem, held: Measured, members: int, executor: Executor | None = None
+    fitted: FittedProblem,
+    held: Measured,
+    members: int,
+    executor: Executor | None = None,
+    average: Sequence[WeightedFit] = (),
 ) -> Comparison:
     """Comparison of the new card with held-out trials, with a 95 % prediction interval of each figure.
 
     The intervals are of simulations with coefficients drawn from their covariance, under random forces with the size
     and correlation time of those that the fit does not explain (:func:`bands`). They are wider by what is uncertain of
-    the measured point and of the heading's zero (:class:`.recorded.Recorded`).
+    the measured point and of the heading's zero (:class:`.recorded.Recorded`). With an `average` over structures, which
+    holds `fitted`, the members of each are as many as its weight says.
     """
     plain = compare_card(fitted.card, held, fitted.estimate.noise, whole=fitted.whole)
     if not members or not plain.figures:
         return plain
-    card = steerable(fitted.card)
-    ship, model = PicklableShip(card.text, "order"), build(card)
-    disturbances, settings = _disturbances(fitted), PredictionSettings(members=members)
+    model = build(steerable(fitted.card))
     intervals: dict[tuple[str, str], tuple[float, float]] = {}
     for trial in held.trials:
         manoeuvre = recorded(trial, model)
         if manoeuvre is None:
             continue
-        try:
-            quantiles = bands(ship, fitted.estimate, manoeuvre, disturbances, settings, executor).quantiles
-        except InputError:  # the motion of every member diverged: no interval
-            continue
-        for name, (lowest, median, highest) in quantiles.items():
+        pooled_members: dict[str, list[Array]] = {}
+        for part in average or (WeightedFit(fitted, 1.0),):
+            settings = PredictionSettings(members=round(part.weight * members))
+            for name, values in _members(part.fit, manoeuvre, settings, executor).items():
+                pooled_members.setdefault(name, []).append(values)
+        for name, parts in pooled_members.items():
+            lowest, median, highest = np.nanquantile(np.concatenate(parts), PredictionSettings().levels)
             figure = IN_BANDS.get(name, name)
             error = NORMAL_95 * from_si(figure, manoeuvre.reading_errors.get(figure, 0.0))
             below, above = math.hypot(median - lowest, error), math.hypot(highest - median, error)
             intervals[trial.name, figure] = (median - below, median + above)
     figures = tuple(replace(figure, interval=intervals.get((figure.trial, figure.name))) for figure in plain.figures)
     return replace(plain, figures=figures)
+
+
+def _members(
+    fitted: FittedProblem, manoeuvre: Recorded, settings: PredictionSettings, executor: Executor | None
+) -> Mapping[str, Array]:
+    """Figure to its value in each member of a fit; empty where no member's motion stays within bounds."""
+    if not settings.members:
+        return {}
+    ship = PicklableShip(steerable(fitted.card).text, "order")
+    try:
+        return bands(ship, fitted.estimate, manoeuvre, _disturbances(fitted), settings, executor).members
+    except InputError:
+        return {}
 
 
 def criteria_or_none(fitted: FittedProblem) -> Criteria | None:

@@ -97,6 +97,9 @@ def _cross_flow(card: ManoeuvringCard) -> ManoeuvringCard:
 AUTO = "auto"
 """Name of the choice of the structure that cross-validation prefers."""
 
+AVERAGE = "average"
+"""Name of the average over structures, by the weights of their predictions."""
+
 BY_EVIDENCE = "evidence"
 """Name of the choice between the terms of the card and cross-flow drag by an information criterion."""
 
@@ -109,7 +112,7 @@ STRUCTURES: Registry[ModelStructure] = Registry(
         ModelStructure("third_order", "the card's terms and all third-order terms in v and r", _third_order),
     ),
     ModelStructure,
-    reserved=(AUTO, BY_EVIDENCE),
+    reserved=(AUTO, AVERAGE, BY_EVIDENCE),
 )
 """By rising number of parameters, then those of installed packages: the first of equal predictions is taken."""
 
