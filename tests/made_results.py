@@ -1,4 +1,5 @@
-"""One small result of every command, made from bundled ships and data that the tests generate."""
+"""One small result of every command, made from bundled ships and data that the tests generate; of ``gap``, whose search
+takes long, from made-up findings."""
 
 from __future__ import annotations
 
@@ -10,9 +11,15 @@ from _pytest.mark import ParameterSet
 
 import tank2sim as t2s
 from tank2sim.api.bundled_ships import list_ships
+from tank2sim.api.gap import GapResult
 from tank2sim.api.result import Result
 from tank2sim.bundled import bundled
+from tank2sim.gap.result import Gap
+from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tests.gap import made_up
 from tests.yaw_truth import Truth, record, written
+
+NO_TRIALS = Measured((), "angle", ())
 
 
 def _trials(folder: Path) -> Path:
@@ -49,6 +56,10 @@ def _identify(folder: Path) -> Result:
     return t2s.identify("mariner", _trials(folder), holdout=folder / "turn.csv", method="equation_error", members=3)
 
 
+def _gap(found: Callable[[], Gap]) -> Result:
+    return GapResult(found(), NO_TRIALS, NO_TRIALS)
+
+
 RESULTS: dict[str, Callable[[Path], Result]] = {
     "audit": lambda folder: t2s.audit(_trials(folder)),
     "autopilot": lambda _: t2s.load("mariner").autopilot(),
@@ -56,6 +67,9 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "check": _check,
     "compare": lambda _: t2s.compare(["mariner", "kvlcc2-captive"], members=2),
     "export": lambda folder: t2s.load("mariner").to_fmu(folder / "m.fmu", fmi=2),
+    "gap": lambda _: _gap(made_up.missing),
+    "gap with an unnamed effect": lambda _: _gap(made_up.outside),
+    "gap without an effect": lambda _: _gap(made_up.nothing),
     "glide": lambda _: t2s.load("kulikovsky-velikanov").glide([-30, -45]),
     "glide of a programme": _glide_programme,
     "identify": _identify,

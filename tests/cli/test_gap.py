@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tank2sim import make_report
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.gap.outcome.improve_card import add_effects_to_card, card_with_effects_text
@@ -112,7 +113,8 @@ def test_a_current_is_written_into_a_card_a_page_and_json(folder: Path, tmp_path
     assert [fitted_as(improved, one) for one in (*fitted.trials, *held.trials)] == ["turn20", "zigzag", None]
     assert improved.text.startswith("# current added by tank2sim gap from turn20, zigzag\n")
     assert (out / "next_test.csv").read_text().startswith("t_s,delta_order_deg")
-    assert "</html>" in (out / "report.html").read_text(encoding="utf-8")
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "</html>" in page and make_report(out / "gap.json").page() == page
 
     words = " ".join(result.stdout.split())
     for reported in ("The model lacks an effect: current", "0.45", "250", "m/s", "turn-35", "held out", "8.00", "1.00"):

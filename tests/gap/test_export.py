@@ -165,3 +165,33 @@ def test_cautions_are_among_the_notices() -> None:
     assert "55 % of the gap of the fitting trials remains" in first and "black box" in second
     unsure = replace(gap, effects=(replace(gap.effects[0], confidence=0.11),))
     assert "those without it are together likelier: its probability is 0.11" in written(unsure)["notices"][0]
+
+
+def test_replays_are_thinned_in_the_units_of_their_columns_with_every_extreme() -> None:
+    trial = made_up.passed("long", 8.0, 1.0)
+    count, place = 5000, 1234
+    time = np.linspace(0.0, 499.9, count)
+    psi = np.full(count, np.nan)
+    psi[::100] = 0.01 * time[::100]  # measured seldom
+    u = np.sin(time / 20)
+    u[place] = 9.0
+    measured = {"motion.psi": psi, "motion.u": u}
+    models = [{"motion.psi": 0.01 * time, "motion.u": np.sin(time / 20) + size} for size in (0.16, 0.02)]
+    noise = {name: made_up.NOISE[name] for name in measured}
+    long = replace(trial, time_s=time, noise=noise, measured=measured, before=models[0], after=models[1], black_box={})
+    (replay,) = written(replace(made_up.missing(), passed=(long,)), files={"long": "long.dat"})["replays"]
+    assert replay["trial"] == "long.dat" and replay["held_out"] is False
+    assert all(set(replay[key]) == {"t_s", "psi_deg", "u_mps"} for key in ("measured", "before", "found"))
+    times = replay["measured"]["t_s"]
+    assert times == replay["before"]["t_s"] == replay["found"]["t_s"] and len(times) < 250
+    assert times[0] == 0 and times[-1] == pytest.approx(499.9) and max(replay["measured"]["u_mps"]) == 9.0
+    headings = [value for value in replay["measured"]["psi_deg"] if value is not None]
+    assert len(headings) == 50 and headings[-1] == pytest.approx(np.rad2deg(psi[4900]), rel=1e-6)
+    assert replay["before"]["u_mps"][0] == pytest.approx(0.16) and replay["found"]["u_mps"][0] == pytest.approx(0.02)
+
+
+def test_the_ship_has_its_name_and_cautions_are_a_part_of_the_notices() -> None:
+    gap = made_up.missing()
+    poor = written(replace(gap, passed=(made_up.passed("turn35", 9.0, 5.0),)))
+    assert poor["ship"] == gap.card.ship.name
+    assert len(poor["cautions"]) == 2 and poor["notices"] == [*poor["cautions"], *gap.notices]

@@ -9,8 +9,9 @@ from html import unescape
 
 import pytest
 
+from tank2sim.gap.outcome.export import gap_as_json
 from tank2sim.report.gap.charts import gap_histories, gap_tracks, misfit_chart, place_chart
-from tank2sim.report.gap.page import gap_charts, gap_page
+from tank2sim.report.gap.page import gap_page
 from tank2sim.report.kit.before_after import ALL, BOTH, before_after_switch, switch
 from tank2sim.report.kit.charts import chart_specification
 from tank2sim.report.kit.page import render_page
@@ -57,13 +58,13 @@ def test_a_switch_is_at_all_together_and_one_model_needs_none() -> None:
     [
         misfit_chart,
         place_chart,
-        lambda gap: gap_tracks(gap, held_out=False),
-        lambda gap: gap_histories(gap, held_out=True)[0],
+        lambda found: gap_tracks(found, held_out=False),
+        lambda found: gap_histories(found, held_out=True)[0],
     ],
     ids=["misfit", "places", "tracks", "histories"],
 )
 def test_every_chart_of_before_and_after_has_the_switch(chart) -> None:
-    specification = chart_specification(chart(made_up.missing()))
+    specification = chart_specification(chart(gap_as_json(made_up.missing())))
     (parameter,) = (one for one in specification["params"] if "bind" in one)
     assert parameter["bind"]["input"] == "radio" and parameter["bind"]["options"] == ["before", "after", BOTH]
     assert f"[{parameter['name']}]" in json.dumps(specification)
@@ -76,8 +77,7 @@ def test_titles_of_colour_bars_are_read_on_a_dark_screen() -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in")
 def test_the_switches_of_a_gap_page_work_and_paper_shows_both(tmp_path) -> None:
-    gap = made_up.missing()
-    page = gap_page(gap, gap_charts(gap))
+    page = gap_page(gap_as_json(made_up.missing()))
     whole = {"Before and after", "Tracks and motions"}
     page = replace(page, sections=[one for one in page.sections if one.heading in whole])
     head, _, tail = render_page(page).rpartition("</body>")

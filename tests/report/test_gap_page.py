@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tank2sim.gap.outcome.export import gap_as_json
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Gap, Passed, Rival
-from tank2sim.report.gap.cause_charts import agreement_chart, binned, rival_chart
+from tank2sim.report.gap.cause_charts import agreement_chart, rival_chart
 from tank2sim.report.gap.charts import gap_tracks, misfit_chart, shown_places, signal_misfit
 from tank2sim.report.gap.page import gap_charts, gap_page
 from tank2sim.report.gap.text import verdict_in_words, with_error
@@ -19,13 +20,21 @@ from tank2sim.report.kit.page import Verdict, render_page
 from tests.gap import made_up
 
 
-@pytest.fixture(scope="module")
-def charts():
-    return gap_charts(made_up.missing())
+def charts_of(gap):
+    return gap_charts(gap_as_json(gap))
 
 
 def page_of(gap):
-    return gap_page(gap, gap_charts(gap))
+    return gap_page(gap_as_json(gap))
+
+
+def words_of(gap):
+    return verdict_in_words(gap_as_json(gap))
+
+
+@pytest.fixture(scope="module")
+def charts():
+    return charts_of(made_up.missing())
 
 
 def rows_of(chart):
@@ -39,8 +48,8 @@ def tables_of(page):
 @pytest.mark.parametrize("verdict", made_up.EVERY)
 def test_every_verdict_has_a_whole_page(verdict) -> None:
     gap = made_up.EVERY[verdict]()
-    drawn = gap_charts(gap)
-    page = gap_page(gap, drawn)
+    drawn = charts_of(gap)
+    page = page_of(gap)
     html = render_page(page)
     assert verdict in html and "nan" not in html.partition("<script")[0].lower()
     assert sum(len(section.charts) for section in page.sections) == len(drawn)
@@ -50,7 +59,7 @@ def test_every_verdict_has_a_whole_page(verdict) -> None:
 
 
 def test_a_named_effect_is_reported_in_words_and_in_a_mariners_units() -> None:
-    words = verdict_in_words(made_up.missing())
+    words = words_of(made_up.missing())
     assert "current (speed 0.45 ± 0.02 m/s, direction towards 270.0 ± 1.5 deg)" in words
     assert "The water moves over the ground" in words
     (row,) = (row for row in tables_of(page_of(made_up.missing()))["What was found, ± one standard error"].rows[1:])
@@ -60,26 +69,26 @@ def test_a_named_effect_is_reported_in_words_and_in_a_mariners_units() -> None:
 def test_a_sensor_at_fault_is_not_called_a_fault_of_the_model() -> None:
     gap = made_up.missing()
     gyro = replace(gap.effects[0], name="gyro_bias", parameters={"rate_radps": np.deg2rad(0.1)}, standard_errors={})
-    words = verdict_in_words(replace(gap, effects=(gyro,)))
+    words = words_of(replace(gap, effects=(gyro,)))
     assert words.startswith("A sensor is at fault, not the model: gyro bias (rate 0.1 deg/s)")
 
 
 def test_ambiguity_names_each_explanation_once() -> None:
     gap = made_up.ambiguous()
-    assert verdict_in_words(gap).endswith("do not distinguish several effects: current, or wind with rudder bias.")
+    assert words_of(gap).endswith("do not distinguish several effects: current, or wind with rudder bias.")
     reported = tables_of(page_of(gap))["Effects that these data cannot distinguish"].rows
     assert [row[0] for row in reported] == ["current", "wind", "rudder bias"]
 
 
 def test_nothing_missing_says_how_well_the_card_follows() -> None:
     gap = made_up.nothing()
-    assert "follows the fitting trials to 1.02 times the noise" in verdict_in_words(gap)
+    assert "follows the fitting trials to 1.02 times the noise" in words_of(gap)
     page = page_of(gap)
     heads = [column.title for column in tables_of(page)["Misfit of each trial, noise units"].columns]
     assert heads == ["trial", "set", "before"]
     assert "How well the card follows" in [section.heading for section in page.sections]
     worse = replace(gap, passed=tuple(made_up.passed(one.name, 4.0, 4.0) for one in gap.passed))
-    assert "4 times the noise, which is more than noise" in verdict_in_words(worse)
+    assert "4 times the noise, which is more than noise" in words_of(worse)
 
 
 def test_misfits_stand_before_and_after_next_to_the_black_box() -> None:
@@ -99,17 +108,17 @@ def test_misfits_stand_before_and_after_next_to_the_black_box() -> None:
 
 
 def test_the_map_has_a_cell_for_each_signal_and_trial_before_and_after() -> None:
-    cells = [row for row in rows_of(misfit_chart(made_up.missing())) if "misfit" in row]
+    cells = [row for row in rows_of(misfit_chart(gap_as_json(made_up.missing()))) if "misfit" in row]
     assert len(cells) == 2 * 3 * 5
     held = [row for row in cells if row["trial"] == "turn20" and row["signal"] == "psi"]
     assert {row["text"] for row in held} == {"9.0", "1.5"}
 
 
 def test_what_left_all_bounds_is_darkest_and_infinite() -> None:
-    cells = [row for row in rows_of(misfit_chart(made_up.outside())) if row.get("trial") == "turn35"]
+    cells = [row for row in rows_of(misfit_chart(gap_as_json(made_up.outside()))) if row.get("trial") == "turn35"]
     lost = [row for row in cells if row["signal"] != "psi"]  # of which nothing is measured where the motion is lost
     assert {row["text"] for row in lost} == {"∞"} and {row["misfit"] for row in lost} == {100.0}
-    assert signal_misfit(made_up.outside(), "before", "motion.x", held_out=False) == np.inf
+    assert signal_misfit(gap_as_json(made_up.outside()), "before", "x_m", held_out=False) == np.inf
 
 
 def test_places_show_what_is_left_in_the_units_of_the_column(charts) -> None:
@@ -128,25 +137,17 @@ def test_places_show_what_is_left_in_the_units_of_the_column(charts) -> None:
 def test_without_places_the_largest_misfits_are_shown() -> None:
     gap = made_up.nothing()
     worse = replace(gap, passed=(*gap.passed, made_up.passed("worst", 5.0, 5.0)))
-    assert {place.trial for place in shown_places(worse)[:5]} == {"worst"}
+    assert {place["trial"] for place in shown_places(gap_as_json(worse))[:5]} == {"worst.csv"}
 
 
 def test_tracks_are_of_their_own_set() -> None:
-    tracks = [chart_specification(gap_tracks(made_up.missing(), held_out=held))["concat"] for held in (True, False)]
+    found = gap_as_json(made_up.missing())
+    tracks = [chart_specification(gap_tracks(found, held_out=held))["concat"] for held in (True, False)]
     assert [[panel["title"]["text"] for panel in panels] for panels in tracks] == [["turn20"], ["turn35", "zigzag"]]
 
 
-def test_means_of_bins_err_by_the_spread_between_trials() -> None:
-    """Two trials a unit apart: mean 0.5, standard error 0.5; a third alone in its bin has no interval."""
-    state = np.array([0.0] * 20 + [1.0] * 5)
-    force = np.array([0.0] * 10 + [1.0] * 10 + [7.0] * 5)
-    low, high = binned(state, force, np.array(["a"] * 10 + ["b"] * 10 + ["c"] * 5))
-    assert low["f"] == 0.5 and low["high"] - low["f"] == pytest.approx(1.96 * 0.5, rel=1e-4)
-    assert high["f"] == 7.0 and high["low"] is None
-
-
 def test_the_missing_force_is_drawn_over_one_turn_of_the_compass() -> None:
-    rows = rows_of(gap_charts(replace(made_up.missing(), effects=(), equation="sway"))["force"])
+    rows = rows_of(charts_of(replace(made_up.missing(), effects=(), equation="sway"))["force"])
     means = [row for row in rows if row.get("trials") == 2]
     assert len(means) == 12 and all(0 <= row["s"] < 360 for row in rows if "s" in row)
     assert max(row["f"] for row in means) == pytest.approx(2.0, abs=0.1)  # MN
@@ -166,14 +167,14 @@ def test_across_north_too() -> None:
     gap = made_up.missing()
     north = replace(gap.effects[0], parameters={"direction_rad": np.deg2rad(-1.0)})
     alone = {"current.direction": {"turn35": (np.deg2rad(1.0), 0.01)}}
-    rows = rows_of(agreement_chart(replace(gap, effects=(north,), agreement=alone)))
+    rows = rows_of(agreement_chart(gap_as_json(replace(gap, effects=(north,), agreement=alone))))
     assert [row["v"] for row in rows if row.get("name") == "turn35"] == [pytest.approx(361)]
 
 
 def test_rivals_are_ranked_and_none_is_always_among_them() -> None:
     gap = made_up.missing()
     many = tuple(Rival((f"effect_{place}",), 10.0 + place, 0.0) for place in range(20))
-    rows = rows_of(rival_chart(replace(gap, rivals=(*many, *gap.rivals))))
+    rows = rows_of(rival_chart(gap_as_json(replace(gap, rivals=(*many, *gap.rivals)))))
     names = [row["name"] for row in rows]
     assert names[:2] == ["current", "effect 0"] and names[-1] == "none (the card as it is)" and len(names) == 13
 
@@ -200,7 +201,7 @@ def test_a_misfit_fits_into_its_cell(misfit, text) -> None:
 def test_thirteen_trials_take_little_of_the_page() -> None:
     gap = made_up.missing()
     trials = tuple(made_up.passed(f"trial_{place}", 5.0, 1.0, held_out=place > 6) for place in range(13))
-    charts = gap_charts(replace(gap, passed=trials))
+    charts = charts_of(replace(gap, passed=trials))
     assert sum(len(json.dumps(chart.to_dict(validate=False))) for chart in charts.values()) < 2e6
 
 
@@ -212,7 +213,7 @@ def test_what_was_found_but_not_measured_does_not_break_the_page() -> None:
     blind = replace(turn, measured={**gone, "motion.psi": turn.measured["motion.psi"]})
     page = page_of(replace(gap, passed=(blind,), where=(), verdict=NO_EFFECT_MISSING, effects=()))
     assert len(tables_of(page)["Misfit of each signal, noise units"].rows) == 2
-    assert verdict_in_words(replace(gap, verdict=MISSING))
+    assert words_of(replace(gap, verdict=MISSING))
 
 
 def carried() -> Gap:
@@ -241,7 +242,7 @@ def carried() -> Gap:
 
 def test_a_fault_of_kinematics_shows_the_missing_velocity_and_no_force() -> None:
     gap = carried()
-    drawn = gap_charts(gap)
+    drawn = charts_of(gap)
     assert {"signal", "when_signal"} <= set(drawn) and not {"force", "when_force"} & set(drawn)
     means = [row["f"] for row in rows_of(drawn["signal"]) if row.get("trials") == 2]
     assert np.mean(means) == pytest.approx(0.5, abs=0.02)
@@ -249,7 +250,7 @@ def test_a_fault_of_kinematics_shows_the_missing_velocity_and_no_force() -> None
     (where,) = (section for section in page_of(gap).sections if section.heading == "Where the gap is")
     assert "No force is missing" in where.text and "the motion over the ground" in where.text
     forced = replace(gap.effects[0], name="rudder_bias", parameters={}, standard_errors={})
-    both = gap_charts(replace(gap, effects=(*gap.effects, forced)))
+    both = charts_of(replace(gap, effects=(*gap.effects, forced)))
     assert {"signal", "force"} <= set(both)
 
 
@@ -262,7 +263,7 @@ def test_each_probability_says_of_what_it_is() -> None:
     assert "Probability that current alone is all that is missing, among the explanations compared: 55 %." in text
     (card,) = (figure for figure in page.figures if figure.label.startswith("Probability"))
     assert card.note == "alone or with another effect"
-    assert "as a whole" in json.dumps(rival_chart(gap).to_dict(validate=False))
+    assert "as a whole" in json.dumps(rival_chart(gap_as_json(gap)).to_dict(validate=False))
 
 
 def test_what_the_others_would_be_is_reported_and_they_do_not_hide() -> None:
@@ -285,9 +286,9 @@ def test_what_replaces_something_of_the_card_has_no_up_to() -> None:
 def test_a_name_that_leaves_much_of_the_gap_is_reported_with_caution() -> None:
     gap = made_up.missing()
     poor = replace(gap, passed=tuple(made_up.passed(one.name, 9.0, 5.0, held_out=one.held_out) for one in gap.passed))
-    words = verdict_in_words(poor)
+    words = words_of(poor)
     # sqrt((5^2 - 1)/(9^2 - 1)) = 0.55; a black box of 3 is better
     assert "Caution: named, but 55 % of the gap of the held-out trials remains" in words
     assert "a linear black box with as many coefficients follows the held-out trials better" in words
     assert page_of(poor).figures[0].verdict is Verdict.CAUTION
-    assert "Caution" not in verdict_in_words(gap)
+    assert "Caution" not in words_of(gap)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tank2sim.api.gap_files import CORRECTED, REPORT, GapFiles, folder_made, put
 from tank2sim.api.result import Result, ResultTable
@@ -28,15 +28,13 @@ from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.outcome.correct_sensors import REMAINING_FAULTS, correct_sensor_faults, corrected_text
 from tank2sim.gap.outcome.export import (
     NEXT_TEST_FILE,
-    estimate_in_file,
     gap_as_json,
-    in_file_units,
     joined,
     measured_in,
     signal_display_name,
 )
 from tank2sim.gap.outcome.improve_card import Found, card_with_effects_text
-from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap, Named
+from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap
 from tank2sim.gap.workflow import GapOptions
 from tank2sim.gap.workflow import run_gap_workflow as run_workflow
 from tank2sim.identification.trials.problem.prepare_trials import Measured
@@ -78,12 +76,13 @@ class GapResult(Result):
         """
         import pandas as pd
 
-        rows = []
-        for effect in self.gap.effects:
-            for name, value in effect.parameters.items():
-                parameter, size = estimate_in_file(name, value)
-                rows.append((effect.name, parameter, size, _standard_error(effect, name), effect.confidence))
-        return pd.DataFrame(rows, columns=["effect", "parameter", "value", "standard_error", "probability"])
+        rows = [
+            (effect["name"], key, value, effect["standard_errors"].get(key), effect["confidence"])
+            for effect in self._results["effects"]
+            for key, value in effect["parameters"].items()
+        ]
+        numbers = ["value", "standard_error", "probability"]
+        return pd.DataFrame(rows, columns=["effect", "parameter", *numbers]).astype(dict.fromkeys(numbers, float))
 
     @property
     def misfit(self) -> pd.DataFrame:
@@ -111,6 +110,10 @@ class GapResult(Result):
 
     def content(self) -> Mapping[str, object]:
         """As :meth:`.Result.content`."""
+        return self._results
+
+    @cached_property
+    def _results(self) -> Mapping[str, Any]:
         trials = (*self.fitted.trials, *self.held.trials)
         return gap_as_json(self.gap, {trial.name: trial.path.name for trial in trials})
 
@@ -120,7 +123,7 @@ class GapResult(Result):
         from tank2sim.report.gap.text import probabilities_in_words, verdict_in_words
 
         gap = self.gap
-        lines = [f"{gap.card.ship.name}: {verdict_in_words(gap)}", *probabilities_in_words(gap)]
+        lines = [f"{gap.card.ship.name}: {verdict_in_words(self._results)}", *probabilities_in_words(self._results)]
         if gap.alternatives:
             lines.append(
                 f"these data cannot distinguish it from: {'; '.join(joined(names) for names in gap.alternatives)}"
@@ -148,10 +151,10 @@ class GapResult(Result):
         gap = self.gap
         columns = ("effect", "parameter", "value", "standard error", "unit")
         found = "What the best of the candidates would be" if gap.verdict == AMBIGUOUS else "What was found"
-        candidates = sizes_of_candidates(gap)
+        candidates = sizes_of_candidates(self._results)
         tables = [
             ResultTable(title, columns, rows, wide=True)
-            for title, effects in ((found, gap.effects), ("What the others would be", candidates))
+            for title, effects in ((found, self._results["effects"]), ("What the others would be", candidates))
             if (rows := [row for effect in effects for row in _parameter_rows(effect)])
         ]
         heads = ("trial", "set", "before", "after")
@@ -162,14 +165,7 @@ class GapResult(Result):
         """Tracks before and after, misfits, the missing force and rivals, by name."""
         from tank2sim.report.gap.page import gap_charts
 
-        return dict(gap_charts(self.gap))
-
-    def page(self) -> str:
-        """As :meth:`.Result.page`."""
-        from tank2sim.report.gap.page import gap_charts, gap_page
-        from tank2sim.report.kit.page import render_page
-
-        return render_page(gap_page(self.gap, gap_charts(self.gap)))
+        return gap_charts(self.to_dict())
 
     def files(self, folder: Path) -> tuple[GapFiles, list[str]]:
         """Path to content of the files that belong into a folder, and messages about them.
@@ -258,24 +254,13 @@ def misfit_text(misfit: float) -> str:
     return f"{misfit:.2f}" if math.isfinite(misfit) else "ran away"
 
 
-def _parameter_rows(effect: Named) -> list[list[object]]:
+def _parameter_rows(effect: Mapping[str, Any]) -> list[list[object]]:
     rows: list[list[object]] = []
-    for parameter, value in effect.parameters.items():
-        key, size = estimate_in_file(parameter, value)
-        error = _standard_error(effect, parameter)
+    for key, value in effect["parameters"].items():
+        error = effect["standard_errors"].get(key)
         words, unit = in_words(key)
-        finite = math.isfinite(size), math.isfinite(error)
-        rows.append(
-            [effect.name, words, size if finite[0] else None, float(f"{error:.2g}") if finite[1] else None, unit or "-"]
-        )
+        rows.append([effect["name"], words, value, None if error is None else float(f"{error:.2g}"), unit or "-"])
     return rows
-
-
-def _standard_error(effect: Named, parameter: str) -> float:
-    """In the units of the card's file; nan if the parameter was not estimated."""
-    if parameter not in effect.standard_errors:
-        return math.nan
-    return in_file_units(parameter, effect.standard_errors[parameter])[1]
 
 
 def find_gap(

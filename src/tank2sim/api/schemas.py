@@ -326,9 +326,32 @@ class IdentifyKeys(_Keys):
     replays: list[CardReplayKeys]
 
 
+class GapReplayKeys(_Part):
+    """A trial as measured and as simulated by the card given and by the card found, thinned to draw."""
+
+    trial: str
+    held_out: bool
+    measured: Columns
+    before: Columns
+    found: Columns
+
+
+class MissingKeys(_Part):
+    """A missing force or a contradiction of records: points and means of bins over a state, means over time."""
+
+    equation: NotRequired[str]
+    quantity: NotRequired[str]
+    explaining: str
+    explained: dict[str, Number]
+    points: dict[str, list[str] | list[Number]]
+    means: Columns
+    over_time: dict[str, list[str] | list[Number]]
+
+
 class GapKeys(_Keys):
     """The missing effect of a model."""
 
+    ship: str
     verdict: str
     effects: list[dict[str, Any]]
     alternatives: list[str]
@@ -343,8 +366,10 @@ class GapKeys(_Keys):
     trials: list[dict[str, Any]]
     figures: list[dict[str, Any]]
     agreement: dict[str, Any]
-    missing_force: dict[str, Any] | None
-    missing_signal: dict[str, Any] | None
+    missing_force: MissingKeys | None
+    missing_signal: MissingKeys | None
+    replays: list[GapReplayKeys]
+    cautions: list[str]
     notices: list[str]
     files: NotRequired[list[str]]
 

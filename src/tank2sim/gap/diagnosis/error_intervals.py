@@ -25,8 +25,8 @@ noise of two readings of position is then a few hundredths of a m/s for a ship).
 
 TURNING, TRACK = ("turning",), ("north", "east", "ahead", "starboard")
 
-_EARTH_BOUND = ("kinematics", "sensor")
-"""Equations in which no force is missing."""
+EARTH_BOUND = ("kinematics", "sensor")
+"""Equations of a gap in the motion over the ground or in a sensor: no force is missing."""
 
 
 def acting(gap: Gap) -> tuple[Acting, ...]:
@@ -42,21 +42,16 @@ def acting(gap: Gap) -> tuple[Acting, ...]:
     return (*by_significance(messages), *(force.passages if force is not None else ()))
 
 
-def earth_bound(gap: Gap) -> bool:
-    """Whether the gap is in the motion over the ground or in a sensor: records then contradict each other."""
-    return gap.equation in _EARTH_BOUND
-
-
 def missing_force_intervals(gap: Gap) -> MissingForce | None:
     """The force that the model lacks; None where nothing but kinematics or sensors is at fault."""
-    if earth_bound(gap) and all(EFFECTS[effect.name].acts_on in _EARTH_BOUND for effect in gap.effects):
+    if gap.equation in EARTH_BOUND and all(EFFECTS[effect.name].acts_on in EARTH_BOUND for effect in gap.effects):
         return None
     return gap.missing_force
 
 
 def contradiction(gap: Gap) -> MissingSignal | None:
     """As :func:`missing_signal`, where the gap is in the kinematics or in a sensor; else None."""
-    return missing_signal(gap.passed) if earth_bound(gap) else None
+    return missing_signal(gap.passed) if gap.equation in EARTH_BOUND else None
 
 
 def missing_signal(passed: Sequence[Passed]) -> MissingSignal | None:

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.files import plain_json
 from tank2sim.gap.diagnosis.error_intervals import acting, contradiction, missing_force_intervals
+from tank2sim.gap.outcome.lacking import missing_as_json
 from tank2sim.gap.proof.cross_check import proof_cautions
-from tank2sim.gap.result import Gap, MissingForce, MissingSignal, Named, NextTest, Passed
+from tank2sim.gap.result import Gap, Named, NextTest, Passed
 from tank2sim.identification.trials.assessment.evaluation import FigureComparison
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
 from tank2sim.records.signals.columns import SignalName
-from tank2sim.units import from_si, in_words
+from tank2sim.records.thinning import Indices, drawn_columns, thin_points
+from tank2sim.units import from_si, in_words, to_si
 
 NEXT_TEST_FILE = "next_test.csv"
 """File next to ``gap.json`` with the orders of the next test."""
@@ -26,10 +29,13 @@ NOISE_FLOOR = 1.0
 _MOST_PASSAGES = 24
 """Number of reported intervals in which the model is wrong, the most significant (project choice)."""
 
+_REPLAY_SAMPLES = 140
+"""Samples of a trial in the JSON, without extremes: as many as its line in a small panel has."""
+
 _IN_FILE = {"rad": "deg", "radps": "degps"}
 
 
-def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, object]:
+def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, Any]:
     """All results, in the form of ``gap.json``; angles in degrees, None for values that are not finite.
 
     Parameters
@@ -39,31 +45,38 @@ def gap_as_json(gap: Gap, files: Mapping[str, str] | None = None) -> dict[str, o
         Name of a trial to that of its file; by default ``<name>.csv``, of the trial format.
     """
     names = {replay.name: (files or {}).get(replay.name, f"{replay.name}.csv") for replay in gap.passed}
-    return {
-        "verdict": gap.verdict,
-        "effects": [_effect(effect) for effect in gap.effects],
-        "alternatives": [joined(alternative) for alternative in gap.alternatives],
-        "where": _where(gap, names),
-        "acting": _acting(gap, names),
-        "equation": gap.equation,
-        "misfit": _misfit(gap),
-        "could_hide": {effect: _in_file(sizes) for effect, sizes in hidden(gap).items()},
-        "could_hide_in_words": {
-            effect: "; ".join(hidden_in_words(effect, name, size) for name, size in sizes.items())
-            for effect, sizes in hidden(gap).items()
-        },
-        "next_test": _next_test(gap.next_test),
-        "rivals": [
-            {"effects": list(rival.effects), "loss": _finite(rival.loss), "probability": _finite(rival.probability)}
-            for rival in gap.rivals
-        ],
-        "trials": [_trial(replay, names[replay.name]) for replay in gap.passed],
-        "figures": _figures(gap, names),
-        "agreement": _agreement(gap, names),
-        "missing_force": _missing(missing_force_intervals(gap)),
-        "missing_signal": _missing(contradiction(gap)),
-        "notices": [*proof_cautions(gap), *gap.notices],
-    }
+    cautions = proof_cautions(gap)
+    found: dict[str, Any] = plain_json(
+        {
+            "ship": gap.card.ship.name,
+            "verdict": gap.verdict,
+            "effects": [_effect(effect) for effect in gap.effects],
+            "alternatives": [joined(alternative) for alternative in gap.alternatives],
+            "where": _where(gap, names),
+            "acting": _acting(gap, names),
+            "equation": gap.equation,
+            "misfit": _misfit(gap),
+            "could_hide": {effect: _in_file(sizes) for effect, sizes in hidden(gap).items()},
+            "could_hide_in_words": {
+                effect: "; ".join(hidden_in_words(effect, name, size) for name, size in sizes.items())
+                for effect, sizes in hidden(gap).items()
+            },
+            "next_test": _next_test(gap.next_test),
+            "rivals": [
+                {"effects": list(rival.effects), "loss": _finite(rival.loss), "probability": _finite(rival.probability)}
+                for rival in gap.rivals
+            ],
+            "trials": [_trial(replay, names[replay.name]) for replay in gap.passed],
+            "figures": _figures(gap, names),
+            "agreement": _agreement(gap, names),
+            "missing_force": missing_as_json(missing_force_intervals(gap), names),
+            "missing_signal": missing_as_json(contradiction(gap), names),
+            "replays": [_replay(replay, names[replay.name]) for replay in gap.passed],
+            "cautions": list(cautions),
+            "notices": [*cautions, *gap.notices],
+        }
+    )
+    return found
 
 
 def hidden(gap: Gap) -> dict[str, Mapping[str, float]]:
@@ -72,10 +85,18 @@ def hidden(gap: Gap) -> dict[str, Mapping[str, float]]:
     return {effect: sizes for effect, sizes in gap.could_hide.items() if effect not in possible}
 
 
-def replaces(effect: str, parameter: str) -> bool:
-    """Whether a parameter replaces a property that the ship has anyway, so that "up to" has no meaning."""
+def replaces(effect: str, key: str) -> bool:
+    """Whether a parameter replaces a property that the ship has anyway, so that "up to" has no meaning.
+
+    Parameters
+    ----------
+    effect : str
+        Key of :data:`tank2sim.dynamics.effects.EFFECTS`.
+    key : str
+        Name of the parameter in a file.
+    """
     known = EFFECTS[effect].parameters if effect in EFFECTS else ()
-    return any(entry.name == parameter and entry.absent is None for entry in known)
+    return any(entry.name == to_si(key, 0.0)[0] and entry.absent is None for entry in known)
 
 
 def hidden_in_words(effect: str, parameter: str, size: float) -> str:
@@ -83,12 +104,12 @@ def hidden_in_words(effect: str, parameter: str, size: float) -> str:
     key, value = in_file_units(parameter, size)
     words, unit = in_words(key)
     text = f"{value:.2g}{f' {unit}' if unit else ''}"
-    if replaces(effect, parameter):
+    if replaces(effect, key):
         return f"{words} of {text} in place of the card's would not show"
     return f"{words} up to {text} would not show"
 
 
-def joined(effects: tuple[str, ...]) -> str:
+def joined(effects: Sequence[str]) -> str:
     """Effects of one explanation as one name: ``current + wind``; ``none`` without any."""
     return " + ".join(effects) or "none"
 
@@ -238,12 +259,33 @@ def _agreement(gap: Gap, names: Mapping[str, str]) -> dict[str, object]:
     return agreement
 
 
-def _missing(lacking: MissingForce | MissingSignal | None) -> dict[str, object] | None:
-    if lacking is None:
-        return None
-    key = {"equation": lacking.equation} if isinstance(lacking, MissingForce) else {"quantity": lacking.quantity}
-    explained = {state: _finite(share) for state, share in lacking.explained.items()}
-    return {**key, "explaining": lacking.explaining, "explained": explained}
+def _replay(replay: Passed, file: str) -> dict[str, object]:
+    """Columns of what was measured and of both simulations at the same instants, thinned to draw."""
+    names = {variable: signal_display_name(variable) for variable in measured_in(replay)}
+    versions = {"measured": replay.measured, "before": replay.before, "found": replay.after}
+    kept = _drawn_rows(replay)
+    return {"trial": file, "held_out": replay.held_out} | {
+        key: drawn_columns(
+            {"t_s": replay.time_s[kept]}
+            | {name.file: name.factor * values[variable][kept] for variable, name in names.items()},
+            len(kept),
+        )
+        for key, values in versions.items()
+    }
+
+
+def _drawn_rows(replay: Passed) -> Indices:
+    """Instants that are kept of a trial: evenly spread ones, as many of each signal that is measured seldom, and the
+    extremes of each signal and of simulated less measured."""
+    kept = even = thin_points([replay.time_s], _REPLAY_SAMPLES)
+    for variable in measured_in(replay):
+        measured = replay.measured[variable]
+        known = np.flatnonzero(np.isfinite(measured))
+        columns = [measured, *(version[variable] - measured for version in (replay.before, replay.after))]
+        seldom = np.isfinite(measured[even]).sum() < min(len(known), _REPLAY_SAMPLES / 2)
+        extremes = thin_points([column[known] for column in columns], _REPLAY_SAMPLES if seldom else 1)
+        kept = np.union1d(kept, known[extremes])
+    return kept
 
 
 def _next_test(test: NextTest | None) -> dict[str, object] | None:

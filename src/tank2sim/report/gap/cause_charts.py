@@ -3,88 +3,81 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import altair as alt
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.gap.outcome.export import effect_parameter_name, estimate_in_file, in_file_units, joined
-from tank2sim.gap.result import Gap, MissingForce, MissingSignal, NextTest
-from tank2sim.records.thinning import thin_points
+from tank2sim.gap.outcome.export import joined
+from tank2sim.gap.outcome.lacking import MISSING_COLUMNS, NORMAL, STATE_COLUMNS
+from tank2sim.identification.trials.as_json import as_number
 from tank2sim.report.gap.charts import SETS, small
-from tank2sim.report.gap.text import as_percent
-from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, extent, plain, series_look, shown_unit, with_unit
+from tank2sim.report.gap.text import as_percent, or_nan, trial_name
+from tank2sim.report.kit.chart_parts import NUMBER, ChartRecord, data, extent, plain, series_look, with_unit
+from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.numbers import format_number
 from tank2sim.units import in_words
-
-BINS = 12
-"""Bins over the state that explains the missing force (project choice): a rudder's range in steps of about 6 deg."""
-
-FORCE_POINTS = 500
-"""Rows of the missing force that are drawn, of all trials together; all of them make the means."""
 
 MOST_RIVALS = 12
 """Explanations, and manoeuvres for the next test, that are shown: the best (project choice)."""
 
-NORMAL = 1.959964
-"""Half a 95 % interval in standard errors."""
-
 UNINFORMATIVE = 10.0
 """Standard error over the smallest from which the bar of a trial may leave the picture."""
 
-STATE_UNITS = {"rudder": "rad", "drift": "rad", "yaw rate": "rad/s", "speed": "m/s", "heading": "rad"}
 _STATE_WORDS = {"rudder": "rudder angle", "drift": "drift angle"}
-_FORCES = {"X": ("surge force", "N"), "Y": ("sway force", "N"), "N": ("yaw moment", "N m")}
-_SIGNALS = {
+_MISSING = {
+    "X": ("surge force", "N"),
+    "Y": ("sway force", "N"),
+    "N": ("yaw moment", "N m"),
     "north": ("velocity to north", "m/s"),
     "east": ("velocity to east", "m/s"),
     "ahead": ("velocity ahead", "m/s"),
     "starboard": ("velocity to starboard", "m/s"),
-    "turning": ("turning (rate of heading less yaw rate)", "rad/s"),
+    "turning": ("turning (rate of heading less yaw rate)", "deg/s"),
 }
 
-Lacking = MissingForce | MissingSignal
-"""What the model lacks, instant by instant."""
 
-_STRIPS = 90
-"""Instants of a trial that are drawn next to each other, each the mean of what it covers."""
-_TURN = 2 * math.pi
+class _Missing(NamedTuple):
+    """What is missing: key of its values in the JSON, words, the shown unit, and what values are divided by."""
 
-
-def _values(lacking: Lacking) -> tuple[Array, str, str]:
-    """What is missing in a reader's unit (n,), its words, and the unit."""
-    if isinstance(lacking, MissingForce):
-        what, unit = _FORCES[lacking.equation]
-        prefix, scale = _prefix(lacking.force)
-        return lacking.force / scale, what, prefix + unit
-    what, variable = _SIGNALS[lacking.quantity]
-    if variable != "rad/s":
-        return lacking.values, what, variable
-    unit, factor = shown_unit(variable)
-    return factor * lacking.values, what, unit
+    key: str
+    words: str
+    unit: str
+    scale: float
 
 
-def lacking_chart(lacking: Lacking, *, title: str = "") -> alt.HConcatChart:
+def _missing(lacking: Json) -> _Missing:
+    name = lacking["equation"] if "equation" in lacking else lacking["quantity"]
+    key, (words, unit) = MISSING_COLUMNS[name], _MISSING[name]
+    if not unit.startswith("N"):
+        return _Missing(key, words, unit, 1.0)
+    prefix, scale = _prefix(np.array(lacking["points"][key], dtype=float))
+    return _Missing(key, words, prefix + unit, scale)
+
+
+def lacking_chart(lacking: Json, *, title: str = "") -> alt.HConcatChart:
     """The missing force or signal over the state that explains most of it, and how much of it each state explains.
 
     Points are single instants of all trials, thinned. Squares are means of bins; their bars are 95 % by the spread
     between the trials in the bin, for instants of one trial do not err independently.
     """
-    unit, factor = shown_unit(STATE_UNITS.get(lacking.explaining, "1"))
-    words = _STATE_WORDS.get(lacking.explaining, lacking.explaining)
-    values = lacking.states[lacking.explaining]
-    state = factor * (np.mod(values, _TURN) if lacking.explaining == "heading" else values)
-    every, what, own_unit = _values(lacking)
-    finite = np.flatnonzero(np.isfinite(state) & np.isfinite(every))
-    trials = np.array(lacking.trials)[finite]
-    state, needed = state[finite], every[finite]
-    kept = thin_points([state, needed], FORCE_POINTS)
-    points = [
-        {"s": plain(float(state[row])), "f": plain(float(needed[row])), "trial": str(trials[row])}
-        for row in kept.tolist()
+    state = STATE_COLUMNS[lacking["explaining"]]
+    words = _STATE_WORDS.get(lacking["explaining"], lacking["explaining"])
+    what, points, means = _missing(lacking), lacking["points"], lacking["means"]
+    cloud_rows: list[ChartRecord] = [
+        {"s": plain(over), "f": plain(value / what.scale), "trial": trial_name(trial)}
+        for trial, over, value in zip(points["trial"], points[state], points[what.key], strict=True)
     ]
-    across, up = with_unit(words, unit), with_unit(f"missing {what}", own_unit)
+    mean_rows: list[ChartRecord] = [
+        {"s": plain(over), "trials": int(trials)}
+        | {key: plain(or_nan(value) / what.scale) for key, value in zip(("f", "low", "high"), values, strict=True)}
+        for over, trials, *values in zip(
+            *(means[key] for key in (state, "trials", what.key, "low_95", "high_95")), strict=True
+        )
+    ]
+    across, up = with_unit(words, in_words(state)[1]), with_unit(f"missing {what.words}", what.unit)
     x = alt.X("s:Q", title=across, scale=alt.Scale(zero=False, nice=False, padding=8), axis=alt.Axis(tickCount=6))
     y = alt.Y("f:Q", title=up, axis=alt.Axis(tickCount=6))
     tooltip = [
@@ -92,33 +85,33 @@ def lacking_chart(lacking: Lacking, *, title: str = "") -> alt.HConcatChart:
         alt.Tooltip("s:Q", title=across, format=NUMBER),
         alt.Tooltip("f:Q", title=up, format=NUMBER),
     ]
-    cloud = alt.Chart(data(points)).mark_point(style="reference", size=12, opacity=0.45, clip=True)
+    cloud = alt.Chart(data(cloud_rows)).mark_point(style="reference", size=12, opacity=0.45, clip=True)
     zero = alt.Chart(data([{"f": 0.0}])).mark_rule(style="reference", strokeDash=[4, 3]).encode(y="f:Q")
-    layers = [zero, cloud.encode(x=x, y=y, tooltip=tooltip), *_means(binned(state, needed, trials), across, up)]
+    layers = [zero, cloud.encode(x=x, y=y, tooltip=tooltip), *_means(mean_rows, across, up)]
     main = alt.layer(*layers).properties(width=400, height=280)
     shares = alt.hconcat(main, _explained(lacking), spacing=24)
-    return shares.properties(title=title, description=f"Missing {what} over {words}, and what each state explains.")
+    return shares.properties(
+        title=title, description=f"Missing {what.words} over {words}, and what each state explains."
+    )
 
 
-def when_chart(lacking: Lacking, *, title: str = "") -> alt.LayerChart:
+def when_chart(lacking: Json, *, title: str = "") -> alt.LayerChart:
     """What is missing over time, a strip a trial: the colour is its size to either side."""
-    values, what, unit = _values(lacking)
-    trials = np.array(lacking.trials)
-    rows: list[ChartRecord] = []
-    for trial in dict.fromkeys(lacking.trials):
-        known = np.flatnonzero((trials == trial) & np.isfinite(values))
-        for part in np.array_split(known, min(_STRIPS, len(known))):
-            begin, end = lacking.time_s[part[0]], lacking.time_s[min(part[-1] + 1, known[-1])]
-            rows.append(
-                {"trial": trial, "f": plain(float(values[part].mean()))} | {"t": plain(begin), "to": plain(end)}
-            )
+    what, parts = _missing(lacking), lacking["over_time"]
+    names = list(dict.fromkeys(map(trial_name, parts["trial"])))
+    rows: list[ChartRecord] = [
+        {"trial": trial_name(trial), "f": plain(value / what.scale), "t": plain(begin), "to": plain(end)}
+        for trial, begin, end, value in zip(
+            *(parts[key] for key in ("trial", "t_start_s", "t_end_s", what.key)), strict=True
+        )
+    ]
     largest = float(np.quantile(np.abs([row["f"] or 0.0 for row in rows]), 0.98)) or 1.0 if rows else 1.0
-    up = with_unit(f"missing {what}", unit)
+    up = with_unit(f"missing {what.words}", what.unit)
     scale = alt.Scale(domain=[-largest, 0, largest], range=list(DIVERGING), type="linear", clamp=True)
     base = alt.Chart(data(rows)).encode(
         x=alt.X("t:Q", title="time (s)", scale=alt.Scale(nice=False)),
         x2="to:Q",
-        y=alt.Y("trial:N", sort=list(dict.fromkeys(lacking.trials)), axis=alt.Axis(title=None, labelLimit=220)),
+        y=alt.Y("trial:N", sort=names, axis=alt.Axis(title=None, labelLimit=220)),
         color=alt.Color("f:Q", scale=scale, legend=alt.Legend(title=up, gradientLength=180, titleLimit=420)),
         tooltip=[
             alt.Tooltip("trial:N"),
@@ -127,34 +120,12 @@ def when_chart(lacking: Lacking, *, title: str = "") -> alt.LayerChart:
             alt.Tooltip("f:Q", title=up, format=NUMBER),
         ],
     )
-    chart = alt.layer(base.mark_rect()).properties(width=520, height=20 * max(1, len(set(lacking.trials))))
-    return chart.properties(title=title, description=f"Missing {what} over time, by trial.")
+    chart = alt.layer(base.mark_rect()).properties(width=520, height=20 * max(1, len(names)))
+    return chart.properties(title=title, description=f"Missing {what.words} over time, by trial.")
 
 
 DIVERGING = ("#D55E00", "#f7f7f7", "#0072B2")
 """Colours of a size to either side: two of the palette that any eye distinguishes."""
-
-
-def binned(state: Array, force: Array, trials: np.ndarray) -> list[ChartRecord]:
-    """Mean of the force (n,) in each of :data:`BINS` equal bins of the state (n,), with its 95 % interval.
-
-    The interval is that of the means of the trials in the bin; None where there is one trial alone.
-    """
-    edges = np.linspace(*extent(state), BINS + 1)
-    place = np.clip(np.digitize(state, edges) - 1, 0, BINS - 1)
-    rows: list[ChartRecord] = []
-    for bin_number in np.unique(place).tolist():
-        inside = place == bin_number
-        trial_means = np.array([force[inside & (trials == trial)].mean() for trial in np.unique(trials[inside])])
-        mean = float(force[inside].mean())
-        half = (
-            NORMAL * float(trial_means.std(ddof=1)) / math.sqrt(len(trial_means)) if len(trial_means) > 1 else math.nan
-        )
-        rows.append(
-            {"s": plain(float(state[inside].mean())), "f": plain(mean), "trials": len(trial_means)}
-            | {"low": plain(mean - half), "high": plain(mean + half)}
-        )
-    return rows
 
 
 def _means(rows: Sequence[ChartRecord], across: str, up: str) -> list[alt.Chart]:
@@ -174,10 +145,10 @@ def _means(rows: Sequence[ChartRecord], across: str, up: str) -> list[alt.Chart]
     ]
 
 
-def _explained(lacking: Lacking) -> alt.LayerChart:
+def _explained(lacking: Json) -> alt.LayerChart:
     rows: list[ChartRecord] = [
         {"name": _STATE_WORDS.get(name, name), "v": plain(100 * share), "text": f"{100 * share:.0f} %"}
-        for name, share in sorted(lacking.explained.items(), key=lambda item: -item[1])
+        for name, share in sorted(lacking["explained"].items(), key=lambda item: -item[1])
     ]
     return _bars(rows, "share of it that each state explains (%)", width=150, domain=[0, 100])
 
@@ -200,17 +171,17 @@ def _bars(
     return alt.layer(bars, texts).properties(width=width, height=22 * max(1, len(rows)))
 
 
-def rival_chart(gap: Gap, *, title: str = "") -> alt.LayerChart | None:
+def rival_chart(found: Json, *, title: str = "") -> alt.LayerChart | None:
     """Explanations that were compared, with their loss of score to the best; None without any."""
-    ranked = sorted(gap.rivals, key=lambda rival: rival.loss)
-    shown, none = ranked[:MOST_RIVALS], [rival for rival in ranked[MOST_RIVALS:] if not rival.effects]
+    ranked = sorted(found["rivals"], key=lambda rival: as_number(rival["loss"]))
+    shown, none = ranked[:MOST_RIVALS], [rival for rival in ranked[MOST_RIVALS:] if not rival["effects"]]
     if not shown:
         return None
     rows: list[ChartRecord] = [
         {
-            "name": joined(rival.effects).replace("_", " ") if rival.effects else "none (the card as it is)",
-            "v": plain(rival.loss),
-            "text": f"{format_number(rival.loss, 3)}  ({as_percent(rival.probability)})",
+            "name": joined(rival["effects"]).replace("_", " ") if rival["effects"] else "none (the card as it is)",
+            "v": plain(as_number(rival["loss"])),
+            "text": f"{format_number(as_number(rival['loss']), 3)}  ({as_percent(rival['probability'])})",
         }
         for rival in (*shown, *none)
     ]
@@ -228,9 +199,10 @@ _COMPARED = (
 )
 
 
-def expected_chart(test: NextTest, *, title: str = "") -> alt.LayerChart | None:
+def expected_chart(test: Json, *, title: str = "") -> alt.LayerChart | None:
     """How far apart the explanations would be in each manoeuvre that was considered; None without any."""
-    best = sorted(test.expected.items(), key=lambda item: -item[1])[:MOST_RIVALS]
+    scores = {name: or_nan(score) for name, score in test["expected"].items()}
+    best = sorted(scores.items(), key=lambda item: -item[1])[:MOST_RIVALS]
     sizes = [(name, math.sqrt(max(score, 0.0))) for name, score in best]  # of a score: a difference in noise units
     rows: list[ChartRecord] = [{"name": name, "v": plain(size), "text": format_number(size, 2)} for name, size in sizes]
     if not rows:
@@ -239,14 +211,14 @@ def expected_chart(test: NextTest, *, title: str = "") -> alt.LayerChart | None:
     return chart.properties(title=title, description="Expected difference in each manoeuvre.")
 
 
-def agreement_chart(gap: Gap, *, title: str = "") -> alt.HConcatChart | None:
+def agreement_chart(found: Json, *, title: str = "") -> alt.HConcatChart | None:
     """What each trial alone would have each parameter of the effect, with 95 % intervals; None without any.
 
     The grey band is the 95 % interval of all fitting trials together.
     """
     panels = [
-        _agreement_panel(gap, variable, trials, named=not place)
-        for place, (variable, trials) in enumerate(item for item in gap.agreement.items() if item[1])
+        _agreement_panel(found, name, trials, named=not place)
+        for place, (name, trials) in enumerate(item for item in found["agreement"].items() if item[1])
     ]
     if not panels:
         return None
@@ -256,31 +228,25 @@ def agreement_chart(gap: Gap, *, title: str = "") -> alt.HConcatChart | None:
     )
 
 
-def _agreement_panel(
-    gap: Gap, variable: str, trials: Mapping[str, tuple[float, float]], *, named: bool
-) -> alt.LayerChart:
-    effect, parameter = effect_parameter_name(variable)
-    words, unit = in_words(in_file_units(parameter, 0.0)[0])
+def _agreement_panel(found: Json, name: str, trials: Json, *, named: bool) -> alt.LayerChart:
+    effect, _, parameter = name.rpartition(".")
+    words, unit = in_words(parameter)
     whole = next(
-        (
-            effect_found
-            for effect_found in gap.effects
-            if effect_found.name == effect and parameter in effect_found.parameters
-        ),
-        None,
+        (entry for entry in found["effects"] if entry["name"] == effect and parameter in entry["parameters"]), None
     )
-    middle = estimate_in_file(parameter, whole.parameters[parameter])[1] if whole else None
-    held = {replay.name: replay.held_out for replay in gap.passed}
+    middle = or_nan(whole["parameters"][parameter]) if whole else None
+    held = {trial["trial"]: trial["held_out"] for trial in found["trials"]}
     rows: list[ChartRecord] = []
-    for trial, (value, error) in trials.items():
-        estimate, half = estimate_in_file(parameter, value)[1], NORMAL * in_file_units(parameter, error)[1]
-        if parameter == "direction_rad" and middle is not None:
+    for trial, alone in trials.items():
+        estimate, half = or_nan(alone["value"]), NORMAL * or_nan(alone["standard_error"])
+        if parameter == "direction_deg" and middle is not None:
             estimate += 360.0 * round((middle - estimate) / 360.0)
+        word = next(word for word, value in SETS.items() if value == held.get(trial, False))
         rows.append(
-            {"name": trial, "run": next(word for word, value in SETS.items() if value == held.get(trial, False))}
+            {"name": trial_name(trial), "run": word}
             | {"v": plain(estimate), "low": plain(estimate - half), "high": plain(estimate + half)}
         )
-    band = NORMAL * in_file_units(parameter, whole.standard_errors.get(parameter, 0.0))[1] if whole else 0.0
+    band = NORMAL * or_nan(whole["standard_errors"].get(parameter, 0.0)) if whole else 0.0
     messages = [row for row in rows if row["low"] is not None and row["high"] is not None]
     least = min((row["high"] - row["low"] for row in messages), default=0.0)
     telling = [row for row in messages if row["high"] - row["low"] <= UNINFORMATIVE * least] or messages
@@ -291,7 +257,7 @@ def _agreement_panel(
     scale = alt.Scale(domain=[low - margin, high + margin], nice=False, zero=False)
     x = alt.X("v:Q", title=with_unit(words, unit), scale=scale, axis=alt.Axis(tickCount=5))
     side = {} if named else {"labels": False, "ticks": False}
-    names = [replay.name for replay in gap.passed if replay.name in trials]
+    names = [trial_name(trial) for trial in held if trial in trials]
     y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, grid=True, labelLimit=220, **side))
     look = series_look(list(SETS), as_points=list(SETS))
     tooltip = [
@@ -305,11 +271,9 @@ def _agreement_panel(
     ]
     if middle is not None:
         span = {"low": plain(middle - band), "high": plain(middle + band), "v": plain(middle)}
-        effect_found = alt.Chart(data([span]))
-        shade = effect_found.mark_rect(style="reference", opacity=0.25).encode(
-            x=alt.X("low:Q", scale=scale), x2="high:Q"
-        )
-        layers = [shade, effect_found.mark_rule(style="reference").encode(x=alt.X("v:Q", scale=scale)), *layers]
+        estimated = alt.Chart(data([span]))
+        shade = estimated.mark_rect(style="reference", opacity=0.25).encode(x=alt.X("low:Q", scale=scale), x2="high:Q")
+        layers = [shade, estimated.mark_rule(style="reference").encode(x=alt.X("v:Q", scale=scale)), *layers]
     title = small(f"{effect.replace('_', ' ')}: {words}")
     return alt.layer(*layers).properties(title=title, width=230, height=22 * len(names))
 

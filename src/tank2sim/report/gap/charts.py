@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import altair as alt
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.gap.outcome.export import measured_in, signal_display_name
-from tank2sim.gap.result import Gap, MisfitPlace, Passed
+from tank2sim.identification.trials.as_json import as_number
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
+from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import thin_points
+from tank2sim.report.gap.text import or_nan, trial_name
 from tank2sim.report.identification.charts import (
     AFTER,
     BEFORE,
@@ -37,6 +37,7 @@ from tank2sim.report.kit.chart_parts import (
     with_unit,
 )
 from tank2sim.report.kit.json_values import Json
+from tank2sim.units import to_si
 
 MOST_TRIALS_DRAWN = 12
 """Tracks in one picture: those of the largest misfit before; more are hard to look at (project choice)."""
@@ -68,80 +69,80 @@ SETS = {"held out": True, "fitting": False}
 """Words for the two kinds of trials to whether they were held out; the honest ones first."""
 
 
-def changes_simulation(gap: Gap) -> bool:
+def signal_of(column: str) -> SignalName:
+    """The signal of a column of a trial file."""
+    return SignalName(to_si(column, 1.0)[0])
+
+
+def changes_simulation(found: Json) -> bool:
     """Whether anything was added to the card, or found in the records, that changes a simulation."""
-    return any(
-        not np.array_equal(replay.before[name], replay.after[name], equal_nan=True)
-        for replay in gap.passed
-        for name in replay.noise
-    )
+    return any(replay["before"] != replay["found"] for replay in found["replays"])
 
 
-def shown_models(gap: Gap) -> tuple[str, ...]:
-    """Which simulations of :class:`Passed` differ: before alone where nothing was added."""
-    return ("before", "after") if changes_simulation(gap) else ("before",)
+def shown_models(found: Json) -> tuple[str, ...]:
+    """Which simulations differ: before alone where nothing was added."""
+    return ("before", "after") if changes_simulation(found) else ("before",)
 
 
-def gap_tracks(gap: Gap, *, held_out: bool, title: str = "") -> alt.ConcatChart | None:
+def gap_tracks(found: Json, *, held_out: bool, title: str = "") -> alt.ConcatChart | None:
     """Tracks as measured, by the card before and by the card found, a panel a trial; None without any.
 
     Of many trials those are shown whose misfit before was largest.
     """
-    chosen = [replay for replay in gap.passed if replay.held_out == held_out]
-    worst = {trial.name for trial in sorted(chosen, key=lambda trial: -trial.misfit("before"))[:MOST_TRIALS_DRAWN]}
-    return track_grid([_columns(trial) for trial in chosen if trial.name in worst], title=title)
+    return track_grid(_worst(found, lambda trial: trial["held_out"] == held_out), title=title)
 
 
-def gap_histories(gap: Gap, *, held_out: bool, title: str = "") -> list[alt.ConcatChart]:
+def gap_histories(found: Json, *, held_out: bool, title: str = "") -> list[alt.ConcatChart]:
     """Motions over time as measured, by the card before and by the card found, a column a trial, in sheets.
 
     Of many trials those are shown whose misfit before was largest.
     """
-    chosen = [
-        replay
-        for replay in gap.passed
-        if replay.held_out == held_out
-        and any(signal_display_name(name).file in HISTORIES for name in measured_in(replay))
-    ]
-    worst = {trial.name for trial in sorted(chosen, key=lambda trial: -trial.misfit("before"))[:MOST_TRIALS_DRAWN]}
-    columns = [_columns(trial) for trial in chosen if trial.name in worst]
+    columns = _worst(
+        found, lambda trial: trial["held_out"] == held_out and not HISTORIES.keys().isdisjoint(trial["signals"])
+    )
     sheets = [columns[first : first + _PER_SHEET] for first in range(0, len(columns), _PER_SHEET)]
     return [history_grid(sheet, signals=HISTORIES, title=title) for sheet in sheets]
 
 
-def _columns(replay: Passed) -> Json:
-    """A trial in the form of ``replays`` in the JSON of an identification."""
-    names = {name: signal_display_name(name) for name in measured_in(replay)}
-    runs = {MEASURED: replay.measured, BEFORE: replay.before, AFTER: replay.after}
-    return {"trial": replay.name} | {
-        SERIES[label]: {"t_s": replay.time_s}
-        | {column.file: column.factor * values[name] for name, column in names.items()}
-        for label, values in runs.items()
+def _worst(found: Json, chosen: Callable[[Json], bool]) -> list[Json]:
+    """Replays of the chosen trials, of many those whose misfit before was largest, by the names of the trials."""
+    misfits = {
+        place: as_number(trial["misfit"].get("before")) for place, trial in enumerate(found["trials"]) if chosen(trial)
     }
+    worst = sorted(misfits, key=lambda place: -misfits[place])[:MOST_TRIALS_DRAWN]
+    replays = [found["replays"][place] for place in sorted(worst)]
+    return [{**replay, "trial": trial_name(replay["trial"])} for replay in replays]
 
 
-def shown_places(gap: Gap) -> list[MisfitPlace]:
-    """The worst places, one of each signal of a trial; where none were found, the signals of the largest misfit."""
-    known = {replay.name: replay for replay in gap.passed}
-    found = [place for place in gap.where if place.trial in known and place.signal in measured_in(known[place.trial])]
-    if not found:
+def shown_places(found: Json) -> list[Json]:
+    """The worst places, one of each signal of a trial; where none were found, the signals of the largest misfit.
+
+    Each has the keys of an entry of ``where``.
+    """
+    signals = {trial["trial"]: trial["signals"] for trial in found["trials"]}
+    places = [place for place in found["where"] if place["signal"] in signals.get(place["trial"], ())]
+    if not places:
+        times = {replay["trial"]: replay["measured"]["t_s"] for replay in found["replays"]}
         whole = [
-            MisfitPlace(replay.name, name, float(replay.time_s[0]), float(replay.time_s[-1]), math.nan)
-            for replay in gap.passed
-            for name in measured_in(replay)
+            {"trial": trial, "signal": name, "t_start_s": times[trial][0], "t_end_s": times[trial][-1]}
+            for trial, names in signals.items()
+            for name in names
         ]
-        found = sorted(whole, key=lambda place: -known[place.trial].misfit("before", place.signal))
-    first = {(place.trial, place.signal): place for place in reversed(found)}
-    return sorted(first.values(), key=found.index)[:MOST_PLACES]
+        places = sorted(whole, key=lambda place: -as_number(signals[place["trial"]][place["signal"]]["before"]))
+    first = {(place["trial"], place["signal"]): place for place in reversed(places)}
+    return sorted(first.values(), key=places.index)[:MOST_PLACES]
 
 
-def place_chart(gap: Gap, *, title: str = "") -> alt.ConcatChart | None:
+def place_chart(found: Json, *, title: str = "") -> alt.ConcatChart | None:
     """Signals over time where the misfit is worst, above; simulated less measured and the band of the noise, below.
 
     The shaded time is that of the place. None without any measurement.
     """
-    known = {replay.name: replay for replay in gap.passed}
-    panels = [_place_panels(known[place.trial], place) for place in shown_places(gap)]
+    replays = {replay["trial"]: replay for replay in found["replays"]}
+    noise = found["misfit"]["noise"]
+    panels = [
+        _place_panels(replays[place["trial"]], place, noise[place["signal"]]["sigma"]) for place in shown_places(found)
+    ]
     if not panels:
         return None
     grid = alt.concat(*panels, columns=PANELS_PER_ROW, spacing=26, params=switch(list(MODEL_SERIES)))
@@ -152,36 +153,38 @@ def place_chart(gap: Gap, *, title: str = "") -> alt.ConcatChart | None:
     )
 
 
-def _place_panels(replay: Passed, place: MisfitPlace) -> alt.VConcatChart:
-    name, look = signal_display_name(place.signal), series_look([AFTER, BEFORE, MEASURED], as_points=[MEASURED])
-    measured = name.factor * replay.measured[place.signal]
-    models = {BEFORE: name.factor * replay.before[place.signal], AFTER: name.factor * replay.after[place.signal]}
+def _place_panels(replay: Json, place: Json, sigma: float) -> alt.VConcatChart:
+    name, look = signal_of(place["signal"]), series_look([AFTER, BEFORE, MEASURED], as_points=[MEASURED])
+    time_s, measured, before, found = (
+        np.array(replay[key][column], dtype=float)
+        for key, column in (("measured", "t_s"), *((key, name.file) for key in SERIES.values()))
+    )
+    models = {BEFORE: before, AFTER: found}
     known = np.flatnonzero(np.isfinite(measured))
     points = known[thin_points([measured[known]], SHOWN_POINTS)]
-    rows = records(MEASURED, {"t": replay.time_s[points], "v": measured[points]})
+    rows = records(MEASURED, {"t": time_s[points], "v": measured[points]})
     residuals: list[ChartRecord] = []
     for label, values in models.items():
         kept = thin_points([values], SHOWN_SAMPLES)
-        rows += records(label, {"t": replay.time_s[kept], "v": values[kept]})
+        rows += records(label, {"t": time_s[kept], "v": values[kept]})
         kept = known[thin_points([(values - measured)[known]], SHOWN_SAMPLES)]
-        residuals += records(label, {"t": replay.time_s[kept], "v": (values - measured)[kept]})
-    band = NOISE_BAND * name.factor * replay.noise[place.signal]
-    times = extent(replay.time_s)
+        residuals += records(label, {"t": time_s[kept], "v": (values - measured)[kept]})
+    band = NOISE_BAND * sigma
+    times = extent(time_s)
     above = _over_time(rows, times, with_unit(name.words, name.unit), look, labelled=False)
     below = _over_time(
         residuals, times, with_unit("simulated − measured", name.unit), look, labelled=True, included=(-band, band)
     )
     noise = alt.Chart(data([{"low": plain(-band), "high": plain(band)}])).mark_rect(style="reference", opacity=0.3)
-    spans = alt.Chart(data([{"from": plain(place.t_start_s), "to": plain(place.t_end_s)}])).mark_rect(
-        style="region", clip=True
-    )
+    begin, end = or_nan(place["t_start_s"]), or_nan(place["t_end_s"])
+    spans = alt.Chart(data([{"from": plain(begin), "to": plain(end)}])).mark_rect(style="region", clip=True)
     when = spans.encode(x="from:Q", x2="to:Q")
-    behind = [when] if (place.t_start_s, place.t_end_s) != times else []
+    behind = [when] if (begin, end) != times else []
     return alt.vconcat(
         alt.layer(*behind, *above).properties(width=200, height=86),
         alt.layer(*behind, noise.encode(y="low:Q", y2="high:Q"), *below).properties(width=200, height=66),
         spacing=16,
-    ).properties(title=small(f"{place.trial} · {name.words}"))
+    ).properties(title=small(f"{trial_name(place['trial'])} · {name.words}"))
 
 
 def _over_time(
@@ -213,24 +216,22 @@ def _over_time(
     return drawn
 
 
-def misfit_chart(gap: Gap, *, title: str = "") -> alt.VConcatChart:
+def misfit_chart(found: Json, *, title: str = "") -> alt.VConcatChart:
     """Misfit of each signal in each trial in noise units, to switch between before, after and both side by side."""
-    measured = {name for replay in gap.passed for name in measured_in(replay)}
-    signals = [name for name in OBSERVED_SIGNALS.values() if name in measured] + sorted(
-        measured - set(OBSERVED_SIGNALS.values())
-    )
-    words = {name: signal_display_name(name).file.rpartition("_")[0].replace("_", " ") for name in signals}
+    measured = {name for trial in found["trials"] for name in trial["signals"]}
+    ordered = [SignalName(name).file for name in OBSERVED_SIGNALS]
+    signals = [name for name in ordered if name in measured] + sorted(measured.difference(ordered))
     rows = [
-        {"group": f"{word} trials", "trial": replay.name, "signal": words[name], "model": model}
-        | {"misfit": replay.misfit(model, name)}
+        {"group": f"{word} trials", "trial": trial_name(trial["trial"]), "model": model}
+        | {"signal": name.rpartition("_")[0].replace("_", " "), "misfit": as_number(trial["signals"][name][model])}
         for word, held in SETS.items()
-        for replay in gap.passed
-        if replay.held_out == held
+        for trial in found["trials"]
+        if trial["held_out"] == held
         for name in signals
-        if name in measured_in(replay)
-        for model in shown_models(gap)
+        if name in trial["signals"]
+        for model in shown_models(found)
     ]
-    return misfit_maps(rows, shown_models(gap), title=title)
+    return misfit_maps(rows, shown_models(found), title=title)
 
 
 def small(text: str) -> alt.Title:
@@ -238,10 +239,14 @@ def small(text: str) -> alt.Title:
     return alt.Title(text, fontSize=11, offset=22, limit=260)
 
 
-def signal_misfit(gap: Gap, model: str, variable: str, *, held_out: bool) -> float | None:
+def signal_misfit(found: Json, model: str, column: str, *, held_out: bool) -> float | None:
     """Misfit of one signal over all trials of a set that measured it, in noise units; None without any."""
-    trials = [replay for replay in gap.passed if replay.held_out == held_out and variable in measured_in(replay)]
-    if not trials or (model == "black_box" and not all(variable in trial.black_box for trial in trials)):
+    trials = [
+        trial["signals"][column]
+        for trial in found["trials"]
+        if trial["held_out"] == held_out and column in trial["signals"]
+    ]
+    if not trials or (model == "black_box" and not all(model in misfits for misfits in trials)):
         return None
-    squares: Array = np.array([trial.misfit(model, variable) ** 2 for trial in trials])
+    squares: Array = np.array([as_number(misfits[model]) ** 2 for misfits in trials])
     return float(np.sqrt(squares.mean()))

@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import altair as alt
 
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.diagnosis.error_intervals import acting, contradiction, earth_bound, missing_force_intervals
-from tank2sim.gap.outcome.export import (
-    NEXT_TEST_FILE,
-    hidden,
-    in_file_units,
-    measured_in,
-    paired_figures,
-    replaces,
-    signal_display_name,
-)
-from tank2sim.gap.proof.cross_check import proof_cautions
-from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, Gap
+from tank2sim.gap.diagnosis.error_intervals import EARTH_BOUND
+from tank2sim.gap.outcome.export import NEXT_TEST_FILE, replaces
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING
+from tank2sim.identification.trials.as_json import as_number
 from tank2sim.report.gap.cause_charts import agreement_chart, expected_chart, lacking_chart, rival_chart, when_chart
 from tank2sim.report.gap.charts import (
     MOST_TRIALS_DRAWN,
@@ -31,17 +23,23 @@ from tank2sim.report.gap.charts import (
     place_chart,
     shown_models,
     signal_misfit,
+    signal_of,
 )
 from tank2sim.report.gap.text import (
     GOOD,
     as_percent,
     effect_in_words,
+    effects_of,
     meaning,
+    or_nan,
     parameter_cells,
+    set_misfit,
     sizes_of_candidates,
+    trial_name,
     verdict_context,
     verdict_in_words,
 )
+from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.numbers import format_number
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
 from tank2sim.units import in_words
@@ -50,33 +48,34 @@ _SURE = 0.9
 """Confidence from which a name is shown without caution (project choice)."""
 
 
-def gap_charts(gap: Gap) -> dict[str, alt.TopLevelMixin]:
-    """File stem to chart; what a gap has nothing for is left out."""
-    test = gap.next_test
-    lacking = {"signal": contradiction(gap), "force": missing_force_intervals(gap)}
+def gap_charts(found: Json) -> dict[str, alt.TopLevelMixin]:
+    """Return the charts of the JSON by file stem; what a gap has nothing for is left out."""
+    test = found["next_test"]
+    lacking = {"signal": found["missing_signal"], "force": found["missing_force"]}
     made: dict[str, alt.TopLevelMixin | None] = {
-        "rivals": rival_chart(gap, title="Explanations compared"),
-        "misfit": misfit_chart(gap, title="Misfit by signal and manoeuvre"),
-        "places": place_chart(gap, title="Where the misfit is worst"),
+        "rivals": rival_chart(found, title="Explanations compared"),
+        "misfit": misfit_chart(found, title="Misfit by signal and manoeuvre"),
+        "places": place_chart(found, title="Where the misfit is worst"),
         **{f"when_{what}": when_chart(values, title=_WHEN[what]) for what, values in lacking.items() if values},
         **{what: lacking_chart(values, title=_OVER[what]) for what, values in lacking.items() if values},
         **{
-            f"tracks_{word.replace(' ', '_')}": gap_tracks(gap, held_out=held, title=f"Tracks, trials {_ON[word]}")
+            f"tracks_{word.replace(' ', '_')}": gap_tracks(found, held_out=held, title=f"Tracks, trials {_ON[word]}")
             for word, held in SETS.items()
         },
         **{
             f"histories_{word.replace(' ', '_')}_{sheet + 1}": chart
             for word, held in SETS.items()
-            for sheet, chart in enumerate(gap_histories(gap, held_out=held, title=f"Motions, trials {_ON[word]}"))
+            for sheet, chart in enumerate(gap_histories(found, held_out=held, title=f"Motions, trials {_ON[word]}"))
         },
-        "agreement": agreement_chart(gap, title="What each trial alone would have"),
+        "agreement": agreement_chart(found, title="What each trial alone would have"),
         "expected": expected_chart(test, title="Information of other manoeuvres") if test else None,
     }
     return {stem: chart for stem, chart in made.items() if chart is not None}
 
 
-def gap_page(gap: Gap, charts: Mapping[str, alt.TopLevelMixin]) -> Page:
-    """The page; `charts` as :func:`gap_charts` gives them."""
+def gap_page(found: Json) -> Page:
+    """Return the page of the JSON of ``tank2sim gap``."""
+    charts = gap_charts(found)
 
     def drawn(*stems: str) -> list[Illustration]:
         names = [name for stem in stems for name in charts if name == stem or name.rpartition("_")[0] == stem]
@@ -85,42 +84,42 @@ def gap_page(gap: Gap, charts: Mapping[str, alt.TopLevelMixin]) -> Page:
     sections = [
         PageSection(
             heading="Verdict",
-            text="\n\n".join([verdict_in_words(gap), *verdict_context(gap)]),
-            tables=[*_parameters(gap), *_candidates(gap), *_explanations(gap)],
+            text="\n\n".join([verdict_in_words(found), *verdict_context(found)]),
+            tables=[*_parameters(found), *_candidates(found), *_explanations(found)],
             charts=drawn("rivals"),
         ),
         PageSection(
-            heading="Before and after" if changes_simulation(gap) else "How well the card follows",
+            heading="Before and after" if changes_simulation(found) else "How well the card follows",
             text=_BEFORE_AND_AFTER
-            + ("" if changes_simulation(gap) else _UNCHANGED)
-            + (_BLACK_BOX if _black_box(gap) else ""),
-            tables=[_signals(gap), _trials(gap)],
+            + ("" if changes_simulation(found) else _UNCHANGED)
+            + (_BLACK_BOX if _black_box(found) else ""),
+            tables=[_signals(found), _trials(found)],
             charts=drawn("misfit"),
         ),
         PageSection(
             heading="Where the gap is",
-            text="\n\n".join([_place_text(gap), _acting_text(gap)]),
-            tables=[*_places(gap), *_passages(gap)],
+            text="\n\n".join([_place_text(found), _acting_text(found)]),
+            tables=[*_places(found), *_passages(found)],
             charts=drawn("when_signal", "signal", "when_force", "force", "places"),
         ),
-        PageSection(heading="Tracks and motions", text=_track_text(gap), charts=drawn(*_RUNS)),
+        PageSection(heading="Tracks and motions", text=_track_text(found), charts=drawn(*_RUNS)),
     ]
-    if figures := _figures(gap):
+    if figures := _figures(found):
         sections.append(PageSection(heading="Figures of manoeuvres", text=_FIGURES, tables=figures))
     if "agreement" in charts:
         sections.append(PageSection(heading="Do the trials agree", text=_AGREEMENT, charts=drawn("agreement")))
-    if hidden := _could_hide(gap):
+    if hidden := _could_hide(found):
         sections.append(PageSection(heading="What could hide", text=_COULD_HIDE, tables=[hidden]))
-    sections.append(PageSection(heading="Next test", text=_next_test(gap), charts=drawn("expected")))
+    sections.append(PageSection(heading="Next test", text=_next_test(found), charts=drawn("expected")))
     # One section: a tenth would not find room for its number in the list of contents.
-    noise = [_noise(gap), *([_table("Notices", ("",), [[notice] for notice in gap.notices])] if gap.notices else [])]
-    sections.append(PageSection(heading="Noise and notices" if gap.notices else "Noise", text=_NOISE, tables=noise))
-    fitting = sum(not replay.held_out for replay in gap.passed)
-    subtitle = (
-        f"What the model lacks, from {_count(fitting, 'trial')} and {len(gap.passed) - fitting or 'none'} held out"
-    )
+    notices = found["notices"][len(found["cautions"]) :]
+    noise = [_noise(found), *([_table("Notices", ("",), [[notice] for notice in notices])] if notices else [])]
+    sections.append(PageSection(heading="Noise and notices" if notices else "Noise", text=_NOISE, tables=noise))
+    fitting = sum(not trial["held_out"] for trial in found["trials"])
+    held_out = len(found["trials"]) - fitting
+    subtitle = f"What the model lacks, from {_count(fitting, 'trial')} and {held_out or 'none'} held out"
     shown = [section for section in sections if section.text or section.tables or section.charts]
-    return Page(title=gap.card.ship.name, subtitle=subtitle, figures=_key_figures(gap), sections=shown)
+    return Page(title=found["ship"], subtitle=subtitle, figures=_key_figures(found), sections=shown)
 
 
 _ON = {"held out": "held out", "fitting": "used for fitting"}
@@ -179,100 +178,98 @@ _CAPTIONS = {
 }
 
 
-def _key_figures(gap: Gap) -> list[KeyFigure]:
-    named = ", ".join(effect_in_words(effect.name) for effect in gap.effects)
-    caution = (
-        Verdict.NONE if gap.verdict in (MISSING, NO_EFFECT_MISSING) and not proof_cautions(gap) else Verdict.CAUTION
-    )
-    figures = [KeyFigure(label="Verdict", value=gap.verdict, verdict=caution, note=named)]
-    if gap.effects:
-        least = min(effect.confidence for effect in gap.effects)
+def _key_figures(found: Json) -> list[KeyFigure]:
+    effects = found["effects"]
+    named = ", ".join(effect_in_words(effect["name"]) for effect in effects)
+    sure = found["verdict"] in (MISSING, NO_EFFECT_MISSING) and not found["cautions"]
+    caution = Verdict.NONE if sure else Verdict.CAUTION
+    figures = [KeyFigure(label="Verdict", value=found["verdict"], verdict=caution, note=named)]
+    if effects:
+        least = min(or_nan(effect["confidence"]) for effect in effects)
         unsure = Verdict.CAUTION if not least >= _SURE else Verdict.NONE
-        note = "alone or with another effect" if len(gap.effects) == 1 else "of the less sure one, in any company"
+        note = "alone or with another effect" if len(effects) == 1 else "of the less sure one, in any company"
         figures.append(
             KeyFigure(label="Probability that it is there", value=as_percent(least), verdict=unsure, note=note)
         )
     for word, held in SETS.items():
-        before, after = (gap.misfit(model, held_out=held) for model in ("before", "after"))
+        before, after = (set_misfit(found, model, held_out=held) for model in ("before", "after"))
         if before is not None and after is not None:
             worse = Verdict.CAUTION if after > max(before, GOOD) else Verdict.NONE
-            note = f"noise units; before {format_number(before, 3)}" if changes_simulation(gap) else "noise units"
+            note = f"noise units; before {format_number(before, 3)}" if changes_simulation(found) else "noise units"
             figures.append(
                 KeyFigure(label=f"Misfit, trials {_ON[word]}", value=_rounded(after), verdict=worse, note=note)
             )
-    if gap.next_test:
-        figures.append(KeyFigure(label="Next test", value=gap.next_test.manoeuvre))
+    if found["next_test"]:
+        figures.append(KeyFigure(label="Next test", value=found["next_test"]["manoeuvre"]))
     return figures
 
 
-def _parameters(gap: Gap) -> list[PageTable]:
+def _parameters(found: Json) -> list[PageTable]:
     rows: list[list[Cell]] = [
-        [effect_in_words(effect.name), *parameter_cells(effect, name)]
-        for effect in gap.effects
-        for name in effect.parameters
+        [effect_in_words(effect["name"]), *parameter_cells(effect, name)]
+        for effect in found["effects"]
+        for name in effect["parameters"]
     ]
     heads = ("effect", "parameter", "value", "unit", "meaning")
-    what = "What the best of the candidates would be" if gap.verdict == AMBIGUOUS else "What was found"
+    what = "What the best of the candidates would be" if found["verdict"] == AMBIGUOUS else "What was found"
     return [_table(f"{what}, ± one standard error", heads, rows)] if rows else []
 
 
-def _candidates(gap: Gap) -> list[PageTable]:
+def _candidates(found: Json) -> list[PageTable]:
     """The sizes of the other effects that it could be."""
     rows: list[list[Cell]] = [
-        [effect_in_words(candidate.name), *parameter_cells(candidate, name), as_percent(candidate.confidence)]
-        for candidate in sizes_of_candidates(gap)
-        for name in candidate.parameters
+        [effect_in_words(candidate["name"]), *parameter_cells(candidate, name), as_percent(candidate["confidence"])]
+        for candidate in sizes_of_candidates(found)
+        for name in candidate["parameters"]
     ]
     heads = ("effect", "parameter", "value", "unit", "meaning", "probability that it is there")
     return [_table("What the others would be, ± one standard error", heads, rows)] if rows else []
 
 
-def _explanations(gap: Gap) -> list[PageTable]:
+def _explanations(found: Json) -> list[PageTable]:
     """The consequences of each effect that is only possible."""
-    named = [effect.name for effect in gap.effects] if gap.verdict == AMBIGUOUS else []
-    possible = dict.fromkeys([*named, *(name for alternative in gap.alternatives for name in alternative)])
+    named = [effect["name"] for effect in found["effects"]] if found["verdict"] == AMBIGUOUS else []
+    possible = dict.fromkeys([*named, *(name for text in found["alternatives"] for name in effects_of(text))])
     rows: list[list[Cell]] = [
         [effect_in_words(name), EFFECTS[name].description] for name in possible if name in EFFECTS
     ]
     return [_table("Effects that these data cannot distinguish", ("effect", "in words"), rows)] if rows else []
 
 
-def _black_box(gap: Gap) -> bool:
-    return any(replay.black_box for replay in gap.passed)
+def _black_box(found: Json) -> bool:
+    return any("black_box" in trial["misfit"] for trial in found["trials"])
 
 
-def _trials(gap: Gap) -> PageTable:
+def _trials(found: Json) -> PageTable:
+    models = _compared(found)
     rows: list[list[Cell]] = [
-        [replay.name, word]
-        + [
-            _cell(None if model == "black_box" and not replay.black_box else replay.misfit(model))
-            for model in _compared(gap)
-        ]
+        [trial_name(trial["trial"]), word]
+        + [_cell(as_number(trial["misfit"][model]) if model in trial["misfit"] else None) for model in models]
         for word, held in SETS.items()
-        for replay in gap.passed
-        if replay.held_out == held and measured_in(replay)
+        for trial in found["trials"]
+        if trial["held_out"] == held and trial["signals"]
     ]
-    heads = ("trial", "set", *(model.replace("_", " ") for model in _compared(gap)))
+    heads = ("trial", "set", *(model.replace("_", " ") for model in models))
     return _table("Misfit of each trial, noise units", heads, rows, digits=_ALL)
 
 
-def _signals(gap: Gap) -> PageTable:
-    measured = {name for replay in gap.passed for name in measured_in(replay)}
-    words = [word for word, held in SETS.items() if any(replay.held_out == held for replay in gap.passed)]
-    columns = [(word, model) for word in words for model in _compared(gap)]
+def _signals(found: Json) -> PageTable:
+    measured = {name for trial in found["trials"] for name in trial["signals"]}
+    words = [word for word, held in SETS.items() if any(trial["held_out"] == held for trial in found["trials"])]
+    columns = [(word, model) for word in words for model in _compared(found)]
     rows: list[list[Cell]] = [
-        [signal_display_name(name).words]
-        + [_cell(signal_misfit(gap, model, name, held_out=SETS[word])) for word, model in columns]
-        for name in gap.noise
+        [signal_of(name).words]
+        + [_cell(signal_misfit(found, model, name, held_out=SETS[word])) for word, model in columns]
+        for name in found["misfit"]["noise"]
         if name in measured
     ]
-    rows.append(["all", *(_cell(gap.misfit(model, held_out=SETS[word])) for word, model in columns)])
+    rows.append(["all", *(_cell(set_misfit(found, model, held_out=SETS[word])) for word, model in columns)])
     heads = ("signal", *(f"{word}, {model.replace('_', ' ')}" for word, model in columns))
     return _table("Misfit of each signal, noise units", heads, rows, digits=_ALL)
 
 
-def _compared(gap: Gap) -> tuple[str, ...]:
-    return (*shown_models(gap), *(("black_box",) if _black_box(gap) else ()))
+def _compared(found: Json) -> tuple[str, ...]:
+    return (*shown_models(found), *(("black_box",) if _black_box(found) else ()))
 
 
 _ALL = 7
@@ -283,42 +280,43 @@ def _cell(misfit: float | None) -> float | None:
     return misfit if misfit is None or not math.isfinite(misfit) else round(misfit, 2)
 
 
-def _place_text(gap: Gap) -> str:
-    if not gap.where:
+def _place_text(found: Json) -> str:
+    if not found["where"]:
         return "No part of any trial exceeds the noise. The largest misfits are shown all the same."
-    first, name = gap.where[0], signal_display_name(gap.where[0].signal)
+    first = found["where"][0]
+    share, begin, end = (or_nan(first[key]) for key in ("share_of_misfit", "t_start_s", "t_end_s"))
     return (
-        f"The largest part of the misfit beyond the noise, {100 * first.share:.0f} %, arises in {name.words} "
-        f"({name.file}) of {first.trial}, from {first.t_start_s:.0f} s to {first.t_end_s:.0f} s. Positions and "
-        "headings count while their difference grows: a track that was left once stays left."
+        f"The largest part of the misfit beyond the noise, {100 * share:.0f} %, arises in "
+        f"{signal_of(first['signal']).words} ({first['signal']}) of {trial_name(first['trial'])}, from {begin:.0f} s "
+        f"to {end:.0f} s. Positions and headings count while their difference grows: a track that was left once stays "
+        "left."
     )
 
 
-def _acting_text(gap: Gap) -> str:
+def _acting_text(found: Json) -> str:
     """When the model itself is wrong, in a sentence; or why no force is shown."""
-    found = acting(gap)
-    without = _NO_FORCE if earth_bound(gap) and missing_force_intervals(gap) is None else ""
-    if not found:
-        none = "the records do not contradict each other" if earth_bound(gap) else "no force exceeds its error"
+    earth_bound = found["equation"] in EARTH_BOUND
+    without = _NO_FORCE if earth_bound and found["missing_force"] is None else ""
+    if not found["acting"]:
+        none = "the records do not contradict each other" if earth_bound else "no force exceeds its error"
         return f"At what moments the cause acts cannot be said: {none}." + without
-    first = found[0]
+    first = found["acting"][0]
+    begin, end = or_nan(first["t_start_s"]), or_nan(first["t_end_s"])
     text = (
-        f"The cause acts most in {_ACTING.get(first.equation, first.equation)}, from "
-        f"{first.t_start_s:.0f} s to {first.t_end_s:.0f} s of {first.trial}."
+        f"The cause acts most in {_ACTING.get(first['equation'], first['equation'])}, from "
+        f"{begin:.0f} s to {end:.0f} s of {trial_name(first['trial'])}."
     )
     return text + without
 
 
-def _passages(gap: Gap) -> list[PageTable]:
+def _passages(found: Json) -> list[PageTable]:
     rows: list[list[Cell]] = [
         [
-            passage.trial,
-            _ACTING.get(passage.equation, passage.equation),
-            passage.t_start_s,
-            passage.t_end_s,
-            passage.size,
+            trial_name(passage["trial"]),
+            _ACTING.get(passage["equation"], passage["equation"]),
+            *(passage[key] for key in ("t_start_s", "t_end_s", "standard_errors")),
         ]
-        for passage in acting(gap)[:_MOST_PASSAGES]
+        for passage in found["acting"][:_MOST_PASSAGES]
     ]
     columns = [
         *(Column(title=head) for head in ("trial", "equation")),
@@ -344,16 +342,16 @@ _NO_FORCE = (
 )
 
 
-def _places(gap: Gap) -> list[PageTable]:
+def _places(found: Json) -> list[PageTable]:
     rows: list[list[Cell]] = [
         [
-            location.trial,
-            signal_display_name(location.signal).words,
-            location.t_start_s,
-            location.t_end_s,
-            100 * location.share,
+            trial_name(place["trial"]),
+            signal_of(place["signal"]).words,
+            place["t_start_s"],
+            place["t_end_s"],
+            100 * or_nan(place["share_of_misfit"]),
         ]
-        for location in gap.where
+        for place in found["where"]
     ]
     columns = [
         *(Column(title=head) for head in ("trial", "signal")),
@@ -363,8 +361,8 @@ def _places(gap: Gap) -> list[PageTable]:
     return [PageTable(caption="Where the misfit arises, beyond the noise", columns=columns, rows=rows)] if rows else []
 
 
-def _track_text(gap: Gap) -> str:
-    counts = {word: sum(replay.held_out == held for replay in gap.passed) for word, held in SETS.items()}
+def _track_text(found: Json) -> str:
+    counts = {word: sum(trial["held_out"] == held for trial in found["trials"]) for word, held in SETS.items()}
     many = [
         f"{word}: the {MOST_TRIALS_DRAWN} of {count} with the largest misfit before"
         for word, count in counts.items()
@@ -373,49 +371,49 @@ def _track_text(gap: Gap) -> str:
     return f"Trials {'; '.join(many)}." if many else ""
 
 
-def _figures(gap: Gap) -> list[PageTable]:
-    held = {replay.name: replay.held_out for replay in gap.passed}
+def _figures(found: Json) -> list[PageTable]:
+    held = {trial["trial"]: trial["held_out"] for trial in found["trials"]}
     groups: dict[str, list[list[Cell]]] = {}
-    for before, after in sorted(paired_figures(gap), key=lambda pair: not held.get(pair[1].trial)):
-        words, unit = in_words(after.name)
-        word = "held out" if held.get(after.trial) else "fitting"
-        simulated = [before.predicted if before else None, *([after.predicted] if changes_simulation(gap) else [])]
-        groups.setdefault(unit, []).append([after.trial, word, words, after.measured, *simulated])
-    heads = ("trial", "set", "figure", "measured", *shown_models(gap))
+    for figure in sorted(found["figures"], key=lambda figure: not held.get(figure["trial"])):
+        words, unit = in_words(figure["figure"])
+        word = "held out" if held.get(figure["trial"]) else "fitting"
+        simulated = [figure[model] for model in shown_models(found)]
+        groups.setdefault(unit, []).append([trial_name(figure["trial"]), word, words, figure["measured"], *simulated])
+    heads = ("trial", "set", "figure", "measured", *shown_models(found))
     return [
         _table(f"Figures in {unit}" if unit else "Figures without unit", heads, rows, digits=4)
         for unit, rows in groups.items()
     ]
 
 
-def _could_hide(gap: Gap) -> PageTable | None:
+def _could_hide(found: Json) -> PageTable | None:
     rows: list[list[Cell]] = []
-    for effect, sizes in hidden(gap).items():
+    for effect, sizes in found["could_hide"].items():
         for name, size in sizes.items():
-            parameter, value = in_file_units(name, size)
-            words, unit = in_words(parameter)
-            shown = format_number(value, 2)
+            words, unit = in_words(name)
+            shown = format_number(or_nan(size), 2)
             shown = f"{shown} in place of the card's" if replaces(effect, name) else f"up to {shown}"
             rows.append([effect_in_words(effect), words, shown, unit or "-", meaning(effect, name)])
     heads = ("effect", "parameter", "would not show", "unit", "meaning")
     return _table("Sizes that these data cannot show", heads, rows) if rows else None
 
 
-def _next_test(gap: Gap) -> str:
-    test = gap.next_test
+def _next_test(found: Json) -> str:
+    test = found["next_test"]
     if test is None:
-        return "" if gap.verdict in (MISSING, NO_EFFECT_MISSING) else "No manoeuvre was found that would decide more."
+        sure = found["verdict"] in (MISSING, NO_EFFECT_MISSING)
+        return "" if sure else "No manoeuvre was found that would decide more."
     # The command has a line of its own: among other words it is broken at its hyphens.
-    command = f"tank2sim simulate improved.toml --manoeuvre {test.manoeuvre}"
-    why = f"{test.why[0].upper()}{test.why[1:].rstrip('.')}."
+    command = f"tank2sim simulate improved.toml --manoeuvre {test['manoeuvre']}"
+    why = f"{test['why'][0].upper()}{test['why'][1:].rstrip('.')}."
     return f"{why}\n\nIts orders are in {NEXT_TEST_FILE}. To see it beforehand:\n\n{command}"
 
 
-def _noise(gap: Gap) -> PageTable:
+def _noise(found: Json) -> PageTable:
     rows: list[list[Cell]] = []
-    for variable, (sigma, origin) in gap.noise.items():
-        name = signal_display_name(variable)
-        rows.append([name.words, name.file, format_number(name.factor * sigma, 3), name.unit, origin])
+    for column, noise in found["misfit"]["noise"].items():
+        name = signal_of(column)
+        rows.append([name.words, column, format_number(or_nan(noise["sigma"]), 3), name.unit, noise["from"]])
     heads = ("signal", "column", "standard deviation", "unit", "from")
     return _table("Measurement noise", heads, rows)
 

@@ -1,13 +1,17 @@
-"""What a gap is in words: the verdict, how sure it is, what is to be said against it, sizes with their errors."""
+"""The JSON of a gap in words: the verdict, its probability, objections to it, sizes with their errors."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from pathlib import PurePath
+
+import numpy as np
 
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.outcome.export import estimate_in_file, in_file_units
-from tank2sim.gap.proof.cross_check import proof_cautions
-from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, Gap, Named
+from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING
+from tank2sim.identification.trials.as_json import as_number
+from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.numbers import format_column, format_number
 from tank2sim.report.kit.page import Cell
 from tank2sim.units import in_words, to_si
@@ -22,64 +26,99 @@ def effect_in_words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def verdict_in_words(gap: Gap) -> str:
+def trial_name(file: str) -> str:
+    """Name of a trial from that of its file."""
+    return PurePath(file).stem
+
+
+def or_nan(value: float | None) -> float:
+    """A number of the JSON; nan for null."""
+    return math.nan if value is None else value
+
+
+def effects_of(explanation: str) -> list[str]:
+    """Effects of one of ``alternatives``: ``current + wind``; none of ``none``."""
+    return [] if explanation == "none" else explanation.split(" + ")
+
+
+def set_misfit(found: Json, version: str, *, held_out: bool) -> float | None:
+    """Root mean square of the misfits of all fitting (or held-out) trials, noise units; None without any.
+
+    `version` is ``before``, ``after`` or ``black_box``; inf where a simulation exceeded all bounds.
+    """
+    misfits = [trial["misfit"] for trial in found["trials"] if trial["held_out"] == held_out]
+    if not misfits or (version == "black_box" and not all(version in misfit for misfit in misfits)):
+        return None
+    return float(np.sqrt(np.mean([as_number(misfit.get(version)) ** 2 for misfit in misfits])))
+
+
+def verdict_in_words(found: Json) -> str:
     """What was found, in a sentence or two, and what is to be said against it."""
-    return " ".join([_found(gap), *(f"Caution: {caution}." for caution in proof_cautions(gap))])
+    return " ".join([_found(found), *(f"Caution: {caution}." for caution in found["cautions"])])
 
 
-def probabilities_in_words(gap: Gap) -> list[str]:
+def probabilities_in_words(found: Json) -> list[str]:
     """What each probability is of: an effect, in whatever company, and one explanation as a whole."""
-    if not gap.effects:
+    effects = found["effects"]
+    if not effects:
         return []
-    each = "; ".join(f"{effect_in_words(effect.name)} {as_percent(effect.confidence)}" for effect in gap.effects)
-    names = tuple(effect.name for effect in gap.effects)
+    each = "; ".join(f"{effect_in_words(effect['name'])} {as_percent(effect['confidence'])}" for effect in effects)
+    names = [effect["name"] for effect in effects]
     messages = [f"probability that the effect is there, alone or with another one: {each}"]
-    whole = next((rival for rival in gap.rivals if set(rival.effects) == set(names)), None)
+    whole = next((rival for rival in found["rivals"] if set(rival["effects"]) == set(names)), None)
     if whole is not None:
-        alone = f"{effect_in_words(names[0])} alone" if len(names) == 1 else " with ".join(map(effect_in_words, names))
+        alone = f"{effect_in_words(names[0])} alone" if len(names) == 1 else _joined(names)
         messages.append(
             f"probability that {alone} is all that is missing, among the explanations compared: "
-            f"{as_percent(whole.probability)}"
+            f"{as_percent(whole['probability'])}"
         )
     return messages
 
 
-def sizes_of_candidates(gap: Gap) -> list[Named]:
-    """The effects of an ambiguous verdict next to the first explanation, of the size that each would have."""
-    sizes = gap.next_test.sizes if gap.next_test is not None else {}
-    known = {effect.name for effect in gap.effects}
-    unknown = dict.fromkeys(name for names in gap.alternatives for name in names if name not in known)
-    return [Named(name, *sizes[name], _sure(gap, name)) for name in unknown if name in sizes]
+def sizes_of_candidates(found: Json) -> list[Json]:
+    """The effects of an ambiguous verdict next to the first explanation, of the size that each would have.
+
+    Each has the keys of an entry of ``effects``.
+    """
+    sizes = found["next_test"]["candidates"] if found["next_test"] else {}
+    known = {effect["name"] for effect in found["effects"]}
+    unknown = dict.fromkeys(name for text in found["alternatives"] for name in effects_of(text) if name not in known)
+    return [{"name": name, **sizes[name], "confidence": _sure(found, name)} for name in unknown if name in sizes]
 
 
-def _sure(gap: Gap, name: str) -> float:
-    return min(sum(rival.probability for rival in gap.rivals if name in rival.effects), 1.0)
+def _sure(found: Json, name: str) -> float:
+    return min(sum(or_nan(rival["probability"]) for rival in found["rivals"] if name in rival["effects"]), 1.0)
 
 
-def as_percent(probability: float) -> str:
+def _joined(names: Sequence[str]) -> str:
+    return " with ".join(map(effect_in_words, names))
+
+
+def as_percent(probability: float | None) -> str:
     """A probability in words of %, never 0 or 100: nothing is that sure."""
-    if not math.isfinite(probability):
+    if probability is None or not math.isfinite(probability):
         return "unknown"
     percent = 100 * probability
     return "< 1 %" if percent < 1 else "> 99 %" if percent > 99 else f"{percent:.0f} %"
 
 
-def _found(gap: Gap) -> str:
-    after = gap.misfit("after", held_out=False)
+def _found(found: Json) -> str:
+    verdict, effects = found["verdict"], found["effects"]
+    after = set_misfit(found, "after", held_out=False)
     follows = "" if after is None else f" follows the fitting trials to {noises(after)}"
-    if gap.verdict == MISSING and gap.effects:
-        names = " and ".join(_with_values(effect) for effect in gap.effects)
-        text = " ".join(EFFECTS[effect.name].description for effect in gap.effects if effect.name in EFFECTS)
-        if all(effect.name in EFFECTS and EFFECTS[effect.name].acts_on == "sensor" for effect in gap.effects):
+    if verdict == MISSING and effects:
+        names = " and ".join(_with_values(effect) for effect in effects)
+        known = [EFFECTS[effect["name"]] for effect in effects if effect["name"] in EFFECTS]
+        text = " ".join(effect.description for effect in known)
+        if len(known) == len(effects) and all(effect.acts_on == "sensor" for effect in known):
             return f"A sensor is at fault, not the model: {names}. {text}".strip()
-        return f"The model lacks {'an effect' if len(gap.effects) == 1 else 'effects'}: {names}. {text}".strip()
-    if gap.verdict == AMBIGUOUS:
-        candidates = dict.fromkeys(
-            [*([tuple(effect.name for effect in gap.effects)] if gap.effects else []), *gap.alternatives]
-        )
-        names = ", or ".join(" with ".join(map(effect_in_words, candidate)) for candidate in candidates)
+        return f"The model lacks {'an effect' if len(effects) == 1 else 'effects'}: {names}. {text}".strip()
+    if verdict == AMBIGUOUS:
+        named = [[effect["name"] for effect in effects]] if effects else []
+        candidates = [*named, *map(effects_of, found["alternatives"])]
+        names = ", or ".join(dict.fromkeys(map(_joined, candidates)))
         return f"Something is missing, but these data do not distinguish several effects: {names}."
-    if gap.verdict == NO_EFFECT_MISSING:
+    if verdict == NO_EFFECT_MISSING:
         good = after is None or after <= GOOD
         remainder = "" if good else ", which is more than noise, but no effect explains the rest better than none"
         return f"No missing effect shows in these data{': the card as given' + follows + remainder if follows else ''}."
@@ -89,24 +128,26 @@ def _found(gap: Gap) -> str:
     )
 
 
-def _with_values(effect: Named) -> str:
+def _with_values(effect: Json) -> str:
     values = []
-    for name in effect.parameters:
+    for name in effect["parameters"]:
         words, value, unit, _ = parameter_cells(effect, name)
         values.append(f"{words} {value}{'' if unit == '-' else f' {unit}'}")
-    return f"{effect_in_words(effect.name)} ({', '.join(values)})" if values else effect_in_words(effect.name)
+    words = effect_in_words(effect["name"])
+    return f"{words} ({', '.join(values)})" if values else words
 
 
-def verdict_context(gap: Gap) -> list[str]:
+def verdict_context(found: Json) -> list[str]:
     """Confidence, rivals and place, a paragraph each."""
-    messages = [f"{text[0].upper()}{text[1:]}." for text in probabilities_in_words(gap)]
-    if gap.alternatives and gap.verdict != AMBIGUOUS:
-        names = "; ".join(" with ".join(map(effect_in_words, alternative)) for alternative in gap.alternatives)
+    verdict, equation = found["verdict"], found["equation"]
+    messages = [f"{text[0].upper()}{text[1:]}." for text in probabilities_in_words(found)]
+    if found["alternatives"] and verdict != AMBIGUOUS:
+        names = "; ".join(_joined(effects_of(text)) for text in found["alternatives"])
         messages.append(f"What else it could be: {names}. These data cannot distinguish them.")
-    elif gap.effects and gap.verdict == MISSING:
+    elif found["effects"] and verdict == MISSING:
         messages.append("What else it could be: none of the explanations without it comes near.")
-    if gap.verdict != NO_EFFECT_MISSING and gap.equation:
-        messages.append(f"The gap is in {_EQUATIONS.get(gap.equation, gap.equation)}.")
+    if verdict != NO_EFFECT_MISSING and equation:
+        messages.append(f"The gap is in {_EQUATIONS.get(equation, equation)}.")
     return messages
 
 
@@ -120,19 +161,26 @@ _EQUATIONS = {
 }
 
 
-def parameter_cells(effect: Named, name: str) -> list[Cell]:
-    """Words, value with its standard error, unit and meaning of a parameter."""
-    key, value = estimate_in_file(name, effect.parameters[name])
-    words, unit = parameter_in_words(effect.name, key)
-    error = in_file_units(name, effect.standard_errors[name])[1] if name in effect.standard_errors else math.nan
-    text = f"{meaning(effect.name, name)}{'' if name in effect.standard_errors else ' (held)'}"
-    return [words, with_error(value, error), unit or "-", text]
+def parameter_cells(effect: Json, key: str) -> list[Cell]:
+    """Words, value with its standard error, unit and meaning of a parameter.
+
+    Parameters
+    ----------
+    effect : dict
+        An entry of ``effects``.
+    key : str
+        One of its ``parameters``.
+    """
+    words, unit = parameter_in_words(effect["name"], key)
+    text = f"{meaning(effect['name'], key)}{'' if key in effect['standard_errors'] else ' (held)'}"
+    shown = with_error(or_nan(effect["parameters"][key]), or_nan(effect["standard_errors"].get(key)))
+    return [words, shown, unit or "-", text]
 
 
 def parameter_in_words(effect: str, key: str) -> tuple[str, str]:
     """Words and unit of a parameter by its name in a file; a direction is reported to be that from or towards which."""
     words, unit = in_words(key)
-    description = meaning(effect, to_si(key, 0.0)[0])
+    description = meaning(effect, key)
     way = next((word for word in ("from", "towards") if f"direction {word} which" in description), "")
     return f"{words} {way}".strip(), unit
 
@@ -147,10 +195,11 @@ def with_error(value: float, error: float) -> str:
     return " ± ".join(format_column([float(value), float(error)], digits))
 
 
-def meaning(effect: str, parameter: str) -> str:
-    """What a parameter of an effect is."""
+def meaning(effect: str, key: str) -> str:
+    """What a parameter of an effect is, by its name in a file."""
     known = EFFECTS[effect].parameters if effect in EFFECTS else ()
-    return next((parameter_known.description for parameter_known in known if parameter_known.name == parameter), "")
+    name = to_si(key, 0.0)[0]
+    return next((parameter.description for parameter in known if parameter.name == name), "")
 
 
 def noises(misfit: float) -> str:

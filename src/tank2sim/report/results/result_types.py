@@ -37,7 +37,8 @@ class ResultType:
 
 
 _GAP_NOTE = (
-    "Tracks and time histories are not in gap.json: they are in report.html, which tank2sim gap wrote next to it."
+    "This gap.json of an older version has no tracks and time histories: they are in report.html, which tank2sim gap "
+    "wrote next to it."
 )
 
 RESULT_TYPES = (

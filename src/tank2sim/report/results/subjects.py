@@ -9,6 +9,7 @@ from tank2sim.report.autopilot.page import autopilot_page
 from tank2sim.report.captive.page import reduction_page
 from tank2sim.report.comparison.page import compare_page
 from tank2sim.report.gap.fleet_page import fleet_page_of_json
+from tank2sim.report.gap.page import gap_page
 from tank2sim.report.glide.page import glide_page
 from tank2sim.report.identification.page import identification_page
 from tank2sim.report.influence.page import influence_page
@@ -115,6 +116,13 @@ _PAGES: Mapping[str, _Page] = {
         identification_page,
         {"ship": str, "effects_of_card": list, "errors_over_windows": dict, "figures": dict, "structures": dict}
         | {"prior_scale": dict, "identifiability": dict, "notices": list, "replays": list},
+    ),
+    "The missing effect": _Page(
+        gap_page,
+        {"ship": str, "verdict": str, "effects": list, "alternatives": list, "where": list, "acting": list}
+        | {"equation": str, "misfit": dict, "could_hide": dict, "next_test": dict, "rivals": list, "trials": list}
+        | {"figures": list, "agreement": dict, "missing_force": dict, "missing_signal": dict, "replays": list}
+        | {"cautions": list, "notices": list},
     ),
     "Fleet": _Page(fleet_page_of_json, {"fleet": str, "ships": list}),
     "Influence coefficients": _Page(
