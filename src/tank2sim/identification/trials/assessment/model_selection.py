@@ -79,7 +79,7 @@ def criteria(problem: Problem, estimate: Estimate, samples: float | None = None)
 def criteria_of(series: Sequence[Array], parameters: float, samples: float | None = None) -> Criteria:
     """Information criteria of Gaussian residuals: `series` of pieces (n, m) without gaps, covariance unknown.
 
-    -2 log likelihood is n log det of the residuals' covariance; n is `samples`, or :func:`effective_samples` unless given.
+    -2 log likelihood is n log det of the residuals' covariance; n is `samples`, by default :func:`effective_samples`.
     """
     every = np.concatenate(series)
     n = effective_samples(series) if samples is None else samples
@@ -90,8 +90,8 @@ def criteria_of(series: Sequence[Array], parameters: float, samples: float | Non
 def effective_samples(series: Sequence[Array]) -> float:
     """Number of independent residuals with the same information: N / (1 + 2 sum of autocorrelations).
 
-    The sum ends at the first that is not positive (Geyer 1992, Statistical Science 7). `series` are pieces (n, m); the m
-    components are taken together, each in units of its own deviation.
+    The sum ends at the first that is not positive (Geyer 1992, Statistical Science 7). `series` are pieces (n, m); the
+    m components are taken together, each in units of its own deviation.
     """
     every = np.concatenate(series)
     size = np.sqrt(np.mean(every**2, axis=0))
