@@ -121,6 +121,10 @@ def _prepare() -> None:
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     warnings.simplefilter("ignore", PluginWarning)  # the process that began it has printed them
+    import scipy.linalg  # noqa: F401  loads the libraries whose threads are limited: each processor has its process
+    from threadpoolctl import threadpool_limits
+
+    threadpool_limits(limits=1, user_api="blas")
     parent = multiprocessing.parent_process()
     assert parent is not None
 

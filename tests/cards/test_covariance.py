@@ -38,6 +38,41 @@ def test_what_is_written_is_read_again_to_the_last_figure(tmp_path: Path, text: 
     np.testing.assert_array_equal(found.matrix, matrix)
 
 
+SAMPLES = np.random.default_rng(2).multivariate_normal([-0.011, -0.003], MATRIX, 50)
+OF_SAMPLES = np.cov(SAMPLES.T)
+
+
+def sampled(samples=SAMPLES) -> Covariance:
+    return Covariance(NAMES, OF_SAMPLES, samples)
+
+
+@pytest.fixture
+def text_of_samples(mariner_card: ManoeuvringCard) -> str:
+    errors = np.sqrt(np.diag(OF_SAMPLES))
+    return mariner_card.text + f"\n[uncertainty]\nYv = {errors[0]:.6g}\nNv = {errors[1]:.6g}\n"
+
+
+def test_samples_are_read_again_to_the_last_figure(tmp_path: Path, text_of_samples: str) -> None:
+    found = read_covariance(card_with(tmp_path, sampled(), text_of_samples))
+    assert found is not None and found.samples is not None
+    np.testing.assert_array_equal(found.samples, SAMPLES)
+
+
+@pytest.mark.parametrize("samples", [SAMPLES[:, :1], 2 * SAMPLES, SAMPLES[:1], np.full((5, 2), np.nan)])
+def test_samples_that_are_not_of_the_covariance_are_refused(tmp_path: Path, text_of_samples: str, samples) -> None:
+    with pytest.raises(InputError) as error:
+        read_covariance(card_with(tmp_path, sampled(samples), text_of_samples))
+    assert error.value.place == "samples"
+
+
+def test_samples_follow_a_number_that_was_tuned(tmp_path: Path, text_of_samples: str) -> None:
+    card = card_with(tmp_path, sampled(), text_of_samples)
+    before = card.derivatives["Nv"]
+    kept = carried(card, changed_text(card.text, card.source, {"derivatives.Nv": before + 1e-6}))
+    assert kept is not None and kept.samples is not None
+    np.testing.assert_allclose(kept.samples - SAMPLES, np.tile([0.0, 1e-6], (50, 1)), rtol=1e-6, atol=1e-15)
+
+
 def test_a_card_without_the_line_has_none(mariner_card: ManoeuvringCard) -> None:
     assert read_covariance(mariner_card) is None
 

@@ -366,3 +366,33 @@ def test_an_average_over_structures_states_their_weights_and_its_intervals_hold_
     assert sum(weights.values()) == pytest.approx(1.0) and found["structure"] == max(weights, key=weights.__getitem__)
     assert weights["linear"] < 0.02, "the ship has terms of third order"
     assert all(figure["interval_95"] is not None for figure in found["figures"]["holdout"])
+
+
+@pytest.mark.slow
+def test_samples_of_the_posterior_are_with_the_card_and_ensembles_take_them(folder: Path) -> None:
+    options = ["--structure", "card", "--posterior", "nuts", "--draws", "60", "--json", "sampled.json"]
+    files = ["-o", "sampled.toml", "--page", "sampled.html"]
+    result = tank2sim("identify", "off.toml", "zigzag20.csv", "turn25.csv", *options, *files, cwd=folder)
+    assert result.returncode == 0, result.stderr
+    found = json.loads((folder / "sampled.json").read_text(encoding="utf-8"))
+    posterior = found["posterior"]
+    assert posterior["draws"] == 240 and posterior["chains"] == 4
+    assert (result.stdout.startswith("NOT CONVERGED")) == (not posterior["converged"])
+    entries = found["derivatives"]
+    assert set(posterior["parameters"]) == set(entries)
+    for name, sampled in posterior["parameters"].items():
+        low, *_, high = sampled["quantiles"]
+        assert low < entries[name]["value"] < high
+        assert high - low == pytest.approx(3.92 * entries[name]["standard_error"], rel=0.3)
+    card = read_card(folder / "sampled.toml")
+    known = read_covariance(card)
+    assert known is not None and known.samples is not None and known.samples.shape == (240, len(entries))
+    stated = [card.derivatives[name.partition(".")[2]] for name in known.names]
+    np.testing.assert_allclose(known.samples.mean(axis=0), stated, rtol=1e-3, atol=1e-6)
+    simulated = tank2sim("simulate", "sampled.toml", "--manoeuvre", "turn:20", "--ensemble", "20", cwd=folder)
+    assert "240 samples of the posterior" in simulated.stdout
+
+
+def test_a_method_without_a_density_is_not_sampled(folder: Path) -> None:
+    options = ["--posterior", "nuts", "--method", "kalman"]
+    refused(tank2sim("identify", "off.toml", "zigzag20.csv", *options, cwd=folder), "--posterior", "kalman")

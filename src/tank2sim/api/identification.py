@@ -26,6 +26,7 @@ from tank2sim.identification.trials.as_json import (
     following_rows,
     identification_as_json,
     identified_card_text,
+    posterior_rows,
     replays,
     replays_as_json,
     structure_rows,
@@ -37,6 +38,7 @@ from tank2sim.identification.trials.identify import (
     IdentificationOptions,
     identify_trials,
 )
+from tank2sim.identification.trials.methods.posterior_sampling import DRAWS
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import SearchReport, silent
 from tank2sim.identification.trials.problem.prepare_trials import Measured
@@ -71,7 +73,8 @@ class IdentificationResult(Result):
         self.before, self.identification, self.fitted, self.held = before, identification, fitted, held
         self.remarks = tuple(remarks(identification))
         self._found: Mapping[str, Any] = plain_json(identification_as_json(identification, self.remarks))
-        self.notices = (*self._found["notices"], *self._found["identifiability"]["notices"], *self.remarks)
+        notices = (*self._found["notices"], *self._found["identifiability"]["notices"], *self.remarks)
+        self.notices = tuple(notice for notice in notices if notice not in self.headline)
 
     @cached_property
     def card(self) -> Card:
@@ -81,7 +84,8 @@ class IdentificationResult(Result):
         tank = [f"{len(captive.runs)} captive tests of {captive.campaign.path.name}"] if captive else []
         text = identified_card_text(found, [*(trial.name for trial in self.fitted.trials), *tank])
         text = with_fitted_trials(text, "the card found", self.fitted.trials)
-        covariance = by_file_name(found.card, found.estimate.free, found.estimate.covariance)
+        estimate = found.estimate
+        covariance = by_file_name(found.card, estimate.free, estimate.covariance, estimate.samples)
         return replace(parse_card(text, "the card found"), covariance=covariance)
 
     @property
@@ -121,8 +125,18 @@ class IdentificationResult(Result):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """None: the first table says it."""
-        return ()
+        """That the posterior has not converged, if so; else none: the first table says it."""
+        samples = self.identification.posterior
+        return () if samples is None or samples.converged else tuple(samples.notices)
+
+    @property
+    def samples(self) -> pd.DataFrame | None:
+        """Draws of the posterior, a column for each parameter in the units of `estimates`; None where it was not
+        sampled."""
+        import pandas as pd
+
+        samples = self.identification.posterior
+        return None if samples is None else pd.DataFrame(samples.flat, columns=list(samples.free))
 
     @property
     def tables(self) -> tuple[ResultTable, ...]:
@@ -131,6 +145,11 @@ class IdentificationResult(Result):
         estimate = found.estimate
         title = f"{found.card.ship.name}: {len(estimate.free)} coefficients from {len(found.problem.runs)} trials"
         tables = [ResultTable(title, ("", "found", "before", "from trials"), estimate_rows(self._found))]
+        if found.posterior is not None:
+            heads = ("", "95 %", "R-hat", "effective size")
+            tables.append(
+                ResultTable(f"Posterior, {len(found.posterior.flat)} draws", heads, posterior_rows(self._found))
+            )
         if found.bootstrap is not None:
             scatter = found.bootstrap.std(axis=0, ddof=1)
             triples = zip(estimate.free, estimate.standard_errors, scatter, strict=True)
@@ -194,6 +213,8 @@ def identify(
     force: bool = False,
     members: int = 100,
     bootstrap: int = 0,
+    posterior: str = "",
+    draws: int = DRAWS,
     executor: str = PROCESSES,
     workers: int | None = None,
     progress: SearchReport = silent,
@@ -231,6 +252,12 @@ def identify(
         Simulations behind the intervals of the figures of held-out trials.
     bootstrap : int
         Sets of trials simulated again with the estimate and fitted, for its scatter.
+    posterior : str
+        ``nuts``: sample the posterior by the no-U-turn sampler; ``ensemble``: by an ensemble of walkers. Estimates,
+        their covariance and all intervals are then those of the samples, which the card carries next to it; about 2 min
+        for 20 coefficients. Needs ``tank2sim[posterior]``.
+    draws : int
+        Draws of each of the sampler's four chains.
     executor : str
         ``processes`` or ``dask://host:port``.
     workers : int, optional
@@ -262,6 +289,8 @@ def identify(
         bootstrap=bootstrap,
         hold=tuple(hold),
         force=force,
+        posterior=posterior,
+        draws=draws,
     )
     fitted, held = fitted_and_held(trials, holdout, ship)
     if campaign is not None:

@@ -298,6 +298,26 @@ class CardReplayKeys(_Part):
     found: Columns
 
 
+class SampledKeys(_Part):
+    """A sampled parameter: R-hat, effective sample size, and its values at the quantile levels."""
+
+    r_hat: Number
+    effective_sample_size: Number
+    quantiles: list[Number]
+
+
+class PosteriorKeys(_Part):
+    """Samples of the posterior, on request."""
+
+    sampler: str
+    chains: int
+    draws: int
+    simulations: int
+    converged: bool
+    quantile_levels: list[float]
+    parameters: dict[str, SampledKeys]
+
+
 class IdentifyKeys(_Keys):
     """Coefficients identified from free-running trials."""
 
@@ -316,6 +336,7 @@ class IdentifyKeys(_Keys):
     figures: dict[str, list[PredictedFigureKeys]]
     structures: dict[str, Any]
     criteria: dict[str, Number] | None
+    posterior: PosteriorKeys | None
     bootstrap: dict[str, Any] | None
     residual_noise: dict[str, Number]
     prior_scale: dict[str, Number]

@@ -3,7 +3,7 @@
 ``# covariance: ship.covariance.json`` names the file, relative to the card's folder. It has ``format``
 (:data:`_FORMAT`), ``names`` (dotted keys of the card, ``derivatives.Yv``) and ``covariance``, a row for each name, in
 the conventions of the card's own text: scaling, units, sign of the rudder. What it does not name is independent, with
-the standard error of the card.
+the standard error of the card. Where a posterior was sampled it has ``samples``, too: rows of numbers by ``names``.
 """
 
 from __future__ import annotations
@@ -51,16 +51,25 @@ class Covariance:
         Their k dotted keys in the card's file.
     matrix : array (k, k)
         In the conventions of that file.
+    samples : array (n, k), optional
+        Of the numbers' joint distribution, in the same conventions; normal without any.
     """
 
     names: tuple[str, ...]
     matrix: Array
+    samples: Array | None = None
 
     def as_text(self) -> str:
         """The JSON of the file: a row of the matrix a line, every figure kept."""
-        rows = ",\n  ".join(json.dumps(row) for row in self.matrix.tolist())
         names = json.dumps(list(self.names))
-        return f'{{\n "format": "{_FORMAT}",\n "names": {names},\n "covariance": [\n  {rows}\n ]\n}}\n'
+        samples = "" if self.samples is None else f',\n "samples": {_rows_text(self.samples)}'
+        covariance = _rows_text(self.matrix)
+        return f'{{\n "format": "{_FORMAT}",\n "names": {names},\n "covariance": {covariance}{samples}\n}}\n'
+
+
+def _rows_text(rows: Array) -> str:
+    lines = ",\n  ".join(json.dumps(row) for row in rows.tolist())
+    return f"[\n  {lines}\n ]"
 
 
 def covariance_file(card: Path) -> Path:
@@ -114,7 +123,13 @@ def carried(card: Card, text: str) -> Covariance | None:
     errors = np.sqrt(np.maximum(np.diag(known.matrix), 0.0)).tolist()
     rows = [place for place, error in enumerate(zip(known.names, errors, strict=True)) if holds(*error)]
     kept = tuple(known.names[row] for row in rows)
-    return Covariance(kept, known.matrix[np.ix_(rows, rows)]) if kept else None
+    if not kept:
+        return None
+    samples = None
+    if known.samples is not None:
+        moved = [float(_at(new, name)) - float(_at(old, name)) for name in kept]  # type: ignore[arg-type]
+        samples = known.samples[:, rows] + np.array(moved)
+    return Covariance(kept, known.matrix[np.ix_(rows, rows)], samples)
 
 
 def read_covariance(card: Card) -> Covariance | None:
@@ -135,14 +150,14 @@ def read_covariance(card: Card) -> Covariance | None:
     if not path.is_file():
         remedy = f"put it next to the card, or take the line '# covariance: {found[1]}' out"
         raise InputError(path, "", f"is missing, and {card.source} refers to it", remedy)
-    names, rows = _form(path)
+    names, rows, drawn = _form(path)
     matrix = _matrix(path, names, rows)
     _check_names(card, path, names)
     _check_errors(card, path, names, matrix)
-    return Covariance(tuple(names), matrix)
+    return Covariance(tuple(names), matrix, None if drawn is None else _samples(path, matrix, drawn))
 
 
-def _form(path: Path) -> tuple[list[str], object]:
+def _form(path: Path) -> tuple[list[str], object, object]:
     try:
         content = json.loads(read_text(path))
     except (ValueError, RecursionError) as error:
@@ -154,7 +169,22 @@ def _form(path: Path) -> tuple[list[str], object]:
         raise InputError(path, "names", "is not a list of keys of the card", 'give names such as "derivatives.Yv"')
     if len(set(names)) < len(names):
         raise InputError(path, "names", "has a name twice", "give each number once")
-    return names, content.get("covariance")
+    return names, content.get("covariance"), content.get("samples")
+
+
+def _samples(path: Path, matrix: Array, rows: object) -> Array:
+    """Samples (n, k) whose variances are those of the covariance."""
+    try:
+        samples = np.array(rows, dtype=float)
+    except (TypeError, ValueError):
+        samples = np.zeros(0)
+    remedy = "write it again with identify, or take the samples out"
+    if samples.ndim != 2 or samples.shape[1] != len(matrix) or len(samples) < 2 or not np.isfinite(samples).all():
+        raise InputError(path, "samples", f"is not a table of rows of {len(matrix)} finite numbers", remedy)
+    errors = np.sqrt(np.diag(matrix))
+    if np.any(np.abs(samples.std(axis=0, ddof=1) - errors) > _ROUNDING * errors):
+        raise InputError(path, "samples", "vary by other standard deviations than the covariance", remedy)
+    return samples
 
 
 def _matrix(path: Path, names: Sequence[str], rows: object) -> Array:

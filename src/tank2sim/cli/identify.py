@@ -14,6 +14,7 @@ from tank2sim.cli.options import executor_option, page_option, plot_folder_optio
 from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.identification.trials.identify import TRIAL_METHODS
+from tank2sim.identification.trials.methods.posterior_sampling import DRAWS, SAMPLERS
 from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
 
 
@@ -62,6 +63,16 @@ from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_
     metavar="N",
     help="Fit N sets of trials simulated again with the estimate, for the scatter of the estimates.",
 )
+@click.option(
+    "--posterior",
+    type=click.Choice(SAMPLERS),
+    is_flag=False,
+    flag_value=SAMPLERS[0],
+    help="Sample the posterior by the no-U-turn sampler (nuts) or by an ensemble of walkers; the card carries it.",
+)
+@click.option(
+    "--draws", type=click.IntRange(10), default=DRAWS, show_default=True, help="Draws of each of four chains."
+)
 @click.option("--hold", multiple=True, metavar="NAME", help="Leave a derivative or parameter as the card has it.")
 @click.option("--force", is_flag=True, help="Fit trials also if they look like another ship's; the card says so.")
 @click.option("--trust-card", is_flag=True, help="Take the card's standard errors as they are.")
@@ -82,6 +93,8 @@ def command(
     executor: str,
     members: int,
     bootstrap: int,
+    posterior: str | None,
+    draws: int,
     hold: tuple[str, ...],
     force: bool,
     trust_card: bool,
@@ -106,6 +119,8 @@ def command(
             force=force,
             members=members,
             bootstrap=bootstrap,
+            posterior=posterior or "",
+            draws=draws,
             executor=executor,
             workers=workers,
             progress=progress,

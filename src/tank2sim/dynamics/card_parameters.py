@@ -224,11 +224,17 @@ class JointErrors:
         In the units of the parameters' values.
     together : frozenset of str
         Keys of the parameters in the card's covariance; all others are independent. Empty without a covariance.
+    samples : array (n, m), optional
+        Of the joint distribution of m parameters, in the units of their values.
+    sampled : tuple of int
+        Places of these parameters.
     """
 
     parameters: tuple[CardParameter, ...]
     covariance: Array
     together: frozenset[str]
+    samples: Array | None = None
+    sampled: tuple[int, ...] = ()
 
     @property
     def in_words(self) -> list[str]:
@@ -239,6 +245,9 @@ class JointErrors:
     @property
     def together_in_words(self) -> str:
         """Text on the correlated parameters."""
+        if self.samples is not None:
+            count = f"{len(self.samples)} samples of the posterior next to the card"
+            return f"{len(self.together)} numbers are drawn together from the {count}"
         return f"errors of {len(self.together)} numbers go together, as the covariance next to the card says"
 
 
@@ -261,4 +270,7 @@ def joint_errors(card: ManoeuvringCard, parameters: Sequence[CardParameter]) -> 
     columns = [known.names.index(name) for name in names]
     factors = np.array([parameters[row].factor for row in rows])
     covariance[np.ix_(rows, rows)] = known.matrix[np.ix_(columns, columns)] / np.outer(factors, factors)
-    return JointErrors(tuple(parameters), covariance, frozenset(names))
+    samples = None if known.samples is None else known.samples[:, columns] / factors
+    return JointErrors(
+        tuple(parameters), covariance, frozenset(names), samples, tuple(rows) if known.samples is not None else ()
+    )

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.form import EffectEntry
@@ -101,12 +102,13 @@ def run_gap_workflow(
     """
     options = options or GapOptions()
     names = _names(card, fitted, options)
-    likelihood = likelihood_from_card(card, fitted)
-    with _processes(options, executor) as pool:
-        found = search(likelihood, progress, pool, names, most=options.max_effects)
-    decision = decide(found)
-    progress("proving")
-    return _assemble_gap(card, (fitted, held), found, decision, progress)
+    with threadpool_limits(limits=1, user_api="blas"):  # small matrices: threads of the library wait for each other
+        likelihood = likelihood_from_card(card, fitted)
+        with _processes(options, executor) as pool:
+            found = search(likelihood, progress, pool, names, most=options.max_effects)
+        decision = decide(found)
+        progress("proving")
+        return _assemble_gap(card, (fitted, held), found, decision, progress)
 
 
 def _names(card: ManoeuvringCard, fitted: Measured, options: GapOptions) -> tuple[str, ...]:

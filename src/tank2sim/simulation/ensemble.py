@@ -51,6 +51,10 @@ class Draws:
         Bounds of the parameters. A member beyond them is drawn again as a whole, from the same stream: this is the
         truncated normal distribution, which preserves correlations. Clipping at the bounds would not.
     seed : int
+    samples : array (n, m), optional
+        Of the joint distribution of m of the parameters: a member has one of its rows instead of normal values.
+    sampled : array (m,)
+        Places of these parameters.
     """
 
     names: tuple[str, ...]
@@ -59,6 +63,8 @@ class Draws:
     lowest: Array
     highest: Array
     seed: int
+    samples: Array | None = None
+    sampled: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def member(self, number: int) -> dict[str, float]:
         """Parameters of a member, by name."""
@@ -71,6 +77,8 @@ class Draws:
         for draw in range(DRAWS):
             # Summed by NumPy, row by row: the order of sums in a linear algebra library depends on the processor.
             values = self.mean + (self.root * stream.standard_normal(len(self.names))).sum(axis=1)
+            if self.samples is not None:
+                values[self.sampled] = self.samples[stream.integers(len(self.samples))]
             outside = (values < self.lowest) | (values > self.highest)
             if not outside.any():
                 return Drawn(dict(zip(self.names, values.tolist(), strict=True)), beyond)

@@ -113,6 +113,28 @@ def test_a_covariance_goes_into_a_file_of_other_conventions_and_back(tmp_path, m
     np.testing.assert_allclose((draws.root @ draws.root.T)[np.ix_(rows, rows)], matrix, rtol=1e-9, atol=1e-20)
 
 
+def test_members_take_their_numbers_together_from_the_samples_of_a_card(tmp_path, mariner_card) -> None:
+    """Far from normal: two points. Each member is at one of them in both numbers, in a file of another rudder sign."""
+    names, ship = ("derivatives.Yv", "derivatives.Nd"), tmp_path / "ship.toml"
+    samples = np.array([[-0.010, -0.0013], [-0.013, -0.0015]] * 5)
+    covariance = np.cov(samples.T)
+    errors = np.sqrt(np.diag(covariance))
+    text = mariner_card.text + f"\n[uncertainty]\nYv = {errors[0]:.8g}\nNd = {errors[1]:.8g}\n"
+    card = parse_card(text, str(ship))
+    assert isinstance(card, ManoeuvringCard)
+    written = by_file_name(card, names, covariance, samples)
+    np.testing.assert_array_equal(written.samples, samples * [1, -1])
+    covariance_file(ship).write_text(written.as_text())
+    own = parse_card(referring(text, ship), str(ship))
+    assert isinstance(own, ManoeuvringCard)
+    draws, _ = draws_of(own, 0)
+    members = [draws.member(number) for number in range(200)]
+    found = {(member["derivatives.Yv"], member["derivatives.Nd"]) for member in members}
+    assert found == {tuple(row) for row in samples.tolist()}
+    assert 60 < sum(member["derivatives.Yv"] == -0.010 for member in members) < 140
+    assert len({member["derivatives.Nv"] for member in members}) == 200
+
+
 def test_members_without_a_mass_matrix_and_runaways_are_counted(mariner_card: ManoeuvringCard) -> None:
     card = changed(mariner_card, Yvdot=0.02)
     bands = manoeuvre_bands(card, Turn(TWENTY), (200.0, 200.0), EnsembleRequest(40, 1))

@@ -38,6 +38,7 @@ def draws_with(errors: JointErrors, seed: int) -> Draws:
     uncertain = np.flatnonzero(np.diag(errors.covariance) > 0)
     chosen = [errors.parameters[place] for place in uncertain]
     bounds = [parameter.bounds for parameter in chosen]
+    rows = {place: row for row, place in enumerate(uncertain.tolist())}
     return Draws(
         names=tuple(parameter.name for parameter in chosen),
         mean=np.array([parameter.value for parameter in chosen]),
@@ -45,17 +46,25 @@ def draws_with(errors: JointErrors, seed: int) -> Draws:
         lowest=np.array([-np.inf if low is None else low for low, _ in bounds]),
         highest=np.array([np.inf if high is None else high for _, high in bounds]),
         seed=seed,
+        samples=errors.samples,
+        sampled=np.array([rows[place] for place in errors.sampled], dtype=np.int64),
     )
 
 
-def by_file_name(card: ManoeuvringCard, names: Sequence[str], matrix: Array) -> Covariance:
-    """A covariance by the names of the card's file instead of the model's, without numbers that are not on the card."""
+def by_file_name(
+    card: ManoeuvringCard, names: Sequence[str], matrix: Array, samples: Array | None = None
+) -> Covariance:
+    """A covariance by the names of the card's file instead of the model's, without numbers that are not on the card.
+
+    `matrix` is (k, k) and `samples`, if any, (n, k).
+    """
     found = {parameter.name: parameter for parameter in card_parameters(card, study_model(card))}
     rows = [place for place, name in enumerate(names) if name in found]
     chosen: list[CardParameter] = [found[names[place]] for place in rows]
     factors = np.array([parameter.factor for parameter in chosen])
     kept = matrix[np.ix_(rows, rows)] * np.outer(factors, factors)
-    return Covariance(tuple(parameter.key for parameter in chosen), (kept + kept.T) / 2)
+    drawn = None if samples is None else samples[:, rows] * factors
+    return Covariance(tuple(parameter.key for parameter in chosen), (kept + kept.T) / 2, drawn)
 
 
 def _root(covariance: Array) -> Array:

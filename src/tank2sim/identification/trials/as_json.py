@@ -22,6 +22,7 @@ from tank2sim.identification.trials.assessment.evaluation import (
 )
 from tank2sim.identification.trials.identify import Identification
 from tank2sim.identification.trials.methods.posterior import scaled_prior
+from tank2sim.identification.trials.methods.posterior_sampling import PosteriorSamples
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.problem.sampled_runs import OBSERVED_SIGNALS
@@ -32,6 +33,9 @@ from tank2sim.units import from_si
 
 SET_KEYS = {"fitted": "fit", "held out": "holdout"}
 """Words for a set of trials to its key in the JSON."""
+
+QUANTILES = (0.025, 0.25, 0.5, 0.75, 0.975)
+"""Levels of the quantiles of a posterior: its median, and the intervals that hold half and 95 % of it."""
 
 NO_YAW = 3.0
 """A run whose yaw rate stays below this many times its noise is straight."""
@@ -47,7 +51,8 @@ def identification_as_json(result: Identification, messages: tuple[str, ...] = (
     """
     estimate, known = result.estimate, result.identifiability
     parameters = _parameters(result)
-    forced = (f"{FORCED}: {'; '.join(result.forced)}",) if result.forced else ()
+    forced = [f"{FORCED}: {'; '.join(result.forced)}"] if result.forced else []
+    unfinished = [] if result.posterior is None or result.posterior.converged else result.posterior.notices
     comparisons = {SET_KEYS[word]: (before, found) for word, before, found in result.comparisons}
     return {
         "ship": result.card.ship.name,
@@ -79,6 +84,7 @@ def identification_as_json(result: Identification, messages: tuple[str, ...] = (
             for name, structure in result.structures.items()
         },
         "criteria": None if result.criteria is None else asdict(result.criteria),
+        "posterior": _posterior(result.posterior),
         "bootstrap": _bootstrap(result),
         "residual_noise": dict(estimate.noise),
         "prior_scale": dict(estimate.prior_scale),
@@ -92,8 +98,8 @@ def identification_as_json(result: Identification, messages: tuple[str, ...] = (
             "unseen": [list(direction) for direction in known.unseen],
             "notices": list(known.notices),
         },
-        "notices": [*forced, *result.notices],
-        "warnings": [*result.notices, *known.notices, *messages],
+        "notices": [*unfinished, *forced, *result.notices],
+        "warnings": [*unfinished, *result.notices, *known.notices, *messages],
     }
 
 
@@ -131,6 +137,43 @@ def _misfit(result: Identification) -> dict[str, object]:
             "holdout": misfit(result.before_holdout, result.noise) if result.before_holdout else None,
         },
     }
+
+
+def _posterior(samples: PosteriorSamples | None) -> dict[str, object] | None:
+    if samples is None:
+        return None
+    quantiles = np.quantile(samples.flat, QUANTILES, axis=0).T
+    return {
+        "sampler": samples.sampler,
+        "chains": len(samples.values),
+        "draws": len(samples.flat),
+        "simulations": samples.simulations,
+        "converged": samples.converged,
+        "quantile_levels": list(QUANTILES),
+        "parameters": {
+            name.removeprefix("derivatives."): {
+                "r_hat": r_hat,
+                "effective_sample_size": effective,
+                "quantiles": list(values),
+            }
+            for name, r_hat, effective, values in zip(
+                samples.free, samples.r_hat, samples.effective, quantiles, strict=True
+            )
+        },
+    }
+
+
+def posterior_rows(found: Mapping[str, Any]) -> list[list[object]]:
+    """Name, 95 % interval, R-hat and effective sample size of each sampled parameter of the JSON."""
+    return [
+        [
+            name,
+            f"{entry['quantiles'][0]:.5g} to {entry['quantiles'][-1]:.5g}",
+            f"{as_number(entry['r_hat']):.4f}",
+            f"{as_number(entry['effective_sample_size']):.0f}",
+        ]
+        for name, entry in (found["posterior"] or {"parameters": {}})["parameters"].items()
+    ]
 
 
 def _bootstrap(result: Identification) -> dict[str, object] | None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
@@ -37,6 +38,12 @@ from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.methods.kalman import kalman
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.methods.posterior import scaled_prior
+from tank2sim.identification.trials.methods.posterior_sampling import (
+    DRAWS,
+    PosteriorSamples,
+    check_sampler,
+    sample_posterior,
+)
 from tank2sim.identification.trials.methods.recursive import recursive
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
@@ -102,6 +109,10 @@ class IdentificationOptions:
         Derivatives (``Xuuu``) and parameters of effects (``wind.yaw_coefficient``) that keep the card's values.
     force : bool
         Fit trials even if they look like those of another ship (:mod:`.other_ship`).
+    posterior : str
+        One of :data:`.posterior_sampling.SAMPLERS`; "" for none.
+    draws : int
+        Draws of each chain of the posterior.
     """
 
     method: str = "output_error"
@@ -113,6 +124,8 @@ class IdentificationOptions:
     bootstrap: int = 0
     hold: tuple[str, ...] = ()
     force: bool = False
+    posterior: str = ""
+    draws: int = DRAWS
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +162,8 @@ class Identification:
     criteria : Criteria or None
         Information criteria of the fit, for comparison with another model of the same trials; None where the
         velocities were not measured.
+    posterior : PosteriorSamples or None
+        On request; values and covariance of the estimate are then its means and covariance.
     bootstrap : array (members, k) or None
         Estimates from trials simulated with the estimate (:mod:`.prediction_intervals`), on request.
     notices : tuple of str
@@ -168,6 +183,7 @@ class Identification:
     structures: Mapping[str, CrossValidation]
     weights: Mapping[str, float]
     criteria: Criteria | None
+    posterior: PosteriorSamples | None
     bootstrap: Array | None
     manoeuvres: Mapping[str, str]
     forced: tuple[str, ...]
@@ -213,7 +229,9 @@ def identify_trials(
     """
     options = options or IdentificationOptions()
     try:
-        return _identified(card, trials, holdout, options, progress, executor)
+        # Small matrices: threads of the linear algebra library wait for each other, and runs have their own threads.
+        with threadpool_limits(limits=1, user_api="blas"):
+            return _identified(card, trials, holdout, options, progress, executor)
     except np.linalg.LinAlgError:
         names = ", ".join(trial.name for trial in trials.trials)
         remedy = "add runs in which rudder, yaw, sway and speed change, or hold terms (--hold)"
@@ -231,6 +249,10 @@ def _identified(
     if trials.captive is not None and options.method != "output_error":
         problem_text = f"{options.method} fits trials alone"
         raise InputError("--campaign", "", problem_text, "leave --method out, or fit the card that reduce makes of it")
+    if options.posterior:
+        check_sampler(options.posterior)
+        if options.method != "output_error":
+            raise InputError("--posterior", "", f"{options.method} has no density to sample", "leave --method out")
     structures: Mapping[str, CrossValidation] = {}
     weights: dict[str, float] = {}
     chosen: tuple[str, ...] = ()
@@ -250,6 +272,10 @@ def _identified(
         problem_text = f"not trials of the ship of {card.source}: {'; '.join(evidence)}"
         raise InputError(names, "", problem_text, "give the card and the trials of one ship, or --force")
     started, unseen, fitted = _fitted(card, structure, trials, options, progress)
+    samples = None
+    if options.posterior:
+        samples = sample_posterior(fitted.problem, fitted.estimate, options.posterior, options.draws)
+        fitted = _with_samples(fitted, started, samples)
     problem, estimate, improved = fitted.problem, fitted.estimate, fitted.card
     noise = noise_of(trials, problem)
     result = identifiability(problem, estimate)
@@ -273,6 +299,7 @@ def _identified(
         structures=structures,
         weights=weights,
         criteria=criteria_or_none(fitted),
+        posterior=samples,
         bootstrap=bootstrap_estimates(
             fitted, trials.driven_by, partial(_in_pieces, options=options), options.bootstrap, executor
         ),
@@ -285,6 +312,7 @@ def _identified(
             *_captive_notice(card, trials.captive),
             *chosen,
             *_unseen_notice(unseen),
+            *(samples.notices if samples is not None and samples.converged else ()),
             *estimate.notices,
         ),
     )
@@ -372,6 +400,14 @@ def _fitted(
     estimate = estimate_parameters(problem, options, progress)
     improved = with_range(card_with_estimate(started, estimate), problem)
     return started, unseen, FittedProblem(problem, estimate, improved, started.model.valid_speed_mps is None)
+
+
+def _with_samples(fitted: FittedProblem, started: ManoeuvringCard, samples: PosteriorSamples) -> FittedProblem:
+    """The fit with means, covariance and samples of the posterior in place of the estimate and its covariance."""
+    mean, covariance = samples.mean, samples.covariance
+    estimate = replace(fitted.estimate, values=mean, covariance=covariance, samples=samples.flat)
+    card = with_range(card_with_estimate(started, estimate), fitted.problem)
+    return replace(fitted, estimate=estimate, card=card)
 
 
 def _kept_weights(

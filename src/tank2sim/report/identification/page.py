@@ -15,12 +15,18 @@ from tank2sim.identification.trials.as_json import (
     following_rows,
     parameters_of,
     pooled_error,
+    posterior_rows,
     relative_error,
     structure_rows,
 )
 from tank2sim.identification.trials.assessment.evaluation import TURN_FIGURE_NAMES
 from tank2sim.report.identification.charts import figure_chart, history_grid, track_grid, window_chart
-from tank2sim.report.identification.parameter_charts import correlation_chart, parameter_chart, singular_value_chart
+from tank2sim.report.identification.parameter_charts import (
+    correlation_chart,
+    parameter_chart,
+    posterior_chart,
+    singular_value_chart,
+)
 from tank2sim.report.kit.json_values import Json
 from tank2sim.report.kit.page import Cell, Column, Illustration, KeyFigure, Page, PageSection, PageTable, Verdict
 
@@ -54,6 +60,9 @@ def identification_charts(found: Json) -> dict[str, alt.TopLevelMixin]:
                 charts[f"histories_{stem}{part}"] = history_grid(sheet, title=f"Motions of trials {word}")
     known, parameters = found["identifiability"], parameters_of(found)
     charts["parameters"] = parameter_chart(parameters, title="Parameters: estimate and prior with 95 % intervals")
+    if found["posterior"]:
+        title = "Samples of the posterior, next to a normal distribution"
+        charts["posterior"] = posterior_chart(parameters, found["posterior"], title=title)
     charts["correlation"] = correlation_chart(known, title="Correlation of the parameters, by the trials alone")
     charts["singular_values"] = singular_value_chart(
         known["singular_values"], title="Information of the trials: singular values"
@@ -101,6 +110,15 @@ def identification_page(found: Json) -> Page:
             notes=found["identifiability"]["notices"],
         )
     )
+    if posterior := found["posterior"]:
+        sections.append(
+            PageSection(
+                heading="Posterior",
+                text=_POSTERIOR.format(**posterior) + ("" if posterior["converged"] else _NOT_CONVERGED),
+                charts=drawn("posterior"),
+                tables=[_table(f"{posterior['draws']} draws", _POSTERIOR_HEADS, posterior_rows(found))],
+            )
+        )
     if structures := structure_rows(found):
         table = _table("Yaw-rate error over windows of trials left out of the fit, %", _STRUCTURE_HEADS, structures)
         sections.append(PageSection(heading="Structure, by cross-validation", tables=[table]))
@@ -126,6 +144,13 @@ _PARAMETERS = (
     "residuals as they are, coloured and with what the model lacks."
 )
 _PARAMETER_HEADS = ("", "found", "before", "from trials")
+_POSTERIOR = (
+    "{draws} draws in {chains} chains by the sampler {sampler}, {simulations} simulations of all trials. R-hat "
+    "compares the chains: converged ones have less than 1.01. The effective size is the number of independent draws "
+    "that are worth as much."
+)
+_NOT_CONVERGED = " THESE CHAINS HAVE NOT CONVERGED: their intervals are not to be relied upon."
+_POSTERIOR_HEADS = ("", "95 %", "R-hat", "effective size")
 _STRUCTURE_HEADS = ("structure", "one at a time, mean", "those of largest amplitude")
 _CAPTIONS = {
     "figures": "Grey: as measured. Bars: interval in which the figure is expected with 95 % probability. "
@@ -135,6 +160,8 @@ _CAPTIONS = {
     "histories": "Turns and zigzags in closed loop, others with the recorded rudder. Drift angle positive when the "
     "water comes from port.",
     "parameters": "In standard errors of the prior, as the fit took it.",
+    "posterior": "Lines: intervals that hold 95 % (thin) and half (thick) of the draws, point: their median. Grey: "
+    "95 % of a normal distribution.",
     "singular": "Sensitivities of all that was measured, in units of the prior. Below the red line the prior "
     "determines more than the trials.",
 }

@@ -74,6 +74,41 @@ def _symmetric_ticks(farthest: float) -> list[float]:
     return [-step for step in reversed(positive)] + [0.0, *positive]
 
 
+def posterior_chart(parameters: Mapping[str, Json], posterior: Json, *, title: str = "") -> alt.LayerChart:
+    """Median and intervals of 50 and 95 % of each sampled parameter, in its standard deviations from its mean.
+
+    The grey band is the 95 % interval of a normal distribution. `parameters` are entries of ``derivatives`` and
+    ``effects`` of the JSON, `posterior` is its entry of that name.
+    """
+    rows: list[ChartRecord] = []
+    for name, entry in posterior["parameters"].items():
+        mean, deviation = parameters[name]["value"], as_number(parameters[name]["standard_error"])
+        low, quarter, middle, three, high = entry["quantiles"]
+        scaled = {"low": low, "quarter": quarter, "v": middle, "three": three, "high": high}
+        shown = {key: plain((value - mean) / deviation) for key, value in scaled.items()}
+        rows.append(
+            {"name": name, **shown, "interval": f"{low:.4g} to {high:.4g}", "found": f"{middle:.4g}", "run": "samples"}
+        )
+    look = series_look(["samples"], as_points=["samples"])
+    y = alt.Y("name:N", sort=[str(row["name"]) for row in rows], axis=alt.Axis(title=None, grid=True, labelLimit=200))
+    x = alt.X("v:Q", title="value less mean, in standard deviations (-)")
+    tooltip = [
+        alt.Tooltip("name:N", title="parameter"),
+        alt.Tooltip("found:N", title="median"),
+        alt.Tooltip("interval:N", title="95 %"),
+    ]
+    normal = alt.Chart(data([{"low": -_NORMAL, "high": _NORMAL}])).mark_rect(style="reference", opacity=0.15)
+    base = alt.Chart(data(rows)).encode(y=y, color=look.colour, tooltip=tooltip)
+    layers = [
+        normal.encode(x=alt.X("low:Q"), x2="high:Q"),
+        base.mark_rule(strokeWidth=1.4).encode(x=alt.X("low:Q"), x2="high:Q"),
+        base.mark_rule(strokeWidth=4).encode(x=alt.X("quarter:Q"), x2="three:Q"),
+        base.mark_point(size=40).encode(x=x, shape=look.shape),
+    ]
+    description = "Medians and intervals of sampled parameters next to the 95 % interval of a normal distribution."
+    return alt.layer(*layers).properties(width=560, height=19 * len(rows), title=title, description=description)
+
+
 def correlation_chart(known: Json, *, title: str = "") -> alt.LayerChart:
     """Correlation of the estimates by the trials alone, as a heat map; frames mark :data:`CLOSE_CORRELATION`.
 

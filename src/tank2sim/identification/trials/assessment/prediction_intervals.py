@@ -116,7 +116,8 @@ def bands(
     settings: PredictionSettings | None = None,
     executor: Executor | None = None,
 ) -> Bands:
-    """Bands of a manoeuvre's figures: coefficients drawn from their covariance, random forces during the manoeuvre.
+    """Bands of a manoeuvre's figures: coefficients drawn from their covariance, or from samples of their posterior, and
+    random forces during the manoeuvre.
 
     Parameters
     ----------
@@ -142,7 +143,7 @@ def bands(
     model = ship.model()
     tasks = []
     for rng in _generators(settings):
-        values = _within_bounds(model, estimate.free, rng.multivariate_normal(estimate.values, estimate.covariance))
+        values = _within_bounds(model, estimate.free, estimate.draw(rng))
         if disturbances is not None:
             values |= draw_disturbances(disturbances, fastest_rate(model), rng)
         tasks.append((ship, manoeuvre, values))

@@ -41,6 +41,14 @@ class ColouredNoise:
         white[:, 0] = residuals[:, 0] / self.deviation  # unit variance, as if the previous residual had been zero
         return white
 
+    def whitened_transposed(self, white: Array) -> Array:
+        """The transpose of :meth:`whitened` applied to `white` (pieces, n)."""
+        later = white.copy()
+        later[:, 0] = 0.0
+        result: Array = lfilter([1.0, -self.phi], [1.0, -self.psi], later[:, ::-1], axis=1)[:, ::-1] / self.sigma
+        result[:, 0] += white[:, 0] / self.deviation
+        return result
+
 
 def white(deviation: float) -> ColouredNoise:
     """Noise without colour."""

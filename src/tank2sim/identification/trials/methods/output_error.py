@@ -18,7 +18,13 @@ from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise,
 from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton
 from tank2sim.identification.trials.methods.posterior import evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.shooting import Normal, Pieces, Shooting, cut
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
+from tank2sim.identification.trials.problem.estimation_problem import (
+    Estimate,
+    FittedMotion,
+    Problem,
+    SearchReport,
+    silent,
+)
 
 LONGEST_SEARCH = 25
 """Steps after which a search ends; it needs 3 to 10."""
@@ -107,7 +113,8 @@ def output_error(
         except KeyboardInterrupt:
             notices.append(INTERRUPTED)
             normals = work.normals(search.values, search.starts, search.noise)
-    return _estimate(problem, search, normals, tuple(notices))
+    motion = FittedMotion(settings.piece_s, tuple(search.starts), search.noise)
+    return _estimate(problem, search, normals, tuple(notices), motion)
 
 
 def _first_noise(problem: Problem, pieces: list[Pieces]) -> tuple[ColouredNoise, ...]:
@@ -199,7 +206,9 @@ def _new_noise(
     return tuple(noise)
 
 
-def _estimate(problem: Problem, search: _Search, normals: list[Normal], notices: tuple[str, ...]) -> Estimate:
+def _estimate(
+    problem: Problem, search: _Search, normals: list[Normal], notices: tuple[str, ...], motion: FittedMotion
+) -> Estimate:
     information = np.asarray(sum(normal.matrix for normal in normals))
     prior = scaled_prior(problem, search.scale)
     before = problem.prior_precision(prior) + _captive_normal(problem, search.values)[0]
@@ -213,4 +222,5 @@ def _estimate(problem: Problem, search: _Search, normals: list[Normal], notices:
         cost=tuple(search.costs),
         prior_scale=search.scale,
         notices=notices,
+        motion=motion,
     )

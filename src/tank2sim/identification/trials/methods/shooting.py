@@ -120,7 +120,7 @@ class Shooting:
         self.problem = problem
         self.sensitivity = Sensitivity(problem.model, problem.free, problem.seen)
         # Weak prior of initial states: within a nominal value of the guess.
-        self._wide = np.array([state.nominal for state in problem.model.states])
+        self.wide = np.array([state.nominal for state in problem.model.states])
 
     def residuals(self, pieces: Pieces, starts: Array, values: Array) -> tuple[Array, Array]:
         """Simulated less measured (pieces, n + 1, ny), and the states (pieces, n + 1, nx)."""
@@ -136,20 +136,27 @@ class Shooting:
         residuals, states = self.residuals(pieces, starts, values)
         if not np.isfinite(states).all() or np.abs(states).max() > 1e9:
             return np.inf
-        total = float(np.sum(_whitened(residuals, residuals, noise) ** 2))
-        total += float(np.sum(((starts - pieces.starts) / self._wide) ** 2))
+        total = float(np.sum(whitened(residuals, residuals, noise) ** 2))
+        total += float(np.sum(((starts - pieces.starts) / self.wide) ** 2))
         return total
 
-    def normal(self, pieces: Pieces, starts: Array, values: Array, noise: Sequence[ColouredNoise]) -> Normal:
-        """Normal equations of one run."""
+    def linearised(
+        self, pieces: Pieces, starts: Array, values: Array, noise: Sequence[ColouredNoise]
+    ) -> tuple[Array, Array, Array]:
+        """Residuals (pieces, n + 1, ny) of a run; whitened (pieces, samples), and their derivatives (pieces, samples,
+        nx + k) by the initial state of the piece and by the parameters.
+        """
         p, h = self.problem.parameters(values), pieces.run.step_s
         residuals, states = self.residuals(pieces, starts, values)
         _, by, _ = self.sensitivity.derivatives(states, pieces.inputs, p, h)
+        white = whitened(residuals, residuals, noise)
+        white_by = whitened(residuals, by.reshape(*by.shape[:2], -1), noise, by.shape[3])
+        return residuals, white.reshape(len(starts), -1), white_by.reshape(len(starts), -1, by.shape[3])
+
+    def normal(self, pieces: Pieces, starts: Array, values: Array, noise: Sequence[ColouredNoise]) -> Normal:
+        """Normal equations of one run."""
         count, nx = starts.shape
-        white = _whitened(residuals, residuals, noise)
-        white_by = _whitened(residuals, by.reshape(*by.shape[:2], -1), noise, by.shape[3])
-        r = white.reshape(count, -1)
-        J = white_by.reshape(count, -1, by.shape[3])
+        residuals, r, J = self.linearised(pieces, starts, values, noise)
         products = J.transpose(0, 2, 1) @ J
         pull = (J.transpose(0, 2, 1) @ r[:, :, None])[:, :, 0]
         # Unknowns: initial states of all pieces, then parameters.
@@ -157,14 +164,14 @@ class Shooting:
         size = count * nx
         H = np.zeros((size + k, size + k))
         shares = np.zeros((count, size + k))
-        spread = np.tile(self._wide, count)
+        spread = np.tile(self.wide, count)
         H[np.arange(size), np.arange(size)] = 1 / spread**2
         for piece in range(count):
             at = np.r_[piece * nx : (piece + 1) * nx, size : size + k]
             H[np.ix_(at, at)] += products[piece]
             shares[piece, at] += pull[piece]
         g = shares.sum(axis=0)
-        g[:size] += ((starts - pieces.starts) / self._wide**2).ravel()
+        g[:size] += ((starts - pieces.starts) / self.wide**2).ravel()
         inner = np.linalg.inv(H[:size, :size])
         mixed = inner @ H[:size, size:]
         return Normal(
@@ -190,17 +197,33 @@ class Shooting:
         return scores.reshape(count * blocks, -1)
 
 
-def _whitened(residuals: Array, values: Array, noise: Sequence[ColouredNoise], columns: int = 1) -> Array:
+def whitened(residuals: Array, values: Array, noise: Sequence[ColouredNoise], columns: int = 1) -> Array:
     """Values (pieces, n, ny * columns) whitened like the residuals; 0 where not measured."""
     shape = (*residuals.shape[:2], residuals.shape[2], columns)
     values = values.reshape(shape)
     result = np.zeros(shape)
     for place, signal_noise in enumerate(noise):
-        known = ~np.isnan(residuals[:, :, place])
+        known, used = _samples(residuals[:, :, place], signal_noise)
         filled = np.where(known[:, :, None], values[:, :, place, :], 0.0)
-        whole = signal_noise.whitened(filled)
-        if signal_noise.phi:  # a sample after a gap would be compared with the filled-in zero
-            after = known[:, :-1]
-            known = known & np.concatenate([np.ones_like(after[:, :1]), after], axis=1)
-        result[:, :, place, :] = np.where(known[:, :, None], whole, 0.0)
+        result[:, :, place, :] = np.where(used[:, :, None], signal_noise.whitened(filled), 0.0)
     return result.reshape(*residuals.shape[:2], -1)
+
+
+def whitening_transposed(residuals: Array, white: Array, noise: Sequence[ColouredNoise]) -> Array:
+    """The transpose of :func:`whitened` applied to `white` (pieces, n, ny): derivatives by whitened residuals become
+    derivatives by residuals."""
+    result = np.zeros_like(white)
+    for place, signal_noise in enumerate(noise):
+        known, used = _samples(residuals[:, :, place], signal_noise)
+        pull = signal_noise.whitened_transposed(np.where(used, white[:, :, place], 0.0))
+        result[:, :, place] = np.where(known, pull, 0.0)
+    return result
+
+
+def _samples(residuals: Array, noise: ColouredNoise) -> tuple[np.ndarray, np.ndarray]:
+    """Which samples (pieces, n) are measured, and which of them count."""
+    known = ~np.isnan(residuals)
+    if not noise.phi:
+        return known, known
+    # A sample after a gap would be compared with the filled-in zero.
+    return known, known & np.concatenate([np.ones_like(known[:, :1]), known[:, :-1]], axis=1)

@@ -9,6 +9,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
+from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise
 from tank2sim.identification.trials.problem.captive_tests import CaptiveTests
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
@@ -107,6 +108,25 @@ class Problem:
 
 
 @dataclass(frozen=True, eq=False)
+class FittedMotion:
+    """Initial states and noise of a fit by output error.
+
+    Parameters
+    ----------
+    piece_s : float or None
+        Length of the pieces, s; None for whole runs.
+    starts : tuple of array (pieces, nx)
+        Initial states of the pieces of each run.
+    noise : tuple of ColouredNoise
+        Of each seen variable.
+    """
+
+    piece_s: float | None
+    starts: tuple[Array, ...]
+    noise: tuple[ColouredNoise, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Estimate:
     """Estimate of the free parameters by one method.
 
@@ -130,6 +150,10 @@ class Estimate:
         Chosen factor on the prior's standard errors by group (:attr:`Problem.groups`).
     notices : tuple of str
         Messages for the user.
+    motion : FittedMotion, optional
+        What output error fitted in addition to the parameters.
+    samples : array (draws, k), optional
+        Of the posterior, where it was sampled: `values` and `covariance` are then theirs.
     """
 
     method: str
@@ -141,6 +165,14 @@ class Estimate:
     cost: tuple[float, ...] = ()
     prior_scale: Mapping[str, float] = field(default_factory=dict)
     notices: tuple[str, ...] = ()
+    motion: FittedMotion | None = None
+    samples: Array | None = None
+
+    def draw(self, generator: np.random.Generator) -> Array:
+        """Random parameters (k,): one of the samples, or normal without any."""
+        if self.samples is not None:
+            return np.asarray(self.samples[generator.integers(len(self.samples))])
+        return generator.multivariate_normal(self.values, self.covariance)
 
     @property
     def standard_errors(self) -> Array:
