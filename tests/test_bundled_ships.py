@@ -56,6 +56,19 @@ def test_the_esso_osaka_turns_as_wide_as_its_records(errors) -> None:
     assert abs(np.mean(turns["advance_m"])) < 0.15
 
 
+@pytest.mark.parametrize(("ship", "model"), [("kvlcc2", "kvlcc2-l7"), ("esso-osaka-ship", "esso-osaka")])
+def test_a_ship_and_its_model_move_alike_by_froudes_law(ship: str, model: str) -> None:
+    large, small = t2s.load(ship), t2s.load(model)
+    lengths = large.card.ship.length_m / small.card.ship.length_m
+    turns, zigzags = (t.turn(35).figures for t in (large, small)), (t.zigzag(20, 20).figures for t in (large, small))
+    (turn, of_model), (zigzag, zigzag_of_model) = turns, zigzags
+    for name in ("advance_m", "transfer_m", "tactical_diameter_m"):
+        assert turn[name] / of_model[name] == pytest.approx(lengths, rel=1e-4), name
+    assert turn["time_90_s"] / of_model["time_90_s"] == pytest.approx(np.sqrt(lengths), rel=1e-4)
+    for name in ("overshoot_1_deg", "overshoot_2_deg"):
+        assert zigzag[name] == pytest.approx(zigzag_of_model[name], abs=1e-3), name
+
+
 @pytest.mark.parametrize("name", IDENTIFIED)
 @pytest.mark.parametrize("rudder", [35, -35])
 def test_a_hard_turn_stays_in_the_range_of_the_card_and_has_no_kink(name: str, rudder: float) -> None:
@@ -77,4 +90,12 @@ def test_identified_ships_name_their_trials_and_hold_no_record_of_them() -> None
         assert source.startswith("Identified by tank2sim") and ("github.com" in source or "FRT-DS" in source)
         assert card.fitted_trials == () and "t_s" not in card.text
         assert card.covariance is not None or "covariance:" in card.text
-    assert {"kvlcc2", "kvlcc2-captive", "esso-osaka", "esso-osaka-estimated", "mariner"} <= set(bundled_cards())
+    assert {
+        "kvlcc2",
+        "kvlcc2-l7",
+        "esso-osaka-ship",
+        "kvlcc2-captive",
+        "esso-osaka",
+        "esso-osaka-estimated",
+        "mariner",
+    } <= set(bundled_cards())

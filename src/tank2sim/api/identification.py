@@ -38,7 +38,7 @@ from tank2sim.identification.trials.identify import (
     IdentificationOptions,
     identify_trials,
 )
-from tank2sim.identification.trials.methods.posterior_sampling import DRAWS
+from tank2sim.identification.trials.methods.posterior_sampling import DRAWS_OF_CHAIN
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import SearchReport, silent
 from tank2sim.identification.trials.problem.prepare_trials import Measured
@@ -214,7 +214,7 @@ def identify(
     members: int = 100,
     bootstrap: int = 0,
     posterior: str = "",
-    draws: int = DRAWS,
+    draws: int = DRAWS_OF_CHAIN,
     executor: str = PROCESSES,
     workers: int | None = None,
     progress: SearchReport = silent,

@@ -14,7 +14,7 @@ from tank2sim.cli.options import executor_option, page_option, plot_folder_optio
 from tank2sim.cli.progress import showing_progress
 from tank2sim.cli.trials import TakesSeveral
 from tank2sim.identification.trials.identify import TRIAL_METHODS
-from tank2sim.identification.trials.methods.posterior_sampling import DRAWS, SAMPLERS
+from tank2sim.identification.trials.methods.posterior_sampling import DRAWS_OF_CHAIN, SAMPLERS
 from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_EVIDENCE, STRUCTURES
 
 
@@ -71,7 +71,7 @@ from tank2sim.identification.trials.problem.structures import AUTO, AVERAGE, BY_
     help="Sample the posterior by the no-U-turn sampler (nuts) or by an ensemble of walkers; the card carries it.",
 )
 @click.option(
-    "--draws", type=click.IntRange(10), default=DRAWS, show_default=True, help="Draws of each of four chains."
+    "--draws", type=click.IntRange(10), default=DRAWS_OF_CHAIN, show_default=True, help="Draws of each of four chains."
 )
 @click.option("--hold", multiple=True, metavar="NAME", help="Leave a derivative or parameter as the card has it.")
 @click.option("--force", is_flag=True, help="Fit trials also if they look like another ship's; the card says so.")

@@ -34,7 +34,7 @@ from tank2sim.units import from_si
 SET_KEYS = {"fitted": "fit", "held out": "holdout"}
 """Words for a set of trials to its key in the JSON."""
 
-QUANTILES = (0.025, 0.25, 0.5, 0.75, 0.975)
+POSTERIOR_LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)
 """Levels of the quantiles of a posterior: its median, and the intervals that hold half and 95 % of it."""
 
 NO_YAW = 3.0
@@ -142,14 +142,14 @@ def _misfit(result: Identification) -> dict[str, object]:
 def _posterior(samples: PosteriorSamples | None) -> dict[str, object] | None:
     if samples is None:
         return None
-    quantiles = np.quantile(samples.flat, QUANTILES, axis=0).T
+    quantiles = np.quantile(samples.flat, POSTERIOR_LEVELS, axis=0).T
     return {
         "sampler": samples.sampler,
         "chains": len(samples.values),
         "draws": len(samples.flat),
         "simulations": samples.simulations,
         "converged": samples.converged,
-        "quantile_levels": list(QUANTILES),
+        "quantile_levels": list(POSTERIOR_LEVELS),
         "parameters": {
             name.removeprefix("derivatives."): {
                 "r_hat": r_hat,

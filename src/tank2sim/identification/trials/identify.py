@@ -39,7 +39,7 @@ from tank2sim.identification.trials.methods.kalman import kalman
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.methods.posterior_sampling import (
-    DRAWS,
+    DRAWS_OF_CHAIN,
     PosteriorSamples,
     check_sampler,
     sample_posterior,
@@ -125,7 +125,7 @@ class IdentificationOptions:
     hold: tuple[str, ...] = ()
     force: bool = False
     posterior: str = ""
-    draws: int = DRAWS
+    draws: int = DRAWS_OF_CHAIN
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,7 +42,7 @@ LARGEST_R_HAT = 1.01
 FEWEST_EFFECTIVE = 400
 """Effective sample size from which R-hat and quantiles are reliable with four chains (Vehtari et al. 2021)."""
 
-DRAWS = 400
+DRAWS_OF_CHAIN = 400
 """Draws of each of :data:`CHAINS` chains. Each is worth about one independent draw; 1600 bring R-hat of 24 parameters
 below its limit (project choice)."""
 
@@ -325,7 +325,7 @@ def sample_posterior(
     problem: Problem,
     estimate: Estimate,
     sampler: str = "nuts",
-    draws: int = DRAWS,
+    draws: int = DRAWS_OF_CHAIN,
     *,
     seed: int = 0,
     robust: bool = True,

@@ -169,7 +169,7 @@ class Estimate:
     samples: Array | None = None
 
     def draw(self, generator: np.random.Generator) -> Array:
-        """Random parameters (k,): one of the samples, or normal without any."""
+        """Random parameters (k,) from a numpy `generator`: one of the samples, or normal without any."""
         if self.samples is not None:
             return np.asarray(self.samples[generator.integers(len(self.samples))])
         return generator.multivariate_normal(self.values, self.covariance)
